@@ -1,0 +1,2 @@
+//! The display board's logic: pure, no hardware.
+#![no_std]

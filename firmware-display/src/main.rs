@@ -1,0 +1,2 @@
+//! The display board's firmware.
+fn main() {}

@@ -1,0 +1,2 @@
+//! The sensor board's logic: pure, no hardware.
+#![no_std]

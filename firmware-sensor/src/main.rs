@@ -1,0 +1,2 @@
+//! The sensor board's firmware.
+fn main() {}

@@ -1,0 +1,23 @@
+//! What the boards and hosts of Ridgelink say to each other.
+//!
+//! Plain data ([`Message`]), one frame format and a decoder that nothing can put out of step.
+//! No DSP, no hardware, no allocation: the same code runs on both boards and on every host.
+#![no_std]
+
+pub mod configuration;
+pub mod hello;
+pub mod message;
+pub mod status;
+
+pub use configuration::{
+    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, SensorConfiguration,
+    Setting,
+};
+pub use hello::{HELLO_LENGTH, Hello, Role};
+pub use message::{
+    CHANNELS, Estimate, GAUGE_BLOCK, GAUGES, GaugeSample, Gauges, Message, Motion,
+    PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,
+};
+pub use status::{
+    DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status,
+};

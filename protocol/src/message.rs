@@ -1,0 +1,167 @@
+//! The wire contract, as a table of types: everything a board or a host can say.
+//!
+//! | message | from | rate | what for |
+//! | --- | --- | --- | --- |
+//! | [`Hello`] | all | at start, on request, once a second until answered | who is there, and do we understand each other |
+//! | [`Estimate`] | sensor | 100 Hz | the surface's wavelength |
+//! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
+//! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
+//! | [`Status`] | boards | 1 Hz | every counter |
+//! | [`Message::Configure`] | host | – | asks for a configuration |
+//! | [`ConfigurationReport`] | boards | – | answers it |
+//! | [`Ping`], [`Pong`] | all | – | round trip and clock offset |
+//! | [`Stop`] | host | – | no more stimulus |
+//!
+//! The order of the variants and of the fields is the wire's: a change of either changes
+//! [`SCHEMA_HASH`] and asks for a new [`PROTOCOL_VERSION`].
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+use crate::configuration::{Configuration, ConfigurationReport};
+use crate::hello::Hello;
+use crate::status::Status;
+
+/// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
+pub const PROTOCOL_VERSION: u16 = 1;
+
+/// A hash of the shape of every message (names, types, order), so that two builds that disagree
+/// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
+pub const SCHEMA_HASH: u64 =
+    u64::from_le_bytes(postcard_schema::key::Key::for_path::<Message>("ridgelink").to_bytes());
+
+/// Strain gauges in the fingertip (Okamoto et al. 2009, section III-A).
+pub const GAUGES: usize = 5;
+/// ADC channels of a scan: the gauges, then the optional tangential force.
+pub const CHANNELS: usize = GAUGES + 1;
+/// Samples carried by one [`Gauges`] message.
+pub const GAUGE_BLOCK: usize = 8;
+
+/// Anything that can stand in a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "no allocator to box with, and a message lives on the stack for one frame"
+)]
+pub enum Message {
+    /// Who speaks. Always variant 0, always the same layout: see [`Hello`].
+    Hello(Hello),
+    /// The surface, as the sensor sees it.
+    Estimate(Estimate),
+    /// The operator's hand, as the display's encoder sees it.
+    Motion(Motion),
+    /// A block of samples, for recording.
+    Gauges(Gauges),
+    /// Every counter of a board.
+    Status(Status),
+    /// Asks a board to take this configuration as a whole.
+    Configure(Configuration),
+    /// A board's configuration as it stands, after a [`Message::Configure`].
+    Configuration(ConfigurationReport),
+    /// Asks for a [`Pong`].
+    Ping(Ping),
+    /// Answers a [`Ping`].
+    Pong(Pong),
+    /// Ends the stimulus until the display board is restarted.
+    Stop(Stop),
+}
+
+/// Which of the paper's ranges an instant is in, equation (8): T1 while v(t)·v(t−A) ≥ 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Range {
+    /// The velocity kept its sign over the window.
+    T1,
+    /// The velocity changed its sign within the window: the counting estimate is not to be used.
+    T2,
+}
+
+/// One estimate of the surface under the sensor, at 100 Hz.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Estimate {
+    /// Counts the sensor's estimates from its start; an estimate with a smaller one is older.
+    pub sequence: u32,
+    /// When it was made, in µs of the sensor's clock.
+    pub instant_us: u64,
+    /// Surface wavelength λ in mm, if the estimator has one; always finite and above 0.
+    pub wavelength_mm: Option<f32>,
+    /// Whether the estimator stands by `wavelength_mm`. Never true without one.
+    pub valid: bool,
+    /// RMS of the band-passed signal over the window times √2 (a sine's amplitude), in ADC steps
+    /// (3.3 V / 4096), mean over the gauges used; 0 or above.
+    pub amplitude_lsb: f32,
+    /// From 0 (a guess) to 1 (certain).
+    pub confidence: f32,
+    /// The paper's range at this instant.
+    pub range: Range,
+    /// Bit g set: gauge g took part.
+    pub gauges_used: u8,
+}
+
+/// The operator's hand, at 500 Hz.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Motion {
+    /// Counts the display's motions from its start.
+    pub sequence: u32,
+    /// When the encoder was read, in µs of the display's clock.
+    pub instant_us: u64,
+    /// Position x in µm since the display's start.
+    pub position_um: i64,
+    /// Velocity v in µm/s, positive towards larger x.
+    pub velocity_um_s: i32,
+}
+
+/// One sample of all channels, at 1 kHz, after the anti-aliasing filter and before the band-pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct GaugeSample {
+    /// Channel values in sixteenths of an ADC step: 0 to 65 535 for 0 to 3.3 V.
+    pub codes: [u16; CHANNELS],
+    /// Travel of the arm since the sample before, in µm.
+    pub travel_um: i16,
+}
+
+/// A block of consecutive samples, sent when [`crate::SensorConfiguration::stream_gauges`] is set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Gauges {
+    /// Index of the first sample since the sensor's start: a gap shows what was lost.
+    pub first_sample: u32,
+    /// Instant of the first sample, in µs of the sensor's clock.
+    pub instant_us: u64,
+    /// The arm's position at the first sample, in µm since the sensor's start.
+    pub position_um: i64,
+    /// The samples, 1 ms apart.
+    pub samples: [GaugeSample; GAUGE_BLOCK],
+}
+
+/// Asks the other end for its clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Ping {
+    /// The sender's clock when it sent this, in µs.
+    pub sent_us: u64,
+}
+
+/// Answers a [`Ping`], with the three instants that give round trip and clock offset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Pong {
+    /// [`Ping::sent_us`], returned.
+    pub sent_us: u64,
+    /// The answerer's clock when the ping reached it, in µs.
+    pub received_us: u64,
+    /// The answerer's clock when it sent this, in µs.
+    pub answered_us: u64,
+}
+
+/// Why the stimulus was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum StopReason {
+    /// A person asked for it.
+    Operator,
+    /// A host program found something wrong.
+    Host,
+}
+
+/// Ends the stimulus: obeyed at the next output tick and kept until the display board restarts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Stop {
+    /// Why.
+    pub reason: StopReason,
+}

@@ -1,0 +1,110 @@
+//! Every counter of a board, sent once a second.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Why a board started last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ResetCause {
+    /// Power came on, or fell too low.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// The independent watchdog: the firmware had stopped, or panicked.
+    Watchdog,
+    /// The firmware asked for it.
+    Software,
+}
+
+/// What one port has seen since the board's start. All counts wrap at 2³².
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct PortCounters {
+    /// Frames sent.
+    pub sent: u32,
+    /// Frames not sent, because the port's queue was full.
+    pub dropped: u32,
+    /// Good frames.
+    pub received: u32,
+    /// Frames that never came: gaps in the sequence, less those that came late.
+    pub lost: u32,
+    /// Frames whose CRC or COBS coding was wrong.
+    pub corrupt: u32,
+    /// Frames longer than the longest allowed.
+    pub overlong: u32,
+    /// Good frames that came after a frame sent later; they are not handled.
+    pub late: u32,
+    /// Good frames that came twice; the second is not handled.
+    pub duplicated: u32,
+    /// Frames with a right CRC whose content is no message of this version.
+    pub malformed: u32,
+    /// Frames from a peer of another protocol or schema; they are not read.
+    pub foreign: u32,
+    /// Frames from a peer that has not said [`crate::Hello`]; they are not read.
+    pub unheralded: u32,
+    /// Bytes lost because the receiver's DMA ring was overrun.
+    pub overruns: u32,
+    /// Noise and framing errors the UART reported.
+    pub line_errors: u32,
+}
+
+/// What only a sensor board counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SensorCounters {
+    /// Samples at 1 kHz since the start.
+    pub samples: u32,
+    /// Conversions lost by the ADC.
+    pub adc_overruns: u32,
+    /// Times the DMA ring was overrun, so that scans were lost.
+    pub dma_overruns: u32,
+    /// Samples that were not done when the next one was due.
+    pub deadline_misses: u32,
+    /// Estimates sent.
+    pub estimates: u32,
+    /// Motions that reached the arm's drive.
+    pub motions: u32,
+}
+
+/// What only a display board counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct DisplayCounters {
+    /// Output ticks at 2 kHz since the start.
+    pub ticks: u32,
+    /// Ticks whose words were sent to the DACs (a tick that changes nothing sends nothing).
+    pub updates: u32,
+    /// Ticks that were not done when the next one was due.
+    pub deadline_misses: u32,
+    /// Valid estimates that the stimulus followed.
+    pub estimates: u32,
+    /// Estimates that were not used: older than one already seen, or out of range.
+    pub refused_estimates: u32,
+    /// Times that the stimulus faded out because the last estimate was too old.
+    pub fades: u32,
+    /// SPI transfers that failed.
+    pub spi_errors: u32,
+}
+
+/// The part of a [`Status`] that depends on the board's role.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum RoleCounters {
+    /// Of a sensor board.
+    Sensor(SensorCounters),
+    /// Of a display board.
+    Display(DisplayCounters),
+}
+
+/// Every counter of a board.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Status {
+    /// Time since the board's start, in µs of its clock.
+    pub uptime_us: u64,
+    /// Why it started.
+    pub reset: ResetCause,
+    /// Watchdog resets since power came on.
+    pub watchdog_resets: u32,
+    /// The port towards the other board.
+    pub peer: PortCounters,
+    /// The console port.
+    pub console: PortCounters,
+    /// What the role counts.
+    pub role: RoleCounters,
+}

@@ -1,0 +1,1 @@
+//! System tests of Ridgelink live in the `tests` folder of this package.
