@@ -33,15 +33,19 @@ pub struct ScanRecord {
     pub codes: [u16; CHANNELS],
     /// The arm encoder's counter at the trigger (5 µm a count, wraps).
     pub encoder: u16,
+    /// Where the arm truly is, in mm.
+    pub position_mm: f64,
 }
 
 /// One reading of the hand encoder by the display, once a tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TickRecord {
     /// Instant of the reading, in ns since the scene's start.
     pub at_ns: u64,
     /// The hand encoder's counter (5 µm a count, wraps).
     pub encoder: u16,
+    /// Where the hand truly is, in mm.
+    pub position_mm: f64,
 }
 
 /// An estimate, as it reached the display.
