@@ -1,2 +1,30 @@
-//! The display board's firmware.
-fn main() {}
+//! The display board: the operator's hand in, fifty actuators out, at 2 kHz and on its own clock.
+//!
+//! ```text
+//! TIM3 ─latch──> TIM4 (hand) ─┐
+//!      └─tick───────────────> output ─SPI1─> 4 × DAC81416, one LDAC edge
+//!            TIM1 holds CLR off ┘ ^ └─ Motion ─> report ─> ports ─> USART2, USART3
+//!                                 └── Estimate, Stop, Configure ─┘
+//! ```
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board;
+#[cfg(target_os = "none")]
+mod tasks;
+
+#[cfg(target_os = "none")]
+nucleo::identify!(protocol::Role::Display);
+
+#[cfg(target_os = "none")]
+#[embassy_executor::main]
+async fn main(spawner: embassy_executor::Spawner) {
+    let board = board::Board::take();
+    tasks::start(spawner, board, HELLO);
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("firmware-display runs on the board: cargo run --release --target thumbv7em-none-eabihf -p firmware-display");
+    std::process::exit(2);
+}

@@ -26,15 +26,20 @@ pub struct SensorConfiguration {
     pub arm_full_scale_um_s: u32,
 }
 
+impl SensorConfiguration {
+    /// What a board starts with: safe, and the paper's numbers where it gives some.
+    pub const DEFAULT: Self = Self {
+        method: Method::Counting,
+        window_ms: 80,
+        counted_gauge: 2,
+        stream_gauges: false,
+        arm_full_scale_um_s: 200_000,
+    };
+}
+
 impl Default for SensorConfiguration {
     fn default() -> Self {
-        Self {
-            method: Method::Counting,
-            window_ms: 80,
-            counted_gauge: 2,
-            stream_gauges: false,
-            arm_full_scale_um_s: 200_000,
-        }
+        Self::DEFAULT
     }
 }
 
@@ -65,16 +70,21 @@ pub struct DisplayConfiguration {
     pub amplitude_mv: u16,
 }
 
+impl DisplayConfiguration {
+    /// What a board starts with: safe, and the paper's numbers where it gives some.
+    pub const DEFAULT: Self = Self {
+        mode: Mode::Uniform,
+        max_age_ms: 500,
+        fade_in_ms: 20,
+        fade_out_ms: 50,
+        pitch_um: 1_500,
+        amplitude_mv: 5_000,
+    };
+}
+
 impl Default for DisplayConfiguration {
     fn default() -> Self {
-        Self {
-            mode: Mode::Uniform,
-            max_age_ms: 500,
-            fade_in_ms: 20,
-            fade_out_ms: 50,
-            pitch_um: 1_500,
-            amplitude_mv: 5_000,
-        }
+        Self::DEFAULT
     }
 }
 

@@ -7,6 +7,7 @@
 pub mod configuration;
 pub mod hello;
 pub mod message;
+pub mod port;
 pub mod status;
 
 pub use configuration::{

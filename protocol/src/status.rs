@@ -64,6 +64,18 @@ pub struct SensorCounters {
     pub motions: u32,
 }
 
+impl SensorCounters {
+    /// Nothing counted.
+    pub const ZERO: Self = Self {
+        samples: 0,
+        adc_overruns: 0,
+        dma_overruns: 0,
+        deadline_misses: 0,
+        estimates: 0,
+        motions: 0,
+    };
+}
+
 /// What only a display board counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DisplayCounters {
@@ -81,6 +93,19 @@ pub struct DisplayCounters {
     pub fades: u32,
     /// SPI transfers that failed.
     pub spi_errors: u32,
+}
+
+impl DisplayCounters {
+    /// Nothing counted.
+    pub const ZERO: Self = Self {
+        ticks: 0,
+        updates: 0,
+        deadline_misses: 0,
+        estimates: 0,
+        refused_estimates: 0,
+        fades: 0,
+        spi_errors: 0,
+    };
 }
 
 /// The part of a [`Status`] that depends on the board's role.

@@ -1,0 +1,244 @@
+//! The sensor board's hardware: pins, clocks, timers and DMA; nothing that computes.
+//!
+//! | what | where |
+//! | --- | --- |
+//! | gauges 0–4, tangential force | A0–A5: PA3 PC0 PC3 PF3 PF5 PF10, all ADC3, DMA2 stream 0 |
+//! | scan trigger, encoder latch | TIM3, 4 kHz |
+//! | arm encoder | TIM4, PD12 PD13 |
+//! | arm drive | TIM1 channel 1 PWM on D6 (PE9), direction on D7 (PF13) |
+//! | peer | USART2, PD5 PD6, DMA1 streams 6 and 5 |
+//! | console | USART3, PD8 PD9, DMA1 streams 3 and 1 |
+//! | link LED | LD1 (PB0) |
+
+use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_futures::select::{Either, select};
+use embassy_stm32::adc::triggers::TIM3_TRGO;
+use embassy_stm32::adc::vals::Exten;
+use embassy_stm32::adc::{Adc, AdcChannel, RingBufferedAdc, SampleTime};
+use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
+use embassy_stm32::interrupt::typelevel::{self, Handler};
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::mode::Async;
+use embassy_stm32::pac;
+use embassy_stm32::pac::timer::vals::Mms;
+use embassy_stm32::peripherals::{
+    ADC3, DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, DMA2_CH0, IWDG, TIM1, TIM3, USART2, USART3,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::low_level::{RoundTo, Timer};
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::timer::Ch1;
+use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, dma};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use firmware_sensor::{Drive, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
+use nucleo::encoder::Encoder;
+use nucleo::ports;
+use protocol::{CHANNELS, ResetCause};
+use static_cell::StaticCell;
+
+bind_interrupts!(struct Irqs {
+    USART2 => usart::InterruptHandler<USART2>;
+    USART3 => usart::InterruptHandler<USART3>;
+    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
+    ADC => OverrunHandler;
+});
+
+/// Set by the converter when DMA did not fetch a word in time.
+static OVERRUN: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+/// The converter stops asking for DMA after an overrun (RM0090, 13.8.1): tells the sampler to begin anew.
+pub struct OverrunHandler;
+
+impl Handler<typelevel::ADC> for OverrunHandler {
+    #[allow(unsafe_code, reason = "the trait's signature")]
+    unsafe fn on_interrupt() {
+        pac::ADC3.cr1().modify(|w| w.set_ovrie(false));
+        OVERRUN.signal(());
+    }
+}
+
+/// Words of the scans that make one sample.
+const BLOCK: usize = SCANS_PER_SAMPLE * CHANNELS;
+/// Two blocks: DMA fills one while the other is read.
+const RING: usize = 2 * BLOCK;
+/// 28 + 12 ADC clocks at 21 MHz: 1.9 µs a channel, 11.4 µs a scan.
+const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
+const ARM_PWM: Hertz = Hertz(20_000);
+/// A watchdog this short bounds a hang to a few estimates; the tasks feed it every 100 ms.
+const WATCHDOG_US: u32 = 400_000;
+
+/// Runs the sampling task above everything else, on the vector of a peripheral that is not used.
+static SAMPLING: InterruptExecutor = InterruptExecutor::new();
+
+#[interrupt]
+#[allow(unsafe_code, reason = "the executor's interrupt hook is unsafe to call from elsewhere")]
+unsafe fn UART5() {
+    // SAFETY: this is the handler of the interrupt that SAMPLING was started with.
+    unsafe { SAMPLING.on_interrupt() }
+}
+
+/// Everything on the board, ready and not yet running.
+pub struct Board {
+    /// Spawns tasks that preempt all others.
+    pub sampling: SendSpawner,
+    /// Gauges and encoder.
+    pub sampler: Sampler,
+    /// The arm's servo drive.
+    pub arm: ArmDrive,
+    /// Receiver and transmitter of the port to the other board.
+    pub peer: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
+    /// Receiver and transmitter of the console port.
+    pub console: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
+    /// Restarts the board unless it is fed; running already.
+    pub watchdog: IndependentWatchdog<'static, IWDG>,
+    /// Shows that the peer is known.
+    pub link_led: Output<'static>,
+    /// Why the board started, and the watchdog resets since power came on.
+    pub started: (ResetCause, u32),
+}
+
+impl Board {
+    /// Sets the hardware up. To be called once.
+    pub fn take() -> Self {
+        static ADC_RING: StaticCell<[u16; RING]> = StaticCell::new();
+        static PEER_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
+        static CONSOLE_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
+
+        let started = nucleo::reset::cause();
+        let p = embassy_stm32::init(nucleo::clock::configuration());
+        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+        watchdog.unleash();
+
+        let encoder = Encoder::new(p.TIM4, p.PD12, p.PD13);
+        let channels = [
+            p.PA3.degrade_adc(),
+            p.PC0.degrade_adc(),
+            p.PC3.degrade_adc(),
+            p.PF3.degrade_adc(),
+            p.PF5.degrade_adc(),
+            p.PF10.degrade_adc(),
+        ];
+        let adc = Adc::<ADC3>::new(p.ADC3).into_ring_buffered(
+            p.DMA2_CH0,
+            ADC_RING.init([0; RING]),
+            Irqs,
+            channels.into_iter().map(|channel| (channel, SAMPLE_TIME)),
+            TIM3_TRGO,
+            Exten::RISING_EDGE,
+        );
+        let trigger = Timer::new(p.TIM3);
+        trigger.set_frequency(Hertz(SCAN_RATE_HZ), RoundTo::Slower);
+        trigger.set_master_mode(Mms::UPDATE);
+
+        let pwm = PwmPin::<TIM1, Ch1>::new(p.PE9, OutputType::PushPull);
+        let pwm = SimplePwm::new(p.TIM1, Some(pwm), None, None, None, ARM_PWM, Default::default());
+        let arm = ArmDrive { pwm, forward: Output::new(p.PF13, Level::Low, Speed::Low) };
+
+        #[allow(clippy::expect_used, reason = "at start-up, with constants: a wrong baud rate can't pass a first test")]
+        let (peer, console) = (
+            Uart::new(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5, Irqs, ports::configuration())
+                .expect("921 600 baud divides from 42 MHz"),
+            Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1, Irqs, ports::configuration())
+                .expect("921 600 baud divides from 42 MHz"),
+        );
+        let (peer_tx, peer_rx) = peer.split();
+        let (console_tx, console_rx) = console.split();
+
+        interrupt::UART5.set_priority(Priority::P6);
+        Self {
+            sampling: SAMPLING.start(interrupt::UART5),
+            sampler: Sampler { adc, trigger, encoder },
+            arm,
+            peer: (peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])), peer_tx),
+            console: (
+                console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
+                console_tx,
+            ),
+            watchdog,
+            link_led: Output::new(p.PB0, Level::Low, Speed::Low),
+            started,
+        }
+    }
+}
+
+/// The gauges and the arm's encoder, sampled together by TIM3.
+pub struct Sampler {
+    adc: RingBufferedAdc<'static, ADC3>,
+    trigger: Timer<'static, TIM3>,
+    encoder: Encoder,
+}
+
+/// Why scans were lost. Sampling goes on with fresh ones.
+pub enum ScansLost {
+    /// The converter was overrun: DMA did not fetch a word before the next was there.
+    Converter,
+    /// The DMA ring was overrun: it was not read for 2 ms.
+    Ring,
+}
+
+impl Sampler {
+    /// Starts the trigger, once DMA and converter are ready for it.
+    pub fn start(&mut self) {
+        self.restart();
+        interrupt::ADC.set_priority(Priority::P6);
+        interrupt::ADC.unpend();
+        #[allow(unsafe_code, reason = "unmasking an interrupt whose handler is bound above")]
+        // SAFETY: no critical section relies on this interrupt being masked.
+        unsafe {
+            interrupt::ADC.enable();
+        }
+        self.trigger.start();
+    }
+
+    fn restart(&mut self) {
+        pac::ADC3.sr().modify(|w| w.set_ovr(false));
+        self.adc.start();
+        pac::ADC3.cr1().modify(|w| w.set_ovrie(true));
+    }
+
+    /// The next sample's scans, and the encoder's position at the last of them.
+    pub async fn next(&mut self) -> Result<([Scan; SCANS_PER_SAMPLE], u16), ScansLost> {
+        let mut words = [0; BLOCK];
+        match select(self.adc.read(&mut words), OVERRUN.wait()).await {
+            Either::First(Ok(_)) => {}
+            Either::First(Err(_)) => return Err(ScansLost::Ring),
+            Either::Second(()) => {
+                self.adc.stop();
+                self.restart();
+                return Err(ScansLost::Converter);
+            }
+        }
+        let encoder = self.encoder.latched();
+        let mut scans = [Scan::default(); SCANS_PER_SAMPLE];
+        for (scan, words) in scans.iter_mut().zip(words.chunks_exact(CHANNELS)) {
+            scan.copy_from_slice(words);
+        }
+        Ok((scans, encoder))
+    }
+}
+
+/// The arm's servo drive: speed as PWM duty, direction on a pin.
+pub struct ArmDrive {
+    pwm: SimplePwm<'static, TIM1>,
+    forward: Output<'static>,
+}
+
+impl ArmDrive {
+    /// Lets the drive follow commands; 0 until the first.
+    pub fn enable(&mut self) {
+        self.pwm.ch1().enable();
+    }
+
+    /// Puts a command on the pins.
+    pub fn set(&mut self, drive: Drive) {
+        self.forward.set_level(if drive.forward { Level::High } else { Level::Low });
+        self.pwm.ch1().set_duty_cycle_fraction(drive.duty.into(), Drive::FULL.into());
+    }
+}

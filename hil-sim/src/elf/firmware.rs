@@ -1,0 +1,139 @@
+//! A firmware's ELF, checked before anything runs: is it one, whose is it, does it speak our protocol.
+
+use std::path::{Path, PathBuf};
+
+use object::{Object, ObjectSection};
+use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
+use rigless::image::Image;
+
+/// The section in which a firmware carries its [`Hello`].
+const IDENTITY: &str = ".ridgelink";
+
+/// Why an ELF can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FirmwareError {
+    /// The file can't be read.
+    #[error(
+        "{}: can't be read ({source}): build the firmware with ./test or with \
+         `cargo build --release --target thumbv7em-none-eabihf -p {package}`",
+        path.display()
+    )]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The package that makes it.
+        package: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is no ELF.
+    #[error("{}: is no ELF file ({reason}): give the firmware as the build left it", path.display())]
+    NoElf {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The ELF does not say what it is.
+    #[error("{}: has no {IDENTITY} section: it is no firmware of Ridgelink, or was stripped of it", path.display())]
+    NoIdentity {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The ELF is for the other board.
+    #[error("{}: is the {found} board's firmware; the {wanted} board's is wanted: exchange the two", path.display())]
+    WrongRole {
+        /// The file.
+        path: PathBuf,
+        /// The role in the ELF.
+        found: String,
+        /// The role wanted.
+        wanted: &'static str,
+    },
+    /// The ELF was built from another protocol.
+    #[error(
+        "{}: speaks protocol {found_version} with schema {found_schema:016x}, this program \
+         {PROTOCOL_VERSION} with {SCHEMA_HASH:016x}: build both from the same sources",
+        path.display()
+    )]
+    OtherProtocol {
+        /// The file.
+        path: PathBuf,
+        /// The protocol version in the ELF.
+        found_version: u16,
+        /// The schema hash in the ELF.
+        found_schema: u64,
+    },
+    /// The emulator can't place it.
+    #[error("{}: {reason}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// What the emulator said.
+        reason: String,
+    },
+}
+
+/// A firmware that may run.
+#[derive(Clone, Debug)]
+pub struct Firmware {
+    /// Where it came from.
+    pub path: PathBuf,
+    /// The ELF, whole: defmt's strings are in it.
+    pub elf: Vec<u8>,
+    /// Who it says it is.
+    pub hello: Hello,
+    /// The same, as the emulator takes it.
+    pub image: Image,
+}
+
+impl Firmware {
+    /// Reads and checks the ELF at `path` for the board of `role`.
+    pub fn read(path: &Path, role: Role) -> Result<Self, FirmwareError> {
+        let package = match role {
+            Role::Display => "firmware-display",
+            _ => "firmware-sensor",
+        };
+        let elf = std::fs::read(path).map_err(|source| FirmwareError::Missing {
+            path: path.to_owned(),
+            package,
+            source,
+        })?;
+        let no_elf = |reason: String| FirmwareError::NoElf { path: path.to_owned(), reason };
+        let file = object::File::parse(&*elf).map_err(|error| no_elf(error.to_string()))?;
+        let hello = file
+            .section_by_name(IDENTITY)
+            .and_then(|section| section.data().ok())
+            .and_then(Hello::from_bytes)
+            .ok_or_else(|| FirmwareError::NoIdentity { path: path.to_owned() })?;
+        let found = Role::from_byte(hello.role);
+        if found != Some(role) {
+            return Err(FirmwareError::WrongRole {
+                path: path.to_owned(),
+                found: found.map_or("?", Role::name).to_owned(),
+                wanted: role.name(),
+            });
+        }
+        if !hello.is_compatible() {
+            return Err(FirmwareError::OtherProtocol {
+                path: path.to_owned(),
+                found_version: hello.protocol_version(),
+                found_schema: hello.schema_hash(),
+            });
+        }
+        let image = Image::new(path, elf.clone(), None).map_err(|error| FirmwareError::Image {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })?;
+        Ok(Self { path: path.to_owned(), elf, hello, image })
+    }
+}
+
+/// The two firmwares of a pair.
+#[derive(Clone, Debug)]
+pub struct Firmwares {
+    /// The sensor board's.
+    pub sensor: Firmware,
+    /// The display board's.
+    pub display: Firmware,
+}

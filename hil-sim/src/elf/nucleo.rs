@@ -1,0 +1,176 @@
+//! An emulated Nucleo-F429ZI: the part, its clock and its UARTs, and a seam for what else is on its pins.
+//!
+//! The part is rigless' STM32F427, which has the same registers for all that is used here. Two things
+//! that the emulator leaves to a board are done at the seam, at the exact instant of TIM3's trigger:
+//! the trigger reaches TIM4 (ITR2, RM0090 table 102), and whatever `Pins` makes of it.
+
+use std::fmt::Debug;
+use std::num::{NonZeroU32, NonZeroU64};
+
+use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::machine::{Board, Target, armv7m};
+use rigless::mcu::{Mcu, Operate};
+use rigless::snapshot::Store;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::TIM4;
+use rigless::soc::{Bus, Error, Width};
+use rigless::time::VirtualNanos;
+
+use super::wire::Wire;
+
+/// What the ST-LINK puts on OSC_IN.
+const ST_LINK_CLOCK_HZ: u64 = 8_000_000;
+const SUPPLY_MV: u32 = 3_300;
+const CORE_CLOCK_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
+/// A fixed rate, so instructions can be counted but never called cycles. An M4F at 168 MHz behind its
+/// flash accelerator needs some 1.4 cycles an instruction: a guess, on the slow side.
+const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(120_000_000).unwrap();
+/// RM0090 section 2.3: SysTick's reference clock is the core's over eight.
+const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
+const PRIORITY_BITS: u8 = 4;
+
+/// Index of USART2, the port to the other board.
+pub const PEER_UART: usize = 1;
+/// Index of USART3, the console.
+pub const CONSOLE_UART: usize = 2;
+const TIM3: usize = 1;
+const TIM4_INDEX: usize = 2;
+/// The internal trigger by which TIM4 hears TIM3.
+const ITR_OF_TIM3: u8 = 2;
+const CNT: u64 = 0x24;
+
+/// What is wired to a board's pins.
+pub trait Pins: Debug + Send + 'static {
+    /// TIM3 triggered at `at_ns`, for the `nth` time: the encoder's counter at this instant.
+    fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16;
+
+    /// After [`Pins::on_trigger`] and the latching of the counter.
+    fn after_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
+
+    /// At every stop of the emulation.
+    fn on_stop(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
+}
+
+/// A board.
+#[derive(Debug)]
+pub struct Nucleo<P> {
+    mcu: Wired<P>,
+}
+
+/// The part with its pins connected.
+#[derive(Debug)]
+pub struct Wired<P> {
+    part: Stm32f427,
+    pins: P,
+    triggers: u64,
+}
+
+impl<P: Pins> Nucleo<P> {
+    /// A board at power-up; `fit` connects what needs the part, such as chips on a bus.
+    pub fn new(pins: P, fit: impl FnOnce(&mut Stm32f427)) -> Result<Self, Error> {
+        let mut part = Stm32f427::new()?;
+        part.rcc.attach_crystals(ST_LINK_CLOCK_HZ, 0);
+        part.set_supply(SUPPLY_MV);
+        part.usart[PEER_UART].attach(Wire::default());
+        part.usart[CONSOLE_UART].attach(Wire::default());
+        fit(&mut part);
+        Ok(Self { mcu: Wired { part, pins, triggers: 0 } })
+    }
+
+    /// What is on the pins, and the part.
+    pub fn pins(&mut self) -> (&mut P, &mut Stm32f427) {
+        (&mut self.mcu.pins, &mut self.mcu.part)
+    }
+
+    /// What is on the pins.
+    pub fn into_pins(self) -> P {
+        self.mcu.pins
+    }
+
+    /// The far end of one of the UARTs.
+    pub fn wire(&mut self, uart: usize) -> &mut Wire {
+        self.mcu.part.usart[uart].chip_mut().expect("attached in new, and kept through resets")
+    }
+}
+
+impl<P: Pins> Wired<P> {
+    /// Passes TIM3's trigger on, if it came since the last look.
+    fn follow_trigger(&mut self, at: VirtualNanos) {
+        let (_, pulses) = self.part.tim[TIM3].trigger_output();
+        let came = pulses != self.triggers;
+        self.triggers = pulses;
+        if !came {
+            return;
+        }
+        let count = self.pins.on_trigger(&mut self.part, at.0);
+        // While the counter's clock is off, before the firmware enables it, there is nothing to set.
+        let _ = self.part.write(at, TIM4.base + CNT, Width::W32, count.into());
+        for level in [Level::High, Level::Low] {
+            self.part.drive_timer(at, TIM4_INDEX, |timer, registers, context| {
+                timer.drive_internal_trigger(ITR_OF_TIM3, level, registers, context);
+            });
+        }
+        self.pins.after_trigger(&mut self.part, at.0);
+    }
+}
+
+impl<P: Pins> Mcu for Wired<P> {
+    fn bus(&self) -> &Bus {
+        self.part.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.part.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        self.part.reset(at, cause);
+        self.triggers = 0;
+    }
+
+    fn poll(&mut self, now: VirtualNanos) {
+        self.part.poll(now);
+        self.follow_trigger(now);
+        self.pins.on_stop(&mut self.part, now.0);
+    }
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        self.part.split(slot)
+    }
+}
+
+impl<P: Debug> Store for Nucleo<P> {}
+
+impl<P: Pins> Board for Nucleo<P> {
+    fn name(&self) -> &'static str {
+        "nucleo-f429zi"
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["stm32f427"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.mcu)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let interrupt_lines = NonZeroU32::new(self.mcu.cpu().interrupt_lines.into())
+            .expect("the part has interrupts");
+        let core = armv7m::Core {
+            variant: armv7m::Variant::M4,
+            clock_hz: CORE_CLOCK_HZ,
+            interrupt_lines,
+            priority_bits: PRIORITY_BITS,
+            refclk_divider: REFCLK_DIVIDER,
+            instructions_per_second: INSTRUCTIONS_PER_SECOND,
+            boot: "flash",
+        }
+        .spec_with_parts(
+            &rigless::cpu::armv7m::windows(self.mcu.bus()),
+            armv7m::Fpu::FpV4Sp,
+            armv7m::MpuRegions::Eight,
+        );
+        vec![Target::new("stm32f427", &mut self.mcu, core)]
+    }
+}

@@ -1,0 +1,112 @@
+//! What is on the sensor board's pins: five gauges and the force channel on ADC3, the arm's encoder,
+//! and the arm's servo drive.
+
+use protocol::CHANNELS;
+use rigless::device::Level;
+use rigless::mcu::Operate;
+use rigless::soc::Width;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::ADC3;
+use rigless::soc::stm32f427::peripherals::adc::Channel;
+use rigless::soc::stm32f427::peripherals::gpio::Pin;
+use rigless::soc::stm32f427::peripherals::tim;
+use rigless::time::VirtualNanos;
+
+use super::nucleo::Pins;
+use crate::arm::{Arm, DriveCommand};
+use crate::recording::ScanRecord;
+use crate::world::World;
+
+/// ADC3's channels on A0–A5: PA3 PC0 PC3 PF3 PF5 PF10.
+const ADC_CHANNELS: [u8; CHANNELS] = [3, 10, 13, 9, 15, 8];
+/// Index of ADC3, and of port F.
+const ADC: usize = 2;
+const PORT_F: usize = 5;
+/// D7, the arm's direction.
+const DIRECTION_PIN: u8 = 13;
+/// The model converts ⌊input · 4095 / reference⌋; microvolts resolve every code.
+const REFERENCE_UV: u32 = 3_300_000;
+const FULL_SCALE: u32 = 4_095;
+const CR2: u64 = 0x08;
+const CR2_SWSTART: u64 = 1 << 30;
+const CR2_EXTEN: u64 = 0b11 << 28;
+const CR2_EXTSEL: u64 = 0b1111 << 24;
+/// EXTSEL of TIM3's trigger output (RM0090, 13.13.3).
+const EXTSEL_TIM3_TRGO: u64 = 0b1000 << 24;
+
+/// The sensor board's surroundings.
+#[derive(Debug)]
+pub struct SensorPins {
+    world: World,
+    arm: Arm,
+    position_mm: f64,
+    /// Every scan converted so far.
+    pub scans: Vec<ScanRecord>,
+}
+
+impl SensorPins {
+    /// The surroundings that `world` and `arm` describe.
+    pub fn new(world: World, arm: Arm) -> Self {
+        Self { world, arm, position_mm: 0.0, scans: Vec::new() }
+    }
+
+    /// Wires up what the part itself has to know.
+    pub fn fit(part: &mut Stm32f427) {
+        part.adc[ADC].set_reference(REFERENCE_UV);
+    }
+
+    /// What the firmware puts on its PWM and direction pins.
+    fn command(part: &mut Stm32f427) -> Option<DriveCommand> {
+        let (timer, registers) = part.advanced_timer(0);
+        let pulse = timer.pulse(tim::Channel::new(1)?, registers)?;
+        let (port, registers) = part.port(PORT_F);
+        let forward = port.level(Pin::new(DIRECTION_PIN)?, registers) == Level::High;
+        Some(DriveCommand { duty: pulse.width.0 as f64 / pulse.period.0 as f64, forward })
+    }
+}
+
+/// The input in µV that the model converts to `code`.
+fn microvolts(code: u16) -> u32 {
+    (u32::from(code) * REFERENCE_UV).div_ceil(FULL_SCALE)
+}
+
+impl Pins for SensorPins {
+    fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
+        let t_s = at_ns as f64 * 1e-9;
+        let command = Self::command(part);
+        self.position_mm = self.arm.position_mm(&self.world, t_s, command);
+        let codes = self.world.codes(t_s, self.position_mm);
+        for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
+            if let Some(channel) = Channel::new(channel) {
+                part.adc[ADC].set_input(channel, microvolts(code));
+            }
+        }
+        let encoder = World::encoder(self.position_mm);
+        self.scans.push(ScanRecord { at_ns, codes, encoder, position_mm: self.position_mm });
+        encoder
+    }
+
+    /// The emulator does not pass a timer's trigger to a converter: starts the scan that the converter
+    /// is set up to start.
+    fn after_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        let at = VirtualNanos(at_ns);
+        let Ok(cr2) = part.peek(at, ADC3.base + CR2, Width::W32) else { return };
+        if cr2 & CR2_EXTEN != 0 && cr2 & CR2_EXTSEL == EXTSEL_TIM3_TRGO {
+            // A converter whose clock is off refuses the write, as it would ignore the trigger.
+            let _ = part.write(at, ADC3.base + CR2, Width::W32, cr2 | CR2_SWSTART);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_survives_the_way_through_microvolts() {
+        for code in 0..=4_095u16 {
+            let converted = u64::from(microvolts(code)) * u64::from(FULL_SCALE) / u64::from(REFERENCE_UV);
+            assert_eq!(converted, code.into());
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! What the two Nucleo-F429ZI boards of Ridgelink have in common, on the board only: on a host this
+//! crate is empty.
+#![no_std]
+#![cfg(target_os = "none")]
+
+pub mod clock;
+pub mod encoder;
+pub mod identity;
+pub mod ports;
+pub mod reset;
