@@ -82,11 +82,6 @@ impl<P: Pins> Nucleo<P> {
         (&mut self.mcu.pins, &mut self.mcu.part)
     }
 
-    /// What is on the pins.
-    pub fn into_pins(self) -> P {
-        self.mcu.pins
-    }
-
     /// The far end of one of the UARTs.
     pub fn wire(&mut self, uart: usize) -> &mut Wire {
         self.mcu.part.usart[uart].chip_mut().expect("attached in new, and kept through resets")

@@ -1,0 +1,103 @@
+# Sourced by ./demo and ./test: finds, or installs where it may, a Rust that builds for the host and
+# for thumbv7em-none-eabihf, or says in one line what is missing.
+#
+# Two worlds:
+# - ordinary: rustup (or anything else that brings the target's core library);
+# - Debian, where rustup can fetch nothing: rustc, cargo and the library's sources from Debian's
+#   packages, core built from them for the boards.
+#
+# Afterwards: host_cargo CARGO_ARGUMENTS… for the host, board_cargo CARGO_ARGUMENTS… for the boards.
+
+target=thumbv7em-none-eabihf
+oldest_minor=95        # the oldest Rust 1.x seen to build everything here
+emulator_minor=98      # what the emulator's manifest asks for; older ones need to be told to go on
+
+say() { printf '%s\n' "$*" >&2; }
+fail() { say "ridgelink: $*"; exit 2; }
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
+
+rust_minor() { "${1:-rustc}" --version 2>/dev/null | sed -n 's/^rustc 1\.\([0-9]*\)\..*/\1/p'; }
+new_enough() { [ "$(rust_minor "$1")" -ge "$oldest_minor" ] 2>/dev/null; }
+has_target() {
+    libraries=$(rustc --print target-libdir --target "$target" 2>/dev/null) && ls "$libraries"/libcore-*.rlib >/dev/null 2>&1
+}
+
+# A C linker is all that host builds need besides Rust.
+need_linker() {
+    command -v cc >/dev/null 2>&1 && return
+    command -v apt-get >/dev/null 2>&1 || fail "no C linker (cc): install a C compiler"
+    as_root apt-get update -qq >&2 && as_root apt-get install -y -qq gcc libc6-dev >&2 \
+        || fail "no C linker (cc), and apt-get could not install gcc: install it as root"
+}
+
+ordinary_world() {
+    command -v rustc >/dev/null 2>&1 && command -v cargo >/dev/null 2>&1 && new_enough rustc || return 1
+    has_target && return
+    command -v rustup >/dev/null 2>&1 || return 1
+    say "ridgelink: adding the boards' target to rustup's toolchain"
+    rustup target add "$target" >&2 && has_target
+}
+
+debian_packages="rustc-web cargo-web rust-web-src rust-web-clippy rustfmt-web lld-19"
+debian_ready() {
+    new_enough /usr/bin/rustc && [ -x /usr/bin/cargo ] && [ -x /usr/bin/cargo-clippy ] \
+        && [ -x /usr/bin/cargo-fmt ] && [ -x /usr/lib/llvm-19/bin/lld ] \
+        && ls -d /usr/lib/rustlib/src/rust/library/core >/dev/null 2>&1
+}
+debian_world() {
+    command -v apt-get >/dev/null 2>&1 || return 1
+    if ! debian_ready; then
+        say "ridgelink: rustup has no $target here; installing $debian_packages from Debian's packages"
+        as_root apt-get update -qq >&2 || return 1
+        # shellcheck disable=SC2086
+        as_root apt-get install -y -qq $debian_packages >&2 || return 1
+        debian_ready || return 1
+    fi
+    links=$PWD/target/toolchain
+    mkdir -p "$links" && ln -sf /usr/lib/llvm-19/bin/lld "$links/rust-lld"
+    PATH=$links:/usr/bin:$PATH
+    export PATH
+}
+
+world=
+if [ "${RIDGELINK_WORLD:-ordinary}" = ordinary ] && ordinary_world; then
+    world=ordinary
+elif debian_world; then
+    world=debian
+else
+    fail "no Rust 1.$oldest_minor or later with the target $target: run 'rustup update stable && rustup target add $target'"
+fi
+need_linker
+
+ignore_version=
+[ "$(rust_minor rustc)" -ge "$emulator_minor" ] || ignore_version=--ignore-rust-version
+
+# The subcommand's own binary is named, so that no other toolchain's is found first.
+cargo_of() {
+    subcommand=$1
+    case $world-$subcommand in
+        debian-clippy) /usr/bin/cargo-clippy "$@" ;;
+        debian-fmt) /usr/bin/cargo-fmt "$@" ;;
+        debian-*) /usr/bin/cargo "$@" ;;
+        *) cargo "$@" ;;
+    esac
+}
+
+host_cargo() {
+    subcommand=$1
+    shift
+    # shellcheck disable=SC2086
+    cargo_of "$subcommand" --locked $ignore_version "$@"
+}
+
+board_cargo() {
+    if [ "$world" = debian ]; then
+        RUSTC_BOOTSTRAP=1 CARGO_UNSTABLE_BUILD_STD=core host_cargo "$@" --target "$target"
+    else
+        host_cargo "$@" --target "$target"
+    fi
+}
+
+build_firmwares() {
+    board_cargo build --release -p firmware-sensor -p firmware-display
+}

@@ -1,0 +1,38 @@
+//! Reads what went over a wire after the fact: every message, with the instant of its frame's last byte.
+
+use protocol::Message;
+use protocol::receiver::{Event, Receiver};
+
+/// A message, and when its frame was complete.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Said {
+    /// Instant of the frame's last byte, in ns since the scene's start.
+    pub at_ns: u64,
+    /// The message.
+    pub message: Message,
+}
+
+/// Collects the messages of one direction of a link.
+#[derive(Default)]
+pub struct Listener {
+    receiver: Receiver,
+    said: Vec<Said>,
+}
+
+impl Listener {
+    /// Takes bytes in their order.
+    pub fn hear(&mut self, bytes: &[(u64, u8)]) {
+        for &(at_ns, byte) in bytes {
+            self.receiver.receive(&[byte], |event| {
+                if let Event::Message(message) = event {
+                    self.said.push(Said { at_ns, message });
+                }
+            });
+        }
+    }
+
+    /// What was said so far.
+    pub fn messages(&self) -> impl DoubleEndedIterator<Item = &Said> {
+        self.said.iter()
+    }
+}
