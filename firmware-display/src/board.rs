@@ -16,7 +16,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt::typelevel::{self, Handler};
-use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::{Mms, Ocm};
@@ -59,8 +60,11 @@ const WATCHDOG_US: u32 = 400_000;
 /// Runs the output task above everything else, on the vector of a peripheral that is not used.
 static OUTPUT: InterruptExecutor = InterruptExecutor::new();
 
-#[interrupt]
-#[allow(unsafe_code, reason = "the executor's interrupt hook is unsafe to call from elsewhere")]
+#[embassy_stm32::interrupt]
+#[allow(
+    unsafe_code,
+    reason = "the executor's interrupt hook is unsafe to call from elsewhere"
+)]
 unsafe fn UART5() {
     // SAFETY: this is the handler of the interrupt that OUTPUT was started with.
     unsafe { OUTPUT.on_interrupt() }
@@ -100,7 +104,11 @@ impl Board {
         let timer = Timer::new(p.TIM3);
         timer.set_frequency(Hertz(TICK_RATE_HZ), RoundTo::Slower);
         timer.set_master_mode(Mms::UPDATE);
-        let ticks = Ticks { timer, encoder: Encoder::new(p.TIM4, p.PD12, p.PD13), seen: 0 };
+        let ticks = Ticks {
+            timer,
+            encoder: Encoder::new(p.TIM4, p.PD12, p.PD13),
+            seen: 0,
+        };
 
         let mut configuration = spi::Config::default();
         configuration.mode = MODE_1;
@@ -120,12 +128,31 @@ impl Board {
             clear: ClearGuard::new(Timer::new(p.TIM1), clear_pin),
         };
 
-        #[allow(clippy::expect_used, reason = "at start-up, with constants: a wrong baud rate can't pass a first test")]
+        #[allow(
+            clippy::expect_used,
+            reason = "at start-up, with constants: a wrong baud rate can't pass a first test"
+        )]
         let (peer, console) = (
-            Uart::new(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5, Irqs, ports::configuration())
-                .expect("921 600 baud divides from 42 MHz"),
-            Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1, Irqs, ports::configuration())
-                .expect("921 600 baud divides from 42 MHz"),
+            Uart::new(
+                p.USART2,
+                p.PD6,
+                p.PD5,
+                p.DMA1_CH6,
+                p.DMA1_CH5,
+                Irqs,
+                ports::configuration(),
+            )
+            .expect("921 600 baud divides from 42 MHz"),
+            Uart::new(
+                p.USART3,
+                p.PD9,
+                p.PD8,
+                p.DMA1_CH3,
+                p.DMA1_CH1,
+                Irqs,
+                ports::configuration(),
+            )
+            .expect("921 600 baud divides from 42 MHz"),
         );
         let (peer_tx, peer_rx) = peer.split();
         let (console_tx, console_rx) = console.split();
@@ -135,7 +162,10 @@ impl Board {
             output: OUTPUT.start(interrupt::UART5),
             ticks,
             dacs,
-            peer: (peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])), peer_tx),
+            peer: (
+                peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])),
+                peer_tx,
+            ),
             console: (
                 console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
                 console_tx,
@@ -158,7 +188,10 @@ impl Handler<typelevel::TIM3> for TickHandler {
     #[allow(unsafe_code, reason = "the trait's signature")]
     unsafe fn on_interrupt() {
         pac::TIM3.sr().write(|w| w.0 = !1);
-        TICKS.store(TICKS.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+        TICKS.store(
+            TICKS.load(Ordering::Relaxed).wrapping_add(1),
+            Ordering::Relaxed,
+        );
         TICKED.signal(());
     }
 }
@@ -176,7 +209,10 @@ impl Ticks {
         self.timer.enable_update_interrupt(true);
         interrupt::TIM3.set_priority(Priority::P5);
         interrupt::TIM3.unpend();
-        #[allow(unsafe_code, reason = "unmasking an interrupt whose handler is bound above")]
+        #[allow(
+            unsafe_code,
+            reason = "unmasking an interrupt whose handler is bound above"
+        )]
         // SAFETY: no critical section relies on this interrupt being masked.
         unsafe {
             interrupt::TIM3.enable();

@@ -13,6 +13,10 @@ mod board;
 #[cfg(target_os = "none")]
 mod tasks;
 
+// The log, and what is logged when all else fails; a panic ends in the watchdog's reset.
+#[cfg(target_os = "none")]
+use {defmt_rtt as _, panic_probe as _};
+
 #[cfg(target_os = "none")]
 nucleo::identify!(protocol::Role::Display);
 
@@ -25,6 +29,8 @@ async fn main(spawner: embassy_executor::Spawner) {
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    eprintln!("firmware-display runs on the board: cargo run --release --target thumbv7em-none-eabihf -p firmware-display");
+    eprintln!(
+        "firmware-display runs on the board: cargo run --release --target thumbv7em-none-eabihf -p firmware-display"
+    );
     std::process::exit(2);
 }

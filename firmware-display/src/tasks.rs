@@ -13,8 +13,8 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Ticker};
-use firmware_display::dac81416::{self, CHIPS, FRAME_BYTES};
 use firmware_display::Display;
+use firmware_display::dac81416::{self, CHIPS, FRAME_BYTES};
 use nucleo::ports::{Ports, Side};
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, DisplayCounters, Estimate, Hello,
@@ -44,8 +44,22 @@ static COUNTERS: Mutex<CriticalSectionRawMutex, Cell<DisplayCounters>> =
 pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     static PORTS: StaticCell<Ports> = StaticCell::new();
     let ports: &'static Ports = PORTS.init(Ports::new(hello));
-    let Board { output, ticks, dacs, peer, console, watchdog, link_led, started } = board;
-    defmt::info!("display {}.{}.{} started", hello.version[0], hello.version[1], hello.version[2]);
+    let Board {
+        output,
+        ticks,
+        dacs,
+        peer,
+        console,
+        watchdog,
+        link_led,
+        started,
+    } = board;
+    defmt::info!(
+        "display {}.{}.{} started",
+        hello.version[0],
+        hello.version[1],
+        hello.version[2]
+    );
     let tasks = (
         drive(ticks, dacs),
         listen(ports, Side::Peer, peer.0),
@@ -55,8 +69,15 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         report(ports),
         care(ports, watchdog, link_led, started),
     );
-    let (Ok(drive), Ok(hear_peer), Ok(tell_peer), Ok(hear_host), Ok(tell_host), Ok(report), Ok(care)) =
-        tasks
+    let (
+        Ok(drive),
+        Ok(hear_peer),
+        Ok(tell_peer),
+        Ok(hear_host),
+        Ok(tell_host),
+        Ok(report),
+        Ok(care),
+    ) = tasks
     else {
         defmt::panic!("each task is spawned once");
     };
@@ -102,7 +123,11 @@ async fn drive(mut ticks: Ticks, mut dacs: Dacs) {
             // A motion that finds no room shows as a gap in its sequence.
             let _ = OUTBOX.try_send(Message::Motion(motion));
         }
-        let counters = DisplayCounters { deadline_misses, spi_errors, ..display.counters() };
+        let counters = DisplayCounters {
+            deadline_misses,
+            spi_errors,
+            ..display.counters()
+        };
         COUNTERS.lock(|shared| shared.set(counters));
     }
 }
@@ -136,7 +161,10 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                     Configuration::Sensor(_) => Some(Setting::Role),
                 };
                 let configuration = Configuration::Display(CONFIGURATION.lock(Cell::get));
-                let answer = ConfigurationReport { refused, configuration };
+                let answer = ConfigurationReport {
+                    refused,
+                    configuration,
+                };
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));
             }
@@ -158,12 +186,17 @@ async fn care(
     ports: &'static Ports,
     mut watchdog: IndependentWatchdog<'static, IWDG>,
     mut link_led: Output<'static>,
-    (reset, watchdog_resets): (ResetCause, u32),
+    started: (ResetCause, u32),
 ) {
+    let (reset, watchdog_resets) = started;
     let mut ticker = Ticker::every(CARE_PERIOD);
     let mut next_status = Instant::now() + STATUS_PERIOD;
     let mut ticks_before = None;
-    defmt::info!("reset by {}, watchdog resets {}", defmt::Debug2Format(&reset), watchdog_resets);
+    defmt::info!(
+        "reset by {}, watchdog resets {}",
+        defmt::Debug2Format(&reset),
+        watchdog_resets
+    );
     loop {
         let counters = COUNTERS.lock(Cell::get);
         if ticks_before != Some(counters.ticks) {
@@ -171,7 +204,11 @@ async fn care(
         }
         ticks_before = Some(counters.ticks);
         ports.poll();
-        link_led.set_level(if ports.is_known(Side::Peer) { Level::High } else { Level::Low });
+        link_led.set_level(if ports.is_known(Side::Peer) {
+            Level::High
+        } else {
+            Level::Low
+        });
         if Instant::now() >= next_status {
             next_status += STATUS_PERIOD;
             ports.post(&Message::Status(Status {

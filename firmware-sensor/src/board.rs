@@ -12,12 +12,13 @@
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_futures::select::{Either, select};
-use embassy_stm32::adc::triggers::TIM3_TRGO;
+use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::adc::vals::Exten;
 use embassy_stm32::adc::{Adc, AdcChannel, RingBufferedAdc, SampleTime};
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt::typelevel::{self, Handler};
-use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::Mms;
@@ -25,9 +26,9 @@ use embassy_stm32::peripherals::{
     ADC3, DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, DMA2_CH0, IWDG, TIM1, TIM3, USART2, USART3,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use embassy_stm32::timer::Ch1;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma};
@@ -77,8 +78,11 @@ const WATCHDOG_US: u32 = 400_000;
 /// Runs the sampling task above everything else, on the vector of a peripheral that is not used.
 static SAMPLING: InterruptExecutor = InterruptExecutor::new();
 
-#[interrupt]
-#[allow(unsafe_code, reason = "the executor's interrupt hook is unsafe to call from elsewhere")]
+#[embassy_stm32::interrupt]
+#[allow(
+    unsafe_code,
+    reason = "the executor's interrupt hook is unsafe to call from elsewhere"
+)]
 unsafe fn UART5() {
     // SAFETY: this is the handler of the interrupt that SAMPLING was started with.
     unsafe { SAMPLING.on_interrupt() }
@@ -138,15 +142,45 @@ impl Board {
         trigger.set_master_mode(Mms::UPDATE);
 
         let pwm = PwmPin::<TIM1, Ch1>::new(p.PE9, OutputType::PushPull);
-        let pwm = SimplePwm::new(p.TIM1, Some(pwm), None, None, None, ARM_PWM, Default::default());
-        let arm = ArmDrive { pwm, forward: Output::new(p.PF13, Level::Low, Speed::Low) };
+        let pwm = SimplePwm::new(
+            p.TIM1,
+            Some(pwm),
+            None,
+            None,
+            None,
+            ARM_PWM,
+            Default::default(),
+        );
+        let arm = ArmDrive {
+            pwm,
+            forward: Output::new(p.PF13, Level::Low, Speed::Low),
+        };
 
-        #[allow(clippy::expect_used, reason = "at start-up, with constants: a wrong baud rate can't pass a first test")]
+        #[allow(
+            clippy::expect_used,
+            reason = "at start-up, with constants: a wrong baud rate can't pass a first test"
+        )]
         let (peer, console) = (
-            Uart::new(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5, Irqs, ports::configuration())
-                .expect("921 600 baud divides from 42 MHz"),
-            Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1, Irqs, ports::configuration())
-                .expect("921 600 baud divides from 42 MHz"),
+            Uart::new(
+                p.USART2,
+                p.PD6,
+                p.PD5,
+                p.DMA1_CH6,
+                p.DMA1_CH5,
+                Irqs,
+                ports::configuration(),
+            )
+            .expect("921 600 baud divides from 42 MHz"),
+            Uart::new(
+                p.USART3,
+                p.PD9,
+                p.PD8,
+                p.DMA1_CH3,
+                p.DMA1_CH1,
+                Irqs,
+                ports::configuration(),
+            )
+            .expect("921 600 baud divides from 42 MHz"),
         );
         let (peer_tx, peer_rx) = peer.split();
         let (console_tx, console_rx) = console.split();
@@ -154,9 +188,16 @@ impl Board {
         interrupt::UART5.set_priority(Priority::P6);
         Self {
             sampling: SAMPLING.start(interrupt::UART5),
-            sampler: Sampler { adc, trigger, encoder },
+            sampler: Sampler {
+                adc,
+                trigger,
+                encoder,
+            },
             arm,
-            peer: (peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])), peer_tx),
+            peer: (
+                peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])),
+                peer_tx,
+            ),
             console: (
                 console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
                 console_tx,
@@ -189,7 +230,10 @@ impl Sampler {
         self.restart();
         interrupt::ADC.set_priority(Priority::P6);
         interrupt::ADC.unpend();
-        #[allow(unsafe_code, reason = "unmasking an interrupt whose handler is bound above")]
+        #[allow(
+            unsafe_code,
+            reason = "unmasking an interrupt whose handler is bound above"
+        )]
         // SAFETY: no critical section relies on this interrupt being masked.
         unsafe {
             interrupt::ADC.enable();
@@ -238,7 +282,13 @@ impl ArmDrive {
 
     /// Puts a command on the pins.
     pub fn set(&mut self, drive: Drive) {
-        self.forward.set_level(if drive.forward { Level::High } else { Level::Low });
-        self.pwm.ch1().set_duty_cycle_fraction(drive.duty.into(), Drive::FULL.into());
+        self.forward.set_level(if drive.forward {
+            Level::High
+        } else {
+            Level::Low
+        });
+        self.pwm
+            .ch1()
+            .set_duty_cycle_fraction(drive.duty.into(), Drive::FULL.into());
     }
 }

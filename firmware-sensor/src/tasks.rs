@@ -44,8 +44,22 @@ static COUNTERS: Mutex<CriticalSectionRawMutex, Cell<SensorCounters>> =
 pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     static PORTS: StaticCell<Ports> = StaticCell::new();
     let ports: &'static Ports = PORTS.init(Ports::new(hello));
-    let Board { sampling, sampler, arm, peer, console, watchdog, link_led, started } = board;
-    defmt::info!("sensor {}.{}.{} started", hello.version[0], hello.version[1], hello.version[2]);
+    let Board {
+        sampling,
+        sampler,
+        arm,
+        peer,
+        console,
+        watchdog,
+        link_led,
+        started,
+    } = board;
+    defmt::info!(
+        "sensor {}.{}.{} started",
+        hello.version[0],
+        hello.version[1],
+        hello.version[2]
+    );
     let tasks = (
         sample(sampler, arm),
         listen(ports, Side::Peer, peer.0),
@@ -55,8 +69,15 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         report(ports),
         care(ports, watchdog, link_led, started),
     );
-    let (Ok(sample), Ok(hear_peer), Ok(tell_peer), Ok(hear_host), Ok(tell_host), Ok(report), Ok(care)) =
-        tasks
+    let (
+        Ok(sample),
+        Ok(hear_peer),
+        Ok(tell_peer),
+        Ok(hear_host),
+        Ok(tell_host),
+        Ok(report),
+        Ok(care),
+    ) = tasks
     else {
         defmt::panic!("each task is spawned once");
     };
@@ -111,8 +132,9 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive) {
             // A block that finds no room shows as a gap in `first_sample`.
             let _ = OUTBOX.try_send(Message::Gauges(gauges));
         }
-        counters.deadline_misses =
-            counters.deadline_misses.wrapping_add(u32::from(begun.elapsed() > SAMPLE_PERIOD));
+        counters.deadline_misses = counters
+            .deadline_misses
+            .wrapping_add(u32::from(begun.elapsed() > SAMPLE_PERIOD));
         COUNTERS.lock(|shared| shared.set(counters));
     }
 }
@@ -145,7 +167,10 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                     Configuration::Display(_) => Some(Setting::Role),
                 };
                 let configuration = Configuration::Sensor(CONFIGURATION.lock(Cell::get));
-                let answer = ConfigurationReport { refused, configuration };
+                let answer = ConfigurationReport {
+                    refused,
+                    configuration,
+                };
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));
             }
@@ -167,12 +192,17 @@ async fn care(
     ports: &'static Ports,
     mut watchdog: IndependentWatchdog<'static, IWDG>,
     mut link_led: Output<'static>,
-    (reset, watchdog_resets): (ResetCause, u32),
+    started: (ResetCause, u32),
 ) {
+    let (reset, watchdog_resets) = started;
     let mut ticker = Ticker::every(CARE_PERIOD);
     let mut next_status = Instant::now() + STATUS_PERIOD;
     let mut samples_before = None;
-    defmt::info!("reset by {}, watchdog resets {}", defmt::Debug2Format(&reset), watchdog_resets);
+    defmt::info!(
+        "reset by {}, watchdog resets {}",
+        defmt::Debug2Format(&reset),
+        watchdog_resets
+    );
     loop {
         let counters = COUNTERS.lock(Cell::get);
         if samples_before != Some(counters.samples) {
@@ -180,7 +210,11 @@ async fn care(
         }
         samples_before = Some(counters.samples);
         ports.poll();
-        link_led.set_level(if ports.is_known(Side::Peer) { Level::High } else { Level::Low });
+        link_led.set_level(if ports.is_known(Side::Peer) {
+            Level::High
+        } else {
+            Level::Low
+        });
         if Instant::now() >= next_status {
             next_status += STATUS_PERIOD;
             ports.post(&Message::Status(Status {

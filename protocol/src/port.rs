@@ -61,7 +61,9 @@ impl Port {
 
     /// Takes received bytes, in any portions, answers greetings and pings, and hands on the rest.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8], mut handle: impl FnMut(Message)) {
-        let Self { sender, receiver, .. } = self;
+        let Self {
+            sender, receiver, ..
+        } = self;
         let mut ping: Option<Ping> = None;
         receiver.receive(bytes, |event| match event {
             Event::Message(Message::Ping(asked)) => ping = Some(asked),
@@ -71,7 +73,11 @@ impl Port {
             Event::Foreign(_) => {}
         });
         if let Some(Ping { sent_us }) = ping {
-            self.post(&Message::Pong(Pong { sent_us, received_us: now_us, answered_us: now_us }));
+            self.post(&Message::Pong(Pong {
+                sent_us,
+                received_us: now_us,
+                answered_us: now_us,
+            }));
         }
         self.poll(now_us);
     }
@@ -80,7 +86,9 @@ impl Port {
     pub fn take(&mut self, out: &mut [u8]) -> usize {
         let mut taken = 0;
         for place in out {
-            let Some(byte) = self.queue.pop_front() else { break };
+            let Some(byte) = self.queue.pop_front() else {
+                break;
+            };
             *place = byte;
             taken += 1;
         }

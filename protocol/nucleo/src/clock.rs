@@ -14,7 +14,10 @@ const ST_LINK_CLOCK: Hertz = Hertz(8_000_000);
 pub fn configuration() -> Config {
     let mut configuration = Config::default();
     let rcc = &mut configuration.rcc;
-    rcc.hse = Some(Hse { freq: ST_LINK_CLOCK, mode: HseMode::Bypass });
+    rcc.hse = Some(Hse {
+        freq: ST_LINK_CLOCK,
+        mode: HseMode::Bypass,
+    });
     rcc.pll_src = PllSource::HSE;
     rcc.pll = Some(Pll {
         prediv: PllPreDiv::DIV4,

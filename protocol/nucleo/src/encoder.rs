@@ -33,7 +33,9 @@ impl Encoder {
         let timer = pac::TIM4;
         // ITR2 of TIM4 is TIM3 (RM0090 table 102).
         timer.smcr().modify(|w| w.set_ts(Ts::ITR2));
-        timer.ccmr_input(LATCH / 2).modify(|w| w.set_ccs(LATCH % 2, CcmrInputCcs::TRC));
+        timer
+            .ccmr_input(LATCH / 2)
+            .modify(|w| w.set_ccs(LATCH % 2, CcmrInputCcs::TRC));
         timer.ccer().modify(|w| w.set_cce(LATCH, true));
         Self { _counter: counter }
     }

@@ -18,7 +18,10 @@ const fn parse(version: &str) -> [u8; 3] {
         match bytes[at] {
             b'.' => part += 1,
             digit => {
-                assert!(digit.is_ascii_digit() && part < 3, "a version is major.minor.patch");
+                assert!(
+                    digit.is_ascii_digit() && part < 3,
+                    "a version is major.minor.patch"
+                );
                 parts[part] = parts[part] * 10 + (digit - b'0');
             }
         }
@@ -34,6 +37,7 @@ macro_rules! identify {
         /// Who this firmware is, on the wire and in the ELF.
         const HELLO: protocol::Hello = $crate::identity::hello($role, env!("CARGO_PKG_VERSION"));
 
+        #[allow(unsafe_code, reason = "a section that only tools read")]
         #[used]
         #[unsafe(link_section = ".ridgelink")]
         static IDENTITY: [u8; protocol::HELLO_LENGTH] = HELLO.to_bytes();

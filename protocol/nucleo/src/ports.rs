@@ -100,7 +100,9 @@ impl Ports {
             match uart.read(&mut bytes).await {
                 Ok(count) => {
                     let now_us = Instant::now().as_micros();
-                    self.with(side, |port| port.receive(now_us, &bytes[..count], &mut handle));
+                    self.with(side, |port| {
+                        port.receive(now_us, &bytes[..count], &mut handle)
+                    });
                 }
                 Err(Error::Overrun) => self.with(side, Port::on_overrun),
                 Err(_) => self.with(side, Port::on_line_error),

@@ -10,6 +10,7 @@ use protocol::ResetCause;
 const KEPT: u32 = 0x5244_474C;
 
 /// In RAM that neither the start-up code nor a reset touches.
+#[allow(unsafe_code, reason = "the section is cortex-m-rt's own, for RAM that is left alone")]
 #[unsafe(link_section = ".uninit.watchdog_resets")]
 static mut WATCHDOG_RESETS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
@@ -18,7 +19,7 @@ static mut WATCHDOG_RESETS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 pub fn cause() -> (ResetCause, u32) {
     let flags = RCC.csr().read();
     RCC.csr().modify(|w| w.set_rmvf(true));
-    let cause = if flags.lpwrstf() || flags.porrstf() || flags.borrstf() {
+    let cause = if flags.porrstf() || flags.borrstf() {
         ResetCause::Power
     } else if flags.wdgrstf() || flags.wwdgrstf() {
         ResetCause::Watchdog
@@ -37,9 +38,17 @@ pub fn cause() -> (ResetCause, u32) {
 fn count(cause: ResetCause) -> u32 {
     // SAFETY: every bit pattern is a valid [u32; 2], and nothing else refers to the static.
     let [mark, resets] = unsafe { addr_of!(WATCHDOG_RESETS).cast::<[u32; 2]>().read_volatile() };
-    let before = if mark == KEPT && cause != ResetCause::Power { resets } else { 0 };
+    let before = if mark == KEPT && cause != ResetCause::Power {
+        resets
+    } else {
+        0
+    };
     let resets = before.wrapping_add(u32::from(cause == ResetCause::Watchdog));
     // SAFETY: as above.
-    unsafe { addr_of_mut!(WATCHDOG_RESETS).cast::<[u32; 2]>().write_volatile([KEPT, resets]) };
+    unsafe {
+        addr_of_mut!(WATCHDOG_RESETS)
+            .cast::<[u32; 2]>()
+            .write_volatile([KEPT, resets])
+    };
     resets
 }
