@@ -14,7 +14,8 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
-use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Speed};
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -113,7 +114,7 @@ impl Board {
         let mut configuration = spi::Config::default();
         configuration.mode = MODE_1;
         configuration.frequency = SPI_CLOCK;
-        let select = |pin| Output::new(pin, Level::High, Speed::VeryHigh);
+        let select = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::High, Speed::VeryHigh);
         let mut clear_pin = Flex::new(p.PE9);
         clear_pin.set_as_af_unchecked(1, AfType::output(OutputType::PushPull, Speed::Low));
         let dacs = Dacs {
