@@ -125,7 +125,12 @@ impl SensorConfiguration {
     pub fn check(&self) -> Result<(), Setting> {
         within(self.window_ms.into(), 10, 200, Setting::WindowMs)?;
         within(self.counted_gauge.into(), 0, 4, Setting::CountedGauge)?;
-        within(self.arm_full_scale_um_s, 1_000, 2_000_000, Setting::ArmFullScale)
+        within(
+            self.arm_full_scale_um_s,
+            1_000,
+            2_000_000,
+            Setting::ArmFullScale,
+        )
     }
 }
 
@@ -141,5 +146,9 @@ impl DisplayConfiguration {
 }
 
 fn within(value: u32, low: u32, high: u32, setting: Setting) -> Result<(), Setting> {
-    if (low..=high).contains(&value) { Ok(()) } else { Err(setting) }
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(setting)
+    }
 }

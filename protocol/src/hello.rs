@@ -145,7 +145,11 @@ impl Hello {
 
     /// The chip's name, as far as it is readable text.
     pub fn chip_name(&self) -> &str {
-        let end = self.chip.iter().position(|&b| b == 0).unwrap_or(self.chip.len());
+        let end = self
+            .chip
+            .iter()
+            .position(|&b| b == 0)
+            .unwrap_or(self.chip.len());
         core::str::from_utf8(&self.chip[..end]).unwrap_or("?")
     }
 

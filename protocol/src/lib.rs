@@ -4,20 +4,27 @@
 //! No DSP, no hardware, no allocation: the same code runs on both boards and on every host.
 #![no_std]
 
+pub mod clock;
 pub mod configuration;
+pub mod frame;
 pub mod hello;
 pub mod message;
+pub mod receiver;
+pub mod sender;
+mod sequence;
 pub mod status;
 
+pub use clock::ClockOffset;
 pub use configuration::{
     Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, SensorConfiguration,
     Setting,
 };
+pub use frame::MAX_FRAME;
 pub use hello::{HELLO_LENGTH, Hello, Role};
 pub use message::{
     CHANNELS, Estimate, GAUGE_BLOCK, GAUGES, GaugeSample, Gauges, Message, Motion,
     PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,
 };
-pub use status::{
-    DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status,
-};
+pub use receiver::{Event, Peer, Receiver};
+pub use sender::Sender;
+pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};

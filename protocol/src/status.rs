@@ -19,13 +19,14 @@ pub enum ResetCause {
 /// What one port has seen since the board's start. All counts wrap at 2³².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PortCounters {
-    /// Frames sent.
+    /// Frames encoded to be sent.
     pub sent: u32,
     /// Frames not sent, because the port's queue was full.
     pub dropped: u32,
-    /// Good frames.
+    /// Good frames, handed on.
     pub received: u32,
-    /// Frames that never came: gaps in the sequence, less those that came late.
+    /// Frames that never came: gaps in the sequence, less those that came late. A frame that came
+    /// corrupt or overlong leaves a gap too.
     pub lost: u32,
     /// Frames whose CRC or COBS coding was wrong.
     pub corrupt: u32,
@@ -37,7 +38,7 @@ pub struct PortCounters {
     pub duplicated: u32,
     /// Frames with a right CRC whose content is no message of this version.
     pub malformed: u32,
-    /// Frames from a peer of another protocol or schema; they are not read.
+    /// Frames from a peer of another protocol or schema; nothing but its Hello is read.
     pub foreign: u32,
     /// Frames from a peer that has not said [`crate::Hello`]; they are not read.
     pub unheralded: u32,
@@ -45,6 +46,27 @@ pub struct PortCounters {
     pub overruns: u32,
     /// Noise and framing errors the UART reported.
     pub line_errors: u32,
+}
+
+impl PortCounters {
+    /// All counts at 0.
+    pub const fn new() -> Self {
+        Self {
+            sent: 0,
+            dropped: 0,
+            received: 0,
+            lost: 0,
+            corrupt: 0,
+            overlong: 0,
+            late: 0,
+            duplicated: 0,
+            malformed: 0,
+            foreign: 0,
+            unheralded: 0,
+            overruns: 0,
+            line_errors: 0,
+        }
+    }
 }
 
 /// What only a sensor board counts.

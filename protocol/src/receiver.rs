@@ -1,0 +1,195 @@
+//! Bytes in, messages out: nothing on the line can put it out of step, and everything is counted.
+
+use crate::frame::{self, MAX_FRAME};
+use crate::hello::Hello;
+use crate::message::Message;
+use crate::sequence::{Arrival, Sequences};
+use crate::status::PortCounters;
+
+/// What a receiver has to tell its owner.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "no allocator to box with, and an event lives on the stack for one frame"
+)]
+pub enum Event {
+    /// A message from a compatible peer; never a Hello, and never one that is late or came before.
+    Message(Message),
+    /// A compatible peer said Hello.
+    Greeted(Hello),
+    /// A peer of another protocol or schema said Hello: nothing else of it will be read.
+    Foreign(Hello),
+    /// A frame came from a peer that has not said Hello to this receiver: ask for one.
+    Unheralded,
+}
+
+/// Who is at the other end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Peer {
+    /// Nobody has said Hello yet.
+    #[default]
+    Silent,
+    /// The last Hello was of this protocol and schema.
+    Known(Hello),
+    /// The last Hello was of another protocol or schema.
+    Foreign(Hello),
+}
+
+/// The receiving direction of a port.
+///
+/// Every frame that ends, except an empty one, raises exactly one of the counters `received`,
+/// `corrupt`, `overlong`, `late`, `duplicated`, `malformed`, `foreign` and `unheralded`; `lost`
+/// counts the gaps between them. A Hello is handed on even if it is late or came before: what it
+/// says does not grow old.
+pub struct Receiver {
+    /// The frame so far, still in COBS.
+    buffer: [u8; MAX_FRAME - 1],
+    /// Bytes in `buffer`.
+    length: usize,
+    /// The frame is longer than `buffer`: the rest of it is passed over.
+    overlong: bool,
+    reader: Reader,
+}
+
+impl Receiver {
+    /// A receiver that has heard nothing yet.
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; MAX_FRAME - 1],
+            length: 0,
+            overlong: false,
+            reader: Reader {
+                sequences: Sequences::new(),
+                peer: Peer::Silent,
+                counters: PortCounters::new(),
+            },
+        }
+    }
+
+    /// Takes bytes as they come, in any portions, and hands on what they amount to.
+    pub fn receive(&mut self, bytes: &[u8], mut handle: impl FnMut(Event)) {
+        for &byte in bytes {
+            if byte != 0 {
+                if let Some(place) = self.buffer.get_mut(self.length) {
+                    *place = byte;
+                    self.length += 1;
+                } else {
+                    self.overlong = true;
+                }
+                continue;
+            }
+            let length = core::mem::take(&mut self.length);
+            if core::mem::take(&mut self.overlong) {
+                count(&mut self.reader.counters.overlong);
+            } else if length > 0
+                && let Some(event) = self.reader.read(&mut self.buffer[..length])
+            {
+                handle(event);
+            }
+        }
+    }
+
+    /// Who is at the other end, by the last Hello.
+    pub const fn peer(&self) -> Peer {
+        self.reader.peer
+    }
+
+    /// What was received so far. `sent`, `dropped`, `overruns` and `line_errors` are the owner's to
+    /// fill in, and 0 here.
+    pub const fn counters(&self) -> PortCounters {
+        self.reader.counters
+    }
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What is known of the peer and of its frames so far.
+struct Reader {
+    sequences: Sequences,
+    peer: Peer,
+    counters: PortCounters,
+}
+
+impl Reader {
+    /// Reads one frame, without its closing 0x00.
+    fn read(&mut self, frame: &mut [u8]) -> Option<Event> {
+        let Ok((sequence, payload)) = frame::decode(frame) else {
+            count(&mut self.counters.corrupt);
+            return None;
+        };
+        if let [0, fields @ ..] = payload
+            && let Some(hello) = Hello::from_bytes(fields)
+        {
+            return Some(self.read_hello(sequence, hello));
+        }
+        let arrival = self.sequences.note(sequence);
+        if !self.count_arrival(arrival) {
+            return None;
+        }
+        match self.peer {
+            Peer::Silent => {
+                count(&mut self.counters.unheralded);
+                Some(Event::Unheralded)
+            }
+            Peer::Foreign(_) => {
+                count(&mut self.counters.foreign);
+                None
+            }
+            Peer::Known(_) => match postcard::take_from_bytes(payload) {
+                // A Hello that `from_bytes` refused is none.
+                Ok((message, [])) if !matches!(message, Message::Hello(_)) => {
+                    count(&mut self.counters.received);
+                    Some(Event::Message(message))
+                }
+                _ => {
+                    count(&mut self.counters.malformed);
+                    None
+                }
+            },
+        }
+    }
+
+    fn read_hello(&mut self, sequence: u16, hello: Hello) -> Event {
+        let arrival = self.sequences.note_hello(sequence, hello.asks != 0);
+        let fresh = self.count_arrival(arrival);
+        if hello.is_compatible() {
+            self.peer = Peer::Known(hello);
+            if fresh {
+                count(&mut self.counters.received);
+            }
+            Event::Greeted(hello)
+        } else {
+            self.peer = Peer::Foreign(hello);
+            if fresh {
+                count(&mut self.counters.foreign);
+            }
+            Event::Foreign(hello)
+        }
+    }
+
+    /// Counts gaps, late and repeated frames; whether this one is neither late nor repeated.
+    fn count_arrival(&mut self, arrival: Arrival) -> bool {
+        let counters = &mut self.counters;
+        match arrival {
+            Arrival::Fresh { lost } => {
+                counters.lost = counters.lost.wrapping_add(lost.into());
+                return true;
+            }
+            Arrival::Late { filled } => {
+                counters.lost = counters.lost.wrapping_sub(filled.into());
+                count(&mut counters.late);
+            }
+            Arrival::Duplicate => count(&mut counters.duplicated),
+        }
+        false
+    }
+}
+
+/// One more; wraps at 2³².
+fn count(counter: &mut u32) {
+    *counter = counter.wrapping_add(1);
+}

@@ -1,0 +1,105 @@
+//! Messages in, numbered frames out, and the handshake before them.
+
+use crate::frame::{self, MAX_FRAME};
+use crate::hello::Hello;
+use crate::message::Message;
+
+/// Between two unanswered Hellos, in µs.
+const HELLO_PERIOD_US: u64 = 1_000_000;
+/// Least time between two Hellos that ask because frames came unheralded, in µs.
+const ASK_PERIOD_US: u64 = 100_000;
+
+/// The sending direction of a port: numbers and encodes frames.
+///
+/// It lets nothing but [`Hello`] out until the peer has said a compatible one itself, so that no
+/// version has to guess at what another one says. Who starts asks; who is asked answers; an answer
+/// asks no more, so the exchange ends.
+pub struct Sender {
+    hello: Hello,
+    sequence: u16,
+    sent: u32,
+    /// The peer has said a compatible Hello.
+    greeted: bool,
+    /// The peer asked for a Hello.
+    answer_due: bool,
+    /// A frame came from a peer that this end knows nothing of.
+    ask_due: bool,
+    /// When the last Hello was made, in µs of the owner's clock.
+    last_hello_us: Option<u64>,
+}
+
+impl Sender {
+    /// A closed sender that numbers from 0 and introduces itself with `hello`.
+    pub const fn new(hello: Hello) -> Self {
+        Self {
+            hello,
+            sequence: 0,
+            sent: 0,
+            greeted: false,
+            answer_due: false,
+            ask_due: false,
+            last_hello_us: None,
+        }
+    }
+
+    /// Encodes `message` as the next frame and counts it. None while the peer is not greeted, unless
+    /// it is a Hello.
+    pub fn encode<'a>(
+        &mut self,
+        message: &Message,
+        out: &'a mut [u8; MAX_FRAME],
+    ) -> Option<&'a [u8]> {
+        if !self.greeted && !matches!(message, Message::Hello(_)) {
+            return None;
+        }
+        let bytes = frame::encode(self.sequence, message, out)?;
+        self.sequence = self.sequence.wrapping_add(1);
+        self.sent = self.sent.wrapping_add(1);
+        Some(bytes)
+    }
+
+    /// A Hello, if one is due at `now_us` of the owner's clock: at the start and once a second until
+    /// greeted, when the peer asked for one, and when its frames came unheralded. It counts as said:
+    /// encode it.
+    pub fn hello_due(&mut self, now_us: u64) -> Option<Message> {
+        let since_us = self
+            .last_hello_us
+            .map_or(u64::MAX, |last_us| now_us.saturating_sub(last_us));
+        let asks = (!self.greeted && since_us >= HELLO_PERIOD_US)
+            || (self.ask_due && since_us >= ASK_PERIOD_US);
+        if !asks && !self.answer_due {
+            return None;
+        }
+        self.answer_due = false;
+        if asks {
+            self.ask_due = false;
+        }
+        self.last_hello_us = Some(now_us);
+        Some(Message::Hello(self.hello.asking(asks)))
+    }
+
+    /// The peer said a compatible Hello: opens. If it `asks`, the next [`Sender::hello_due`] answers.
+    pub fn on_greeting(&mut self, asks: bool) {
+        self.greeted = true;
+        self.ask_due = false;
+        self.answer_due |= asks;
+    }
+
+    /// A frame came from a peer that has not said Hello: the next [`Sender::hello_due`] asks for one,
+    /// at most once in 100 ms.
+    pub fn on_unheralded(&mut self) {
+        self.ask_due = true;
+    }
+
+    /// The peer said a Hello of another protocol or schema: closes, and says Hello once a second, so
+    /// that the peer learns it too.
+    pub fn on_foreign(&mut self) {
+        self.greeted = false;
+        self.answer_due = false;
+    }
+
+    /// Frames encoded since the start; wraps at 2³².
+    pub const fn sent(&self) -> u32 {
+        self.sent
+    }
+}

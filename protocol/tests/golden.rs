@@ -1,0 +1,152 @@
+//! The wire's bytes, literally.
+//!
+//! Boards in the field speak these bytes. Whoever changes one of them, or [`protocol::SCHEMA_HASH`],
+//! raises [`protocol::PROTOCOL_VERSION`].
+
+mod messages;
+
+use messages::{events, greeted_receiver, hello, samples};
+use protocol::{Event, HELLO_LENGTH, Hello, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver};
+use protocol::{SCHEMA_HASH, frame};
+
+/// The number of every frame below.
+const SEQUENCE: u16 = 0x0102;
+
+/// Name of a message in [`samples`], and its whole frame in hexadecimal: COBS over the sequence
+/// (02 01), the payload (first byte: the variant) and the CRC-32, then 00.
+const GOLDEN: &[(&str, &str)] = &[
+    (
+        "hello",
+        "030201065244474c01156d9a580741bdc98c7353544d3332463432395a490101010101020106016b\
+         5eadbe00",
+    ),
+    (
+        "estimate",
+        "0b020101ac02c08db701010101034001022002440109403f01042b8efb2a00",
+    ),
+    (
+        "estimate without a wavelength",
+        "0402010103904e01010101010101010101061f7cbda36400",
+    ),
+    ("motion", "14020102dc0bc08db701f1c001e0c5084a1aa3f300"),
+    (
+        "gauges",
+        "6b020103a01f8092f401c0b80280800281800282800283800284800285800207e48002e58002e680\
+         02e78002e88002e9800205c88102c98102ca8102cb8102cc8102cd810203ac8202ad8202ae8202af\
+         8202b08202b18202019083029183029283029383029483029583023ef48302f58302f68302f78302\
+         f88302f9830202d88402d98402da8402db8402dc8402dd840204bc8502bd8502be8502bf8502c085\
+         02c1850206b2e562c800",
+    ),
+    (
+        "sensor's status",
+        "31020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
+         07f107f207f307f4070e8827010203f403c413bb992e0a00",
+    ),
+    (
+        "display's status",
+        "40020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
+         07f107f207f307f40701904ea84601f4030203044fb28f1b00",
+    ),
+    ("configure a sensor", "04020105010b500201c09a0c55a2fb4b00"),
+    (
+        "configure a display",
+        "120201050101f4031432dc0b882737898b4200",
+    ),
+    (
+        "configuration taken",
+        "0402010601010b500201c09a0c7e733b8600",
+    ),
+    (
+        "configuration refused",
+        "1402010601080101f4031432dc0b882724bb88a400",
+    ),
+    ("ping", "0a020107e807da39d20900"),
+    ("pong", "0e020108e807d00f82102723874600"),
+    ("stop by the operator", "0402010905e9c64d5b00"),
+    ("stop by the host", "09020109017ff64a2c00"),
+];
+
+fn bytes(hexadecimal: &str) -> Vec<u8> {
+    assert_eq!(hexadecimal.len() % 2, 0);
+    (0..hexadecimal.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&hexadecimal[at..at + 2], 16).expect("hexadecimal digits"))
+        .collect()
+}
+
+#[test]
+fn every_message_is_encoded_to_its_golden_bytes() {
+    let samples = samples();
+    assert_eq!(samples.len(), GOLDEN.len());
+    for ((name, message), (golden_name, golden)) in samples.iter().zip(GOLDEN) {
+        assert_eq!(name, golden_name);
+        let mut out = [0; MAX_FRAME];
+        let frame = frame::encode(SEQUENCE, message, &mut out).expect("it fits");
+        assert_eq!(frame, bytes(golden), "{name}");
+    }
+}
+
+#[test]
+fn every_golden_frame_is_received_as_its_message() {
+    for ((name, message), (_, golden)) in samples().iter().zip(GOLDEN) {
+        let expected = match message {
+            Message::Hello(hello) => Event::Greeted(*hello),
+            message => Event::Message(message.clone()),
+        };
+        let received = events(&mut greeted_receiver(), &bytes(golden));
+        assert_eq!(received, [expected], "{name}");
+    }
+}
+
+#[test]
+fn the_golden_frames_show_every_variant() {
+    // Variant bytes 0 to 9, the largest of them the number of variants less one.
+    let mut variants: Vec<u8> = samples()
+        .iter()
+        .map(|(_, message)| postcard::to_stdvec(message).expect("it encodes")[0])
+        .collect();
+    variants.dedup();
+    assert_eq!(variants, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
+}
+
+#[test]
+fn version_and_schema_are_those_of_the_golden_frames() {
+    assert_eq!(PROTOCOL_VERSION, 1);
+    assert_eq!(SCHEMA_HASH, 0x8cc9_bd41_0758_9a6d);
+}
+
+#[test]
+fn a_hello_of_any_version_lies_as_this_one_does() {
+    // Magic, protocol 0x0203, schema, role, chip, version 4.5.6, asks.
+    let golden = bytes(
+        "5244474c\
+         0302\
+         0807060504030201\
+         64\
+         53544d33324634323949000000000000\
+         040506\
+         01",
+    );
+    assert_eq!(golden.len(), HELLO_LENGTH);
+    let later = Hello {
+        protocol: 0x0203_u16.to_le_bytes(),
+        schema: 0x0102_0304_0506_0708_u64.to_le_bytes(),
+        role: b'd',
+        chip: *b"STM32F429I\0\0\0\0\0\0",
+        version: [4, 5, 6],
+        ..hello()
+    };
+    assert_eq!(later.to_bytes(), *golden);
+    assert_eq!(Hello::from_bytes(&golden), Some(later));
+    assert_eq!(
+        postcard::to_stdvec(&Message::Hello(later)).expect("it encodes")[1..],
+        golden
+    );
+
+    let mut frame = [0; MAX_FRAME];
+    let frame = frame::encode_payload(7, &[&[0], &golden[..]].concat(), &mut frame);
+    let mut receiver = Receiver::new();
+    let received = events(&mut receiver, frame.expect("it fits"));
+    assert_eq!(received, [Event::Foreign(later)]);
+    assert_eq!(receiver.peer(), Peer::Foreign(later));
+}

@@ -1,0 +1,471 @@
+//! Arbitrary messages, and the longest of each kind.
+#![allow(
+    dead_code,
+    reason = "each test binary uses its own part of this module"
+)]
+
+use proptest::prelude::*;
+use protocol::*;
+
+/// A compatible Hello that asks for an answer.
+pub fn hello() -> Hello {
+    Hello::new(Role::Sensor, "STM32F429ZI", [0, 1, 0]).asking(true)
+}
+
+/// A Hello of a later protocol version.
+pub fn foreign_hello() -> Hello {
+    Hello {
+        protocol: (PROTOCOL_VERSION + 1).to_le_bytes(),
+        ..hello()
+    }
+}
+
+/// A sender that has been greeted and whose own Hello is still to be said.
+pub fn open_sender() -> Sender {
+    let mut sender = Sender::new(hello());
+    sender.on_greeting(false);
+    sender
+}
+
+/// One frame's bytes, the closing 0x00 included.
+pub fn frame_of(sender: &mut Sender, message: &Message) -> Vec<u8> {
+    let mut out = [0; MAX_FRAME];
+    sender
+        .encode(message, &mut out)
+        .expect("the sender is open")
+        .to_vec()
+}
+
+/// The frame numbered `sequence` around any payload.
+pub fn raw_frame(sequence: u16, payload: &[u8]) -> Vec<u8> {
+    let mut out = [0; MAX_FRAME];
+    frame::encode_payload(sequence, payload, &mut out)
+        .expect("the payload fits")
+        .to_vec()
+}
+
+/// The frame numbered `sequence`, of a message.
+pub fn numbered(sequence: u16, message: &Message) -> Vec<u8> {
+    raw_frame(sequence, &postcard::to_stdvec(message).expect("it encodes"))
+}
+
+/// Everything a receiver hands on for these bytes.
+pub fn events(receiver: &mut Receiver, bytes: &[u8]) -> Vec<Event> {
+    let mut events = Vec::new();
+    receiver.receive(bytes, |event| events.push(event));
+    events
+}
+
+/// A receiver that has heard a compatible Hello in frame 0.
+pub fn greeted_receiver() -> Receiver {
+    let mut receiver = Receiver::new();
+    let greeting = events(&mut receiver, &numbered(0, &Message::Hello(hello())));
+    assert_eq!(greeting, [Event::Greeted(hello())]);
+    receiver
+}
+
+/// Any message, its floats finite.
+pub fn message() -> impl Strategy<Value = Message> {
+    prop_oneof![any_hello().prop_map(Message::Hello), content(),]
+}
+
+/// Any message but a Hello, its floats finite.
+pub fn content() -> impl Strategy<Value = Message> {
+    prop_oneof![
+        estimate().prop_map(Message::Estimate),
+        motion().prop_map(Message::Motion),
+        gauges().prop_map(Message::Gauges),
+        status().prop_map(Message::Status),
+        configuration().prop_map(Message::Configure),
+        (proptest::option::of(setting()), configuration()).prop_map(|(refused, configuration)| {
+            Message::Configuration(ConfigurationReport {
+                refused,
+                configuration,
+            })
+        }),
+        any::<u64>().prop_map(|sent_us| Message::Ping(Ping { sent_us })),
+        any::<[u64; 3]>().prop_map(|[sent_us, received_us, answered_us]| {
+            Message::Pong(Pong {
+                sent_us,
+                received_us,
+                answered_us,
+            })
+        }),
+        prop_oneof![Just(StopReason::Operator), Just(StopReason::Host)]
+            .prop_map(|reason| Message::Stop(Stop { reason })),
+    ]
+}
+
+/// Any Hello of this build.
+pub fn any_hello() -> impl Strategy<Value = Hello> {
+    (
+        prop_oneof![Just(Role::Sensor), Just(Role::Display), Just(Role::Host)],
+        "[ -~]{0,20}",
+        any::<[u8; 3]>(),
+        any::<bool>(),
+    )
+        .prop_map(|(role, chip, version, asks)| Hello::new(role, &chip, version).asking(asks))
+}
+
+fn finite() -> impl Strategy<Value = f32> {
+    proptest::num::f32::NORMAL | proptest::num::f32::ZERO | proptest::num::f32::SUBNORMAL
+}
+
+fn estimate() -> impl Strategy<Value = Estimate> {
+    (
+        any::<(u32, u64, bool, u8)>(),
+        proptest::option::of(finite()),
+        finite(),
+        finite(),
+        prop_oneof![Just(Range::T1), Just(Range::T2)],
+    )
+        .prop_map(
+            |(
+                (sequence, instant_us, valid, gauges_used),
+                wavelength_mm,
+                amplitude_lsb,
+                confidence,
+                range,
+            )| {
+                Estimate {
+                    sequence,
+                    instant_us,
+                    wavelength_mm,
+                    valid,
+                    amplitude_lsb,
+                    confidence,
+                    range,
+                    gauges_used,
+                }
+            },
+        )
+}
+
+fn motion() -> impl Strategy<Value = Motion> {
+    any::<(u32, u64, i64, i32)>().prop_map(|(sequence, instant_us, position_um, velocity_um_s)| {
+        Motion {
+            sequence,
+            instant_us,
+            position_um,
+            velocity_um_s,
+        }
+    })
+}
+
+fn gauges() -> impl Strategy<Value = Gauges> {
+    any::<(u32, u64, i64, [([u16; CHANNELS], i16); GAUGE_BLOCK])>().prop_map(
+        |(first_sample, instant_us, position_um, samples)| Gauges {
+            first_sample,
+            instant_us,
+            position_um,
+            samples: samples.map(|(codes, travel_um)| GaugeSample { codes, travel_um }),
+        },
+    )
+}
+
+/// Port counters from thirteen numbers, in their order.
+pub fn port(n: [u32; 13]) -> PortCounters {
+    PortCounters {
+        sent: n[0],
+        dropped: n[1],
+        received: n[2],
+        lost: n[3],
+        corrupt: n[4],
+        overlong: n[5],
+        late: n[6],
+        duplicated: n[7],
+        malformed: n[8],
+        foreign: n[9],
+        unheralded: n[10],
+        overruns: n[11],
+        line_errors: n[12],
+    }
+}
+
+fn status() -> impl Strategy<Value = Status> {
+    let role = prop_oneof![
+        any::<[u32; 6]>().prop_map(|n| RoleCounters::Sensor(sensor_counters(n))),
+        any::<[u32; 7]>().prop_map(|n| RoleCounters::Display(display_counters(n))),
+    ];
+    let reset = prop_oneof![
+        Just(ResetCause::Power),
+        Just(ResetCause::Pin),
+        Just(ResetCause::Watchdog),
+        Just(ResetCause::Software)
+    ];
+    (any::<(u64, u32, [u32; 13], [u32; 13])>(), reset, role).prop_map(
+        |((uptime_us, watchdog_resets, peer, console), reset, role)| Status {
+            uptime_us,
+            reset,
+            watchdog_resets,
+            peer: port(peer),
+            console: port(console),
+            role,
+        },
+    )
+}
+
+/// Sensor counters from six numbers, in their order.
+pub fn sensor_counters(n: [u32; 6]) -> SensorCounters {
+    SensorCounters {
+        samples: n[0],
+        adc_overruns: n[1],
+        dma_overruns: n[2],
+        deadline_misses: n[3],
+        estimates: n[4],
+        motions: n[5],
+    }
+}
+
+/// Display counters from seven numbers, in their order.
+pub fn display_counters(n: [u32; 7]) -> DisplayCounters {
+    DisplayCounters {
+        ticks: n[0],
+        updates: n[1],
+        deadline_misses: n[2],
+        estimates: n[3],
+        refused_estimates: n[4],
+        fades: n[5],
+        spi_errors: n[6],
+    }
+}
+
+fn configuration() -> impl Strategy<Value = Configuration> {
+    prop_oneof![
+        any::<(u16, u8, bool, u32)>().prop_map(
+            |(window_ms, counted_gauge, stream_gauges, arm_full_scale_um_s)| {
+                Configuration::Sensor(SensorConfiguration {
+                    method: Method::Counting,
+                    window_ms,
+                    counted_gauge,
+                    stream_gauges,
+                    arm_full_scale_um_s,
+                })
+            }
+        ),
+        (
+            prop_oneof![Just(Mode::Uniform), Just(Mode::Travelling)],
+            any::<[u16; 5]>()
+        )
+            .prop_map(
+                |(mode, [max_age_ms, fade_in_ms, fade_out_ms, pitch_um, amplitude_mv])| {
+                    Configuration::Display(DisplayConfiguration {
+                        mode,
+                        max_age_ms,
+                        fade_in_ms,
+                        fade_out_ms,
+                        pitch_um,
+                        amplitude_mv,
+                    })
+                }
+            ),
+    ]
+}
+
+fn setting() -> impl Strategy<Value = Setting> {
+    proptest::sample::select(vec![
+        Setting::Role,
+        Setting::WindowMs,
+        Setting::CountedGauge,
+        Setting::ArmFullScale,
+        Setting::MaxAgeMs,
+        Setting::FadeInMs,
+        Setting::FadeOutMs,
+        Setting::PitchUm,
+        Setting::AmplitudeMv,
+    ])
+}
+
+/// The longest message of the same kind: every number where its varint is longest. The match names
+/// every variant, so that a new one does not compile until it stands here too.
+pub fn longest_like(message: &Message) -> Message {
+    match message {
+        Message::Hello(hello) => Message::Hello(*hello),
+        Message::Estimate(_) => Message::Estimate(Estimate {
+            sequence: u32::MAX,
+            instant_us: u64::MAX,
+            wavelength_mm: Some(f32::MAX),
+            valid: true,
+            amplitude_lsb: f32::MAX,
+            confidence: f32::MAX,
+            range: Range::T2,
+            gauges_used: u8::MAX,
+        }),
+        Message::Motion(_) => Message::Motion(Motion {
+            sequence: u32::MAX,
+            instant_us: u64::MAX,
+            position_um: i64::MIN,
+            velocity_um_s: i32::MIN,
+        }),
+        Message::Gauges(_) => Message::Gauges(Gauges {
+            first_sample: u32::MAX,
+            instant_us: u64::MAX,
+            position_um: i64::MIN,
+            samples: [GaugeSample {
+                codes: [u16::MAX; CHANNELS],
+                travel_um: i16::MIN,
+            }; GAUGE_BLOCK],
+        }),
+        Message::Status(_) => Message::Status(Status {
+            uptime_us: u64::MAX,
+            reset: ResetCause::Software,
+            watchdog_resets: u32::MAX,
+            peer: port([u32::MAX; 13]),
+            console: port([u32::MAX; 13]),
+            role: RoleCounters::Display(display_counters([u32::MAX; 7])),
+        }),
+        Message::Configure(_) => Message::Configure(longest_configuration()),
+        Message::Configuration(_) => Message::Configuration(ConfigurationReport {
+            refused: Some(Setting::AmplitudeMv),
+            configuration: longest_configuration(),
+        }),
+        Message::Ping(_) => Message::Ping(Ping { sent_us: u64::MAX }),
+        Message::Pong(_) => Message::Pong(Pong {
+            sent_us: u64::MAX,
+            received_us: u64::MAX,
+            answered_us: u64::MAX,
+        }),
+        Message::Stop(_) => Message::Stop(Stop {
+            reason: StopReason::Host,
+        }),
+    }
+}
+
+fn longest_configuration() -> Configuration {
+    Configuration::Display(DisplayConfiguration {
+        mode: Mode::Travelling,
+        max_age_ms: u16::MAX,
+        fade_in_ms: u16::MAX,
+        fade_out_ms: u16::MAX,
+        pitch_um: u16::MAX,
+        amplitude_mv: u16::MAX,
+    })
+}
+
+/// One message of each kind, with every role and both outcomes of a configuration.
+pub fn samples() -> Vec<(&'static str, Message)> {
+    let sensor = Configuration::Sensor(SensorConfiguration {
+        method: Method::Counting,
+        window_ms: 80,
+        counted_gauge: 2,
+        stream_gauges: true,
+        arm_full_scale_um_s: 200_000,
+    });
+    let display = Configuration::Display(DisplayConfiguration {
+        mode: Mode::Travelling,
+        max_age_ms: 500,
+        fade_in_ms: 20,
+        fade_out_ms: 50,
+        pitch_um: 1_500,
+        amplitude_mv: 5_000,
+    });
+    let status = |role| {
+        Message::Status(Status {
+            uptime_us: 5_000_000,
+            reset: ResetCause::Watchdog,
+            watchdog_resets: 1,
+            peer: port(core::array::from_fn(|i| 1 + i as u32)),
+            console: port(core::array::from_fn(|i| 1_000 + i as u32)),
+            role,
+        })
+    };
+    vec![
+        ("hello", Message::Hello(hello())),
+        (
+            "estimate",
+            Message::Estimate(Estimate {
+                sequence: 300,
+                instant_us: 3_000_000,
+                wavelength_mm: Some(2.0),
+                valid: true,
+                amplitude_lsb: 512.5,
+                confidence: 0.75,
+                range: Range::T2,
+                gauges_used: 0b0_0100,
+            }),
+        ),
+        (
+            "estimate without a wavelength",
+            Message::Estimate(Estimate {
+                sequence: 0,
+                instant_us: 10_000,
+                wavelength_mm: None,
+                valid: false,
+                amplitude_lsb: 0.0,
+                confidence: 0.0,
+                range: Range::T1,
+                gauges_used: 0b1_1111,
+            }),
+        ),
+        (
+            "motion",
+            Message::Motion(Motion {
+                sequence: 1_500,
+                instant_us: 3_000_000,
+                position_um: -12_345,
+                velocity_um_s: 70_000,
+            }),
+        ),
+        (
+            "gauges",
+            Message::Gauges(Gauges {
+                first_sample: 4_000,
+                instant_us: 4_000_000,
+                position_um: 20_000,
+                samples: core::array::from_fn(|i| GaugeSample {
+                    codes: core::array::from_fn(|channel| 32_768 + 100 * i as u16 + channel as u16),
+                    travel_um: i as i16 - 4,
+                }),
+            }),
+        ),
+        (
+            "sensor's status",
+            status(RoleCounters::Sensor(sensor_counters([
+                5_000, 1, 2, 3, 500, 2_500,
+            ]))),
+        ),
+        (
+            "display's status",
+            status(RoleCounters::Display(display_counters([
+                10_000, 9_000, 1, 500, 2, 3, 4,
+            ]))),
+        ),
+        ("configure a sensor", Message::Configure(sensor)),
+        ("configure a display", Message::Configure(display)),
+        (
+            "configuration taken",
+            Message::Configuration(ConfigurationReport {
+                refused: None,
+                configuration: sensor,
+            }),
+        ),
+        (
+            "configuration refused",
+            Message::Configuration(ConfigurationReport {
+                refused: Some(Setting::AmplitudeMv),
+                configuration: display,
+            }),
+        ),
+        ("ping", Message::Ping(Ping { sent_us: 1_000 })),
+        (
+            "pong",
+            Message::Pong(Pong {
+                sent_us: 1_000,
+                received_us: 2_000,
+                answered_us: 2_050,
+            }),
+        ),
+        (
+            "stop by the operator",
+            Message::Stop(Stop {
+                reason: StopReason::Operator,
+            }),
+        ),
+        (
+            "stop by the host",
+            Message::Stop(Stop {
+                reason: StopReason::Host,
+            }),
+        ),
+    ]
+}
