@@ -1,0 +1,169 @@
+//! What the filters cost on the board, in instructions: each part is run for 1 000 ms of a pseudo-random
+//! signal, between two marks that an emulator can see.
+//!
+//! A mark is a 32-bit write to the CRC unit's data register, [`MARKS`]: k at the start of part k, k + 100
+//! at its end, 999 when all is done.
+//!
+//! | part | what |
+//! | --- | --- |
+//! | 0 | nothing but the loop over the signal |
+//! | 1 | band-pass and crossings of five gauges, `firmware-sensor` |
+//! | 2 | the same with `biquad`, direct form II transposed |
+//! | 3 | the same with `idsp`, direct form II transposed |
+//! | 4 | anti-aliasing of six channels |
+//! | 5 | the whole of `Sensor::step` |
+//!
+//! On a computer this is an empty program: `cargo bench -p firmware-sensor` measures there.
+#![cfg_attr(target_os = "none", no_std)]
+#![cfg_attr(target_os = "none", no_main)]
+
+#[cfg(not(target_os = "none"))]
+fn main() {}
+
+#[cfg(target_os = "none")]
+mod board {
+    use core::hint::black_box;
+
+    use biquad::Biquad;
+    // The memory map, the vector table and the logger that the linker scripts ask for.
+    use defmt_rtt as _;
+    use dsp_process::SplitProcess;
+    use embassy_stm32 as _;
+    use firmware_sensor::bandpass::{BAND, BandPass, ORDER};
+    use firmware_sensor::crossing::Crossing;
+    use firmware_sensor::decimate::{AntiAlias, History};
+    use firmware_sensor::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan, Sensor};
+    use protocol::{CHANNELS, GAUGES, SensorConfiguration};
+
+    const MILLISECONDS: usize = 1_000;
+    /// The CRC unit's data register.
+    const MARKS: *mut u32 = 0x4002_3000 as *mut u32;
+    /// RCC_AHB1ENR and the bit that gives the CRC unit its clock.
+    const AHB1_CLOCKS: *mut u32 = 0x4002_3830 as *mut u32;
+    const CRC_CLOCK: u32 = 1 << 12;
+    const DONE: u32 = 999;
+
+    type Millisecond = [Scan; SCANS_PER_SAMPLE];
+    type Signal = [Millisecond; MILLISECONDS];
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        enable_marks();
+        let scans =
+            cortex_m::singleton!(: Signal = [[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS]);
+        let samples =
+            cortex_m::singleton!(: [[f32; GAUGES]; MILLISECONDS] = [[0.0; GAUGES]; MILLISECONDS]);
+        if let (Some(scans), Some(samples)) = (scans, samples) {
+            let mut noise = Noise(1);
+            for (scans, sample) in scans.iter_mut().zip(samples.iter_mut()) {
+                *scans = [[(); CHANNELS]; SCANS_PER_SAMPLE].map(|scan| scan.map(|()| noise.code()));
+                *sample = [(); GAUGES].map(|()| f32::from(noise.code()) - f32::from(MID_RAIL_CODE));
+            }
+            run(scans, samples);
+        }
+        mark(DONE);
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+
+    fn run(scans: &Signal, samples: &[[f32; GAUGES]; MILLISECONDS]) {
+        let ours = BandPass::<ORDER>::new(BAND);
+        let biquads = ours.biquads();
+
+        part(0, samples, |_, x| x);
+
+        let mut lanes = [ours.settled(0.0); GAUGES];
+        part(1, samples, |gauge, x| ours.step(&mut lanes[gauge], x));
+
+        let sections = biquads.map(|[b0, b1, b2, a1, a2]| {
+            biquad::DirectForm2Transposed::<f32>::new(biquad::Coefficients { b0, b1, b2, a1, a2 })
+        });
+        let mut lanes = [sections; GAUGES];
+        part(2, samples, |gauge, x| {
+            lanes[gauge].iter_mut().fold(x, |x, section| section.run(x))
+        });
+
+        // idsp's recursive coefficients have the other sign.
+        let sections = biquads.map(|[b0, b1, b2, a1, a2]| idsp::iir::Biquad::<f32> {
+            ba: [b0, b1, b2, -a1, -a2],
+        });
+        let mut lanes: [[idsp::iir::DirectForm2Transposed<f32>; ORDER]; GAUGES] =
+            Default::default();
+        part(3, samples, |gauge, x| {
+            let sections = sections.iter().zip(&mut lanes[gauge]);
+            sections.fold(x, |x, (section, lane)| section.process(lane, x))
+        });
+
+        let anti_alias = AntiAlias::new();
+        let mut history = History::settled(&scans[0][0]);
+        mark(4);
+        for scans in black_box(scans) {
+            black_box(anti_alias.step(&mut history, scans));
+        }
+        mark(104);
+
+        let mut sensor = Sensor::new(SensorConfiguration::default());
+        mark(5);
+        for (ms, scans) in black_box(scans).iter().enumerate() {
+            black_box(sensor.step(ms as u64 * 1_000, scans, (ms * 10) as u16));
+        }
+        mark(105);
+    }
+
+    /// Part `number`: `filter` on all gauges and the crossings of what comes out.
+    #[inline(never)]
+    fn part(
+        number: u32,
+        samples: &[[f32; GAUGES]; MILLISECONDS],
+        mut filter: impl FnMut(usize, f32) -> f32,
+    ) {
+        let mut crossing = [Crossing::default(); GAUGES];
+        mark(number);
+        for sample in black_box(samples) {
+            let mut impulses = [false; GAUGES];
+            for gauge in 0..GAUGES {
+                impulses[gauge] = crossing[gauge].step(filter(gauge, sample[gauge]));
+            }
+            black_box(impulses);
+        }
+        mark(number + 100);
+    }
+
+    #[allow(
+        unsafe_code,
+        reason = "a volatile access to registers that nothing else here uses"
+    )]
+    fn enable_marks() {
+        // SAFETY: RCC_AHB1ENR exists on every STM32F4, and nothing else has been set up yet.
+        unsafe { AHB1_CLOCKS.write_volatile(AHB1_CLOCKS.read_volatile() | CRC_CLOCK) };
+    }
+
+    #[allow(
+        unsafe_code,
+        reason = "a volatile access to registers that nothing else here uses"
+    )]
+    fn mark(number: u32) {
+        // SAFETY: the CRC unit has its clock, takes any word and touches no memory.
+        unsafe { MARKS.write_volatile(number) };
+    }
+
+    /// Xorshift, 32 bits.
+    struct Noise(u32);
+
+    impl Noise {
+        fn code(&mut self) -> u16 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 17;
+            self.0 ^= self.0 << 5;
+            (self.0 >> 20) as u16
+        }
+    }
+
+    #[panic_handler]
+    fn panic(_: &core::panic::PanicInfo) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! The whole [`Sensor`] on synthetic signals: ADC codes and encoder counts in, estimates out.
+
+use std::f64::consts::PI;
+
+use firmware_sensor::counting::predicted_mean_mm;
+use firmware_sensor::{
+    Drive, ESTIMATE_RATE_HZ, MICROMETRES_PER_COUNT, MID_RAIL_CODE, Output, SCAN_RATE_HZ,
+    SCANS_PER_SAMPLE, Scan, Sensor,
+};
+use protocol::{Estimate, Gauges, Motion, Range, SensorConfiguration};
+
+const WINDOW_S: f64 = 0.08;
+/// The codes that a gauge swings from mid-rail, and how far its rest may be off.
+const SWING: f64 = 600.0;
+const OFFSETS: [f64; 6] = [0.0, 31.0, -240.0, 5.0, 90.0, 0.0];
+
+/// A trapezoidal grating's signal, fundamental 1, at place x in wavelengths.
+fn grating(x: f64) -> f64 {
+    [1.0, 3.0, 5.0]
+        .map(|k: f64| (k * 0.1 * PI).sin() / (0.1 * PI * k * k) * (2.0 * PI * k * x).sin())
+        .iter()
+        .sum()
+}
+
+/// The sensor on a grating of `wavelength_mm`, moved along `position_mm` of time in s, for `duration_s`.
+fn rub(
+    sensor: &mut Sensor,
+    duration_s: f64,
+    wavelength_mm: f64,
+    position_mm: impl Fn(f64) -> f64,
+) -> Vec<Output> {
+    let scan = |number: u64| -> Scan {
+        let x = position_mm(number as f64 / f64::from(SCAN_RATE_HZ)) / wavelength_mm;
+        std::array::from_fn(|channel| {
+            let swing = SWING * grating(x + 0.137 * channel as f64);
+            (f64::from(MID_RAIL_CODE) + OFFSETS[channel] + swing).floor() as u16
+        })
+    };
+    (0..(duration_s * 1_000.0) as u64)
+        .map(|ms| {
+            let last = (ms + 1) * SCANS_PER_SAMPLE as u64 - 1;
+            let scans =
+                std::array::from_fn(|i| scan(last + 1 + i as u64 - SCANS_PER_SAMPLE as u64));
+            let position_um = 1_000.0 * position_mm(last as f64 / f64::from(SCAN_RATE_HZ));
+            // The sum keeps positions on a count's edge from falling to either side of it.
+            let counts = ((position_um + 1e-6) / f64::from(MICROMETRES_PER_COUNT)).floor() as i64;
+            sensor.step((ms + 1) * 1_000, &scans, counts as u16)
+        })
+        .collect()
+}
+
+fn estimates(outputs: &[Output]) -> Vec<Estimate> {
+    outputs
+        .iter()
+        .filter_map(|output| output.estimate)
+        .collect()
+}
+
+fn default_sensor() -> Sensor {
+    Sensor::new(SensorConfiguration::default())
+}
+
+#[test]
+fn every_cell_of_table_1_is_where_quantisation_puts_it() {
+    for speed_mm_s in [30.0, 50.0, 70.0] {
+        for wavelength_mm in [1.0, 2.0, 3.0, 4.0] {
+            for gauge in 0..5 {
+                let mut sensor = Sensor::new(SensorConfiguration {
+                    counted_gauge: gauge,
+                    ..SensorConfiguration::default()
+                });
+                let outputs = rub(&mut sensor, 2.5, wavelength_mm, |t_s| speed_mm_s * t_s);
+                let settled = &estimates(&outputs)[50..];
+                assert_eq!(settled.len(), 200);
+                assert!(settled.iter().all(|estimate| estimate.valid));
+                let sum: f64 = settled
+                    .iter()
+                    .filter_map(|estimate| estimate.wavelength_mm)
+                    .map(f64::from)
+                    .sum();
+                let got = sum / 200.0;
+                let want = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
+                assert!(
+                    (got - want).abs() <= 0.03,
+                    "{got} is not {want} at {speed_mm_s} mm/s on {wavelength_mm} mm, gauge {gauge}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_single_estimate_is_one_of_the_two_counts_that_fit() {
+    // 30 mm/s on 3 mm: 1.6 crossings a window, so λe is 4.8 mm or 2.4 mm, and the speed 1 % off at most.
+    let outputs = rub(&mut default_sensor(), 2.5, 3.0, |t_s| 30.0 * t_s);
+    for estimate in &estimates(&outputs)[50..] {
+        let got = f64::from(estimate.wavelength_mm.unwrap_or(f32::NAN));
+        let fits = |want: f64| (got / want - 1.0).abs() <= 0.0105;
+        assert!(fits(4.8) || fits(2.4), "{got}");
+    }
+}
+
+#[test]
+fn estimates_come_at_100_hz_numbered_from_0() {
+    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
+    let estimates = estimates(&outputs);
+    assert_eq!(estimates.len(), ESTIMATE_RATE_HZ as usize);
+    for (number, estimate) in estimates.iter().enumerate() {
+        assert_eq!(estimate.sequence as usize, number);
+        assert_eq!(estimate.instant_us, (number as u64 + 1) * 10_000);
+        assert_eq!(estimate.gauges_used, 1 << 2);
+    }
+}
+
+#[test]
+fn nothing_is_valid_before_the_filters_have_settled_and_a_window_is_full() {
+    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
+    let estimates = estimates(&outputs);
+    // 135 ms of settling and 80 ms of window.
+    for estimate in &estimates {
+        let full = estimate.instant_us >= 215_000;
+        assert_eq!(estimate.valid, full, "at {} µs", estimate.instant_us);
+        assert_eq!(
+            estimate.wavelength_mm.is_some(),
+            full,
+            "at {} µs",
+            estimate.instant_us
+        );
+    }
+}
+
+#[test]
+fn a_new_configuration_is_counted_for_a_whole_window_first() {
+    let mut sensor = default_sensor();
+    rub(&mut sensor, 1.0, 2.0, |t_s| 50.0 * t_s);
+    let configuration = SensorConfiguration {
+        window_ms: 120,
+        counted_gauge: 4,
+        ..SensorConfiguration::default()
+    };
+    sensor.configure(configuration);
+    assert_eq!(sensor.configuration(), configuration);
+    let outputs = rub(&mut sensor, 1.0, 2.0, |t_s| 50.0 * (t_s + 1.0));
+    for (number, estimate) in estimates(&outputs).iter().enumerate() {
+        assert_eq!(estimate.sequence as usize, 100 + number);
+        assert_eq!(estimate.gauges_used, 1 << 4);
+        assert_eq!(
+            estimate.wavelength_mm.is_some(),
+            number >= 11,
+            "number {number}"
+        );
+        if number >= 11 {
+            // 50 mm/s on 2 mm: 6 crossings in every window.
+            assert_eq!(estimate.wavelength_mm, Some(2.0));
+            assert_eq!(estimate.confidence, 1.0 - 1.0 / 6.0);
+        }
+    }
+}
+
+#[test]
+fn a_resting_sensor_has_no_valid_estimate() {
+    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |_| 0.3);
+    for estimate in estimates(&outputs) {
+        assert!(!estimate.valid);
+        assert_eq!(estimate.wavelength_mm, None);
+        assert_eq!(estimate.confidence, 0.0);
+        // A constant is no step: not even the filters' start shows.
+        assert!(estimate.amplitude_lsb < 0.01, "{}", estimate.amplitude_lsb);
+    }
+}
+
+#[test]
+fn a_creeping_sensor_has_no_valid_estimate() {
+    let outputs = rub(&mut default_sensor(), 3.0, 0.1, |t_s| 1.5 * t_s);
+    let estimates = estimates(&outputs);
+    assert!(
+        estimates
+            .iter()
+            .any(|estimate| estimate.wavelength_mm.is_some())
+    );
+    assert!(estimates.iter().all(|estimate| !estimate.valid));
+}
+
+#[test]
+fn the_amplitude_is_the_fundamentals_in_adc_steps() {
+    // 50 mm/s on 1 mm: 50 Hz, whole cycles in a window. The band-pass takes 1.4 % of it and leaves 0.36 of
+    // the third harmonic, which is 0.29 of the fundamental: 0.5 % more in RMS.
+    let outputs = rub(&mut default_sensor(), 2.0, 1.0, |t_s| 50.0 * t_s);
+    let want = SWING * (0.1 * PI).sin() / (0.1 * PI);
+    for estimate in &estimates(&outputs)[50..] {
+        let got = f64::from(estimate.amplitude_lsb);
+        assert!((got / want - 0.991).abs() <= 0.002, "{got} is not {want}");
+    }
+}
+
+#[test]
+fn a_rub_to_and_fro_is_in_t1_as_long_as_the_paper_says_and_valid_only_then() {
+    // A·fv = 0.08 · 0.83, so 1 − 2 A fv of the time: 86.7 %. Over ten strokes, sampled at 100 Hz.
+    let strokes_hz = 0.83;
+    let position_mm =
+        |t_s: f64| -70.0 / (2.0 * PI * strokes_hz) * (2.0 * PI * strokes_hz * t_s).cos();
+    let outputs = rub(&mut default_sensor(), 12.5, 2.0, position_mm);
+    let settled = &estimates(&outputs)[45..];
+    let in_t1 = settled
+        .iter()
+        .filter(|estimate| estimate.range == Range::T1)
+        .count();
+    let share = in_t1 as f64 / settled.len() as f64;
+    let want = 1.0 - 2.0 * WINDOW_S * strokes_hz;
+    // Forty borders of ranges, each placed to within an estimate, of 1 205 estimates.
+    assert!(
+        (share - want).abs() <= 40.0 / 1_205.0,
+        "{share} is not {want}"
+    );
+    for estimate in settled {
+        assert!(!estimate.valid || estimate.range == Range::T1);
+        if let Some(wavelength_mm) = estimate.wavelength_mm {
+            assert!(wavelength_mm.is_finite() && wavelength_mm > 0.0);
+        }
+    }
+}
+
+#[test]
+fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
+    let mut sensor = Sensor::new(SensorConfiguration {
+        stream_gauges: true,
+        ..SensorConfiguration::default()
+    });
+    let speed_mm_s = 40.0;
+    let outputs = rub(&mut sensor, 1.0, 4.0, |t_s| speed_mm_s * t_s);
+    let blocks: Vec<Gauges> = outputs.iter().filter_map(|output| output.gauges).collect();
+    assert_eq!(blocks.len(), 125);
+    for (number, block) in blocks.iter().enumerate().skip(2) {
+        assert_eq!(block.first_sample as usize, 8 * number);
+        let first_ms = 8 * number as i64 + 1;
+        assert_eq!(block.instant_us as i64, (first_ms - 4) * 1_000);
+        let mut position_um = block.position_um;
+        for (at, sample) in block.samples.iter().enumerate() {
+            assert_eq!(sample.travel_um, 40);
+            position_um += if at == 0 {
+                0
+            } else {
+                i64::from(sample.travel_um)
+            };
+            // The encoder started at the first millisecond's last scan, three scans in.
+            let x_mm = (position_um as f64 + speed_mm_s * 0.75) / 1_000.0;
+            for channel in 0..6 {
+                let code = f64::from(sample.codes[channel]) / 16.0;
+                let want = f64::from(MID_RAIL_CODE)
+                    + OFFSETS[channel]
+                    + SWING * grating(x_mm / 4.0 + 0.137 * channel as f64);
+                // The codes' floor, up to 1; the encoder's, up to 5 µm of a slope of at most
+                // 2 · 2π · 600 / 4 mm; the filter's flatness, 0.1 dB of 600 at most.
+                let bound = 1.0 + 0.005 * 2.0 * 2.0 * PI * SWING / 4.0 + 0.0116 * SWING;
+                assert!((code - want).abs() <= bound, "{code} is not {want}");
+            }
+        }
+    }
+    assert!(
+        rub(&mut default_sensor(), 0.1, 4.0, |_| 0.0)
+            .iter()
+            .all(|o| o.gauges.is_none())
+    );
+}
+
+#[test]
+fn the_drive_follows_motions_and_stops_without_them() {
+    let mut sensor = default_sensor();
+    let still = rub(&mut sensor, 0.01, 2.0, |_| 0.0);
+    assert!(still.iter().all(|output| output.drive.duty == 0));
+    let motion = Motion {
+        sequence: 3,
+        instant_us: 0,
+        position_um: 77_000,
+        velocity_um_s: -100_000,
+    };
+    assert!(sensor.on_motion(&motion));
+    assert!(!sensor.on_motion(&motion));
+    let moving = rub(&mut sensor, 0.2, 2.0, |t_s| -100.0 * (t_s - 0.000_75));
+    assert_eq!(
+        moving[0].drive,
+        Drive {
+            duty: Drive::FULL / 2,
+            forward: false
+        }
+    );
+    assert!(moving[..100].iter().all(|output| output.drive.duty > 0));
+    assert!(moving[100..].iter().all(|output| output.drive.duty == 0));
+}
+
+#[test]
+fn a_replay_is_the_same_bit_for_bit() {
+    let play = || rub(&mut default_sensor(), 1.0, 1.0, |t_s| 70.0 * t_s);
+    assert_eq!(play(), play());
+}
