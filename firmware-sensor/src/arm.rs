@@ -1,0 +1,216 @@
+//! The slave arm follows the operator's hand: [`Motion`]s in, PWM duty and direction out.
+
+use protocol::Motion;
+
+/// Milliseconds without a [`Motion`] after which the arm stands still.
+const SILENCE_MS: u32 = 100;
+/// kp: the velocity that an error of position adds, in µm/s per µm. The error decays with a time
+/// constant of 1/kp, 100 ms: slow beside the drive, so that no drive of this kind oscillates with it.
+const POSITION_GAIN_PER_S: i64 = 10;
+/// Errors of position are taken for no larger than this, in µm: any such error asks for full speed, and
+/// whatever number a frame carries, nothing overflows.
+const MAX_ERROR_UM: i64 = 1_000_000;
+
+/// What the arm's servo drive gets: its velocity command as PWM and a direction pin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drive {
+    /// PWM high time, 0 to [`Drive::FULL`].
+    pub duty: u16,
+    /// Towards larger x.
+    pub forward: bool,
+}
+
+impl Drive {
+    /// The duty of 100 %, which asks for the configured full-scale speed: the ticks of a 20 kHz period
+    /// of the 84 MHz timer clock.
+    pub const FULL: u16 = (84_000_000_u32 / 20_000) as u16;
+}
+
+/// Follows the hand from where both were when its first motion came.
+#[derive(Clone, Debug, Default)]
+pub struct Arm {
+    following: Option<Following>,
+}
+
+#[derive(Clone, Debug)]
+struct Following {
+    sequence: u32,
+    /// Hand minus arm when the first motion came.
+    offset_um: i64,
+    hand_um: i64,
+    velocity_um_s: i32,
+    /// Since the last motion came.
+    age_ms: u32,
+}
+
+impl Arm {
+    /// Takes a motion that came while the arm was at `arm_um`. One with an older or the same sequence
+    /// is refused, and false returned.
+    ///
+    /// The first motion, also the first one after [a silence](Arm::step), fixes the offset between hand
+    /// and arm: the arm never jumps to where the hand went meanwhile, and a restarted display, which
+    /// counts from 0 again, is followed.
+    pub fn on_motion(&mut self, motion: &Motion, arm_um: i64) -> bool {
+        let offset_um = match &self.following {
+            None => motion.position_um.saturating_sub(arm_um),
+            Some(f) if motion.sequence.wrapping_sub(f.sequence).cast_signed() > 0 => f.offset_um,
+            Some(_) => return false,
+        };
+        self.following = Some(Following {
+            sequence: motion.sequence,
+            offset_um,
+            hand_um: motion.position_um,
+            velocity_um_s: motion.velocity_um_s,
+            age_ms: 0,
+        });
+        true
+    }
+
+    /// The drive for the next millisecond, with the arm at `arm_um`: the hand's velocity plus kp times
+    /// the distance to the hand, which is taken to move on with its last velocity. Within
+    /// ±`full_scale_um_s`; 0 after 100 ms without a motion.
+    pub fn step(&mut self, arm_um: i64, full_scale_um_s: u32) -> Drive {
+        let Some(f) = &mut self.following else {
+            return Drive::default();
+        };
+        if f.age_ms >= SILENCE_MS {
+            self.following = None;
+            return Drive::default();
+        }
+        let velocity_um_s = i64::from(f.velocity_um_s);
+        let hand_um = f
+            .hand_um
+            .saturating_add(velocity_um_s * i64::from(f.age_ms) / 1_000);
+        let error_um = hand_um.saturating_sub(f.offset_um).saturating_sub(arm_um);
+        let error_um = error_um.clamp(-MAX_ERROR_UM, MAX_ERROR_UM);
+        f.age_ms += 1;
+        drive(
+            velocity_um_s + POSITION_GAIN_PER_S * error_um,
+            full_scale_um_s,
+        )
+    }
+}
+
+fn drive(command_um_s: i64, full_scale_um_s: u32) -> Drive {
+    let full_scale = u64::from(full_scale_um_s.max(1));
+    let speed = command_um_s.unsigned_abs().min(full_scale);
+    let duty = (speed * u64::from(Drive::FULL) + full_scale / 2) / full_scale;
+    Drive {
+        duty: duty as u16,
+        forward: command_um_s > 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FULL_SCALE_UM_S: u32 = 200_000;
+
+    fn motion(sequence: u32, position_um: i64, velocity_um_s: i32) -> Motion {
+        Motion {
+            sequence,
+            instant_us: 0,
+            position_um,
+            velocity_um_s,
+        }
+    }
+
+    fn command_um_s(drive: Drive) -> f64 {
+        let speed = f64::from(drive.duty) * f64::from(FULL_SCALE_UM_S) / f64::from(Drive::FULL);
+        if drive.forward { speed } else { -speed }
+    }
+
+    #[test]
+    fn stands_still_until_the_first_motion() {
+        assert_eq!(
+            Arm::default().step(123, FULL_SCALE_UM_S),
+            Drive {
+                duty: 0,
+                forward: false
+            }
+        );
+    }
+
+    #[test]
+    fn starts_from_wherever_the_hand_and_the_arm_are() {
+        let mut arm = Arm::default();
+        assert!(arm.on_motion(&motion(9, 5_000_000, 0), -777));
+        assert_eq!(arm.step(-777, FULL_SCALE_UM_S).duty, 0);
+    }
+
+    #[test]
+    fn commands_the_hands_velocity_and_the_share_of_its_lead() {
+        let mut arm = Arm::default();
+        arm.on_motion(&motion(0, 0, 50_000), 0);
+        assert_eq!(
+            arm.step(0, FULL_SCALE_UM_S),
+            Drive {
+                duty: Drive::FULL / 4,
+                forward: true
+            }
+        );
+        arm.on_motion(&motion(1, 100, -50_000), 0);
+        // One duty step is full scale / 4200 = 48 µm/s; rounding makes half of it.
+        let command = command_um_s(arm.step(0, FULL_SCALE_UM_S));
+        assert!((command + 49_000.0).abs() <= 24.0, "{command}");
+    }
+
+    #[test]
+    fn refuses_an_older_or_repeated_sequence_also_where_it_wraps() {
+        let mut arm = Arm::default();
+        assert!(arm.on_motion(&motion(u32::MAX - 1, 0, 1_000), 0));
+        assert!(arm.on_motion(&motion(1, 0, 2_000), 0));
+        assert!(!arm.on_motion(&motion(1, 0, 3_000), 0));
+        assert!(!arm.on_motion(&motion(u32::MAX, 0, 4_000), 0));
+        assert_eq!(arm.step(0, FULL_SCALE_UM_S).duty, Drive::FULL / 100);
+    }
+
+    #[test]
+    fn stops_after_100_ms_of_silence_and_then_takes_a_restarted_display() {
+        let mut arm = Arm::default();
+        arm.on_motion(&motion(1_000, 0, 50_000), 0);
+        for ms in 0..100 {
+            assert!(arm.step(ms * 50, FULL_SCALE_UM_S).duty > 0, "at {ms} ms");
+        }
+        assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+        assert!(arm.on_motion(&motion(0, 900_000, 0), 5_000));
+        assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+    }
+
+    #[test]
+    fn never_exceeds_full_scale_whatever_the_frame_says() {
+        for position_um in [i64::MIN, -1, 0, i64::MAX] {
+            for velocity_um_s in [i32::MIN, 0, i32::MAX] {
+                let mut arm = Arm::default();
+                arm.on_motion(&motion(0, 0, 0), i64::MAX);
+                arm.on_motion(&motion(1, position_um, velocity_um_s), 0);
+                for _ in 0..100 {
+                    assert!(arm.step(i64::MIN, FULL_SCALE_UM_S).duty <= Drive::FULL);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn follows_a_rubbing_hand_to_within_a_tenth_of_a_millimetre() {
+        // An ideal drive, motions every 2 ms. What is left is the hold between steps, at most
+        // |a|·2 ms/kp, and rounding of the duty, 24 µm/s /kp: together below 0.1 mm.
+        let angular = 2.0 * core::f64::consts::PI * 0.83;
+        let hand = |ms: u32| 13_422.0 * libm::sin(angular * f64::from(ms) / 1_000.0);
+        let mut arm = Arm::default();
+        let mut arm_um = 0.0;
+        for ms in 0..5_000_u32 {
+            if ms % 2 == 0 {
+                let velocity = (hand(ms + 1) - hand(ms.saturating_sub(1))) * 500.0;
+                arm.on_motion(
+                    &motion(ms / 2, hand(ms) as i64, velocity as i32),
+                    arm_um as i64,
+                );
+            }
+            arm_um += command_um_s(arm.step(arm_um as i64, FULL_SCALE_UM_S)) / 1_000.0;
+            let error = arm_um - hand(ms + 1);
+            assert!(error.abs() < 100.0, "{error} µm at {ms} ms");
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! The sensor board as a whole: scans, encoder and [`Motion`]s in; estimates, samples and the arm's
+//! drive out.
+
+use protocol::{Estimate, GAUGES, Gauges, Motion, Range, SensorConfiguration};
+
+use crate::amplitude::Amplitude;
+use crate::arm::{Arm, Drive};
+use crate::bandpass::{BAND, BandPass, Lane, ORDER};
+use crate::block::{Block, Place};
+use crate::counting::{self, Counting};
+use crate::crossing::Crossing;
+use crate::decimate::{self, AntiAlias, History};
+use crate::travel::Travel;
+use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
+
+/// Below this speed, in mm/s, no estimate is valid: fingertip and surface stick (Okamoto et al. 2009,
+/// section III-C), and 5 µm counts make more than a tenth of it.
+const MIN_SPEED_MM_S: f32 = 2.0;
+/// Time after the start, in samples, until crossings are counted: three time constants of the
+/// band-pass' slowest poles, √2 / (2π · 5 Hz), so that 5 % of whatever the start stirred up are left.
+const SETTLING_SAMPLES: u32 = (3.0 * core::f64::consts::SQRT_2
+    / (2.0 * core::f64::consts::PI * BAND.low_hz())
+    * SAMPLE_RATE_HZ as f64) as u32;
+const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
+const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
+
+/// What a millisecond brought.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Output {
+    /// Every tenth time.
+    pub estimate: Option<Estimate>,
+    /// Every eighth time, if the configuration asks for them.
+    pub gauges: Option<Gauges>,
+    /// For the arm, at once.
+    pub drive: Drive,
+}
+
+/// The state of everything between the ADC and the link. Its future depends on nothing else than what
+/// it is given: a replay of the same inputs gives the same outputs, bit for bit, on any machine.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    configuration: SensorConfiguration,
+    anti_alias: AntiAlias,
+    band_pass: BandPass<ORDER>,
+    /// None before the first scan.
+    started: Option<Started>,
+    counting: Counting,
+    arm: Arm,
+    block: Block,
+    /// Samples that are still to pass before crossings are counted.
+    settling: u32,
+    samples: u32,
+    estimates: u32,
+}
+
+/// What can only be set up once the first scan and encoder reading are known.
+#[derive(Clone, Debug)]
+struct Started {
+    history: History,
+    lanes: [Lane<ORDER>; GAUGES],
+    travel: Travel,
+    counted: Counted,
+}
+
+/// The counted gauge's past.
+#[derive(Clone, Debug, Default)]
+struct Counted {
+    crossing: Crossing,
+    amplitude: Amplitude,
+}
+
+impl Sensor {
+    /// A sensor before its first scan. `configuration` must have passed its check.
+    pub fn new(configuration: SensorConfiguration) -> Self {
+        Self {
+            configuration,
+            anti_alias: AntiAlias::new(),
+            band_pass: BandPass::new(BAND),
+            started: None,
+            counting: Counting::new(configuration.window_ms),
+            arm: Arm::default(),
+            block: Block::default(),
+            settling: SETTLING_SAMPLES,
+            samples: 0,
+            estimates: 0,
+        }
+    }
+
+    /// Takes another configuration, which must have passed its check. The estimator starts over: there
+    /// is no wavelength before a whole window has been counted. Filters, positions and arm go on.
+    pub fn configure(&mut self, configuration: SensorConfiguration) {
+        self.configuration = configuration;
+        self.counting = Counting::new(configuration.window_ms);
+        self.block.clear();
+        if let Some(started) = &mut self.started {
+            started.counted = Counted::default();
+        }
+    }
+
+    /// The configuration in force.
+    pub fn configuration(&self) -> SensorConfiguration {
+        self.configuration
+    }
+
+    /// Takes a motion from the link. False if it was refused, being older than the last one.
+    pub fn on_motion(&mut self, motion: &Motion) -> bool {
+        let arm_um = self
+            .started
+            .as_ref()
+            .map_or(0, |started| started.travel.position_um(0));
+        self.arm.on_motion(motion, arm_um)
+    }
+
+    /// Takes a millisecond's four scans, oldest first, and the encoder's counter at the last of them,
+    /// at `instant_us` of the board's clock.
+    ///
+    /// To be done within that millisecond: what is late delays all that follows, and once the ADC's
+    /// buffer overruns, scans are lost and λ is wrong for the length of a window.
+    pub fn step(
+        &mut self,
+        instant_us: u64,
+        scans: &[Scan; SCANS_PER_SAMPLE],
+        encoder: u16,
+    ) -> Output {
+        let started = self
+            .started
+            .get_or_insert_with(|| Started::new(&self.band_pass, &scans[0], encoder));
+        let sample = self.anti_alias.step(&mut started.history, scans);
+        started.travel.push(encoder);
+
+        let mut banded = [0.0; GAUGES];
+        for ((y, x), lane) in banded.iter_mut().zip(sample).zip(&mut started.lanes) {
+            *y = self.band_pass.step(lane, x);
+        }
+        let gauge = usize::from(self.configuration.counted_gauge).min(GAUGES - 1);
+        let impulse = started.counted.crossing.step(banded[gauge]);
+        started.counted.amplitude.push(banded[gauge]);
+        if self.settling == 0 {
+            self.counting.push(impulse);
+        }
+        self.settling = self.settling.saturating_sub(1);
+
+        let arm_um = started.travel.position_um(0);
+        let place = started.place(self.samples, instant_us);
+        self.samples = self.samples.wrapping_add(1);
+        let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
+            let estimate = started.estimate(&self.counting, 1 << gauge, self.estimates, instant_us);
+            self.estimates = self.estimates.wrapping_add(1);
+            Some(estimate)
+        } else {
+            None
+        };
+        let gauges = if self.configuration.stream_gauges {
+            self.block.push(place, &sample)
+        } else {
+            None
+        };
+        let drive = self
+            .arm
+            .step(arm_um, self.configuration.arm_full_scale_um_s);
+        Output {
+            estimate,
+            gauges,
+            drive,
+        }
+    }
+}
+
+impl Started {
+    fn new(band_pass: &BandPass<ORDER>, first: &Scan, encoder: u16) -> Self {
+        Self {
+            history: History::settled(first),
+            lanes: core::array::from_fn(|gauge| {
+                band_pass.settled(decimate::from_mid_rail(first[gauge]))
+            }),
+            travel: Travel::new(encoder),
+            counted: Counted::default(),
+        }
+    }
+
+    /// Where and when the sample that has just come out of the anti-aliasing filter was taken.
+    fn place(&self, sample: u32, instant_us: u64) -> Place {
+        let delay_us = decimate::DELAY_MS as u64 * MICROSECONDS_PER_SAMPLE;
+        Place {
+            sample,
+            instant_us: instant_us.saturating_sub(delay_us),
+            position_um: self.travel.position_um(decimate::DELAY_MS),
+            position_before_um: self.travel.position_um(decimate::DELAY_MS + 1),
+        }
+    }
+
+    /// The paper's estimate, and what speaks for it.
+    ///
+    /// Valid: in T1, with a crossing in a full window, and moving at t − A/2. The confidence is then
+    /// 1 − 1/n for n crossings, since a count that may as well have been one less is off by 1/n; else 0.
+    fn estimate(
+        &self,
+        counting: &Counting,
+        gauges_used: u8,
+        sequence: u32,
+        instant_us: u64,
+    ) -> Estimate {
+        let window_ms = counting.window_ms();
+        let count = counting.count().unwrap_or(0);
+        let velocity_mm_s = self.travel.velocity_mm_s(window_ms);
+        let wavelength_mm =
+            counting::wavelength_mm(velocity_mm_s, counting::frequency_hz(count, window_ms));
+        let range = counting::range(
+            self.travel.velocity_mm_s(0),
+            self.travel.velocity_mm_s(2 * window_ms),
+        );
+        let valid =
+            wavelength_mm.is_some() && range == Range::T1 && velocity_mm_s.abs() >= MIN_SPEED_MM_S;
+        Estimate {
+            sequence,
+            instant_us,
+            wavelength_mm,
+            valid,
+            amplitude_lsb: self.counted.amplitude.over(window_ms),
+            confidence: if valid {
+                1.0 - 1.0 / f32::from(count)
+            } else {
+                0.0
+            },
+            range,
+            gauges_used,
+        }
+    }
+}
