@@ -1,9 +1,16 @@
 //! How long a movement of the hand takes to reach the outputs.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use serde::Serialize;
 
 use crate::analysis::finite;
-use crate::recording::{Recording, volts};
+use crate::analysis::phase::DuePhase;
+use crate::analysis::track::COUNT_MM;
+use crate::recording::{ACTUATORS, OutputRecord, Recording, volts};
+
+/// One step of a DAC's word, in V.
+const WORD_V: f64 = 10.0 / 65_536.0;
 
 /// Time from a movement of the hand to the LDAC edge that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -26,27 +33,36 @@ struct Spread {
 /// Measures every instant of movement while the stimulus is on.
 ///
 /// Movement between two ticks shows at the second one's encoder reading and is carried by the first
-/// edge after it: its times are spread uniformly from that tick's to a tick more. Movement below
-/// one count, or while every output is at 0 V (no λ yet, faded out), asks for no edge and is left out.
-pub fn reaction(recording: &Recording) -> Option<Reaction> {
+/// edge after it: its times are spread uniformly from that tick's to a tick more. Movement that asks
+/// for no edge is left out: below one count, while every output is at 0 V (no λ yet, faded out), or
+/// from one side of a crest to the other, where a tick may end at the voltage it began with.
+pub fn reaction(recording: &Recording, due: &DuePhase) -> Option<Reaction> {
     let mut spreads = Vec::new();
     let outputs = &recording.outputs;
+    let peaks = peaks(outputs);
     for pair in recording.ticks.windows(2) {
         let [before, tick] = [pair[0], pair[1]];
         if before.encoder == tick.encoder {
             continue;
         }
         let next = outputs.partition_point(|output| output.at_ns < tick.at_ns);
-        let on = next
-            .checked_sub(1)
-            .and_then(|last| outputs.get(last))
-            .is_some_and(|output| output.words.iter().any(|&word| volts(word) != 0.0));
-        if let Some(edge) = outputs.get(next).filter(|_| on) {
-            spreads.push(Spread {
-                shortest_ns: edge.at_ns as f64 - tick.at_ns as f64,
-                longest_ns: edge.at_ns as f64 - before.at_ns as f64,
-            });
+        let held = next.checked_sub(1).and_then(|last| outputs.get(last));
+        let (Some(held), Some(edge)) = (held, outputs.get(next)) else {
+            continue;
+        };
+        let period_ns = tick.at_ns.saturating_sub(before.at_ns);
+        let prompt = edge.at_ns < tick.at_ns + period_ns;
+        let travel_mm = (tick.position_mm - before.position_mm).abs() + COUNT_MM;
+        let travel_cycles = due
+            .shortest_mm()
+            .map_or(0.0, |shortest_mm| travel_mm / shortest_mm);
+        if is_at_rest(held) || (!prompt && is_over_crests(held, &peaks, travel_cycles)) {
+            continue;
         }
+        spreads.push(Spread {
+            shortest_ns: edge.at_ns as f64 - tick.at_ns as f64,
+            longest_ns: edge.at_ns as f64 - before.at_ns as f64,
+        });
     }
     let longest_ns = spreads
         .iter()
@@ -57,6 +73,31 @@ pub fn reaction(recording: &Recording) -> Option<Reaction> {
         p99_ms: quantile_ns(&spreads, 0.99, longest_ns) * 1e-6,
         max_ms: finite(longest_ns)? * 1e-6,
     })
+}
+
+/// The highest voltage of either sign that each actuator ever had.
+fn peaks(outputs: &[OutputRecord]) -> [f64; ACTUATORS] {
+    let mut peaks = [0.0; ACTUATORS];
+    for output in outputs {
+        for (peak, &word) in peaks.iter_mut().zip(&output.words) {
+            *peak = f64::max(*peak, volts(word).abs());
+        }
+    }
+    peaks
+}
+
+fn is_at_rest(output: &OutputRecord) -> bool {
+    output.words.iter().all(|&word| volts(word) == 0.0)
+}
+
+/// Whether every actuator is so near a crest that `travel_cycles` may take it as far behind as it is
+/// before it now, within the rounding of the words.
+fn is_over_crests(held: &OutputRecord, peaks: &[f64; ACTUATORS], travel_cycles: f64) -> bool {
+    let share = (PI * travel_cycles).min(FRAC_PI_2).cos();
+    held.words
+        .iter()
+        .zip(peaks)
+        .all(|(&word, peak)| volts(word).abs() >= share * peak - WORD_V)
 }
 
 /// The time that a share of all movement stays below, found by halving, to well below a ns.
@@ -82,9 +123,18 @@ fn quantile_ns(spreads: &[Spread], share: f64, longest_ns: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::analysis::synthetic::Run;
+    use crate::truth::Truth;
 
     /// Bound in ms: instants are whole ns.
     const EXACT_MS: f64 = 1e-5;
+
+    fn measured(recording: &Recording) -> Option<Reaction> {
+        let surface = |_| 2.0;
+        reaction(
+            recording,
+            &DuePhase::new(&Truth::new("", "", &surface), recording),
+        )
+    }
 
     fn near(value: f64, expected: f64) -> bool {
         (value - expected).abs() < EXACT_MS
@@ -97,7 +147,7 @@ mod tests {
             edge_s: Box::new(|_| 0.1e-3),
             ..Run::steady(50.0, 2.0)
         };
-        let reaction = reaction(&run.record()).unwrap();
+        let reaction = measured(&run.record()).unwrap();
         assert!(near(reaction.p50_ms, 0.35), "{reaction:?}");
         assert!(near(reaction.p99_ms, 0.595), "{reaction:?}");
         assert!(near(reaction.max_ms, 0.6), "{reaction:?}");
@@ -105,6 +155,7 @@ mod tests {
 
     #[test]
     fn two_sorts_of_edges_mix_their_spreads() {
+        // 47 mm/s, so that crests fall on even and odd ticks alike.
         // Half of the edges 0.1 ms, half 0.4 ms after their tick: 0.1 to 0.6 and 0.4 to 0.9 ms.
         let run = Run {
             edge_s: Box::new(|t_s| {
@@ -114,9 +165,9 @@ mod tests {
                     0.4e-3
                 }
             }),
-            ..Run::steady(50.0, 2.0)
+            ..Run::steady(47.0, 2.0)
         };
-        let reaction = reaction(&run.record()).unwrap();
+        let reaction = measured(&run.record()).unwrap();
         // Half of all lies below 0.5 ms by symmetry; the last 1 % is 2 % of the late sort's 0.5 ms.
         // One tick's sort more or less of some 4 000 moves a quantile by 0.0002 ms at most.
         assert!((reaction.p50_ms - 0.5).abs() < 2e-4, "{reaction:?}");
@@ -129,18 +180,34 @@ mod tests {
         let run = Run::steady(50.0, 2.0);
         let mut recording = run.record();
         recording.outputs.remove(1_000);
-        let reaction = reaction(&recording).unwrap();
+        let reaction = measured(&recording).unwrap();
         // Up to the tick before the missing edge, a whole tick more than the others.
         assert!(near(reaction.max_ms, 1.0), "{reaction:?}");
     }
 
     #[test]
+    fn a_crest_passed_without_an_edge_is_no_delay() {
+        // 80 ticks a cycle, phases at odd 160ths: the two ticks about each crest share their voltage.
+        let run = Run {
+            ahead_cycles: Box::new(|_| 0.5 / 80.0),
+            ..Run::steady(50.0, 2.0)
+        };
+        let recording = run.record();
+        assert!(recording.outputs.len() < recording.ticks.len() - 80);
+        assert!(
+            near(measured(&recording).unwrap().max_ms, 0.5),
+            "{:?}",
+            measured(&recording)
+        );
+    }
+
+    #[test]
     fn a_hand_at_rest_and_outputs_at_zero_have_no_reaction() {
-        assert_eq!(reaction(&Run::steady(0.0, 2.0).record()), None);
+        assert_eq!(measured(&Run::steady(0.0, 2.0).record()), None);
         let run = Run {
             estimate: Box::new(|_| (2.0, false)),
             ..Run::steady(50.0, 2.0)
         };
-        assert_eq!(reaction(&run.record()), None);
+        assert_eq!(measured(&run.record()), None);
     }
 }

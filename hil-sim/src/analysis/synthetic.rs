@@ -2,6 +2,7 @@
 
 use protocol::{CHANNELS, Estimate, GAUGES, Range};
 
+use crate::analysis::track::COUNT_MM;
 use crate::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
@@ -9,7 +10,6 @@ use crate::recording::{
 pub const TICK_S: f64 = 500e-6;
 pub const SCAN_S: f64 = 250e-6;
 pub const ESTIMATE_S: f64 = 10e-3;
-const COUNT_MM: f64 = 0.005;
 const FADE_IN_S: f64 = 20e-3;
 
 /// A run to be made up. Every closure takes s since the start, [`Run::surface_mm`] takes mm.
