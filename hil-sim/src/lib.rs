@@ -1,1 +1,14 @@
-//! x
+//! Ridgelink's simulator: scenes, the world that a scene describes, and engines that run the firmware in it.
+
+pub mod analysis;
+pub mod arm;
+pub mod gauges;
+pub mod json;
+pub mod motion;
+pub mod recording;
+pub mod report;
+pub mod scene;
+pub mod surface;
+pub mod truth;
+pub mod weather;
+pub mod world;

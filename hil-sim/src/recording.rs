@@ -101,3 +101,11 @@ pub struct Recording {
     /// Log lines of both boards, decoded from defmt: instant in ns, board, text. Empty from `native`.
     pub log: Vec<(u64, &'static str, String)>,
 }
+
+impl Recording {
+    /// Virtual time run per wall time; none if that was too short to be measured.
+    pub fn realtime_factor(&self) -> Option<f64> {
+        let factor = self.duration_s / self.wall_s;
+        factor.is_finite().then_some(factor)
+    }
+}

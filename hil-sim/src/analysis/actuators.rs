@@ -1,0 +1,354 @@
+//! What the actuators did, against what the hand did and the wavelength in force.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use crate::analysis::cycles::{self, Cycle};
+use crate::analysis::finite;
+use crate::analysis::phase::DuePhase;
+use crate::analysis::phase_error::phase_error;
+use crate::analysis::reaction::{Reaction, reaction};
+use crate::analysis::track::{COUNT_MM, Track};
+use crate::analysis::voltage::{peak_v, voltage};
+use crate::recording::{ACTUATORS, Recording, volts};
+use crate::truth::Truth;
+
+/// Voltage below which an actuator does not vibrate, in V.
+const STILL_V: f64 = 0.05;
+
+/// What the actuators did. None where nothing vibrated, or not long enough.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Actuators {
+    /// Frequency of the reference actuator's voltage in Hz, between the first and the last upward
+    /// zero crossing of the longest stretch at full amplitude in which the hand did not turn.
+    pub frequency_hz: Option<f64>,
+    /// Mean of |v|/λ̂ over the same stretch, in Hz.
+    pub truth_hz: Option<f64>,
+    /// Root mean square of the phase error, cycle by cycle, against [`DuePhase`], in cycles.
+    pub phase_error_rms_cycles: Option<f64>,
+    /// Its mean, in cycles: above 0 where the stimulus is ahead.
+    pub phase_error_mean_cycles: Option<f64>,
+    /// The largest change of any channel at one LDAC edge, in V.
+    pub max_step_v: Option<f64>,
+    /// The largest step that one tick of travel explains: 2π · amplitude · Δx/λ̂ for the longest
+    /// travel of a tick, one encoder count more, and the shortest λ̂ in force.
+    pub natural_step_v: Option<f64>,
+    /// The mean over whole cycles of the channel for which it is farthest from 0, in V, each moment
+    /// weighted with its advance of phase: an uneven speed alone gives no mean.
+    pub mean_v: Option<f64>,
+    /// The longest time from the first to the last channel's change at one edge, in µs.
+    pub skew_us: Option<f64>,
+    /// Time from a hand movement to the LDAC edge that carries it, p99, in ms.
+    pub hand_to_output_p99_ms: Option<f64>,
+    /// The same, its median and its longest.
+    pub hand_to_output: Option<Reaction>,
+}
+
+/// Judges the outputs of a recording.
+pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
+    let due = DuePhase::new(truth, recording);
+    let hand = Track::of_hand(recording);
+    let reference = voltage(recording, truth.reference_actuator.min(ACTUATORS - 1));
+    let reaction = reaction(recording, &due);
+    let mut actuators = Actuators {
+        max_step_v: max_step_v(recording),
+        natural_step_v: natural_step_v(truth, &hand, &due),
+        skew_us: recording
+            .outputs
+            .iter()
+            .map(|o| o.skew_ns)
+            .max()
+            .map(|ns| ns as f64 * 1e-3),
+        hand_to_output_p99_ms: reaction.map(|reaction| reaction.p99_ms),
+        hand_to_output: reaction,
+        ..Actuators::default()
+    };
+    if peak_v(&reference) < STILL_V {
+        return actuators;
+    }
+    let cycles = cycles::cycles(&reference, &hand);
+    if let Some((stretch, count)) = cycles::longest_stretch(&cycles) {
+        let stretch_s = stretch.to_s - stretch.from_s;
+        let travelled = due.travelled_cycles(stretch.to_s) - due.travelled_cycles(stretch.from_s);
+        actuators.frequency_hz = finite(count as f64 / stretch_s);
+        actuators.truth_hz = finite(travelled / stretch_s);
+    }
+    let error = phase_error(&reference, &due);
+    actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
+    actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
+    actuators.mean_v = worst_mean_v(recording, &cycles, &due);
+    actuators
+}
+
+/// The largest change of any channel at one edge; before the first all are at 0 V.
+fn max_step_v(recording: &Recording) -> Option<f64> {
+    let mut before = [0x8000_u16; ACTUATORS];
+    let mut largest: Option<u16> = None;
+    for output in &recording.outputs {
+        for (from, to) in before.iter().zip(&output.words) {
+            largest = largest.max(Some(from.abs_diff(*to)));
+        }
+        before = output.words;
+    }
+    // A difference of words is a voltage above 0 V's word.
+    largest.map(|steps| f64::from(steps) * (volts(0x8001) - volts(0x8000)))
+}
+
+fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
+    let travel_mm = hand
+        .points()
+        .windows(2)
+        .map(|pair| (pair[1].1 - pair[0].1).abs())
+        .fold(f64::NAN, f64::max);
+    let amplitude_v = f64::from(truth.display.amplitude_mv) * 1e-3;
+    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()?)
+}
+
+/// The mean of the channel farthest from 0 V over all whole cycles of the reference.
+fn worst_mean_v(recording: &Recording, cycles: &[Cycle], due: &DuePhase) -> Option<f64> {
+    let weights = weights(&voltage(recording, 0), cycles, due);
+    let whole: f64 = weights.iter().sum();
+    (0..ACTUATORS)
+        .filter_map(|actuator| {
+            let voltage = voltage(recording, actuator);
+            let sum: f64 = voltage
+                .iter()
+                .zip(&weights)
+                .map(|(point, w)| point.1 * w)
+                .sum();
+            finite(sum / whole)
+        })
+        .max_by(|one, other| one.abs().total_cmp(&other.abs()))
+}
+
+/// What each point of a voltage (every channel has its points at the same instants) adds to the
+/// integral over phase of the straight lines between them, within the cycles.
+fn weights(points: &[(f64, f64)], cycles: &[Cycle], due: &DuePhase) -> Vec<f64> {
+    let mut weights = vec![0.0; points.len()];
+    for (index, pair) in points.windows(2).enumerate() {
+        let (from_s, to_s) = (pair[0].0, pair[1].0);
+        if to_s <= from_s {
+            continue;
+        }
+        let next = cycles.partition_point(|cycle| cycle.to_s <= from_s);
+        for cycle in cycles[next..]
+            .iter()
+            .take_while(|cycle| cycle.from_s < to_s)
+        {
+            let (start_s, end_s) = (from_s.max(cycle.from_s), to_s.min(cycle.to_s));
+            let advance = due.travelled_cycles(end_s) - due.travelled_cycles(start_s);
+            let way = (0.5 * (start_s + end_s) - from_s) / (to_s - from_s);
+            weights[index] += (1.0 - way) * advance;
+            weights[index + 1] += way * advance;
+        }
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::Mode;
+
+    use super::*;
+    use crate::analysis::synthetic::{Run, TICK_S};
+
+    fn judged(run: &Run) -> Actuators {
+        judge(&Truth::new("", "", &*run.surface_mm), &run.record())
+    }
+
+    #[test]
+    fn measures_a_steady_frequency_to_a_hundredth_of_a_percent() {
+        // 50 mm/s over 2 mm is 25 Hz; an encoder count is 0.0025 of some 48 cycles.
+        let actuators = judged(&Run::steady(50.0, 2.0));
+        let (frequency_hz, truth_hz) =
+            (actuators.frequency_hz.unwrap(), actuators.truth_hz.unwrap());
+        assert!((truth_hz - 25.0).abs() < 25.0 * 1e-6, "{truth_hz}");
+        assert!((frequency_hz - 25.0).abs() < 25.0 * 1e-4, "{frequency_hz}");
+    }
+
+    #[test]
+    fn measures_a_stimulus_at_the_wrong_frequency_as_such() {
+        // 0.3 cycles a second too many.
+        let run = Run {
+            ahead_cycles: Box::new(|t_s| 0.3 * t_s),
+            ..Run::steady(50.0, 2.0)
+        };
+        let actuators = judged(&run);
+        assert!((actuators.frequency_hz.unwrap() - 25.3).abs() < 25.3e-4);
+        assert!((actuators.truth_hz.unwrap() - 25.0).abs() < 25.0e-4);
+    }
+
+    #[test]
+    fn measures_backwards_strokes_like_forward_ones() {
+        let actuators = judged(&Run::steady(-70.0, 1.0));
+        assert!((actuators.frequency_hz.unwrap() - 70.0).abs() < 70.0e-4);
+        assert!((actuators.truth_hz.unwrap() - 70.0).abs() < 70.0e-4);
+    }
+
+    #[test]
+    fn follows_a_swinging_hand_within_one_stroke() {
+        let actuators = judged(&Run::swinging(70.0, 0.83, 2.0));
+        let (frequency_hz, truth_hz) =
+            (actuators.frequency_hz.unwrap(), actuators.truth_hz.unwrap());
+        // A stroke holds 2 · 70 / (2π 0.83 · 2) = 13.4 cycles: a count at either end is 0.04 %.
+        assert!(
+            (frequency_hz / truth_hz - 1.0).abs() < 5e-4,
+            "{frequency_hz} {truth_hz}"
+        );
+        assert!(actuators.phase_error_rms_cycles.unwrap() < 0.005);
+        assert!(
+            actuators.mean_v.unwrap().abs() < 0.005,
+            "{:?}",
+            actuators.mean_v
+        );
+    }
+
+    #[test]
+    fn finds_a_phase_offset_of_a_twentieth_of_a_cycle() {
+        let run = Run {
+            ahead_cycles: Box::new(|_| -0.05),
+            ..Run::steady(50.0, 2.0)
+        };
+        let actuators = judged(&run);
+        // Counts are floored, so the display is behind by half a count, 0.00125 cycles, more.
+        assert!((actuators.phase_error_mean_cycles.unwrap() + 0.05).abs() < 0.0025);
+        assert!((actuators.phase_error_rms_cycles.unwrap() - 0.05).abs() < 0.0025);
+    }
+
+    #[test]
+    fn finds_the_rms_of_a_slow_jitter_of_phase() {
+        // A sine of 0.04 cycles at 1 Hz, two whole periods of it: 0.04/√2.
+        let run = Run {
+            ahead_cycles: Box::new(|t_s| 0.04 * (TAU * t_s).sin()),
+            ..Run::steady(50.0, 2.0)
+        };
+        let rms = judged(&run).phase_error_rms_cycles.unwrap();
+        assert!((rms - 0.04 / 2f64.sqrt()).abs() < 0.001, "{rms}");
+    }
+
+    #[test]
+    fn a_late_edge_is_a_phase_behind() {
+        // 0.3 ms at 25 Hz: 0.0075 cycles.
+        let run = Run {
+            edge_s: Box::new(|_| 0.3e-3),
+            ..Run::steady(50.0, 2.0)
+        };
+        let late = judged(&run).phase_error_mean_cycles.unwrap();
+        let prompt = judged(&Run::steady(50.0, 2.0))
+            .phase_error_mean_cycles
+            .unwrap();
+        assert!((prompt - late - 0.0075).abs() < 1e-4, "{prompt} {late}");
+    }
+
+    #[test]
+    fn a_travelling_pattern_is_in_phase_at_its_place() {
+        let run = Run {
+            pitch_mm: 0.3,
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut truth = Truth::new("", "", &*run.surface_mm);
+        truth.reference_actuator = 3;
+        truth.reference_place_mm = 0.9;
+        truth.display.mode = Mode::Travelling;
+        let actuators = judge(&truth, &run.record());
+        assert!(actuators.phase_error_rms_cycles.unwrap() < 0.0025);
+        assert!(
+            actuators.mean_v.unwrap().abs() < 0.005,
+            "{:?}",
+            actuators.mean_v
+        );
+    }
+
+    #[test]
+    fn the_mean_is_that_of_the_worst_channel() {
+        let run = Run {
+            offset_v: -0.02,
+            ..Run::steady(50.0, 2.0)
+        };
+        let mean_v = judged(&run).mean_v.unwrap();
+        // Within 1 mV: the words are 0.15 mV apart, the others' means well below.
+        assert!((mean_v + 0.02).abs() < 1e-3, "{mean_v}");
+    }
+
+    #[test]
+    fn estimates_that_jump_give_no_mean_and_no_phase_error() {
+        // What the paper's counting does at 30 mm/s over 4 mm: two counts in turn, three windows each.
+        let run = Run {
+            estimate: Box::new(|t_s| {
+                (
+                    if (t_s / 0.03) as u32 % 2 == 0 {
+                        2.4
+                    } else {
+                        4.8
+                    },
+                    true,
+                )
+            }),
+            ..Run::steady(30.0, 4.0)
+        };
+        let actuators = judged(&run);
+        assert!(
+            actuators.mean_v.unwrap().abs() < 0.005,
+            "{:?}",
+            actuators.mean_v
+        );
+        // A count is 0.002 cycles at 2.4 mm; each of 66 changes leaves up to half of that, of either sign.
+        assert!(actuators.phase_error_rms_cycles.unwrap() < 0.002 + 66f64.sqrt() * 0.0005);
+        let ratio = actuators.frequency_hz.unwrap() / actuators.truth_hz.unwrap();
+        assert!((ratio - 1.0).abs() < 5e-4, "{ratio}");
+        assert!(actuators.max_step_v.unwrap() <= actuators.natural_step_v.unwrap());
+    }
+
+    #[test]
+    fn the_natural_step_is_what_a_tick_of_travel_explains() {
+        let actuators = judged(&Run::steady(50.0, 2.0));
+        let expected_v = 5.0 * TAU * (50.0 * TICK_S + 0.005) / 2.0;
+        assert!((actuators.natural_step_v.unwrap() - expected_v).abs() < 1e-9);
+        assert!(actuators.max_step_v.unwrap() <= expected_v);
+        // Five counts a tick: the step at the zero crossing is that of 0.025 mm.
+        assert!(actuators.max_step_v.unwrap() > 0.99 * 5.0 * TAU * 0.025 / 2.0);
+    }
+
+    #[test]
+    fn a_jump_of_one_channel_is_the_largest_step() {
+        let run = Run::steady(50.0, 2.0);
+        let mut recording = run.record();
+        for output in &mut recording.outputs[1_000..] {
+            output.words[49] = 0xffff;
+        }
+        recording.outputs[999].words[49] = 0x8000;
+        recording.outputs[5].skew_ns = 1_500;
+        let actuators = judge(&Truth::new("", "", &*run.surface_mm), &recording);
+        let expected_v = 32_767.0 * 10.0 / 65_536.0;
+        assert!((actuators.max_step_v.unwrap() - expected_v).abs() < 1e-9);
+        assert_eq!(actuators.skew_us, Some(1.5));
+    }
+
+    #[test]
+    fn a_run_without_a_valid_estimate_has_no_frequency() {
+        let run = Run {
+            estimate: Box::new(|_| (2.0, false)),
+            ..Run::steady(50.0, 2.0)
+        };
+        assert_eq!(judged(&run), Actuators::default());
+    }
+
+    #[test]
+    fn recordings_of_any_length_are_judged_without_a_panic() {
+        let run = Run::steady(50.0, 2.0);
+        let whole = run.record();
+        let truth = Truth::new("", "", &*run.surface_mm);
+        for length in (0..80).chain([400, 3_999]) {
+            let mut recording = whole.clone();
+            recording.outputs.truncate(length);
+            judge(&truth, &recording);
+            recording.ticks.truncate(length);
+            judge(&truth, &recording);
+            recording.estimates.truncate(length);
+            judge(&truth, &recording);
+            recording.ticks.clear();
+            judge(&truth, &recording);
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! The estimates beside the truth.
+
+use serde::Serialize;
+
+use crate::analysis::track::Track;
+use crate::analysis::{finite, mean, seconds};
+use crate::recording::Recording;
+use crate::truth::Truth;
+
+/// Speed from which on the arm counts as in motion, in mm/s.
+pub const MOTION_MM_S: f64 = 5.0;
+/// Relative error within which an estimate counts as settled.
+pub const SETTLED: f64 = 0.1;
+/// Relative change of λ from one scan to the next that makes a boundary between specimens.
+const BOUNDARY: f64 = 1e-3;
+/// How long an estimate speaks for the surface, in s, if no other follows: one and a half of the
+/// 10 ms between two, so that a little jitter leaves no gap.
+const ESTIMATE_LASTS_S: f64 = 15e-3;
+
+/// An estimate and the truth at its instant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct JudgedEstimate {
+    /// The instant the sensor gives it, in s since the scene's start.
+    pub t_s: f64,
+    /// The true λ under the sensor at that instant, in mm; none where there is no surface.
+    pub truth_mm: Option<f64>,
+    /// The estimated λ in mm.
+    pub wavelength_mm: Option<f64>,
+    /// From 0 (a guess) to 1 (certain).
+    pub confidence: Option<f64>,
+    /// Whether the estimator stands by it.
+    pub valid: bool,
+}
+
+/// The estimates as a whole. Relative errors are (λ̂ − λ)/λ of each valid estimate at its instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Root of the mean square of the relative errors, in %.
+    pub rms_percent: Option<f64>,
+    /// Mean of the relative errors, in %.
+    pub bias_percent: Option<f64>,
+    /// Mean of the valid λ̂, in mm.
+    pub mean_mm: Option<f64>,
+    /// Share of the time in motion (|v| > [`MOTION_MM_S`]) with a valid estimate, 0 to 1; none
+    /// without motion.
+    pub valid_share: Option<f64>,
+    /// From the last boundary between two specimens until every later valid estimate is within
+    /// [`SETTLED`], in ms; none without a boundary, or if that never came.
+    pub settling_ms: Option<f64>,
+    /// Mean time from an estimate's instant to its last byte at the display, in ms.
+    pub latency_ms: Option<f64>,
+}
+
+impl JudgedEstimate {
+    /// The relative error of a valid estimate where there is a surface.
+    pub fn relative_error(&self) -> Option<f64> {
+        let truth_mm = self.truth_mm?;
+        let wavelength_mm = self.wavelength_mm.filter(|_| self.valid)?;
+        Some((wavelength_mm - truth_mm) / truth_mm)
+    }
+}
+
+/// Judges the estimates of a recording, one by one and as a whole.
+pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summary) {
+    let arm = Track::of_arm(recording);
+    let estimates: Vec<JudgedEstimate> = recording
+        .estimates
+        .iter()
+        .map(|record| {
+            let t_s = seconds(record.made_ns);
+            JudgedEstimate {
+                t_s,
+                truth_mm: arm
+                    .position_mm(t_s)
+                    .and_then(|x_mm| truth.wavelength_at(x_mm)),
+                wavelength_mm: record
+                    .estimate
+                    .wavelength_mm
+                    .map(f64::from)
+                    .and_then(finite),
+                confidence: finite(f64::from(record.estimate.confidence)),
+                valid: record.estimate.valid,
+            }
+        })
+        .collect();
+    let errors = || estimates.iter().filter_map(JudgedEstimate::relative_error);
+    let received = recording
+        .estimates
+        .iter()
+        .filter_map(|record| Some((record.received_ns? as f64 - record.made_ns as f64) * 1e-6));
+    let summary = Summary {
+        rms_percent: mean(errors().map(|e| e * e)).map(|square| 100.0 * square.sqrt()),
+        bias_percent: mean(errors()).map(|e| 100.0 * e),
+        mean_mm: mean(
+            estimates
+                .iter()
+                .filter(|e| e.valid)
+                .filter_map(|e| e.wavelength_mm),
+        ),
+        valid_share: valid_share(&arm, &estimates),
+        settling_ms: last_boundary_s(truth, &arm).and_then(|at_s| settling_ms(at_s, &estimates)),
+        latency_ms: mean(received),
+    };
+    (estimates, summary)
+}
+
+/// Share of the time in motion for which the last estimate made is valid.
+fn valid_share(arm: &Track, estimates: &[JudgedEstimate]) -> Option<f64> {
+    let (mut moving_s, mut valid_s) = (0.0, 0.0);
+    let mut made = 0;
+    for pair in arm.points().windows(2) {
+        let [(from_s, from_mm), (to_s, to_mm)] = [pair[0], pair[1]];
+        let step_s = to_s - from_s;
+        if step_s <= 0.0 || ((to_mm - from_mm) / step_s).abs() <= MOTION_MM_S {
+            continue;
+        }
+        moving_s += step_s;
+        while estimates
+            .get(made)
+            .is_some_and(|estimate| estimate.t_s <= from_s)
+        {
+            made += 1;
+        }
+        let last = made.checked_sub(1).and_then(|last| estimates.get(last));
+        if last.is_some_and(|e| e.valid && from_s - e.t_s < ESTIMATE_LASTS_S) {
+            valid_s += step_s;
+        }
+    }
+    finite(valid_s / moving_s)
+}
+
+/// When the sensor last crossed from one specimen to another, in s.
+fn last_boundary_s(truth: &Truth, arm: &Track) -> Option<f64> {
+    let mut last_s = None;
+    let mut before_mm = None;
+    for &(t_s, x_mm) in arm.points() {
+        let Some(here_mm) = truth.wavelength_at(x_mm) else {
+            continue;
+        };
+        if before_mm.is_some_and(|before: f64| (here_mm / before - 1.0).abs() > BOUNDARY) {
+            last_s = Some(t_s);
+        }
+        before_mm = Some(here_mm);
+    }
+    last_s
+}
+
+/// Time from `boundary_s` to the first valid estimate after which none is off by more than
+/// [`SETTLED`], in ms.
+fn settling_ms(boundary_s: f64, estimates: &[JudgedEstimate]) -> Option<f64> {
+    let mut settled_s = None;
+    for estimate in estimates
+        .iter()
+        .filter(|estimate| estimate.t_s >= boundary_s)
+    {
+        match estimate.relative_error() {
+            Some(error) if error.abs() <= SETTLED => {
+                settled_s = settled_s.or(Some(estimate.t_s));
+            }
+            Some(_) => settled_s = None,
+            None => {}
+        }
+    }
+    settled_s.map(|t_s| (t_s - boundary_s) * 1e3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::synthetic::Run;
+
+    fn summary(run: &Run) -> Summary {
+        judge(&Truth::new("", "", &*run.surface_mm), &run.record()).1
+    }
+
+    fn near(value: Option<f64>, expected: f64, bound: f64) -> bool {
+        value.is_some_and(|value| (value - expected).abs() <= bound)
+    }
+
+    /// Two specimens, 1 mm and from x = 50 mm on 4 mm, at 50 mm/s: the boundary is at 1 s.
+    fn over_a_boundary(estimate: impl Fn(f64) -> (f32, bool) + 'static) -> Run {
+        Run {
+            surface_mm: Box::new(|x_mm| if x_mm < 50.0 { 1.0 } else { 4.0 }),
+            estimate: Box::new(estimate),
+            ..Run::steady(50.0, 1.0)
+        }
+    }
+
+    #[test]
+    fn errors_are_relative_and_of_valid_estimates_only() {
+        // λ = 2 mm: valid ones in turn 2.2 (+10 %) and 1.9 mm (−5 %), each third invalid and far off.
+        let run = Run {
+            estimate: Box::new(|t_s| match (t_s * 100.0).round() as u32 % 3 {
+                0 => (2.2, true),
+                1 => (1.9, true),
+                _ => (7.0, false),
+            }),
+            duration_s: 1.51,
+            ..Run::steady(50.0, 2.0)
+        };
+        let summary = summary(&run);
+        // 50 of either sort: √((0.1² + 0.05²)/2), (0.1 − 0.05)/2, (2.2 + 1.9)/2; λ̂ is an f32.
+        assert!(
+            near(summary.rms_percent, 100.0 * 0.00625f64.sqrt(), 1e-4),
+            "{summary:?}"
+        );
+        assert!(near(summary.bias_percent, 2.5, 1e-4), "{summary:?}");
+        assert!(near(summary.mean_mm, 2.05, 1e-6), "{summary:?}");
+        assert_eq!(summary.settling_ms, None);
+    }
+
+    #[test]
+    fn each_estimate_is_beside_the_wavelength_at_its_own_instant() {
+        let run = over_a_boundary(|_| (1.0, true));
+        let (estimates, _) = judge(&Truth::new("", "", &*run.surface_mm), &run.record());
+        assert_eq!(estimates[98].t_s, 0.99);
+        assert_eq!(estimates[98].truth_mm, Some(1.0));
+        assert_eq!(estimates[100].truth_mm, Some(4.0));
+    }
+
+    #[test]
+    fn a_surface_without_a_wavelength_is_not_judged() {
+        let run = Run {
+            surface_mm: Box::new(|_| f64::NAN),
+            ..Run::steady(50.0, 2.0)
+        };
+        let (estimates, summary) = judge(&Truth::new("", "", &*run.surface_mm), &run.record());
+        assert_eq!(estimates[0].truth_mm, None);
+        assert_eq!(summary.rms_percent, None);
+        assert!(near(summary.mean_mm, 2.0, 1e-9));
+    }
+
+    #[test]
+    fn the_valid_share_is_of_the_time_in_motion() {
+        // At rest for 1 s, then 50 mm/s for 1 s; valid in the last 0.25 s of it and while at rest.
+        let run = Run {
+            position_mm: Box::new(|t_s| 50.0 * (t_s - 1.0).max(0.0)),
+            estimate: Box::new(|t_s| (2.0, !(0.995..1.745).contains(&t_s))),
+            ..Run::steady(50.0, 2.0)
+        };
+        assert!(
+            near(summary(&run).valid_share, 0.25, 1e-3),
+            "{:?}",
+            summary(&run)
+        );
+    }
+
+    #[test]
+    fn an_estimate_does_not_speak_for_a_long_silence() {
+        let run = Run::steady(50.0, 2.0);
+        let mut recording = run.record();
+        recording.estimates.truncate(99);
+        let (_, summary) = judge(&Truth::new("", "", &*run.surface_mm), &recording);
+        // From 10 ms to 15 ms after the last one at 0.99 s, of 2 s.
+        assert!(near(summary.valid_share, 0.995 / 2.0, 1e-3), "{summary:?}");
+    }
+
+    #[test]
+    fn a_hand_at_rest_has_no_valid_share() {
+        assert_eq!(summary(&Run::steady(0.0, 2.0)).valid_share, None);
+        assert_eq!(summary(&Run::steady(4.9, 2.0)).valid_share, None);
+    }
+
+    #[test]
+    fn settling_is_counted_from_the_last_boundary_to_the_last_time_within_a_tenth() {
+        // Within 10 % of 4 mm at 1.05 s, out of it again at 1.10 s, for good from 1.12 s on.
+        let run = over_a_boundary(|t_s| {
+            let tick = (t_s * 100.0).round() as u32;
+            match tick {
+                ..100 => (1.0, true),
+                100..105 | 110..112 => (2.5, true),
+                105..107 => (1.0, false),
+                _ => (4.3, true),
+            }
+        });
+        assert!(
+            near(summary(&run).settling_ms, 120.0, 1e-6),
+            "{:?}",
+            summary(&run)
+        );
+    }
+
+    #[test]
+    fn estimates_that_stay_wrong_never_settle() {
+        assert_eq!(summary(&over_a_boundary(|_| (1.0, true))).settling_ms, None);
+        assert_eq!(
+            summary(&over_a_boundary(|_| (4.0, false))).settling_ms,
+            None
+        );
+    }
+
+    #[test]
+    fn latency_is_the_mean_from_instant_to_arrival() {
+        let run = Run {
+            transit_s: 3.5e-3,
+            ..Run::steady(50.0, 2.0)
+        };
+        assert!(
+            near(summary(&run).latency_ms, 3.5, 1e-6),
+            "{:?}",
+            summary(&run)
+        );
+        let mut recording = run.record();
+        for record in &mut recording.estimates {
+            record.received_ns = None;
+        }
+        let (_, summary) = judge(&Truth::new("", "", &*run.surface_mm), &recording);
+        assert_eq!(summary.latency_ms, None);
+    }
+
+    #[test]
+    fn an_empty_recording_has_no_summary() {
+        let run = Run {
+            duration_s: 0.0,
+            ..Run::steady(50.0, 2.0)
+        };
+        assert_eq!(summary(&run), Summary::default());
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_not_passed_on() {
+        let run = Run {
+            estimate: Box::new(|_| (f32::NAN, true)),
+            ..Run::steady(50.0, 2.0)
+        };
+        let (estimates, summary) = judge(&Truth::new("", "", &*run.surface_mm), &run.record());
+        assert_eq!(estimates[0].wavelength_mm, None);
+        assert_eq!(summary.rms_percent, None);
+    }
+}

@@ -1,0 +1,183 @@
+//! Recordings of a made-up run whose answers are known: a pair of boards without fault, a sine surface.
+
+use protocol::{CHANNELS, Estimate, GAUGES, Range};
+
+use crate::analysis::track::COUNT_MM;
+use crate::recording::{
+    ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
+};
+
+pub const TICK_S: f64 = 500e-6;
+pub const SCAN_S: f64 = 250e-6;
+pub const ESTIMATE_S: f64 = 10e-3;
+const FADE_IN_S: f64 = 20e-3;
+
+/// A run to be made up. Every closure takes s since the start, [`Run::surface_mm`] takes mm.
+pub struct Run {
+    pub duration_s: f64,
+    /// Where hand and arm both are, in mm.
+    pub position_mm: Box<dyn Fn(f64) -> f64>,
+    /// λ at a position, in mm.
+    pub surface_mm: Box<dyn Fn(f64) -> f64>,
+    /// λ̂ in mm and whether it is valid.
+    pub estimate: Box<dyn Fn(f64) -> (f32, bool)>,
+    /// From an estimate's instant to its arrival, in s.
+    pub transit_s: f64,
+    /// From a tick to its LDAC edge, in s.
+    pub edge_s: Box<dyn Fn(f64) -> f64>,
+    /// What the stimulus is ahead of its due phase, in cycles.
+    pub ahead_cycles: Box<dyn Fn(f64) -> f64>,
+    /// Added to actuator 7's voltage, in V.
+    pub offset_v: f64,
+    /// Phase from one actuator to the next, in mm of place.
+    pub pitch_mm: f64,
+}
+
+impl Run {
+    /// `speed_mm_s` on one specimen of `wavelength_mm`, rightly estimated, outputs without delay.
+    pub fn steady(speed_mm_s: f64, wavelength_mm: f64) -> Self {
+        Self {
+            duration_s: 2.0,
+            position_mm: Box::new(move |t_s| speed_mm_s * t_s),
+            surface_mm: Box::new(move |_| wavelength_mm),
+            estimate: Box::new(move |_| (wavelength_mm as f32, true)),
+            transit_s: 1e-3,
+            edge_s: Box::new(|_| 0.0),
+            ahead_cycles: Box::new(|_| 0.0),
+            offset_v: 0.0,
+            pitch_mm: 0.0,
+        }
+    }
+
+    /// A hand that swings, v = peak sin(2π f t), on λ.
+    pub fn swinging(peak_mm_s: f64, frequency_hz: f64, wavelength_mm: f64) -> Self {
+        let turn = std::f64::consts::TAU * frequency_hz;
+        Self {
+            position_mm: Box::new(move |t_s| peak_mm_s / turn * (1.0 - (turn * t_s).cos())),
+            ..Self::steady(peak_mm_s, wavelength_mm)
+        }
+    }
+
+    /// Makes the recording up.
+    pub fn record(&self) -> Recording {
+        let estimates = self.estimates();
+        let ticks: Vec<TickRecord> = instants(TICK_S, self.duration_s)
+            .map(|t_s| TickRecord {
+                at_ns: nanoseconds(t_s),
+                encoder: self.counts(t_s) as u16,
+                position_mm: (self.position_mm)(t_s),
+            })
+            .collect();
+        Recording {
+            engine: Engine::Native,
+            duration_s: self.duration_s,
+            wall_s: 0.001,
+            hash: 0x0123_4567_89ab_cdef,
+            scans: instants(SCAN_S, self.duration_s)
+                .map(|t_s| self.scan(t_s))
+                .collect(),
+            outputs: self.outputs(&ticks, &estimates),
+            ticks,
+            estimates,
+            sensor_status: None,
+            display_status: None,
+            log: Vec::new(),
+        }
+    }
+
+    fn counts(&self, t_s: f64) -> i64 {
+        ((self.position_mm)(t_s) / COUNT_MM).floor() as i64
+    }
+
+    fn scan(&self, t_s: f64) -> ScanRecord {
+        let x_mm = (self.position_mm)(t_s);
+        let cycles = x_mm / (self.surface_mm)(x_mm);
+        let mut codes = [2_048; CHANNELS];
+        for (gauge, code) in codes[..GAUGES].iter_mut().enumerate() {
+            let phase = std::f64::consts::TAU * cycles + gauge as f64;
+            *code = (2_048.0 + 400.0 * phase.sin()) as u16;
+        }
+        ScanRecord {
+            at_ns: nanoseconds(t_s),
+            codes,
+            encoder: self.counts(t_s) as u16,
+            position_mm: x_mm,
+        }
+    }
+
+    fn estimates(&self) -> Vec<EstimateRecord> {
+        instants(ESTIMATE_S, self.duration_s)
+            .skip(1)
+            .enumerate()
+            .map(|(sequence, t_s)| {
+                let (wavelength_mm, valid) = (self.estimate)(t_s);
+                let received_s = t_s + self.transit_s;
+                EstimateRecord {
+                    made_ns: nanoseconds(t_s),
+                    received_ns: (received_s < self.duration_s).then(|| nanoseconds(received_s)),
+                    estimate: Estimate {
+                        sequence: sequence as u32,
+                        instant_us: nanoseconds(t_s) / 1_000,
+                        wavelength_mm: Some(wavelength_mm),
+                        valid,
+                        amplitude_lsb: 400.0,
+                        confidence: 0.75,
+                        range: Range::T1,
+                        gauges_used: 0b100,
+                    },
+                }
+            })
+            .collect()
+    }
+
+    /// A display as it should be: phase from the encoder's counts and the last valid λ̂ received.
+    fn outputs(&self, ticks: &[TickRecord], estimates: &[EstimateRecord]) -> Vec<OutputRecord> {
+        let mut outputs = Vec::new();
+        let mut held = [0x8000; ACTUATORS];
+        let (mut cycles, mut on_since_s) = (0.0, None);
+        for pair in ticks.windows(2) {
+            let t_s = pair[1].at_ns as f64 / 1e9;
+            let in_force = estimates
+                .iter()
+                .rfind(|e| e.estimate.valid && e.received_ns.is_some_and(|at| at <= pair[1].at_ns));
+            let Some(wavelength_mm) = in_force.and_then(|e| e.estimate.wavelength_mm) else {
+                continue;
+            };
+            let wavelength_mm = f64::from(wavelength_mm);
+            let counts = pair[1].encoder.wrapping_sub(pair[0].encoder) as i16;
+            cycles += f64::from(counts) * COUNT_MM / wavelength_mm;
+            let on_s = t_s - *on_since_s.get_or_insert(t_s);
+            let amplitude_v = 5.0 * (on_s / FADE_IN_S).min(1.0);
+            let mut words = [0; ACTUATORS];
+            for (actuator, word) in words.iter_mut().enumerate() {
+                let place = actuator as f64 * self.pitch_mm / wavelength_mm;
+                let phase = std::f64::consts::TAU * (cycles + (self.ahead_cycles)(t_s) + place);
+                let offset_v = if actuator == 7 { self.offset_v } else { 0.0 };
+                *word = word_of(amplitude_v * phase.sin() + offset_v);
+            }
+            if words != held {
+                held = words;
+                let at_ns = nanoseconds(t_s + (self.edge_s)(t_s));
+                outputs.push(OutputRecord {
+                    at_ns,
+                    words,
+                    skew_ns: 0,
+                });
+            }
+        }
+        outputs
+    }
+}
+
+/// The DAC word of a voltage in the ±5 V range.
+pub fn word_of(volts: f64) -> u16 {
+    (volts * 6_553.6 + 32_768.0).round().clamp(0.0, 65_535.0) as u16
+}
+
+fn instants(step_s: f64, end_s: f64) -> impl Iterator<Item = f64> {
+    (0..(end_s / step_s).round() as u32).map(move |i| f64::from(i) * step_s)
+}
+
+pub fn nanoseconds(t_s: f64) -> u64 {
+    (t_s * 1e9).round() as u64
+}

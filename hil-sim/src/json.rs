@@ -1,0 +1,166 @@
+//! A run in JSON: one object per scene.
+
+use protocol::Status;
+use serde::Serialize;
+
+use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
+use crate::recording::Recording;
+use crate::truth::Truth;
+
+/// A scene's object. A number that could not be measured is null.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneResult<'a> {
+    /// The scene's name.
+    pub name: &'a str,
+    /// `native` or `elf`.
+    pub engine: &'static str,
+    /// How λ was estimated.
+    pub method: &'a str,
+    /// XXH3 of every link byte and DAC word with its instant: 16 hexadecimal digits.
+    pub hash: String,
+    /// Virtual time run per wall time.
+    pub realtime_factor: Option<f64>,
+    /// Every estimate beside the truth.
+    pub estimates: &'a [JudgedEstimate],
+    /// The estimates as a whole.
+    pub summary: Summary,
+    /// What the actuators did.
+    pub actuators: Actuators,
+    /// The counters of both ends.
+    pub link: Link,
+    /// What faults were injected.
+    pub faults: &'a [Fault],
+}
+
+/// The last counters of both ends; null where none arrived.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Link {
+    /// The sensor board's.
+    pub sensor: Option<Status>,
+    /// The display board's.
+    pub display: Option<Status>,
+}
+
+/// A fault that was injected, and how the boards took it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fault {
+    /// Its kind, as the scene writes it.
+    pub kind: String,
+    /// When, in s since the scene's start.
+    pub at_s: f64,
+    /// Until it was noticed, in ms.
+    pub detected_ms: Option<f64>,
+    /// Until the outputs were harmless, in ms.
+    pub safe_ms: Option<f64>,
+}
+
+impl<'a> SceneResult<'a> {
+    /// The object of one run.
+    pub fn new(truth: &Truth<'a>, recording: &Recording, verdict: &'a Verdict) -> Self {
+        Self {
+            name: truth.name,
+            engine: recording.engine.name(),
+            method: truth.method,
+            hash: format!("{:016x}", recording.hash),
+            realtime_factor: recording.realtime_factor(),
+            estimates: &verdict.estimates,
+            summary: verdict.summary,
+            actuators: verdict.actuators,
+            link: Link {
+                sensor: recording.sensor_status,
+                display: recording.display_status,
+            },
+            faults: &[],
+        }
+    }
+}
+
+/// The JSON of several runs: a list, indented, closed by a line break.
+///
+/// # Errors
+/// None in practice: there are no maps here whose keys are not text.
+pub fn to_json(results: &[SceneResult]) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(results)? + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::analysis::judge;
+    use crate::analysis::synthetic::Run;
+
+    fn parsed(run: &Run) -> Value {
+        let truth = Truth::new("a scene", "counting", &*run.surface_mm);
+        let recording = run.record();
+        let verdict = judge(&truth, &recording);
+        let text = to_json(&[SceneResult::new(&truth, &recording, &verdict)]).unwrap();
+        serde_json::from_str(&text).unwrap()
+    }
+
+    fn keys(value: &Value) -> Vec<&str> {
+        value
+            .as_object()
+            .unwrap()
+            .keys()
+            .map(String::as_str)
+            .collect()
+    }
+
+    #[test]
+    fn a_scene_has_the_contracts_names() {
+        let json = parsed(&Run::steady(50.0, 2.0));
+        let scene = &json[0];
+        assert_eq!(scene["name"], "a scene");
+        assert_eq!(scene["engine"], "native");
+        assert_eq!(scene["method"], "counting");
+        assert_eq!(scene["hash"], "0123456789abcdef");
+        assert_eq!(scene["realtime_factor"], 2_000.0);
+        assert_eq!(scene["faults"], json!([]));
+        assert_eq!(scene["link"], json!({ "sensor": null, "display": null }));
+        assert_eq!(
+            scene["estimates"][0],
+            json!({
+                "t_s": 0.01,
+                "truth_mm": 2.0,
+                "wavelength_mm": 2.0,
+                "confidence": 0.75,
+                "valid": true
+            })
+        );
+        let summary = keys(&scene["summary"]);
+        for name in [
+            "rms_percent",
+            "bias_percent",
+            "mean_mm",
+            "valid_share",
+            "settling_ms",
+            "latency_ms",
+        ] {
+            assert!(summary.contains(&name), "{name}");
+        }
+        let actuators = keys(&scene["actuators"]);
+        for name in [
+            "frequency_hz",
+            "truth_hz",
+            "phase_error_rms_cycles",
+            "max_step_v",
+            "mean_v",
+            "skew_us",
+        ] {
+            assert!(actuators.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_was_not_measured_is_null() {
+        let json = parsed(&Run {
+            duration_s: 0.0,
+            ..Run::steady(50.0, 2.0)
+        });
+        let numbers = |part: &str| json[0][part].as_object().unwrap().clone();
+        assert!(numbers("summary").values().all(Value::is_null));
+        assert!(numbers("actuators").values().all(Value::is_null));
+    }
+}

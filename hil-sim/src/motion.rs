@@ -1,0 +1,97 @@
+//! Where the hand is, and what its encoder says.
+
+use crate::scene::Motion;
+
+/// Travel for one count of either encoder, in mm: 5 µm.
+pub const MM_PER_COUNT: f64 = 0.005;
+
+/// The 16-bit counter of an encoder at `position_mm`: counts of 5 µm, wrapping.
+pub fn encoder(position_mm: f64) -> u16 {
+    // Two's complement: a negative position wraps downwards.
+    (position_mm / MM_PER_COUNT).floor() as i64 as u16
+}
+
+impl Motion {
+    /// The hand's position x in mm, `t_s` after the start.
+    pub fn position_mm(&self, t_s: f64) -> f64 {
+        match self {
+            Motion::Constant { speed_mm_s } => speed_mm_s * t_s,
+            Motion::Sinusoid {
+                amplitude_mm_s,
+                frequency_hz,
+            } => {
+                let omega = std::f64::consts::TAU * frequency_hz;
+                amplitude_mm_s / omega * (1.0 - (omega * t_s).cos())
+            }
+            Motion::Recorded(positions) => positions.value(positions.row(t_s, 0), 0, t_s),
+        }
+    }
+
+    /// The hand's velocity v in mm/s, `t_s` after the start.
+    pub fn velocity_mm_s(&self, t_s: f64) -> f64 {
+        match self {
+            Motion::Constant { speed_mm_s } => *speed_mm_s,
+            Motion::Sinusoid {
+                amplitude_mm_s,
+                frequency_hz,
+            } => amplitude_mm_s * (std::f64::consts::TAU * frequency_hz * t_s).sin(),
+            Motion::Recorded(positions) => positions.slope(positions.row(t_s, 0), 0, t_s),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Series;
+    use std::sync::Arc;
+
+    #[test]
+    fn velocity_is_the_slope_of_position() {
+        let recorded = Series {
+            at: vec![0.0, 0.5, 2.0],
+            values: vec![1.0, 11.0, -19.0],
+            width: 1,
+        };
+        let motions = [
+            Motion::Constant { speed_mm_s: -30.0 },
+            Motion::Sinusoid {
+                amplitude_mm_s: 70.0,
+                frequency_hz: 0.83,
+            },
+            Motion::Recorded(Arc::new(recorded)),
+        ];
+        // Central difference over 2h: the error is h²/6 · v'' ≤ 1e-8/6 · 70 · (2π 0.83)² = 3.2e-6.
+        let h = 1e-4;
+        for motion in motions {
+            for t in [0.1, 0.4, 0.7, 1.3] {
+                let slope = (motion.position_mm(t + h) - motion.position_mm(t - h)) / (2.0 * h);
+                assert!(
+                    (slope - motion.velocity_mm_s(t)).abs() < 4e-6,
+                    "{motion:?} at {t}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_encoder_wraps_in_both_directions() {
+        assert_eq!(encoder(0.0), 0);
+        assert_eq!(encoder(0.0049), 0);
+        assert_eq!(encoder(1.0025), 200);
+        assert_eq!(encoder(-0.001), 65_535);
+        assert_eq!(encoder(65_536.0 * 0.005 + 0.001), 0);
+    }
+
+    #[test]
+    fn a_recorded_hand_rests_after_its_last_row() {
+        let recorded = Series {
+            at: vec![0.0, 1.0],
+            values: vec![0.0, 5.0],
+            width: 1,
+        };
+        let motion = Motion::Recorded(Arc::new(recorded));
+        assert_eq!(motion.position_mm(9.0), 5.0);
+        assert_eq!(motion.velocity_mm_s(9.0), 0.0);
+    }
+}

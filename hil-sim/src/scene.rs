@@ -1,0 +1,266 @@
+//! A scene: what is rubbed, how, through which link, and what must come out.
+//!
+//! Scenes are TOML files ([`Scene::load`]); [`Scene::constant`] builds the paper's in code. A scene that
+//! loaded has been checked as a whole, its CSV files included: nothing in it can stop a run.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
+
+mod error;
+mod read;
+mod series;
+mod table;
+
+pub use error::SceneError;
+pub use series::Series;
+
+/// Everything that decides a run. Two runs of equal scenes are equal, byte for byte.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Names the scene and its outputs: 1 to 64 of `A–Z a–z 0–9 . _ -`, no dot in front. Default: the
+    /// file's name without its ending.
+    pub name: String,
+    /// All randomness comes from it. Default 1.
+    pub seed: u64,
+    /// Virtual time to run, in s: above 0, to 600. Default 3.
+    pub duration_s: f64,
+    /// What is rubbed.
+    pub surface: Surface,
+    /// How the operator's hand moves.
+    pub motion: Motion,
+    /// How the arm follows the hand.
+    pub arm: ArmDrive,
+    /// What the ADC sees.
+    pub gauges: Gauges,
+    /// What the way between the boards does to the bytes, in either direction.
+    pub link: Link,
+    /// What the sensor makes of it.
+    pub estimator: Estimator,
+    /// How the fifty actuators share the stimulus (`[display] mode`). Default uniform.
+    pub display_mode: Mode,
+    /// What must come out.
+    pub expect: Expect,
+}
+
+/// `[surface]`: specimens side by side along x.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// At least one, in the order of x. The first also covers everything before it, the last goes on
+    /// for ever.
+    pub specimens: Vec<Specimen>,
+    /// Where the first one begins, in mm. Default 0.
+    pub start_mm: f64,
+    /// The shape of the ridges. Default trapezoid.
+    pub profile: Profile,
+}
+
+/// A piece of a surface with one wavelength.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Specimen {
+    /// λ in mm: 0.01 to 100.
+    pub wavelength_mm: f64,
+    /// Its extent along x in mm, above 0; infinite if it is the last.
+    pub length_mm: f64,
+}
+
+/// The shape of the ridges.
+#[derive(Clone, Debug)]
+pub enum Profile {
+    /// A sine.
+    Sine,
+    /// A grating with ridges as wide as its grooves and ramps of 0.1 λ.
+    Trapezoid,
+    /// Measured heights over x, in any unit; `file` has the columns `x_mm,height`. The specimens are
+    /// then only the truth to judge against.
+    Recorded(Arc<Series>),
+}
+
+/// `[motion]`: the operator's hand. Its methods are in [`crate::motion`].
+#[derive(Clone, Debug)]
+pub enum Motion {
+    /// One speed from the start on.
+    Constant {
+        /// In mm/s, −1000 to 1000. Default 50.
+        speed_mm_s: f64,
+    },
+    /// v = amplitude · sin(2π · frequency · t), from x = 0 on.
+    Sinusoid {
+        /// The highest speed in mm/s, 0 to 1000.
+        amplitude_mm_s: f64,
+        /// In Hz, above 0, to 20.
+        frequency_hz: f64,
+    },
+    /// Measured positions, straight lines between them; `file` has the columns `t_s,x_mm`.
+    Recorded(Arc<Series>),
+}
+
+/// `[arm]`: how the remote fingertip follows the hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmDrive {
+    /// Default motion.
+    pub follows: Follows,
+    /// The drive's first-order lag in ms, 0 to 1000. Default 0. Only with [`Follows::Link`].
+    pub lag_ms: f64,
+}
+
+/// What the arm follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Follows {
+    /// The hand, exactly.
+    Motion,
+    /// The `Motion` frames that reach the sensor board, through its drive.
+    Link,
+}
+
+/// `[gauges]` and `[contact]`: where the ADC's voltages come from.
+#[derive(Clone, Debug)]
+pub enum Gauges {
+    /// Each gauge feels the texture under its own place: no slip, no stick. See [`crate::gauges`].
+    Kinematic(Kinematic),
+    /// Voltages at the pins; `file` has the columns `t_s,g0,g1,g2,g3,g4` and, optionally, `tangential`.
+    Recorded(Arc<Series>),
+}
+
+/// The kinematic gauges' imperfections.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Kinematic {
+    /// Power of the fundamental at unit gain over the white noise's in 0–500 Hz, in dB, −40 to 120.
+    /// Default none: no noise.
+    pub snr_db: Option<f64>,
+    /// Mains hum, common to all gauges, its amplitude relative to the fundamental's at unit gain, 0 to
+    /// 10. Default 0.
+    pub hum_50_hz: f64,
+    /// A second harmonic, relative to the fundamental, 0 to 1. Default 0.
+    pub second_harmonic: f64,
+    /// Gauges that say nothing: mid-rail, without signal, hum or noise. Default none.
+    pub dead: [bool; GAUGES],
+    /// Gauges whose amplifier drives the ADC into both ends. Default none.
+    pub saturated: [bool; GAUGES],
+}
+
+/// `[link]`: the weather between the boards, the same for either direction. All default to 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Link {
+    /// One way, in ms, 0 to 10 000.
+    pub delay_ms: f64,
+    /// Largest further delay of a frame in ms, 0 to 10 000, evenly spread; it changes no order.
+    pub jitter_ms: f64,
+    /// Share of frames that never come.
+    pub loss: f64,
+    /// Share of frames that come after the frame that was sent after them.
+    pub reorder: f64,
+    /// Share of bytes of which one bit is turned.
+    pub corrupt: f64,
+}
+
+/// `[estimator]`: how λ is estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Estimator {
+    /// `"default"` and `"counting"` are the paper's count of crossings.
+    pub method: Method,
+    /// The counting window A in ms, 10 to 200. Default 80, the paper's.
+    pub window_ms: u16,
+}
+
+/// `[expect]`: bounds on the summary. One that is absent is not judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Expect {
+    /// `rms_percent` at most this.
+    pub wavelength_rms_percent: Option<f64>,
+    /// `bias_percent` within ± this.
+    pub wavelength_bias_percent: Option<f64>,
+    /// `mean_mm` within ± [`Expect::mean_tolerance_mm`] of this.
+    pub mean_mm: Option<f64>,
+    /// In mm. Default 0.03.
+    pub mean_tolerance_mm: f64,
+    /// `valid_share` at least this, 0 to 1.
+    pub valid_share_min: Option<f64>,
+    /// `settling_ms` at most this.
+    pub settling_ms: Option<f64>,
+    /// `latency_ms` at most this.
+    pub latency_ms: Option<f64>,
+    /// The actuators' frequency within ± this many percent of v/λ̂.
+    pub frequency_percent: Option<f64>,
+    /// `phase_error_rms_cycles` at most this.
+    pub phase_rms_cycles: Option<f64>,
+}
+
+impl Scene {
+    /// Reads and checks a scene and every file it names.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|error| SceneError::unreadable(path, &error))?;
+        read::read(path, &text)
+    }
+
+    /// As [`Scene::load`], from text that is said to stand at `path`.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
+        read::read(path, text)
+    }
+
+    /// One specimen of `wavelength_mm`, a trapezoid, rubbed at `speed_mm_s` for 3 s without noise: a cell
+    /// of the paper's Table I. The values must be within the ranges of [`Specimen`] and [`Motion`].
+    pub fn constant(wavelength_mm: f64, speed_mm_s: f64) -> Self {
+        Self {
+            name: format!("constant-{wavelength_mm}mm-{speed_mm_s}mm-s"),
+            seed: 1,
+            duration_s: 3.0,
+            surface: Surface {
+                specimens: vec![Specimen {
+                    wavelength_mm,
+                    length_mm: f64::INFINITY,
+                }],
+                start_mm: 0.0,
+                profile: Profile::Trapezoid,
+            },
+            motion: Motion::Constant { speed_mm_s },
+            arm: ArmDrive {
+                follows: Follows::Motion,
+                lag_ms: 0.0,
+            },
+            gauges: Gauges::Kinematic(Kinematic::default()),
+            link: Link::default(),
+            estimator: Estimator::default(),
+            display_mode: Mode::Uniform,
+            expect: Expect::default(),
+        }
+    }
+
+    /// What the scene asks of the sensor board.
+    pub fn sensor_configuration(&self) -> SensorConfiguration {
+        SensorConfiguration {
+            method: self.estimator.method,
+            window_ms: self.estimator.window_ms,
+            ..SensorConfiguration::default()
+        }
+    }
+
+    /// What the scene asks of the display board.
+    pub fn display_configuration(&self) -> DisplayConfiguration {
+        DisplayConfiguration {
+            mode: self.display_mode,
+            ..DisplayConfiguration::default()
+        }
+    }
+}
+
+impl Default for Estimator {
+    fn default() -> Self {
+        let defaults = SensorConfiguration::default();
+        Self {
+            method: Method::Counting,
+            window_ms: defaults.window_ms,
+        }
+    }
+}
+
+impl Estimator {
+    /// The method's name in scenes and in the JSON.
+    pub const fn method_name(&self) -> &'static str {
+        match self.method {
+            Method::Counting => "counting",
+        }
+    }
+}

@@ -1,0 +1,456 @@
+//! From TOML to a checked [`Scene`], section by section.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use protocol::{Method, Mode};
+
+use super::series::Series;
+use super::table::{Bounds, Source, Table};
+use super::{
+    ArmDrive, Estimator, Expect, Follows, Gauges, Kinematic, Link, Motion, Profile, Scene,
+    SceneError, Specimen, Surface,
+};
+use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
+
+/// Faster than any hand, and than the arm's drive allows.
+const MOST_SPEED_MM_S: f64 = 1000.0;
+
+const DURATION: Bounds = Bounds {
+    what: "a duration",
+    give: "a time above 0 in s, 600 at most",
+    allows: |s| s > 0.0 && s <= 600.0,
+};
+const WAVELENGTH: Bounds = Bounds {
+    what: "a wavelength",
+    give: "a length above 0 in mm (0.01 to 100)",
+    allows: |mm| (0.01..=100.0).contains(&mm),
+};
+const LENGTH: Bounds = Bounds {
+    what: "a length",
+    give: "a length above 0 in mm, 100 000 at most",
+    allows: |mm| mm > 0.0 && mm <= 100_000.0,
+};
+const PLACE: Bounds = Bounds {
+    what: "a place",
+    give: "a place within ± 100 000 mm",
+    allows: |mm| mm.abs() <= 100_000.0,
+};
+const SPEED: Bounds = Bounds {
+    what: "a speed of a hand",
+    give: "a speed in mm/s, −1000 to 1000",
+    allows: |mm_s| mm_s.abs() <= MOST_SPEED_MM_S,
+};
+const AMPLITUDE: Bounds = Bounds {
+    what: "a hand's highest speed",
+    give: "a speed in mm/s, 0 to 1000",
+    allows: |mm_s| (0.0..=MOST_SPEED_MM_S).contains(&mm_s),
+};
+const FREQUENCY: Bounds = Bounds {
+    what: "a frequency of a hand",
+    give: "a frequency above 0 in Hz, 20 at most",
+    allows: |hz| hz > 0.0 && hz <= 20.0,
+};
+const LAG: Bounds = Bounds {
+    what: "a lag",
+    give: "a time in ms, 0 to 1000",
+    allows: |ms| (0.0..=1000.0).contains(&ms),
+};
+const DELAY: Bounds = Bounds {
+    what: "a delay",
+    give: "a time in ms, 0 to 10 000",
+    allows: |ms| (0.0..=10_000.0).contains(&ms),
+};
+const SHARE: Bounds = Bounds {
+    what: "a share",
+    give: "a number from 0 to 1",
+    allows: |share| (0.0..=1.0).contains(&share),
+};
+const SNR: Bounds = Bounds {
+    what: "a signal-to-noise ratio",
+    give: "a ratio in dB, −40 to 120, or take it out for no noise",
+    allows: |db| (-40.0..=120.0).contains(&db),
+};
+const HUM: Bounds = Bounds {
+    what: "an amplitude of hum",
+    give: "a number from 0 to 10, relative to the signal",
+    allows: |ratio| (0.0..=10.0).contains(&ratio),
+};
+const BOUND: Bounds = Bounds {
+    what: "a bound",
+    give: "a number above 0",
+    allows: |bound| bound > 0.0,
+};
+
+pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
+    let source = Source::new(path, text);
+    let document = source.parse()?;
+    let mut root = Table::root(&source, &document);
+
+    let name = name(&mut root, path)?;
+    let seed = root.whole("seed", 0, i64::MAX as u64)?.unwrap_or(1);
+    let duration_s = root.number("duration_s", &DURATION)?.unwrap_or(3.0);
+    let surface = surface(root.table("surface")?)?;
+    let motion = motion(root.table("motion")?, duration_s)?;
+    let arm = arm(root.table("arm")?)?;
+    let contact_given = contact(root.table("contact")?)?;
+    let gauges = gauges(root.table("gauges")?, duration_s)?;
+    if contact_given && matches!(gauges, Gauges::Recorded(_)) {
+        return Err(root.refuse(
+            "contact",
+            "does not apply to recorded gauges: take [contact] out",
+        ));
+    }
+    let link = link(root.table("link")?)?;
+    let estimator = estimator(root.table("estimator")?)?;
+    let display_mode = display(root.table("display")?)?;
+    if let Some(fault) = root.tables("fault")?.first() {
+        return Err(fault.refuse(
+            "kind",
+            "faults are known but not built in this version: take [[fault]] out",
+        ));
+    }
+    let expect = expect(root.table("expect")?)?;
+    if let Profile::Recorded(heights) = &surface.profile {
+        covers_travel(&root, heights, &motion, duration_s)?;
+    }
+    root.finish("")?;
+    Ok(Scene {
+        name,
+        seed,
+        duration_s,
+        surface,
+        motion,
+        arm,
+        gauges,
+        link,
+        estimator,
+        display_mode,
+        expect,
+    })
+}
+
+fn name(root: &mut Table<'_>, path: &Path) -> Result<String, SceneError> {
+    let from_file = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = root.text("name")?.unwrap_or(&from_file);
+    let usable = (1..=64).contains(&name.len())
+        && !name.starts_with('.')
+        && name
+            .bytes()
+            .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
+    if usable {
+        Ok(name.to_owned())
+    } else {
+        Err(root.refuse(
+            "name",
+            format!("{name:?} cannot name a file everywhere: give 1 to 64 of A–Z a–z 0–9 . _ - without a dot in front"),
+        ))
+    }
+}
+
+fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
+    let mut specimens = Vec::new();
+    let rows = table.tables("specimens")?;
+    let last = rows.len().saturating_sub(1);
+    for (index, mut row) in rows.into_iter().enumerate() {
+        let wavelength_mm = row.needed_number("wavelength_mm", &WAVELENGTH)?;
+        let length_mm = row.number("length_mm", &LENGTH)?;
+        let length_mm = match length_mm {
+            _ if index == last => f64::INFINITY,
+            Some(length_mm) => length_mm,
+            None => {
+                return Err(row.refuse(
+                    "length_mm",
+                    "is missing: all but the last specimen need one",
+                ));
+            }
+        };
+        row.finish("")?;
+        specimens.push(Specimen {
+            wavelength_mm,
+            length_mm,
+        });
+    }
+    if specimens.is_empty() {
+        return Err(table.refuse(
+            "specimens",
+            "there are none: give one or more, such as [{ wavelength_mm = 2.0 }]",
+        ));
+    }
+    let start_mm = table.number("start_mm", &PLACE)?.unwrap_or(0.0);
+    let kind = table.choice(
+        "profile",
+        &[("trapezoid", 't'), ("sine", 's'), ("recorded", 'r')],
+        &[],
+    )?;
+    let profile = match kind {
+        't' => Profile::Trapezoid,
+        's' => Profile::Sine,
+        _ => Profile::Recorded(series(&mut table, &["x_mm,height"], |_, _| Ok(()))?),
+    };
+    table.finish(if kind == 'r' {
+        ""
+    } else {
+        " unless profile = \"recorded\""
+    })?;
+    Ok(Surface {
+        specimens,
+        start_mm,
+        profile,
+    })
+}
+
+fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
+    match table.choice(
+        "kind",
+        &[("constant", 'c'), ("sinusoid", 's'), ("recorded", 'r')],
+        &[],
+    )? {
+        'c' => {
+            let speed_mm_s = table.number("speed_mm_s", &SPEED)?.unwrap_or(50.0);
+            table.finish(" with kind = \"constant\"")?;
+            Ok(Motion::Constant { speed_mm_s })
+        }
+        's' => {
+            let amplitude_mm_s = table.needed_number("amplitude_mm_s", &AMPLITUDE)?;
+            let frequency_hz = table.needed_number("frequency_hz", &FREQUENCY)?;
+            table.finish(" with kind = \"sinusoid\"")?;
+            Ok(Motion::Sinusoid {
+                amplitude_mm_s,
+                frequency_hz,
+            })
+        }
+        _ => {
+            let positions = series(&mut table, &["t_s,x_mm"], |before, row| {
+                if !(PLACE.allows)(row[1]) {
+                    return Err((1, format!("is out of reach: give {}", PLACE.give)));
+                }
+                let Some(before) = before else { return Ok(()) };
+                let speed_mm_s = (row[1] - before[1]) / (row[0] - before[0]);
+                if speed_mm_s.abs() <= MOST_SPEED_MM_S {
+                    Ok(())
+                } else {
+                    Err((
+                        1,
+                        format!(
+                            "is {speed_mm_s:.0} mm/s from the row before: no hand is faster than 1000"
+                        ),
+                    ))
+                }
+            })?;
+            covers_time(&table, &positions, duration_s)?;
+            table.finish(" with kind = \"recorded\"")?;
+            Ok(Motion::Recorded(positions))
+        }
+    }
+}
+
+fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
+    let follows = table.choice(
+        "follows",
+        &[("motion", Follows::Motion), ("link", Follows::Link)],
+        &[],
+    )?;
+    let lag_ms = table.number("lag_ms", &LAG)?.unwrap_or(0.0);
+    if lag_ms > 0.0 && follows == Follows::Motion {
+        return Err(table.refuse(
+            "lag_ms",
+            "an arm that follows \"motion\" has no lag: give follows = \"link\"",
+        ));
+    }
+    table.finish("")?;
+    Ok(ArmDrive { follows, lag_ms })
+}
+
+/// Whether the section holds anything.
+fn contact(mut table: Table<'_>) -> Result<bool, SceneError> {
+    table.choice(
+        "model",
+        &[("auto", ()), ("kinematic", ())],
+        &["rigid", "stick-slip"],
+    )?;
+    table.choice("friction", &[("none", ())], &["mild", "strong", "severe"])?;
+    let given = table.contains("model") || table.contains("friction");
+    table.finish("")?;
+    Ok(given)
+}
+
+fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<Gauges, SceneError> {
+    let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')], &[])?;
+    table.not_built("tangential_n_per_v")?;
+    table.not_built("stiffness_n_per_m")?;
+    let tangential = table.boolean("tangential")?;
+    if kind == 'k' {
+        // Kinematic contact knows no force: the channel, wired or not, stays at mid-rail.
+        let snr_db = table.number("snr_db", &SNR)?;
+        let hum_50_hz = table.number("hum_50_hz", &HUM)?.unwrap_or(0.0);
+        let second_harmonic = table.number("second_harmonic", &SHARE)?.unwrap_or(0.0);
+        let dead = table.gauges("dead")?;
+        let saturated = table.gauges("saturated")?;
+        if let Some(gauge) = (0..dead.len()).find(|&gauge| dead[gauge] && saturated[gauge]) {
+            return Err(table.refuse(
+                "saturated",
+                format!("gauge {gauge} is dead already: name it in one list only"),
+            ));
+        }
+        table.finish(" with kind = \"kinematic\"")?;
+        return Ok(Gauges::Kinematic(Kinematic {
+            snr_db,
+            hum_50_hz,
+            second_harmonic,
+            dead,
+            saturated,
+        }));
+    }
+    let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
+    let volts = series(&mut table, &headers, |before, row| {
+        if let Some(column) = (1..row.len()).find(|&column| !(-0.3..=4.0).contains(&row[column])) {
+            return Err((
+                column,
+                "is no voltage that an ADC pin bears: give −0.3 to 4.0 V".to_owned(),
+            ));
+        }
+        // A little slack for times written in decimals.
+        if before.is_some_and(|before| row[0] - before[0] > 1.001e-3) {
+            return Err((
+                0,
+                "comes more than 1 ms after the row before: give 1 kHz or more".to_owned(),
+            ));
+        }
+        Ok(())
+    })?;
+    if tangential == Some(true) && volts.width == 5 {
+        return Err(table.refuse(
+            "tangential",
+            "true, but the file has no column of that name: add it or give false",
+        ));
+    }
+    covers_time(&table, &volts, duration_s)?;
+    table.finish(" with kind = \"recorded\"")?;
+    Ok(Gauges::Recorded(volts))
+}
+
+fn link(mut table: Table<'_>) -> Result<Link, SceneError> {
+    let link = Link {
+        delay_ms: table.number("delay_ms", &DELAY)?.unwrap_or(0.0),
+        jitter_ms: table.number("jitter_ms", &DELAY)?.unwrap_or(0.0),
+        loss: table.number("loss", &SHARE)?.unwrap_or(0.0),
+        reorder: table.number("reorder", &SHARE)?.unwrap_or(0.0),
+        corrupt: table.number("corrupt", &SHARE)?.unwrap_or(0.0),
+    };
+    table.finish("")?;
+    Ok(link)
+}
+
+fn estimator(mut table: Table<'_>) -> Result<Estimator, SceneError> {
+    let built = [
+        ("default", Method::Counting),
+        ("counting", Method::Counting),
+    ];
+    let method = table.choice("method", &built, &["crossings", "bank"])?;
+    let defaults = Estimator::default();
+    let window_ms = table
+        .whole("window_ms", 10, 200)?
+        .map_or(defaults.window_ms, |ms| ms as u16);
+    table.finish("")?;
+    Ok(Estimator { method, window_ms })
+}
+
+fn display(mut table: Table<'_>) -> Result<Mode, SceneError> {
+    let mode = table.choice(
+        "mode",
+        &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
+        &[],
+    )?;
+    table.finish("")?;
+    Ok(mode)
+}
+
+fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
+    let mean_mm = table.number("mean_mm", &WAVELENGTH)?;
+    let mean_tolerance_mm = table.number("mean_tolerance_mm", &BOUND)?;
+    if mean_tolerance_mm.is_some() && mean_mm.is_none() {
+        return Err(table.refuse(
+            "mean_tolerance_mm",
+            "has nothing to bound: give mean_mm too",
+        ));
+    }
+    let expect = Expect {
+        wavelength_rms_percent: table.number("wavelength_rms_percent", &BOUND)?,
+        wavelength_bias_percent: table.number("wavelength_bias_percent", &BOUND)?,
+        mean_mm,
+        mean_tolerance_mm: mean_tolerance_mm.unwrap_or(0.03),
+        valid_share_min: table.number("valid_share_min", &SHARE)?,
+        settling_ms: table.number("settling_ms", &BOUND)?,
+        latency_ms: table.number("latency_ms", &BOUND)?,
+        frequency_percent: table.number("frequency_percent", &BOUND)?,
+        phase_rms_cycles: table.number("phase_rms_cycles", &BOUND)?,
+    };
+    table.finish("")?;
+    Ok(expect)
+}
+
+/// The CSV file that `table` names.
+fn series(
+    table: &mut Table<'_>,
+    headers: &[&str],
+    check: impl Fn(Option<&[f64]>, &[f64]) -> Result<(), (usize, String)>,
+) -> Result<Arc<Series>, SceneError> {
+    let Some(name) = table.text("file")? else {
+        return Err(table.refuse(
+            "file",
+            format!(
+                "is missing: give a CSV file with the columns {}",
+                headers[0]
+            ),
+        ));
+    };
+    let path = table.source().beside(name);
+    match File::open(&path) {
+        Ok(file) => Ok(Arc::new(Series::read(&path, file, headers, check)?)),
+        Err(error) => {
+            let path = path.display();
+            Err(table.refuse(
+                "file",
+                format!(
+                    "{path} cannot be read: {error}: names are relative to the scene's own folder"
+                ),
+            ))
+        }
+    }
+}
+
+fn covers_time(table: &Table<'_>, series: &Series, duration_s: f64) -> Result<(), SceneError> {
+    let (first, last) = series.extent();
+    // The last scan is one scan before the end.
+    if first <= 0.0 && last >= duration_s - 1.0 / f64::from(SCAN_RATE_HZ) {
+        return Ok(());
+    }
+    let message = format!(
+        "lasts from {first} to {last} s, the scene from 0 to {duration_s} s: give a longer file or a shorter duration_s"
+    );
+    Err(table.refuse("file", message))
+}
+
+fn covers_travel(
+    root: &Table<'_>,
+    heights: &Series,
+    motion: &Motion,
+    duration_s: f64,
+) -> Result<(), SceneError> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for step in 0..=(duration_s * 1000.0).ceil() as u64 {
+        let x_mm = motion.position_mm(step as f64 / 1000.0);
+        (low, high) = (low.min(x_mm), high.max(x_mm));
+    }
+    let (low, high) = (low + PLACES_MM[0], high + PLACES_MM[PLACES_MM.len() - 1]);
+    let (first, last) = heights.extent();
+    if first <= low && last >= high {
+        return Ok(());
+    }
+    let message = format!(
+        "the profile lies from {first} to {last} mm, the gauges come from {low:.3} to {high:.3} mm: give a longer profile or a shorter travel"
+    );
+    Err(root.refuse("surface", message))
+}

@@ -1,0 +1,200 @@
+//! The texture under a gauge, and the wavelength that is true there.
+//!
+//! The trapezoid (ridge = groove, ramps of 0.1 λ) is the sum of its odd harmonics up to 7, seen through
+//! a contact that blurs with a Gaussian of 0.12 mm, and scaled so that its fundamental has amplitude 1.
+//! Each specimen begins with a rising flank at mid-height, so its neighbour meets it in a step, as two
+//! plates that are laid side by side do.
+//!
+//! The blur and the ramp are guesses of the numerical study behind this project, not measurements.
+
+use crate::scene::{self, Profile, Series};
+
+/// Width of the contact, the standard deviation of a Gaussian, in mm: a guess.
+pub const CONTACT_BLUR_MM: f64 = 0.12;
+/// Width of a ramp of the trapezoid, in λ: a guess.
+pub const RAMP: f64 = 0.1;
+/// The highest harmonic of the trapezoid.
+pub const HIGHEST_HARMONIC: u32 = 7;
+
+/// Points of one period. At 2048 the straight line between two of them misses the 7th harmonic by at
+/// most (2π · 7 / 2048)² / 8 = 6e-5 of its amplitude.
+const POINTS: usize = 1 << POINTS_LOG2;
+const POINTS_LOG2: u32 = 11;
+/// What is left of a phase of 32 bits below the point's number.
+const FRACTION_BITS: u32 = 32 - POINTS_LOG2;
+/// Spacing of a recorded profile once it is blurred, in mm: a sixth of the blur.
+const GRID_MM: f64 = 0.02;
+
+/// One period, its first point repeated at the end.
+type Period = [f32; POINTS + 1];
+
+/// The surface, ready to be felt.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    patches: Vec<Patch>,
+    recorded: Option<Recorded>,
+}
+
+#[derive(Clone, Debug)]
+struct Patch {
+    start_mm: f64,
+    wavelength_mm: f64,
+    cycles_per_mm: f64,
+    period: Box<Period>,
+}
+
+/// Measured heights, blurred, on an even grid, without their mean, RMS 1/√2 as a sine of amplitude 1.
+#[derive(Clone, Debug)]
+struct Recorded {
+    start_mm: f64,
+    heights: Vec<f32>,
+}
+
+impl Surface {
+    /// Prepares a scene's surface. `second_harmonic` is relative to the fundamental.
+    pub fn new(surface: &scene::Surface, second_harmonic: f64) -> Self {
+        let mut start_mm = surface.start_mm;
+        let mut patches = Vec::with_capacity(surface.specimens.len());
+        for specimen in &surface.specimens {
+            let wavelength_mm = specimen.wavelength_mm;
+            let period = period(&harmonics(&surface.profile, wavelength_mm), second_harmonic);
+            patches.push(Patch {
+                start_mm,
+                wavelength_mm,
+                cycles_per_mm: wavelength_mm.recip(),
+                period,
+            });
+            start_mm += specimen.length_mm;
+        }
+        let recorded = match &surface.profile {
+            Profile::Recorded(heights) => Some(Recorded::new(heights)),
+            Profile::Sine | Profile::Trapezoid => None,
+        };
+        Self { patches, recorded }
+    }
+
+    /// The true wavelength at `x_mm`, in mm.
+    pub fn wavelength_mm(&self, x_mm: f64) -> f64 {
+        self.patch(x_mm).wavelength_mm
+    }
+
+    /// What a gauge at `x_mm` feels, 1 being the fundamental's amplitude. `advance` shifts the texture by
+    /// a share of its period, in 2⁻³² cycles; a recorded one is not shifted.
+    #[inline]
+    pub fn feel(&self, x_mm: f64, advance: u32) -> f32 {
+        match &self.recorded {
+            Some(recorded) => recorded.feel(x_mm),
+            None => self.patch(x_mm).feel(x_mm, advance),
+        }
+    }
+
+    #[inline]
+    fn patch(&self, x_mm: f64) -> &Patch {
+        let after = self.patches[1..]
+            .iter()
+            .take_while(|patch| patch.start_mm <= x_mm)
+            .count();
+        &self.patches[after]
+    }
+}
+
+impl Patch {
+    #[inline]
+    fn feel(&self, x_mm: f64, advance: u32) -> f32 {
+        let cycles = (x_mm - self.start_mm) * self.cycles_per_mm;
+        // Whole cycles fall off at the top.
+        let phase = ((cycles * 4_294_967_296.0) as i64 as u32).wrapping_add(advance);
+        let point = (phase >> FRACTION_BITS) as usize;
+        let fraction = (phase & ((1 << FRACTION_BITS) - 1)) as f32 / (1 << FRACTION_BITS) as f32;
+        let (from, to) = (self.period[point], self.period[point + 1]);
+        from + (to - from) * fraction
+    }
+}
+
+impl Recorded {
+    fn new(profile: &Series) -> Self {
+        let (first, last) = profile.extent();
+        let points = ((last - first) / GRID_MM).floor() as usize + 1;
+        let mut row = 0;
+        let raw: Vec<f64> = (0..points)
+            .map(|point| {
+                let x_mm = first + point as f64 * GRID_MM;
+                row = profile.row(x_mm, row);
+                profile.value(row, 0, x_mm)
+            })
+            .collect();
+        let mean = raw.iter().sum::<f64>() / points as f64;
+
+        let reach = (4.0 * CONTACT_BLUR_MM / GRID_MM).ceil() as i64;
+        let weight = |step: i64| (-0.5 * (step as f64 * GRID_MM / CONTACT_BLUR_MM).powi(2)).exp();
+        let total: f64 = (-reach..=reach).map(weight).sum();
+        let blurred: Vec<f64> = (0..points as i64)
+            .map(|centre| {
+                let sum: f64 = (-reach..=reach)
+                    .map(|step| {
+                        let point = (centre + step).clamp(0, points as i64 - 1) as usize;
+                        weight(step) * (raw[point] - mean)
+                    })
+                    .sum();
+                sum / total
+            })
+            .collect();
+
+        let power = blurred.iter().map(|height| height * height).sum::<f64>() / points as f64;
+        // A perfectly flat profile stays flat.
+        let scale = if power > 0.0 {
+            (0.5 / power).sqrt()
+        } else {
+            0.0
+        };
+        let heights = blurred
+            .iter()
+            .map(|height| (height * scale) as f32)
+            .collect();
+        Self {
+            start_mm: first,
+            heights,
+        }
+    }
+
+    fn feel(&self, x_mm: f64) -> f32 {
+        let at = ((x_mm - self.start_mm) / GRID_MM).clamp(0.0, (self.heights.len() - 1) as f64);
+        let point = (at as usize).min(self.heights.len().saturating_sub(2));
+        let (from, to) = (
+            self.heights[point],
+            self.heights[(point + 1).min(self.heights.len() - 1)],
+        );
+        from + (to - from) * (at - point as f64) as f32
+    }
+}
+
+/// The amplitudes of the sines n = 1, 3, 5, 7, the first of them 1.
+fn harmonics(profile: &Profile, wavelength_mm: f64) -> [(u32, f64); 4] {
+    use std::f64::consts::{PI, TAU};
+    // A square wave's 1/n, its flanks drawn out over RAMP (a sinc), through the contact (a Gaussian).
+    let amplitude = |n: u32| {
+        let n = f64::from(n);
+        let ramp = (PI * n * RAMP).sin() / (PI * n * RAMP);
+        let blur = (-0.5 * (TAU * n * CONTACT_BLUR_MM / wavelength_mm).powi(2)).exp();
+        ramp * blur / n
+    };
+    [1, 3, 5, HIGHEST_HARMONIC].map(|n| match profile {
+        // Very short waves are blurred to nothing; the signal is relative to what is left.
+        _ if n == 1 => (n, 1.0),
+        Profile::Trapezoid if amplitude(1) > 0.0 => (n, amplitude(n) / amplitude(1)),
+        _ => (n, 0.0),
+    })
+}
+
+fn period(harmonics: &[(u32, f64)], second_harmonic: f64) -> Box<Period> {
+    let mut period = Box::new([0.0; POINTS + 1]);
+    for (point, value) in period.iter_mut().enumerate() {
+        let theta = std::f64::consts::TAU * point as f64 / POINTS as f64;
+        let odd: f64 = harmonics
+            .iter()
+            .map(|&(n, a)| a * (f64::from(n) * theta).sin())
+            .sum();
+        *value = (odd + second_harmonic * (2.0 * theta).sin()) as f32;
+    }
+    period
+}

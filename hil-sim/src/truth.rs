@@ -1,0 +1,52 @@
+//! What a scene knows and the firmware does not: the ground on which a recording is judged.
+
+use protocol::{DisplayConfiguration, SensorConfiguration};
+
+/// The truth behind a [`crate::recording::Recording`], lent by the scene that was run.
+///
+/// Positions are not here: the recording carries them, exact, at every scan and tick.
+#[derive(Clone, Copy)]
+pub struct Truth<'a> {
+    /// The scene's name.
+    pub name: &'a str,
+    /// How λ was estimated, as the scene writes it.
+    pub method: &'a str,
+    /// λ in mm of the surface at position x, in mm. Where it is not finite and above 0 (no surface,
+    /// say), nothing is judged.
+    pub wavelength_mm: &'a dyn Fn(f64) -> f64,
+    /// How the sensor board was set.
+    pub sensor: SensorConfiguration,
+    /// How the display board was set.
+    pub display: DisplayConfiguration,
+    /// The actuator whose voltage is measured, below [`crate::recording::ACTUATORS`].
+    pub reference_actuator: usize,
+    /// Where that actuator is on the skin, in mm along the rubbing direction, as the travelling
+    /// mode counts it; not used in the uniform mode.
+    pub reference_place_mm: f64,
+}
+
+impl<'a> Truth<'a> {
+    /// A truth with both boards in their default configuration, measured at actuator 0.
+    pub fn new(name: &'a str, method: &'a str, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Self {
+        Self {
+            name,
+            method,
+            wavelength_mm,
+            sensor: SensorConfiguration::default(),
+            display: DisplayConfiguration::default(),
+            reference_actuator: 0,
+            reference_place_mm: 0.0,
+        }
+    }
+
+    /// λ in mm at position `x_mm`, if there is a surface.
+    pub fn wavelength_at(&self, x_mm: f64) -> Option<f64> {
+        let wavelength_mm = (self.wavelength_mm)(x_mm);
+        (wavelength_mm.is_finite() && wavelength_mm > 0.0).then_some(wavelength_mm)
+    }
+
+    /// The counting window A, in s.
+    pub fn window_s(&self) -> f64 {
+        f64::from(self.sensor.window_ms) * 1e-3
+    }
+}
