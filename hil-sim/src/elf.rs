@@ -30,13 +30,17 @@ use crate::digest::Digest;
 use crate::listener::{Listener, Said};
 use crate::recording::{Engine, EstimateRecord, Recording, ScanRecord};
 use crate::scene::{Scene, SceneError};
-use crate::weather::{Direction, Weather};
+use crate::weather::Weather;
 use crate::world::World;
 use display::{DisplayPins, DisplayRecords};
 use lockstep::{Cable, ConsoleHost, Lockstep, Watched};
 use nucleo::Nucleo;
 use rtt::Log;
 use sensor::SensorPins;
+
+/// The two directions' numbers, as in the native engine: the same scene has the same weather.
+const TO_DISPLAY: u64 = 0;
+const TO_SENSOR: u64 = 1;
 
 /// Why a run on emulated boards failed.
 #[derive(Debug, thiserror::Error)]
@@ -102,20 +106,20 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let end_ns = (scene.duration_s * 1e9).ceil() as u64;
     let sensor_world = World::new(scene)?;
     let display_world = World::new(scene)?;
-    let arm = Arm::new(scene);
+    let arm = Arm::new(&scene.arm, &scene.motion);
     let (to_display, from_sensor) = sync_channel(1);
     let (to_sensor, from_display) = sync_channel(1);
 
     let sensor_driver = Lockstep::new(
         Cable { to_peer: to_display, from_peer: from_display },
-        Weather::new(&scene.link, scene.seed, Direction::ToSensor),
+        Weather::new(&scene.link, scene.seed, TO_SENSOR),
         console_for(scene, Role::Sensor),
         Log::find(&firmwares.sensor.elf),
         end_ns,
     );
     let display_driver = Lockstep::new(
         Cable { to_peer: to_sensor, from_peer: from_sensor },
-        Weather::new(&scene.link, scene.seed, Direction::ToDisplay),
+        Weather::new(&scene.link, scene.seed, TO_DISPLAY),
         console_for(scene, Role::Display),
         Log::find(&firmwares.display.elf),
         end_ns,
@@ -124,7 +128,7 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let started = Instant::now();
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
-            let board = Nucleo::new(SensorPins::new(sensor_world, arm), SensorPins::fit);
+            let board = Nucleo::new(SensorPins::new(sensor_world, arm, scene.sensor_configuration()), SensorPins::fit);
             let take = |pins: &mut SensorPins, _: &mut Stm32f427| std::mem::take(&mut pins.scans);
             drive("sensor", board, &firmwares.sensor, sensor_driver, end_ns, take)
         });

@@ -13,6 +13,7 @@ use rigless::soc::stm32f427::peripherals::tim;
 
 use super::nucleo::Pins;
 use crate::dac81416::Dac81416;
+use crate::motion::encoder;
 use crate::recording::{OutputRecord, TickRecord};
 use crate::world::World;
 
@@ -158,7 +159,7 @@ fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
 impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
-        let encoder = World::encoder(position_mm);
+        let encoder = encoder(position_mm);
         self.records.ticks.push(TickRecord { at_ns, encoder, position_mm });
         encoder
     }

@@ -1,7 +1,7 @@
 //! What is on the sensor board's pins: five gauges and the force channel on ADC3, the arm's encoder,
 //! and the arm's servo drive.
 
-use protocol::CHANNELS;
+use protocol::{CHANNELS, SensorConfiguration};
 use rigless::device::Level;
 use rigless::mcu::Operate;
 use rigless::soc::Width;
@@ -13,7 +13,8 @@ use rigless::soc::stm32f427::peripherals::tim;
 use rigless::time::VirtualNanos;
 
 use super::nucleo::Pins;
-use crate::arm::{Arm, DriveCommand};
+use crate::arm::Arm;
+use crate::motion::encoder;
 use crate::recording::ScanRecord;
 use crate::world::World;
 
@@ -39,15 +40,17 @@ const EXTSEL_TIM3_TRGO: u64 = 0b1000 << 24;
 pub struct SensorPins {
     world: World,
     arm: Arm,
+    arm_full_scale_mm_s: f64,
     position_mm: f64,
     /// Every scan converted so far.
     pub scans: Vec<ScanRecord>,
 }
 
 impl SensorPins {
-    /// The surroundings that `world` and `arm` describe.
-    pub fn new(world: World, arm: Arm) -> Self {
-        Self { world, arm, position_mm: 0.0, scans: Vec::new() }
+    /// The surroundings that `world` and `arm` describe; the servo drive is scaled as the board is told.
+    pub fn new(world: World, arm: Arm, configuration: SensorConfiguration) -> Self {
+        let arm_full_scale_mm_s = f64::from(configuration.arm_full_scale_um_s) * 1e-3;
+        Self { world, arm, arm_full_scale_mm_s, position_mm: 0.0, scans: Vec::new() }
     }
 
     /// Wires up what the part itself has to know.
@@ -55,13 +58,17 @@ impl SensorPins {
         part.adc[ADC].set_reference(REFERENCE_UV);
     }
 
-    /// What the firmware puts on its PWM and direction pins.
-    fn command(part: &mut Stm32f427) -> Option<DriveCommand> {
+    /// The speed in mm/s that the firmware asks for on its PWM and direction pins.
+    fn command_mm_s(&self, part: &mut Stm32f427) -> f64 {
+        let channel = tim::Channel::new(1).expect("a timer has a channel 1");
         let (timer, registers) = part.advanced_timer(0);
-        let pulse = timer.pulse(tim::Channel::new(1)?, registers)?;
+        let duty = timer
+            .pulse(channel, registers)
+            .map_or(0.0, |pulse| pulse.width.0 as f64 / pulse.period.0 as f64);
+        let direction = Pin::new(DIRECTION_PIN).expect("a port has sixteen pins");
         let (port, registers) = part.port(PORT_F);
-        let forward = port.level(Pin::new(DIRECTION_PIN)?, registers) == Level::High;
-        Some(DriveCommand { duty: pulse.width.0 as f64 / pulse.period.0 as f64, forward })
+        let sign = if port.level(direction, registers) == Level::High { 1.0 } else { -1.0 };
+        sign * duty * self.arm_full_scale_mm_s
     }
 }
 
@@ -73,15 +80,16 @@ fn microvolts(code: u16) -> u32 {
 impl Pins for SensorPins {
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
         let t_s = at_ns as f64 * 1e-9;
-        let command = Self::command(part);
-        self.position_mm = self.arm.position_mm(&self.world, t_s, command);
+        let command_mm_s = self.command_mm_s(part);
+        self.arm.command(t_s, command_mm_s);
+        self.position_mm = self.arm.position_mm(t_s);
         let codes = self.world.codes(t_s, self.position_mm);
         for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
             if let Some(channel) = Channel::new(channel) {
                 part.adc[ADC].set_input(channel, microvolts(code));
             }
         }
-        let encoder = World::encoder(self.position_mm);
+        let encoder = encoder(self.position_mm);
         self.scans.push(ScanRecord { at_ns, codes, encoder, position_mm: self.position_mm });
         encoder
     }
