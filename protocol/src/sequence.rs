@@ -85,15 +85,20 @@ impl Sequences {
 
     /// Notes a Hello, which a peer that was restarted says first, numbering from 0 again.
     ///
-    /// Only one who has not been answered yet `asks`, so an asking Hello under a number that came
-    /// before is a restart, not a duplicate; one from outside of the window always is.
+    /// Only one who has not been answered yet `asks`, so an asking Hello under an old number is a
+    /// restart, unless it fills a gap; one from outside of the window always is. A network that
+    /// delivers an asking Hello twice can thus raise `lost` by the few frames in between.
     pub(crate) fn note_hello(&mut self, sequence: u16, asks: bool) -> Arrival {
         let newest = self.newest;
         let arrival = self.note(sequence);
         let outside = newest.is_some_and(|newest| {
             sequence.wrapping_sub(newest) >= WINDOW && newest.wrapping_sub(sequence) >= WINDOW
         });
-        if outside || (asks && arrival == Arrival::Duplicate) {
+        let restarted = match arrival {
+            Arrival::Fresh { .. } | Arrival::Late { filled: true } => outside,
+            Arrival::Late { filled: false } | Arrival::Duplicate => outside || asks,
+        };
+        if restarted {
             self.restart(sequence);
             return Arrival::Fresh { lost: 0 };
         }
