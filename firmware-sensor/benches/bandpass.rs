@@ -1,5 +1,5 @@
 //! Band-pass and crossings of five gauges, a millisecond at a time, beside two other crates' biquads with
-//! the same coefficients. For instructions on the board itself see `examples/filter_cost.rs`.
+//! the same coefficients; then the whole sensor. For instructions on the board itself see `examples/filter_cost.rs`.
 
 use std::hint::black_box;
 
@@ -8,7 +8,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use dsp_process::SplitProcess;
 use firmware_sensor::bandpass::{BAND, BandPass, ORDER};
 use firmware_sensor::crossing::Crossing;
-use protocol::GAUGES;
+use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
+use protocol::{GAUGES, SensorConfiguration};
 
 const SAMPLES: usize = 1_000;
 
@@ -79,6 +80,19 @@ fn second_of_five_gauges(criterion: &mut Criterion) {
         });
     });
     group.finish();
+
+    criterion.bench_function("1000 ms of the whole sensor", |bencher| {
+        let mut sensor = Sensor::new(SensorConfiguration::default());
+        let mut ms = 0_u64;
+        bencher.iter(|| {
+            for sample in &signal {
+                let scan =
+                    std::array::from_fn(|g| (2_048.0 + sample.get(g).unwrap_or(&0.0)) as u16);
+                ms += 1;
+                black_box(sensor.step(ms * 1_000, &[scan; SCANS_PER_SAMPLE], (ms * 10) as u16));
+            }
+        });
+    });
 }
 
 criterion_group!(benches, second_of_five_gauges);

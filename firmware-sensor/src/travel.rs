@@ -17,7 +17,7 @@ const HALF_SPAN_MS: usize = ALIGNMENT_MS;
 const HISTORY_MS: usize = 256;
 const _: () = assert!(ALIGNMENT_MS + counting::MAX_WINDOW_MS + HALF_SPAN_MS < HISTORY_MS);
 
-/// The arm's positions of the last [`HISTORY_MS`] ms.
+/// The arm's positions of the last 256 ms.
 #[derive(Clone, Debug)]
 pub struct Travel {
     encoder: u16,

@@ -244,10 +244,10 @@ fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
             };
             // The encoder started at the first millisecond's last scan, three scans in.
             let x_mm = (position_um as f64 + speed_mm_s * 0.75) / 1_000.0;
-            for channel in 0..6 {
-                let code = f64::from(sample.codes[channel]) / 16.0;
+            for (channel, (code, offset)) in sample.codes.iter().zip(OFFSETS).enumerate() {
+                let code = f64::from(*code) / 16.0;
                 let want = f64::from(MID_RAIL_CODE)
-                    + OFFSETS[channel]
+                    + offset
                     + SWING * grating(x_mm / 4.0 + 0.137 * channel as f64);
                 // The codes' floor, up to 1; the encoder's, up to 5 µm of a slope of at most
                 // 2 · 2π · 600 / 4 mm; the filter's flatness, 0.1 dB of 600 at most.
