@@ -109,8 +109,8 @@ impl Array {
         for ((row, gains), flips) in rows.zip(gains).zip(flips) {
             for (((word, gain), flip), sine) in row.iter_mut().zip(gains).zip(flips).zip(columns) {
                 // Q16 × Q15, back to Q16; then Q16 × Q31, rounded to whole steps.
-                let peak = (u64::from(level) * u64::from(*gain)) >> 15;
-                let steps = ((peak * u64::from(sine.magnitude) + HALF) >> 47) as i32;
+                let peak = ((u64::from(level) * u64::from(*gain)) >> 15) as u32;
+                let steps = ((u64::from(peak) * u64::from(sine.magnitude) + HALF) >> 47) as i32;
                 let steps = steps.min(LARGEST_OFFSET);
                 let sign = sine.sign ^ flip;
                 let new = ZERO_VOLT.wrapping_add(((steps ^ sign) - sign) as u16);

@@ -226,7 +226,7 @@ impl Display {
     }
 
     fn next_drawn(&self) -> Drawn {
-        let level = (u64::from(self.amplitude) * u64::from(self.fade.gain()) >> 31) as u32;
+        let level = ((u64::from(self.amplitude) * u64::from(self.fade.gain())) >> 31) as u32;
         if self.stopped || level == 0 {
             return Drawn::default();
         }
