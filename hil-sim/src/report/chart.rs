@@ -11,7 +11,7 @@ use crate::report::palette::{Colour, GRID, INK};
 
 /// Size of the drawing area. Coordinates are whole, so it is drawn large and shown smaller.
 const WIDTH: u32 = 2_000;
-const FONT: u32 = 30;
+const FONT: u32 = 33;
 
 /// An axis.
 #[derive(Clone, Debug)]
@@ -123,7 +123,7 @@ fn draw_into(
             }
             Mark::Dots(colour, points) => {
                 let style = colour.drawn().filled();
-                let dots = points.iter().map(|&point| Circle::new(point, 6, style));
+                let dots = points.iter().map(|&point| Circle::new(point, 5, style));
                 chart.draw_series(dots)?;
             }
             Mark::Strokes(colour, places, height) => {
@@ -176,22 +176,27 @@ impl Ranged for Labelled {
     }
 }
 
-/// Four to nine round values in a range, with their text.
+/// Three to nine round values in a range, with their text.
 fn round_ticks(range: &Range<f64>) -> Vec<(f64, String)> {
-    let rough = (range.end - range.start) / 6.0;
-    let decade = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .map(|round| round * decade)
+    let least = (range.end - range.start) / 8.0;
+    let decade = 10f64.powf(least.log10().floor());
+    let round = [1.0, 2.0, 5.0, 10.0].map(|round| round * decade);
+    let step = round
         .into_iter()
-        .rfind(|s| *s <= rough);
-    let step = step.unwrap_or(decade);
+        .find(|step| *step >= least)
+        .unwrap_or(least);
     let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let first = (range.start / step - 1e-9).ceil();
     let last = (range.end / step + 1e-9).floor();
     (0..=(last - first).clamp(0.0, 20.0) as u32)
         .map(|index| (first + f64::from(index)) * step)
         // Adding 0 takes the sign off −0.
-        .map(|value| (value, format!("{:.decimals$}", value + 0.0)))
+        .map(|value| {
+            (
+                value,
+                format!("{:.decimals$}", value + 0.0).replace('-', "−"),
+            )
+        })
         .collect()
 }
 
@@ -212,9 +217,9 @@ mod tests {
         );
         assert_eq!(
             texts(-70.0..70.0),
-            ["-60", "-40", "-20", "0", "20", "40", "60"]
+            ["−60", "−40", "−20", "0", "20", "40", "60"]
         );
-        assert_eq!(texts(1.40..1.60)[..3], ["1.40", "1.42", "1.44"]);
+        assert_eq!(texts(1.40..1.60), ["1.40", "1.45", "1.50", "1.55", "1.60"]);
     }
 
     #[test]

@@ -23,7 +23,7 @@ const UNIFORM: [usize; 3] = [0, 24, 49];
 /// Actuators shown when the pattern travels: every other one of the middle row.
 const TRAVELLING: [usize; 5] = [20, 22, 24, 26, 28];
 /// Distance between two actuators' zero lines, in V: 5 V up, 5 V down and a gap.
-const LANE_V: f64 = 11.0;
+const LANE_V: f64 = 13.0;
 /// A difference between hand and arm worth a line of its own, in mm.
 const APART_MM: f64 = 0.1;
 
@@ -127,9 +127,9 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
     };
     let nth = stride(verdict.estimates.len(), DOTS);
     let marks = [
-        Mark::Line(SECOND, with_steps(&truths)),
         Mark::Dots(REFUSED, dots(false)),
         Mark::Dots(FIRST, dots(true)),
+        Mark::Line(SECOND, with_steps(&truths)),
     ];
     let mut note = String::from("What lies above the chart is drawn at its upper edge.");
     if nth > 1 {
@@ -189,7 +189,7 @@ fn velocity(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
             &Axis::new("velocity v in mm/s", low - margin..high + margin),
             &marks,
         )?,
-        note: format!("A = {} ms.", truth.sensor.window_ms),
+        note: format!("The window A is {} ms.", truth.sensor.window_ms),
     })
 }
 
@@ -225,7 +225,7 @@ fn voltages(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
         named: Some(labels),
         ..Axis::new("actuator: voltage in V", zero_v(shown.len() - 1) - 5.5..5.5)
     };
-    let height = 150 + 190 * shown.len() as u32;
+    let height = 150 + 200 * shown.len() as u32;
     Ok(Figure {
         title: match truth.display.mode {
             Mode::Uniform => "Voltages of three actuators, all in phase".into(),

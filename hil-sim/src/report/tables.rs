@@ -13,7 +13,9 @@ pub const LOG_LINES: usize = 200;
 
 /// A number with so many decimals and its unit, or a dash.
 fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
-    value.map_or("–".into(), |value| format!("{value:.decimals$}{unit}"))
+    value.map_or("–".into(), |value| {
+        format!("{value:.decimals$}{unit}").replace('-', "−")
+    })
 }
 
 /// One line per scene, each leading to its chapter.
