@@ -1,2 +1,43 @@
-//! The display board's logic: pure, no hardware.
+//! The display board's logic: the hand's travel and the surface's λ in, fifty DAC words out.
+//!
+//! ```text
+//! encoder ──> Phase ──> sine ──> Array ──> words ──> dac81416 ──> SPI
+//!               ▲                  ▲
+//!    λ of the last valid estimate  Fade: age of that estimate
+//! ```
+//!
+//! Pure: no hardware, no clock (time is counted in ticks), no allocation, no panic. What the board
+//! runs, a host can replay word for word.
 #![no_std]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod array;
+pub mod dac81416;
+pub mod display;
+pub mod fade;
+pub mod hand;
+pub mod pattern;
+pub mod phase;
+pub mod sine;
+
+pub use array::{Array, Place, Polarity, Trim};
+pub use display::Display;
+
+/// Output ticks per second: ten samples a cycle at 200 Hz.
+pub const TICK_RATE_HZ: u32 = 2_000;
+/// Actuators on the fingertip (Okamoto et al. 2009, section IV): [`array::ROWS`] × [`array::COLUMNS`].
+pub const ACTUATORS: usize = 50;
+/// Rate of [`protocol::Motion`], in Hz.
+pub const MOTION_RATE_HZ: u32 = 500;
+/// Travel of the hand for one count of its encoder, in µm.
+pub const MICROMETRES_PER_COUNT: i32 = 5;
+/// The DAC word of 0 V.
+pub const ZERO_VOLT: u16 = 0x8000;
+
+/// Ticks in `ms` milliseconds.
+const fn ticks(ms: u16) -> u32 {
+    const { assert!(TICK_RATE_HZ.is_multiple_of(1_000)) };
+    ms as u32 * (TICK_RATE_HZ / 1_000)
+}

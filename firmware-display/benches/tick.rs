@@ -1,0 +1,57 @@
+//! Output ticks of a moving hand: 500 µs each on the board.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use firmware_display::Display;
+use protocol::{DisplayConfiguration, Estimate, Mode, Range};
+
+const TICKS: u64 = 2_000;
+
+fn estimate(sequence: u32, wavelength_mm: f32) -> Estimate {
+    Estimate {
+        sequence,
+        instant_us: 0,
+        wavelength_mm: Some(wavelength_mm),
+        valid: true,
+        amplitude_lsb: 100.0,
+        confidence: 1.0,
+        range: Range::T1,
+        gauges_used: 4,
+    }
+}
+
+/// One second: 70 mm/s, an estimate every 20 ticks.
+fn second(criterion: &mut Criterion, name: &str, mode: Mode) {
+    let mut group = criterion.benchmark_group("tick");
+    group.throughput(Throughput::Elements(TICKS));
+    let configuration = DisplayConfiguration {
+        mode,
+        ..DisplayConfiguration::default()
+    };
+    let mut display = Display::new(configuration);
+    let (mut sequence, mut encoder) = (0_u32, 0_u16);
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| {
+            for tick in 0..TICKS {
+                if tick % 20 == 0 {
+                    sequence = sequence.wrapping_add(1);
+                    display.on_estimate(&estimate(sequence, 2.0 + (sequence % 7) as f32 * 0.01));
+                }
+                encoder = encoder.wrapping_add(7);
+                black_box(display.tick(encoder));
+                black_box(display.words());
+                black_box(display.motion(tick));
+            }
+        });
+    });
+    group.finish();
+}
+
+fn ticks(criterion: &mut Criterion) {
+    second(criterion, "one second, uniform", Mode::Uniform);
+    second(criterion, "one second, travelling", Mode::Travelling);
+}
+
+criterion_group!(benches, ticks);
+criterion_main!(benches);

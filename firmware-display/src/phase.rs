@@ -1,0 +1,166 @@
+//! The stimulus' phase, accumulated from the hand's travel.
+//!
+//! Equation (12) of Okamoto et al. 2009, y = 5 sin(2π (v/λ) t) V, holds while v and λ are constant.
+//! Read as φ = 2π ∫ v/λ dt = 2π ∫ dx/λ it holds always: each encoder count turns the phase by
+//! Δx/λ, and a change of λ changes how fast the phase turns from now on, never where it is.
+//!
+//! The phase is an integer, so nothing is lost however long the hand rubs, it wraps freely, and
+//! travel taken back takes the phase back to the same bit: a reversed stroke plays the wave back.
+
+use crate::MICROMETRES_PER_COUNT;
+
+/// The shortest wavelength followed, in mm: 20 counts of the encoder.
+pub const SHORTEST_WAVELENGTH_MM: f32 = 0.1;
+/// The longest wavelength followed, in mm: longer than a fingertip's stroke needs.
+pub const LONGEST_WAVELENGTH_MM: f32 = 50.0;
+
+/// One turn, 2π, in phase units.
+pub const TURN: f64 = (1_u64 << 32) as f64;
+
+const MILLIMETRES_PER_COUNT: f64 = MICROMETRES_PER_COUNT as f64 / 1_000.0;
+
+/// A surface wavelength that the stimulus can follow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wavelength {
+    mm: f32,
+}
+
+impl Wavelength {
+    /// Takes `mm` if it is finite and from [`SHORTEST_WAVELENGTH_MM`] to [`LONGEST_WAVELENGTH_MM`].
+    pub fn new(mm: f32) -> Option<Self> {
+        // A NaN is in no range.
+        (SHORTEST_WAVELENGTH_MM..=LONGEST_WAVELENGTH_MM)
+            .contains(&mm)
+            .then_some(Self { mm })
+    }
+
+    /// The wavelength in mm.
+    pub const fn mm(self) -> f32 {
+        self.mm
+    }
+
+    /// Phase of one encoder count, in turns / 2³², rounded to the nearest: off by half a unit at
+    /// most, which is 1.2·10⁻⁶ of the longest wavelength's step and less of any other's.
+    pub const fn phase_per_count(self) -> u32 {
+        (TURN * MILLIMETRES_PER_COUNT / self.mm as f64 + 0.5) as u32
+    }
+
+    /// Phase of a `distance_um` at rest on the surface, in turns / 2³², whole turns dropped.
+    pub const fn phase_of(self, distance_um: f64) -> u32 {
+        (TURN * distance_um / 1_000.0 / self.mm as f64 + 0.5) as u64 as u32
+    }
+}
+
+/// A phase accumulator: 2³² is one turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Phase {
+    turns: u32,
+    per_count: u32,
+}
+
+impl Phase {
+    /// Follows `wavelength` from here on.
+    pub const fn follow(&mut self, wavelength: Wavelength) {
+        self.per_count = wavelength.phase_per_count();
+    }
+
+    /// Moves on by `counts` of the encoder, back if negative. Before the first
+    /// [`Phase::follow`] nothing moves.
+    pub const fn advance(&mut self, counts: i16) {
+        // Two's complement: multiplying modulo 2³² takes a negative count back by as much as the
+        // positive one went forward.
+        self.turns = self
+            .turns
+            .wrapping_add((counts as i32 as u32).wrapping_mul(self.per_count));
+    }
+
+    /// The phase, in turns / 2³².
+    pub const fn turns(self) -> u32 {
+        self.turns
+    }
+
+    /// Phase of one count of the wavelength followed, in turns / 2³²; 0 before the first.
+    pub const fn per_count(self) -> u32 {
+        self.per_count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn phase_after_five_metres_is_travel_over_wavelength() {
+        for mm in [0.1_f32, 0.83, 1.0, 2.0, 3.0, 4.0, 7.77, 50.0] {
+            let mut phase = Phase::default();
+            phase.follow(Wavelength::new(mm).unwrap());
+            const COUNTS: u32 = 1_000_000;
+            for _ in 0..COUNTS {
+                phase.advance(1);
+            }
+            let expected = f64::from(COUNTS) * MILLIMETRES_PER_COUNT / f64::from(mm);
+            // Each count is off by half a unit at most; f64 adds far less than one unit a turn.
+            let bound = f64::from(COUNTS) * 0.5 / TURN + 1e-9;
+            let off = f64::from(phase.turns()) / TURN - expected;
+            let off = off - off.round();
+            assert!(
+                off.abs() <= bound,
+                "{mm} mm: off by {off} turns, bound {bound}"
+            );
+        }
+    }
+
+    #[test]
+    fn travel_taken_back_takes_the_phase_back_to_the_bit() {
+        let mut phase = Phase::default();
+        phase.follow(Wavelength::new(1.7).unwrap());
+        let there: std::vec::Vec<u32> = (0..5_000_i32)
+            .map(|i| {
+                phase.advance((i % 37 - 3) as i16);
+                phase.turns()
+            })
+            .collect();
+        for i in (1..5_000_i32).rev() {
+            phase.advance(-((i % 37 - 3) as i16));
+            assert_eq!(phase.turns(), there[i as usize - 1]);
+        }
+    }
+
+    #[test]
+    fn one_large_step_equals_many_small_ones() {
+        let mut once = Phase::default();
+        once.follow(Wavelength::new(0.1).unwrap());
+        let mut often = once;
+        once.advance(i16::MIN);
+        (0..32_768).for_each(|_| often.advance(-1));
+        assert_eq!(once, often);
+    }
+
+    #[test]
+    fn a_new_wavelength_leaves_the_phase_where_it_is() {
+        let mut phase = Phase::default();
+        phase.follow(Wavelength::new(2.0).unwrap());
+        phase.advance(123);
+        let before = phase.turns();
+        phase.follow(Wavelength::new(3.0).unwrap());
+        assert_eq!(phase.turns(), before);
+    }
+
+    #[test]
+    fn wavelengths_that_cannot_be_followed_are_refused() {
+        for mm in [
+            0.0,
+            -1.0,
+            0.099,
+            50.01,
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            1e-40,
+        ] {
+            assert_eq!(Wavelength::new(mm), None, "{mm}");
+        }
+        assert!(Wavelength::new(SHORTEST_WAVELENGTH_MM).is_some());
+        assert!(Wavelength::new(LONGEST_WAVELENGTH_MM).is_some());
+    }
+}

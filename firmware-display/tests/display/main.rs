@@ -1,0 +1,6 @@
+//! The display as a whole, through its public face.
+
+mod any_events;
+mod rig;
+mod stimulus;
+mod supervisor;
