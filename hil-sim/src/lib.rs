@@ -5,6 +5,7 @@ pub mod arm;
 pub mod gauges;
 pub mod json;
 pub mod motion;
+pub mod native;
 pub mod recording;
 pub mod report;
 pub mod scene;

@@ -12,6 +12,8 @@ mod error;
 mod read;
 mod series;
 mod table;
+#[cfg(test)]
+mod tests;
 
 pub use error::SceneError;
 pub use series::Series;

@@ -26,7 +26,8 @@ pub struct Truth<'a> {
 }
 
 impl<'a> Truth<'a> {
-    /// A truth with both boards in their default configuration, measured at actuator 0.
+    /// A truth with both boards in their default configuration, measured at an actuator in the
+    /// middle of the array.
     pub fn new(name: &'a str, method: &'a str, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Self {
         Self {
             name,
@@ -34,7 +35,7 @@ impl<'a> Truth<'a> {
             wavelength_mm,
             sensor: SensorConfiguration::default(),
             display: DisplayConfiguration::default(),
-            reference_actuator: 0,
+            reference_actuator: 24,
             reference_place_mm: 0.0,
         }
     }

@@ -1,0 +1,557 @@
+//! What is refused, and with which words.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::*;
+
+const SURFACE: &str = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+
+/// The text of the refusal of a scene that stands at `scenes/x.toml`.
+fn refusal(text: &str) -> String {
+    match Scene::parse(Path::new("scenes/x.toml"), text) {
+        Ok(scene) => panic!("taken: {scene:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+/// The refusal of a scene that is sound but for `section`, which starts at line 3.
+fn refusal_of(section: &str) -> String {
+    refusal(&format!("{SURFACE}{section}"))
+}
+
+/// A folder of its own for a test's CSV files, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("hil-sim-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    /// Loads a scene with `section`, whose CSV file `data.csv` holds `csv`.
+    fn load(&self, section: &str, csv: &str) -> Result<Scene, SceneError> {
+        fs::write(self.0.join("data.csv"), csv).unwrap();
+        let scene = self.0.join("x.toml");
+        fs::write(&scene, format!("{SURFACE}{section}")).unwrap();
+        Scene::load(&scene)
+    }
+
+    /// The refusal, without the folder's name.
+    fn refusal(&self, section: &str, csv: &str) -> String {
+        let error = self.load(section, csv).unwrap_err().to_string();
+        error.replace(
+            &format!("{}{}", self.0.display(), std::path::MAIN_SEPARATOR),
+            "",
+        )
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+#[test]
+fn every_key_of_the_contract_parses() {
+    let scene = Scene::parse(
+        Path::new("x.toml"),
+        r#"
+        name = "boundary-1-4"
+        seed = 7
+        duration_s = 3.0
+        [surface]
+        specimens = [
+          { wavelength_mm = 1.0, length_mm = 60.0 },
+          { wavelength_mm = 4.0, length_mm = 200.0 },
+        ]
+        start_mm = 0.0
+        profile = "trapezoid"
+        [motion]
+        kind = "constant"
+        speed_mm_s = 50.0
+        [arm]
+        follows = "motion"
+        lag_ms = 0.0
+        [contact]
+        model = "auto"
+        friction = "none"
+        [gauges]
+        snr_db = 20.0
+        hum_50_hz = 0.0
+        dead = []
+        saturated = []
+        tangential = false
+        second_harmonic = 0.15
+        [link]
+        delay_ms = 0.0
+        jitter_ms = 0.0
+        loss = 0.0
+        reorder = 0.0
+        corrupt = 0.0
+        [estimator]
+        method = "default"
+        window_ms = 80
+        [display]
+        mode = "travelling"
+        [expect]
+        wavelength_rms_percent = 1.0
+        "#,
+    )
+    .unwrap();
+    assert_eq!(scene.name, "boundary-1-4");
+    assert_eq!(scene.seed, 7);
+    let Gauges::Kinematic(gauges) = scene.gauges else {
+        panic!("not kinematic")
+    };
+    assert_eq!(gauges.snr_db, Some(20.0));
+    assert_eq!(gauges.second_harmonic, 0.15);
+    assert_eq!(scene.surface.specimens.len(), 2);
+    assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
+    assert_eq!(scene.display_mode, Mode::Travelling);
+    assert_eq!(scene.expect.wavelength_rms_percent, Some(1.0));
+}
+
+#[test]
+fn all_but_the_specimens_has_a_default() {
+    let scene = Scene::parse(Path::new("some/scene.toml"), SURFACE).unwrap();
+    assert_eq!(
+        (scene.name.as_str(), scene.seed, scene.duration_s),
+        ("scene", 1, 3.0)
+    );
+    assert!(matches!(scene.surface.profile, Profile::Trapezoid));
+    assert!(matches!(
+        scene.motion,
+        Motion::Constant { speed_mm_s: 50.0 }
+    ));
+    assert_eq!(
+        scene.arm,
+        ArmDrive {
+            follows: Follows::Motion,
+            lag_ms: 0.0
+        }
+    );
+    assert!(matches!(scene.gauges, Gauges::Kinematic(k) if k == Kinematic::default()));
+    assert_eq!(scene.link, Link::default());
+    assert_eq!(
+        scene.estimator,
+        Estimator {
+            method: Method::Counting,
+            window_ms: 80
+        }
+    );
+    assert_eq!(
+        scene.expect,
+        Expect {
+            mean_tolerance_mm: 0.03,
+            ..Expect::default()
+        }
+    );
+}
+
+#[test]
+fn whole_numbers_do_where_numbers_are_asked_for() {
+    let text = "duration_s = 1_000_000\n";
+    assert!(refusal(text).contains("is not a duration"));
+    let scene = Scene::parse(
+        Path::new("x.toml"),
+        "duration_s = 2\n[surface]\nspecimens = [{ wavelength_mm = 0x2 }]",
+    );
+    let scene = scene.unwrap();
+    assert_eq!(
+        (scene.duration_s, scene.surface.specimens[0].wavelength_mm),
+        (2.0, 2.0)
+    );
+}
+
+#[test]
+fn a_refusal_says_file_line_key_and_what_to_do() {
+    let text = "name = \"x\"\n[surface]\nspecimens = [\n  { wavelength_mm = 1.0, length_mm = 3 },\n  { wavelength_mm = -1.0 },\n]\n";
+    assert_eq!(
+        refusal(text),
+        "scenes/x.toml:5: surface.specimens[1].wavelength_mm: -1.0 is not a wavelength: \
+         give a length above 0 in mm (0.01 to 100)"
+    );
+}
+
+#[test]
+fn impossible_values_are_refused_at_their_line_and_key() {
+    for (section, want) in [
+        (
+            "[motion]\nspeed_mm_s = 1000.1",
+            "x.toml:4: motion.speed_mm_s: 1000.1 is not a speed",
+        ),
+        (
+            "[motion]\nspeed_mm_s = nan",
+            "x.toml:4: motion.speed_mm_s: nan is not a speed",
+        ),
+        (
+            "[motion]\nspeed_mm_s = 1e999",
+            "x.toml:4: motion.speed_mm_s: 1e999 is not a speed",
+        ),
+        (
+            "[motion]\nkind = \"sinusoid\"\namplitude_mm_s = -1\nfrequency_hz = 1",
+            "x.toml:5: motion.amplitude_mm_s: -1 is not",
+        ),
+        (
+            "[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 0",
+            "x.toml:6: motion.frequency_hz: 0 is not a frequency",
+        ),
+        (
+            "[arm]\nfollows = \"link\"\nlag_ms = -0.1",
+            "x.toml:5: arm.lag_ms: -0.1 is not a lag",
+        ),
+        (
+            "[arm]\nlag_ms = 5",
+            "x.toml:4: arm.lag_ms: an arm that follows \"motion\" has no lag",
+        ),
+        (
+            "[link]\nloss = 1.01",
+            "x.toml:4: link.loss: 1.01 is not a share: give a number from 0 to 1",
+        ),
+        (
+            "[link]\nreorder = -0.1",
+            "x.toml:4: link.reorder: -0.1 is not a share",
+        ),
+        (
+            "[link]\n\ncorrupt = inf",
+            "x.toml:5: link.corrupt: inf is not a share",
+        ),
+        (
+            "[link]\ndelay_ms = -1",
+            "x.toml:4: link.delay_ms: -1 is not a delay",
+        ),
+        (
+            "[gauges]\nsnr_db = -inf",
+            "x.toml:4: gauges.snr_db: -inf is not a signal-to-noise ratio",
+        ),
+        (
+            "[gauges]\nhum_50_hz = -1",
+            "x.toml:4: gauges.hum_50_hz: -1 is not",
+        ),
+        (
+            "[gauges]\ndead = [0, 5]",
+            "x.toml:4: gauges.dead[1]: 5 is not a gauge: the gauges are 0 to 4",
+        ),
+        (
+            "[gauges]\ndead = [-1]",
+            "x.toml:4: gauges.dead[0]: -1 is not a gauge",
+        ),
+        (
+            "[gauges]\nsaturated = [1,\n1]",
+            "x.toml:5: gauges.saturated[1]: 1 is named twice",
+        ),
+        (
+            "[gauges]\ndead = [1.5]",
+            "x.toml:4: gauges.dead[0]: 1.5 is no gauge number",
+        ),
+        (
+            "[gauges]\ndead = [3]\nsaturated = [3]",
+            "x.toml:5: gauges.saturated: gauge 3 is dead already",
+        ),
+        (
+            "[estimator]\nwindow_ms = 9",
+            "x.toml:4: estimator.window_ms: 9 is out of range",
+        ),
+        (
+            "[expect]\nwavelength_rms_percent = 0",
+            "x.toml:4: expect.wavelength_rms_percent: 0 is not a bound",
+        ),
+        (
+            "[expect]\nmean_tolerance_mm = 0.1",
+            "x.toml:4: expect.mean_tolerance_mm: has nothing to bound",
+        ),
+    ] {
+        let refusal = refusal_of(section);
+        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+    }
+    for (text, want) in [
+        ("seed = -1", "x.toml:1: seed: -1 is out of range"),
+        (
+            "duration_s = 0",
+            "x.toml:1: duration_s: 0 is not a duration: give a time above 0 in s",
+        ),
+        (
+            "duration_s = -3.0",
+            "x.toml:1: duration_s: -3.0 is not a duration",
+        ),
+        (
+            "name = \"a/b\"",
+            "x.toml:1: name: \"a/b\" cannot name a file",
+        ),
+        ("name = \"..\"", "x.toml:1: name: \"..\" cannot name a file"),
+        ("name = \"\"", "x.toml:1: name: \"\" cannot name a file"),
+        ("", "x.toml:1: surface.specimens: there are none"),
+        (
+            "[surface]\nspecimens = []",
+            "x.toml:2: surface.specimens: there are none",
+        ),
+        (
+            "[surface]\nspecimens = [{ length_mm = 3 }]",
+            "x.toml:2: surface.specimens[0].wavelength_mm: is missing",
+        ),
+        (
+            "[surface]\nspecimens = [{ wavelength_mm = 1 }, { wavelength_mm = 2 }]",
+            "x.toml:2: surface.specimens[0].length_mm: is missing",
+        ),
+        (
+            "[surface]\nspecimens = [{ wavelength_mm = 1, length_mm = 0 }, { wavelength_mm = 2 }]",
+            "x.toml:2: surface.specimens[0].length_mm: 0 is not a length",
+        ),
+    ] {
+        let refusal = refusal(text);
+        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+    }
+}
+
+#[test]
+fn unknown_keys_are_refused_with_those_that_there_are() {
+    for (section, want) in [
+        (
+            "[motion]\nspeed = 5",
+            "x.toml:4: motion.speed: no such key here with kind = \"constant\"",
+        ),
+        (
+            "[motion]\namplitude_mm_s = 5",
+            "x.toml:4: motion.amplitude_mm_s: no such key here",
+        ),
+        ("[surfaces]\nx = 1", "x.toml:3: surfaces: no such key here"),
+        (
+            "[link]\nlost = 0.1",
+            "there are delay_ms, jitter_ms, loss, reorder, corrupt",
+        ),
+        (
+            "[expect]\nrms = 1",
+            "x.toml:4: expect.rms: no such key here",
+        ),
+    ] {
+        let refusal = refusal_of(section);
+        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+    }
+    let text = "[surface]\nspecimens = [{ wavelength_mm = 1, wavelenght = 2 }]";
+    assert!(refusal(text).contains("x.toml:2: surface.specimens[0].wavelenght: no such key here"));
+}
+
+#[test]
+fn wrong_types_are_refused() {
+    for (section, want) in [
+        (
+            "[motion]\nspeed_mm_s = \"fast\"",
+            "x.toml:4: motion.speed_mm_s: holds a text: give a number",
+        ),
+        (
+            "[motion]\nkind = 3",
+            "x.toml:4: motion.kind: holds a whole number: give a text in quotes",
+        ),
+        (
+            "[gauges]\ntangential = 1",
+            "x.toml:4: gauges.tangential: holds a whole number: give true or false",
+        ),
+        (
+            "[gauges]\ndead = 1",
+            "x.toml:4: gauges.dead: holds a whole number: give a list of gauge numbers",
+        ),
+        (
+            "[estimator]\nwindow_ms = 80.5",
+            "x.toml:4: estimator.window_ms: holds a number: give a whole number",
+        ),
+        (
+            "[expect]\nmean_mm = [1]",
+            "x.toml:4: expect.mean_mm: holds a list: give a number",
+        ),
+        (
+            "[[motion]]\nkind = \"constant\"",
+            "x.toml:3: motion: holds a list: give a table",
+        ),
+    ] {
+        let refusal = refusal_of(section);
+        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+    }
+    assert!(
+        refusal("surface = 1").contains("x.toml:1: surface: holds a whole number: give a table")
+    );
+    let text = "[surface]\nspecimens = [1.0]";
+    assert!(refusal(text).contains("x.toml:2: surface.specimens[0]: holds a number: give a table"));
+}
+
+#[test]
+fn broken_toml_is_refused_at_its_line() {
+    assert!(refusal("name = \"x\"\nseed = \n").starts_with("scenes/x.toml:2: "));
+    assert!(refusal("seed = 1\nseed = 2\n").starts_with("scenes/x.toml:2: "));
+}
+
+#[test]
+fn what_this_version_does_not_build_is_refused_as_such() {
+    for (section, key) in [
+        (
+            "[estimator]\nmethod = \"bank\"",
+            "x.toml:4: estimator.method: \"bank\"",
+        ),
+        (
+            "[estimator]\nmethod = \"crossings\"",
+            "x.toml:4: estimator.method: \"crossings\"",
+        ),
+        (
+            "[contact]\nmodel = \"stick-slip\"",
+            "x.toml:4: contact.model: \"stick-slip\"",
+        ),
+        (
+            "[contact]\nfriction = \"severe\"",
+            "x.toml:4: contact.friction: \"severe\"",
+        ),
+        (
+            "[gauges]\nstiffness_n_per_m = 400",
+            "x.toml:4: gauges.stiffness_n_per_m:",
+        ),
+        (
+            "[[fault]]\nat_s = 1.0\nkind = \"link-down\"\nfor_s = 0.5",
+            "x.toml:5: fault[0].kind: faults",
+        ),
+    ] {
+        let refusal = refusal_of(section);
+        assert!(refusal.contains(key), "{refusal}\nwanted {key}");
+        assert!(
+            refusal.contains("known but not built in this version"),
+            "{refusal}"
+        );
+    }
+    assert!(refusal_of("[estimator]\nmethod = \"magic\"").contains("\"magic\" is unknown"));
+}
+
+#[test]
+fn a_missing_file_is_refused() {
+    let missing = Scene::load(Path::new("no/such/scene.toml"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        missing.starts_with("no/such/scene.toml: cannot be read: "),
+        "{missing}"
+    );
+    let refusal = refusal_of("[motion]\nkind = \"recorded\"\nfile = \"gone.csv\"");
+    assert!(
+        refusal.starts_with("scenes/x.toml:5: motion.file: scenes"),
+        "{refusal}"
+    );
+    assert!(refusal.contains("gone.csv cannot be read: "), "{refusal}");
+    assert!(
+        refusal_of("[motion]\nkind = \"recorded\"").contains("x.toml:3: motion.file: is missing")
+    );
+}
+
+#[test]
+fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
+    const MOTION: &str = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("motion");
+    let scene = folder
+        .load(MOTION, "t_s, x_mm\n0, 0\n1, 50\n3, 25\n")
+        .unwrap();
+    assert_eq!(scene.motion.position_mm(0.5), 25.0);
+    assert_eq!(scene.motion.velocity_mm_s(2.0), -12.5);
+    for (csv, want) in [
+        (
+            "t_s,x_mm\n0,0\n1,fast\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"fast\" is no number",
+        ),
+        (
+            "t_s,x_mm\n0,0\n1,NaN\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"NaN\" is not finite",
+        ),
+        (
+            "t_s,x_mm\n0,0\n\n1,\n3,1\n",
+            "data.csv:4: column 2 (x_mm): \"\" is no number",
+        ),
+        (
+            "t_s,x_mm\n0,0\n2,0\n2,1\n",
+            "data.csv:4: column 1 (t_s): \"2\" does not increase, after 2",
+        ),
+        (
+            "t_s,x_mm\n0,0\n1\n",
+            "data.csv:3: 1 cells where the first line has 2",
+        ),
+        (
+            "t_s,x_mm\n0,0\n",
+            "data.csv: 1 row(s) of numbers: give two or more",
+        ),
+        ("t_s,x_mm\n", "data.csv: 0 row(s) of numbers"),
+        (
+            "",
+            "data.csv:1: the first line is \"\": it must be t_s,x_mm",
+        ),
+        (
+            "t,x\n0,0\n3,1\n",
+            "data.csv:1: the first line is \"t,x\": it must be t_s,x_mm",
+        ),
+        ("0,0\n3,1\n", "data.csv:1: the first line is \"0,0\""),
+        (
+            "t_s,x_mm\n0,0\n0.001,2\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"2\" is 2000 mm/s from the row before",
+        ),
+        (
+            "t_s,x_mm\n0,0\n2,50\n",
+            "x.toml:5: motion.file: lasts from 0 to 2 s, the scene from 0 to 3 s",
+        ),
+    ] {
+        let refusal = folder.refusal(MOTION, csv);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+}
+
+#[test]
+fn recorded_gauges_are_played_and_refused_below_a_kilohertz() {
+    const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("gauges");
+    let rows: String = (0..=3000)
+        .map(|ms| format!("{},0,0.825,1.65,2.475,3.3\n", f64::from(ms) / 1000.0))
+        .collect();
+    let scene = folder
+        .load(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{rows}"))
+        .unwrap();
+    let mut world = crate::world::World::new(&scene).unwrap();
+    assert_eq!(world.codes(1.00025, 0.0), [0, 1024, 2048, 3072, 4095, 2048]);
+    for (csv, want) in [
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.01,1,1,1,1,1\n",
+            "data.csv:3: column 1 (t_s): \"0.01\" comes more than 1 ms",
+        ),
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,12\n",
+            "data.csv:2: column 6 (g4): \"12\" is no voltage",
+        ),
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.001,1,1,1,1,1\n",
+            "x.toml:5: gauges.file: lasts from 0 to 0.001 s",
+        ),
+    ] {
+        let refusal = folder.refusal(GAUGES, csv);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+    let both = folder.refusal(
+        &format!("{GAUGES}snr_db = 20"),
+        &format!("t_s,g0,g1,g2,g3,g4\n{rows}"),
+    );
+    assert!(
+        both.starts_with("x.toml:6: gauges.snr_db: no such key here with kind = \"recorded\""),
+        "{both}"
+    );
+}
+
+#[test]
+fn a_recorded_profile_must_cover_the_travel() {
+    let folder = Folder::new("profile");
+    let profile = "profile = \"recorded\"\nfile = \"data.csv\"\n";
+    let heights = |to: i32| {
+        let rows: String = (-40..=to)
+            .map(|x| format!("{},{}\n", f64::from(x) / 10.0, f64::from(x % 20)))
+            .collect();
+        format!("x_mm,height\n{rows}")
+    };
+    // 3 s at 50 mm/s, and the outermost gauges 3 mm further.
+    folder.load(profile, &heights(1530)).unwrap();
+    let refusal = folder.refusal(profile, &heights(1500));
+    assert!(
+        refusal.contains("the gauges come from -3.000 to 153.000 mm"),
+        "{refusal}"
+    );
+}
