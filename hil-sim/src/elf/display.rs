@@ -20,6 +20,7 @@ use crate::world::World;
 /// Chips on the bus, and the actuators on each but the last.
 pub const CHIPS: usize = 4;
 const ACTUATORS_PER_CHIP: usize = 13;
+/// Channels of a DAC81416, used or not.
 const CHANNELS_PER_CHIP: usize = 16;
 /// Chip selects: D10 D9 D8 D7.
 const SELECTS: [(&str, u8); CHIPS] = [("GPIOD", 14), ("GPIOD", 15), ("GPIOF", 12), ("GPIOF", 13)];
@@ -109,7 +110,7 @@ impl DisplayPins {
 
     /// What the run leaves, once it is over.
     pub fn leave(&mut self, part: &mut Stm32f427) -> DisplayRecords {
-        let errors = |chip| on_bus(part, chip).chip.counters().malformed_frames();
+        let errors = |chip| on_bus(part, chip).chip.faults().len() as u64;
         self.records.dac_frame_errors = (0..CHIPS).map(errors).sum();
         std::mem::take(&mut self.records)
     }
