@@ -67,7 +67,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     if peak_v(&reference) < STILL_V {
         return actuators;
     }
-    let cycles = cycles::cycles(&reference, &hand);
+    let cycles = cycles::cycles(&reference, &hand, &due);
     if let Some((stretch, count)) = cycles::longest_stretch(&cycles) {
         let stretch_s = stretch.to_s - stretch.from_s;
         let travelled = due.travelled_cycles(stretch.to_s) - due.travelled_cycles(stretch.from_s);
@@ -77,7 +77,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     let error = phase_error(&reference, &due);
     actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
     actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
-    actuators.mean_v = worst_mean_v(recording, &cycles, &due);
+    actuators.mean_v = worst_mean_v(recording, &cycles::continued(&cycles), &due);
     actuators
 }
 
@@ -243,16 +243,22 @@ mod tests {
 
     #[test]
     fn a_travelling_pattern_is_in_phase_at_its_place() {
+        // The run's actuators are 0.3 mm apart from number 0 on, the array's 10 columns are so from
+        // −1.35 mm on: number 3 is at 0.9 and at −0.45 mm, and the run's wave is to be late by both.
         let run = Run {
             pitch_mm: 0.3,
+            ahead_cycles: Box::new(|_| (-0.45 - 0.9) / 2.0),
             ..Run::steady(50.0, 2.0)
         };
         let mut truth = Truth::new("", "", &*run.surface_mm);
         truth.reference_actuator = 3;
-        truth.reference_place_mm = 0.9;
         truth.display.mode = Mode::Travelling;
+        truth.display.pitch_um = 300;
         let actuators = judge(&truth, &run.record());
-        assert!(actuators.phase_error_rms_cycles.unwrap() < 0.0025);
+        assert!(
+            actuators.phase_error_rms_cycles.unwrap() < 0.0025,
+            "{actuators:?}"
+        );
         assert!(
             actuators.mean_v.unwrap().abs() < 0.005,
             "{:?}",
@@ -277,7 +283,7 @@ mod tests {
         let run = Run {
             estimate: Box::new(|t_s| {
                 (
-                    if (t_s / 0.03) as u32 % 2 == 0 {
+                    if ((t_s / 0.03) as u32).is_multiple_of(2) {
                         2.4
                     } else {
                         4.8

@@ -159,7 +159,7 @@ mod tests {
         // Half of the edges 0.1 ms, half 0.4 ms after their tick: 0.1 to 0.6 and 0.4 to 0.9 ms.
         let run = Run {
             edge_s: Box::new(|t_s| {
-                if (t_s / 500e-6).round() as u32 % 2 == 0 {
+                if ((t_s / 500e-6).round() as u32).is_multiple_of(2) {
                     0.1e-3
                 } else {
                     0.4e-3
