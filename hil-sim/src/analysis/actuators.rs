@@ -11,7 +11,7 @@ use crate::analysis::phase_error::phase_error;
 use crate::analysis::reaction::{Reaction, reaction};
 use crate::analysis::track::{COUNT_MM, Track};
 use crate::analysis::voltage::{peak_v, voltage};
-use crate::recording::{ACTUATORS, Recording, volts};
+use crate::recording::{ACTUATORS, Recording, WORD_V};
 use crate::truth::Truth;
 
 /// Voltage below which an actuator does not vibrate, in V.
@@ -32,7 +32,8 @@ pub struct Actuators {
     /// The largest change of any channel at one LDAC edge, in V.
     pub max_step_v: Option<f64>,
     /// The largest step that one tick of travel explains: 2π · amplitude · Δx/λ̂ for the longest
-    /// travel of a tick, one encoder count more, and the shortest λ̂ in force.
+    /// travel of a tick, one encoder count more, and the shortest λ̂ in force; and one step of the
+    /// DAC, since both words are rounded.
     pub natural_step_v: Option<f64>,
     /// The mean over whole cycles of the channel for which it is farthest from 0, in V, each moment
     /// weighted with its advance of phase: an uneven speed alone gives no mean.
@@ -91,8 +92,7 @@ fn max_step_v(recording: &Recording) -> Option<f64> {
         }
         before = output.words;
     }
-    // A difference of words is a voltage above 0 V's word.
-    largest.map(|steps| f64::from(steps) * (volts(0x8001) - volts(0x8000)))
+    largest.map(|steps| f64::from(steps) * WORD_V)
 }
 
 fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
@@ -102,7 +102,7 @@ fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
         .map(|pair| (pair[1].1 - pair[0].1).abs())
         .fold(f64::NAN, f64::max);
     let amplitude_v = f64::from(truth.display.amplitude_mv) * 1e-3;
-    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()?)
+    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()? + WORD_V)
 }
 
 /// The mean of the channel farthest from 0 V over all whole cycles of the reference.
@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn the_natural_step_is_what_a_tick_of_travel_explains() {
         let actuators = judged(&Run::steady(50.0, 2.0));
-        let expected_v = 5.0 * TAU * (50.0 * TICK_S + 0.005) / 2.0;
+        let expected_v = 5.0 * TAU * (50.0 * TICK_S + 0.005) / 2.0 + 10.0 / 65_536.0;
         assert!((actuators.natural_step_v.unwrap() - expected_v).abs() < 1e-9);
         assert!(actuators.max_step_v.unwrap() <= expected_v);
         // Five counts a tick: the step at the zero crossing is that of 0.025 mm.

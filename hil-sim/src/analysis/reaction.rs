@@ -7,10 +7,7 @@ use serde::Serialize;
 use crate::analysis::finite;
 use crate::analysis::phase::DuePhase;
 use crate::analysis::track::COUNT_MM;
-use crate::recording::{ACTUATORS, OutputRecord, Recording, volts};
-
-/// One step of a DAC's word, in V.
-const WORD_V: f64 = 10.0 / 65_536.0;
+use crate::recording::{ACTUATORS, OutputRecord, Recording, WORD_V, volts};
 
 /// Time from a movement of the hand to the LDAC edge that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
