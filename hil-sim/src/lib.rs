@@ -13,7 +13,6 @@ pub mod surface;
 pub mod truth;
 pub mod weather;
 pub mod world;
-pub mod dac81416;
 pub mod digest;
 pub mod elf;
 pub mod listener;

@@ -70,7 +70,7 @@ impl Port {
             Event::Message(message) => handle(message),
             Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
             Event::Unheralded => sender.on_unheralded(),
-            Event::Foreign(_) => {}
+            Event::Foreign(_) => sender.on_foreign(),
         });
         if let Some(Ping { sent_us }) = ping {
             self.post(&Message::Pong(Pong {

@@ -110,7 +110,7 @@ impl DisplayPins {
 
     /// What the run leaves, once it is over.
     pub fn leave(&mut self, part: &mut Stm32f427) -> DisplayRecords {
-        let errors = |chip| on_bus(part, chip).chip.faults().len() as u64;
+        let errors = |chip| on_bus(part, chip).chip.counters().faults;
         self.records.dac_frame_errors = (0..CHIPS).map(errors).sum();
         std::mem::take(&mut self.records)
     }

@@ -74,7 +74,8 @@ impl SensorPins {
 
 /// The input in µV that the model converts to `code`.
 fn microvolts(code: u16) -> u32 {
-    (u32::from(code) * REFERENCE_UV).div_ceil(FULL_SCALE)
+    let scaled = u64::from(code) * u64::from(REFERENCE_UV);
+    u32::try_from(scaled.div_ceil(FULL_SCALE.into())).expect("at most the reference")
 }
 
 impl Pins for SensorPins {
