@@ -1,1 +1,3 @@
 //! x
+pub mod dac81416;
+pub mod recording;
