@@ -2,8 +2,12 @@
 
 pub mod analysis;
 pub mod arm;
+pub mod dac81416;
+pub mod digest;
+pub mod elf;
 pub mod gauges;
 pub mod json;
+pub mod listener;
 pub mod motion;
 pub mod native;
 pub mod recording;
@@ -13,6 +17,3 @@ pub mod surface;
 pub mod truth;
 pub mod weather;
 pub mod world;
-pub mod digest;
-pub mod elf;
-pub mod listener;
