@@ -240,15 +240,16 @@ pub struct Dacs {
 }
 
 impl Dacs {
-    /// Brings all chips from power-up to streaming, at 0 V.
+    /// Brings all chips from power-up to streaming, at 0 V. Their channels are powered down until
+    /// their words stand, so CLR, under which no word is taken, can be released before.
     pub async fn start(&mut self) -> Result<(), spi::Error> {
+        self.clear.start();
         for write in dac81416::start_up() {
             for chip in 0..CHIPS {
                 self.write(chip, &write).await?;
             }
+            self.hold_off_clear();
         }
-        self.load();
-        self.clear.start();
         Ok(())
     }
 

@@ -244,7 +244,11 @@ impl Sampler {
     fn restart(&mut self) {
         pac::ADC3.sr().modify(|w| w.set_ovr(false));
         self.adc.start();
-        pac::ADC3.cr1().modify(|w| w.set_ovrie(true));
+        pac::ADC3.cr1().modify(|w| {
+            // DMA fetches each word; an interrupt a conversion would only cost time.
+            w.set_eocie(false);
+            w.set_ovrie(true);
+        });
     }
 
     /// The next sample's scans, and the encoder's position at the last of them.

@@ -42,6 +42,9 @@ use sensor::SensorPins;
 const TO_DISPLAY: u64 = 0;
 const TO_SENSOR: u64 = 1;
 
+const SCANS_PER_ESTIMATE: usize =
+    (firmware_sensor::SCAN_RATE_HZ / firmware_sensor::ESTIMATE_RATE_HZ) as usize;
+
 /// Why a run on emulated boards failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ElfError {
@@ -243,11 +246,12 @@ fn record(
     let mut display_said = Listener::default();
     display_said.hear(&display.driver.sent);
 
+    let clock_offset_ns = clock_offset_ns(&said, &sensor.left);
     let mut estimates: Vec<EstimateRecord> = Vec::new();
     for Said { message, .. } in said.messages() {
         if let Message::Estimate(estimate) = message {
             estimates.push(EstimateRecord {
-                made_ns: estimate.instant_us * 1_000,
+                made_ns: (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns),
                 received_ns: None,
                 estimate: *estimate,
             });
@@ -280,6 +284,19 @@ fn record(
         display_status: last_status(&display_said),
         log,
     }
+}
+
+/// What the sensor's clock is ahead of the scene's, from the first estimate and the scan that it ends with.
+fn clock_offset_ns(said: &Listener, scans: &[ScanRecord]) -> i64 {
+    let first = said.messages().find_map(|said| match said.message {
+        Message::Estimate(estimate) => Some(estimate),
+        _ => None,
+    });
+    let Some(estimate) = first else { return 0 };
+    let scan = (estimate.sequence as usize + 1) * SCANS_PER_ESTIMATE - 1;
+    scans.get(scan).map_or(0, |scan| {
+        (estimate.instant_us * 1_000).cast_signed() - scan.at_ns.cast_signed()
+    })
 }
 
 fn last_status(listener: &Listener) -> Option<Status> {

@@ -30,7 +30,10 @@ pub trait Watched: Pins {
 }
 
 impl Watched for SensorPins {
-    fn on_write(_board: &mut Nucleo<Self>, _address: u64, _value: u64, _at_ns: u64) {}
+    fn on_write(board: &mut Nucleo<Self>, address: u64, value: u64, at_ns: u64) {
+        let (pins, part) = board.pins();
+        pins.on_write(part, address, value, at_ns);
+    }
 }
 
 impl Watched for DisplayPins {

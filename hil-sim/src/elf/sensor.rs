@@ -58,6 +58,28 @@ impl SensorPins {
         part.adc[ADC].set_reference(REFERENCE_UV);
     }
 
+    /// The firmware wrote `value` to `address`: a scan that software starts, if that is what it makes.
+    pub fn on_write(&mut self, part: &mut Stm32f427, address: u64, value: u64, at_ns: u64) {
+        if address == ADC3.base + CR2 && value & CR2_SWSTART != 0 {
+            self.present(part, at_ns);
+        }
+    }
+
+    /// Puts the voltages of `at_ns` on the pins for the scan that begins; returns the arm's encoder.
+    fn present(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
+        let t_s = at_ns as f64 * 1e-9;
+        self.position_mm = self.arm.position_mm(t_s);
+        let codes = self.world.codes(t_s, self.position_mm);
+        for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
+            if let Some(channel) = Channel::new(channel) {
+                part.adc[ADC].set_input(channel, microvolts(code));
+            }
+        }
+        let encoder = encoder(self.position_mm);
+        self.scans.push(ScanRecord { at_ns, codes, encoder, position_mm: self.position_mm });
+        encoder
+    }
+
     /// The speed in mm/s that the firmware asks for on its PWM and direction pins.
     fn command_mm_s(&self, part: &mut Stm32f427) -> f64 {
         let channel = tim::Channel::new(1).expect("a timer has a channel 1");
@@ -80,19 +102,9 @@ fn microvolts(code: u16) -> u32 {
 
 impl Pins for SensorPins {
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
-        let t_s = at_ns as f64 * 1e-9;
         let command_mm_s = self.command_mm_s(part);
-        self.arm.command(t_s, command_mm_s);
-        self.position_mm = self.arm.position_mm(t_s);
-        let codes = self.world.codes(t_s, self.position_mm);
-        for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
-            if let Some(channel) = Channel::new(channel) {
-                part.adc[ADC].set_input(channel, microvolts(code));
-            }
-        }
-        let encoder = encoder(self.position_mm);
-        self.scans.push(ScanRecord { at_ns, codes, encoder, position_mm: self.position_mm });
-        encoder
+        self.arm.command(at_ns as f64 * 1e-9, command_mm_s);
+        self.present(part, at_ns)
     }
 
     /// The emulator does not pass a timer's trigger to a converter: starts the scan that the converter
