@@ -2,10 +2,13 @@
 
 pub mod analysis;
 pub mod arm;
+pub mod elf;
+pub mod expectation;
 pub mod gauges;
 pub mod json;
 pub mod motion;
 pub mod native;
+pub mod outcome;
 pub mod recording;
 pub mod report;
 pub mod scene;

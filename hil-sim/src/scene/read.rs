@@ -1,6 +1,5 @@
 //! From TOML to a checked [`Scene`], section by section.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -407,8 +406,8 @@ fn series(
         ));
     };
     let path = table.source().beside(name);
-    match File::open(&path) {
-        Ok(file) => Ok(Arc::new(Series::read(&path, file, headers, check)?)),
+    match std::fs::read(&path) {
+        Ok(bytes) => Ok(Arc::new(Series::read(&path, &bytes, headers, check)?)),
         Err(error) => {
             let path = path.display();
             Err(table.refuse(
