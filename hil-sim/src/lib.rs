@@ -2,6 +2,7 @@
 
 pub mod analysis;
 pub mod arm;
+pub mod dac81416;
 pub mod elf;
 pub mod expectation;
 pub mod gauges;
