@@ -70,9 +70,12 @@ pub struct OutputRecord {
     pub skew_ns: u64,
 }
 
+/// One step of a DAC word of the ±5 V range, in V.
+pub const WORD_V: f64 = 10.0 / 65_536.0;
+
 /// Converts a DAC word of the ±5 V range to volts.
 pub fn volts(word: u16) -> f64 {
-    (f64::from(word) - 32_768.0) * 10.0 / 65_536.0
+    (f64::from(word) - 32_768.0) * WORD_V
 }
 
 /// Everything a run leaves behind.

@@ -1,6 +1,7 @@
 //! What a scene knows and the firmware does not: the ground on which a recording is judged.
 
-use protocol::{DisplayConfiguration, SensorConfiguration};
+use firmware_display::array;
+use protocol::{DisplayConfiguration, Mode, SensorConfiguration};
 
 /// The truth behind a [`crate::recording::Recording`], lent by the scene that was run.
 ///
@@ -20,9 +21,6 @@ pub struct Truth<'a> {
     pub display: DisplayConfiguration,
     /// The actuator whose voltage is measured, below [`crate::recording::ACTUATORS`].
     pub reference_actuator: usize,
-    /// Where that actuator is on the skin, in mm along the rubbing direction, as the travelling
-    /// mode counts it; not used in the uniform mode.
-    pub reference_place_mm: f64,
 }
 
 impl<'a> Truth<'a> {
@@ -36,7 +34,6 @@ impl<'a> Truth<'a> {
             sensor: SensorConfiguration::default(),
             display: DisplayConfiguration::default(),
             reference_actuator: 24,
-            reference_place_mm: 0.0,
         }
     }
 
@@ -49,5 +46,17 @@ impl<'a> Truth<'a> {
     /// The counting window A, in s.
     pub fn window_s(&self) -> f64 {
         f64::from(self.sensor.window_ms) * 1e-3
+    }
+
+    /// How far the reference actuator is from the fingertip's middle along the scan, in mm, where
+    /// that counts: in the travelling mode.
+    pub fn reference_place_mm(&self) -> f64 {
+        match self.display.mode {
+            Mode::Uniform => 0.0,
+            Mode::Travelling => {
+                let place = array::place(self.reference_actuator, self.display.pitch_um);
+                f64::from(place.x_um) * 1e-3
+            }
+        }
     }
 }

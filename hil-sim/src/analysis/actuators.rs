@@ -11,7 +11,7 @@ use crate::analysis::phase_error::phase_error;
 use crate::analysis::reaction::{Reaction, reaction};
 use crate::analysis::track::{COUNT_MM, Track};
 use crate::analysis::voltage::{peak_v, voltage};
-use crate::recording::{ACTUATORS, Recording, volts};
+use crate::recording::{ACTUATORS, Recording, WORD_V};
 use crate::truth::Truth;
 
 /// Voltage below which an actuator does not vibrate, in V.
@@ -32,7 +32,8 @@ pub struct Actuators {
     /// The largest change of any channel at one LDAC edge, in V.
     pub max_step_v: Option<f64>,
     /// The largest step that one tick of travel explains: 2π · amplitude · Δx/λ̂ for the longest
-    /// travel of a tick, one encoder count more, and the shortest λ̂ in force.
+    /// travel of a tick, one encoder count more, and the shortest λ̂ in force; and one step of the
+    /// DAC, since both words are rounded.
     pub natural_step_v: Option<f64>,
     /// The mean over whole cycles of the channel for which it is farthest from 0, in V, each moment
     /// weighted with its advance of phase: an uneven speed alone gives no mean.
@@ -67,7 +68,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     if peak_v(&reference) < STILL_V {
         return actuators;
     }
-    let cycles = cycles::cycles(&reference, &hand);
+    let cycles = cycles::cycles(&reference, &hand, &due);
     if let Some((stretch, count)) = cycles::longest_stretch(&cycles) {
         let stretch_s = stretch.to_s - stretch.from_s;
         let travelled = due.travelled_cycles(stretch.to_s) - due.travelled_cycles(stretch.from_s);
@@ -77,7 +78,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     let error = phase_error(&reference, &due);
     actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
     actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
-    actuators.mean_v = worst_mean_v(recording, &cycles, &due);
+    actuators.mean_v = worst_mean_v(recording, &cycles::continued(&cycles), &due);
     actuators
 }
 
@@ -91,8 +92,7 @@ fn max_step_v(recording: &Recording) -> Option<f64> {
         }
         before = output.words;
     }
-    // A difference of words is a voltage above 0 V's word.
-    largest.map(|steps| f64::from(steps) * (volts(0x8001) - volts(0x8000)))
+    largest.map(|steps| f64::from(steps) * WORD_V)
 }
 
 fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
@@ -102,7 +102,7 @@ fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
         .map(|pair| (pair[1].1 - pair[0].1).abs())
         .fold(f64::NAN, f64::max);
     let amplitude_v = f64::from(truth.display.amplitude_mv) * 1e-3;
-    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()?)
+    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()? + WORD_V)
 }
 
 /// The mean of the channel farthest from 0 V over all whole cycles of the reference.
@@ -243,16 +243,22 @@ mod tests {
 
     #[test]
     fn a_travelling_pattern_is_in_phase_at_its_place() {
+        // The run's actuators are 0.3 mm apart from number 0 on, the array's 10 columns are so from
+        // −1.35 mm on: number 3 is at 0.9 and at −0.45 mm, and the run's wave is to be late by both.
         let run = Run {
             pitch_mm: 0.3,
+            ahead_cycles: Box::new(|_| (-0.45 - 0.9) / 2.0),
             ..Run::steady(50.0, 2.0)
         };
         let mut truth = Truth::new("", "", &*run.surface_mm);
         truth.reference_actuator = 3;
-        truth.reference_place_mm = 0.9;
         truth.display.mode = Mode::Travelling;
+        truth.display.pitch_um = 300;
         let actuators = judge(&truth, &run.record());
-        assert!(actuators.phase_error_rms_cycles.unwrap() < 0.0025);
+        assert!(
+            actuators.phase_error_rms_cycles.unwrap() < 0.0025,
+            "{actuators:?}"
+        );
         assert!(
             actuators.mean_v.unwrap().abs() < 0.005,
             "{:?}",
@@ -277,7 +283,7 @@ mod tests {
         let run = Run {
             estimate: Box::new(|t_s| {
                 (
-                    if (t_s / 0.03) as u32 % 2 == 0 {
+                    if ((t_s / 0.03) as u32).is_multiple_of(2) {
                         2.4
                     } else {
                         4.8
@@ -303,7 +309,7 @@ mod tests {
     #[test]
     fn the_natural_step_is_what_a_tick_of_travel_explains() {
         let actuators = judged(&Run::steady(50.0, 2.0));
-        let expected_v = 5.0 * TAU * (50.0 * TICK_S + 0.005) / 2.0;
+        let expected_v = 5.0 * TAU * (50.0 * TICK_S + 0.005) / 2.0 + 10.0 / 65_536.0;
         assert!((actuators.natural_step_v.unwrap() - expected_v).abs() < 1e-9);
         assert!(actuators.max_step_v.unwrap() <= expected_v);
         // Five counts a tick: the step at the zero crossing is that of 0.025 mm.

@@ -1,11 +1,10 @@
 //! The whole cycles of a stimulus: from one upward zero crossing to the next.
 
+use crate::analysis::phase::DuePhase;
 use crate::analysis::track::Track;
-use crate::analysis::voltage::peak_v;
 
-/// Share of the highest voltage that both half waves must reach for the stimulus to count as at
-/// full amplitude: five samples a cycle can miss a crest by 1 − cos(π/5) = 0.19.
-const FULL: f64 = 0.8;
+/// Share of the usual amplitude from which on a cycle counts as at full amplitude.
+const FULL: f64 = 0.95;
 
 /// A cycle at full amplitude, during which the hand did not turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +16,7 @@ pub struct Cycle {
 }
 
 /// The cycles of a voltage (s, V) at full amplitude, in order.
-pub fn cycles(voltage: &[(f64, f64)], hand: &Track) -> Vec<Cycle> {
-    let full_v = FULL * peak_v(voltage);
+pub fn cycles(voltage: &[(f64, f64)], hand: &Track, due: &DuePhase) -> Vec<Cycle> {
     let mut cycles = Vec::new();
     let mut start: Option<(f64, usize)> = None;
     for (index, pair) in voltage.windows(2).enumerate() {
@@ -26,21 +24,52 @@ pub fn cycles(voltage: &[(f64, f64)], hand: &Track) -> Vec<Cycle> {
         if from_v < 0.0 && to_v >= 0.0 {
             let crossing_s = from_s + (to_s - from_s) * from_v / (from_v - to_v);
             if let Some((start_s, first)) = start {
-                let within = &voltage[first..=index];
-                let full = within.iter().any(|point| point.1 >= full_v)
-                    && within.iter().any(|point| point.1 <= -full_v);
                 let cycle = Cycle {
                     from_s: start_s,
                     to_s: crossing_s,
                 };
-                if full && !turns(hand, cycle) {
-                    cycles.push(cycle);
-                }
+                cycles.push((cycle, amplitude_v(cycle, &voltage[first..=index], due)));
             }
             start = Some((crossing_s, index + 1));
         }
     }
-    cycles
+    cycles.retain(|(cycle, _)| !turns(hand, *cycle));
+    let mut amplitudes: Vec<f64> = cycles.iter().map(|cycle| cycle.1).collect();
+    amplitudes.sort_by(f64::total_cmp);
+    // The upper quartile: neither fades nor a single odd cycle decide what is usual.
+    let usual_v = amplitudes
+        .get(amplitudes.len() * 3 / 4)
+        .copied()
+        .unwrap_or(0.0);
+    cycles.retain(|cycle| cycle.1 >= FULL * usual_v);
+    cycles.into_iter().map(|cycle| cycle.0).collect()
+}
+
+/// √2 of the root mean square over a cycle of travel, however few its points and however uneven the
+/// speed; 0 without travel.
+fn amplitude_v(cycle: Cycle, within: &[(f64, f64)], due: &DuePhase) -> f64 {
+    let mut before = (due.travelled_cycles(cycle.from_s), 0.0);
+    let (mut sum, start) = (0.0, before.0);
+    for &(t_s, v) in within.iter().chain(&[(cycle.to_s, 0.0)]) {
+        let now = (due.travelled_cycles(t_s), v * v);
+        sum += 0.5 * (before.1 + now.1) * (now.0 - before.0);
+        before = now;
+    }
+    let whole = before.0 - start;
+    if whole > 0.0 {
+        (2.0 * sum / whole).sqrt()
+    } else {
+        0.0
+    }
+}
+
+/// The cycles that follow another one at full amplitude. The first after a fade may still have grown
+/// by a few percent, which gives it a mean of its own.
+pub fn continued(cycles: &[Cycle]) -> Vec<Cycle> {
+    let pairs = cycles
+        .windows(2)
+        .filter(|pair| pair[0].to_s == pair[1].from_s);
+    pairs.map(|pair| pair[1]).collect()
 }
 
 /// The longest run of cycles that follow each other, as one: from the first crossing to the last.

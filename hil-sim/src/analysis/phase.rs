@@ -21,10 +21,7 @@ impl DuePhase {
     /// The phase due at the reference actuator.
     pub fn new(truth: &Truth, recording: &Recording) -> Self {
         let wavelengths = received_wavelengths(recording);
-        let place_mm = match truth.display.mode {
-            protocol::Mode::Uniform => 0.0,
-            protocol::Mode::Travelling => truth.reference_place_mm,
-        };
+        let place_mm = truth.reference_place_mm();
         let mut due = Self::default();
         let mut next = 0;
         let mut in_force_mm: Option<f64> = None;

@@ -7,10 +7,7 @@ use serde::Serialize;
 use crate::analysis::finite;
 use crate::analysis::phase::DuePhase;
 use crate::analysis::track::COUNT_MM;
-use crate::recording::{ACTUATORS, OutputRecord, Recording, volts};
-
-/// One step of a DAC's word, in V.
-const WORD_V: f64 = 10.0 / 65_536.0;
+use crate::recording::{ACTUATORS, OutputRecord, Recording, WORD_V, volts};
 
 /// Time from a movement of the hand to the LDAC edge that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -159,7 +156,7 @@ mod tests {
         // Half of the edges 0.1 ms, half 0.4 ms after their tick: 0.1 to 0.6 and 0.4 to 0.9 ms.
         let run = Run {
             edge_s: Box::new(|t_s| {
-                if (t_s / 500e-6).round() as u32 % 2 == 0 {
+                if ((t_s / 500e-6).round() as u32).is_multiple_of(2) {
                     0.1e-3
                 } else {
                     0.4e-3

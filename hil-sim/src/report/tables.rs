@@ -49,7 +49,7 @@ pub fn index(chapters: &[Chapter]) -> String {
         );
     }
     format!(
-        "<div class=wide><table><thead><tr><th>scene</th><th>expected</th><th>engine</th><th>method</th><th>mean λ̂</th>\
+        "<div class=wide><table><thead><tr><th>scene</th><th></th><th>engine</th><th>method</th><th>mean λ̂</th>\
          <th>RMS error</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
          <tbody>{rows}</tbody></table></div>\n"
     )
