@@ -1,7 +1,5 @@
 //! A scene that was run, judged.
 
-use firmware_display::array;
-
 use crate::analysis::{self, Verdict};
 use crate::expectation;
 use crate::json::SceneResult;
@@ -10,9 +8,6 @@ use crate::report::Chapter;
 use crate::scene::Scene;
 use crate::surface::Surface;
 use crate::truth::Truth;
-
-/// The actuator that stands for all fifty where one frequency and phase is measured.
-const REFERENCE_ACTUATOR: usize = 24;
 
 /// A run and what came of it.
 pub struct Outcome {
@@ -65,13 +60,9 @@ impl Outcome {
 }
 
 fn truth<'a>(scene: &'a Scene, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Truth<'a> {
-    let display = scene.display_configuration();
-    let place = array::place(REFERENCE_ACTUATOR, display.pitch_um);
     Truth {
         sensor: scene.sensor_configuration(),
-        display,
-        reference_actuator: REFERENCE_ACTUATOR,
-        reference_place_mm: f64::from(place.x_um) / 1_000.0,
+        display: scene.display_configuration(),
         ..Truth::new(&scene.name, scene.estimator.method_name(), wavelength_mm)
     }
 }
