@@ -1,6 +1,7 @@
 //! The `elf` engine: the two ELFs that a user would flash, on two emulated Nucleo-F429ZI boards joined
 //! by a UART.
 
+pub mod cost;
 mod display;
 mod firmware;
 mod lockstep;
@@ -51,6 +52,9 @@ pub enum ElfError {
     /// The scene's world can't be built.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A firmware can't be used.
+    #[error(transparent)]
+    Firmware(#[from] FirmwareError),
     /// A board could not be put together.
     #[error("the {board} board can't be emulated: {reason}")]
     Board {

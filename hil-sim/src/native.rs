@@ -34,7 +34,18 @@ const STEPS_PER_TICK: u64 = (firmware_sensor::SCAN_RATE_HZ / firmware_display::T
 const STEPS_PER_STATUS: u64 = firmware_sensor::SCAN_RATE_HZ as u64;
 /// What a host calls itself in a Hello.
 const CHIP: &str = "host";
-const VERSION: [u8; 3] = [0, 1, 0];
+const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+const fn number(text: &str) -> u8 {
+    match u8::from_str_radix(text, 10) {
+        Ok(number) => number,
+        Err(_) => panic!("a version's part is above 255"),
+    }
+}
 
 /// Runs a scene.
 pub fn run(scene: &Scene) -> Result<Recording, SceneError> {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
 
+mod bounds;
 mod error;
 mod read;
 mod series;

@@ -198,3 +198,123 @@ fn period(harmonics: &[(u32, f64)], second_harmonic: f64) -> Box<Period> {
     }
     period
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::Specimen;
+
+    fn surface(profile: Profile, specimens: &[(f64, f64)]) -> Surface {
+        let specimens = specimens
+            .iter()
+            .map(|&(wavelength_mm, length_mm)| Specimen {
+                wavelength_mm,
+                length_mm,
+            })
+            .collect();
+        Surface::new(
+            &scene::Surface {
+                specimens,
+                start_mm: 10.0,
+                profile,
+            },
+            0.0,
+        )
+    }
+
+    /// Amplitude and phase of the `n`th harmonic of what is felt over one period of 2 mm.
+    fn harmonic(surface: &Surface, n: f64, advance: u32) -> (f64, f64) {
+        let points = 4096;
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for point in 0..points {
+            let cycles = f64::from(point) / f64::from(points);
+            let felt = f64::from(surface.feel(10.0 + 2.0 * cycles, advance));
+            sine += felt * (TAU * n * cycles).sin();
+            cosine += felt * (TAU * n * cycles).cos();
+        }
+        let scale = 2.0 / f64::from(points);
+        ((sine * scale).hypot(cosine * scale), cosine.atan2(sine))
+    }
+
+    #[test]
+    fn the_fundamental_has_amplitude_one_and_the_harmonics_their_share() {
+        let trapezoid = surface(Profile::Trapezoid, &[(2.0, f64::INFINITY)]);
+        // f32 and straight lines between the points: below 1e-4.
+        assert!((harmonic(&trapezoid, 1.0, 0).0 - 1.0).abs() < 1e-4);
+        assert!(harmonic(&trapezoid, 2.0, 0).0 < 1e-4);
+        // 1/3 of a square's, sinc(0.3)/sinc(0.1) for the ramps, e^(−½ (2π 0.12/2)² (9 − 1)) for the blur.
+        let ramp = (0.3 * TAU / 2.0).sin() / 3.0 / (0.1 * TAU / 2.0).sin();
+        let third = ramp / 3.0 * (-0.5 * (TAU * 0.06).powi(2) * 8.0).exp();
+        assert!((harmonic(&trapezoid, 3.0, 0).0 - third).abs() < 1e-4);
+        let sine = surface(Profile::Sine, &[(2.0, f64::INFINITY)]);
+        assert!(harmonic(&sine, 3.0, 0).0 < 1e-4);
+    }
+
+    #[test]
+    fn an_advance_shifts_the_texture_by_its_share_of_a_cycle() {
+        let trapezoid = surface(Profile::Trapezoid, &[(2.0, f64::INFINITY)]);
+        let (_, phase) = harmonic(&trapezoid, 1.0, 1 << 29);
+        assert!((phase - TAU / 8.0).abs() < 1e-4, "{phase}");
+        assert_eq!(trapezoid.feel(10.25, 1 << 31), trapezoid.feel(11.25, 0));
+    }
+
+    #[test]
+    fn each_place_has_its_own_specimen_and_the_outer_ones_go_on() {
+        let three = surface(
+            Profile::Sine,
+            &[(1.0, 5.0), (2.0, 5.0), (4.0, f64::INFINITY)],
+        );
+        for (x_mm, wavelength_mm) in [
+            (-1e6, 1.0),
+            (14.999, 1.0),
+            (15.0, 2.0),
+            (19.999, 2.0),
+            (20.0, 4.0),
+            (1e6, 4.0),
+        ] {
+            assert_eq!(three.wavelength_mm(x_mm), wavelength_mm, "{x_mm}");
+        }
+        // A quarter of each one's wave after its start: the crest.
+        for x_mm in [10.25, 15.5, 21.0] {
+            assert!((three.feel(x_mm, 0) - 1.0).abs() < 1e-6, "{x_mm}");
+        }
+    }
+
+    #[test]
+    fn far_from_the_start_the_texture_is_as_sharp_as_near() {
+        let sine = surface(Profile::Sine, &[(2.0, f64::INFINITY)]);
+        for cycles in [0.1, 0.3, 0.77] {
+            let near = sine.feel(10.0 + 2.0 * cycles, 0);
+            let far = sine.feel(10.0 + 2.0 * (1e6 + cycles), 0);
+            assert!((near - far).abs() < 1e-5);
+            assert!((f64::from(near) - (TAU * cycles).sin()).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_recorded_sine_is_felt_as_a_sine_of_amplitude_one() {
+        let at: Vec<f64> = (0..=4000).map(|row| f64::from(row) * 0.01).collect();
+        let values = at
+            .iter()
+            .map(|x_mm| 7.0 + 0.03 * (TAU * x_mm / 2.0).sin())
+            .collect();
+        let series = Arc::new(Series {
+            at,
+            values,
+            width: 1,
+        });
+        let recorded = surface(Profile::Recorded(series), &[(2.0, f64::INFINITY)]);
+        // Twenty whole periods of 2 mm; the ends' blur reaches 0.5 mm in.
+        for x_mm in [4.5, 10.1, 31.3] {
+            let felt = f64::from(recorded.feel(x_mm, 0));
+            assert!(
+                (felt - (TAU * x_mm / 2.0).sin()).abs() < 0.01,
+                "{felt} at {x_mm}"
+            );
+        }
+        assert!(recorded.feel(-5.0, 0).is_finite() && recorded.feel(99.0, 0).is_finite());
+    }
+}

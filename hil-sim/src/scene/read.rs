@@ -1,87 +1,21 @@
 //! From TOML to a checked [`Scene`], section by section.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
 use protocol::{Method, Mode};
 
+use super::bounds::{
+    AMPLITUDE, BOUND, DELAY, DURATION, FREQUENCY, HUM, LAG, LENGTH, MOST_SPEED_MM_S, PLACE, SHARE,
+    SNR, SPEED, WAVELENGTH,
+};
 use super::series::Series;
-use super::table::{Bounds, Source, Table};
+use super::table::{Source, Table};
 use super::{
     ArmDrive, Estimator, Expect, Follows, Gauges, Kinematic, Link, Motion, Profile, Scene,
     SceneError, Specimen, Surface,
 };
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
-
-/// Faster than any hand, and than the arm's drive allows.
-const MOST_SPEED_MM_S: f64 = 1000.0;
-
-const DURATION: Bounds = Bounds {
-    what: "a duration",
-    give: "a time above 0 in s, 600 at most",
-    allows: |s| s > 0.0 && s <= 600.0,
-};
-const WAVELENGTH: Bounds = Bounds {
-    what: "a wavelength",
-    give: "a length above 0 in mm (0.01 to 100)",
-    allows: |mm| (0.01..=100.0).contains(&mm),
-};
-const LENGTH: Bounds = Bounds {
-    what: "a length",
-    give: "a length above 0 in mm, 100 000 at most",
-    allows: |mm| mm > 0.0 && mm <= 100_000.0,
-};
-const PLACE: Bounds = Bounds {
-    what: "a place",
-    give: "a place within ± 100 000 mm",
-    allows: |mm| mm.abs() <= 100_000.0,
-};
-const SPEED: Bounds = Bounds {
-    what: "a speed of a hand",
-    give: "a speed in mm/s, −1000 to 1000",
-    allows: |mm_s| mm_s.abs() <= MOST_SPEED_MM_S,
-};
-const AMPLITUDE: Bounds = Bounds {
-    what: "a hand's highest speed",
-    give: "a speed in mm/s, 0 to 1000",
-    allows: |mm_s| (0.0..=MOST_SPEED_MM_S).contains(&mm_s),
-};
-const FREQUENCY: Bounds = Bounds {
-    what: "a frequency of a hand",
-    give: "a frequency above 0 in Hz, 20 at most",
-    allows: |hz| hz > 0.0 && hz <= 20.0,
-};
-const LAG: Bounds = Bounds {
-    what: "a lag",
-    give: "a time in ms, 0 to 1000",
-    allows: |ms| (0.0..=1000.0).contains(&ms),
-};
-const DELAY: Bounds = Bounds {
-    what: "a delay",
-    give: "a time in ms, 0 to 10 000",
-    allows: |ms| (0.0..=10_000.0).contains(&ms),
-};
-const SHARE: Bounds = Bounds {
-    what: "a share",
-    give: "a number from 0 to 1",
-    allows: |share| (0.0..=1.0).contains(&share),
-};
-const SNR: Bounds = Bounds {
-    what: "a signal-to-noise ratio",
-    give: "a ratio in dB, −40 to 120, or take it out for no noise",
-    allows: |db| (-40.0..=120.0).contains(&db),
-};
-const HUM: Bounds = Bounds {
-    what: "an amplitude of hum",
-    give: "a number from 0 to 10, relative to the signal",
-    allows: |ratio| (0.0..=10.0).contains(&ratio),
-};
-const BOUND: Bounds = Bounds {
-    what: "a bound",
-    give: "a number above 0",
-    allows: |bound| bound > 0.0,
-};
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let source = Source::new(path, text);
@@ -407,8 +341,8 @@ fn series(
         ));
     };
     let path = table.source().beside(name);
-    match File::open(&path) {
-        Ok(file) => Ok(Arc::new(Series::read(&path, file, headers, check)?)),
+    match std::fs::read(&path) {
+        Ok(bytes) => Ok(Arc::new(Series::read(&path, &bytes, headers, check)?)),
         Err(error) => {
             let path = path.display();
             Err(table.refuse(

@@ -1,6 +1,5 @@
 //! Measured columns from a CSV file, over time or place.
 
-use std::io::Read;
 use std::path::Path;
 
 use super::SceneError;
@@ -18,19 +17,33 @@ pub struct Series {
 }
 
 impl Series {
-    /// Reads CSV from `file`, to be called `path`, whose first line must be one of `headers`. `check` sees
+    /// Reads CSV from `bytes`, to be called `path`, whose first line must be one of `headers`. `check` sees
     /// each row after the one before it, and may refuse it: column index and what to do.
     pub(super) fn read(
         path: &Path,
-        file: impl Read,
+        bytes: &[u8],
         headers: &[&str],
         check: impl Fn(Option<&[f64]>, &[f64]) -> Result<(), (usize, String)>,
     ) -> Result<Self, SceneError> {
-        let refuse = |line: Option<u64>, key: String, message: String| SceneError {
+        let refuse = |line: Option<usize>, key: String, message: String| SceneError {
             file: path.display().to_string(),
-            line: line.map(|line| line as usize),
+            line,
             key,
             message,
+        };
+        // The reader's own count stands before the empty lines that it passes over.
+        let line_at = |position: Option<&csv::Position>| {
+            let start = (position?.byte() as usize).min(bytes.len());
+            let empty = bytes[start..]
+                .iter()
+                .take_while(|byte| b"\r\n".contains(byte))
+                .count();
+            Some(
+                1 + bytes[..start + empty]
+                    .iter()
+                    .filter(|&&byte| byte == b'\n')
+                    .count(),
+            )
         };
         let broken = |error: csv::Error| {
             let message = match error.kind() {
@@ -44,16 +57,12 @@ impl Series {
                 csv::ErrorKind::Utf8 { .. } => "is not text: give CSV in UTF-8".to_owned(),
                 _ => format!("cannot be read: {error}"),
             };
-            refuse(
-                error.position().map(csv::Position::line),
-                String::new(),
-                message,
-            )
+            refuse(line_at(error.position()), String::new(), message)
         };
 
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .from_reader(file);
+            .from_reader(bytes);
         let header: Vec<String> = reader
             .headers()
             .map_err(broken)?
@@ -77,10 +86,13 @@ impl Series {
         let mut record = csv::StringRecord::new();
         let mut before: Option<Vec<f64>> = None;
         while reader.read_record(&mut record).map_err(broken)? {
-            let line = record.position().map(csv::Position::line);
             let refuse_cell = |column: usize, message: String| {
                 let key = format!("column {} ({})", column + 1, header[column]);
-                refuse(line, key, format!("{:?} {message}", &record[column]))
+                refuse(
+                    line_at(record.position()),
+                    key,
+                    format!("{:?} {message}", &record[column]),
+                )
             };
             let mut row = Vec::with_capacity(header.len());
             for (column, cell) in record.iter().enumerate() {

@@ -7,21 +7,12 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::SceneError;
+use super::bounds::Bounds;
 
 /// The scene's text and where it came from.
 pub(super) struct Source<'t> {
     path: &'t Path,
     text: &'t str,
-}
-
-/// What a number may be, and the words for saying so.
-pub(super) struct Bounds {
-    /// "is not {what}"
-    pub what: &'static str,
-    /// "give {give}"
-    pub give: &'static str,
-    /// Never called with a number that is not finite.
-    pub allows: fn(f64) -> bool,
 }
 
 /// A table of the scene, or its absence; it remembers which keys it was asked for.

@@ -1,0 +1,118 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
+use protocol::Role;
+
+mod cost;
+mod demo;
+mod run;
+mod size;
+
+/// Ridgelink's simulator.
+#[derive(Debug, Parser)]
+#[command(name = "hil-sim", version, about)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs scenes and judges them by what they expect: exit status 0 if all is as expected, 1 if
+    /// not, 2 if a scene or a file cannot be used
+    Run(Run),
+    /// Rubs the paper's four specimens at its three speeds on the ELFs and prints Table I three times
+    /// over: the paper's, predicted, and this ELF's
+    Demo(Demo),
+    /// Prints what the two ELFs take of flash and RAM
+    Size(Elves),
+    /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
+    /// sensor
+    Cost(Cost),
+}
+
+#[derive(Debug, clap::Args)]
+struct Demo {
+    #[command(flatten)]
+    elves: Elves,
+    /// Where to write the report with plots
+    #[arg(long, value_name = "FILE", default_value = "target/demo.html")]
+    report: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct Cost {
+    /// The ELF that exercises the filters: the example filter_cost of firmware-sensor
+    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost")]
+    elf: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct Run {
+    /// Scenes: TOML files
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// What runs the firmware
+    #[arg(long, value_enum, default_value_t = EngineName::Native)]
+    engine: EngineName,
+    /// Where to write every result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Where to write a report with plots, as one HTML page
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    elves: Elves,
+}
+
+/// Where the boards' firmwares are.
+#[derive(Debug, clap::Args)]
+struct Elves {
+    /// The sensor board's ELF
+    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/firmware-sensor")]
+    sensor_elf: PathBuf,
+    /// The display board's ELF
+    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/firmware-display")]
+    display_elf: PathBuf,
+}
+
+impl Elves {
+    fn read(&self) -> Result<Firmwares, FirmwareError> {
+        Ok(Firmwares {
+            sensor: Firmware::read(&self.sensor_elf, Role::Sensor)?,
+            display: Firmware::read(&self.display_elf, Role::Display)?,
+        })
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum EngineName {
+    /// The firmware's libraries, on this computer
+    Native,
+    /// The flashed ELFs, on emulated boards
+    Elf,
+}
+
+impl Arguments {
+    /// Does what was asked for.
+    ///
+    /// # Errors
+    /// If a scene or a file cannot be used.
+    pub fn execute(self) -> anyhow::Result<ExitCode> {
+        match self.command {
+            Command::Run(run) => run.execute(),
+            Command::Demo(demo) => demo.execute(),
+            Command::Size(elves) => size::execute(&elves),
+            Command::Cost(cost) => cost.execute(),
+        }
+    }
+}
+
+/// A number with so many decimals, or a dash.
+fn number(number: Option<f64>, decimals: usize) -> String {
+    number.map_or("–".to_owned(), |number| format!("{number:.decimals$}"))
+}

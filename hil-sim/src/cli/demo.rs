@@ -1,0 +1,108 @@
+//! `hil-sim demo`.
+
+use std::process::ExitCode;
+
+use anyhow::Context;
+use firmware_sensor::counting::predicted_mean_mm;
+use hil_sim::elf::{self, Firmwares};
+use hil_sim::outcome::Outcome;
+use hil_sim::report::html;
+use hil_sim::scene::Scene;
+
+use super::{Demo, number};
+
+/// Speeds of Table I, in mm/s, with its mean estimates for 1, 2, 3 and 4 mm (Okamoto et al. 2009).
+const TABLE_1: [(f64, [f64; 4]); 3] = [
+    (30.0, [1.006, 2.072, 3.390, 4.321]),
+    (50.0, [1.006, 1.844, 3.096, 4.038]),
+    (70.0, [1.128, 1.978, 3.023, 4.075]),
+];
+const WAVELENGTHS_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
+/// The paper's counting window.
+const WINDOW_S: f64 = 0.080;
+/// The paper's two seconds of estimates, and what the filters need to settle before.
+const DURATION_S: f64 = 2.3;
+/// What the ELF may be from the prediction, which knows neither filters nor sampling.
+const TOLERANCE_MM: f64 = 0.03;
+const FREQUENCY_TOLERANCE: f64 = 0.001;
+
+impl Demo {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let firmwares = self.elves.read()?;
+        println!(
+            "Two emulated boards, a UART between them, {} and {}:\n",
+            firmwares.sensor.path.display(),
+            firmwares.display.path.display()
+        );
+        println!("{HEADER}");
+        let mut outcomes = Vec::new();
+        let mut as_predicted = true;
+        for (speed_mm_s, paper_mm) in TABLE_1 {
+            for (wavelength_mm, paper_mm) in WAVELENGTHS_MM.into_iter().zip(paper_mm) {
+                let outcome = rub(wavelength_mm, speed_mm_s, &firmwares)?;
+                let predicted_mm = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
+                println!("{}", row(wavelength_mm, speed_mm_s, paper_mm, predicted_mm, &outcome));
+                as_predicted &= is_as_predicted(predicted_mm, &outcome);
+                outcomes.push(outcome);
+            }
+        }
+        let chapters: Vec<_> = outcomes.iter().map(Outcome::chapter).collect();
+        let folder = self.report.parent().unwrap_or(std::path::Path::new("."));
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        std::fs::write(&self.report, html(&chapters)?)
+            .with_context(|| self.report.display().to_string())?;
+        println!("\n{}", verdict(as_predicted));
+        println!("Plots of every cell: {}", self.report.display());
+        Ok(if as_predicted { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    }
+}
+
+fn rub(wavelength_mm: f64, speed_mm_s: f64, firmwares: &Firmwares) -> anyhow::Result<Outcome> {
+    let mut scene = Scene::constant(wavelength_mm, speed_mm_s);
+    scene.duration_s = DURATION_S;
+    let (recording, _) = elf::run(&scene, firmwares)?;
+    Ok(Outcome::new(scene, recording))
+}
+
+const HEADER: &str = "\
+              mean λ̂ in mm                 fifty actuators
+ v    λ    paper  predicted  this ELF   Hz      v/λ̂ Hz   off %   phase rms   × real
+mm/s  mm                                                         cycles      time";
+
+fn row(
+    wavelength_mm: f64,
+    speed_mm_s: f64,
+    paper_mm: f64,
+    predicted_mm: f64,
+    outcome: &Outcome,
+) -> String {
+    let summary = &outcome.verdict.summary;
+    let actuators = &outcome.verdict.actuators;
+    format!(
+        "{speed_mm_s:>3}   {wavelength_mm:>2}   {paper_mm:>6.3} {predicted_mm:>8.3} {:>9}  {:>8} {:>9} {:>7} {:>9} {:>9}",
+        number(summary.mean_mm, 3),
+        number(actuators.frequency_hz, 3),
+        number(actuators.truth_hz, 3),
+        number(frequency_error(outcome).map(|error| 100.0 * error), 3),
+        number(actuators.phase_error_rms_cycles, 4),
+        number(outcome.recording.realtime_factor(), 2),
+    )
+}
+
+fn frequency_error(outcome: &Outcome) -> Option<f64> {
+    let actuators = &outcome.verdict.actuators;
+    Some(actuators.frequency_hz? / actuators.truth_hz? - 1.0)
+}
+
+fn is_as_predicted(predicted_mm: f64, outcome: &Outcome) -> bool {
+    let mean_mm = outcome.verdict.summary.mean_mm;
+    mean_mm.is_some_and(|mean_mm| (mean_mm - predicted_mm).abs() <= TOLERANCE_MM)
+        && frequency_error(outcome).is_some_and(|error| error.abs() <= FREQUENCY_TOLERANCE)
+}
+
+fn verdict(as_predicted: bool) -> String {
+    let (not, percent) = (if as_predicted { "" } else { "NOT " }, 100.0 * FREQUENCY_TOLERANCE);
+    format!(
+        "All cells are {not}within {TOLERANCE_MM} mm of the prediction, with every actuator {not}within {percent} % of v/λ̂."
+    )
+}

@@ -1,0 +1,58 @@
+//! `hil-sim size`.
+
+use std::process::ExitCode;
+
+use object::{Object, ObjectSection, SectionFlags, SectionKind};
+
+use super::Elves;
+
+const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0820_0000;
+const RAM: std::ops::Range<u64> = 0x2000_0000..0x2003_0000;
+const ALLOCATED: u64 = object::elf::SHF_ALLOC as u64;
+
+/// What an ELF takes, in bytes.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Footprint {
+    /// Code, constants and the initial values of variables.
+    flash: u64,
+    /// Variables; the stack has what is left.
+    ram: u64,
+}
+
+pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
+    let firmwares = elves.read()?;
+    let flash_total = FLASH.end - FLASH.start;
+    let ram_total = RAM.end - RAM.start;
+    println!("| ELF | flash, bytes | of 2 MiB | static RAM, bytes | of 192 KiB |");
+    println!("| --- | ---: | ---: | ---: | ---: |");
+    for (name, firmware) in
+        [("firmware-sensor", &firmwares.sensor), ("firmware-display", &firmwares.display)]
+    {
+        let Footprint { flash, ram } = footprint(&object::File::parse(&*firmware.elf)?);
+        println!(
+            "| {name} | {flash} | {:.1} % | {ram} | {:.1} % |",
+            100.0 * flash as f64 / flash_total as f64,
+            100.0 * ram as f64 / ram_total as f64,
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn footprint(file: &object::File<'_>) -> Footprint {
+    let mut footprint = Footprint::default();
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
+        if u64::from(sh_flags) & ALLOCATED == 0 {
+            continue;
+        }
+        let variable = RAM.contains(&section.address());
+        let stored = !matches!(section.kind(), SectionKind::UninitializedData);
+        if variable {
+            footprint.ram += section.size();
+        }
+        if stored && (variable || FLASH.contains(&section.address())) {
+            footprint.flash += section.size();
+        }
+    }
+    footprint
+}

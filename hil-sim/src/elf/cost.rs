@@ -1,0 +1,99 @@
+//! Counts the instructions between marks that a firmware leaves: no model of time, no cycles.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
+use rigless::image::Image;
+use rigless::session::Session;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::time::VirtualNanos;
+
+use super::nucleo::{Nucleo, Pins};
+use super::{ElfError, FirmwareError};
+
+/// Where a firmware writes its marks: the data register of the CRC unit, which nothing else uses.
+const MARKS: u64 = 0x4002_3000;
+/// Added to a part's number at its end.
+const END: u64 = 100;
+/// The mark after the last part.
+const DONE: u64 = 999;
+/// Virtual time after which a firmware that has not come to its end is given up.
+const LIMIT: VirtualNanos = VirtualNanos(60_000_000_000);
+
+/// Nothing on the pins.
+#[derive(Debug)]
+struct Bare;
+
+impl Pins for Bare {
+    fn on_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) -> u16 {
+        0
+    }
+}
+
+#[derive(Default)]
+struct Marks {
+    begun: BTreeMap<u64, u64>,
+    taken: BTreeMap<u64, u64>,
+    done: bool,
+}
+
+impl Driver<Nucleo<Bare>> for Marks {
+    fn on_settled(
+        &mut self,
+        session: &mut Session<Nucleo<Bare>>,
+        _host: &mut dyn Host,
+        settled: Settled,
+    ) {
+        let Settled::Access {
+            access: Access { kind: AccessKind::Write, address: MARKS, value, instruction_count, virtual_time, .. },
+            ..
+        } = settled
+        else {
+            return;
+        };
+        if value == DONE {
+            self.done = true;
+            session.pause_at(Some(virtual_time));
+        } else if let Some(begun) = value.checked_sub(END).and_then(|part| self.begun.get(&part)) {
+            self.taken.insert(value - END, instruction_count - begun);
+        } else {
+            self.begun.insert(value, instruction_count);
+        }
+    }
+
+    fn on_stop(
+        &mut self,
+        _session: &mut Session<Nucleo<Bare>>,
+        stop: Stop,
+        _host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        (!self.done && stop.at < LIMIT).then_some(LIMIT)
+    }
+}
+
+/// Instructions that each part of the ELF at `path` took, by the part's number.
+///
+/// # Errors
+/// If the file can't be read or placed, or does not come to its end.
+pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
+    let board = |reason: String| ElfError::Board { board: "bare", reason };
+    let elf = std::fs::read(path).map_err(|source| {
+        ElfError::Firmware(FirmwareError::Missing {
+            path: path.to_owned(),
+            package: "firmware-sensor --example filter_cost",
+            source,
+        })
+    })?;
+    let image = Image::new(path, elf, None).map_err(|error| board(error.to_string()))?;
+    let nucleo = Nucleo::new(Bare, |_| {}).map_err(|error| board(error.to_string()))?;
+    let session =
+        Session::new(Box::new(nucleo), 0, LIMIT).map_err(|error| board(error.to_string()))?;
+    let finished = emulator::run(session, &Start::new(&[image]), Marks::default())
+        .map_err(|error| board(error.to_string()))?;
+    if finished.driver.done {
+        Ok(finished.driver.taken)
+    } else {
+        Err(board(format!("{} never came to its end", path.display())))
+    }
+}
