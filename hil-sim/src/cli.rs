@@ -47,7 +47,11 @@ struct Demo {
 #[derive(Debug, clap::Args)]
 struct Cost {
     /// The ELF that exercises the filters: the example filter_cost of firmware-sensor
-    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost")]
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost"
+    )]
     elf: PathBuf,
 }
 
@@ -73,10 +77,18 @@ struct Run {
 #[derive(Debug, clap::Args)]
 struct Elves {
     /// The sensor board's ELF
-    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/firmware-sensor")]
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/release/firmware-sensor"
+    )]
     sensor_elf: PathBuf,
     /// The display board's ELF
-    #[arg(long, value_name = "ELF", default_value = "target/thumbv7em-none-eabihf/release/firmware-display")]
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/release/firmware-display"
+    )]
     display_elf: PathBuf,
 }
 

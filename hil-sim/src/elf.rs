@@ -24,7 +24,7 @@ use rigless::soc::stm32f427::Stm32f427;
 use rigless::time::VirtualNanos;
 
 pub use firmware::{Firmware, FirmwareError, Firmwares};
-pub use lockstep::QUANTUM_NS;
+pub use lockstep::{QUANTUM_NS, WARM_UP_NS};
 
 use crate::arm::Arm;
 use crate::digest::Digest;
@@ -76,7 +76,9 @@ pub enum ElfError {
         reason: String,
     },
     /// The firmware touched what the emulator has no model for.
-    #[error("the {board} board's firmware reached an address that no model answers for: {address:#010x}")]
+    #[error(
+        "the {board} board's firmware reached an address that no model answers for: {address:#010x}"
+    )]
     Unmapped {
         /// Which board.
         board: &'static str,
@@ -118,14 +120,20 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let (to_sensor, from_display) = sync_channel(1);
 
     let sensor_driver = Lockstep::new(
-        Cable { to_peer: to_display, from_peer: from_display },
+        Cable {
+            to_peer: to_display,
+            from_peer: from_display,
+        },
         Weather::new(&scene.link, scene.seed, TO_SENSOR),
         console_for(scene, Role::Sensor),
         Log::find(&firmwares.sensor.elf),
         end_ns,
     );
     let display_driver = Lockstep::new(
-        Cable { to_peer: to_sensor, from_peer: from_sensor },
+        Cable {
+            to_peer: to_sensor,
+            from_peer: from_sensor,
+        },
         Weather::new(&scene.link, scene.seed, TO_DISPLAY),
         console_for(scene, Role::Display),
         Log::find(&firmwares.display.elf),
@@ -135,23 +143,43 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let started = Instant::now();
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
-            let board = Nucleo::new(SensorPins::new(sensor_world, arm, scene.sensor_configuration()), SensorPins::fit);
+            let board = Nucleo::new(
+                SensorPins::new(sensor_world, arm, scene.sensor_configuration()),
+                SensorPins::fit,
+            );
             let take = |pins: &mut SensorPins, _: &mut Stm32f427| std::mem::take(&mut pins.scans);
-            drive("sensor", board, &firmwares.sensor, sensor_driver, end_ns, take)
+            drive(
+                "sensor",
+                board,
+                &firmwares.sensor,
+                sensor_driver,
+                end_ns,
+                take,
+            )
         });
         let board = Nucleo::new(DisplayPins::new(display_world), DisplayPins::fit);
-        let display =
-            drive("display", board, &firmwares.display, display_driver, end_ns, DisplayPins::leave);
+        let display = drive(
+            "display",
+            board,
+            &firmwares.display,
+            display_driver,
+            end_ns,
+            DisplayPins::leave,
+        );
         (sensor.join(), display)
     });
-    let wall_s = started.elapsed().as_secs_f64();
+    let ended = Instant::now();
     let sensor = sensor.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
     // The board that fails abandons the other: its own reason is the one to tell.
     let (sensor, display) = match (sensor, display) {
         (Ok(sensor), Ok(display)) => (sensor, display),
         (Err(error), Ok(_)) | (Ok(_), Err(error)) => return Err(error),
         (Err(sensor), Err(display)) => {
-            return Err(if is_abandoned(&sensor) { display } else { sensor });
+            return Err(if is_abandoned(&sensor) {
+                display
+            } else {
+                sensor
+            });
         }
     };
     let facts = BoardFacts {
@@ -161,7 +189,12 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
         clears: display.left.clears,
         dac_frame_errors: display.left.dac_frame_errors,
     };
-    Ok((record(scene, sensor, display, wall_s), facts))
+    let (begun, warm_up_s) = match sensor.driver.warm {
+        Some(warm) => (warm, WARM_UP_NS as f64 * 1e-9),
+        None => (started, 0.0),
+    };
+    let pace = (warm_up_s, (ended - begun).as_secs_f64());
+    Ok((record(scene, sensor, display, pace), facts))
 }
 
 const ABANDONED: &str = "the other board stopped";
@@ -196,7 +229,10 @@ fn drive<P: Watched, T>(
     end_ns: u64,
     take: impl FnOnce(&mut P, &mut Stm32f427) -> T,
 ) -> Result<Outcome<T>, ElfError> {
-    let board_error = |reason: String| ElfError::Board { board: name, reason };
+    let board_error = |reason: String| ElfError::Board {
+        board: name,
+        reason,
+    };
     let board = board.map_err(|error| board_error(error.to_string()))?;
     let first_stop = VirtualNanos(QUANTUM_NS);
     let session = Session::new(Box::new(board), 0, first_stop)
@@ -219,7 +255,10 @@ fn drive<P: Watched, T>(
         });
     }
     if let Some(unmapped) = finished.session.unmapped().first() {
-        return Err(ElfError::Unmapped { board: name, address: unmapped.address });
+        return Err(ElfError::Unmapped {
+            board: name,
+            address: unmapped.address,
+        });
     }
     let resets = finished.session.resets().len();
     let (pins, part) = finished.session.board_mut().pins();
@@ -235,7 +274,7 @@ fn record(
     scene: &Scene,
     sensor: Outcome<Vec<ScanRecord>>,
     display: Outcome<DisplayRecords>,
-    wall_s: f64,
+    (warm_up_s, wall_s): (f64, f64),
 ) -> Recording {
     let mut digest = Digest::default();
     digest.link(&sensor.driver.sent);
@@ -272,12 +311,18 @@ fn record(
     }
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
     for (board, driver) in [("sensor", &sensor.driver), ("display", &display.driver)] {
-        log.extend(driver.log_lines().into_iter().map(|(at_ns, line)| (at_ns, board, line)));
+        log.extend(
+            driver
+                .log_lines()
+                .into_iter()
+                .map(|(at_ns, line)| (at_ns, board, line)),
+        );
     }
     log.sort_by_key(|&(at_ns, ..)| at_ns);
     Recording {
         engine: Engine::Elf,
         duration_s: scene.duration_s,
+        warm_up_s,
         wall_s,
         hash: digest.finish(),
         scans: sensor.left,
@@ -304,8 +349,11 @@ fn clock_offset_ns(said: &Listener, scans: &[ScanRecord]) -> i64 {
 }
 
 fn last_status(listener: &Listener) -> Option<Status> {
-    listener.messages().rev().find_map(|said| match said.message {
-        Message::Status(status) => Some(status),
-        _ => None,
-    })
+    listener
+        .messages()
+        .rev()
+        .find_map(|said| match said.message {
+            Message::Status(status) => Some(status),
+            _ => None,
+        })
 }

@@ -242,6 +242,7 @@ impl Pair {
         Recording {
             engine: Engine::Native,
             duration_s,
+            warm_up_s: 0.0,
             wall_s,
             hash: self.tape.hash.finish(),
             scans: self.tape.scans,

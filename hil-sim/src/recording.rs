@@ -85,7 +85,10 @@ pub struct Recording {
     pub engine: Engine,
     /// Virtual time run, in s.
     pub duration_s: f64,
-    /// Wall time that took, in s, without boot and set-up of the simulator.
+    /// Virtual time at the beginning that is not in `wall_s`, in s: in the elf engine the emulator
+    /// translates the firmware as it first runs, which costs a second or two once.
+    pub warm_up_s: f64,
+    /// Wall time that the rest took, in s.
     pub wall_s: f64,
     /// XXH3 of every link byte and every DAC word with its instant.
     pub hash: u64,
@@ -108,7 +111,7 @@ pub struct Recording {
 impl Recording {
     /// Virtual time run per wall time; none if that was too short to be measured.
     pub fn realtime_factor(&self) -> Option<f64> {
-        let factor = self.duration_s / self.wall_s;
+        let factor = (self.duration_s - self.warm_up_s) / self.wall_s;
         factor.is_finite().then_some(factor)
     }
 }

@@ -71,6 +71,7 @@ impl Run {
         Recording {
             engine: Engine::Native,
             duration_s: self.duration_s,
+            warm_up_s: 0.0,
             wall_s: 0.001,
             hash: 0x0123_4567_89ab_cdef,
             scans: instants(SCAN_S, self.duration_s)

@@ -41,7 +41,10 @@ impl Demo {
             for (wavelength_mm, paper_mm) in WAVELENGTHS_MM.into_iter().zip(paper_mm) {
                 let outcome = rub(wavelength_mm, speed_mm_s, &firmwares)?;
                 let predicted_mm = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
-                println!("{}", row(wavelength_mm, speed_mm_s, paper_mm, predicted_mm, &outcome));
+                println!(
+                    "{}",
+                    row(wavelength_mm, speed_mm_s, paper_mm, predicted_mm, &outcome)
+                );
                 as_predicted &= is_as_predicted(predicted_mm, &outcome);
                 outcomes.push(outcome);
             }
@@ -53,7 +56,11 @@ impl Demo {
             .with_context(|| self.report.display().to_string())?;
         println!("\n{}", verdict(as_predicted));
         println!("Plots of every cell: {}", self.report.display());
-        Ok(if as_predicted { ExitCode::SUCCESS } else { ExitCode::from(1) })
+        Ok(if as_predicted {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(1)
+        })
     }
 }
 
@@ -101,7 +108,10 @@ fn is_as_predicted(predicted_mm: f64, outcome: &Outcome) -> bool {
 }
 
 fn verdict(as_predicted: bool) -> String {
-    let (not, percent) = (if as_predicted { "" } else { "NOT " }, 100.0 * FREQUENCY_TOLERANCE);
+    let (not, percent) = (
+        if as_predicted { "" } else { "NOT " },
+        100.0 * FREQUENCY_TOLERANCE,
+    );
     format!(
         "All cells are {not}within {TOLERANCE_MM} mm of the prediction, with every actuator {not}within {percent} % of v/λ̂."
     )

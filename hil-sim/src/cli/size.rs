@@ -2,13 +2,12 @@
 
 use std::process::ExitCode;
 
-use object::{Object, ObjectSection, SectionFlags, SectionKind};
+use object::{Object, ObjectSection, SectionKind};
 
 use super::Elves;
 
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0820_0000;
 const RAM: std::ops::Range<u64> = 0x2000_0000..0x2003_0000;
-const ALLOCATED: u64 = object::elf::SHF_ALLOC as u64;
 
 /// What an ELF takes, in bytes.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -25,9 +24,10 @@ pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
     let ram_total = RAM.end - RAM.start;
     println!("| ELF | flash, bytes | of 2 MiB | static RAM, bytes | of 192 KiB |");
     println!("| --- | ---: | ---: | ---: | ---: |");
-    for (name, firmware) in
-        [("firmware-sensor", &firmwares.sensor), ("firmware-display", &firmwares.display)]
-    {
+    for (name, firmware) in [
+        ("firmware-sensor", &firmwares.sensor),
+        ("firmware-display", &firmwares.display),
+    ] {
         let Footprint { flash, ram } = footprint(&object::File::parse(&*firmware.elf)?);
         println!(
             "| {name} | {flash} | {:.1} % | {ram} | {:.1} % |",
@@ -40,11 +40,8 @@ pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
 
 fn footprint(file: &object::File<'_>) -> Footprint {
     let mut footprint = Footprint::default();
+    // Sections for tools only (symbols, defmt's strings) have no address in either memory.
     for section in file.sections() {
-        let SectionFlags::Elf { sh_flags } = section.flags() else { continue };
-        if u64::from(sh_flags) & ALLOCATED == 0 {
-            continue;
-        }
         let variable = RAM.contains(&section.address());
         let stored = !matches!(section.kind(), SectionKind::UninitializedData);
         if variable {

@@ -46,7 +46,15 @@ impl Driver<Nucleo<Bare>> for Marks {
         settled: Settled,
     ) {
         let Settled::Access {
-            access: Access { kind: AccessKind::Write, address: MARKS, value, instruction_count, virtual_time, .. },
+            access:
+                Access {
+                    kind: AccessKind::Write,
+                    address: MARKS,
+                    value,
+                    instruction_count,
+                    virtual_time,
+                    ..
+                },
             ..
         } = settled
         else {
@@ -55,7 +63,10 @@ impl Driver<Nucleo<Bare>> for Marks {
         if value == DONE {
             self.done = true;
             session.pause_at(Some(virtual_time));
-        } else if let Some(begun) = value.checked_sub(END).and_then(|part| self.begun.get(&part)) {
+        } else if let Some(begun) = value
+            .checked_sub(END)
+            .and_then(|part| self.begun.get(&part))
+        {
             self.taken.insert(value - END, instruction_count - begun);
         } else {
             self.begun.insert(value, instruction_count);
@@ -77,7 +88,10 @@ impl Driver<Nucleo<Bare>> for Marks {
 /// # Errors
 /// If the file can't be read or placed, or does not come to its end.
 pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
-    let board = |reason: String| ElfError::Board { board: "bare", reason };
+    let board = |reason: String| ElfError::Board {
+        board: "bare",
+        reason,
+    };
     let elf = std::fs::read(path).map_err(|source| {
         ElfError::Firmware(FirmwareError::Missing {
             path: path.to_owned(),

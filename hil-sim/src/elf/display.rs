@@ -96,14 +96,22 @@ pub struct DisplayPins {
 impl DisplayPins {
     /// The surroundings that `world` describes.
     pub fn new(world: World) -> Self {
-        Self { world, clear: None, records: DisplayRecords::default() }
+        Self {
+            world,
+            clear: None,
+            records: DisplayRecords::default(),
+        }
     }
 
     /// Wires the converters up.
     pub fn fit(part: &mut Stm32f427) {
         for (port, pin) in SELECTS {
             let pin = Pin::new(pin).expect("a port has sixteen pins");
-            let select = Select { port, pin, active: Level::Low };
+            let select = Select {
+                port,
+                pin,
+                active: Level::Low,
+            };
             part.spi[SPI].attach_selected(OnBus::default(), select);
         }
     }
@@ -133,9 +141,12 @@ impl DisplayPins {
 
     /// Keeps the voltages, if any channel has changed since they were kept last.
     fn record(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let changes: Vec<u64> =
-            (0..CHIPS).filter_map(|chip| on_bus(part, chip).changed_ns.take()).collect();
-        let (Some(first), Some(last)) = (changes.iter().min(), changes.iter().max()) else { return };
+        let changes: Vec<u64> = (0..CHIPS)
+            .filter_map(|chip| on_bus(part, chip).changed_ns.take())
+            .collect();
+        let (Some(first), Some(last)) = (changes.iter().min(), changes.iter().max()) else {
+            return;
+        };
         let words = std::array::from_fn(|actuator| {
             let chip = on_bus(part, actuator / ACTUATORS_PER_CHIP);
             word_of(chip.volts[actuator % ACTUATORS_PER_CHIP])
@@ -143,25 +154,37 @@ impl DisplayPins {
         let skew_ns = last - first;
         let outputs = &mut self.records.outputs;
         if outputs.last().is_none_or(|kept| kept.words != words) {
-            outputs.push(OutputRecord { at_ns, words, skew_ns });
+            outputs.push(OutputRecord {
+                at_ns,
+                words,
+                skew_ns,
+            });
         }
     }
 }
 
 /// The word of the ±5 V range that gives `volts`, to the nearest.
 fn word_of(volts: f64) -> u16 {
-    (volts * 65_536.0 / 10.0 + 32_768.0).round().clamp(0.0, 65_535.0) as u16
+    (volts * 65_536.0 / 10.0 + 32_768.0)
+        .round()
+        .clamp(0.0, 65_535.0) as u16
 }
 
 fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
-    part.spi[SPI].chip_mut(chip).expect("attached by fit, and kept through resets")
+    part.spi[SPI]
+        .chip_mut(chip)
+        .expect("attached by fit, and kept through resets")
 }
 
 impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
         let encoder = encoder(position_mm);
-        self.records.ticks.push(TickRecord { at_ns, encoder, position_mm });
+        self.records.ticks.push(TickRecord {
+            at_ns,
+            encoder,
+            position_mm,
+        });
         encoder
     }
 

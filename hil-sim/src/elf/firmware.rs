@@ -99,13 +99,18 @@ impl Firmware {
             package,
             source,
         })?;
-        let no_elf = |reason: String| FirmwareError::NoElf { path: path.to_owned(), reason };
+        let no_elf = |reason: String| FirmwareError::NoElf {
+            path: path.to_owned(),
+            reason,
+        };
         let file = object::File::parse(&*elf).map_err(|error| no_elf(error.to_string()))?;
         let hello = file
             .section_by_name(IDENTITY)
             .and_then(|section| section.data().ok())
             .and_then(Hello::from_bytes)
-            .ok_or_else(|| FirmwareError::NoIdentity { path: path.to_owned() })?;
+            .ok_or_else(|| FirmwareError::NoIdentity {
+                path: path.to_owned(),
+            })?;
         let found = Role::from_byte(hello.role);
         if found != Some(role) {
             return Err(FirmwareError::WrongRole {
@@ -125,7 +130,12 @@ impl Firmware {
             path: path.to_owned(),
             reason: error.to_string(),
         })?;
-        Ok(Self { path: path.to_owned(), elf, hello, image })
+        Ok(Self {
+            path: path.to_owned(),
+            elf,
+            hello,
+            image,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 //! the end of every quantum of virtual time. Which thread runs when decides nothing.
 
 use std::sync::mpsc::{Receiver, SyncSender};
+use std::time::Instant;
 
 use protocol::port::Port;
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
@@ -18,6 +19,8 @@ use crate::weather::Weather;
 /// What a byte takes from board to board at the least, and how often the boards wait for each other.
 /// Smaller is closer to a bare cable and slower; at 500 µs the pair keeps ahead of a wall clock.
 pub const QUANTUM_NS: u64 = 500_000;
+/// Virtual time by which the emulator has met, and translated, all of the firmware that a run needs.
+pub const WARM_UP_NS: u64 = 500_000_000;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
 
@@ -72,6 +75,8 @@ pub struct Lockstep {
     pub sent: Vec<TimedByte>,
     /// What the board heard from its peer, with the instants at which each byte was complete.
     pub heard: Vec<TimedByte>,
+    /// When the board had run for [`WARM_UP_NS`].
+    pub warm: Option<Instant>,
     /// Set if the other board's thread is gone before the end.
     pub abandoned: bool,
 }
@@ -95,6 +100,7 @@ impl Lockstep {
             end_ns,
             sent: Vec::new(),
             heard: Vec::new(),
+            warm: None,
             abandoned: false,
         }
     }
@@ -165,7 +171,14 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
         settled: Settled,
     ) {
         if let Settled::Access {
-            access: Access { kind: AccessKind::Write, address, value, virtual_time, .. },
+            access:
+                Access {
+                    kind: AccessKind::Write,
+                    address,
+                    value,
+                    virtual_time,
+                    ..
+                },
             ..
         } = settled
         {
@@ -190,10 +203,18 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
             if !self.exchange(session.board_mut(), now_ns) || now_ns >= self.end_ns {
                 return None;
             }
+            if self.warm.is_none() && now_ns >= WARM_UP_NS {
+                self.warm = Some(Instant::now());
+            }
             self.next_exchange_ns += QUANTUM_NS;
         }
-        let due_ns = session.board_mut().wire(PEER_UART).next_due().filter(|&due| due > now_ns);
-        Some(VirtualNanos(due_ns.map_or(self.next_exchange_ns, |due| due.min(self.next_exchange_ns))))
+        let due_ns = session
+            .board_mut()
+            .wire(PEER_UART)
+            .next_due()
+            .filter(|&due| due > now_ns);
+        Some(VirtualNanos(due_ns.map_or(self.next_exchange_ns, |due| {
+            due.min(self.next_exchange_ns)
+        })))
     }
 }
-

@@ -74,7 +74,13 @@ impl<P: Pins> Nucleo<P> {
         part.usart[PEER_UART].attach(Wire::default());
         part.usart[CONSOLE_UART].attach(Wire::default());
         fit(&mut part);
-        Ok(Self { mcu: Wired { part, pins, triggers: 0 } })
+        Ok(Self {
+            mcu: Wired {
+                part,
+                pins,
+                triggers: 0,
+            },
+        })
     }
 
     /// What is on the pins, and the part.
@@ -84,7 +90,9 @@ impl<P: Pins> Nucleo<P> {
 
     /// The far end of one of the UARTs.
     pub fn wire(&mut self, uart: usize) -> &mut Wire {
-        self.mcu.part.usart[uart].chip_mut().expect("attached in new, and kept through resets")
+        self.mcu.part.usart[uart]
+            .chip_mut()
+            .expect("attached in new, and kept through resets")
     }
 }
 
@@ -99,11 +107,14 @@ impl<P: Pins> Wired<P> {
         }
         let count = self.pins.on_trigger(&mut self.part, at.0);
         // While the counter's clock is off, before the firmware enables it, there is nothing to set.
-        let _ = self.part.write(at, TIM4.base + CNT, Width::W32, count.into());
+        let _ = self
+            .part
+            .write(at, TIM4.base + CNT, Width::W32, count.into());
         for level in [Level::High, Level::Low] {
-            self.part.drive_timer(at, TIM4_INDEX, |timer, registers, context| {
-                timer.drive_internal_trigger(ITR_OF_TIM3, level, registers, context);
-            });
+            self.part
+                .drive_timer(at, TIM4_INDEX, |timer, registers, context| {
+                    timer.drive_internal_trigger(ITR_OF_TIM3, level, registers, context);
+                });
         }
         self.pins.after_trigger(&mut self.part, at.0);
     }

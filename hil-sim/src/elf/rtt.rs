@@ -29,17 +29,26 @@ impl Log {
             .find(|symbol| symbol.name() == Ok("_SEGGER_RTT"))?
             .address();
         let table = Table::parse(elf).ok()??;
-        Some(Self { block, table, bytes: Vec::new() })
+        Some(Self {
+            block,
+            table,
+            bytes: Vec::new(),
+        })
     }
 
     /// Takes what the board has logged since the last call.
     pub fn read(&mut self, at_ns: u64, host: &mut dyn Host) {
         let mut word = |offset: u64| {
-            host.read(self.block + offset, Width::W32).ok().filter(|&word| word <= u32::MAX.into())
+            host.read(self.block + offset, Width::W32)
+                .ok()
+                .filter(|&word| word <= u32::MAX.into())
         };
-        let (Some(buffer), Some(size), Some(write), Some(read)) =
-            (word(BUFFER), word(SIZE), word(WRITE_OFFSET), word(READ_OFFSET))
-        else {
+        let (Some(buffer), Some(size), Some(write), Some(read)) = (
+            word(BUFFER),
+            word(SIZE),
+            word(WRITE_OFFSET),
+            word(READ_OFFSET),
+        ) else {
             return;
         };
         if size == 0 || write >= size || read >= size || write == read {
@@ -48,11 +57,16 @@ impl Log {
         let mut taken = Vec::new();
         let mut at = read;
         while at != write {
-            let Ok(byte) = host.read(buffer + at, Width::W8) else { return };
+            let Ok(byte) = host.read(buffer + at, Width::W8) else {
+                return;
+            };
             taken.push(byte.to_le_bytes()[0]);
             at = (at + 1) % size;
         }
-        if host.write(self.block + READ_OFFSET, Width::W32, write).is_ok() {
+        if host
+            .write(self.block + READ_OFFSET, Width::W32, write)
+            .is_ok()
+        {
             self.bytes.push((at_ns, taken));
         }
     }

@@ -50,7 +50,13 @@ impl SensorPins {
     /// The surroundings that `world` and `arm` describe; the servo drive is scaled as the board is told.
     pub fn new(world: World, arm: Arm, configuration: SensorConfiguration) -> Self {
         let arm_full_scale_mm_s = f64::from(configuration.arm_full_scale_um_s) * 1e-3;
-        Self { world, arm, arm_full_scale_mm_s, position_mm: 0.0, scans: Vec::new() }
+        Self {
+            world,
+            arm,
+            arm_full_scale_mm_s,
+            position_mm: 0.0,
+            scans: Vec::new(),
+        }
     }
 
     /// Wires up what the part itself has to know.
@@ -76,7 +82,12 @@ impl SensorPins {
             }
         }
         let encoder = encoder(self.position_mm);
-        self.scans.push(ScanRecord { at_ns, codes, encoder, position_mm: self.position_mm });
+        self.scans.push(ScanRecord {
+            at_ns,
+            codes,
+            encoder,
+            position_mm: self.position_mm,
+        });
         encoder
     }
 
@@ -89,7 +100,11 @@ impl SensorPins {
             .map_or(0.0, |pulse| pulse.width.0 as f64 / pulse.period.0 as f64);
         let direction = Pin::new(DIRECTION_PIN).expect("a port has sixteen pins");
         let (port, registers) = part.port(PORT_F);
-        let sign = if port.level(direction, registers) == Level::High { 1.0 } else { -1.0 };
+        let sign = if port.level(direction, registers) == Level::High {
+            1.0
+        } else {
+            -1.0
+        };
         sign * duty * self.arm_full_scale_mm_s
     }
 }
@@ -111,7 +126,9 @@ impl Pins for SensorPins {
     /// is set up to start.
     fn after_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) {
         let at = VirtualNanos(at_ns);
-        let Ok(cr2) = part.peek(at, ADC3.base + CR2, Width::W32) else { return };
+        let Ok(cr2) = part.peek(at, ADC3.base + CR2, Width::W32) else {
+            return;
+        };
         if cr2 & CR2_EXTEN != 0 && cr2 & CR2_EXTSEL == EXTSEL_TIM3_TRGO {
             // A converter whose clock is off refuses the write, as it would ignore the trigger.
             let _ = part.write(at, ADC3.base + CR2, Width::W32, cr2 | CR2_SWSTART);
@@ -126,7 +143,8 @@ mod tests {
     #[test]
     fn every_code_survives_the_way_through_microvolts() {
         for code in 0..=4_095u16 {
-            let converted = u64::from(microvolts(code)) * u64::from(FULL_SCALE) / u64::from(REFERENCE_UV);
+            let converted =
+                u64::from(microvolts(code)) * u64::from(FULL_SCALE) / u64::from(REFERENCE_UV);
             assert_eq!(converted, code.into());
         }
     }
