@@ -145,7 +145,7 @@ mod tests {
         for code in 0..=4_095u16 {
             let converted =
                 u64::from(microvolts(code)) * u64::from(FULL_SCALE) / u64::from(REFERENCE_UV);
-            assert_eq!(converted, code.into());
+            assert_eq!(converted, u64::from(code));
         }
     }
 }
