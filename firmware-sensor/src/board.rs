@@ -184,6 +184,12 @@ impl Board {
         );
         let (peer_tx, peer_rx) = peer.split();
         let (console_tx, console_rx) = console.split();
+        let mut peer_rx = peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES]));
+        let mut console_rx =
+            console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES]));
+        // The other board may be up already: what it says before the tasks run is kept.
+        peer_rx.start_uart();
+        console_rx.start_uart();
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {
@@ -194,14 +200,8 @@ impl Board {
                 encoder,
             },
             arm,
-            peer: (
-                peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])),
-                peer_tx,
-            ),
-            console: (
-                console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
-                console_tx,
-            ),
+            peer: (peer_rx, peer_tx),
+            console: (console_rx, console_tx),
             watchdog,
             link_led: Output::new(p.PB0, Level::Low, Speed::Low),
             started,
