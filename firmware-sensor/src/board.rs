@@ -12,12 +12,11 @@
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_futures::select::{Either, select};
-use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::adc::vals::Exten;
 use embassy_stm32::adc::{Adc, AdcChannel, RingBufferedAdc, SampleTime};
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
-use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
@@ -29,6 +28,7 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma};
