@@ -91,10 +91,12 @@ host_cargo() {
 }
 
 board_cargo() {
+    subcommand=$1
+    shift
     if [ "$world" = debian ]; then
-        RUSTC_BOOTSTRAP=1 CARGO_UNSTABLE_BUILD_STD=core host_cargo "$@" --target "$target"
+        RUSTC_BOOTSTRAP=1 CARGO_UNSTABLE_BUILD_STD=core host_cargo "$subcommand" --target "$target" "$@"
     else
-        host_cargo "$@" --target "$target"
+        host_cargo "$subcommand" --target "$target" "$@"
     fi
 }
 
