@@ -16,8 +16,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Speed};
-use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
@@ -157,20 +157,20 @@ impl Board {
         );
         let (peer_tx, peer_rx) = peer.split();
         let (console_tx, console_rx) = console.split();
+        let mut peer_rx = peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES]));
+        let mut console_rx =
+            console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES]));
+        // The other board may be up already: what it says before the tasks run is kept.
+        peer_rx.start_uart();
+        console_rx.start_uart();
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {
             output: OUTPUT.start(interrupt::UART5),
             ticks,
             dacs,
-            peer: (
-                peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])),
-                peer_tx,
-            ),
-            console: (
-                console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
-                console_tx,
-            ),
+            peer: (peer_rx, peer_tx),
+            console: (console_rx, console_tx),
             watchdog,
             link_led: Output::new(p.PB0, Level::Low, Speed::Low),
             started,

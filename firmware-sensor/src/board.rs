@@ -12,12 +12,11 @@
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_futures::select::{Either, select};
-use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::adc::vals::Exten;
 use embassy_stm32::adc::{Adc, AdcChannel, RingBufferedAdc, SampleTime};
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
-use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
@@ -29,6 +28,7 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma};
@@ -184,6 +184,12 @@ impl Board {
         );
         let (peer_tx, peer_rx) = peer.split();
         let (console_tx, console_rx) = console.split();
+        let mut peer_rx = peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES]));
+        let mut console_rx =
+            console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES]));
+        // The other board may be up already: what it says before the tasks run is kept.
+        peer_rx.start_uart();
+        console_rx.start_uart();
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {
@@ -194,14 +200,8 @@ impl Board {
                 encoder,
             },
             arm,
-            peer: (
-                peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES])),
-                peer_tx,
-            ),
-            console: (
-                console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES])),
-                console_tx,
-            ),
+            peer: (peer_rx, peer_tx),
+            console: (console_rx, console_tx),
             watchdog,
             link_led: Output::new(p.PB0, Level::Low, Speed::Low),
             started,

@@ -20,8 +20,9 @@ impl Digest {
         }
     }
 
-    /// A frame of which every byte has the instant of the last, in ns.
-    pub fn frame(&mut self, at_ns: u64, bytes: &[u8]) {
+    /// A frame of the board that `mark` stands for, whose bytes follow each other from `at_ns` on.
+    pub fn frame(&mut self, mark: u8, at_ns: u64, bytes: &[u8]) {
+        self.0.write(&[mark]);
         self.0.write(&at_ns.to_le_bytes());
         self.0.write(bytes);
     }

@@ -5,22 +5,13 @@
 //! a tick are at the actuators at its instant. Every message is framed, sent byte by byte at 921 600
 //! baud through the scene's weather, and decoded by the receiver at its first step after a byte's arrival.
 //!
-//! The hash is XXH3-64 over, in the order of their beginnings, each frame sent (`S` or `D` for the
-//! board, the instant of its first bit in ns, its bytes) and each set of words (`W`, the instant, 50
-//! words); all numbers little-endian.
+//! The hash is taken in the order of their beginnings over each frame sent, with the instant of its
+//! first bit, and each set of words, with its instant.
 
-use std::hash::Hasher;
 use std::time::Instant;
 
-use firmware_display::Display;
-use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
-use protocol::{
-    CHANNELS, Estimate, Event, Hello, MAX_FRAME, Message, PortCounters, Receiver, ResetCause, Role,
-    RoleCounters, Sender, SensorCounters, Status,
-};
-use twox_hash::XxHash3_64;
-
 use crate::arm::Arm;
+use crate::digest::Digest;
 use crate::motion::encoder;
 use crate::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
@@ -28,6 +19,12 @@ use crate::recording::{
 use crate::scene::{Scene, SceneError};
 use crate::weather::{BYTE_NS, Weather};
 use crate::world::World;
+use firmware_display::Display;
+use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
+use protocol::{
+    CHANNELS, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
+    RoleCounters, SensorCounters, Status,
+};
 
 const STEP_NS: u64 = 1_000_000_000 / firmware_sensor::SCAN_RATE_HZ as u64;
 const STEPS_PER_TICK: u64 = (firmware_sensor::SCAN_RATE_HZ / firmware_display::TICK_RATE_HZ) as u64;
@@ -68,19 +65,15 @@ struct Pair {
     drive: Drive,
     sensor_counters: SensorCounters,
     display: Display,
-    sensor_port: Port,
-    display_port: Port,
+    sensor_end: End,
+    display_end: End,
     tape: Tape,
 }
 
 impl Pair {
     fn new(scene: &Scene) -> Result<Self, SceneError> {
-        let port = |role, mark, direction| Port {
-            sender: Sender::new(Hello::new(role, CHIP, VERSION)),
-            receiver: Receiver::new(),
-            wire: Weather::new(&scene.link, scene.seed, direction),
-            free_ns: 0,
-            mark,
+        let end = |role, mark, direction| {
+            End::new(role, Weather::new(&scene.link, scene.seed, direction), mark)
         };
         Ok(Self {
             world: World::new(scene)?,
@@ -90,8 +83,8 @@ impl Pair {
             drive: Drive::default(),
             sensor_counters: SensorCounters::default(),
             display: Display::new(scene.display_configuration()),
-            sensor_port: port(Role::Sensor, b'S', 0),
-            display_port: port(Role::Display, b'D', 1),
+            sensor_end: end(Role::Sensor, b'S', 0),
+            display_end: end(Role::Display, b'D', 1),
             tape: Tape::new(scene.duration_s),
         })
     }
@@ -100,18 +93,18 @@ impl Pair {
         let now_ns = step * STEP_NS;
         let t_s = step as f64 / f64::from(firmware_sensor::SCAN_RATE_HZ);
         self.hear(now_ns);
-        self.sensor_port.greet(now_ns, &mut self.tape.hash);
-        self.display_port.greet(now_ns, &mut self.tape.hash);
+        self.sensor_end.greet(now_ns, &mut self.tape.digest);
+        self.display_end.greet(now_ns, &mut self.tape.digest);
         self.scan(step, now_ns, t_s);
         if step.is_multiple_of(STEPS_PER_TICK) {
             self.tick(now_ns, t_s);
         }
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
-            self.sensor_port
-                .send(now_ns, &Message::Status(sensor), &mut self.tape.hash);
-            self.display_port
-                .send(now_ns, &Message::Status(display), &mut self.tape.hash);
+            self.sensor_end
+                .send(now_ns, &Message::Status(sensor), &mut self.tape.digest);
+            self.display_end
+                .send(now_ns, &Message::Status(display), &mut self.tape.digest);
         }
     }
 
@@ -120,21 +113,21 @@ impl Pair {
         let Self {
             sensor,
             display,
-            sensor_port,
-            display_port,
+            sensor_end,
+            display_end,
             sensor_counters,
             tape,
             ..
         } = self;
-        sensor_port.hear(&mut display_port.wire, now_ns, |_, message| {
+        sensor_end.hear(&mut display_end.wire, now_ns, |_, message| {
             if let Message::Motion(motion) = message
                 && sensor.on_motion(&motion)
             {
                 sensor_counters.motions = sensor_counters.motions.wrapping_add(1);
             }
         });
-        display_port.hear(
-            &mut sensor_port.wire,
+        display_end.hear(
+            &mut sensor_end.wire,
             now_ns,
             |due_ns, message| match message {
                 Message::Estimate(estimate) => {
@@ -176,14 +169,14 @@ impl Pair {
                 estimate,
             });
             let sent =
-                self.sensor_port
-                    .send(now_ns, &Message::Estimate(estimate), &mut self.tape.hash);
+                self.sensor_end
+                    .send(now_ns, &Message::Estimate(estimate), &mut self.tape.digest);
             self.sensor_counters.estimates =
                 self.sensor_counters.estimates.wrapping_add(u32::from(sent));
         }
         if let Some(gauges) = output.gauges {
-            self.sensor_port
-                .send(now_ns, &Message::Gauges(gauges), &mut self.tape.hash);
+            self.sensor_end
+                .send(now_ns, &Message::Gauges(gauges), &mut self.tape.digest);
         }
     }
 
@@ -200,8 +193,8 @@ impl Pair {
             self.tape.output(now_ns, self.display.words());
         }
         if let Some(motion) = self.display.motion(now_ns / 1_000) {
-            self.display_port
-                .send(now_ns, &Message::Motion(motion), &mut self.tape.hash);
+            self.display_end
+                .send(now_ns, &Message::Motion(motion), &mut self.tape.digest);
         }
     }
 
@@ -217,21 +210,18 @@ impl Pair {
     }
 
     fn statuses(&self, now_ns: u64) -> (Status, Status) {
-        let status = |port: &Port, role| Status {
+        let status = |end: &End, role| Status {
             uptime_us: now_ns / 1_000,
             reset: ResetCause::Power,
             watchdog_resets: 0,
-            peer: port.counters(),
+            peer: end.port.counters(),
             console: PortCounters::default(),
             role,
         };
         (
+            status(&self.sensor_end, RoleCounters::Sensor(self.sensor_counters)),
             status(
-                &self.sensor_port,
-                RoleCounters::Sensor(self.sensor_counters),
-            ),
-            status(
-                &self.display_port,
+                &self.display_end,
                 RoleCounters::Display(self.display.counters()),
             ),
         )
@@ -244,7 +234,7 @@ impl Pair {
             duration_s,
             warm_up_s: 0.0,
             wall_s,
-            hash: self.tape.hash.finish(),
+            hash: self.tape.digest.finish(),
             scans: self.tape.scans,
             ticks: self.tape.ticks,
             estimates: self.tape.estimates,
@@ -257,9 +247,8 @@ impl Pair {
 }
 
 /// A board's port towards the other board, and the wire that leads away from it.
-struct Port {
-    sender: Sender,
-    receiver: Receiver,
+struct End {
+    port: Port,
     wire: Weather,
     /// When the wire has carried all that was sent so far.
     free_ns: u64,
@@ -267,38 +256,50 @@ struct Port {
     mark: u8,
 }
 
-impl Port {
-    /// Says Hello if it is time to.
-    fn greet(&mut self, now_ns: u64, hash: &mut XxHash3_64) {
-        if let Some(hello) = self.sender.hello_due(now_ns / 1_000) {
-            self.send(now_ns, &hello, hash);
+impl End {
+    fn new(role: Role, wire: Weather, mark: u8) -> Self {
+        Self {
+            port: Port::new(Hello::new(role, CHIP, VERSION)),
+            wire,
+            free_ns: 0,
+            mark,
         }
     }
 
-    /// Puts a message on the wire behind what is there already. False if the peer is not greeted yet.
-    fn send(&mut self, now_ns: u64, message: &Message, hash: &mut XxHash3_64) -> bool {
+    /// Says Hello if it is time to.
+    fn greet(&mut self, now_ns: u64, digest: &mut Digest) {
+        self.port.poll(now_ns / 1_000);
+        self.flush(now_ns, digest);
+    }
+
+    /// Says a message. False if nobody listens yet.
+    fn send(&mut self, now_ns: u64, message: &Message, digest: &mut Digest) -> bool {
+        self.port.post(message);
+        self.flush(now_ns, digest)
+    }
+
+    /// Puts what the port has to say on the wire, behind what is there already; false if it is nothing.
+    fn flush(&mut self, now_ns: u64, digest: &mut Digest) -> bool {
         let mut out = [0; MAX_FRAME];
-        let Some(frame) = self.sender.encode(message, &mut out) else {
-            return false;
-        };
-        let start_ns = self.free_ns.max(now_ns);
-        hash.write(&[self.mark]);
-        hash.write(&start_ns.to_le_bytes());
-        hash.write(frame);
-        self.free_ns = start_ns;
-        for &byte in frame {
-            self.free_ns += BYTE_NS;
-            self.wire.push(self.free_ns, byte);
+        let mut said = false;
+        loop {
+            let count = self.port.take(&mut out);
+            if count == 0 {
+                return said;
+            }
+            said = true;
+            self.free_ns = self.free_ns.max(now_ns);
+            digest.frame(self.mark, self.free_ns, &out[..count]);
+            for &byte in &out[..count] {
+                self.free_ns += BYTE_NS;
+                self.wire.push(self.free_ns, byte);
+            }
         }
-        true
     }
 
     /// Takes what has arrived over the peer's `wire`, and hands on each message with its last byte's
     /// arrival.
     fn hear(&mut self, wire: &mut Weather, now_ns: u64, mut handle: impl FnMut(u64, Message)) {
-        let Self {
-            sender, receiver, ..
-        } = self;
         let mut bytes = [0; 64];
         let mut length = 0;
         while let Some((due_ns, byte)) = wire.pop(now_ns) {
@@ -310,27 +311,17 @@ impl Port {
             if byte != 0 && more {
                 continue;
             }
-            receiver.receive(&bytes[..length], |event| match event {
-                Event::Message(message) => handle(due_ns, message),
-                Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
-                Event::Foreign(_) => sender.on_foreign(),
-                Event::Unheralded => sender.on_unheralded(),
-            });
+            let heard = &bytes[..length];
+            self.port
+                .receive(now_ns / 1_000, heard, |message| handle(due_ns, message));
             length = 0;
-        }
-    }
-
-    fn counters(&self) -> PortCounters {
-        PortCounters {
-            sent: self.sender.sent(),
-            ..self.receiver.counters()
         }
     }
 }
 
 /// What is written down while the pair runs.
 struct Tape {
-    hash: XxHash3_64,
+    digest: Digest,
     scans: Vec<ScanRecord>,
     ticks: Vec<TickRecord>,
     estimates: Vec<EstimateRecord>,
@@ -342,7 +333,7 @@ impl Tape {
     fn new(duration_s: f64) -> Self {
         let room = |rate_hz: u32| (duration_s * f64::from(rate_hz)).ceil() as usize + 1;
         Self {
-            hash: XxHash3_64::new(),
+            digest: Digest::default(),
             scans: Vec::with_capacity(room(firmware_sensor::SCAN_RATE_HZ)),
             ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
@@ -351,18 +342,13 @@ impl Tape {
     }
 
     fn output(&mut self, at_ns: u64, words: &[u16; ACTUATORS]) {
-        let mut bytes = [0; 2 * ACTUATORS];
-        for (place, word) in bytes.chunks_exact_mut(2).zip(words) {
-            place.copy_from_slice(&word.to_le_bytes());
-        }
-        self.hash.write(b"W");
-        self.hash.write(&at_ns.to_le_bytes());
-        self.hash.write(&bytes);
-        self.outputs.push(OutputRecord {
+        let output = OutputRecord {
             at_ns,
             words: *words,
             skew_ns: 0,
-        });
+        };
+        self.digest.output(&output);
+        self.outputs.push(output);
     }
 
     fn received(&mut self, estimate: &Estimate, due_ns: u64) {

@@ -104,11 +104,23 @@ fn row(outcome: &Outcome) -> String {
         number(actuators.frequency_hz, 3),
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),
-        number(outcome.recording.realtime_factor(), 0),
+        pace(outcome.recording.realtime_factor()),
         if outcome.unmet.is_empty() {
             "ok"
         } else {
             "FAILED"
+        },
+    )
+}
+
+/// A multiple of real time, with decimals where they matter.
+fn pace(factor: Option<f64>) -> String {
+    number(
+        factor,
+        if factor.is_some_and(|factor| factor < 10.0) {
+            2
+        } else {
+            0
         },
     )
 }

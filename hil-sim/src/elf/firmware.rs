@@ -14,7 +14,7 @@ const IDENTITY: &str = ".ridgelink";
 pub enum FirmwareError {
     /// The file can't be read.
     #[error(
-        "{}: can't be read ({source}): build the firmware with ./test or with \
+        "{}: can't be read: build the firmware with ./test or with \
          `cargo build --release --target thumbv7em-none-eabihf -p {package}`",
         path.display()
     )]

@@ -26,9 +26,11 @@ impl Encoder {
         a: Peri<'static, PD12>,
         b: Peri<'static, PD13>,
     ) -> Self {
-        let mut configuration = qei::Config::default();
-        configuration.ch1_pull = Pull::Up;
-        configuration.ch2_pull = Pull::Up;
+        let configuration = qei::Config {
+            ch1_pull: Pull::Up,
+            ch2_pull: Pull::Up,
+            ..Default::default()
+        };
         let counter = Qei::new(counter, a, b, configuration);
         let timer = pac::TIM4;
         // ITR2 of TIM4 is TIM3 (RM0090 table 102).

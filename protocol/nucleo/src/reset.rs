@@ -10,7 +10,10 @@ use protocol::ResetCause;
 const KEPT: u32 = 0x5244_474C;
 
 /// In RAM that neither the start-up code nor a reset touches.
-#[allow(unsafe_code, reason = "the section is cortex-m-rt's own, for RAM that is left alone")]
+#[allow(
+    unsafe_code,
+    reason = "the section is cortex-m-rt's own, for RAM that is left alone"
+)]
 #[unsafe(link_section = ".uninit.watchdog_resets")]
 static mut WATCHDOG_RESETS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
