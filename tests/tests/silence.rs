@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use firmware_display::ZERO_VOLT;
 use hil_sim::recording::{OutputRecord, volts};
-use protocol::DisplayConfiguration;
+use protocol::{DisplayConfiguration, RoleCounters};
 use tests::run::{Run, scene, scene_in};
 
 /// From here to there, in s, the gauges say nothing.
@@ -169,18 +169,9 @@ fn the_stimulus_comes_back_with_the_signal() {
     let (_, next_ns) = pause_ns();
     let back = outputs(next_ns, u64::MAX);
     assert!(highest_v(back) >= 4.99, "{}", highest_v(back));
-    let RoleFades(fades) = RoleFades::of(&DEAD_FOR_A_WHILE);
-    assert_eq!(fades, 1);
-}
-
-/// How often the display says that it faded out.
-struct RoleFades(u32);
-
-impl RoleFades {
-    fn of(run: &Run) -> Self {
-        match run.recording.display_status.unwrap().role {
-            protocol::RoleCounters::Display(counters) => Self(counters.fades),
-            other => panic!("{other:?}"),
-        }
-    }
+    let status = DEAD_FOR_A_WHILE.recording.display_status.unwrap();
+    let RoleCounters::Display(counters) = status.role else {
+        panic!("{status:?}");
+    };
+    assert_eq!(counters.fades, 1);
 }
