@@ -143,7 +143,11 @@ fn a_reversed_stroke_plays_the_wave_back_word_for_word() {
         })
     };
     let settled_ns = TURN_NS * 6 / 10;
-    let in_force_mm = valid(0, settled_ns).last().unwrap().estimate.wavelength_mm;
+    let in_force_mm = valid(0, settled_ns)
+        .next_back()
+        .unwrap()
+        .estimate
+        .wavelength_mm;
     assert!(
         in_force_mm.is_some_and(|mm| (mm - 2.0).abs() < 0.01),
         "{in_force_mm:?}"
