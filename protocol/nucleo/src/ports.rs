@@ -87,7 +87,8 @@ impl Ports {
         self.with(side, |port| port.counters())
     }
 
-    /// Receives for ever: hands each message that is not the link's own to `handle`. No deadline: the
+    /// Receives for ever: hands each message that is not the link's own to `handle`, which runs while
+    /// the port is borrowed and so must not post, only pass on. No deadline: the
     /// DMA ring holds 11 ms, and what is lost when it overruns is counted.
     pub async fn listen(
         &self,
