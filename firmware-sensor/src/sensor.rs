@@ -16,6 +16,10 @@ use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 /// Below this speed, in mm/s, no estimate is valid: fingertip and surface stick (Okamoto et al. 2009,
 /// section III-C), and 5 µm counts make more than a tenth of it.
 const MIN_SPEED_MM_S: f32 = 2.0;
+/// Below this amplitude of the counted gauge, in ADC steps, no estimate is valid: a gauge that falls
+/// silent leaves a band-pass that rings on, and crosses zero, for seconds. It is ten times what the
+/// ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
+const MIN_AMPLITUDE_LSB: f32 = 1.0;
 /// Time after the start, in samples, until crossings are counted: three time constants of the
 /// band-pass' slowest poles, √2 / (2π · 5 Hz), so that 5 % of whatever the start stirred up are left.
 const SETTLING_SAMPLES: u32 = (3.0 * core::f64::consts::SQRT_2
@@ -191,7 +195,7 @@ impl Started {
 
     /// The paper's estimate, and what speaks for it.
     ///
-    /// Valid: in T1, with a crossing in a full window, and moving at t − A/2. The confidence is then
+    /// Valid: in T1, with a crossing in a full window, a signal, and moving at t − A/2. The confidence is then
     /// 1 − 1/n for n crossings, since a count that may as well have been one less is off by 1/n; else 0.
     fn estimate(
         &self,
@@ -209,14 +213,17 @@ impl Started {
             self.travel.velocity_mm_s(0),
             self.travel.velocity_mm_s(2 * window_ms),
         );
-        let valid =
-            wavelength_mm.is_some() && range == Range::T1 && velocity_mm_s.abs() >= MIN_SPEED_MM_S;
+        let amplitude_lsb = self.counted.amplitude.over(window_ms);
+        let valid = wavelength_mm.is_some()
+            && range == Range::T1
+            && velocity_mm_s.abs() >= MIN_SPEED_MM_S
+            && amplitude_lsb >= MIN_AMPLITUDE_LSB;
         Estimate {
             sequence,
             instant_us,
             wavelength_mm,
             valid,
-            amplitude_lsb: self.counted.amplitude.over(window_ms),
+            amplitude_lsb,
             confidence: if valid {
                 1.0 - 1.0 / f32::from(count)
             } else {

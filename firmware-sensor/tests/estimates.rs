@@ -170,6 +170,30 @@ fn a_resting_sensor_has_no_valid_estimate() {
 }
 
 #[test]
+fn a_gauge_that_falls_silent_has_no_valid_estimate_once_the_filters_have_rung_out() {
+    let mut sensor = default_sensor();
+    rub(&mut sensor, 1.0, 2.0, |t_s| 50.0 * t_s);
+    let silent = [[MID_RAIL_CODE + 40; 6]; SCANS_PER_SAMPLE];
+    // 50 mm/s are 10 counts a millisecond.
+    let estimates: Vec<Estimate> = (1..=3_000_u16)
+        .filter_map(|ms| {
+            let encoder = 10_000_u16.wrapping_add(10 * ms);
+            sensor.step(1_000_000, &silent, encoder).estimate
+        })
+        .collect();
+    // The slowest poles' time constant is √2 / (2π · 5 Hz); below one step after ln(SWING) of them,
+    // over the whole of a window.
+    let ringing_s = 2f64.sqrt() / (2.0 * PI * 5.0) * SWING.ln() + WINDOW_S;
+    let rung_out = (ringing_s * f64::from(ESTIMATE_RATE_HZ)).ceil() as usize;
+    assert!(estimates[rung_out..].iter().all(|estimate| !estimate.valid));
+    // Crossings of what is left of the ringing are still counted.
+    let counted = estimates[rung_out..]
+        .iter()
+        .filter(|estimate| estimate.wavelength_mm.is_some());
+    assert!(counted.count() > 10);
+}
+
+#[test]
 fn a_creeping_sensor_has_no_valid_estimate() {
     let outputs = rub(&mut default_sensor(), 3.0, 0.1, |t_s| 1.5 * t_s);
     let estimates = estimates(&outputs);

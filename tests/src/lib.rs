@@ -1,1 +1,7 @@
-//! System tests of Ridgelink live in the `tests` folder of this package.
+//! What Ridgelink's system tests share. The tests themselves, one idea a file, are in the `tests`
+//! folder of this package: they run scenes on the two ELFs that a user would flash, through the same
+//! library as the `hil-sim` command.
+
+pub mod elves;
+pub mod history;
+pub mod run;

@@ -1,0 +1,143 @@
+//! `hil-sim run --engine elf` with files that are not the firmware wanted. Needs the two ELFs, as
+//! ./test builds them.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use protocol::{Hello, PROTOCOL_VERSION, Role};
+
+const SCENE: &str = "duration_s = 0.3\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+
+/// Where cargo, or the folder named in RIDGELINK_ELVES, has the ELF of a board.
+fn built(role: Role) -> PathBuf {
+    let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/thumbv7em-none-eabihf/release"),
+        PathBuf::from,
+    );
+    folder.join(format!("firmware-{}", role.name()))
+}
+
+fn elf(role: Role) -> Vec<u8> {
+    let path = built(role);
+    fs::read(&path).unwrap_or_else(|error| {
+        panic!(
+            "{}: {error}: run ./test, or cargo build --release --target thumbv7em-none-eabihf \
+             -p firmware-sensor -p firmware-display",
+            path.display()
+        )
+    })
+}
+
+/// Runs a scene with this file as the sensor's firmware, in a folder of the test's own: exit status,
+/// what it printed, and what it complained about.
+fn run_with_sensor(name: &str, bytes: Option<&[u8]>) -> (Option<i32>, String, String) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("elf-cli")
+        .join(name);
+    fs::remove_dir_all(&folder).ok();
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("a.toml"), SCENE).unwrap();
+    if let Some(bytes) = bytes {
+        fs::write(folder.join("sensor.elf"), bytes).unwrap();
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args([
+            "run",
+            "a.toml",
+            "--engine",
+            "elf",
+            "--sensor-elf",
+            "sensor.elf",
+        ])
+        .arg("--display-elf")
+        .arg(built(Role::Display))
+        .output()
+        .unwrap();
+    (
+        output.status.code(),
+        String::from_utf8(output.stdout).unwrap(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+fn assert_refused(name: &str, bytes: Option<&[u8]>, says: &[&str]) {
+    let (status, printed, complaint) = run_with_sensor(name, bytes);
+    assert_eq!(status, Some(2), "{complaint}");
+    assert!(printed.is_empty(), "{printed}");
+    assert!(complaint.starts_with("sensor.elf: "), "{complaint}");
+    for words in says {
+        assert!(
+            complaint.contains(words),
+            "{words:?} is not in {complaint:?}"
+        );
+    }
+}
+
+#[test]
+fn the_two_firmwares_run_a_scene() {
+    let (status, printed, complaint) = run_with_sensor("sound", Some(&elf(Role::Sensor)));
+    assert_eq!(status, Some(0), "{complaint}");
+    assert!(printed.contains("ok"), "{printed}");
+}
+
+#[test]
+fn a_missing_elf_exits_2_with_the_command_that_builds_it() {
+    assert_refused(
+        "missing",
+        None,
+        &["can't be read", "cargo build", "firmware-sensor"],
+    );
+}
+
+#[test]
+fn a_text_for_an_elf_exits_2() {
+    assert_refused(
+        "text",
+        Some(b"not an ELF\n"),
+        &["is no ELF file", "as the build left it"],
+    );
+}
+
+#[test]
+fn a_truncated_elf_exits_2() {
+    let whole = elf(Role::Sensor);
+    assert_refused(
+        "truncated",
+        Some(&whole[..whole.len() / 2]),
+        &["is no ELF file"],
+    );
+}
+
+#[test]
+fn the_other_boards_elf_exits_2() {
+    let says = ["is the display board's firmware", "exchange the two"];
+    assert_refused("swapped", Some(&elf(Role::Display)), &says);
+}
+
+#[test]
+fn an_elf_of_another_protocol_exits_2() {
+    let mut patched = elf(Role::Sensor);
+    let length = protocol::HELLO_LENGTH;
+    let mut changed = 0;
+    for at in 0..=patched.len() - length {
+        let Some(hello) = Hello::from_bytes(&patched[at..at + length]) else {
+            continue;
+        };
+        let other = Hello {
+            protocol: (PROTOCOL_VERSION + 1).to_le_bytes(),
+            ..hello
+        };
+        patched[at..at + length].copy_from_slice(&other.to_bytes());
+        changed += 1;
+    }
+    assert!(changed > 0, "the ELF does not hold its identity");
+    let says = format!("speaks protocol {}", PROTOCOL_VERSION + 1);
+    assert_refused(
+        "other-protocol",
+        Some(&patched),
+        &[&says, "build both from the same sources"],
+    );
+}

@@ -1,0 +1,166 @@
+//! Replays what a display board did with its own library, word for word.
+
+use firmware_display::Display;
+use hil_sim::recording::{ACTUATORS, EstimateRecord, Recording};
+use hil_sim::weather::BYTE_NS;
+use protocol::{DisplayConfiguration, MAX_FRAME};
+
+/// From an estimate's last byte at the UART until the output task has it, in ns, if the line is idle
+/// then: a byte's time (11 µs) until it counts as idle, as much of the simulator's own, and the
+/// listening task, which takes some 10 µs and may be held up by an output tick of 60 µs.
+const TAKEN_NS: u64 = 100_000;
+/// The same, if other frames follow without a gap: the port is read when the line falls idle. A
+/// status follows an estimate once a second; no two frames are longer than this.
+const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
+
+/// How a display board came to its words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Replay {
+    /// Outputs of which every word is as the library says.
+    pub outputs: usize,
+    /// Estimates that were taken late, the line not being idle after them.
+    pub held_up: usize,
+}
+
+/// One way in which it may have been.
+#[derive(Clone)]
+struct History {
+    display: Display,
+    /// How many of the estimates that arrived have been taken, or overwritten by a later one.
+    taken: usize,
+    /// One that arrived is not taken although it could be.
+    waiting: bool,
+    held_up: usize,
+}
+
+/// Replays a display board from its encoder readings and the estimates that reached it, and compares
+/// every word of every output.
+///
+/// An estimate that arrives just before a tick may be taken at this tick or at a later one: all
+/// histories are followed up until the words tell, and of those that do, the one with the fewest
+/// held up counts. Of two that arrive between two ticks the task sees the later one only. Estimates
+/// older than one that has arrived before are never taken.
+///
+/// # Errors
+/// The first word that no history explains.
+pub fn replay(
+    recording: &Recording,
+    configuration: DisplayConfiguration,
+) -> Result<Replay, String> {
+    let arrived = arrived(recording);
+    let mut histories = vec![History {
+        display: Display::new(configuration),
+        taken: 0,
+        waiting: false,
+        held_up: 0,
+    }];
+    let mut outputs = recording.outputs.iter().peekable();
+    let mut compared = 0;
+    for (index, tick) in recording.ticks.iter().enumerate() {
+        let end_ns = recording.ticks.get(index + 1).map(|next| next.at_ns);
+        let output = outputs.next_if(|output| {
+            output.at_ns >= tick.at_ns && end_ns.is_none_or(|end_ns| output.at_ns < end_ns)
+        });
+        let may = arrived.partition_point(|&(at_ns, _)| at_ns <= tick.at_ns);
+        let usual = arrived.partition_point(|&(at_ns, _)| at_ns + TAKEN_NS <= tick.at_ns);
+        let must = arrived.partition_point(|&(at_ns, _)| at_ns + HELD_UP_NS <= tick.at_ns);
+        let mut next = Vec::new();
+        let mut differences = Vec::new();
+        for history in &histories {
+            for taken in must.max(history.taken)..=may {
+                let mut history = history.clone();
+                if taken > history.taken {
+                    history.display.on_estimate(&arrived[taken - 1].1.estimate);
+                    history.taken = taken;
+                }
+                if history.waiting != (usual > taken) {
+                    history.waiting = usual > taken;
+                    history.held_up += usize::from(history.waiting);
+                }
+                let sent = history.display.tick(tick.encoder);
+                let wanted = output.map(|output| &output.words);
+                match difference(sent.then(|| history.display.words()), wanted) {
+                    // The run may end between a tick and its edge.
+                    Some(_) if end_ns.is_none() && wanted.is_none() => next.push(history),
+                    Some(difference) => differences.push(difference),
+                    None => next.push(history),
+                }
+            }
+        }
+        if next.is_empty() {
+            return Err(format!(
+                "tick {index} at {} ns, encoder {}, after {compared} equal outputs: {}",
+                tick.at_ns,
+                tick.encoder,
+                differences.join("; or, with another history: ")
+            ));
+        }
+        merge(&mut next);
+        histories = next;
+        compared += usize::from(output.is_some());
+    }
+    match outputs.next() {
+        None => Ok(Replay {
+            outputs: compared,
+            held_up: histories.iter().map(|h| h.held_up).min().unwrap_or(0),
+        }),
+        Some(output) => Err(format!(
+            "the output at {} ns belongs to no tick",
+            output.at_ns
+        )),
+    }
+}
+
+/// The estimates that the display's port hands on, by arrival.
+fn arrived(recording: &Recording) -> Vec<(u64, &EstimateRecord)> {
+    let mut arrived: Vec<_> = recording
+        .estimates
+        .iter()
+        .filter_map(|record| Some((record.received_ns?, record)))
+        .collect();
+    arrived.sort_by_key(|&(at_ns, _)| at_ns);
+    let mut newest = None;
+    arrived.retain(|(_, record)| {
+        let sequence = Some(record.estimate.sequence);
+        let news = sequence > newest;
+        newest = newest.max(sequence);
+        news
+    });
+    arrived
+}
+
+/// The first difference between what the library would send and what came out.
+fn difference(due: Option<&[u16; ACTUATORS]>, seen: Option<&[u16; ACTUATORS]>) -> Option<String> {
+    match (due, seen) {
+        (None, None) => None,
+        (Some(_), None) => Some("an output is due and none came".to_owned()),
+        (None, Some(_)) => Some("an output came and none is due".to_owned()),
+        (Some(due), Some(seen)) => {
+            let actuator = due.iter().zip(seen).position(|(due, seen)| due != seen)?;
+            Some(format!(
+                "actuator {actuator}: {:#06x} is due, {:#06x} came",
+                due[actuator], seen[actuator]
+            ))
+        }
+    }
+}
+
+/// Of those histories that have become equal, keeps the one with the fewest held up.
+fn merge(histories: &mut Vec<History>) {
+    if histories.len() < 2 {
+        return;
+    }
+    histories.sort_by_key(|history| history.held_up);
+    let mut seen = Vec::new();
+    histories.retain(|history| {
+        let state = format!(
+            "{} {} {:?}",
+            history.taken, history.waiting, history.display
+        );
+        let news = !seen.contains(&state);
+        if news {
+            seen.push(state);
+        }
+        news
+    });
+}

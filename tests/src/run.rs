@@ -1,0 +1,63 @@
+//! Runs of scenes on the ELFs.
+
+use std::path::Path;
+
+use hil_sim::analysis::Verdict;
+use hil_sim::elf::{self, BoardFacts};
+use hil_sim::outcome::Outcome;
+use hil_sim::recording::Recording;
+use hil_sim::scene::Scene;
+
+use crate::elves;
+
+/// A scene that was run on the two ELFs, and what came of it.
+#[derive(Debug)]
+pub struct Run {
+    /// What was run.
+    pub scene: Scene,
+    /// What the run left behind.
+    pub recording: Recording,
+    /// The recording, judged.
+    pub verdict: Verdict,
+    /// What only the emulated boards know.
+    pub facts: BoardFacts,
+}
+
+impl Run {
+    /// Runs `scene`.
+    ///
+    /// # Panics
+    /// If the ELFs can't be used, or a board stops before the scene's end.
+    pub fn of(scene: Scene) -> Self {
+        let (recording, facts) =
+            elf::run(&scene, elves::both()).unwrap_or_else(|error| panic!("{error}"));
+        let Outcome {
+            scene,
+            recording,
+            verdict,
+            ..
+        } = Outcome::new(scene, recording);
+        Self {
+            scene,
+            recording,
+            verdict,
+            facts,
+        }
+    }
+}
+
+/// A scene from TOML, as a file would hold it; the files it names are relative to `folder`.
+///
+/// # Panics
+/// If the scene is refused.
+pub fn scene_in(folder: &Path, toml: &str) -> Scene {
+    Scene::parse(&folder.join("scene.toml"), toml).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A scene from TOML that names no files.
+///
+/// # Panics
+/// If the scene is refused.
+pub fn scene(toml: &str) -> Scene {
+    scene_in(Path::new(""), toml)
+}

@@ -1,0 +1,178 @@
+//! The hand turns back, and the surface changes under it: no jolt, and the wave is played back.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use hil_sim::recording::{ACTUATORS, Recording};
+use tests::run::{Run, scene, scene_in};
+
+/// Okamoto et al. 2009, Fig. 7, over the boundary of Fig. 8.
+static TO_AND_FRO: LazyLock<Run> = LazyLock::new(|| {
+    Run::of(scene(
+        r#"
+        duration_s = 3.0
+
+        [surface]
+        specimens = [
+          { wavelength_mm = 1.0, length_mm = 13.0 },
+          { wavelength_mm = 4.0 },
+        ]
+
+        [motion]
+        kind = "sinusoid"
+        amplitude_mm_s = 70.0
+        frequency_hz = 0.83
+        "#,
+    ))
+});
+
+/// When the hand of [`back_and_slower`] turns, in ns.
+const TURN_NS: u64 = 1_000_000_000;
+
+/// Out at 50 mm/s, at which 2 mm are counted without an error, and back at another speed, so that the
+/// ticks of the way back meet all of the five counts between two of the way out.
+fn back_and_slower() -> Run {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("reversal");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("motion.csv"), "t_s,x_mm\n0,0\n1,50\n1.3,39.5\n").unwrap();
+    Run::of(scene_in(
+        &folder,
+        r#"
+        duration_s = 1.3
+
+        [surface]
+        specimens = [{ wavelength_mm = 2.0 }]
+
+        [motion]
+        kind = "recorded"
+        file = "motion.csv"
+        "#,
+    ))
+}
+
+/// For each tick its instant, the hand's counter, and the words that came of it.
+fn words_at_ticks(recording: &Recording) -> Vec<(u64, u16, [u16; ACTUATORS])> {
+    let ends_ns = recording.ticks.iter().skip(1).map(|next| next.at_ns);
+    let outputs = &recording.outputs;
+    recording
+        .ticks
+        .iter()
+        .zip(ends_ns)
+        .filter_map(|(tick, end_ns)| {
+            let last = outputs.partition_point(|output| output.at_ns < end_ns);
+            let output = outputs.get(last.checked_sub(1)?)?;
+            Some((tick.at_ns, tick.encoder, output.words))
+        })
+        .collect()
+}
+
+#[test]
+fn no_step_is_larger_than_the_largest_natural_one_across_reversals_and_boundaries() {
+    let actuators = &TO_AND_FRO.verdict.actuators;
+    let (step_v, natural_v) = (
+        actuators.max_step_v.unwrap(),
+        actuators.natural_step_v.unwrap(),
+    );
+    assert!(step_v <= natural_v, "{step_v} V of {natural_v} V");
+    // Both specimens were felt, so both kinds of change are within.
+    let felt = |low_mm: f32, high_mm: f32| {
+        TO_AND_FRO.recording.estimates.iter().any(|record| {
+            let estimate = &record.estimate;
+            let in_range = |mm: f32| (low_mm..high_mm).contains(&mm);
+            estimate.valid && estimate.wavelength_mm.is_some_and(in_range)
+        })
+    };
+    assert!(felt(0.8, 1.25) && felt(3.2, 5.0));
+}
+
+#[test]
+fn the_actuators_vibrate_at_full_amplitude_in_step_with_the_hand() {
+    let actuators = &TO_AND_FRO.verdict.actuators;
+    let (measured_hz, due_hz) = (actuators.frequency_hz.unwrap(), actuators.truth_hz.unwrap());
+    // Within one stroke of at most 27 cycles an encoder count of 5 µm at either end is 0.04 %.
+    assert!(
+        (measured_hz / due_hz - 1.0).abs() <= 1e-3,
+        "{measured_hz} Hz, due {due_hz} Hz"
+    );
+    let highest = TO_AND_FRO
+        .recording
+        .outputs
+        .iter()
+        .flat_map(|output| output.words)
+        .max();
+    // 5 V less the sine's fall half a tick beside its crest: cos(π · 70 Hz · 500 µs) at 1 mm.
+    let crest = 32_768.0 * (std::f64::consts::PI * 70.0 * 500e-6).cos();
+    assert!(
+        f64::from(highest.unwrap()) - 32_768.0 >= crest,
+        "{highest:?}"
+    );
+    // Every change of λ̂, and there are 80 a second, may leave half a count, of 0.005 cycles at 1 mm.
+    let rms = actuators.phase_error_rms_cycles.unwrap();
+    assert!(rms <= 0.0025 * 240f64.sqrt(), "{rms} cycles");
+}
+
+#[test]
+fn hand_movement_is_at_the_outputs_within_a_millisecond() {
+    let p99_ms = TO_AND_FRO.verdict.actuators.hand_to_output_p99_ms.unwrap();
+    assert!(p99_ms <= 1.0, "{p99_ms} ms");
+}
+
+#[test]
+fn all_channels_change_on_one_edge_to_one_voltage() {
+    assert!(TO_AND_FRO.recording.outputs.len() > 4_000);
+    for output in &TO_AND_FRO.recording.outputs {
+        assert_eq!(output.skew_ns, 0, "{output:?}");
+        assert!(
+            output.words.iter().all(|word| *word == output.words[0]),
+            "{output:?}"
+        );
+    }
+}
+
+#[test]
+fn a_reversed_stroke_plays_the_wave_back_word_for_word() {
+    let run = back_and_slower();
+    // λ̂ settles to 2 mm on the way out, and stays in force on the way back until the next valid
+    // estimate, which T2 keeps away for the length of a window.
+    let valid = |from_ns: u64, to_ns: u64| {
+        run.recording.estimates.iter().filter(move |record| {
+            let received_ns = record.received_ns.unwrap_or(u64::MAX);
+            record.estimate.valid && (from_ns..to_ns).contains(&received_ns)
+        })
+    };
+    let settled_ns = TURN_NS * 6 / 10;
+    let in_force_mm = valid(0, settled_ns)
+        .next_back()
+        .unwrap()
+        .estimate
+        .wavelength_mm;
+    assert!(
+        in_force_mm.is_some_and(|mm| (mm - 2.0).abs() < 0.01),
+        "{in_force_mm:?}"
+    );
+    assert!(valid(settled_ns, TURN_NS).all(|r| r.estimate.wavelength_mm == in_force_mm));
+    // The last estimate of the way out may still arrive.
+    let next = valid(TURN_NS + 10_000_000, u64::MAX).next();
+    let end_ns = next.map_or(u64::MAX, |record| record.received_ns.unwrap());
+    assert!(end_ns >= TURN_NS + 80_000_000, "{next:?}");
+
+    let words = words_at_ticks(&run.recording);
+    let out: HashMap<u16, [u16; ACTUATORS]> = words
+        .iter()
+        .filter(|(at_ns, ..)| (settled_ns..TURN_NS).contains(at_ns))
+        .map(|&(_, encoder, words)| (encoder, words))
+        .collect();
+    let mut played_back = 0;
+    for (at_ns, encoder, back) in &words {
+        if (TURN_NS..end_ns).contains(at_ns)
+            && let Some(out) = out.get(encoder)
+        {
+            assert_eq!(out, back, "at {at_ns} ns, encoder {encoder}");
+            played_back += 1;
+        }
+    }
+    // 3.5 counts a tick, one of five of which was met on the way out: 160 ticks, some 32.
+    assert!(played_back >= 25, "{played_back} ticks compared");
+}
