@@ -226,13 +226,13 @@ impl Line {
             self.send(chip + 1);
             return;
         }
-        cortex_m::asm::delay(if self.transfers[chip].is_broadcast {
+        wait(if self.transfers[chip].is_broadcast {
             BROADCAST_CYCLES
         } else {
             LOAD_CYCLES
         });
         self.load.set_low();
-        cortex_m::asm::delay(LOAD_CYCLES);
+        wait(LOAD_CYCLES);
         self.load.set_high();
         self.state = State::Idle;
     }
@@ -288,9 +288,15 @@ fn control(request: u8) -> Cr {
     control
 }
 
+/// Waits for `cycles` at least. A turn of the loop takes a Cortex-M4 three: one to subtract, two to
+/// branch.
+fn wait(cycles: u32) {
+    cortex_m::asm::delay(cycles.div_ceil(3));
+}
+
 /// Waits for SPI1's last two bytes; false if they do not come.
 fn is_shifted_out() -> bool {
-    cortex_m::asm::delay(LAST_BYTES_CYCLES);
+    wait(LAST_BYTES_CYCLES);
     (0..LOOKS).any(|_| {
         let status = SPI1.sr().read();
         status.txe() && !status.bsy()
