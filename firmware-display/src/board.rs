@@ -23,7 +23,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::{Mms, Ocm};
 use embassy_stm32::peripherals::{
-    DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, DMA2_CH3, IWDG, TIM1, TIM3, USART2, USART3,
+    DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, IWDG, TIM1, TIM3, USART2, USART3,
 };
 use embassy_stm32::spi::{self, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
@@ -33,12 +33,14 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use firmware_display::TICK_RATE_HZ;
-use firmware_display::dac81416::{self, CHIPS, FRAME_BYTES};
+use firmware_display::dac81416;
+use firmware_display::{ACTUATORS, TICK_RATE_HZ};
 use nucleo::encoder::Encoder;
 use nucleo::ports;
 use protocol::ResetCause;
 use static_cell::StaticCell;
+
+use crate::chain::{Chain, Fault, FrameHandler};
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<USART2>;
@@ -47,12 +49,12 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
-    DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
+    DMA2_STREAM3 => FrameHandler;
     TIM3 => TickHandler;
 });
 
 /// 27 bytes a chip in 10.3 µs; the DAC81416 takes up to 50 MHz.
-const SPI_CLOCK: Hertz = Hertz(21_000_000);
+const SPI_CLOCK: Hertz = Hertz(dac81416::MAX_CLOCK_HZ);
 /// CLR falls this long after the last tick that was served: four ticks.
 const HOLD_OFF_US: u16 = (4 * 1_000_000 / TICK_RATE_HZ) as u16;
 /// The tasks feed the watchdog every 50 ms.
@@ -118,14 +120,17 @@ impl Board {
         let mut clear_pin = Flex::new(p.PE9);
         clear_pin.set_as_af_unchecked(1, AfType::output(OutputType::PushPull, Speed::Low));
         let dacs = Dacs {
-            spi: Spi::new_txonly(p.SPI1, p.PA5, p.PA7, p.DMA2_CH3, Irqs, configuration),
-            select: [
-                select(p.PD14.into()),
-                select(p.PD15.into()),
-                select(p.PF12.into()),
-                select(p.PF13.into()),
-            ],
-            load: Output::new(p.PE11, Level::High, Speed::VeryHigh),
+            chain: Chain::new(
+                Spi::new_blocking_txonly(p.SPI1, p.PA5, p.PA7, configuration),
+                p.DMA2_CH3,
+                [
+                    select(p.PD14.into()),
+                    select(p.PD15.into()),
+                    select(p.PF12.into()),
+                    select(p.PF13.into()),
+                ],
+                Output::new(p.PE11, Level::High, Speed::VeryHigh),
+            ),
             clear: ClearGuard::new(Timer::new(p.TIM1), clear_pin),
         };
 
@@ -233,52 +238,43 @@ impl Ticks {
 
 /// The four converters.
 pub struct Dacs {
-    spi: Spi<'static, Async, spi::mode::Master>,
-    select: [Output<'static>; CHIPS],
-    load: Output<'static>,
+    chain: Chain,
     clear: ClearGuard,
 }
 
 impl Dacs {
     /// Brings all chips from power-up to streaming, at 0 V. Their channels are powered down until
     /// their words stand, so CLR, under which no word is taken, can be released before.
-    pub async fn start(&mut self) -> Result<(), spi::Error> {
+    pub fn start(&mut self) -> Result<(), spi::Error> {
         self.clear.start();
-        for write in dac81416::start_up() {
-            for chip in 0..CHIPS {
-                self.write(chip, &write).await?;
-            }
-            self.hold_off_clear();
-        }
-        Ok(())
-    }
-
-    /// Loads every channel, then changes all of them on one LDAC edge.
-    pub async fn update(&mut self, frames: &[[u8; FRAME_BYTES]; CHIPS]) -> Result<(), spi::Error> {
-        for (chip, frame) in frames.iter().enumerate() {
-            self.write(chip, frame).await?;
-        }
-        self.load();
-        Ok(())
-    }
-
-    /// Keeps CLR off for four more ticks.
-    pub fn hold_off_clear(&mut self) {
-        self.clear.hold_off();
-    }
-
-    async fn write(&mut self, chip: usize, bytes: &[u8]) -> Result<(), spi::Error> {
-        self.select[chip].set_low();
-        let written = self.spi.write(bytes).await;
-        self.select[chip].set_high();
+        let written = dac81416::start_up().try_for_each(|write| {
+            self.clear.hold_off();
+            self.chain.write(&write)
+        });
+        self.chain.open();
         written
     }
 
-    fn load(&mut self) {
-        // At 168 MHz two writes to the port are 20 ns and more apart, the chip's shortest pulse.
-        self.load.set_low();
-        self.load.set_high();
+    /// Starts to load every channel; all of them change on one LDAC edge.
+    pub fn update(&mut self, words: &[u16; ACTUATORS]) {
+        self.chain.send(words);
     }
+
+    /// How the last update went, to be asked before the next. CLR is kept off for four more ticks,
+    /// unless it went wrong: outputs that can't be changed go to 0 V.
+    pub fn finish(&mut self) -> Result<Clear, Fault> {
+        self.chain.finish()?;
+        Ok(self.clear.hold_off())
+    }
+}
+
+/// What CLR did since it was held off last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clear {
+    /// It stayed high.
+    Held,
+    /// It fell: the chips are at 0 V and took no words.
+    Fell,
 }
 
 /// CLR is low, and the outputs at 0 V, unless this timer runs: its channel is high from count 1 on,
@@ -309,9 +305,17 @@ impl ClearGuard {
         self.hold_off();
     }
 
-    fn hold_off(&mut self) {
+    fn hold_off(&mut self) -> Clear {
         let r = pac::TIM1;
         r.cnt().write(|w| w.set_cnt(1));
-        r.cr1().modify(|w| w.set_cen(true));
+        let mut control = r.cr1().read();
+        let clear = if control.cen() {
+            Clear::Held
+        } else {
+            Clear::Fell
+        };
+        control.set_cen(true);
+        r.cr1().write_value(control);
+        clear
     }
 }

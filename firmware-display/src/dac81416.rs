@@ -10,16 +10,21 @@
 //!
 //! With streaming enabled the chip select may stay low after the first word: each further word goes
 //! to the next address. So one frame carries all of a chip's channels, and one falling edge of LDAC,
-//! common to the four chips, makes all of them voltages.
+//! common to the four chips, makes all of them voltages. Where a chip's words are all equal, as in the
+//! paper's uniform drive, a frame with a single broadcast word says the same in three bytes instead of 27:
+//! it fills the same buffers, and they wait for LDAC alike (SLASEO0B, 8.3.1.2.2).
 
 use crate::{ACTUATORS, ZERO_VOLT};
 
 /// Chips on the board, a chip select each.
 pub const CHIPS: usize = 4;
-/// Channels used of each chip; the last chip drives the remaining 11 and keeps two at 0 V.
+/// Channels used of each chip; the last chip drives the remaining 11, and nothing is wired to its other
+/// two.
 pub const CHANNELS_PER_CHIP: usize = 13;
-/// Bytes of a chip's streaming frame: the first channel's address, then its channels' words.
+/// Bytes of a chip's longest frame: the first channel's address, then its channels' words.
 pub const FRAME_BYTES: usize = 1 + 2 * CHANNELS_PER_CHIP;
+/// Bytes of a broadcast: its address and a word.
+const BROADCAST_BYTES: usize = 3;
 
 const _: () = assert!(CHIPS * CHANNELS_PER_CHIP >= ACTUATORS);
 const _: () = assert!((CHIPS - 1) * CHANNELS_PER_CHIP < ACTUATORS);
@@ -96,6 +101,8 @@ const REFERENCE_ON: u16 = 0x3F00;
 /// ±5 V for four channels.
 const RANGES_BIPOLAR_5_V: u16 = 0x9999;
 const ALL_CHANNELS: u16 = 0xFFFF;
+/// The channels of [`Frame`]; the others stay at 0 V.
+const FRAME_CHANNELS: u16 = (1 << CHANNELS_PER_CHIP) - 1;
 const NO_CHANNEL: u16 = 0x0000;
 /// Bit 4 of [`register::TRIGGER`].
 const TRIGGER_LDAC: u16 = 1 << 4;
@@ -111,7 +118,7 @@ pub const fn read(register: u8) -> [u8; 3] {
     [register::READ | register, 0, 0]
 }
 
-const WRITES_BEFORE_CODES: usize = 10;
+const WRITES_BEFORE_CODES: usize = 11;
 const WRITES_AFTER_CODES: usize = 3;
 /// Writes in [`START_UP`].
 pub const START_UP_WRITES: usize = WRITES_BEFORE_CODES + CHANNELS + WRITES_AFTER_CODES;
@@ -135,6 +142,7 @@ const fn start_up_writes() -> [[u8; 3]; START_UP_WRITES] {
         write(TOGGCONFIG0, 0),
         write(TOGGCONFIG1, 0),
         write(SYNCCONFIG, ALL_CHANNELS),
+        write(BRDCONFIG, FRAME_CHANNELS),
         write(DACRANGE0, RANGES_BIPOLAR_5_V),
         write(DACRANGE0 + 1, RANGES_BIPOLAR_5_V),
         write(DACRANGE0 + 2, RANGES_BIPOLAR_5_V),
@@ -170,15 +178,63 @@ pub const fn place_of(actuator: usize) -> (usize, usize) {
     (actuator / CHANNELS_PER_CHIP, actuator % CHANNELS_PER_CHIP)
 }
 
-/// Writes the four chips' streaming frames for `words`: actuator i is channel i % 13 of chip i / 13.
-pub fn stream(words: &[u16; ACTUATORS], frames: &mut [[u8; FRAME_BYTES]; CHIPS]) {
-    for (frame, words) in frames.iter_mut().zip(words.chunks(CHANNELS_PER_CHIP)) {
-        let (address, data) = frame.split_at_mut(1);
-        address[0] = register::DAC0;
+/// What goes to a chip under one chip select at an output tick: a word for each of its channels, or
+/// one for all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    bytes: [u8; FRAME_BYTES],
+    is_broadcast: bool,
+}
+
+impl Frame {
+    /// 0 V on each channel.
+    pub const ZERO_VOLT: Self = {
+        let [address, high, low] = write(register::BRDCAST, ZERO_VOLT);
+        let mut bytes = [0; FRAME_BYTES];
+        bytes[0] = address;
+        bytes[1] = high;
+        bytes[2] = low;
+        Self {
+            bytes,
+            is_broadcast: true,
+        }
+    };
+
+    /// The bytes to send, 3 or [`FRAME_BYTES`].
+    pub fn bytes(&self) -> &[u8] {
+        if self.is_broadcast {
+            &self.bytes[..BROADCAST_BYTES]
+        } else {
+            &self.bytes
+        }
+    }
+
+    /// Whether it is one word for all channels.
+    pub fn is_broadcast(&self) -> bool {
+        self.is_broadcast
+    }
+
+    /// Takes the words of the first channels. The frame's others get 0 V; or, if `words` are all
+    /// equal, that word too: nothing is wired to them.
+    fn set(&mut self, words: &[u16]) {
+        self.is_broadcast = words.windows(2).all(|pair| pair[0] == pair[1]);
+        let (address, data) = self.bytes.split_at_mut(1);
+        address[0] = if self.is_broadcast {
+            register::BRDCAST
+        } else {
+            register::DAC0
+        };
         let words = words.iter().copied().chain(core::iter::repeat(ZERO_VOLT));
         for (bytes, word) in data.chunks_exact_mut(2).zip(words) {
             bytes.copy_from_slice(&word.to_be_bytes());
         }
+    }
+}
+
+/// Writes the four chips' frames for `words`: actuator i is channel i % 13 of chip i / 13.
+pub fn stream(words: &[u16; ACTUATORS], frames: &mut [Frame; CHIPS]) {
+    for (frame, words) in frames.iter_mut().zip(words.chunks(CHANNELS_PER_CHIP)) {
+        frame.set(words);
     }
 }
 
@@ -195,6 +251,7 @@ mod tests {
             [0x07, 0x00, 0x00],
             [0x08, 0x00, 0x00],
             [0x06, 0xFF, 0xFF],
+            [0x05, 0x1F, 0xFF],
             [0x0A, 0x99, 0x99],
             [0x0B, 0x99, 0x99],
             [0x0C, 0x99, 0x99],
@@ -237,22 +294,26 @@ mod tests {
         );
     }
 
+    fn frames_of(words: &[u16; ACTUATORS]) -> [Frame; CHIPS] {
+        let mut frames = [Frame::ZERO_VOLT; CHIPS];
+        stream(words, &mut frames);
+        frames
+    }
+
     #[test]
     fn streaming_frames_are_these_bytes() {
-        let words = core::array::from_fn(|i| 0x4000 + i as u16);
-        let mut frames = [[0xAA; FRAME_BYTES]; CHIPS];
-        stream(&words, &mut frames);
+        let frames = frames_of(&core::array::from_fn(|i| 0x4000 + i as u16));
         assert_eq!(
-            frames[0],
+            frames[0].bytes(),
             [
                 0x10, 0x40, 0x00, 0x40, 0x01, 0x40, 0x02, 0x40, 0x03, 0x40, 0x04, 0x40, 0x05, 0x40,
                 0x06, 0x40, 0x07, 0x40, 0x08, 0x40, 0x09, 0x40, 0x0A, 0x40, 0x0B, 0x40, 0x0C,
             ]
         );
-        assert_eq!(frames[1][..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
-        assert_eq!(frames[2][..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
+        assert_eq!(frames[1].bytes()[..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
+        assert_eq!(frames[2].bytes()[..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
         assert_eq!(
-            frames[3],
+            frames[3].bytes(),
             [
                 0x10, 0x40, 0x27, 0x40, 0x28, 0x40, 0x29, 0x40, 0x2A, 0x40, 0x2B, 0x40, 0x2C, 0x40,
                 0x2D, 0x40, 0x2E, 0x40, 0x2F, 0x40, 0x30, 0x40, 0x31, 0x80, 0x00, 0x80, 0x00,
@@ -261,16 +322,39 @@ mod tests {
     }
 
     #[test]
+    fn equal_words_are_these_three_bytes_a_chip() {
+        for frame in frames_of(&[0x1234; ACTUATORS]) {
+            assert_eq!(frame.bytes(), [0x0F, 0x12, 0x34]);
+        }
+        assert_eq!(Frame::ZERO_VOLT.bytes(), [0x0F, 0x80, 0x00]);
+    }
+
+    #[test]
+    fn only_a_chip_whose_words_all_agree_gets_a_broadcast() {
+        for actuator in 0..ACTUATORS {
+            let mut words = [0x1234; ACTUATORS];
+            words[actuator] = 0x1235;
+            let (chip, _) = place_of(actuator);
+            for (c, frame) in frames_of(&words).iter().enumerate() {
+                let length = if c == chip { FRAME_BYTES } else { 3 };
+                assert_eq!(frame.bytes().len(), length, "chip {c}, actuator {actuator}");
+            }
+        }
+    }
+
+    #[test]
     fn each_actuator_has_a_channel_of_its_own_where_the_frame_puts_its_word() {
         for actuator in 0..ACTUATORS {
             let mut words = [ZERO_VOLT; ACTUATORS];
             words[actuator] = 0x1234;
-            let mut frames = [[0; FRAME_BYTES]; CHIPS];
-            stream(&words, &mut frames);
             let (chip, channel) = place_of(actuator);
-            for (c, frame) in frames.iter().enumerate() {
-                for (n, bytes) in frame[1..].chunks(2).enumerate() {
-                    let expected = if (c, n) == (chip, channel) {
+            for (c, frame) in frames_of(&words).iter().enumerate() {
+                if c != chip {
+                    assert_eq!(frame.bytes(), [0x0F, 0x80, 0x00]);
+                    continue;
+                }
+                for (n, bytes) in frame.bytes()[1..].chunks(2).enumerate() {
+                    let expected = if n == channel {
                         [0x12, 0x34]
                     } else {
                         [0x80, 0]

@@ -11,6 +11,8 @@
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod chain;
+#[cfg(target_os = "none")]
 mod tasks;
 
 // The log, and what is logged when all else fails; a panic ends in the watchdog's reset.

@@ -14,7 +14,6 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Ticker};
 use firmware_display::Display;
-use firmware_display::dac81416::{self, CHIPS, FRAME_BYTES};
 use nucleo::ports::{Ports, Side};
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, DisplayCounters, Estimate, Hello,
@@ -22,7 +21,8 @@ use protocol::{
 };
 use static_cell::StaticCell;
 
-use crate::board::{Board, Dacs, Ticks};
+use crate::board::{Board, Clear, Dacs, Ticks};
+use crate::chain::Fault;
 
 const CARE_PERIOD: Duration = Duration::from_millis(50);
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
@@ -92,19 +92,30 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     spawner.spawn(care);
 }
 
-/// Reads the hand, moves the phase, puts fifty voltages out. Deadline: one tick, 500 µs. Missed, the
-/// next output carries the travel of both ticks, and the miss is counted; missed four times, the
-/// hardware lets CLR fall and all outputs go to 0 V.
+/// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: one tick, 500 µs, for
+/// them to arrive. Missed, they are given up, the next output carries the travel of both ticks, and the
+/// miss is counted; missed four times in a row, the hardware lets CLR fall and all outputs go to 0 V.
 #[embassy_executor::task]
 async fn drive(mut ticks: Ticks, mut dacs: Dacs) {
     let mut display = Display::new(DisplayConfiguration::default());
-    let mut frames = [[0; FRAME_BYTES]; CHIPS];
     let mut deadline_misses = 0u32;
-    let mut spi_errors = u32::from(dacs.start().await.is_err());
+    let mut spi_errors = u32::from(dacs.start().is_err());
     ticks.start();
     loop {
         let (encoder, missed) = ticks.next().await;
         deadline_misses = deadline_misses.wrapping_add(missed);
+        match dacs.finish() {
+            Ok(Clear::Held) => {}
+            Ok(Clear::Fell) => display.resend(),
+            Err(Fault::Transfer) => {
+                spi_errors = spi_errors.wrapping_add(1);
+                display.resend();
+            }
+            Err(Fault::Stall) => {
+                deadline_misses = deadline_misses.wrapping_add(1);
+                display.resend();
+            }
+        }
         if STOP.try_take().is_some() {
             display.stop();
         }
@@ -115,10 +126,8 @@ async fn drive(mut ticks: Ticks, mut dacs: Dacs) {
             display.on_estimate(&estimate);
         }
         if display.tick(encoder) {
-            dac81416::stream(display.words(), &mut frames);
-            spi_errors = spi_errors.wrapping_add(u32::from(dacs.update(&frames).await.is_err()));
+            dacs.update(display.words());
         }
-        dacs.hold_off_clear();
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
             // A motion that finds no room shows as a gap in its sequence.
             let _ = OUTBOX.try_send(Message::Motion(motion));
