@@ -15,40 +15,28 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::Peri;
+use embassy_stm32::bind_interrupts;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::{Mms, Ocm};
-use embassy_stm32::peripherals::{
-    DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, IWDG, TIM1, TIM3, USART2, USART3,
-};
+use embassy_stm32::peripherals::{TIM1, TIM3};
 use embassy_stm32::spi::{self, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
-use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
-use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use firmware_display::dac81416;
 use firmware_display::{ACTUATORS, TICK_RATE_HZ};
+use nucleo::care::Vitals;
 use nucleo::encoder::Encoder;
-use nucleo::ports;
-use protocol::ResetCause;
-use static_cell::StaticCell;
+use nucleo::serial::{self, Serial};
 
 use crate::chain::{Chain, Fault, FrameHandler};
 
 bind_interrupts!(struct Irqs {
-    USART2 => usart::InterruptHandler<USART2>;
-    USART3 => usart::InterruptHandler<USART3>;
-    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
-    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
-    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
     DMA2_STREAM3 => FrameHandler;
     TIM3 => TickHandler;
 });
@@ -57,8 +45,6 @@ bind_interrupts!(struct Irqs {
 const SPI_CLOCK: Hertz = Hertz(dac81416::MAX_CLOCK_HZ);
 /// CLR falls this long after the last tick that was served: four ticks.
 const HOLD_OFF_US: u16 = (4 * 1_000_000 / TICK_RATE_HZ) as u16;
-/// The tasks feed the watchdog every 50 ms.
-const WATCHDOG_US: u32 = 400_000;
 
 /// Runs the output task above everything else, on the vector of a peripheral that is not used.
 static OUTPUT: InterruptExecutor = InterruptExecutor::new();
@@ -81,28 +67,20 @@ pub struct Board {
     pub ticks: Ticks,
     /// The actuators' converters.
     pub dacs: Dacs,
-    /// Receiver and transmitter of the port to the other board.
-    pub peer: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
-    /// Receiver and transmitter of the console port.
-    pub console: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
-    /// Restarts the board unless it is fed; running already.
-    pub watchdog: IndependentWatchdog<'static, IWDG>,
-    /// Shows that the peer is known.
-    pub link_led: Output<'static>,
-    /// Why the board started, and the watchdog resets since power came on.
-    pub started: (ResetCause, u32),
+    /// The port to the other board.
+    pub peer: Serial,
+    /// The console port.
+    pub console: Serial,
+    /// What keeps the board alive.
+    pub vitals: Vitals,
 }
 
 impl Board {
     /// Sets the hardware up. To be called once.
     pub fn take() -> Self {
-        static PEER_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
-        static CONSOLE_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
-
         let started = nucleo::reset::cause();
         let p = embassy_stm32::init(nucleo::clock::configuration());
-        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
-        watchdog.unleash();
+        let vitals = Vitals::new(p.IWDG, p.PB0, started);
 
         let timer = Timer::new(p.TIM3);
         timer.set_frequency(Hertz(TICK_RATE_HZ), RoundTo::Slower);
@@ -134,51 +112,17 @@ impl Board {
             clear: ClearGuard::new(Timer::new(p.TIM1), clear_pin),
         };
 
-        #[allow(
-            clippy::expect_used,
-            reason = "at start-up, with constants: a wrong baud rate can't pass a first test"
-        )]
-        let (peer, console) = (
-            Uart::new(
-                p.USART2,
-                p.PD6,
-                p.PD5,
-                p.DMA1_CH6,
-                p.DMA1_CH5,
-                Irqs,
-                ports::configuration(),
-            )
-            .expect("921 600 baud divides from 42 MHz"),
-            Uart::new(
-                p.USART3,
-                p.PD9,
-                p.PD8,
-                p.DMA1_CH3,
-                p.DMA1_CH1,
-                Irqs,
-                ports::configuration(),
-            )
-            .expect("921 600 baud divides from 42 MHz"),
-        );
-        let (peer_tx, peer_rx) = peer.split();
-        let (console_tx, console_rx) = console.split();
-        let mut peer_rx = peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES]));
-        let mut console_rx =
-            console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES]));
-        // The other board may be up already: what it says before the tasks run is kept.
-        peer_rx.start_uart();
-        console_rx.start_uart();
+        let peer = serial::peer(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5);
+        let console = serial::console(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1);
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {
             output: OUTPUT.start(interrupt::UART5),
             ticks,
             dacs,
-            peer: (peer_rx, peer_tx),
-            console: (console_rx, console_tx),
-            watchdog,
-            link_led: Output::new(p.PB0, Level::Low, Speed::Low),
-            started,
+            peer,
+            console,
+            vitals,
         }
     }
 }

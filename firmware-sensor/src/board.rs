@@ -18,35 +18,25 @@ use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Async;
 use embassy_stm32::pac;
 use embassy_stm32::pac::timer::vals::Mms;
-use embassy_stm32::peripherals::{
-    ADC3, DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, DMA2_CH0, IWDG, TIM1, TIM3, USART2, USART3,
-};
+use embassy_stm32::peripherals::{ADC3, DMA2_CH0, TIM1, TIM3};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_stm32::triggers::TIM3_TRGO;
-use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use firmware_sensor::{Drive, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
+use nucleo::care::Vitals;
 use nucleo::encoder::Encoder;
-use nucleo::ports;
-use protocol::{CHANNELS, ResetCause};
+use nucleo::serial::{self, Serial};
+use protocol::CHANNELS;
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Irqs {
-    USART2 => usart::InterruptHandler<USART2>;
-    USART3 => usart::InterruptHandler<USART3>;
-    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
-    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
-    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
     DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
     ADC => OverrunHandler;
 });
@@ -72,8 +62,6 @@ const RING: usize = 2 * BLOCK;
 /// 28 + 12 ADC clocks at 21 MHz: 1.9 µs a channel, 11.4 µs a scan.
 const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
 const ARM_PWM: Hertz = Hertz(20_000);
-/// A watchdog this short bounds a hang to a few estimates; the tasks feed it every 100 ms.
-const WATCHDOG_US: u32 = 400_000;
 
 /// Runs the sampling task above everything else, on the vector of a peripheral that is not used.
 static SAMPLING: InterruptExecutor = InterruptExecutor::new();
@@ -96,29 +84,21 @@ pub struct Board {
     pub sampler: Sampler,
     /// The arm's servo drive.
     pub arm: ArmDrive,
-    /// Receiver and transmitter of the port to the other board.
-    pub peer: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
-    /// Receiver and transmitter of the console port.
-    pub console: (RingBufferedUartRx<'static>, UartTx<'static, Async>),
-    /// Restarts the board unless it is fed; running already.
-    pub watchdog: IndependentWatchdog<'static, IWDG>,
-    /// Shows that the peer is known.
-    pub link_led: Output<'static>,
-    /// Why the board started, and the watchdog resets since power came on.
-    pub started: (ResetCause, u32),
+    /// The port to the other board.
+    pub peer: Serial,
+    /// The console port.
+    pub console: Serial,
+    /// What keeps the board alive.
+    pub vitals: Vitals,
 }
 
 impl Board {
     /// Sets the hardware up. To be called once.
     pub fn take() -> Self {
         static ADC_RING: StaticCell<[u16; RING]> = StaticCell::new();
-        static PEER_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
-        static CONSOLE_RING: StaticCell<[u8; ports::RING_BYTES]> = StaticCell::new();
-
         let started = nucleo::reset::cause();
         let p = embassy_stm32::init(nucleo::clock::configuration());
-        let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
-        watchdog.unleash();
+        let vitals = Vitals::new(p.IWDG, p.PB0, started);
 
         let encoder = Encoder::new(p.TIM4, p.PD12, p.PD13);
         let channels = [
@@ -156,40 +136,8 @@ impl Board {
             forward: Output::new(p.PF13, Level::Low, Speed::Low),
         };
 
-        #[allow(
-            clippy::expect_used,
-            reason = "at start-up, with constants: a wrong baud rate can't pass a first test"
-        )]
-        let (peer, console) = (
-            Uart::new(
-                p.USART2,
-                p.PD6,
-                p.PD5,
-                p.DMA1_CH6,
-                p.DMA1_CH5,
-                Irqs,
-                ports::configuration(),
-            )
-            .expect("921 600 baud divides from 42 MHz"),
-            Uart::new(
-                p.USART3,
-                p.PD9,
-                p.PD8,
-                p.DMA1_CH3,
-                p.DMA1_CH1,
-                Irqs,
-                ports::configuration(),
-            )
-            .expect("921 600 baud divides from 42 MHz"),
-        );
-        let (peer_tx, peer_rx) = peer.split();
-        let (console_tx, console_rx) = console.split();
-        let mut peer_rx = peer_rx.into_ring_buffered(PEER_RING.init([0; ports::RING_BYTES]));
-        let mut console_rx =
-            console_rx.into_ring_buffered(CONSOLE_RING.init([0; ports::RING_BYTES]));
-        // The other board may be up already: what it says before the tasks run is kept.
-        peer_rx.start_uart();
-        console_rx.start_uart();
+        let peer = serial::peer(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5);
+        let console = serial::console(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1);
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {
@@ -200,11 +148,9 @@ impl Board {
                 encoder,
             },
             arm,
-            peer: (peer_rx, peer_tx),
-            console: (console_rx, console_tx),
-            watchdog,
-            link_led: Output::new(p.PB0, Level::Low, Speed::Low),
-            started,
+            peer,
+            console,
+            vitals,
         }
     }
 }

@@ -3,21 +3,18 @@
 use core::cell::Cell;
 
 use embassy_executor::Spawner;
-use embassy_stm32::gpio::{Level, Output};
-use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
-use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::usart::RingBufferedUartRx;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Instant, Ticker};
+use embassy_time::{Duration, Instant};
 use firmware_sensor::Sensor;
-use nucleo::ports::{Ports, Side};
+use nucleo::care::care;
+use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
+use nucleo::spawn::once;
 use protocol::{
-    Configuration, ConfigurationReport, Hello, Message, Motion, ResetCause, RoleCounters,
-    SensorConfiguration, SensorCounters, Setting, Status,
+    Configuration, ConfigurationReport, Hello, Message, Motion, RoleCounters, SensorConfiguration,
+    SensorCounters, Setting,
 };
 use static_cell::StaticCell;
 
@@ -25,11 +22,7 @@ use crate::board::{ArmDrive, Board, Sampler, ScansLost};
 
 /// Time between two samples: the sampling task's deadline.
 const SAMPLE_PERIOD: Duration = Duration::from_hz(firmware_sensor::SAMPLE_RATE_HZ as u64);
-const CARE_PERIOD: Duration = Duration::from_millis(50);
-const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
-/// From the sampling task to the ports; full only if the thread is held up for 40 ms.
-static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
 /// From the ports to the sampling task: the latest counts.
 static MOTION: Signal<CriticalSectionRawMutex, Motion> = Signal::new();
 static CONFIGURE: Signal<CriticalSectionRawMutex, SensorConfiguration> = Signal::new();
@@ -50,46 +43,19 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         arm,
         peer,
         console,
-        watchdog,
-        link_led,
-        started,
+        vitals,
     } = board;
-    defmt::info!(
-        "sensor {}.{}.{} started",
-        hello.version[0],
-        hello.version[1],
-        hello.version[2]
-    );
-    let tasks = (
-        sample(sampler, arm),
-        listen(ports, Side::Peer, peer.0),
-        speak(ports, Side::Peer, peer.1),
-        listen(ports, Side::Console, console.0),
-        speak(ports, Side::Console, console.1),
-        report(ports),
-        care(ports, watchdog, link_led, started),
-    );
-    let (
-        Ok(sample),
-        Ok(hear_peer),
-        Ok(tell_peer),
-        Ok(hear_host),
-        Ok(tell_host),
-        Ok(report),
-        Ok(care),
-    ) = tasks
-    else {
-        defmt::panic!("each task is spawned once");
-    };
-    sampling.spawn(sample);
-    for task in [hear_peer, hear_host] {
-        spawner.spawn(task);
+    let [major, minor, patch] = hello.version;
+    defmt::info!("sensor {}.{}.{} started", major, minor, patch);
+    sampling.spawn(once(sample(sampler, arm)));
+    for (side, serial) in [(Side::Peer, peer), (Side::Console, console)] {
+        spawner.spawn(once(listen(ports, side, serial.receiver)));
+        spawner.spawn(once(speak(ports, side, serial.transmitter)));
     }
-    for task in [tell_peer, tell_host] {
-        spawner.spawn(task);
-    }
-    spawner.spawn(report);
-    spawner.spawn(care);
+    spawner.spawn(once(report(ports)));
+    spawner.spawn(once(care(ports, vitals, || {
+        RoleCounters::Sensor(COUNTERS.lock(Cell::get))
+    })));
 }
 
 /// Samples, estimates, drives the arm. Deadline: one sample period, 1 ms. Missed, DMA goes on for
@@ -139,15 +105,6 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive) {
     }
 }
 
-/// Puts what the sampling task made on both ports. Deadline: 10 ms, the next estimate.
-#[embassy_executor::task]
-async fn report(ports: &'static Ports) {
-    loop {
-        let message = OUTBOX.receive().await;
-        ports.post(&message);
-    }
-}
-
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
 async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
@@ -177,55 +134,4 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
             _ => {}
         })
         .await
-}
-
-/// Talks on a port. See [`Ports::speak`].
-#[embassy_executor::task(pool_size = 2)]
-async fn speak(ports: &'static Ports, side: Side, uart: UartTx<'static, Async>) {
-    ports.speak(side, uart).await
-}
-
-/// Greets, sends the counters, and feeds the watchdog as long as samples come. Deadline: 400 ms, the
-/// watchdog's.
-#[embassy_executor::task]
-async fn care(
-    ports: &'static Ports,
-    mut watchdog: IndependentWatchdog<'static, IWDG>,
-    mut link_led: Output<'static>,
-    started: (ResetCause, u32),
-) {
-    let (reset, watchdog_resets) = started;
-    let mut ticker = Ticker::every(CARE_PERIOD);
-    let mut next_status = Instant::now() + STATUS_PERIOD;
-    let mut samples_before = None;
-    defmt::info!(
-        "reset by {}, watchdog resets {}",
-        defmt::Debug2Format(&reset),
-        watchdog_resets
-    );
-    loop {
-        let counters = COUNTERS.lock(Cell::get);
-        if samples_before != Some(counters.samples) {
-            watchdog.pet();
-        }
-        samples_before = Some(counters.samples);
-        ports.poll();
-        link_led.set_level(if ports.is_known(Side::Peer) {
-            Level::High
-        } else {
-            Level::Low
-        });
-        if Instant::now() >= next_status {
-            next_status += STATUS_PERIOD;
-            ports.post(&Message::Status(Status {
-                uptime_us: Instant::now().as_micros(),
-                reset,
-                watchdog_resets,
-                peer: ports.counters(Side::Peer),
-                console: ports.counters(Side::Console),
-                role: RoleCounters::Sensor(counters),
-            }));
-        }
-        ticker.next().await;
-    }
 }

@@ -3,8 +3,11 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod care;
 pub mod clock;
 pub mod encoder;
 pub mod identity;
 pub mod ports;
 pub mod reset;
+pub mod serial;
+pub mod spawn;

@@ -3,19 +3,16 @@
 use core::cell::RefCell;
 
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{Config, Error, RingBufferedUartRx, UartTx};
+use embassy_stm32::usart::{Error, RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::ThreadModeMutex;
-use embassy_sync::blocking_mutex::raw::ThreadModeRawMutex;
+use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, ThreadModeRawMutex};
+use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use protocol::port::Port;
 use protocol::receiver::Peer;
 use protocol::{Hello, Message, PortCounters};
 
-/// Speed of both ports, 8N1.
-pub const BAUD: u32 = 921_600;
-/// Bytes a receiver's DMA ring holds: 11 ms of an uninterrupted line.
-pub const RING_BYTES: usize = 1_024;
 /// Most bytes handed to a transmitter's DMA at once.
 const BURST_BYTES: usize = 256;
 
@@ -28,11 +25,22 @@ pub enum Side {
     Console,
 }
 
-/// The UARTs' settings.
-pub fn configuration() -> Config {
-    let mut configuration = Config::default();
-    configuration.baudrate = BAUD;
-    configuration
+/// What tasks of any priority want said on both ports; full only if the thread is held up for 8 ms.
+pub static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
+
+/// Puts what is in the [`OUTBOX`] on both ports. Deadline: 2 ms, the display's next motion.
+#[embassy_executor::task]
+pub async fn report(ports: &'static Ports) {
+    loop {
+        let message = OUTBOX.receive().await;
+        ports.post(&message);
+    }
+}
+
+/// Talks on a port. See [`Ports::speak`].
+#[embassy_executor::task(pool_size = 2)]
+pub async fn speak(ports: &'static Ports, side: Side, uart: UartTx<'static, Async>) {
+    ports.speak(side, uart).await
 }
 
 /// Both ports, shared by the tasks of the thread-mode executor.

@@ -1,0 +1,88 @@
+//! The two UARTs of a board, with a DMA ring behind each receiver.
+//!
+//! | port | UART | pins TX, RX | DMA1 streams TX, RX |
+//! | --- | --- | --- | --- |
+//! | peer | USART2 | PD5, PD6 | 6, 5 |
+//! | console | USART3, the ST-LINK's | PD8, PD9 | 3, 1 |
+
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{
+    DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, PD5, PD6, PD8, PD9, USART2, USART3,
+};
+use embassy_stm32::usart::{self, Config, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::{Peri, bind_interrupts, dma};
+use static_cell::StaticCell;
+
+bind_interrupts!(struct Irqs {
+    USART2 => usart::InterruptHandler<USART2>;
+    USART3 => usart::InterruptHandler<USART3>;
+    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+});
+
+/// Speed of both ports, 8N1.
+pub const BAUD: u32 = 921_600;
+/// Bytes a receiver's ring holds: 11 ms of an uninterrupted line.
+const RING_BYTES: usize = 1_024;
+
+/// One UART: its receiver runs already, so that what the other board says before the tasks run is kept.
+pub struct Serial {
+    /// The receiver.
+    pub receiver: RingBufferedUartRx<'static>,
+    /// The transmitter.
+    pub transmitter: UartTx<'static, Async>,
+}
+
+/// The port to the other board. To be called once.
+pub fn peer(
+    uart: Peri<'static, USART2>,
+    rx: Peri<'static, PD6>,
+    tx: Peri<'static, PD5>,
+    tx_dma: Peri<'static, DMA1_CH6>,
+    rx_dma: Peri<'static, DMA1_CH5>,
+) -> Serial {
+    static RING: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
+    start(
+        Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
+        RING.init([0; RING_BYTES]),
+    )
+}
+
+/// The console port. To be called once.
+pub fn console(
+    uart: Peri<'static, USART3>,
+    rx: Peri<'static, PD9>,
+    tx: Peri<'static, PD8>,
+    tx_dma: Peri<'static, DMA1_CH3>,
+    rx_dma: Peri<'static, DMA1_CH1>,
+) -> Serial {
+    static RING: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
+    start(
+        Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
+        RING.init([0; RING_BYTES]),
+    )
+}
+
+fn configuration() -> Config {
+    let mut configuration = Config::default();
+    configuration.baudrate = BAUD;
+    configuration
+}
+
+fn start(
+    uart: Result<Uart<'static, Async>, usart::ConfigError>,
+    ring: &'static mut [u8; RING_BYTES],
+) -> Serial {
+    let Ok(uart) = uart else {
+        defmt::panic!("{} baud divides from 42 MHz", BAUD);
+    };
+    let (transmitter, receiver) = uart.split();
+    let mut receiver = receiver.into_ring_buffered(ring);
+    receiver.start_uart();
+    Serial {
+        receiver,
+        transmitter,
+    }
+}
