@@ -32,9 +32,11 @@ const CYCLES_PER_BIT: u32 = CYCLES_PER_US * 1_000_000 / dac81416::MAX_CLOCK_HZ;
 /// The stream is done as soon as the last byte is in SPI1's buffer, when up to two bytes are still to
 /// be shifted out. One bit more, because the STM32F4's BSY is said to fall before the last edge does.
 const LAST_BYTES_CYCLES: u32 = (2 * 8 + 1) * CYCLES_PER_BIT;
-/// From a broadcast to LDAC, 4 µs: the chip's t_BCASTWAIT, read as the time that its buffers take.
+/// From a broadcast to LDAC, 4 µs: the family's t_BCASTWAIT (DAC81408, SLASER3A), read on the safe side
+/// as the time that the buffers take.
 const BROADCAST_CYCLES: u32 = 4 * CYCLES_PER_US;
-/// From a word to LDAC, and from LDAC's fall to its rise, 0.1 µs; the chip asks for 80 and 20 ns.
+/// From a word to LDAC, and from LDAC's fall to its rise, 0.1 µs; the family asks for 80 and 20 ns
+/// (DAC81404, SLASEH2A).
 const LOAD_CYCLES: u32 = CYCLES_PER_US / 10 + 1;
 /// Looks at a flag that is due, before it is given up: a microsecond and more.
 const LOOKS: usize = 32;
@@ -80,8 +82,8 @@ impl Chain {
         }
     }
 
-    /// Writes `bytes` to each chip and waits for it, 4 µs with all interrupts held off: for start-up,
-    /// before [`Chain::open`].
+    /// Writes `bytes` to each chip and waits, with interrupts held off while a chip is selected: for
+    /// start-up, three bytes at a time, before [`Chain::open`].
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), spi::Error> {
         (0..CHIPS).try_for_each(|chip| with_line(|line| line.write(chip, bytes)).unwrap_or(Ok(())))
     }
@@ -91,8 +93,8 @@ impl Chain {
         with_line(|line| line.open());
     }
 
-    /// Starts an update of all channels to `words`; they change together, 50 µs later at most.
-    /// [`Chain::finish`] comes between two of them.
+    /// Starts an update of all channels to `words`; they change together, some 50 µs later.
+    /// [`Chain::finish`] comes between two of these.
     pub fn send(&mut self, words: &[u16; ACTUATORS]) {
         dac81416::stream(words, self.frames);
         let transfers = self.frames.each_ref().map(Transfer::of);

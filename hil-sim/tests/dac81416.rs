@@ -187,6 +187,21 @@ fn trigger_loads_as_the_pin_does() {
 }
 
 #[test]
+fn a_broadcast_while_streaming_fills_the_channels_that_brdconfig_names_and_waits_for_ldac() {
+    let mut chip = running();
+    write(&mut chip, r::SYNCCONFIG, 0xFFFF);
+    write(&mut chip, r::BRDCONFIG, 0x1FFF);
+    write(&mut chip, r::SPICONFIG, STREAMING);
+    stream(&mut chip, r::BRDCAST, &[0xC000]);
+    assert_eq!(voltages(&chip), [0.0; CHANNELS]);
+    pulse_ldac(&mut chip);
+    let expected: [f64; CHANNELS] =
+        std::array::from_fn(|channel| if channel < 13 { 2.5 } else { 0.0 });
+    assert_eq!(voltages(&chip), expected);
+    assert_eq!(chip.faults(), []);
+}
+
+#[test]
 fn a_soft_reset_returns_to_power_up() {
     for code in [0x000A, 0x1010] {
         let mut chip = running();
