@@ -71,10 +71,11 @@ fn rub(wavelength_mm: f64, speed_mm_s: f64, firmwares: &Firmwares) -> anyhow::Re
     Ok(Outcome::new(scene, recording))
 }
 
-const HEADER: &str = "\
-              mean λ̂ in mm                 fifty actuators
- v    λ    paper  predicted  this ELF   Hz      v/λ̂ Hz   off %   phase rms   × real
-mm/s  mm                                                         cycles      time";
+const HEADER: &str = concat!(
+    "                mean λ̂ in mm               fifty actuators\n",
+    "  v    λ   paper predicted  this ELF        Hz   v/λ̂, Hz   off, %  phase rms    × real\n",
+    "mm/s  mm                                                            cycles      time",
+);
 
 fn row(
     wavelength_mm: f64,
@@ -86,7 +87,7 @@ fn row(
     let summary = &outcome.verdict.summary;
     let actuators = &outcome.verdict.actuators;
     format!(
-        "{speed_mm_s:>3}   {wavelength_mm:>2}   {paper_mm:>6.3} {predicted_mm:>8.3} {:>9}  {:>8} {:>9} {:>7} {:>9} {:>9}",
+        "{speed_mm_s:>4} {wavelength_mm:>3} {paper_mm:>8.3} {predicted_mm:>9.3} {:>9} {:>9} {:>9} {:>8} {:>10} {:>9}",
         number(summary.mean_mm, 3),
         number(actuators.frequency_hz, 3),
         number(actuators.truth_hz, 3),
