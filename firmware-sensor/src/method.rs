@@ -3,6 +3,7 @@
 use protocol::{Method, SensorConfiguration};
 
 use crate::counting::Counting;
+use crate::crossings::Crossings;
 use crate::estimator::{Estimator, Finding, Touch};
 use crate::travel::Travel;
 
@@ -12,6 +13,8 @@ use crate::travel::Travel;
 pub enum Running {
     /// [`Method::Counting`]
     Counting(Counting),
+    /// [`Method::Crossings`]
+    Crossings(Crossings),
 }
 
 impl Running {
@@ -19,9 +22,12 @@ impl Running {
     /// touch.
     pub fn new(configuration: &SensorConfiguration) -> Self {
         match configuration.method {
-            Method::Counting | Method::AdaptedCounting | Method::Crossings | Method::Bank => {
+            Method::Counting | Method::AdaptedCounting => {
                 Self::Counting(Counting::new(configuration))
             }
+            Method::Crossings => Self::Crossings(Crossings::new(configuration)),
+            // STAND-IN until there is a bank: this line is to become the bank's own.
+            Method::Bank => Self::Crossings(Crossings::new(configuration)),
         }
     }
 }
@@ -30,12 +36,14 @@ impl Estimator for Running {
     fn push(&mut self, touch: &Touch) {
         match self {
             Self::Counting(counting) => counting.push(touch),
+            Self::Crossings(crossings) => crossings.push(touch),
         }
     }
 
     fn find(&mut self, travel: &Travel) -> Finding {
         match self {
             Self::Counting(counting) => counting.find(travel),
+            Self::Crossings(crossings) => crossings.find(travel),
         }
     }
 }
