@@ -29,6 +29,9 @@ const _: () = assert!(
     "the delay is a whole number of ms"
 );
 
+/// Power gain for white noise, Σh²: what is left of the scans' variance in a sample.
+pub const NOISE_GAIN: f32 = 0.217_262;
+
 /// Kaiser's rule for the window's shape, for attenuations above 50 dB.
 const KAISER_BETA: f64 = 0.1102 * (ATTENUATION_DB - 8.7);
 
@@ -143,6 +146,12 @@ mod tests {
             let tap = SCANS_PER_SAMPLE - 1 - delay % SCANS_PER_SAMPLE;
             f64::from(filter.taps[delay / SCANS_PER_SAMPLE][tap])
         })
+    }
+
+    #[test]
+    fn leaves_the_stated_share_of_white_noise() {
+        let share: f64 = impulse_response().iter().map(|h| h * h).sum();
+        assert!((share - f64::from(NOISE_GAIN)).abs() < 1e-6, "{share}");
     }
 
     fn gain_db(frequency_hz: f64) -> f64 {

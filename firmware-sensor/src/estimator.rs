@@ -35,6 +35,10 @@ pub struct Touch {
     /// Where the contact was at the instant of `banded`, as far as a filter whose delay depends on
     /// frequency can have one: see [`crate::travel::ALIGNMENT_MS`].
     pub banded_place: Place,
+    /// Variance of the white noise in each of `gauges`, in ADC steps².
+    pub noise: [f32; GAUGES],
+    /// Amplitude in ADC steps of what may be hum in `gauges`, as long as that is not known; 0 once it is.
+    pub pickup_lsb: f32,
     /// Bit g set: gauge g is in good health and allowed to take part.
     pub usable: u8,
 }
@@ -52,6 +56,8 @@ pub struct Finding {
     pub amplitude_lsb: f32,
     /// Bit g set: gauge g took part.
     pub gauges_used: u8,
+    /// Bit g set: gauge g says something else than the others, who agree.
+    pub misfits: u8,
 }
 
 /// An estimator of λ.
