@@ -165,7 +165,7 @@ mod board {
         });
         for (ms, (scans, encoder)) in black_box(scans).iter().zip(encoder).enumerate() {
             mark(number);
-            black_box(sensor.step(ms as u64 * 1_000, scans, *encoder));
+            black_box(&sensor.step(ms as u64 * 1_000, scans, *encoder));
             mark(number + 100);
         }
     }
