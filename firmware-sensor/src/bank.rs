@@ -43,6 +43,8 @@ const PLAY_WITH_FORCE_UM: i32 = 30;
 /// the amplitude 0.35 (the surface's period is still λ); a fingertip that sticks and slips over several
 /// ridges, two specimens under one fingertip and hum are beyond.
 const MOST_UNEXPLAINED: f32 = 0.45;
+/// The same right after a change of surface, when the kernel still holds some of what was before.
+const MOST_UNEXPLAINED_AFTER_CHANGE: f32 = 0.7;
 /// What the noise may add to it, relative to noise over signal: both are measured over finite times.
 const UNEXPLAINED_PER_NOISE: f32 = 0.2;
 /// Share of the kernel that must have been filled since the start.
@@ -165,18 +167,19 @@ struct Fit {
     determinant: f32,
 }
 
-/// What a candidate's fit says of the gauges that it is right for.
+/// What a candidate's fit says of the usable gauges.
 #[derive(Clone, Copy, Debug, Default)]
 struct Agreement {
     /// Bit g set: the wave explains gauge g.
     fitting: u8,
     /// Bit g set: the wave explains less than half of gauge g, noise left out.
     misfits: u8,
-    /// Energy that it explains in the fitting ones, and their noise.
+    /// The wave explains the gauges as a whole.
+    whole: bool,
+    /// Energy that it explains, all gauges together, what neither it nor noise does, and the noise.
     explained: f32,
+    unexplained: f32,
     noise: f32,
-    /// Energy less noise of all usable gauges.
-    signal: f32,
 }
 
 impl Bank {
@@ -260,20 +263,28 @@ impl Bank {
         let Some(fit) = Fit::of(sums) else {
             return Agreement::default();
         };
+        let most = match kernel {
+            Kernel::Short => MOST_UNEXPLAINED_AFTER_CHANGE,
+            Kernel::Long => MOST_UNEXPLAINED,
+        };
+        let fits = |explained: f32, unexplained: f32, noise: f32| {
+            unexplained <= most * explained + UNEXPLAINED_PER_NOISE * noise
+        };
         let mut agreement = Agreement::default();
         for gauge in gauges_of(self.touch.usable) {
             let explained = fit.energy(sums, gauge);
             let noise = self.touch.noise[gauge];
             let unexplained = fit.variance(sums, gauge) - explained - noise;
-            agreement.signal += explained + unexplained.max(0.0);
-            if unexplained <= MOST_UNEXPLAINED * explained + UNEXPLAINED_PER_NOISE * noise {
+            if fits(explained, unexplained, noise) {
                 agreement.fitting |= 1 << gauge;
-                agreement.explained += explained;
-                agreement.noise += noise;
             } else if unexplained > explained {
                 agreement.misfits |= 1 << gauge;
             }
+            agreement.explained += explained;
+            agreement.unexplained += unexplained;
+            agreement.noise += noise;
         }
+        agreement.whole = fits(agreement.explained, agreement.unexplained, agreement.noise);
         agreement
     }
 
@@ -290,18 +301,44 @@ impl Bank {
     }
 }
 
+impl Bank {
     /// The wavelength that explains most over one of the kernels, and whether it can be stood by.
     fn look(&self, kernel: Kernel) -> Look {
         let (energies, number) = self.spectrum(kernel, self.touch.usable);
         let agreement = self.agreement(kernel, number);
         let vertex = self.vertex(kernel, number, |i| energies[i]);
         let wavelength_mm = vertex.unwrap_or(self.candidates[number].wavelength_mm);
+        // What was felt before a change of surface is no sign of stick and slip after it.
+        let jerky = kernel == Kernel::Long
+            && !self.force_channel
+            && self.jerky(wavelength_mm, &agreement);
         Look {
             number,
             wavelength_mm: (energies[number] > 0.0).then_some(wavelength_mm),
-            stands: vertex.is_some() && self.stands(kernel, number, wavelength_mm, &agreement),
+            jerky,
+            stands: vertex.is_some()
+                && !jerky
+                && self.stands(kernel, number, wavelength_mm, &agreement),
             agreement,
         }
+    }
+
+    fn finding(&self, look: &Look, valid: bool) -> Finding {
+        Finding {
+            wavelength_mm: look.wavelength_mm,
+            valid,
+            confidence: look.agreement.confidence(),
+            amplitude_lsb: self.amplitude_lsb(&look.agreement),
+            gauges_used: self.touch.usable,
+            misfits: if valid { look.agreement.misfits } else { 0 },
+            jerky: look.jerky,
+        }
+    }
+
+    /// Amplitude of the wave, RMS over the usable gauges.
+    fn amplitude_lsb(&self, agreement: &Agreement) -> f32 {
+        let usable = self.touch.usable.count_ones().max(1) as f32;
+        libm::sqrtf(2.0 * agreement.explained / usable)
     }
 
     fn stands(
@@ -325,15 +362,15 @@ impl Bank {
             * wavelength_mm;
         let per_sample_mm = self.speed_mm_s.max(SLOWEST_MM_S) / SAMPLE_RATE_HZ as f32;
         let noise = 2.0 * agreement.noise * per_sample_mm / kernel_mm;
-        let amplitude_lsb = agreement.amplitude_lsb();
+        let amplitude_lsb = self.amplitude_lsb(agreement);
         2 * fitting > usable
+            && (agreement.whole || kernel == Kernel::Short)
             && self.rested < REST_SAMPLES
             && fit.weight >= LEAST_FILLED
             && fit.determined() >= LEAST_DETERMINED
             && agreement.explained >= LEAST_OVER_NOISE * noise
             && amplitude_lsb >= LEAST_AMPLITUDE_LSB
             && amplitude_lsb * MOST_PICKUP >= self.touch.pickup_lsb
-            && (self.force_channel || !self.jerky(wavelength_mm, agreement))
     }
 }
 
@@ -343,6 +380,7 @@ struct Look {
     wavelength_mm: Option<f32>,
     agreement: Agreement,
     stands: bool,
+    jerky: bool,
 }
 
 impl Estimator for Bank {
@@ -395,7 +433,7 @@ impl Estimator for Bank {
         if long.stands && agree {
             self.since_valid = 0;
             self.known_mm = long.wavelength_mm.unwrap_or(0.0);
-            return long.finding(true);
+            return self.finding(&long, true);
         }
         if self.since_valid <= CHANGE_ESTIMATES {
             let short = self.look(Kernel::Short);
@@ -403,36 +441,18 @@ impl Estimator for Bank {
                 (wavelength_mm / self.known_mm - 1.0).abs() > MOST_DISAGREEMENT
             });
             if short.stands && changed {
-                return short.finding(true);
+                self.jerk = Jerk::default();
+                return self.finding(&short, true);
             }
         }
-        long.finding(false)
-    }
-}
-
-impl Look {
-    fn finding(&self, valid: bool) -> Finding {
-        Finding {
-            wavelength_mm: self.wavelength_mm,
-            valid,
-            confidence: self.agreement.confidence(),
-            amplitude_lsb: self.agreement.amplitude_lsb(),
-            gauges_used: self.agreement.fitting,
-            misfits: if valid { self.agreement.misfits } else { 0 },
-        }
+        self.finding(&long, false)
     }
 }
 
 impl Agreement {
-    /// Amplitude of the wave, RMS over the fitting gauges.
-    fn amplitude_lsb(&self) -> f32 {
-        let fitting = self.fitting.count_ones().max(1) as f32;
-        libm::sqrtf(2.0 * self.explained / fitting)
-    }
-
-    /// Share of the usable gauges' energy, noise left out, that the wave explains.
+    /// Share of the gauges' energy, noise left out, that the wave explains.
     fn confidence(&self) -> f32 {
-        let signal = self.signal.max(self.explained);
+        let signal = self.explained + self.unexplained.max(0.0);
         if signal > 0.0 {
             self.explained / signal
         } else {

@@ -30,7 +30,9 @@ pub struct Touch {
     /// Where the fingertip's contact was at the instant of `gauges`, to the sample: the arm's position,
     /// less its deflection F/k where the force channel tells it.
     pub place: Place,
-    /// The gauges behind the band-pass, in ADC steps.
+    /// The counted gauge behind the band-pass, as the paper has it: with whatever hum there is.
+    pub counted: f32,
+    /// The gauges behind the band-pass, hum taken out, in ADC steps; 0 if the estimator does not want them.
     pub banded: [f32; GAUGES],
     /// Where the contact was at the instant of `banded`, as far as a filter whose delay depends on
     /// frequency can have one: see [`crate::travel::ALIGNMENT_MS`].
@@ -58,6 +60,8 @@ pub struct Finding {
     pub gauges_used: u8,
     /// Bit g set: gauge g says something else than the others, who agree.
     pub misfits: u8,
+    /// The gauges hold more power at high frequencies than a slipping fingertip would make.
+    pub jerky: bool,
 }
 
 /// An estimator of λ.

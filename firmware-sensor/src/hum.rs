@@ -20,9 +20,13 @@ const _: () = assert!(SAMPLE_RATE_HZ.is_multiple_of(2 * MAINS_HZ));
 const FOLLOWED_SAMPLES: f32 = 300.0;
 /// Samples from the start until hum has been told from what else is at its frequency for the moment.
 const LEARNED_SAMPLES: u32 = 400;
+/// Samples from the start until a gauge may be blamed for its own hum: three time constants.
+const SURE_SAMPLES: u32 = 3 * FOLLOWED_SAMPLES as u32;
 /// Share of the gauges' power at the mains' frequency that is common to them, from which on it is taken
-/// for hum while that is still being learned. Five gauges of random phases have 0.2.
+/// for hum, and up to which for texture. Five gauges of random phases have 0.2.
 const COMMON: f32 = 0.6;
+/// See [`COMMON`].
+const DOUBTFUL: f32 = 0.4;
 /// How near v/λ may come to the mains' frequency, in Hz, before a texture may be taken for hum.
 const NEAR_HZ: f32 = 4.0;
 
@@ -70,7 +74,9 @@ impl Hum {
             // Goes on where the phase was.
             self.samples -= CYCLE as u32 * HALF as u32;
         }
-        let common = self.common(usable).0;
+        let (common, share) = self.common(usable);
+        let trust = ((share - DOUBTFUL) / (COMMON - DOUBTFUL)).clamp(0.0, 1.0);
+        let common = common.map(|z| trust * z);
         for (x, own) in gauges.iter_mut().zip(self.phasors) {
             let z = if self.near { common } else { own };
             *x -= z[0] * cos - z[1] * sin;
@@ -95,8 +101,12 @@ impl Hum {
         libm::hypotf(common[0], common[1])
     }
 
-    /// Amplitude of a gauge's own hum in ADC steps, beyond what is common to `usable`.
+    /// Amplitude of a gauge's own hum in ADC steps, beyond what is common to `usable`; 0 as long as it
+    /// may be texture.
     pub fn own_lsb(&self, gauge: usize, usable: u8) -> f32 {
+        if self.near || self.samples < SURE_SAMPLES {
+            return 0.0;
+        }
         let (common, _) = self.common(usable & !(1 << gauge));
         let z = self.phasors[gauge];
         libm::hypotf(z[0] - common[0], z[1] - common[1])
