@@ -263,7 +263,7 @@ impl Estimator {
     /// The method's name in scenes and in the JSON.
     pub const fn method_name(&self) -> &'static str {
         match self.method {
-            Method::Counting => "counting", _ => "x",
+            Method::Counting => "counting",
         }
     }
 }
