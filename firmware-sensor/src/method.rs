@@ -37,14 +37,9 @@ impl Running {
 }
 
 impl Running {
-    /// Whether the estimator looks at the gauges behind the band-pass ([`Touch::banded`]).
-    pub fn wants_band_pass(&self) -> bool {
-        matches!(self, Self::Crossings(_))
-    }
-
     /// Whether the estimator has to wait until the start has died down in the band-pass.
     pub fn waits(&self) -> bool {
-        !matches!(self, Self::Bank(_))
+        matches!(self, Self::Counting(_) | Self::AdaptedCounting(_))
     }
 }
 
