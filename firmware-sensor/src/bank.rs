@@ -245,7 +245,8 @@ impl Bank {
         if *around.end() >= self.count {
             return None;
         }
-        let [x0, x1, x2] = [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
+        let [x0, x1, x2] =
+            [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
         let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
             let energy = energy(i).max(f32::MIN_POSITIVE);
             match kernel {
@@ -311,9 +312,8 @@ impl Bank {
         let vertex = self.vertex(kernel, number, |i| energies[i]);
         let wavelength_mm = vertex.unwrap_or(self.candidates[number].wavelength_mm);
         // What was felt before a change of surface is no sign of stick and slip after it.
-        let jerky = kernel == Kernel::Long
-            && !self.force_channel
-            && self.jerky(wavelength_mm, &agreement);
+        let jerky =
+            kernel == Kernel::Long && !self.force_channel && self.jerky(wavelength_mm, &agreement);
         Look {
             number,
             wavelength_mm: (energies[number] > 0.0).then_some(wavelength_mm),

@@ -87,7 +87,11 @@ impl Health {
                     at_rails += 1.0 / SCANS_PER_SAMPLE as f32;
                 }
             }
-            history.still = if changed { 0 } else { history.still.saturating_add(1) };
+            history.still = if changed {
+                0
+            } else {
+                history.still.saturating_add(1)
+            };
             history.at_rails += follow * (at_rails - history.at_rails);
             let away = sample[gauge] - history.mean;
             history.mean += follow * away;
@@ -104,7 +108,11 @@ impl Health {
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             let misfit = signs.misfits >> gauge & 1 == 1;
             if signs.agreed {
-                history.misfits = if misfit { history.misfits.saturating_add(1) } else { 0 };
+                history.misfits = if misfit {
+                    history.misfits.saturating_add(1)
+                } else {
+                    0
+                };
             }
             let hum = signs.hum_lsb[gauge] * signs.hum_lsb[gauge] / 2.0;
             let fault = if history.at_rails > AT_RAILS {

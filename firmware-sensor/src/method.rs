@@ -12,6 +12,10 @@ use crate::travel::Travel;
 /// One estimator of four, as large as the largest: which one is known at run time only, and there is no
 /// heap to put it on.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one Running on a board, and no heap to put its larger variant on"
+)]
 pub enum Running {
     /// [`Method::Bank`]
     Bank(Bank),

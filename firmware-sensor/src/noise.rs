@@ -58,7 +58,9 @@ mod tests {
     fn measures_white_noise_to_within_its_own_spread() {
         let mut state = 1_u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
         // Uniform over ±60: variance 60²/3, and 1/12 of the rounding.
@@ -66,15 +68,17 @@ mod tests {
         let want = (60.0 * 60.0 / 3.0 + 1.0 / 12.0) * f64::from(decimate::NOISE_GAIN);
         // 600 squares in the mean, each as uncertain as it is large, √2: six of their deviations.
         let bound = 6.0 * libm::sqrt(2.0 / 600.0);
-        assert!((f64::from(variance) / want - 1.0).abs() < bound, "{variance} not {want}");
+        assert!(
+            (f64::from(variance) / want - 1.0).abs() < bound,
+            "{variance} not {want}"
+        );
     }
 
     #[test]
     fn does_not_take_a_texture_for_noise() {
         // 100 Hz of 400 steps: 1.5e-5 · 400²/2 · 0.22 / 20 = 0.013, beside the ADC's own rounding.
         let variance = run(|scan| {
-            2_048.0
-                + 400.0 * libm::sin(2.0 * core::f64::consts::PI * 100.0 * scan as f64 / 4_000.0)
+            2_048.0 + 400.0 * libm::sin(2.0 * core::f64::consts::PI * 100.0 * scan as f64 / 4_000.0)
         });
         assert!(variance < 0.2, "{variance}");
     }

@@ -97,15 +97,17 @@ impl Sensor {
     /// is no counted wavelength before a whole window has been counted. What is known of the gauges, the
     /// positions and the arm go on.
     pub fn configure(&mut self, configuration: SensorConfiguration) {
+        if configuration.counted_gauge != self.configuration.counted_gauge {
+            self.settling = SETTLING_SAMPLES;
+            if let Some(started) = &mut self.started {
+                started.lane = None;
+            }
+        }
         self.configuration = configuration;
         self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
         self.block.clear();
-        self.settling = SETTLING_SAMPLES;
-        if let Some(started) = &mut self.started {
-            started.lane = None;
-        }
     }
 
     /// The configuration in force.
