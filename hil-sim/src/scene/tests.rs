@@ -50,7 +50,9 @@ fn every_key_of_the_contract_parses() {
         hum_50_hz = 0.0
         dead = []
         saturated = []
-        tangential = false
+        tangential = true
+        tangential_n_per_v = 1.5
+        stiffness_n_per_m = 600
         second_harmonic = 0.15
         [link]
         delay_ms = 0.0
@@ -106,8 +108,7 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
         Path::new("x.toml"),
         &format!(
             "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
-             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n\
-             stiffness = \"estimated\"\n"
+             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n"
         ),
     )
     .unwrap();
@@ -121,7 +122,6 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             gauges: 0b1_0011,
             bank_travel_percent: 150,
             bank_candidates: 36,
-            stiffness_n_per_m: 0,
             ..SensorConfiguration::DEFAULT
         }
     );
@@ -137,6 +137,33 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             ),
         );
         assert_eq!(scene.unwrap().sensor_configuration().check(), Ok(()));
+    }
+}
+
+#[test]
+fn the_force_channel_is_the_sensors_as_the_gauges_section_has_it() {
+    let configuration = |section: &str| {
+        let text = format!("{SURFACE}{section}");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        let configuration = scene.sensor_configuration();
+        assert_eq!(configuration.check(), Ok(()), "{section}");
+        (
+            configuration.force_channel,
+            configuration.force_mn_per_v,
+            configuration.stiffness_n_per_m,
+        )
+    };
+    let wired = "[gauges]\ntangential = true\n";
+    assert_eq!(configuration(wired), (true, 1_000, 400));
+    let other = format!("{wired}tangential_n_per_v = 1.5\nstiffness_n_per_m = 600\n");
+    assert_eq!(configuration(&other), (true, 1_500, 600));
+    let estimated = format!("{other}[estimator]\nstiffness = \"estimated\"\n");
+    assert_eq!(configuration(&estimated), (true, 1_500, 0));
+    // Both ends of what a scene may give.
+    for (n_per_v, n_per_m) in [("0.05", "10"), ("20", "10_000")] {
+        configuration(&format!(
+            "{wired}tangential_n_per_v = {n_per_v}\nstiffness_n_per_m = {n_per_m}\n"
+        ));
     }
 }
 
@@ -172,7 +199,17 @@ fn all_but_the_specimens_has_a_default() {
         scene.arm,
         ArmDrive {
             follows: Follows::Motion,
-            lag_ms: 0.0
+            lag_ms: 0.0,
+            encoder_um: 5,
+        }
+    );
+    assert_eq!(scene.contact, Contact::Kinematic);
+    assert_eq!(
+        scene.force,
+        Force {
+            present: false,
+            n_per_v: 1.0,
+            stiffness_n_per_m: 400.0,
         }
     );
     assert!(matches!(scene.gauges, Gauges::Kinematic(k) if k == Kinematic::default()));
@@ -317,6 +354,10 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:4: estimator.stiffness: \"guessed\" is unknown",
         ),
         (
+            "[estimator]\nstiffness = \"estimated\"",
+            "x.toml:4: estimator.stiffness: cannot be estimated without the force channel",
+        ),
+        (
             "[expect]\nwrong_share_max = 1.1",
             "x.toml:4: expect.wrong_share_max: 1.1 is not a share",
         ),
@@ -451,16 +492,9 @@ fn broken_toml_is_refused_at_its_line() {
 fn what_this_version_does_not_build_is_refused_as_such() {
     for (section, key) in [
         (
-            "[contact]\nmodel = \"stick-slip\"",
-            "x.toml:4: contact.model: \"stick-slip\"",
-        ),
-        (
-            "[contact]\nfriction = \"severe\"",
-            "x.toml:4: contact.friction: \"severe\"",
-        ),
-        (
-            "[gauges]\nstiffness_n_per_m = 400",
-            "x.toml:4: gauges.stiffness_n_per_m:",
+            "[contact]
+model = \"rigid\"",
+            "x.toml:4: contact.model: \"rigid\"",
         ),
         (
             "[[fault]]\nat_s = 1.0\nkind = \"link-down\"\nfor_s = 0.5",
