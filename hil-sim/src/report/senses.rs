@@ -24,7 +24,7 @@ const OF_CONTACT: [(Colour, &str); 3] = [
 ];
 const OF_GAUGES: [(Colour, &str); 3] = [
     (FIRST, "gauge takes part"),
-    (QUIET, "sound, takes no part"),
+    (QUIET, "sound but unused"),
     (REFUSED, "left out: dead, stuck, saturated, noisy or hum"),
 ];
 

@@ -128,7 +128,7 @@ fn senses(estimates: &[JudgedEstimate]) -> Vec<(&'static str, String)> {
     for (gauge, name) in NAMES.into_iter().enumerate() {
         let said = estimates.iter().map(|e| match e.health[gauge] {
             GaugeHealth::Good if e.gauges_used >> gauge & 1 == 1 => "takes part",
-            GaugeHealth::Good => "sound, takes no part",
+            GaugeHealth::Good => "sound but unused",
             other => words::of_health(other),
         });
         lines.push((name, shares(said)));
