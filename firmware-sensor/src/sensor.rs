@@ -132,7 +132,7 @@ impl Sensor {
         self.settling = self.settling.saturating_sub(1);
 
         let arm_um = started.travel.position_um(0);
-        let place = started.place(self.samples, instant_us);
+        let number = self.samples;
         self.samples = self.samples.wrapping_add(1);
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
@@ -157,7 +157,7 @@ impl Sensor {
             None
         };
         let gauges = if self.configuration.stream_gauges {
-            self.block.push(place, &sample)
+            self.block.push(started.place(number, instant_us), &sample)
         } else {
             None
         };
