@@ -28,8 +28,8 @@ use pink::{Pink, Poles};
 pub use recorded::RecordedGauges;
 use resonance::{Resonance, Ring};
 use stream::Stream;
-pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 use trouble::Trouble;
+pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 
 /// Scans of all channels per second.
 pub const SCAN_RATE_HZ: u32 = 4_000;

@@ -12,6 +12,9 @@ pub const KINETIC: f64 = 0.6;
 /// Velocity vs at which the surplus over μk has fallen to 1/e, in m/s: a guess.
 pub const STRIBECK_M_S: f64 = 0.02;
 
+/// (v/vs)² from which on the surplus is below the last digit of μk.
+const NOTHING_LEFT: f64 = 40.0;
+
 /// Friction force over sliding speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stribeck {
@@ -47,7 +50,11 @@ impl Stribeck {
     #[inline]
     pub fn sliding_n(&self, velocity_m_s: f64) -> f64 {
         let relative = velocity_m_s * (1.0 / STRIBECK_M_S);
-        self.kinetic_n + self.surplus_n * (-relative * relative).exp()
+        let square = relative * relative;
+        if square > NOTHING_LEFT {
+            return self.kinetic_n;
+        }
+        self.kinetic_n + self.surplus_n * (-square).exp()
     }
 }
 
