@@ -285,18 +285,24 @@ fn pink_noise_has_its_rms_its_slope_and_its_own_stream() {
             .map(|(pink, white)| pink - white)
             .collect();
         power += rms(&noise).powi(2) / 5.0;
-        let band = |low: i32, high: i32| -> f64 {
-            (low * 10..high * 10)
-                .map(|bin| tone(&noise, f64::from(bin) / 10.0).0.powi(2) / 2.0)
+        // An octave from 20 of its tones.
+        let octave = |low_hz: f64| -> f64 {
+            (0..20)
+                .map(|tenth| {
+                    tone(&noise, low_hz * (1.0 + f64::from(tenth) / 20.0))
+                        .0
+                        .powi(2)
+                        * low_hz
+                })
                 .sum()
         };
-        slow += band(2, 4) / 5.0;
-        fast += band(100, 200) / 5.0;
+        slow += octave(2.0);
+        fast += octave(128.0);
     }
     // Most of the power lies below 10 Hz, some hundred degrees of freedom in all: 5 σ are 60 %.
     assert!((0.1..0.4).contains(&power), "{power} for 0.25");
-    // Octaves of 1/f hold the same. 5 · 2 · 20 degrees of freedom in the lower one: σ = 10 %; 4 σ and a
-    // decibel of ripple.
+    // Octaves of 1/f hold the same. 5 · 2 · 20 degrees of freedom in each: σ = 14 % of the ratio; 4 σ and
+    // a decibel of ripple.
     assert!((0.45..1.8).contains(&(slow / fast)), "{slow} to {fast}");
 }
 

@@ -57,11 +57,8 @@ fn rhythm(track: impl Iterator<Item = (f64, f64, bool)>) -> Rhythm {
 }
 
 /// Three seconds at `speed_m_s` from rest.
-fn rubbed(friction: Friction, speed_m_s: f64, sub_step_s: f64) -> Rhythm {
-    let mut slider = Slider {
-        sub_step_s,
-        ..slider(friction)
-    };
+fn rubbed(friction: Friction, speed_m_s: f64) -> Rhythm {
+    let mut slider = slider(friction);
     rhythm((0..12_000).map(|scan| {
         let t_s = f64::from(scan) * SCAN_S;
         slider.follow(t_s, speed_m_s * t_s);
@@ -148,10 +145,7 @@ fn a_slider_that_slides_steadily_lags_by_kinetic_friction_over_stiffness() {
 fn the_rhythm_is_that_of_a_plain_integration_in_steps_of_a_microsecond() {
     for friction in FRICTIONS {
         for speed_m_s in [0.03, 0.07] {
-            let (fast, plain) = (
-                rubbed(friction, speed_m_s, SUB_STEP_S),
-                reference(friction, speed_m_s),
-            );
+            let (fast, plain) = (rubbed(friction, speed_m_s), reference(friction, speed_m_s));
             // The first and the last slip are seen on a scan, ± 250 µs of 2 s: 2.5e-4. Euler's error is
             // its step times the fastest rate in a slip, 1 µs / 0.22 ms, for the tenth of the period that
             // falls into it: 5e-4.
@@ -172,12 +166,11 @@ fn the_rhythm_is_that_of_a_plain_integration_in_steps_of_a_microsecond() {
     }
 }
 
-/// Places in mm every millisecond of two seconds along a stroke with two reversals.
-fn stroke(friction: Friction, sub_step_s: f64, scans_per_ms: u32) -> Vec<f64> {
-    let mut slider = Slider {
-        sub_step_s,
-        ..slider(friction)
-    };
+/// Places in mm every millisecond of two seconds along a stroke with three reversals; steps shorter by
+/// `finer`.
+fn stroke(friction: Friction, stiffness: f64, finer: f64, scans_per_ms: u32) -> Vec<f64> {
+    let mut slider = Slider::new(Stribeck::new(friction), stiffness);
+    slider.longest_step_s /= finer;
     let arm_m = |t_s: f64| 0.07 / 5.0 * (1.0 - (5.0 * t_s).cos());
     (0..2_000 * scans_per_ms)
         .filter_map(|scan| {
@@ -196,20 +189,20 @@ fn farthest(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn the_step_does_not_matter_within_a_tenth_of_a_micrometre_nor_the_scans_within_one() {
+fn the_step_does_not_matter_within_a_fifth_of_a_micrometre_nor_the_scans_within_one() {
     for friction in FRICTIONS {
-        let places = stroke(friction, SUB_STEP_S, 4);
-        // Fourth order: rates are off by (50 µs / 0.22 ms)⁴ / 120 = 2e-5, a slip of 10 ms by 0.2 µs, which
-        // at 200 mm/s is 0.04 µm. The next rest begins afresh but for its place.
-        let finer = stroke(friction, SUB_STEP_S / 25.0, 4);
-        let off_mm = farthest(&places, &finer);
-        assert!(off_mm < 1e-4, "{friction:?}: {off_mm} mm");
-        // Straight lines between scans are off in velocity by a·T/2 = 350 mm/s² · 125 µs = 0.04 mm/s. That
-        // moves a break by c·Δv/(k·v) = 0.3 µs at 50 mm/s, and the slip behind it by 0.06 µm; the slower
-        // the arm, the more.
-        let denser = stroke(friction, SUB_STEP_S, 20);
-        let off_mm = farthest(&places, &denser);
-        assert!(off_mm < 1e-3, "{friction:?}: {off_mm} mm");
+        for stiffness in [100.0, 400.0, 3_000.0] {
+            let places = stroke(friction, stiffness, 1.0, 4);
+            // Rates are off by 3e-5, a slip of 10 ms by 0.3 µs, which at 200 mm/s is 0.06 µm. The next rest
+            // begins afresh but for its place.
+            let off_mm = farthest(&places, &stroke(friction, stiffness, 25.0, 4));
+            assert!(off_mm < 2e-4, "{friction:?} {stiffness}: {off_mm} mm");
+            // Straight lines between scans are off in velocity by a·T/2 = 350 mm/s² · 125 µs = 0.04 mm/s.
+            // That moves a break by c·Δv/(k·v) = 0.3 µs at 50 mm/s, and the slip behind it by 0.06 µm; the
+            // slower the arm and the softer the spring, the more.
+            let off_mm = farthest(&places, &stroke(friction, stiffness, 1.0, 20));
+            assert!(off_mm < 1e-3, "{friction:?} {stiffness}: {off_mm} mm");
+        }
     }
 }
 
