@@ -44,6 +44,9 @@ pub struct Summary {
     /// Share of the time in motion (|v| > [`MOTION_MM_S`]) with a valid estimate, 0 to 1; none
     /// without motion.
     pub valid_share: Option<f64>,
+    /// Share of all estimates that are valid and yet more than [`SETTLED`] off, 0 to 1; none without
+    /// any estimate.
+    pub wrong_share: Option<f64>,
     /// From the last boundary between two specimens until every later valid estimate is within
     /// [`SETTLED`], in ms; none without a boundary, or if that never came.
     pub settling_ms: Option<f64>,
@@ -57,6 +60,13 @@ impl JudgedEstimate {
         let truth_mm = self.truth_mm?;
         let wavelength_mm = self.wavelength_mm.filter(|_| self.valid)?;
         Some((wavelength_mm - truth_mm) / truth_mm)
+    }
+
+    /// Whether the estimator stands by something that is more than [`SETTLED`] off, or no number at
+    /// all. Never where there is no surface.
+    pub fn is_wrong(&self) -> bool {
+        let right = |error: f64| error.abs() <= SETTLED;
+        self.valid && self.truth_mm.is_some() && !self.relative_error().is_some_and(right)
     }
 }
 
@@ -98,6 +108,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summ
                 .filter_map(|e| e.wavelength_mm),
         ),
         valid_share: valid_share(&arm, &estimates),
+        wrong_share: mean(estimates.iter().map(|e| f64::from(u8::from(e.is_wrong())))),
         settling_ms: last_boundary_s(truth, &arm).and_then(|at_s| settling_ms(at_s, &estimates)),
         latency_ms: mean(received),
     };
@@ -207,6 +218,22 @@ mod tests {
         assert!(near(summary.bias_percent, 2.5, 1e-4), "{summary:?}");
         assert!(near(summary.mean_mm, 2.05, 1e-6), "{summary:?}");
         assert_eq!(summary.settling_ms, None);
+    }
+
+    #[test]
+    fn wrong_are_the_valid_estimates_that_are_more_than_a_tenth_off() {
+        // λ = 2 mm: in turn 2.3 mm valid (wrong), 2.3 mm invalid, 1.9 mm valid, no number but valid (wrong).
+        let run = Run {
+            estimate: Box::new(|t_s| match (t_s * 100.0).round() as u32 % 4 {
+                0 => (2.3, true),
+                1 => (2.3, false),
+                2 => (1.9, true),
+                _ => (f32::NAN, true),
+            }),
+            duration_s: 2.01,
+            ..Run::steady(50.0, 2.0)
+        };
+        assert_eq!(summary(&run).wrong_share, Some(0.5));
     }
 
     #[test]
