@@ -91,25 +91,31 @@ impl Axis {
         }
     }
 
-    /// Named steps, group by group.
-    pub fn named(label: &'static str, groups: Vec<(String, Vec<(String, Vec<Setting>)>)>) -> Self {
-        let mut axis = Self {
+    /// An axis without steps, for [`Axis::group`] to add to.
+    pub fn named(label: &'static str) -> Self {
+        Self {
             label,
             scale: Scale::Named,
             steps: Vec::new(),
             groups: Vec::new(),
-        };
-        for (name, steps) in groups {
-            axis.groups.push((name, steps.len()));
-            for (label, settings) in steps {
-                axis.steps.push(Step {
-                    at: axis.steps.len() as f64,
-                    label,
-                    settings,
-                });
-            }
         }
-        axis
+    }
+
+    /// Adds named steps that belong together.
+    pub fn group(
+        &mut self,
+        name: String,
+        steps: impl IntoIterator<Item = (&'static str, Vec<Setting>)>,
+    ) {
+        let before = self.steps.len();
+        for (label, settings) in steps {
+            self.steps.push(Step {
+                at: self.steps.len() as f64,
+                label: label.to_owned(),
+                settings,
+            });
+        }
+        self.groups.push((name, self.steps.len() - before));
     }
 
     /// The CSV's columns for this axis.

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use super::Map;
 use super::axis::Axis;
 use super::error::MapError;
-use super::knob::{Knob, Setting};
+use super::knob::Knob;
 
 /// Noise of all maps but the one that changes it, in dB.
 const SNR_DB: f64 = 20.0;
@@ -122,21 +122,19 @@ fn wavelength(eighths: RangeInclusive<i32>) -> Axis {
 
 /// Four frictions for each of three wavelengths, without and with the force channel.
 fn friction() -> Axis {
-    let mut groups = Vec::new();
+    let mut axis = Axis::named("friction");
     for (tangential, channel) in [("false", "no force"), ("true", "force")] {
         for wavelength_mm in [1.0, 2.0, 4.0] {
-            let steps = ["none", "mild", "strong", "severe"]
-                .map(|friction| {
-                    let settings: Vec<Setting> = vec![
-                        Knob::Wavelength.at(wavelength_mm),
-                        Knob::Friction.is(friction),
-                        Knob::Tangential.is(tangential),
-                    ];
-                    (friction.to_owned(), settings)
-                })
-                .to_vec();
-            groups.push((format!("{wavelength_mm} mm, {channel}"), steps));
+            let steps = ["none", "mild", "strong", "severe"].map(|friction| {
+                let settings = vec![
+                    Knob::Wavelength.at(wavelength_mm),
+                    Knob::Friction.is(friction),
+                    Knob::Tangential.is(tangential),
+                ];
+                (friction, settings)
+            });
+            axis.group(format!("{wavelength_mm} mm, {channel}"), steps);
         }
     }
-    Axis::named("friction", groups)
+    axis
 }
