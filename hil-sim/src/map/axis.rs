@@ -48,6 +48,11 @@ impl Axis {
         Self::numbers(label, Scale::Log, knob, 1.0, values)
     }
 
+    /// These steps, in rising order and about the same ratio apart.
+    pub fn listed(label: &'static str, knob: Knob, values: &[f64]) -> Self {
+        Self::numbers(label, Scale::Log, knob, 1.0, values.iter().copied())
+    }
+
     /// `count` steps from `first` to `last` by the same difference.
     pub fn linear(label: &'static str, knob: Knob, first: f64, last: f64, count: usize) -> Self {
         Self::linear_in(label, knob, 1.0, first, last, count)
@@ -159,15 +164,20 @@ impl Axis {
         Some((at.round().max(0.0) as usize).min(self.steps.len() - 1))
     }
 
-    /// Where a value is, counted in steps from the first; None if there is no such place.
+    /// Where a value is, counted in steps from the first: on the axis' scale between the two steps around
+    /// it, and beyond the ends as it goes on there. None if there is no such place.
     pub fn along(&self, value: f64) -> Option<f64> {
-        let (first, last) = (self.steps.first()?.at, self.steps.last()?.at);
         let scaled = |value: f64| match self.scale {
             Scale::Log => value.ln(),
             Scale::Linear | Scale::Named => value,
         };
-        let share = (scaled(value) - scaled(first)) / (scaled(last) - scaled(first));
-        let along = share * (self.steps.len() - 1) as f64;
+        let after = self.steps.partition_point(|step| step.at <= value);
+        let from = after.max(1).min(self.steps.len().checked_sub(1)?) - 1;
+        let (low, high) = (
+            scaled(self.steps[from].at),
+            scaled(self.steps.get(from + 1)?.at),
+        );
+        let along = from as f64 + (scaled(value) - low) / (high - low);
         along.is_finite().then_some(along)
     }
 
@@ -246,6 +256,9 @@ mod tests {
         assert_eq!(log.nearest("1e9"), Some(2));
         assert_eq!(log.nearest("-1"), None);
         assert_eq!(log.nearest("fast"), None);
+        let listed = Axis::listed("", Knob::Encoder, &[5.0, 10.0, 15.0, 200.0]);
+        assert_eq!(listed.nearest("15"), Some(2));
+        assert_eq!(listed.along(20.0 / 2f64.sqrt() / 2.0), Some(0.5));
     }
 
     #[test]

@@ -14,6 +14,11 @@ const SPEED_MM_S: f64 = 50.0;
 /// Reversals of the paper's Fig. 7, in Hz.
 const FIG_7_HZ: f64 = 0.83;
 
+/// Encoders, in µm: the model's counter has steps of 5 µm.
+const ENCODER_UM: [f64; 11] = [
+    5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 70.0, 100.0, 150.0, 200.0,
+];
+
 /// All maps, in order.
 pub fn catalogue() -> Vec<Map> {
     let noise = || Knob::Snr.at(SNR_DB);
@@ -63,7 +68,7 @@ pub fn catalogue() -> Vec<Map> {
             name: "encoder-wavelength",
             title: "Encoder resolution × wavelength",
             conditions: "50 mm/s, 20 dB",
-            x: Axis::log("encoder resolution in µm", Knob::Encoder, 5.0, 200.0, 17),
+            x: Axis::listed("encoder resolution in µm", Knob::Encoder, &ENCODER_UM),
             y: wavelength(-3..=19),
             base: vec![noise(), speed()],
         },
