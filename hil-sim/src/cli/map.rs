@@ -54,18 +54,16 @@ impl Maps {
             }
             named
         };
-        let mut methods = if self.methods.is_empty() {
-            METHODS.map(str::to_owned).to_vec()
-        } else {
-            self.methods
-        };
         // Naming one twice runs it once.
-        let all = methods.clone();
-        let mut index = 0;
-        methods.retain(|method| {
-            index += 1;
-            !all[..index - 1].contains(method)
-        });
+        let mut methods: Vec<String> = Vec::new();
+        for method in self.methods {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        if methods.is_empty() {
+            methods = METHODS.map(str::to_owned).to_vec();
+        }
         if self.list {
             list(&maps);
             return Ok(ExitCode::SUCCESS);
@@ -123,7 +121,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Vec<String>> {
 /// A bar on stderr; none if that is no terminal.
 fn progress(name: &'static str, runs: usize) -> ProgressBar {
     let bar = ProgressBar::new(runs as u64);
-    let template = "{msg:20} {bar:40} {pos}/{len}, {per_sec}, {eta} to go";
+    let template = "{msg:20} {bar:40} {pos}/{len} runs, {elapsed} so far, {eta} to go";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }

@@ -13,7 +13,7 @@ const WIDTH: f64 = 1_000.0;
 const RIGHT: f64 = 14.0;
 const GAP: f64 = 26.0;
 /// Top edge of the first row's name.
-const TOP: f64 = 142.0;
+const TOP: f64 = 126.0;
 /// Room for a row's name above its panels.
 const NAME: f64 = 22.0;
 const BELOW_ROW: f64 = 14.0;
@@ -50,7 +50,7 @@ const QUANTITIES: [Quantity; 3] = [
         white_zero: false,
     },
     Quantity {
-        title: "share of the time in motion with a valid estimate",
+        title: "valid share of the time in motion",
         ramp: Ramp::Meadow,
         value: |measured| measured.valid_share.map(|share| 100.0 * share),
         share: |percent| percent / 100.0,
@@ -65,7 +65,7 @@ const QUANTITIES: [Quantity; 3] = [
         white_zero: false,
     },
     Quantity {
-        title: "estimates valid, yet more than 10 % off",
+        title: "valid, yet more than 10 % off",
         ramp: Ramp::Ember,
         value: |measured| measured.wrong_share().map(|share| 100.0 * share),
         share: |percent| decades_above(0.1, percent),
