@@ -13,8 +13,8 @@ use super::bounds::{
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link, Motion,
-    Profile, Resonance, Scene, SceneError, Specimen, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link,
+    Motion, Profile, Resonance, Scene, SceneError, Specimen, Surface,
 };
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
 
