@@ -9,6 +9,7 @@ use protocol::Role;
 
 mod cost;
 mod demo;
+mod map;
 mod run;
 mod size;
 
@@ -33,6 +34,9 @@ enum Command {
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
     Cost(Cost),
+    /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
+    /// heat maps. Run again, it goes on where it was stopped
+    Map(map::Maps),
 }
 
 #[derive(Debug, clap::Args)]
@@ -120,6 +124,7 @@ impl Arguments {
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
+            Command::Map(maps) => maps.execute(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod analysis;
 pub mod arm;
+pub mod contact;
 pub mod dac81416;
 pub mod digest;
 pub mod elf;
@@ -9,12 +10,14 @@ pub mod expectation;
 pub mod gauges;
 pub mod json;
 pub mod listener;
+pub mod map;
 pub mod motion;
 pub mod native;
 pub mod outcome;
 pub mod recording;
 pub mod report;
 pub mod scene;
+pub mod skew;
 pub mod surface;
 pub mod truth;
 pub mod weather;

@@ -7,8 +7,15 @@ pub const MM_PER_COUNT: f64 = 0.005;
 
 /// The 16-bit counter of an encoder at `position_mm`: counts of 5 µm, wrapping.
 pub fn encoder(position_mm: f64) -> u16 {
+    coarse_encoder(position_mm, 1)
+}
+
+/// The same of an encoder that goes on by `step_counts` at a time, 1 or more.
+pub fn coarse_encoder(position_mm: f64, step_counts: u16) -> u16 {
+    let counts = (position_mm / MM_PER_COUNT).floor() as i64;
+    let step_counts = i64::from(step_counts);
     // Two's complement: a negative position wraps downwards.
-    (position_mm / MM_PER_COUNT).floor() as i64 as u16
+    (counts.div_euclid(step_counts) * step_counts) as u16
 }
 
 impl Motion {
@@ -81,6 +88,18 @@ mod tests {
         assert_eq!(encoder(1.0025), 200);
         assert_eq!(encoder(-0.001), 65_535);
         assert_eq!(encoder(65_536.0 * 0.005 + 0.001), 0);
+    }
+
+    #[test]
+    fn a_coarse_encoder_stands_on_whole_steps_and_wraps_as_a_fine_one() {
+        for (position_mm, fine) in [(0.0, 0), (1.0025, 200), (-0.001, 65_535)] {
+            assert_eq!(coarse_encoder(position_mm, 1), fine);
+        }
+        // Steps of 50 µm: ten counts.
+        assert_eq!(coarse_encoder(0.0499, 10), 0);
+        assert_eq!(coarse_encoder(0.0501, 10), 10);
+        assert_eq!(coarse_encoder(-0.001, 10), 65_526);
+        assert_eq!(coarse_encoder(65_540.0 * 0.005 + 0.001, 10), 4);
     }
 
     #[test]

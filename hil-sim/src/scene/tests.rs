@@ -42,16 +42,30 @@ fn every_key_of_the_contract_parses() {
         [arm]
         follows = "motion"
         lag_ms = 0.0
+        encoder_um = 50
         [contact]
         model = "auto"
-        friction = "none"
+        friction = "strong"
         [gauges]
         snr_db = 20.0
         hum_50_hz = 0.0
         dead = []
         saturated = []
-        tangential = false
+        tangential = true
+        tangential_n_per_v = 0.5
+        stiffness_n_per_m = 800
         second_harmonic = 0.15
+        stuck = [0]
+        noisy = [1]
+        humming = [2]
+        trouble_from_s = 1
+        trouble_for_s = 0.5
+        resonance_hz = 180
+        resonance_damping = 0.2
+        pink = 0.1
+        drift = 0.3
+        offset = 5
+        skew_us = -250
         [link]
         delay_ms = 0.0
         jitter_ms = 0.0
@@ -59,12 +73,18 @@ fn every_key_of_the_contract_parses() {
         reorder = 0.0
         corrupt = 0.0
         [estimator]
-        method = "default"
-        window_ms = 80
+        method = "crossings"
+        window_ms = 60
+        counted_gauge = 1
+        gauges = [0, 1, 4]
+        travel_wavelengths = 1.5
+        candidates = 36
+        stiffness = "estimated"
         [display]
         mode = "travelling"
         [expect]
         wavelength_rms_percent = 1.0
+        wrong_share_max = 0.001
         "#,
     )
     .unwrap();
@@ -74,11 +94,135 @@ fn every_key_of_the_contract_parses() {
         panic!("not kinematic")
     };
     assert_eq!(gauges.snr_db, Some(20.0));
-    assert_eq!(gauges.second_harmonic, 0.15);
+    assert_eq!(
+        gauges,
+        Kinematic {
+            snr_db: Some(20.0),
+            second_harmonic: 0.15,
+            stuck: [true, false, false, false, false],
+            noisy: [false, true, false, false, false],
+            humming: [false, false, true, false, false],
+            trouble_from_s: 1.0,
+            trouble_for_s: Some(0.5),
+            resonance: Some(Resonance {
+                hz: 180.0,
+                damping: 0.2
+            }),
+            pink: 0.1,
+            drift: 0.3,
+            offset: 5.0,
+            skew_us: -250.0,
+            ..Kinematic::default()
+        }
+    );
+    assert_eq!(
+        scene.force,
+        Force {
+            present: true,
+            n_per_v: 0.5,
+            stiffness_n_per_m: 800.0
+        }
+    );
+    assert_eq!(scene.contact, Contact::StickSlip(Friction::Strong));
+    assert_eq!(scene.arm.encoder_um, 50);
     assert_eq!(scene.surface.specimens.len(), 2);
     assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
     assert_eq!(scene.display_mode, Mode::Travelling);
     assert_eq!(scene.expect.wavelength_rms_percent, Some(1.0));
+    assert_eq!(scene.expect.wrong_share_max, Some(0.001));
+    assert_eq!(
+        scene.estimator,
+        Estimator {
+            method: Method::Crossings,
+            window_ms: 60,
+            counted_gauge: 1,
+            gauges: [true, true, false, false, true],
+            travel_percent: 150,
+            candidates: 36,
+            stiffness: Stiffness::Estimated,
+        }
+    );
+}
+
+#[test]
+fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
+    let scene = Scene::parse(
+        Path::new("x.toml"),
+        &format!(
+            "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
+             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n"
+        ),
+    )
+    .unwrap();
+    let configuration = scene.sensor_configuration();
+    assert_eq!(
+        configuration,
+        SensorConfiguration {
+            method: Method::AdaptedCounting,
+            window_ms: 60,
+            counted_gauge: 1,
+            gauges: 0b1_0011,
+            bank_travel_percent: 150,
+            bank_candidates: 36,
+            ..SensorConfiguration::DEFAULT
+        }
+    );
+    // Both ends of every range that a scene may give are in the sensor's.
+    for [travel, candidates, window_ms, gauge] in
+        [["0.3", "12", "10", "0"], ["3", "36", "200", "4"]]
+    {
+        let scene = Scene::parse(
+            Path::new("x.toml"),
+            &format!(
+                "{SURFACE}[estimator]\ntravel_wavelengths = {travel}\ncandidates = {candidates}\n\
+                 window_ms = {window_ms}\ncounted_gauge = {gauge}\ngauges = [{gauge}]\n"
+            ),
+        );
+        assert_eq!(scene.unwrap().sensor_configuration().check(), Ok(()));
+    }
+}
+
+#[test]
+fn the_force_channel_is_the_sensors_as_the_gauges_section_has_it() {
+    let configuration = |section: &str| {
+        let text = format!("{SURFACE}{section}");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        let configuration = scene.sensor_configuration();
+        assert_eq!(configuration.check(), Ok(()), "{section}");
+        (
+            configuration.force_channel,
+            configuration.force_mn_per_v,
+            configuration.stiffness_n_per_m,
+        )
+    };
+    let wired = "[gauges]\ntangential = true\n";
+    assert_eq!(configuration(wired), (true, 1_000, 400));
+    let other = format!("{wired}tangential_n_per_v = 1.5\nstiffness_n_per_m = 600\n");
+    assert_eq!(configuration(&other), (true, 1_500, 600));
+    let estimated = format!("{other}[estimator]\nstiffness = \"estimated\"\n");
+    assert_eq!(configuration(&estimated), (true, 1_500, 0));
+    // Both ends of what a scene may give.
+    for (n_per_v, n_per_m) in [("0.05", "10"), ("20", "10_000")] {
+        configuration(&format!(
+            "{wired}tangential_n_per_v = {n_per_v}\nstiffness_n_per_m = {n_per_m}\n"
+        ));
+    }
+}
+
+#[test]
+fn every_method_has_its_word_and_the_default_is_the_boards() {
+    for (word, method) in [
+        ("default", SensorConfiguration::DEFAULT.method),
+        ("bank", Method::Bank),
+        ("crossings", Method::Crossings),
+        ("counting", Method::Counting),
+        ("counting-adapted", Method::AdaptedCounting),
+    ] {
+        let text = format!("{SURFACE}[estimator]\nmethod = \"{word}\"");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        assert_eq!(scene.sensor_configuration().method, method);
+        assert!(word == "default" || scene.estimator.method_name() == word);
+    }
 }
 
 #[test]
@@ -97,18 +241,23 @@ fn all_but_the_specimens_has_a_default() {
         scene.arm,
         ArmDrive {
             follows: Follows::Motion,
-            lag_ms: 0.0
+            lag_ms: 0.0,
+            encoder_um: 5,
+        }
+    );
+    assert_eq!(scene.contact, Contact::Kinematic);
+    assert_eq!(
+        scene.force,
+        Force {
+            present: false,
+            n_per_v: 1.0,
+            stiffness_n_per_m: 400.0,
         }
     );
     assert!(matches!(scene.gauges, Gauges::Kinematic(k) if k == Kinematic::default()));
     assert_eq!(scene.link, Link::default());
-    assert_eq!(
-        scene.estimator,
-        Estimator {
-            method: Method::Counting,
-            window_ms: 80
-        }
-    );
+    assert_eq!(scene.estimator, Estimator::default());
+    assert_eq!(scene.sensor_configuration(), SensorConfiguration::DEFAULT);
     assert_eq!(
         scene.expect,
         Expect {
@@ -116,6 +265,26 @@ fn all_but_the_specimens_has_a_default() {
             ..Expect::default()
         }
     );
+}
+
+#[test]
+fn friction_decides_the_contact_where_it_is_left_open() {
+    let contact = |section: &str| {
+        let text = format!("{SURFACE}[contact]\n{section}");
+        Scene::parse(Path::new("x.toml"), &text).unwrap().contact
+    };
+    assert_eq!(contact(""), Contact::Kinematic);
+    assert_eq!(contact("model = \"kinematic\""), Contact::Kinematic);
+    for (word, friction) in [
+        ("mild", Friction::Mild),
+        ("strong", Friction::Strong),
+        ("severe", Friction::Severe),
+    ] {
+        let given = format!("friction = \"{word}\"");
+        assert_eq!(contact(&given), Contact::StickSlip(friction));
+        let both = format!("{given}\nmodel = \"stick-slip\"");
+        assert_eq!(contact(&both), Contact::StickSlip(friction));
+    }
 }
 
 #[test]
@@ -219,8 +388,116 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:5: gauges.saturated: gauge 3 is dead already",
         ),
         (
+            "[gauges]\nstuck = [2, 3]\nhumming = [3]",
+            "x.toml:5: gauges.humming: gauge 3 is stuck already",
+        ),
+        (
+            "[gauges]\nnoisy = [0]\nsaturated = [0]",
+            "x.toml:4: gauges.noisy: gauge 0 is saturated already",
+        ),
+        (
+            "[gauges]\ntrouble_from_s = 1",
+            "x.toml:4: gauges.trouble_from_s: there is no trouble",
+        ),
+        (
+            "[gauges]\ndead = [1]\ntrouble_for_s = 0",
+            "x.toml:5: gauges.trouble_for_s: no trouble lasts 0 s",
+        ),
+        (
+            "[gauges]\ndead = [1]\ntrouble_from_s = -1",
+            "x.toml:5: gauges.trouble_from_s: -1 is not an instant",
+        ),
+        (
+            "[gauges]\nresonance_damping = 0.1",
+            "x.toml:4: gauges.resonance_damping: has nothing to damp",
+        ),
+        (
+            "[gauges]\nresonance_hz = 180\nresonance_damping = 1",
+            "x.toml:5: gauges.resonance_damping: 1 is not a damping ratio",
+        ),
+        (
+            "[gauges]\nresonance_hz = 5",
+            "x.toml:4: gauges.resonance_hz: 5 is not a resonance",
+        ),
+        (
+            "[gauges]\npink = -0.1",
+            "x.toml:4: gauges.pink: -0.1 is not a disturbance",
+        ),
+        (
+            "[gauges]\ndrift = 11",
+            "x.toml:4: gauges.drift: 11 is not a disturbance",
+        ),
+        (
+            "[gauges]\noffset = -1",
+            "x.toml:4: gauges.offset: -1 is not a disturbance",
+        ),
+        (
+            "[gauges]\nskew_us = 5001",
+            "x.toml:4: gauges.skew_us: 5001 is not a skew",
+        ),
+        (
+            "[gauges]\ntangential_n_per_v = 0",
+            "x.toml:4: gauges.tangential_n_per_v: 0 is not a scale",
+        ),
+        (
+            "[gauges]\nstiffness_n_per_m = 1",
+            "x.toml:4: gauges.stiffness_n_per_m: 1 is not a fingertip's stiffness",
+        ),
+        (
+            "[arm]\nencoder_um = 7",
+            "x.toml:4: arm.encoder_um: 7 is not an encoder's resolution: give a whole multiple of 5",
+        ),
+        (
+            "[arm]\nencoder_um = 505",
+            "x.toml:4: arm.encoder_um: 505 is not an encoder's resolution",
+        ),
+        (
+            "[contact]\nmodel = \"kinematic\"\nfriction = \"mild\"",
+            "x.toml:5: contact.friction: a \"kinematic\" contact knows no friction",
+        ),
+        (
+            "[contact]\nmodel = \"stick-slip\"",
+            "x.toml:3: contact.friction: without friction nothing sticks",
+        ),
+        (
+            "[contact]\nmodel = \"stick-slip\"\nfriction = \"none\"",
+            "x.toml:5: contact.friction: without friction nothing sticks",
+        ),
+        (
             "[estimator]\nwindow_ms = 9",
             "x.toml:4: estimator.window_ms: 9 is out of range",
+        ),
+        (
+            "[estimator]\ngauges = []",
+            "x.toml:4: estimator.gauges: there are none: name one or more of 0 to 4",
+        ),
+        (
+            "[estimator]\ngauges = [0, 7]",
+            "x.toml:4: estimator.gauges[1]: 7 is not a gauge",
+        ),
+        (
+            "[estimator]\ncounted_gauge = 5",
+            "x.toml:4: estimator.counted_gauge: 5 is out of range",
+        ),
+        (
+            "[estimator]\ntravel_wavelengths = 0.29",
+            "x.toml:4: estimator.travel_wavelengths: 0.29 is not a travel to average over",
+        ),
+        (
+            "[estimator]\ncandidates = 37",
+            "x.toml:4: estimator.candidates: 37 is out of range",
+        ),
+        (
+            "[estimator]\nstiffness = \"guessed\"",
+            "x.toml:4: estimator.stiffness: \"guessed\" is unknown",
+        ),
+        (
+            "[estimator]\nstiffness = \"estimated\"",
+            "x.toml:4: estimator.stiffness: cannot be estimated without the force channel",
+        ),
+        (
+            "[expect]\nwrong_share_max = 1.1",
+            "x.toml:4: expect.wrong_share_max: 1.1 is not a share",
         ),
         (
             "[expect]\nwavelength_rms_percent = 0",
@@ -353,24 +630,9 @@ fn broken_toml_is_refused_at_its_line() {
 fn what_this_version_does_not_build_is_refused_as_such() {
     for (section, key) in [
         (
-            "[estimator]\nmethod = \"bank\"",
-            "x.toml:4: estimator.method: \"bank\"",
-        ),
-        (
-            "[estimator]\nmethod = \"crossings\"",
-            "x.toml:4: estimator.method: \"crossings\"",
-        ),
-        (
-            "[contact]\nmodel = \"stick-slip\"",
-            "x.toml:4: contact.model: \"stick-slip\"",
-        ),
-        (
-            "[contact]\nfriction = \"severe\"",
-            "x.toml:4: contact.friction: \"severe\"",
-        ),
-        (
-            "[gauges]\nstiffness_n_per_m = 400",
-            "x.toml:4: gauges.stiffness_n_per_m:",
+            "[contact]
+model = \"rigid\"",
+            "x.toml:4: contact.model: \"rigid\"",
         ),
         (
             "[[fault]]\nat_s = 1.0\nkind = \"link-down\"\nfor_s = 0.5",
