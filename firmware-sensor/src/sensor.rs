@@ -1,7 +1,9 @@
 //! The sensor board as a whole: scans, encoder and [`Motion`]s in; estimates, samples and the arm's
 //! drive out.
 
-use protocol::{Estimate, GAUGES, Gauges, Motion, Range, SensorConfiguration};
+use protocol::{
+    Contact, Estimate, GAUGES, GaugeHealth, Gauges, Motion, Range, SensorConfiguration,
+};
 
 use crate::amplitude::Amplitude;
 use crate::arm::{Arm, Drive};
@@ -223,14 +225,18 @@ impl Started {
             instant_us,
             wavelength_mm,
             valid,
-            amplitude_lsb,
             confidence: if valid {
                 1.0 - 1.0 / f32::from(count)
             } else {
                 0.0
             },
+            amplitude_lsb,
+            counted_mm: wavelength_mm,
             range,
+            contact: Contact::Unknown,
+            lag_um: None,
             gauges_used,
+            health: [GaugeHealth::Good; GAUGES],
         }
     }
 }
