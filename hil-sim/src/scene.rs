@@ -264,6 +264,7 @@ impl Estimator {
     pub const fn method_name(&self) -> &'static str {
         match self.method {
             Method::Counting => "counting",
+            _ => "default",
         }
     }
 }
