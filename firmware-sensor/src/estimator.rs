@@ -14,6 +14,14 @@ pub const PLACES_PER_UM: i32 = 4;
 /// [`Place`] units in a mm.
 pub const PLACES_PER_MM: i32 = 1_000 * PLACES_PER_UM;
 
+/// Below this speed, in mm/s, there is nothing to estimate: fingertip and surface stick (Okamoto et al.
+/// 2009, section III-C), and 5 µm counts make more than a tenth of it.
+pub const MIN_SPEED_MM_S: f32 = 2.0;
+/// Below this amplitude of a gauge behind the band-pass, in ADC steps, there is nothing to estimate from:
+/// a gauge that falls silent leaves a band-pass that rings on, and crosses zero, for seconds. It is ten
+/// times what the ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
+pub const MIN_AMPLITUDE_LSB: f32 = 1.0;
+
 /// A millisecond's samples and where the fingertip was when they were taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touch {
@@ -48,7 +56,7 @@ pub struct Finding {
 
 /// An estimator of λ.
 pub trait Estimator {
-    /// Takes the next millisecond's touch.
+    /// Takes the next millisecond's touch. The first one finds the filters in front settled.
     fn push(&mut self, touch: &Touch);
 
     /// What can be said now. Asked for every tenth millisecond, so what is dear and not needed in

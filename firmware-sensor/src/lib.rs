@@ -1,8 +1,9 @@
 //! The sensor board's logic, from ADC scans to λ: pure, no hardware, the same on the board and on a host.
 //!
 //! ```text
-//! 4 kHz scans ─> decimate ─> bandpass ×5 ─> crossing ─> counting ─┐
-//! encoder ─────> travel ──────────────────────────────────────────┴─> Estimate, 100 Hz
+//! 4 kHz scans ─> decimate ─┬─> bandpass ×5 ─┬─> counting, the paper's ──────────────┐
+//!                          └────────────────┴─> Touch ─> the estimator of the ──────┤
+//! encoder ─────> travel ──────────────────────> Touch ─> configured method ─────────┴─> Estimate, 100 Hz
 //! Motion ──────> arm ─> Drive
 //! ```
 //!
@@ -15,7 +16,11 @@ pub mod bandpass;
 pub mod block;
 pub mod counting;
 pub mod crossing;
+pub mod crossings;
 pub mod decimate;
+pub mod estimator;
+pub mod landmarks;
+pub mod method;
 pub mod sensor;
 pub mod travel;
 

@@ -126,7 +126,14 @@ mod tests {
                 "truth_mm": 2.0,
                 "wavelength_mm": 2.0,
                 "confidence": 0.75,
-                "valid": true
+                "valid": true,
+                "counted_mm": 2.25,
+                "range": "T1",
+                "amplitude_lsb": 400.0,
+                "contact": "slip",
+                "lag_um": null,
+                "gauges_used": [0, 2, 3, 4],
+                "health": ["good", "dead", "good", "good", "good"]
             })
         );
         let summary = keys(&scene["summary"]);
@@ -135,6 +142,8 @@ mod tests {
             "bias_percent",
             "mean_mm",
             "valid_share",
+            "wrong_share",
+            "counted_rms_percent",
             "settling_ms",
             "latency_ms",
         ] {

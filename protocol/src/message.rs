@@ -3,7 +3,7 @@
 //! | message | from | rate | what for |
 //! | --- | --- | --- | --- |
 //! | [`Hello`] | all | at start, on request, once a second until answered | who is there, and do we understand each other |
-//! | [`Estimate`] | sensor | 100 Hz | the surface's wavelength |
+//! | [`Estimate`] | sensor | 100 Hz | the surface, the contact with it, the gauges' health |
 //! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
 //! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
 //! | [`Status`] | boards | 1 Hz | every counter |

@@ -1,0 +1,131 @@
+//! How good each method is on synthetic rubs.
+
+mod rubbing;
+
+use protocol::Method;
+use rubbing::{Judgement, Motion, Rub, with};
+
+fn show(name: &str, method: Method, rubs: &[Rub]) -> Judgement {
+    let mut worst = Judgement {
+        valid_share: 1.0,
+        ..Judgement::default()
+    };
+    let mut mean = 0.0;
+    let mut amp = (f64::MAX, 0.0f64);
+    for rub in rubs {
+        let j = rub.judge(with(method));
+        mean += j.rms_percent / rubs.len() as f64;
+        worst.rms_percent = worst.rms_percent.max(j.rms_percent);
+        worst.worst_percent = worst.worst_percent.max(j.worst_percent);
+        worst.valid_share = worst.valid_share.min(j.valid_share);
+        worst.wrong_share = worst.wrong_share.max(j.wrong_share);
+        amp = (amp.0.min(j.amplitude_lsb), amp.1.max(j.amplitude_lsb));
+    }
+    println!(
+        "{name:28} {:>16} rms mean {mean:6.2} max {:6.2} worst {:7.2} valid {:.3} wrong {:.4} amp {:.0}..{:.0}",
+        format!("{method:?}"),
+        worst.rms_percent,
+        worst.worst_percent,
+        worst.valid_share,
+        worst.wrong_share,
+        amp.0,
+        amp.1
+    );
+    worst
+}
+
+fn table_1(change: impl Fn(&mut Rub)) -> Vec<Rub> {
+    let mut rubs = vec![];
+    for speed in [30.0, 50.0, 70.0] {
+        for wavelength_mm in [1.0, 2.0, 3.0, 4.0] {
+            let mut rub = Rub::new(Motion::Constant(speed), wavelength_mm);
+            change(&mut rub);
+            rubs.push(rub);
+        }
+    }
+    rubs
+}
+
+fn strokes(motion: Motion, wavelengths: &[f64], change: impl Fn(&mut Rub)) -> Vec<Rub> {
+    wavelengths
+        .iter()
+        .map(|w| {
+            let mut rub = Rub::new(motion, *w);
+            rub.duration_s = 6.0;
+            change(&mut rub);
+            rub
+        })
+        .collect()
+}
+
+#[test]
+fn survey() {
+    for method in [Method::Crossings] {
+        for db in [40.0, 20.0, 10.0, 0.0] {
+            show(
+                &format!("table 1 {db} dB"),
+                method,
+                &table_1(|r| r.snr_db = Some(db)),
+            );
+        }
+        show("table 1 dead 1", method, &table_1(|r| r.dead = vec![1]));
+        show(
+            "table 1 dead 0 1",
+            method,
+            &table_1(|r| r.dead = vec![0, 1]),
+        );
+        show(
+            "table 1 saturated 2",
+            method,
+            &table_1(|r| r.saturated = vec![2]),
+        );
+        show(
+            "table 1 2nd harmonic .5",
+            method,
+            &table_1(|r| r.second_harmonic = 0.5),
+        );
+        show("table 1 drift 0.5", method, &table_1(|r| r.drift = 0.5));
+        show(
+            "fig 7",
+            method,
+            &strokes(Motion::Sinusoid(70.0, 0.83), &[2.0], |_| ()),
+        );
+        show(
+            "fig 7 0 dB",
+            method,
+            &strokes(Motion::Sinusoid(70.0, 0.83), &[2.0], |r| {
+                r.snr_db = Some(0.0)
+            }),
+        );
+        show(
+            "2 Hz 70 mm/s",
+            method,
+            &strokes(Motion::Sinusoid(70.0, 2.0), &[1.0, 2.0, 3.0, 4.0], |_| ()),
+        );
+        show(
+            "1 Hz 100 mm/s",
+            method,
+            &strokes(Motion::Sinusoid(100.0, 1.0), &[1.0, 2.0, 3.0, 4.0], |_| ()),
+        );
+        show(
+            "off grid",
+            method,
+            &strokes(Motion::Constant(50.0), &[0.8, 1.37, 2.71, 3.3, 5.0], |_| ()),
+        );
+        show(
+            "slow 2.5 Hz",
+            method,
+            &strokes(Motion::Constant(10.0), &[4.0], |_| ()),
+        );
+        show(
+            "fast 100 Hz",
+            method,
+            &strokes(Motion::Constant(100.0), &[1.0], |_| ()),
+        );
+        show(
+            "fast 150 Hz",
+            method,
+            &strokes(Motion::Constant(150.0), &[1.0], |_| ()),
+        );
+    }
+}
