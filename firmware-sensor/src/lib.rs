@@ -10,6 +10,7 @@
 //! [`Sensor::step`] is the whole of it, once per millisecond.
 #![no_std]
 
+pub mod adapted;
 pub mod amplitude;
 pub mod arm;
 pub mod bandpass;
@@ -22,6 +23,7 @@ pub mod estimator;
 pub mod landmarks;
 pub mod method;
 pub mod sensor;
+pub mod stroke;
 pub mod travel;
 
 pub use arm::Drive;

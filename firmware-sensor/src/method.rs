@@ -2,6 +2,7 @@
 
 use protocol::{Method, SensorConfiguration};
 
+use crate::adapted::AdaptedCounting;
 use crate::counting::Counting;
 use crate::crossings::Crossings;
 use crate::estimator::{Estimator, Finding, Touch};
@@ -13,6 +14,8 @@ use crate::travel::Travel;
 pub enum Running {
     /// [`Method::Counting`]
     Counting(Counting),
+    /// [`Method::AdaptedCounting`]
+    AdaptedCounting(AdaptedCounting),
     /// [`Method::Crossings`]
     Crossings(Crossings),
 }
@@ -22,9 +25,8 @@ impl Running {
     /// touch.
     pub fn new(configuration: &SensorConfiguration) -> Self {
         match configuration.method {
-            Method::Counting | Method::AdaptedCounting => {
-                Self::Counting(Counting::new(configuration))
-            }
+            Method::Counting => Self::Counting(Counting::new(configuration)),
+            Method::AdaptedCounting => Self::AdaptedCounting(AdaptedCounting::new(configuration)),
             Method::Crossings => Self::Crossings(Crossings::new(configuration)),
             // STAND-IN until there is a bank: this line is to become the bank's own.
             Method::Bank => Self::Crossings(Crossings::new(configuration)),
@@ -36,6 +38,7 @@ impl Estimator for Running {
     fn push(&mut self, touch: &Touch) {
         match self {
             Self::Counting(counting) => counting.push(touch),
+            Self::AdaptedCounting(counting) => counting.push(touch),
             Self::Crossings(crossings) => crossings.push(touch),
         }
     }
@@ -43,6 +46,7 @@ impl Estimator for Running {
     fn find(&mut self, travel: &Travel) -> Finding {
         match self {
             Self::Counting(counting) => counting.find(travel),
+            Self::AdaptedCounting(counting) => counting.find(travel),
             Self::Crossings(crossings) => crossings.find(travel),
         }
     }

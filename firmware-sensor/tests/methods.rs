@@ -60,7 +60,7 @@ fn strokes(motion: Motion, wavelengths: &[f64], change: impl Fn(&mut Rub)) -> Ve
 
 #[test]
 fn survey() {
-    for method in [Method::Crossings] {
+    for method in [Method::AdaptedCounting] {
         for db in [40.0, 20.0, 10.0, 0.0] {
             show(
                 &format!("table 1 {db} dB"),
@@ -127,5 +127,30 @@ fn survey() {
             method,
             &strokes(Motion::Constant(150.0), &[1.0], |_| ()),
         );
+    }
+}
+
+#[test]
+fn boundary() {
+    for (from, to) in [(1.0, 4.0), (4.0, 1.0), (2.0, 3.0), (3.0,2.0), (1.0, 1.3), (4.0, 3.5)] {
+        for speed in [70.0, 50.0] {
+            let mut worst = 0.0f64;
+            let mut wrong = 0;
+            for seed in 0..10 {
+                let mut rub = Rub::new(Motion::Constant(speed), from);
+                rub.specimens.push((to, 60.0 + 0.1 * seed as f64));
+                rub.seed = seed;
+                let at_s = rub.specimens[1].1 / speed;
+                for e in rub.estimates(with(Method::Crossings)) {
+                    let t_s = e.instant_us as f64 / 1e6;
+                    let truth = if t_s > at_s { to } else { from };
+                    let error = e.wavelength_mm.unwrap_or(0.0) as f64 / truth - 1.0;
+                    if t_s > at_s && error.abs() > 0.1 { worst = worst.max(t_s - at_s); }
+                    if e.valid && error.abs() > 0.1 { wrong += 1; }
+                    if seed == 0 && (t_s - at_s).abs() < 0.2 && speed == 70.0 { print!("{:.2}{} ", e.wavelength_mm.unwrap_or(0.0), if e.valid {""} else {"?"}); }
+                }
+            }
+            println!("{from} -> {to} at {speed}: settled after {:.0} ms, valid but wrong {} ms a boundary", worst * 1e3, wrong);
+        }
     }
 }
