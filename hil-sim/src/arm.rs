@@ -92,6 +92,7 @@ mod tests {
             &ArmDrive {
                 follows: Follows::Link,
                 lag_ms,
+                ..ArmDrive::default()
             },
             &hand,
         )
@@ -103,13 +104,7 @@ mod tests {
             amplitude_mm_s: 70.0,
             frequency_hz: 0.83,
         };
-        let mut arm = Arm::new(
-            &ArmDrive {
-                follows: Follows::Motion,
-                lag_ms: 0.0,
-            },
-            &hand,
-        );
+        let mut arm = Arm::new(&ArmDrive::default(), &hand);
         arm.command(0.1, 1000.0);
         assert_eq!(arm.position_mm(0.7), hand.position_mm(0.7));
     }

@@ -1,18 +1,35 @@
-//! The voltages of five kinematic gauges, as ADC codes.
+//! The voltages of five computed gauges, as ADC codes.
 //!
-//! A gauge feels the texture under its own place and nothing else: no slip, no stick, no resonance. Its
-//! gain, place and phase are guesses of the numerical study behind this project, not measurements; the
-//! phase advances the texture as a whole, by that angle of its fundamental.
+//! A gauge feels the texture under its own place on the fingertip, through the sensor's resonance if
+//! there is one; hum, noise, drift and offset come in behind it. Its gain, place and phase are guesses
+//! of the numerical study behind this project, not measurements; the phase advances the texture as a
+//! whole, by that angle of its fundamental.
 
 use std::f64::consts::TAU;
 
-use protocol::{CHANNELS, GAUGES};
-use rand::SeedableRng;
+use protocol::GAUGES;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::scene::{Kinematic, Series};
+use crate::scene::Kinematic;
 use crate::surface::Surface;
+
+mod force;
+mod pink;
+mod recorded;
+mod resonance;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod trouble;
+
+pub use force::{ForceChannel, NOISE_N};
+use pink::{Pink, Poles};
+pub use recorded::RecordedGauges;
+use resonance::{Resonance, Ring};
+use stream::Stream;
+pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
+use trouble::Trouble;
 
 /// Scans of all channels per second.
 pub const SCAN_RATE_HZ: u32 = 4_000;
@@ -26,11 +43,12 @@ pub const PHASES_RAD: [f64; GAUGES] = [0.0, 0.4, -0.7, 1.1, -0.3];
 pub const VOLTS_PER_UNIT: f64 = 0.3;
 /// Where a gauge rests, in V.
 pub const MID_RAIL_VOLTS: f64 = 1.65;
-/// A saturated gauge's amplifier has this gain too much: the ADC clips at ± 1.65 / (20 · 0.3), about a
-/// quarter of the signal's amplitude.
-pub const SATURATED_GAIN: f64 = 20.0;
 /// The band in which the signal-to-noise ratio counts the noise, in Hz.
 pub const SNR_BAND_HZ: f64 = 500.0;
+/// Frequency of the drift, in Hz: a guess.
+pub const DRIFT_HZ: f64 = 0.11;
+/// Each gauge's share of the static offset.
+pub const OFFSET_SHARES: [f64; GAUGES] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
 const VOLTS_FULL_SCALE: f64 = 3.3;
 const CODES: f64 = 4096.0;
@@ -38,13 +56,17 @@ const CODES_PER_UNIT: f64 = VOLTS_PER_UNIT / VOLTS_FULL_SCALE * CODES;
 const MID_RAIL_CODE: f32 = (MID_RAIL_VOLTS / VOLTS_FULL_SCALE * CODES) as f32;
 const HUM_HZ: f64 = 50.0;
 
-/// Five kinematic gauges and their noise.
+/// Five computed gauges, their noise and their troubles.
 #[derive(Clone, Debug)]
 pub struct KinematicGauges {
-    lanes: [Lane; GAUGES],
+    sound: [Lane; GAUGES],
+    broken: [Lane; GAUGES],
+    trouble: Trouble,
+    resonance: Option<(Resonance, [Option<Ring>; GAUGES])>,
     hum_codes: f64,
     noise_codes: Option<f32>,
     noise: Xoshiro256PlusPlus,
+    slow: Option<Slow>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -52,54 +74,110 @@ struct Lane {
     place_mm: f64,
     advance: u32,
     signal_codes: f32,
-    /// Gain of what comes in behind the gauge: hum and noise. 0 if dead.
+    /// Gain of what comes in behind the gauge: hum and noise.
     pickup: f32,
 }
 
+/// Drift, offset and 1/f noise.
+#[derive(Clone, Debug)]
+struct Slow {
+    drift_codes: f64,
+    offset_codes: [f32; GAUGES],
+    pink: Option<(Pink, [Poles; GAUGES], Xoshiro256PlusPlus)>,
+}
+
 impl KinematicGauges {
-    /// The gauges of a scene. The noise depends on `seed` alone: a dead gauge changes no other's.
+    /// The gauges of a scene. The noise depends on `seed` alone: a broken gauge changes no other's.
     pub fn new(kinematic: &Kinematic, seed: u64) -> Self {
-        let lanes = std::array::from_fn(|gauge| {
-            let gain = match (kinematic.dead[gauge], kinematic.saturated[gauge]) {
-                (true, _) => 0.0,
-                (false, true) => SATURATED_GAIN,
-                (false, false) => 1.0,
-            };
-            Lane {
-                place_mm: PLACES_MM[gauge],
-                advance: (PHASES_RAD[gauge] / TAU * 4_294_967_296.0) as i64 as u32,
-                signal_codes: (gain * GAINS[gauge] * CODES_PER_UNIT) as f32,
-                pickup: gain as f32,
-            }
-        });
+        let trouble = Trouble::new(kinematic, stream::draws(seed, Stream::Broken));
+        let slow = kinematic.pink > 0.0 || kinematic.drift > 0.0 || kinematic.offset > 0.0;
         Self {
-            lanes,
+            sound: std::array::from_fn(|gauge| Lane::new(gauge, 1.0)),
+            broken: std::array::from_fn(|gauge| Lane::new(gauge, trouble.gain(gauge))),
+            trouble,
+            resonance: kinematic
+                .resonance
+                .map(|resonance| (Resonance::new(resonance), [None; GAUGES])),
             hum_codes: kinematic.hum_50_hz * CODES_PER_UNIT,
             noise_codes: kinematic
                 .snr_db
                 .map(|db| (noise_per_unit(db) * CODES_PER_UNIT) as f32),
-            noise: Xoshiro256PlusPlus::seed_from_u64(seed),
+            noise: stream::draws(seed, Stream::White),
+            slow: slow.then(|| Slow::new(kinematic, seed)),
         }
     }
 
-    /// One scan with the arm at `arm_mm`, at `t_s`. The sixth channel rests: kinematic contact knows no
-    /// force.
+    /// One scan at `t_s`, the fingertip's middle at `fingertip_mm` of the surface.
     #[inline]
-    pub fn scan(&mut self, surface: &Surface, t_s: f64, arm_mm: f64) -> [u16; CHANNELS] {
+    pub fn scan(&mut self, surface: &Surface, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
+        let hum_phase = || (TAU * (HUM_HZ * t_s).fract()).sin();
         let hum = if self.hum_codes == 0.0 {
             0.0
         } else {
-            (self.hum_codes * (TAU * (HUM_HZ * t_s).fract()).sin()) as f32
+            (self.hum_codes * hum_phase()) as f32
         };
-        let mut codes = [code(MID_RAIL_CODE); CHANNELS];
-        for (code_out, lane) in codes.iter_mut().zip(&self.lanes) {
+        let broken = self.trouble.is_on(t_s);
+        let lanes = if broken { &self.broken } else { &self.sound };
+        let mut codes = [0; GAUGES];
+        for (gauge, (code_out, lane)) in codes.iter_mut().zip(lanes).enumerate() {
             let mut pickup = hum;
             if let Some(noise_codes) = self.noise_codes {
                 let sample: f32 = StandardNormal.sample(&mut self.noise);
                 pickup += noise_codes * sample;
             }
-            let signal = surface.feel(arm_mm + lane.place_mm, lane.advance);
-            *code_out = code(MID_RAIL_CODE + signal * lane.signal_codes + pickup * lane.pickup);
+            if let Some(slow) = &mut self.slow {
+                pickup += slow.codes(gauge, t_s);
+            }
+            let mut signal = surface.feel(fingertip_mm + lane.place_mm, lane.advance);
+            if let Some((resonance, rings)) = &mut self.resonance {
+                signal = resonance.step(&mut rings[gauge], f64::from(signal)) as f32;
+            }
+            let mut level = MID_RAIL_CODE + signal * lane.signal_codes + pickup * lane.pickup;
+            if broken {
+                level = self.trouble.level(gauge, level, hum_phase);
+            }
+            *code_out = code(level);
+        }
+        codes
+    }
+}
+
+impl Lane {
+    fn new(gauge: usize, gain: f64) -> Self {
+        Self {
+            place_mm: PLACES_MM[gauge],
+            advance: (PHASES_RAD[gauge] / TAU * 4_294_967_296.0) as i64 as u32,
+            signal_codes: (gain * GAINS[gauge] * CODES_PER_UNIT) as f32,
+            pickup: gain as f32,
+        }
+    }
+}
+
+impl Slow {
+    fn new(kinematic: &Kinematic, seed: u64) -> Self {
+        Self {
+            drift_codes: kinematic.drift * CODES_PER_UNIT,
+            offset_codes: OFFSET_SHARES
+                .map(|share| (share * kinematic.offset * CODES_PER_UNIT) as f32),
+            pink: (kinematic.pink > 0.0).then(|| {
+                let pink = Pink::new(kinematic.pink * CODES_PER_UNIT);
+                let mut noise = stream::draws(seed, Stream::Pink);
+                let poles = std::array::from_fn(|_| pink.start(&mut noise));
+                (pink, poles, noise)
+            }),
+        }
+    }
+
+    /// What is added to a gauge's next scan. The drift of each gauge is a fifth of a turn ahead of the
+    /// one before.
+    fn codes(&mut self, gauge: usize, t_s: f64) -> f32 {
+        let mut codes = self.offset_codes[gauge];
+        if self.drift_codes > 0.0 {
+            let turns = DRIFT_HZ * t_s + gauge as f64 / GAUGES as f64;
+            codes += (self.drift_codes * (TAU * turns).sin()) as f32;
+        }
+        if let Some((pink, poles, noise)) = &mut self.pink {
+            codes += pink.step(&mut poles[gauge], noise);
         }
         codes
     }
@@ -116,204 +194,4 @@ fn noise_per_unit(snr_db: f64) -> f64 {
 #[inline]
 fn code(codes: f32) -> u16 {
     codes.clamp(0.0, (CODES - 1.0) as f32) as u16
-}
-
-/// Recorded voltages, played back.
-#[derive(Clone, Debug)]
-pub struct RecordedGauges {
-    volts: std::sync::Arc<Series>,
-    row: usize,
-}
-
-impl RecordedGauges {
-    /// Plays `volts`: five columns, or six with the tangential force.
-    pub fn new(volts: std::sync::Arc<Series>) -> Self {
-        Self { volts, row: 0 }
-    }
-
-    /// One scan at `t_s`, on the straight line between the rows around it.
-    pub fn scan(&mut self, t_s: f64) -> [u16; CHANNELS] {
-        self.row = self.volts.row(t_s, self.row);
-        std::array::from_fn(|channel| {
-            if channel < self.volts.width {
-                let volts = self.volts.value(self.row, channel, t_s);
-                code((volts / VOLTS_FULL_SCALE * CODES) as f32)
-            } else {
-                code(MID_RAIL_CODE)
-            }
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Scene, Specimen};
-
-    const SCANS: usize = 40_000;
-
-    fn surface() -> Surface {
-        Surface::new(&Scene::constant(2.0, 50.0).surface, 0.0)
-    }
-
-    /// Ten seconds at 50 mm/s.
-    fn scans(kinematic: Kinematic, seed: u64) -> Vec<[u16; CHANNELS]> {
-        let surface = surface();
-        let mut gauges = KinematicGauges::new(&kinematic, seed);
-        (0..SCANS)
-            .map(|scan| {
-                let t_s = scan as f64 / f64::from(SCAN_RATE_HZ);
-                gauges.scan(&surface, t_s, 50.0 * t_s)
-            })
-            .collect()
-    }
-
-    fn lane(scans: &[[u16; CHANNELS]], channel: usize) -> Vec<f64> {
-        scans
-            .iter()
-            .map(|codes| f64::from(codes[channel]))
-            .collect()
-    }
-
-    /// Amplitude of the tone at `hz`, in codes, and its phase against a sine that starts with the scans.
-    fn tone(lane: &[f64], hz: f64) -> (f64, f64) {
-        let (mut sine, mut cosine) = (0.0, 0.0);
-        for (scan, code) in lane.iter().enumerate() {
-            let angle = TAU * hz * scan as f64 / f64::from(SCAN_RATE_HZ);
-            sine += code * angle.sin();
-            cosine += code * angle.cos();
-        }
-        (
-            2.0 * sine.hypot(cosine) / lane.len() as f64,
-            cosine.atan2(sine),
-        )
-    }
-
-    #[test]
-    fn each_gauge_has_its_gain_place_and_phase() {
-        let scans = scans(Kinematic::default(), 1);
-        for gauge in 0..GAUGES {
-            let lane = lane(&scans, gauge);
-            let (amplitude, phase) = tone(&lane, 25.0);
-            let expected = GAINS[gauge] * 0.3 / 3.3 * 4096.0;
-            // Rounding down to codes adds less than a code's noise: 1/√12 · √(2/40 000) ≪ 0.1.
-            assert!(
-                (amplitude - expected).abs() < 0.1,
-                "{gauge}: {amplitude} for {expected}"
-            );
-            let expected = TAU * PLACES_MM[gauge] / 2.0 + PHASES_RAD[gauge];
-            let difference = ((phase - expected) / TAU + 0.5).rem_euclid(1.0) - 0.5;
-            assert!(difference.abs() < 1e-3, "{gauge}: {phase} for {expected}");
-            let mean = lane.iter().sum::<f64>() / SCANS as f64;
-            // floor takes half a code off.
-            assert!((mean - 2047.5).abs() < 0.1, "{gauge}: mean {mean}");
-        }
-        assert!(scans.iter().all(|codes| codes[5] == 2048));
-    }
-
-    #[test]
-    fn the_noise_has_the_power_that_the_ratio_asks_for_and_is_white() {
-        let noisy = Kinematic {
-            snr_db: Some(10.0),
-            ..Kinematic::default()
-        };
-        let (clean, noisy) = (scans(Kinematic::default(), 1), scans(noisy, 1));
-        for gauge in 0..GAUGES {
-            let noise: Vec<f64> = lane(&noisy, gauge)
-                .iter()
-                .zip(lane(&clean, gauge))
-                .map(|(noisy, clean)| noisy - clean)
-                .collect();
-            let power = noise.iter().map(|n| n * n).sum::<f64>() / SCANS as f64;
-            // A quarter of it lies in 0–500 of 2000 Hz.
-            let signal = 0.5 * CODES_PER_UNIT * CODES_PER_UNIT;
-            let ratio_db = 10.0 * (signal / (power / 4.0)).log10();
-            // χ² with 40 000 degrees of freedom: σ of the power 0.7 %, 0.03 dB; 5 σ.
-            assert!((ratio_db - 10.0).abs() < 0.15, "{gauge}: {ratio_db} dB");
-            let next: f64 =
-                noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / SCANS as f64 / power;
-            // σ = 1/√40 000 = 0.005; 5 σ.
-            assert!(next.abs() < 0.025, "{gauge}: {next}");
-        }
-    }
-
-    #[test]
-    fn hum_is_common_to_all_gauges_and_relative_to_the_signal() {
-        let scans = scans(
-            Kinematic {
-                hum_50_hz: 0.5,
-                ..Kinematic::default()
-            },
-            1,
-        );
-        for gauge in 0..GAUGES {
-            let (amplitude, phase) = tone(&lane(&scans, gauge), 50.0);
-            assert!(
-                (amplitude - 0.5 * CODES_PER_UNIT).abs() < 0.1,
-                "{gauge}: {amplitude}"
-            );
-            assert!(phase.abs() < 1e-3);
-        }
-    }
-
-    #[test]
-    fn a_dead_gauge_rests_a_saturated_one_clips_and_the_others_stay_as_they_were() {
-        let mut broken = Kinematic {
-            snr_db: Some(20.0),
-            hum_50_hz: 0.1,
-            ..Kinematic::default()
-        };
-        let whole = scans(broken, 5);
-        broken.dead[1] = true;
-        broken.saturated[3] = true;
-        let broken = scans(broken, 5);
-        assert!(broken.iter().all(|codes| codes[1] == 2048));
-        let clipped = broken
-            .iter()
-            .filter(|codes| codes[3] == 0 || codes[3] == 4095)
-            .count();
-        // A sine of amplitude a is beyond c for 1 − 2/π · asin(c/a) of the time: 70 % with
-        // c/a = 1.65 / (20 · 0.3 · 0.6) = 0.46; the harmonics and the noise move it little.
-        assert!(
-            (0.6..0.9).contains(&(clipped as f64 / SCANS as f64)),
-            "{clipped}"
-        );
-        for gauge in [0, 2, 4] {
-            assert_eq!(lane(&broken, gauge), lane(&whole, gauge));
-        }
-    }
-
-    #[test]
-    fn noise_is_the_seed_s() {
-        let noisy = Kinematic {
-            snr_db: Some(20.0),
-            ..Kinematic::default()
-        };
-        assert_eq!(scans(noisy, 3), scans(noisy, 3));
-        assert_ne!(scans(noisy, 3), scans(noisy, 4));
-    }
-
-    #[test]
-    fn at_a_boundary_each_gauge_feels_what_lies_under_its_own_place() {
-        let mut scene = Scene::constant(2.0, 50.0).surface;
-        scene.specimens = vec![
-            Specimen {
-                wavelength_mm: 1.0,
-                length_mm: 60.0,
-            },
-            Specimen {
-                wavelength_mm: 4.0,
-                length_mm: f64::INFINITY,
-            },
-        ];
-        let both = Surface::new(&scene, 0.0);
-        scene.specimens.truncate(1);
-        let first = Surface::new(&scene, 0.0);
-        let feel =
-            |surface| KinematicGauges::new(&Kinematic::default(), 1).scan(surface, 0.0, 60.2);
-        let (both, first) = (feel(&both), feel(&first));
-        // Places −3 and −1.5 mm are still before 60 mm.
-        assert_eq!(both[..2], first[..2]);
-        assert!((2..5).all(|gauge| both[gauge] != first[gauge]));
-    }
 }

@@ -3,6 +3,7 @@
 pub mod analysis;
 pub mod arm;
 pub mod chart;
+pub mod contact;
 pub mod dac81416;
 pub mod digest;
 pub mod elf;
@@ -16,6 +17,7 @@ pub mod outcome;
 pub mod recording;
 pub mod report;
 pub mod scene;
+pub mod skew;
 pub mod surface;
 pub mod truth;
 pub mod weather;

@@ -11,6 +11,12 @@ pub fn encoder(position_mm: f64) -> u16 {
     (position_mm / MM_PER_COUNT).floor() as i64 as u16
 }
 
+/// The same of an encoder that moves on by `step_counts` at a time.
+pub fn coarse_encoder(position_mm: f64, step_counts: u16) -> u16 {
+    let step_mm = MM_PER_COUNT * f64::from(step_counts);
+    ((position_mm / step_mm).floor() as i64).wrapping_mul(step_counts.into()) as u16
+}
+
 impl Motion {
     /// The hand's position x in mm, `t_s` after the start.
     pub fn position_mm(&self, t_s: f64) -> f64 {
@@ -81,6 +87,18 @@ mod tests {
         assert_eq!(encoder(1.0025), 200);
         assert_eq!(encoder(-0.001), 65_535);
         assert_eq!(encoder(65_536.0 * 0.005 + 0.001), 0);
+    }
+
+    #[test]
+    fn a_coarse_encoder_stands_on_whole_steps_and_wraps_as_a_fine_one() {
+        for (position_mm, fine) in [(0.0, 0), (1.0025, 200), (-0.001, 65_535)] {
+            assert_eq!(coarse_encoder(position_mm, 1), fine);
+        }
+        // Steps of 50 µm: ten counts.
+        assert_eq!(coarse_encoder(0.0499, 10), 0);
+        assert_eq!(coarse_encoder(0.0501, 10), 10);
+        assert_eq!(coarse_encoder(-0.001, 10), 65_526);
+        assert_eq!(coarse_encoder(65_540.0 * 0.005 + 0.001, 10), 4);
     }
 
     #[test]

@@ -144,7 +144,7 @@ impl Pair {
     fn scan(&mut self, step: u64, now_ns: u64, t_s: f64) {
         let position_mm = self.arm.position_mm(t_s);
         let codes = self.world.codes(t_s, position_mm);
-        let encoder = encoder(position_mm);
+        let encoder = self.world.arm_encoder(t_s, position_mm);
         self.tape.scans.push(ScanRecord {
             at_ns: now_ns,
             codes,

@@ -35,8 +35,12 @@ pub struct Scene {
     pub motion: Motion,
     /// How the arm follows the hand.
     pub arm: ArmDrive,
+    /// How the fingertip follows the arm.
+    pub contact: Contact,
     /// What the ADC sees.
     pub gauges: Gauges,
+    /// The sixth channel, and the shear stiffness that it is read with.
+    pub force: Force,
     /// What the way between the boards does to the bytes, in either direction.
     pub link: Link,
     /// What the sensor makes of it.
@@ -106,7 +110,13 @@ pub struct ArmDrive {
     pub follows: Follows,
     /// The drive's first-order lag in ms, 0 to 1000. Default 0. Only with [`Follows::Link`].
     pub lag_ms: f64,
+    /// Resolution of the arm's encoder in µm, a multiple of [`ENCODER_COUNT_UM`], to 500. Default 5. The
+    /// counter goes on by so many counts at a time.
+    pub encoder_um: u16,
 }
+
+/// A count of either encoder, in µm.
+pub const ENCODER_COUNT_UM: u16 = 5;
 
 /// What the arm follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,16 +127,50 @@ pub enum Follows {
     Link,
 }
 
-/// `[gauges]` and `[contact]`: where the ADC's voltages come from.
+/// `[contact]`: how the fingertip follows the arm, a rung of [`crate::contact`]'s ladder. Without effect
+/// on recorded gauges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contact {
+    /// It is where the arm is. The default without friction.
+    #[default]
+    Kinematic,
+    /// It hangs on a spring, and sticks and slips. The default with friction.
+    StickSlip(Friction),
+}
+
+/// `[contact] friction`: how sticky the surface is; see [`crate::contact::Stribeck`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Friction {
+    /// μs = 0.75.
+    Mild,
+    /// μs = 1.0.
+    Strong,
+    /// μs = 1.3.
+    Severe,
+}
+
+/// `[gauges]`: the sixth channel, a tangential force at the base of the sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Force {
+    /// Whether it is wired (`tangential`). Default no, and mid-rail; yes with a recording that has it.
+    pub present: bool,
+    /// Newton for a volt above mid-rail (`tangential_n_per_v`), 0.05 to 20. Default 1.
+    pub n_per_v: f64,
+    /// Shear stiffness of the fingertip in N/m (`stiffness_n_per_m`), 10 to 10 000; the slider's spring,
+    /// too. Default 400, a guess.
+    pub stiffness_n_per_m: f64,
+}
+
+/// `[gauges]`: where the ADC's voltages come from.
 #[derive(Clone, Debug)]
 pub enum Gauges {
-    /// Each gauge feels the texture under its own place: no slip, no stick. See [`crate::gauges`].
+    /// Computed: each gauge feels the texture under its own place. See [`crate::gauges`].
     Kinematic(Kinematic),
     /// Voltages at the pins; `file` has the columns `t_s,g0,g1,g2,g3,g4` and, optionally, `tangential`.
     Recorded(Arc<Series>),
 }
 
-/// The kinematic gauges' imperfections.
+/// The computed gauges' imperfections. "Relative" is to the amplitude of the fundamental at unit gain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Kinematic {
     /// Power of the fundamental at unit gain over the white noise's in 0–500 Hz, in dB, −40 to 120.
@@ -141,6 +185,38 @@ pub struct Kinematic {
     pub dead: [bool; GAUGES],
     /// Gauges whose amplifier drives the ADC into both ends. Default none.
     pub saturated: [bool; GAUGES],
+    /// Gauges that stand at one code, off mid-rail ([`crate::gauges::STUCK_CODE`]). Default none.
+    pub stuck: [bool; GAUGES],
+    /// Gauges with white noise of their own, RMS 3 relative. Default none.
+    pub noisy: [bool; GAUGES],
+    /// Gauges with 50 Hz hum of their own, amplitude 2 relative. Default none.
+    pub humming: [bool; GAUGES],
+    /// From when on the gauges of these five lists are so, in s, 0 to 600; sound before. Default 0.
+    pub trouble_from_s: f64,
+    /// For how long, in s, above 0, to 600; sound again after. Default for good.
+    pub trouble_for_s: Option<f64>,
+    /// The sensor's resonance, between the texture and the gauges. Default none.
+    pub resonance: Option<Resonance>,
+    /// RMS of 1/f noise, each gauge its own, relative, 0 to 10. Default 0.
+    pub pink: f64,
+    /// Amplitude of a sine of [`crate::gauges::DRIFT_HZ`], its phase differing by gauge, relative, 0 to
+    /// 10. Default 0.
+    pub drift: f64,
+    /// Largest static offset, relative, 0 to 10; each gauge has its share
+    /// ([`crate::gauges::OFFSET_SHARES`]), and beyond ±5.5 the ADC clips. Default 0.
+    pub offset: f64,
+    /// How much later than the position the ADC is read, in µs, −5000 to 5000: its channels at t belong
+    /// to x(t − skew). Default 0. See [`crate::skew`].
+    pub skew_us: f64,
+}
+
+/// A resonance of second order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resonance {
+    /// Its frequency without damping (`resonance_hz`), in Hz, 10 to 2000. 180 is a guess.
+    pub hz: f64,
+    /// Its damping ratio ζ (`resonance_damping`), 0.01 to 0.99. Default 0.15, a guess.
+    pub damping: f64,
 }
 
 /// `[link]`: the weather between the boards, the same for either direction. All default to 0.
@@ -242,11 +318,10 @@ impl Scene {
                 profile: Profile::Trapezoid,
             },
             motion: Motion::Constant { speed_mm_s },
-            arm: ArmDrive {
-                follows: Follows::Motion,
-                lag_ms: 0.0,
-            },
+            arm: ArmDrive::default(),
+            contact: Contact::Kinematic,
             gauges: Gauges::Kinematic(Kinematic::default()),
+            force: Force::default(),
             link: Link::default(),
             estimator: Estimator::default(),
             display_mode: Mode::Uniform,
@@ -280,6 +355,26 @@ impl Scene {
         DisplayConfiguration {
             mode: self.display_mode,
             ..DisplayConfiguration::default()
+        }
+    }
+}
+
+impl Default for ArmDrive {
+    fn default() -> Self {
+        Self {
+            follows: Follows::Motion,
+            lag_ms: 0.0,
+            encoder_um: ENCODER_COUNT_UM,
+        }
+    }
+}
+
+impl Default for Force {
+    fn default() -> Self {
+        Self {
+            present: false,
+            n_per_v: 1.0,
+            stiffness_n_per_m: 400.0,
         }
     }
 }

@@ -14,7 +14,6 @@ use rigless::time::VirtualNanos;
 
 use super::nucleo::Pins;
 use crate::arm::Arm;
-use crate::motion::encoder;
 use crate::recording::ScanRecord;
 use crate::world::World;
 
@@ -81,7 +80,7 @@ impl SensorPins {
                 part.adc[ADC].set_input(channel, microvolts(code));
             }
         }
-        let encoder = encoder(self.position_mm);
+        let encoder = self.world.arm_encoder(t_s, self.position_mm);
         self.scans.push(ScanRecord {
             at_ns,
             codes,

@@ -83,3 +83,43 @@ pub(super) const BOUND: Bounds = Bounds {
     give: "a number above 0",
     allows: |bound| bound > 0.0,
 };
+pub(super) const ENCODER_STEP: Bounds = Bounds {
+    what: "an encoder's resolution",
+    give: "a whole multiple of 5 in µm, 5 to 500",
+    allows: |um| (5.0..=500.0).contains(&um) && um % 5.0 == 0.0,
+};
+pub(super) const FORCE_SCALE: Bounds = Bounds {
+    what: "a scale of a force channel",
+    give: "newton per volt, 0.05 to 20",
+    allows: |n_per_v| (0.05..=20.0).contains(&n_per_v),
+};
+pub(super) const STIFFNESS: Bounds = Bounds {
+    what: "a fingertip's stiffness",
+    give: "a stiffness in N/m, 10 to 10 000",
+    allows: |n_per_m| (10.0..=10_000.0).contains(&n_per_m),
+};
+pub(super) const RESONANCE: Bounds = Bounds {
+    what: "a resonance",
+    give: "a frequency in Hz, 10 to 2000, or take it out for none",
+    allows: |hz| (10.0..=2000.0).contains(&hz),
+};
+pub(super) const DAMPING: Bounds = Bounds {
+    what: "a damping ratio",
+    give: "a number from 0.01 to 0.99",
+    allows: |zeta| (0.01..=0.99).contains(&zeta),
+};
+pub(super) const RELATIVE: Bounds = Bounds {
+    what: "a disturbance",
+    give: "a number from 0 to 10, relative to the signal",
+    allows: |ratio| (0.0..=10.0).contains(&ratio),
+};
+pub(super) const SKEW: Bounds = Bounds {
+    what: "a skew",
+    give: "a time in µs, −5000 to 5000",
+    allows: |us| us.abs() <= 5000.0,
+};
+pub(super) const INSTANT: Bounds = Bounds {
+    what: "an instant",
+    give: "a time in s, 0 to 600",
+    allows: |s| (0.0..=600.0).contains(&s),
+};

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use protocol::{GAUGES, Method, Mode};
 
 use super::bounds::{
-    AMPLITUDE, BOUND, DELAY, DURATION, FREQUENCY, HUM, LAG, LENGTH, MOST_SPEED_MM_S, PLACE, SHARE,
-    SNR, SPEED, TRAVEL, WAVELENGTH,
+    AMPLITUDE, BOUND, DAMPING, DELAY, DURATION, ENCODER_STEP, FORCE_SCALE, FREQUENCY, HUM, INSTANT,
+    LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
+    TRAVEL, WAVELENGTH,
 };
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Estimator, Expect, Follows, Gauges, Kinematic, Link, Motion, Profile, Scene,
-    SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link, Motion,
+    Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
 
@@ -28,8 +29,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let surface = surface(root.table("surface")?)?;
     let motion = motion(root.table("motion")?, duration_s)?;
     let arm = arm(root.table("arm")?)?;
-    let contact_given = contact(root.table("contact")?)?;
-    let gauges = gauges(root.table("gauges")?, duration_s)?;
+    let (contact, contact_given) = contact(root.table("contact")?)?;
+    let (gauges, force) = gauges(root.table("gauges")?, duration_s)?;
     if contact_given && matches!(gauges, Gauges::Recorded(_)) {
         return Err(root.refuse(
             "contact",
@@ -57,7 +58,9 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         surface,
         motion,
         arm,
+        contact,
         gauges,
+        force,
         link,
         estimator,
         display_mode,
@@ -193,49 +196,70 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
             "an arm that follows \"motion\" has no lag: give follows = \"link\"",
         ));
     }
+    let encoder_um = table
+        .number("encoder_um", &ENCODER_STEP)?
+        .map_or(ArmDrive::default().encoder_um, |um| um as u16);
     table.finish("")?;
-    Ok(ArmDrive { follows, lag_ms })
+    Ok(ArmDrive {
+        follows,
+        lag_ms,
+        encoder_um,
+    })
 }
 
-/// Whether the section holds anything.
-fn contact(mut table: Table<'_>) -> Result<bool, SceneError> {
-    table.choice(
+/// The contact, and whether the section holds anything.
+fn contact(mut table: Table<'_>) -> Result<(Contact, bool), SceneError> {
+    let model = table.choice(
         "model",
-        &[("auto", ()), ("kinematic", ())],
-        &["rigid", "stick-slip"],
+        &[("auto", 'a'), ("kinematic", 'k'), ("stick-slip", 's')],
+        &["rigid"],
     )?;
-    table.choice("friction", &[("none", ())], &["mild", "strong", "severe"])?;
-    let given = table.contains("model") || table.contains("friction");
-    table.finish("")?;
-    Ok(given)
-}
-
-fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<Gauges, SceneError> {
-    let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')], &[])?;
-    table.not_built("tangential_n_per_v")?;
-    table.not_built("stiffness_n_per_m")?;
-    let tangential = table.boolean("tangential")?;
-    if kind == 'k' {
-        // Kinematic contact knows no force: the channel, wired or not, stays at mid-rail.
-        let snr_db = table.number("snr_db", &SNR)?;
-        let hum_50_hz = table.number("hum_50_hz", &HUM)?.unwrap_or(0.0);
-        let second_harmonic = table.number("second_harmonic", &SHARE)?.unwrap_or(0.0);
-        let dead = table.gauges("dead")?;
-        let saturated = table.gauges("saturated")?;
-        if let Some(gauge) = (0..dead.len()).find(|&gauge| dead[gauge] && saturated[gauge]) {
+    let friction = table.choice(
+        "friction",
+        &[
+            ("none", None),
+            ("mild", Some(Friction::Mild)),
+            ("strong", Some(Friction::Strong)),
+            ("severe", Some(Friction::Severe)),
+        ],
+        &[],
+    )?;
+    let contact = match (model, friction) {
+        ('k', Some(_)) => {
             return Err(table.refuse(
-                "saturated",
-                format!("gauge {gauge} is dead already: name it in one list only"),
+                "friction",
+                "a \"kinematic\" contact knows no friction: give \"none\", or model = \"stick-slip\"",
             ));
         }
-        table.finish(" with kind = \"kinematic\"")?;
-        return Ok(Gauges::Kinematic(Kinematic {
-            snr_db,
-            hum_50_hz,
-            second_harmonic,
-            dead,
-            saturated,
-        }));
+        ('s', None) => {
+            return Err(table.refuse(
+                "friction",
+                "without friction nothing sticks: give \"mild\", \"strong\" or \"severe\", or model = \"kinematic\"",
+            ));
+        }
+        (_, None) => Contact::Kinematic,
+        (_, Some(friction)) => Contact::StickSlip(friction),
+    };
+    let given = table.contains("model") || table.contains("friction");
+    table.finish("")?;
+    Ok((contact, given))
+}
+
+fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), SceneError> {
+    let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')], &[])?;
+    let tangential = table.boolean("tangential")?;
+    let defaults = Force::default();
+    let force = Force {
+        present: tangential.unwrap_or(defaults.present),
+        n_per_v: table
+            .number("tangential_n_per_v", &FORCE_SCALE)?
+            .unwrap_or(defaults.n_per_v),
+        stiffness_n_per_m: table
+            .number("stiffness_n_per_m", &STIFFNESS)?
+            .unwrap_or(defaults.stiffness_n_per_m),
+    };
+    if kind == 'k' {
+        return Ok((Gauges::Kinematic(kinematic(table)?), force));
     }
     let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
     let volts = series(&mut table, &headers, |before, row| {
@@ -262,7 +286,74 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<Gauges, SceneError> {
     }
     covers_time(&table, &volts, duration_s)?;
     table.finish(" with kind = \"recorded\"")?;
-    Ok(Gauges::Recorded(volts))
+    let present = tangential.unwrap_or(volts.width == 6);
+    Ok((Gauges::Recorded(volts), Force { present, ..force }))
+}
+
+fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
+    let resonance_hz = table.number("resonance_hz", &RESONANCE)?;
+    let damping = table.number("resonance_damping", &DAMPING)?;
+    if damping.is_some() && resonance_hz.is_none() {
+        return Err(table.refuse(
+            "resonance_damping",
+            "has nothing to damp: give resonance_hz too",
+        ));
+    }
+    let trouble_for_s = table.number("trouble_for_s", &INSTANT)?;
+    let kinematic = Kinematic {
+        snr_db: table.number("snr_db", &SNR)?,
+        hum_50_hz: table.number("hum_50_hz", &HUM)?.unwrap_or(0.0),
+        second_harmonic: table.number("second_harmonic", &SHARE)?.unwrap_or(0.0),
+        dead: table.gauges("dead")?,
+        saturated: table.gauges("saturated")?,
+        stuck: table.gauges("stuck")?,
+        noisy: table.gauges("noisy")?,
+        humming: table.gauges("humming")?,
+        trouble_from_s: table.number("trouble_from_s", &INSTANT)?.unwrap_or(0.0),
+        trouble_for_s,
+        resonance: resonance_hz.map(|hz| Resonance {
+            hz,
+            damping: damping.unwrap_or(0.15),
+        }),
+        pink: table.number("pink", &RELATIVE)?.unwrap_or(0.0),
+        drift: table.number("drift", &RELATIVE)?.unwrap_or(0.0),
+        offset: table.number("offset", &RELATIVE)?.unwrap_or(0.0),
+        skew_us: table.number("skew_us", &SKEW)?.unwrap_or(0.0),
+    };
+    let lists = [
+        ("dead", kinematic.dead),
+        ("saturated", kinematic.saturated),
+        ("stuck", kinematic.stuck),
+        ("noisy", kinematic.noisy),
+        ("humming", kinematic.humming),
+    ];
+    for (index, (key, list)) in lists.iter().enumerate() {
+        for (earlier, other) in &lists[..index] {
+            if let Some(gauge) = (0..list.len()).find(|&gauge| list[gauge] && other[gauge]) {
+                return Err(table.refuse(
+                    key,
+                    format!("gauge {gauge} is {earlier} already: name it in one list only"),
+                ));
+            }
+        }
+    }
+    if trouble_for_s == Some(0.0) {
+        return Err(table.refuse(
+            "trouble_for_s",
+            "no trouble lasts 0 s: give a time above 0, or take it out",
+        ));
+    }
+    let healthy = lists.iter().all(|(_, list)| !list.contains(&true));
+    for key in ["trouble_from_s", "trouble_for_s"] {
+        if healthy && table.contains(key) {
+            return Err(table.refuse(
+                key,
+                "there is no trouble: name gauges in dead, saturated, stuck, noisy or humming",
+            ));
+        }
+    }
+    table.finish(" with kind = \"kinematic\"")?;
+    Ok(kinematic)
 }
 
 fn link(mut table: Table<'_>) -> Result<Link, SceneError> {

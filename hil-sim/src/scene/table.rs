@@ -246,14 +246,6 @@ impl<'t> Table<'t> {
         Ok(chosen)
     }
 
-    /// Refuses a key of the contract that this version does not build.
-    pub fn not_built(&mut self, key: &'static str) -> Result<(), SceneError> {
-        match self.get(key) {
-            None => Ok(()),
-            Some(_) => Err(self.refuse(key, "is known but not built in this version: take it out")),
-        }
-    }
-
     /// Refuses every key that nobody asked for. `with` says what decided which keys there are, or is empty.
     pub fn finish(self, with: &str) -> Result<(), SceneError> {
         let unknown = self
