@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use protocol::Role;
 
+mod chart;
 mod cost;
 mod demo;
 mod run;
@@ -33,6 +34,8 @@ enum Command {
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
     Cost(Cost),
+    /// Draws what the estimators give against what they cost
+    Chart(chart::Chart),
 }
 
 #[derive(Debug, clap::Args)]
@@ -120,6 +123,7 @@ impl Arguments {
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
+            Command::Chart(chart) => chart.execute(),
         }
     }
 }

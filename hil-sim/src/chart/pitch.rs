@@ -10,11 +10,13 @@ use super::tally::{Tally, operations};
 
 /// YIN answers at the first dip of its normalised difference below 1 less this: 0.2.
 const YIN_CLARITY: f32 = 0.8;
-/// McLeod's method answers at the first peak of its normalised correlation above this.
-const MCLEOD_CLARITY: f32 = 0.7;
+/// McLeod's method answers at the first peak of its normalised correlation above this. The crate's (0.3.0)
+/// is not normalised as meant, since its inverse transform leaves a factor of the length: it falls as
+/// 1 − τ/N, so that the 0.7 or so which is usual would leave only the periods below 0.3 N.
+const MCLEOD_CLARITY: f32 = 0.4;
 
-/// A detector over the last `N` ms. It finds frequencies from 2 000/`N` Hz on (YIN: two periods within
-/// the window); the documented resolution is that of its parabola through the lags of whole ms.
+/// A detector over the last `N` ms. It finds periods up to N/2 (YIN), 0.6 N (McLeod). Their resolution is a
+/// lag of 1 ms, parted by a parabola.
 pub struct Pitch<const N: usize, D> {
     window: Window<N>,
     detector: D,

@@ -95,7 +95,7 @@ impl Setting {
             Method::Bank => "bank",
             Method::Crossings => "crossings",
             Method::Counting => "counting",
-            Method::AdaptedCounting => "counting, A adapted",
+            Method::AdaptedCounting => "adapted count",
         }
     }
 

@@ -16,6 +16,8 @@ use super::{ElfError, FirmwareError};
 const MARKS: u64 = 0x4002_3000;
 /// Added to a part's number at its end.
 const END: u64 = 100;
+/// The mark after each millisecond of a part, if it leaves any.
+const MILLISECOND: u64 = 998;
 /// The mark after the last part.
 const DONE: u64 = 999;
 /// Virtual time after which a firmware that has not come to its end is given up.
@@ -31,10 +33,23 @@ impl Pins for Bare {
     }
 }
 
+/// What a part took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// Instructions from its first mark to its last.
+    pub instructions: u64,
+    /// The most in one of its milliseconds; 0 if it does not mark them.
+    pub worst_millisecond: u64,
+}
+
 #[derive(Default)]
 struct Marks {
     begun: BTreeMap<u64, u64>,
-    taken: BTreeMap<u64, u64>,
+    /// Instructions at the last mark, and the most between two millisecond marks since the last part
+    /// began.
+    last: u64,
+    worst: u64,
+    taken: BTreeMap<u64, Taken>,
     done: bool,
 }
 
@@ -63,14 +78,22 @@ impl Driver<Nucleo<Bare>> for Marks {
         if value == DONE {
             self.done = true;
             session.pause_at(Some(virtual_time));
+        } else if value == MILLISECOND {
+            self.worst = self.worst.max(instruction_count - self.last);
         } else if let Some(begun) = value
             .checked_sub(END)
             .and_then(|part| self.begun.get(&part))
         {
-            self.taken.insert(value - END, instruction_count - begun);
+            let taken = Taken {
+                instructions: instruction_count - begun,
+                worst_millisecond: self.worst,
+            };
+            self.taken.insert(value - END, taken);
         } else {
             self.begun.insert(value, instruction_count);
+            self.worst = 0;
         }
+        self.last = instruction_count;
     }
 
     fn on_stop(
@@ -88,6 +111,19 @@ impl Driver<Nucleo<Bare>> for Marks {
 /// # Errors
 /// If the file can't be read or placed, or does not come to its end.
 pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
+    let parts = profile(path, "firmware-sensor --example filter_cost")?;
+    Ok(parts
+        .into_iter()
+        .map(|(part, taken)| (part, taken.instructions))
+        .collect())
+}
+
+/// What each part of the ELF at `path` took, by the part's number. `package` is where that ELF comes from:
+/// what comes behind `cargo build -p`.
+///
+/// # Errors
+/// As [`count`].
+pub fn profile(path: &Path, package: &'static str) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let board = |reason: String| ElfError::Board {
         board: "bare",
         reason,
@@ -95,7 +131,7 @@ pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
     let elf = std::fs::read(path).map_err(|source| {
         ElfError::Firmware(FirmwareError::Missing {
             path: path.to_owned(),
-            package: "firmware-sensor --example filter_cost",
+            package,
             source,
         })
     })?;

@@ -12,8 +12,6 @@ pub mod phase_lock;
 pub mod roster;
 pub mod spectrum;
 
-pub use entrant::{Answer, Entrant};
-
 use protocol::GAUGES;
 
 /// The lowest frequency that is looked for, in Hz; `v/λ` of 10 mm/s over 4 mm.
