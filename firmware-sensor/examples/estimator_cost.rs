@@ -2,8 +2,8 @@
 //! runs here works through the same second of a fingertip on a 2 mm grating at 50 mm/s, 20 dB, after
 //! another second that lets it start.
 //!
-//! A mark is a 32-bit write to the CRC unit's data register, [`MARKS`]: k at the start of part k, 998 after
-//! each millisecond, k + 100 at its end, 999 when all is done. The parts' numbers, the settings and the
+//! A mark is a 32-bit write to the CRC unit's data register, [`MARKS`]: k before each millisecond of part k,
+//! k + 100 after it, 999 when all is done. The parts' numbers, the settings and the
 //! rivals are the simulator's own files.
 //!
 //! On a computer this is an empty program.
@@ -54,7 +54,6 @@ mod board {
     /// RCC_AHB1ENR and the bit that gives the CRC unit its clock.
     const AHB1_CLOCKS: *mut u32 = 0x4002_3830 as *mut u32;
     const CRC_CLOCK: u32 = 1 << 12;
-    const MILLISECOND: u32 = 998;
     const DONE: u32 = 999;
 
     type Millisecond = [Scan; SCANS_PER_SAMPLE];
@@ -135,18 +134,17 @@ mod board {
         mut step: impl FnMut(usize, &Millisecond, u16),
     ) {
         for second in 0..2 {
-            if second == 1 {
-                mark(number);
-            }
             for (ms, scans) in black_box(signal).iter().enumerate() {
                 let ms = second * signal.len() + ms;
+                if second == 1 {
+                    mark(number);
+                }
                 step(ms, scans, (ms * COUNTS_PER_MS) as u16);
                 if second == 1 {
-                    mark(MILLISECOND);
+                    mark(number + 100);
                 }
             }
         }
-        mark(number + 100);
     }
 
     struct Field<'a> {

@@ -62,7 +62,7 @@ impl Estimator for AdaptedCounting {
 }
 
 /// The window A in s that makes equation (11) least, for λ = `wavelength_mm` and fv = `strokes_hz`, both
-/// above 0; within 0.1 % while A·fv ≤ 0.25, which holds for λ ≥ 0.5 mm and fv ≤ 3 Hz.
+/// above 0; within 0.2 % for λ from 0.5 mm and fv up to 3 Hz.
 ///
 /// With x = πAfv and x/sin x − 1 = x²/6 + 7x⁴/360 + …, the derivative of (11) by A is
 /// λπ²fv²A/3 · (1 + 7x²/30 + …) − σ/√(2πfs) · A^(−3/2). It is 0 at

@@ -106,9 +106,9 @@ impl Counted {
         self.gauge
     }
 
-    /// Takes the next sample of all gauges behind the band-pass.
-    pub fn push(&mut self, banded: &[f32; GAUGES]) {
-        let impulse = self.crossing.step(banded[self.gauge]);
+    /// Takes the counted gauge's next sample behind the band-pass.
+    pub fn push(&mut self, banded: f32) {
+        let impulse = self.crossing.step(banded);
         self.impulses.push(impulse);
     }
 
@@ -172,8 +172,8 @@ impl CountedGauge {
 
     pub(crate) fn push(&mut self, touch: &Touch) {
         let gauge = self.counted.gauge();
-        self.counted.push(&touch.banded);
-        self.amplitude.push(touch.banded[gauge]);
+        self.counted.push(touch.counted);
+        self.amplitude.push(touch.counted);
         self.usable = touch.usable & 1 << gauge != 0;
     }
 
@@ -200,6 +200,7 @@ impl CountedGauge {
             },
             amplitude_lsb,
             gauges_used: 1 << self.counted.gauge(),
+            ..Finding::default()
         }
     }
 }

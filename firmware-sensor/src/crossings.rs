@@ -126,6 +126,7 @@ impl Estimator for Crossings {
             confidence: agree as f32 / usable as f32,
             amplitude_lsb: libm::sqrtf(2.0 * powers / count as f32),
             gauges_used: agreeing.fold(0, |used, (_, gauge)| used | 1 << gauge),
+            ..Finding::default()
         }
     }
 }

@@ -30,11 +30,17 @@ pub struct Touch {
     /// Where the fingertip's contact was at the instant of `gauges`, to the sample: the arm's position,
     /// less its deflection F/k where the force channel tells it.
     pub place: Place,
-    /// The gauges behind the band-pass, in ADC steps.
+    /// The counted gauge behind the band-pass, as the paper has it: with whatever hum there is.
+    pub counted: f32,
+    /// The gauges behind the band-pass, hum taken out, in ADC steps; 0 if the estimator does not want them.
     pub banded: [f32; GAUGES],
     /// Where the contact was at the instant of `banded`, as far as a filter whose delay depends on
     /// frequency can have one: see [`crate::travel::ALIGNMENT_MS`].
     pub banded_place: Place,
+    /// Variance of the white noise in each of `gauges`, in ADC steps².
+    pub noise: [f32; GAUGES],
+    /// Amplitude in ADC steps of what may be hum in `gauges`, as long as that is not known; 0 once it is.
+    pub pickup_lsb: f32,
     /// Bit g set: gauge g is in good health and allowed to take part.
     pub usable: u8,
 }
@@ -52,6 +58,10 @@ pub struct Finding {
     pub amplitude_lsb: f32,
     /// Bit g set: gauge g took part.
     pub gauges_used: u8,
+    /// Bit g set: gauge g says something else than the others, who agree.
+    pub misfits: u8,
+    /// The gauges hold more power at high frequencies than a slipping fingertip would make.
+    pub jerky: bool,
 }
 
 /// An estimator of λ.

@@ -3,6 +3,7 @@
 use protocol::{Method, SensorConfiguration};
 
 use crate::adapted::AdaptedCounting;
+use crate::bank::Bank;
 use crate::counting::Counting;
 use crate::crossings::Crossings;
 use crate::estimator::{Estimator, Finding, Touch};
@@ -12,6 +13,8 @@ use crate::travel::Travel;
 /// heap to put it on.
 #[derive(Clone, Debug)]
 pub enum Running {
+    /// [`Method::Bank`]
+    Bank(Bank),
     /// [`Method::Counting`]
     Counting(Counting),
     /// [`Method::AdaptedCounting`]
@@ -28,15 +31,27 @@ impl Running {
             Method::Counting => Self::Counting(Counting::new(configuration)),
             Method::AdaptedCounting => Self::AdaptedCounting(AdaptedCounting::new(configuration)),
             Method::Crossings => Self::Crossings(Crossings::new(configuration)),
-            // STAND-IN until there is a bank: this line is to become the bank's own.
-            Method::Bank => Self::Crossings(Crossings::new(configuration)),
+            Method::Bank => Self::Bank(Bank::new(configuration)),
         }
+    }
+}
+
+impl Running {
+    /// Whether the estimator looks at the gauges behind the band-pass ([`Touch::banded`]).
+    pub fn wants_band_pass(&self) -> bool {
+        matches!(self, Self::Crossings(_))
+    }
+
+    /// Whether the estimator has to wait until the start has died down in the band-pass.
+    pub fn waits(&self) -> bool {
+        !matches!(self, Self::Bank(_))
     }
 }
 
 impl Estimator for Running {
     fn push(&mut self, touch: &Touch) {
         match self {
+            Self::Bank(bank) => bank.push(touch),
             Self::Counting(counting) => counting.push(touch),
             Self::AdaptedCounting(counting) => counting.push(touch),
             Self::Crossings(crossings) => crossings.push(touch),
@@ -45,6 +60,7 @@ impl Estimator for Running {
 
     fn find(&mut self, travel: &Travel) -> Finding {
         match self {
+            Self::Bank(bank) => bank.find(travel),
             Self::Counting(counting) => counting.find(travel),
             Self::AdaptedCounting(counting) => counting.find(travel),
             Self::Crossings(crossings) => crossings.find(travel),

@@ -1,17 +1,19 @@
 //! The sensor board as a whole: scans, encoder and [`Motion`]s in; estimates, samples and the arm's
 //! drive out.
 
-use protocol::{
-    CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Gauges, Motion, SensorConfiguration,
-};
+use protocol::{Contact, Estimate, GAUGES, Gauges, Motion, SensorConfiguration};
 
 use crate::arm::{Arm, Drive};
 use crate::bandpass::{BAND, BandPass, Lane, ORDER};
 use crate::block::{Block, Place};
 use crate::counting::{Counted, PAPERS_WINDOW_MS};
 use crate::decimate::{self, AntiAlias, History};
-use crate::estimator::{Estimator, Touch};
+use crate::estimator::{Estimator, Finding, Touch};
+use crate::health::{Health, Signs};
+use crate::hum::Hum;
 use crate::method::Running;
+use crate::noise::Noise;
+use crate::slip::Slip;
 use crate::travel::{ALIGNMENT_MS, Travel};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
@@ -20,6 +22,8 @@ use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 const SETTLING_SAMPLES: u32 = (3.0 * core::f64::consts::SQRT_2
     / (2.0 * core::f64::consts::PI * BAND.low_hz())
     * SAMPLE_RATE_HZ as f64) as u32;
+/// Speed of the arm from which on it moves, in mm/s.
+const MOVING_MM_S: f32 = 2.0;
 const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
 const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
 
@@ -45,6 +49,10 @@ pub struct Sensor {
     started: Option<Started>,
     /// The paper's count, whatever the method.
     counted: Counted,
+    noise: Noise,
+    hum: Hum,
+    health: Health,
+    slip: Slip,
     estimator: Running,
     arm: Arm,
     block: Block,
@@ -58,7 +66,12 @@ pub struct Sensor {
 #[derive(Clone, Debug)]
 struct Started {
     history: History,
+    /// The counted gauge, as the paper has it.
+    counted_lane: Lane<ORDER>,
+    /// All gauges without their hum, for estimators that want them band-passed.
     lanes: [Lane<ORDER>; GAUGES],
+    /// The lanes are to be settled on the next sample.
+    resettle: bool,
     travel: Travel,
 }
 
@@ -71,6 +84,10 @@ impl Sensor {
             band_pass: BandPass::new(BAND),
             started: None,
             counted: Counted::new(&configuration),
+            noise: Noise::default(),
+            hum: Hum::default(),
+            health: Health::default(),
+            slip: Slip::new(&configuration),
             estimator: Running::new(&configuration),
             arm: Arm::default(),
             block: Block::default(),
@@ -81,12 +98,18 @@ impl Sensor {
     }
 
     /// Takes another configuration, which must have passed its check. The estimators start over: there
-    /// is no counted wavelength before a whole window has been counted. Filters, positions and arm go on.
+    /// is no counted wavelength before a whole window has been counted. What is known of the gauges, the
+    /// positions and the arm go on.
     pub fn configure(&mut self, configuration: SensorConfiguration) {
         self.configuration = configuration;
         self.counted = Counted::new(&configuration);
+        self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
         self.block.clear();
+        self.settling = SETTLING_SAMPLES;
+        if let Some(started) = &mut self.started {
+            started.resettle = true;
+        }
     }
 
     /// The configuration in force.
@@ -120,22 +143,53 @@ impl Sensor {
         let sample = self.anti_alias.step(&mut started.history, scans);
         started.travel.push(encoder);
 
-        let mut banded = [0.0; GAUGES];
-        for ((y, x), lane) in banded.iter_mut().zip(sample).zip(&mut started.lanes) {
-            *y = self.band_pass.step(lane, x);
-        }
-        let touch = started.touch(&sample, banded, self.configuration.gauges);
+        let raw: [f32; GAUGES] = core::array::from_fn(|gauge| sample[gauge]);
+        self.noise.push(scans);
+        self.health.push(scans, &raw);
+        let usable = self.health.good() & self.configuration.gauges;
+        let mut gauges = raw;
+        self.hum.remove(&mut gauges, usable);
+
+        let arm = started.travel.place(decimate::DELAY_MS);
+        let lag = self.slip.push(arm, sample[GAUGES]);
+        let counted_gauge = usize::from(self.configuration.counted_gauge).min(GAUGES - 1);
+        let (counted, banded) = started.band_pass(
+            &self.band_pass,
+            raw[counted_gauge],
+            &gauges,
+            self.estimator.wants_band_pass(),
+        );
+        let touch = Touch {
+            gauges,
+            place: arm.wrapping_sub(lag),
+            counted,
+            banded,
+            banded_place: started.travel.place(ALIGNMENT_MS).wrapping_sub(lag),
+            noise: self.noise.variances(),
+            pickup_lsb: self.hum.pickup_lsb(usable),
+            usable,
+        };
         if self.settling == 0 {
-            self.counted.push(&touch.banded);
+            self.counted.push(counted);
+        }
+        if self.settling == 0 || !self.estimator.waits() {
             self.estimator.push(&touch);
         }
         self.settling = self.settling.saturating_sub(1);
 
         let arm_um = started.travel.position_um(0);
-        let place = started.place(self.samples, instant_us);
+        let number = self.samples;
         self.samples = self.samples.wrapping_add(1);
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
+            let contact = contact(&self.slip, &started.travel, &finding);
+            self.hum.texture_at(frequency_hz(&started.travel, &finding));
+            self.health.judge(&Signs {
+                noise: touch.noise,
+                hum_lsb: core::array::from_fn(|gauge| self.hum.own_lsb(gauge, usable)),
+                misfits: finding.misfits,
+                agreed: finding.valid,
+            });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
             let sequence = self.estimates;
             self.estimates = self.estimates.wrapping_add(1);
@@ -148,16 +202,16 @@ impl Sensor {
                 amplitude_lsb: finding.amplitude_lsb,
                 counted_mm: count.wavelength_mm,
                 range: count.range,
-                contact: Contact::Unknown,
-                lag_um: None,
+                contact,
+                lag_um: self.slip.lag_um(),
                 gauges_used: finding.gauges_used,
-                health: [GaugeHealth::Good; GAUGES],
+                health: self.health.verdicts(),
             })
         } else {
             None
         };
         let gauges = if self.configuration.stream_gauges {
-            self.block.push(place, &sample)
+            self.block.push(started.place(number, instant_us), &sample)
         } else {
             None
         };
@@ -176,22 +230,32 @@ impl Started {
     fn new(band_pass: &BandPass<ORDER>, first: &Scan, encoder: u16) -> Self {
         Self {
             history: History::settled(first),
-            lanes: core::array::from_fn(|gauge| {
-                band_pass.settled(decimate::from_mid_rail(first[gauge]))
-            }),
+            counted_lane: band_pass.settled(0.0),
+            lanes: [band_pass.settled(0.0); GAUGES],
+            resettle: true,
             travel: Travel::new(encoder),
         }
     }
 
-    /// What the estimator is to see of the sample that has just come out of the filters.
-    fn touch(&self, sample: &[f32; CHANNELS], banded: [f32; GAUGES], usable: u8) -> Touch {
-        Touch {
-            gauges: core::array::from_fn(|gauge| sample[gauge]),
-            place: self.travel.place(decimate::DELAY_MS),
-            banded,
-            banded_place: self.travel.place(ALIGNMENT_MS),
-            usable,
+    /// Band-passes the counted gauge and, if they are `wanted`, all.
+    fn band_pass(
+        &mut self,
+        band_pass: &BandPass<ORDER>,
+        counted: f32,
+        gauges: &[f32; GAUGES],
+        wanted: bool,
+    ) -> (f32, [f32; GAUGES]) {
+        if core::mem::take(&mut self.resettle) {
+            self.counted_lane = band_pass.settled(counted);
+            self.lanes = gauges.map(|x| band_pass.settled(x));
         }
+        let mut banded = [0.0; GAUGES];
+        if wanted {
+            for ((y, x), lane) in banded.iter_mut().zip(gauges).zip(&mut self.lanes) {
+                *y = band_pass.step(lane, *x);
+            }
+        }
+        (band_pass.step(&mut self.counted_lane, counted), banded)
     }
 
     /// Where and when the sample that has just come out of the anti-aliasing filter was taken.
@@ -203,5 +267,23 @@ impl Started {
             position_um: self.travel.position_um(decimate::DELAY_MS),
             position_before_um: self.travel.position_um(decimate::DELAY_MS + 1),
         }
+    }
+}
+
+/// v/λ̂ in Hz where λ̂ is stood by.
+fn frequency_hz(travel: &Travel, finding: &Finding) -> Option<f32> {
+    let wavelength_mm = finding.wavelength_mm.filter(|_| finding.valid)?;
+    Some(travel.velocity_mm_s(0).abs() / wavelength_mm)
+}
+
+/// What the fingertip does: as the force channel tells; without one, it slips where a wavelength is stood
+/// by, and hints of sticking and slipping in turn are all that can be had.
+fn contact(slip: &Slip, travel: &Travel, finding: &Finding) -> Contact {
+    match slip.contact(travel, decimate::DELAY_MS) {
+        Contact::Unknown if slip.lag_um().is_some() => Contact::Unknown,
+        Contact::Unknown if travel.velocity_mm_s(0).abs() < MOVING_MM_S => Contact::Unknown,
+        Contact::Unknown if finding.jerky => Contact::StickSlip,
+        Contact::Unknown if finding.valid => Contact::Slip,
+        told => told,
     }
 }

@@ -31,7 +31,7 @@ pub struct SensorConfiguration {
     /// Travel over which the bank averages, as percent of λ, 30 to 300: the knob between accuracy and
     /// latency.
     pub bank_travel_percent: u16,
-    /// Wavenumbers in the bank, 12 to 36.
+    /// Wavenumbers in the bank, 12 to 24.
     pub bank_candidates: u8,
     /// Whether the sixth channel carries the tangential force.
     pub force_channel: bool,
@@ -53,7 +53,7 @@ impl SensorConfiguration {
         counted_gauge: 2,
         gauges: 0b11111,
         bank_travel_percent: 70,
-        bank_candidates: 28,
+        bank_candidates: 24,
         force_channel: false,
         force_mn_per_v: 1_000,
         stiffness_n_per_m: 400,
@@ -177,7 +177,7 @@ impl SensorConfiguration {
             300,
             Setting::BankTravel,
         )?;
-        within(self.bank_candidates.into(), 12, 36, Setting::BankCandidates)?;
+        within(self.bank_candidates.into(), 12, 24, Setting::BankCandidates)?;
         within(self.force_mn_per_v.into(), 1, 60_000, Setting::ForceScale)?;
         if self.stiffness_n_per_m != 0 {
             within(

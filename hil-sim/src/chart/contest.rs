@@ -107,6 +107,14 @@ impl Contestant {
         }
     }
 
+    /// The setting, if it is one of ours.
+    pub fn setting(&self) -> Option<Setting> {
+        match self {
+            Self::Ours(setting) => Some(*setting),
+            Self::Rival { .. } => None,
+        }
+    }
+
     fn start(&self, scene: SensorConfiguration) -> Box<dyn Run> {
         match self {
             Self::Ours(setting) => Box::new(Board {
@@ -336,6 +344,14 @@ mod tests {
                     "{name}: {error:?} Hz off at {frequency_hz} Hz, {bound} allowed"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn the_board_takes_every_setting() {
+        for setting in SETTINGS {
+            let configuration = setting.on(SensorConfiguration::DEFAULT);
+            assert_eq!(configuration.check(), Ok(()), "{setting:?}");
         }
     }
 

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::elf::ElfError;
-use crate::elf::cost::{Taken, profile};
+use crate::elf::cost::{Taken, measure_example};
 
 use super::contest::{Contestant, Work};
 use super::fourier::operations_of_transform;
-use super::parts::{FRONT, MILLISECONDS, SETTINGS_FROM, TRANSFORM};
+use super::parts::{FRONT, SETTINGS_FROM, TRANSFORM};
 use super::settings::SETTINGS;
 
 /// Milliseconds from one answer to the next.
@@ -36,7 +36,7 @@ impl Costs {
     /// # Errors
     /// If it can't be read, or does not come to its end.
     pub fn count(path: &Path) -> Result<Self, ElfError> {
-        let parts = profile(path, "firmware-sensor --example estimator_cost")?;
+        let parts = measure_example(path, "firmware-sensor --example estimator_cost")?;
         Ok(Self { parts })
     }
 
@@ -73,8 +73,8 @@ impl Costs {
     fn part(&self, part: u32) -> Option<Cost> {
         let taken = self.parts.get(&u64::from(part))?;
         Some(Cost {
-            mean: taken.instructions as f64 / f64::from(MILLISECONDS),
-            worst: Some(taken.worst_millisecond as f64),
+            mean: taken.total as f64 / taken.pieces as f64,
+            worst: Some(taken.largest as f64),
         })
     }
 }

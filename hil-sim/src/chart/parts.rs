@@ -8,5 +8,5 @@ pub const RIVALS_FROM: u32 = 40;
 pub const FRONT: u32 = 60;
 /// One real transform of [`super::rivals::spectrum::LENGTH`] samples a millisecond, and nothing else.
 pub const TRANSFORM: u32 = 61;
-/// Milliseconds that every part is counted over.
+/// Milliseconds that every part is counted over, each a piece of its own.
 pub const MILLISECONDS: u32 = 1_000;

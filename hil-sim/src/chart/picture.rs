@@ -69,12 +69,14 @@ struct Scale {
 
 impl Scale {
     fn decades(low: f64, high: f64, label: &str) -> Self {
-        let mut ticks = Vec::new();
-        let mut tick = 10f64.powf(low.log10().ceil());
-        while tick <= high * 1.001 {
-            ticks.push((tick, short(tick)));
-            tick *= 10.0;
-        }
+        // Where there is room, 2 and 5 are labelled too.
+        let steps: &[f64] = if high / low < 1e3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
+        let ticks = decades
+            .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
+            .filter(|tick| (low..=high * 1.001).contains(tick))
+            .map(|tick| (tick, short(tick)))
+            .collect();
         Self {
             low,
             high,
@@ -148,8 +150,8 @@ pub fn draw(result: &ContestResult) -> String {
          <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
     );
     legend(&mut svg);
-    let cost = Scale::decades(700.0, 100_000.0, "instructions a ms");
-    let error = Scale::decades(0.05, 100.0, "");
+    let cost = Scale::decades(700.0, 30_000.0, "instructions a ms");
+    let error = Scale::decades(0.03, 300.0, "");
     let settling = Scale::even(0.0, 400.0, 100.0, "");
     for index in 0..panels {
         let (column, row) = (index % COLUMNS, index / COLUMNS);
@@ -164,6 +166,7 @@ pub fn draw(result: &ContestResult) -> String {
                 let panel = Panel { left, top, x: &cost, y: &settling };
                 let title = format!("{}: settled within 10 %, ms", family.title);
                 axes(&mut svg, &panel, &title);
+                budget(&mut svg, &panel);
                 for goal_ms in goals_ms(family) {
                     goal(&mut svg, &panel, goal_ms, &format!("goal {goal_ms} ms"));
                 }
@@ -174,6 +177,7 @@ pub fn draw(result: &ContestResult) -> String {
             Some(family) => {
                 let panel = Panel { left, top, x: &cost, y: &error };
                 axes(&mut svg, &panel, &format!("{}: RMS error, %", family.title));
+                budget(&mut svg, &panel);
                 bounds(&mut svg, &panel, family);
                 if let Some(percent) = family.goal_percent() {
                     goal(&mut svg, &panel, percent, &format!("goal {percent} %"));
@@ -210,7 +214,12 @@ fn goals_ms(family: &super::family::Family) -> Vec<f64> {
 }
 
 fn text(svg: &mut String, x: f64, y: f64, style: &str, words: &str) {
-    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{words}</text>");
+    // A white edge keeps it legible over lines.
+    let _ = writeln!(
+        svg,
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" stroke=\"#ffffff\" stroke-width=\"3\" \
+         paint-order=\"stroke\" {style}>{words}</text>"
+    );
 }
 
 fn line(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &str) {
@@ -232,7 +241,7 @@ fn legend(svg: &mut String) {
     let mut x = MARGIN + 8.0;
     for (dash, words) in [
         (knob_dash("travel_percent"), "bank: travel 50–150 % of λ"),
-        (knob_dash("candidates"), "bank: 16–36 candidates"),
+        (knob_dash("candidates"), "bank: 12–24 candidates"),
         (knob_dash("gauges"), "1, 3, 5 gauges"),
     ] {
         let style = format!("stroke=\"#0072B2\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"");
@@ -245,7 +254,7 @@ fn legend(svg: &mut String) {
         x,
         y,
         "font-size=\"12\"",
-        "hollow: cost estimated; faint: valid less than half of the time",
+        "ring: default; hollow: cost estimated; faint: valid share below ½",
     );
     text(
         svg,
@@ -255,6 +264,17 @@ fn legend(svg: &mut String) {
         "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated \
          Cortex-M4F. Dashed: Cramér–Rao bound for the bank’s travel, 80 ms and 160 ms.",
     );
+}
+
+/// The most that the default estimator may cost, in instructions a ms: 5 % of 168 MHz.
+const BUDGET: f64 = 8_000.0;
+
+fn budget(svg: &mut String, panel: &Panel<'_>) {
+    let (x, bottom) = panel.at(BUDGET, panel.y.low);
+    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"1 3\"");
+    line(svg, (x, panel.top), (x, bottom), &style);
+    let style = format!("font-size=\"10\" fill=\"{SOFT}\"");
+    text(svg, x + 3.0, bottom - 4.0, &style, "5 % of the M4F");
 }
 
 fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
@@ -315,7 +335,13 @@ fn marks(
     place: impl Fn(&Entry) -> Option<(f64, f64)>,
     family: usize,
 ) {
-    let at = |entry: &Entry| place(entry).map(|(x, y)| panel.at(x, y));
+    let at = |entry: &Entry| {
+        let (x, y) = place(entry)?;
+        // What takes longer than a panel shows is left out; an error beyond its edge stands at it.
+        let shown = (panel.x.logarithmic || x <= panel.x.high)
+            && (panel.y.logarithmic || y <= panel.y.high);
+        shown.then(|| panel.at(x, y))
+    };
     for pair in result.entries.windows(2) {
         let [from, to] = [&pair[0], &pair[1]];
         if (from.method, from.knob) != (to.method, to.knob) {
@@ -334,21 +360,30 @@ fn marks(
         let (Some(point), Some(look)) = (at(entry), look_of(entry.method)) else {
             continue;
         };
+        if entry.is_default() {
+            ring(svg, point, look);
+        }
         let hollow = entry.cost.is_some_and(|cost| cost.worst.is_none());
         let rarely = entry.scores[family]
             .valid_share
             .is_some_and(|share| share < 0.5);
         mark(svg, point, look, hollow, if rarely { 0.3 } else { 1.0 });
         if entry.method == "counting" && entry.value == 80 {
-            text(
-                svg,
-                point.0 + 7.0,
-                point.1 - 4.0,
-                "font-size=\"10\" font-style=\"italic\"",
-                "the paper’s count",
-            );
+            // Below if there is no room above.
+            let aside = if point.1 < panel.top + 10.0 { 14.0 } else { -5.0 };
+            let style = "font-size=\"10\" font-style=\"italic\"";
+            text(svg, point.0 + 6.0, point.1 + aside, style, "the paper’s count");
         }
     }
+}
+
+/// Around the default setting's mark.
+fn ring(svg: &mut String, (x, y): (f64, f64), look: &Look) {
+    let _ = writeln!(
+        svg,
+        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>",
+        look.colour
+    );
 }
 
 fn look_of(method: &str) -> Option<&'static Look> {
@@ -401,12 +436,12 @@ mod tests {
 
     #[test]
     fn a_scale_puts_its_ends_and_what_lies_beyond_at_0_and_1() {
-        let scale = Scale::decades(0.1, 100.0, "");
+        let scale = Scale::decades(0.1, 1_000.0, "");
         assert_eq!(scale.place(0.1), 0.0);
         assert_eq!(scale.place(1e9), 1.0);
-        assert!((scale.place(1.0) - 1.0 / 3.0).abs() < 1e-12);
+        assert!((scale.place(1.0) - 0.25).abs() < 1e-12);
         let ticks: Vec<&str> = scale.ticks.iter().map(|tick| &*tick.1).collect();
-        assert_eq!(ticks, ["0.1", "1", "10", "100"]);
+        assert_eq!(ticks, ["0.1", "1", "10", "100", "1k"]);
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! The contest's result, and its CSV.
 
+use protocol::SensorConfiguration;
+
 use super::bound::bank_travel_mm;
 use super::costs::Cost;
 use super::family::Family;
 use super::score::Score;
+use super::settings::Setting;
 
 /// A contestant's row.
 #[derive(Clone, Debug)]
@@ -14,10 +17,21 @@ pub struct Entry {
     pub knob: &'static str,
     /// Its value.
     pub value: u16,
+    /// What the sensor board is set to, if it is one of ours.
+    pub setting: Option<Setting>,
     /// What it costs on the board.
     pub cost: Option<Cost>,
     /// A score for each family.
     pub scores: Vec<Score>,
+}
+
+impl Entry {
+    /// Whether it is what the board does without being told.
+    pub fn is_default(&self) -> bool {
+        let default = SensorConfiguration::DEFAULT;
+        self.setting
+            .is_some_and(|setting| setting.on(default) == default)
+    }
 }
 
 /// Everything that the chart shows.
@@ -44,7 +58,7 @@ pub enum Window {
 impl Window {
     /// The bound on a family in percent, if it is of the kind that has one.
     pub fn bound_percent(self, family: &Family) -> Option<f64> {
-        let travel_percent = protocol::SensorConfiguration::DEFAULT.bank_travel_percent;
+        let travel_percent = SensorConfiguration::DEFAULT.bank_travel_percent;
         family.bound_percent(|wavelength_mm, speed_mm_s| match self {
             Self::BankTravel => bank_travel_mm(travel_percent, wavelength_mm) / speed_mm_s.abs(),
             Self::Ms(ms) => f64::from(ms) * 1e-3,

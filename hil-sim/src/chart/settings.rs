@@ -38,16 +38,15 @@ const fn setting(method: Method, knob: Knob, value: u16) -> Setting {
 }
 
 /// All of them. A knob's values rise.
-pub const SETTINGS: [Setting; 19] = [
+pub const SETTINGS: [Setting; 18] = [
     setting(Method::Bank, Knob::Travel, 50),
     setting(Method::Bank, Knob::Travel, 70),
     setting(Method::Bank, Knob::Travel, 100),
     setting(Method::Bank, Knob::Travel, 150),
+    setting(Method::Bank, Knob::Candidates, 12),
     setting(Method::Bank, Knob::Candidates, 16),
     setting(Method::Bank, Knob::Candidates, 20),
     setting(Method::Bank, Knob::Candidates, 24),
-    setting(Method::Bank, Knob::Candidates, 28),
-    setting(Method::Bank, Knob::Candidates, 36),
     setting(Method::Bank, Knob::Gauges, 1),
     setting(Method::Bank, Knob::Gauges, 3),
     setting(Method::Bank, Knob::Gauges, 5),

@@ -88,6 +88,7 @@ impl Estimators {
                     method: contestant.method(),
                     knob: contestant.knob(),
                     value: contestant.value(),
+                    setting: contestant.setting(),
                     cost: costs.of(index, contestant),
                     scores,
                 }

@@ -16,8 +16,6 @@ use super::{ElfError, FirmwareError};
 const MARKS: u64 = 0x4002_3000;
 /// Added to a part's number at its end.
 const END: u64 = 100;
-/// The mark after each millisecond of a part, if it leaves any.
-const MILLISECOND: u64 = 998;
 /// The mark after the last part.
 const DONE: u64 = 999;
 /// Virtual time after which a firmware that has not come to its end is given up.
@@ -33,22 +31,20 @@ impl Pins for Bare {
     }
 }
 
-/// What a part took.
+/// The instructions of a part, which may come in pieces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Taken {
-    /// Instructions from its first mark to its last.
-    pub instructions: u64,
-    /// The most in one of its milliseconds; 0 if it does not mark them.
-    pub worst_millisecond: u64,
+    /// Of all pieces.
+    pub total: u64,
+    /// Of the largest piece.
+    pub largest: u64,
+    /// How many pieces.
+    pub pieces: u64,
 }
 
 #[derive(Default)]
 struct Marks {
     begun: BTreeMap<u64, u64>,
-    /// Instructions at the last mark, and the most between two millisecond marks since the last part
-    /// began.
-    last: u64,
-    worst: u64,
     taken: BTreeMap<u64, Taken>,
     done: bool,
 }
@@ -78,22 +74,18 @@ impl Driver<Nucleo<Bare>> for Marks {
         if value == DONE {
             self.done = true;
             session.pause_at(Some(virtual_time));
-        } else if value == MILLISECOND {
-            self.worst = self.worst.max(instruction_count - self.last);
         } else if let Some(begun) = value
             .checked_sub(END)
             .and_then(|part| self.begun.get(&part))
         {
-            let taken = Taken {
-                instructions: instruction_count - begun,
-                worst_millisecond: self.worst,
-            };
-            self.taken.insert(value - END, taken);
+            let piece = instruction_count - begun;
+            let taken = self.taken.entry(value - END).or_default();
+            taken.total += piece;
+            taken.largest = taken.largest.max(piece);
+            taken.pieces += 1;
         } else {
             self.begun.insert(value, instruction_count);
-            self.worst = 0;
         }
-        self.last = instruction_count;
     }
 
     fn on_stop(
@@ -111,19 +103,29 @@ impl Driver<Nucleo<Bare>> for Marks {
 /// # Errors
 /// If the file can't be read or placed, or does not come to its end.
 pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
-    let parts = profile(path, "firmware-sensor --example filter_cost")?;
-    Ok(parts
+    let taken = measure(path)?;
+    Ok(taken
         .into_iter()
-        .map(|(part, taken)| (part, taken.instructions))
+        .map(|(k, taken)| (k, taken.total))
         .collect())
 }
 
-/// What each part of the ELF at `path` took, by the part's number. `package` is where that ELF comes from:
-/// what comes behind `cargo build -p`.
+/// The same, piece by piece.
 ///
 /// # Errors
 /// As [`count`].
-pub fn profile(path: &Path, package: &'static str) -> Result<BTreeMap<u64, Taken>, ElfError> {
+pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
+    measure_example(path, "firmware-sensor --example filter_cost")
+}
+
+/// The same of any ELF that leaves marks. `package` is what it is built with, behind `cargo build -p`.
+///
+/// # Errors
+/// As [`count`].
+pub fn measure_example(
+    path: &Path,
+    package: &'static str,
+) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let board = |reason: String| ElfError::Board {
         board: "bare",
         reason,
