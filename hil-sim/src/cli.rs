@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use protocol::Role;
 
+mod chart;
 mod cost;
 mod demo;
 mod map;
@@ -37,6 +38,8 @@ enum Command {
     /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
     /// heat maps. Run again, it goes on where it was stopped
     Map(map::Maps),
+    /// Draws what the estimators give against what they cost
+    Chart(chart::Chart),
 }
 
 #[derive(Debug, clap::Args)]
@@ -125,6 +128,7 @@ impl Arguments {
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
             Command::Map(maps) => maps.execute(),
+            Command::Chart(chart) => chart.execute(),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod analysis;
 pub mod arm;
+pub mod chart;
 pub mod contact;
 pub mod dac81416;
 pub mod digest;

@@ -115,6 +115,17 @@ pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
 /// # Errors
 /// As [`count`].
 pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
+    measure_example(path, "firmware-sensor --example filter_cost")
+}
+
+/// The same of any ELF that leaves marks. `package` is what it is built with, behind `cargo build -p`.
+///
+/// # Errors
+/// As [`count`].
+pub fn measure_example(
+    path: &Path,
+    package: &'static str,
+) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let board = |reason: String| ElfError::Board {
         board: "bare",
         reason,
@@ -122,7 +133,7 @@ pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let elf = std::fs::read(path).map_err(|source| {
         ElfError::Firmware(FirmwareError::Missing {
             path: path.to_owned(),
-            package: "firmware-sensor --example filter_cost",
+            package,
             source,
         })
     })?;

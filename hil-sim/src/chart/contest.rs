@@ -1,0 +1,371 @@
+//! Every estimator on the same samples of every scene.
+//!
+//! A scene is run once, by the native engine; the scans that its sensor board was given are then given to
+//! every contestant, and what it says of λ every tenth millisecond is judged as the board's estimates are.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
+use protocol::{
+    Contact, Estimate, GAUGES, GaugeHealth, Range, SensorConfiguration,
+};
+
+use crate::analysis::Summary;
+use crate::analysis::estimates;
+use crate::native;
+use crate::recording::{EstimateRecord, Recording};
+use crate::scene::{Scene, SceneError};
+use crate::surface::Surface;
+use crate::truth::Truth;
+
+use super::fourier::RealFft;
+use super::pitch::{mcleod, yin};
+use super::rivals::roster::{Visitor, show_all};
+use super::rivals::Rival;
+use super::rivals::entrant::{Answer, Entrant};
+use super::settings::{SETTINGS, Setting};
+
+/// Who runs.
+pub enum Contestant {
+    /// The firmware's sensor, with a setting.
+    Ours(Setting),
+    /// Another method.
+    Rival {
+        /// Its name.
+        method: &'static str,
+        /// Its window in ms; the PLL's natural frequency in Hz.
+        value: u16,
+        /// Its cost.
+        work: Work,
+        /// Makes one.
+        start: Box<dyn Fn() -> Box<dyn Run> + Send + Sync>,
+    },
+}
+
+/// How a rival's cost is known.
+#[derive(Clone, Copy, Debug)]
+pub enum Work {
+    /// It runs on the board: the part of this number there.
+    Part(u32),
+    /// It does not: operations of an answer on the host.
+    Operations(fn() -> u64),
+}
+
+/// Something that answers while scans come.
+pub trait Run {
+    /// Takes a millisecond.
+    fn step(&mut self, scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer>;
+}
+
+impl<R: Rival> Run for Entrant<R> {
+    fn step(&mut self, scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer> {
+        Entrant::step(self, scans, encoder)
+    }
+}
+
+/// The firmware's sensor among the others.
+struct Board {
+    sensor: Sensor,
+    instant_us: u64,
+}
+
+impl Run for Board {
+    fn step(&mut self, scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer> {
+        self.instant_us += 1_000;
+        let output = self.sensor.step(self.instant_us, scans, encoder);
+        output.estimate.map(|estimate| Answer {
+            wavelength_mm: estimate.wavelength_mm,
+            valid: estimate.valid,
+        })
+    }
+}
+
+impl Contestant {
+    /// The method's name.
+    pub fn method(&self) -> &'static str {
+        match self {
+            Self::Ours(setting) => setting.method_name(),
+            Self::Rival { method, .. } => method,
+        }
+    }
+
+    /// The knob that is swept.
+    pub fn knob(&self) -> &'static str {
+        match self {
+            Self::Ours(setting) => setting.knob_name(),
+            Self::Rival { method: "PLL", .. } => "natural_hz",
+            Self::Rival { .. } => "window_ms",
+        }
+    }
+
+    /// Its value.
+    pub fn value(&self) -> u16 {
+        match self {
+            Self::Ours(setting) => setting.value,
+            Self::Rival { value, .. } => *value,
+        }
+    }
+
+    /// The setting, if it is one of ours.
+    pub fn setting(&self) -> Option<Setting> {
+        match self {
+            Self::Ours(setting) => Some(*setting),
+            Self::Rival { .. } => None,
+        }
+    }
+
+    fn start(&self, scene: SensorConfiguration) -> Box<dyn Run> {
+        match self {
+            Self::Ours(setting) => Box::new(Board {
+                sensor: Sensor::new(setting.on(scene)),
+                instant_us: 0,
+            }),
+            Self::Rival { start, .. } => start(),
+        }
+    }
+}
+
+/// All contestants: ours, the rivals that run on the board, the others.
+pub fn contestants() -> Vec<Contestant> {
+    let mut field = Field(SETTINGS.map(Contestant::Ours).into());
+    show_all::<RealFft>(&mut field);
+    field.guest("YIN", 160, super::pitch::operations_of_yin::<160>, yin::<160>);
+    field.guest("YIN", 320, super::pitch::operations_of_yin::<320>, yin::<320>);
+    field.guest(
+        "McLeod",
+        160,
+        super::pitch::operations_of_mcleod::<160, 256>,
+        mcleod::<160, 256>,
+    );
+    field.guest(
+        "McLeod",
+        320,
+        super::pitch::operations_of_mcleod::<320, 512>,
+        mcleod::<320, 512>,
+    );
+    field.0
+}
+
+struct Field(Vec<Contestant>);
+
+impl Field {
+    fn guest<R: Rival + 'static>(
+        &mut self,
+        method: &'static str,
+        value: u16,
+        operations: fn() -> u64,
+        rival: fn() -> R,
+    ) {
+        self.enter(method, value, Work::Operations(operations), rival);
+    }
+
+    fn enter<R: Rival + 'static>(
+        &mut self,
+        method: &'static str,
+        value: u16,
+        work: Work,
+        rival: fn() -> R,
+    ) {
+        self.0.push(Contestant::Rival {
+            method,
+            value,
+            work,
+            start: Box::new(move || Box::new(Entrant::new(rival()))),
+        });
+    }
+}
+
+impl Visitor for Field {
+    fn visit<R: Rival + 'static>(&mut self, method: &'static str, value: u16, rival: fn() -> R) {
+        let before = (self.0.len() - SETTINGS.len()) as u32;
+        let work = Work::Part(super::parts::RIVALS_FROM + before);
+        self.enter(method, value, work, rival);
+    }
+}
+
+/// Runs every contestant over every scene, on all cores: for each scene, in the order given, a summary
+/// for each contestant, in theirs. `done` is told after each scene.
+///
+/// # Errors
+/// If a scene can't be run.
+pub fn run(
+    contestants: &[Contestant],
+    scenes: &[&Scene],
+    done: impl Fn() + Sync,
+) -> Result<Vec<Vec<Summary>>, SceneError> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(vec![None; scenes.len()]);
+    std::thread::scope(|scope| {
+        for _ in 0..cores.min(scenes.len()) {
+            scope.spawn(|| {
+                while let index = next.fetch_add(1, Ordering::Relaxed)
+                    && let Some(scene) = scenes.get(index)
+                {
+                    let result = run_scene(contestants, scene);
+                    results.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(result);
+                    done();
+                }
+            });
+        }
+    });
+    let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
+    results.into_iter().flatten().collect()
+}
+
+fn run_scene(contestants: &[Contestant], scene: &Scene) -> Result<Vec<Summary>, SceneError> {
+    let mut recording = native::run(scene)?;
+    let surface = Surface::new(&scene.surface, 0.0);
+    let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
+    let truth = Truth::new(&scene.name, "", &wavelength_mm);
+    Ok(contestants
+        .iter()
+        .map(|contestant| {
+            recording.estimates = answers(
+                &mut *contestant.start(scene.sensor_configuration()),
+                &recording,
+            );
+            estimates::judge(&truth, &recording).1
+        })
+        .collect())
+}
+
+fn answers(contestant: &mut dyn Run, recording: &Recording) -> Vec<EstimateRecord> {
+    let mut records = Vec::with_capacity(recording.estimates.len());
+    for scans in recording.scans.as_chunks::<SCANS_PER_SAMPLE>().0 {
+        let last = &scans[SCANS_PER_SAMPLE - 1];
+        let codes = scans.map(|scan| scan.codes);
+        if let Some(answer) = contestant.step(&codes, last.encoder) {
+            records.push(EstimateRecord {
+                made_ns: last.at_ns,
+                received_ns: None,
+                estimate: estimate(answer, records.len() as u32, last.at_ns / 1_000),
+            });
+        }
+    }
+    records
+}
+
+/// An answer, as the board would send it.
+fn estimate(answer: Answer, sequence: u32, instant_us: u64) -> Estimate {
+    Estimate {
+        sequence,
+        instant_us,
+        wavelength_mm: answer.wavelength_mm,
+        valid: answer.valid,
+        confidence: f32::from(u8::from(answer.valid)),
+        amplitude_lsb: 0.0,
+        counted_mm: None,
+        range: Range::T1,
+        contact: Contact::Unknown,
+        lag_um: None,
+        gauges_used: 0,
+        health: [GaugeHealth::Good; GAUGES],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::rivals::HEARD;
+
+    /// What a rival hears of a clean sine, and how far off it may be by its own documentation, in Hz, once
+    /// its longest window is full.
+    fn error_hz(rival: &mut dyn Rival, frequency_hz: f64) -> Option<f64> {
+        let mut worst: Option<f64> = None;
+        for ms in 0..8_000 {
+            let sine = (std::f64::consts::TAU * frequency_hz * f64::from(ms) / 1_000.0).sin();
+            let mut sample = [0.0; GAUGES];
+            sample[HEARD] = 300.0 * sine as f32;
+            rival.push(&sample);
+            if ms > 7_000 && ms % 10 == 9 {
+                let error = (f64::from(rival.frequency_hz()?) - frequency_hz).abs();
+                worst = Some(worst.map_or(error, |worst| worst.max(error)));
+            }
+        }
+        worst
+    }
+
+    /// What is left of AR(2)'s closed form when the window holds no whole number of half waves: with
+    /// θ = ωτ, τ = 3 ms, the mean c of cos 2φ over it is at most 1/(N' sin ω), which moves θ by
+    /// c · sin θ cos θ / (cos² θ + ½), to first order (a tenth for the second).
+    fn ripple_hz(frequency_hz: f64, window_ms: f64) -> f64 {
+        let omega = std::f64::consts::TAU * frequency_hz / 1_000.0;
+        let theta = 3.0 * omega;
+        let mean = 1.0 / ((window_ms - 6.0) * omega.sin());
+        let moved = mean * theta.sin() * theta.cos().abs() / (theta.cos().powi(2) + 0.5);
+        1.1 * moved * 1_000.0 / (std::f64::consts::TAU * 3.0)
+    }
+
+    struct Check;
+
+    impl Visitor for Check {
+        fn visit<R: Rival + 'static>(&mut self, method: &'static str, value: u16, rival: fn() -> R) {
+            for frequency_hz in [20.0, 33.3, 47.0, 71.0] {
+                let window = f64::from(value);
+                let bound = match method {
+                    // Half of the distance of two filters, half of the window's own line.
+                    "Goertzel" => 0.25 * 1_000.0 / window,
+                    "FFT" => 0.5 * 1_000.0 / window,
+                    "AR(2)" => ripple_hz(frequency_hz, window),
+                    // The PLL's bandwidth.
+                    _ => window,
+                };
+                let error = error_hz(&mut rival(), frequency_hz);
+                assert!(
+                    error.is_some_and(|error| error <= bound),
+                    "{method} {value}: {error:?} Hz off at {frequency_hz} Hz, {bound} allowed"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn each_rival_on_the_board_finds_a_clean_sine_within_its_resolution() {
+        show_all::<RealFft>(&mut Check);
+    }
+
+    #[test]
+    fn yin_and_mcleod_find_a_clean_sine_within_half_a_lag() {
+        let mut detectors: [(&str, Box<dyn Rival>); 4] = [
+            ("YIN 160", Box::new(yin::<160>())),
+            ("YIN 320", Box::new(yin::<320>())),
+            ("McLeod 160", Box::new(mcleod::<160, 256>())),
+            ("McLeod 320", Box::new(mcleod::<320, 512>())),
+        ];
+        for (name, detector) in &mut detectors {
+            for frequency_hz in [20.0, 33.3, 47.0, 71.0] {
+                // Half a ms of the period: df = f² dT.
+                let bound = frequency_hz * frequency_hz * 0.5e-3;
+                let error = error_hz(&mut **detector, frequency_hz);
+                assert!(
+                    error.is_some_and(|error| error <= bound),
+                    "{name}: {error:?} Hz off at {frequency_hz} Hz, {bound} allowed"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_board_takes_every_setting() {
+        for setting in SETTINGS {
+            let configuration = setting.on(SensorConfiguration::DEFAULT);
+            assert_eq!(configuration.check(), Ok(()), "{setting:?}");
+        }
+    }
+
+    #[test]
+    fn a_contest_is_the_same_each_time_and_in_the_order_given() {
+        let scenes = [Scene::constant(2.0, 50.0), Scene::constant(3.0, 70.0)];
+        let scenes: Vec<&Scene> = scenes.iter().collect();
+        let field = contestants();
+        let first = run(&field, &scenes, || {}).unwrap();
+        assert_eq!(first, run(&field, &scenes, || {}).unwrap());
+        assert_eq!(first.len(), 2);
+        let backwards: Vec<&Scene> = scenes.iter().rev().copied().collect();
+        let second = run(&field, &backwards, || {}).unwrap();
+        assert_eq!(first[0], second[1]);
+        assert_eq!(first[0].len(), field.len());
+    }
+}

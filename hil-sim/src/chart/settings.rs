@@ -1,0 +1,111 @@
+//! The firmware's own estimators and where their knobs are set. Shared with the example `estimator_cost` of
+//! `firmware-sensor`, which counts what each costs: part k there is entry k here.
+
+use protocol::{Method, SensorConfiguration};
+
+/// What is swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knob {
+    /// Travel over which the bank averages, in percent of λ.
+    Travel,
+    /// Wavenumbers in the bank.
+    Candidates,
+    /// Gauges that take part.
+    Gauges,
+    /// The counting window A in ms.
+    Window,
+    /// Nothing.
+    Fixed,
+}
+
+/// One of the firmware's estimators with one of its knobs set; the others are at their defaults.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting {
+    /// The estimator.
+    pub method: Method,
+    /// The knob.
+    pub knob: Knob,
+    /// Its value.
+    pub value: u16,
+}
+
+const fn setting(method: Method, knob: Knob, value: u16) -> Setting {
+    Setting {
+        method,
+        knob,
+        value,
+    }
+}
+
+/// All of them. A knob's values rise.
+pub const SETTINGS: [Setting; 18] = [
+    setting(Method::Bank, Knob::Travel, 50),
+    setting(Method::Bank, Knob::Travel, 70),
+    setting(Method::Bank, Knob::Travel, 100),
+    setting(Method::Bank, Knob::Travel, 150),
+    setting(Method::Bank, Knob::Candidates, 12),
+    setting(Method::Bank, Knob::Candidates, 16),
+    setting(Method::Bank, Knob::Candidates, 20),
+    setting(Method::Bank, Knob::Candidates, 24),
+    setting(Method::Bank, Knob::Gauges, 1),
+    setting(Method::Bank, Knob::Gauges, 3),
+    setting(Method::Bank, Knob::Gauges, 5),
+    setting(Method::Crossings, Knob::Gauges, 1),
+    setting(Method::Crossings, Knob::Gauges, 3),
+    setting(Method::Crossings, Knob::Gauges, 5),
+    setting(Method::Counting, Knob::Window, 40),
+    setting(Method::Counting, Knob::Window, 80),
+    setting(Method::Counting, Knob::Window, 160),
+    setting(Method::AdaptedCounting, Knob::Fixed, 0),
+];
+
+impl Setting {
+    /// The setting on top of what a scene asks for.
+    pub fn on(&self, scene: SensorConfiguration) -> SensorConfiguration {
+        let defaults = SensorConfiguration::DEFAULT;
+        let mut configuration = SensorConfiguration {
+            method: self.method,
+            window_ms: defaults.window_ms,
+            gauges: defaults.gauges,
+            bank_travel_percent: defaults.bank_travel_percent,
+            bank_candidates: defaults.bank_candidates,
+            ..scene
+        };
+        match self.knob {
+            Knob::Travel => configuration.bank_travel_percent = self.value,
+            Knob::Candidates => configuration.bank_candidates = self.value as u8,
+            Knob::Gauges => {
+                configuration.gauges = match self.value {
+                    // The counted one; the outermost ones too; all.
+                    1 => 0b00100,
+                    3 => 0b10101,
+                    _ => 0b11111,
+                }
+            }
+            Knob::Window => configuration.window_ms = self.value,
+            Knob::Fixed => {}
+        }
+        configuration
+    }
+
+    /// The method's name in the chart.
+    pub const fn method_name(&self) -> &'static str {
+        match self.method {
+            Method::Bank => "bank",
+            Method::Crossings => "crossings",
+            Method::Counting => "counting",
+            Method::AdaptedCounting => "adapted count",
+        }
+    }
+
+    /// The knob's name in the CSV.
+    pub const fn knob_name(&self) -> &'static str {
+        match self.knob {
+            Knob::Travel => "travel_percent",
+            Knob::Candidates => "candidates",
+            Knob::Gauges => "gauges",
+            Knob::Window => "window_ms",
+            Knob::Fixed => "",
+        }
+    }
+}

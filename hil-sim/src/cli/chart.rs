@@ -1,0 +1,113 @@
+//! `hil-sim chart`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::Context;
+use clap::Subcommand;
+use hil_sim::chart::contest::{self, contestants};
+use hil_sim::chart::costs::Costs;
+use hil_sim::chart::family;
+use hil_sim::chart::picture;
+use hil_sim::chart::result::{ContestResult, Entry};
+use hil_sim::chart::score::Score;
+use hil_sim::scene::Scene;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Chart {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Accuracy against cost: every estimator with its knobs swept, and rivals, on the same samples of
+    /// every scene, against the instructions they take on an emulated Cortex-M4F. Writes estimators.csv
+    /// and estimators.svg
+    Estimators(Estimators),
+}
+
+#[derive(Debug, clap::Args)]
+struct Estimators {
+    /// The scenes: a folder with a folder for each family
+    #[arg(long, value_name = "FOLDER", default_value = "hil-sim/scenes/estimation")]
+    scenes: PathBuf,
+    /// Where to write CSV and SVG
+    #[arg(long, value_name = "FOLDER", default_value = "target/chart")]
+    out: PathBuf,
+    /// The ELF that exercises the estimators: the example estimator_cost of firmware-sensor
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/release/examples/estimator_cost"
+    )]
+    elf: PathBuf,
+}
+
+impl Chart {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        match self.what {
+            What::Estimators(estimators) => estimators.execute()?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Estimators {
+    fn execute(self) -> anyhow::Result<()> {
+        let families = family::load(&self.scenes)?;
+        create_folder(&self.out)?;
+        let costs = Costs::count(&self.elf)?;
+        let contestants = contestants();
+
+        let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
+        let done = AtomicUsize::new(0);
+        let summaries = contest::run(&contestants, &scenes, || {
+            let done = 1 + done.fetch_add(1, Ordering::Relaxed);
+            eprint!("\r{done} of {} scenes", scenes.len());
+            let _ = std::io::stderr().flush();
+        })?;
+        eprintln!();
+
+        let entries = contestants
+            .iter()
+            .enumerate()
+            .map(|(index, contestant)| {
+                let mut rest = &summaries[..];
+                let scores = families
+                    .iter()
+                    .map(|family| {
+                        let (these, others) = rest.split_at(family.scenes.len());
+                        rest = others;
+                        Score::new(&family.scenes, these.iter().map(|scene| &scene[index]))
+                    })
+                    .collect();
+                Entry {
+                    method: contestant.method(),
+                    knob: contestant.knob(),
+                    value: contestant.value(),
+                    setting: contestant.setting(),
+                    cost: costs.of(index, contestant),
+                    scores,
+                }
+            })
+            .collect();
+        let result = ContestResult { families, entries };
+        write(&self.out.join("estimators.csv"), &result.csv()?)?;
+        write(&self.out.join("estimators.svg"), &picture::draw(&result))?;
+        Ok(())
+    }
+}
+
+fn create_folder(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: can't be made: give another with --out", folder.display()))
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
+    println!("{}", path.display());
+    Ok(())
+}
