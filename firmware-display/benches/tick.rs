@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use firmware_display::Display;
-use protocol::{DisplayConfiguration, Estimate, Mode, Range};
+use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
 
 const TICKS: u64 = 2_000;
 
@@ -14,10 +14,14 @@ fn estimate(sequence: u32, wavelength_mm: f32) -> Estimate {
         instant_us: 0,
         wavelength_mm: Some(wavelength_mm),
         valid: true,
-        amplitude_lsb: 100.0,
         confidence: 1.0,
+        amplitude_lsb: 100.0,
+        counted_mm: None,
         range: Range::T1,
-        gauges_used: 4,
+        contact: Contact::Unknown,
+        lag_um: None,
+        gauges_used: 0b1_1111,
+        health: [GaugeHealth::Good; GAUGES],
     }
 }
 

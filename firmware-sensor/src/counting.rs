@@ -7,53 +7,200 @@
 //! is therefore half-open, (t − A, t]: 80 samples, each standing for the crossings in the millisecond
 //! that ends with it.
 
-use protocol::Range;
+use protocol::{GAUGES, Range, SensorConfiguration};
 
+use crate::amplitude::Amplitude;
+use crate::crossing::Crossing;
+use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, Touch};
+use crate::travel::Travel;
+
+/// The window A that the paper arrives at, in ms.
+pub const PAPERS_WINDOW_MS: usize = 80;
 /// The longest window that a configuration can ask for, in ms.
 pub const MAX_WINDOW_MS: usize = 200;
 
-/// The impulses of the last A, and how many they are.
-#[derive(Clone, Debug)]
-pub struct Counting {
-    impulses: [bool; MAX_WINDOW_MS],
-    window_ms: usize,
-    next: usize,
-    filled_ms: usize,
-    count: u16,
+/// The impulses of the last 256 ms.
+#[derive(Clone, Debug, Default)]
+pub struct Impulses {
+    /// Bit b of word w: the impulse of millisecond 32w + b, modulo 256.
+    words: [u32; WORDS],
+    newest: u8,
+    filled_ms: u16,
 }
 
-impl Counting {
-    /// An empty window of A = `window_ms`, which is 1 to [`MAX_WINDOW_MS`]; else the nearest of them.
-    pub fn new(window_ms: u16) -> Self {
+const WORDS: usize = 8;
+const _: () = assert!(32 * WORDS == 1 << u8::BITS, "`newest` wraps with the words");
+const _: () = assert!(MAX_WINDOW_MS < 32 * WORDS);
+
+impl Impulses {
+    /// Takes p(t) of the next millisecond.
+    pub fn push(&mut self, impulse: bool) {
+        self.newest = self.newest.wrapping_add(1);
+        let word = &mut self.words[usize::from(self.newest / 32)];
+        let bit = self.newest % 32;
+        *word = (*word & !(1 << bit)) | u32::from(impulse) << bit;
+        self.filled_ms = (self.filled_ms + 1).min(MAX_WINDOW_MS as u16);
+    }
+
+    /// The impulses of the last A = `window_ms`, 1 to [`MAX_WINDOW_MS`], once there have been so many
+    /// milliseconds.
+    pub fn count(&self, window_ms: usize) -> Option<u16> {
+        if window_ms > usize::from(self.filled_ms) {
+            return None;
+        }
+        let mut left = window_ms as u32;
+        let mut word = usize::from(self.newest / 32);
+        // The window's newest bits end in the middle of a word, at the top after a shift.
+        let mut bits = self.words[word] << (31 - self.newest % 32);
+        let mut present = u32::from(self.newest % 32) + 1;
+        let mut count = 0;
+        loop {
+            let taken = present.min(left);
+            if taken > 0 {
+                count += (bits >> (32 - taken)).count_ones();
+            }
+            left -= taken;
+            if left == 0 {
+                return Some(count as u16);
+            }
+            word = (word + WORDS - 1) % WORDS;
+            bits = self.words[word];
+            present = 32;
+        }
+    }
+}
+
+/// The crossings of one gauge.
+#[derive(Clone, Debug)]
+pub struct Counted {
+    gauge: usize,
+    crossing: Crossing,
+    impulses: Impulses,
+}
+
+/// What a count over a window says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Count {
+    /// The crossings in the window; 0 before it is full.
+    pub crossings: u16,
+    /// v(t − A/2) in mm/s.
+    pub velocity_mm_s: f32,
+    /// λe in mm, equation (5).
+    pub wavelength_mm: Option<f32>,
+    /// The range of equation (8).
+    pub range: Range,
+}
+
+impl Counted {
+    /// Nothing counted yet of the gauge that `configuration` names.
+    pub fn new(configuration: &SensorConfiguration) -> Self {
         Self {
-            impulses: [false; MAX_WINDOW_MS],
-            window_ms: usize::from(window_ms).clamp(1, MAX_WINDOW_MS),
-            next: 0,
-            filled_ms: 0,
-            count: 0,
+            gauge: usize::from(configuration.counted_gauge).min(GAUGES - 1),
+            crossing: Crossing::default(),
+            impulses: Impulses::default(),
         }
     }
 
-    /// Takes p(t) of the next millisecond.
-    pub fn push(&mut self, impulse: bool) {
-        let oldest = core::mem::replace(&mut self.impulses[self.next], impulse);
-        self.count = self.count + u16::from(impulse) - u16::from(oldest);
-        self.next = if self.next + 1 == self.window_ms {
-            0
-        } else {
-            self.next + 1
-        };
-        self.filled_ms = (self.filled_ms + 1).min(self.window_ms);
+    /// The gauge that is counted.
+    pub fn gauge(&self) -> usize {
+        self.gauge
     }
 
-    /// The impulses in the window, once it has been filled.
-    pub fn count(&self) -> Option<u16> {
-        (self.filled_ms == self.window_ms).then_some(self.count)
+    /// Takes the next sample of all gauges behind the band-pass.
+    pub fn push(&mut self, banded: &[f32; GAUGES]) {
+        let impulse = self.crossing.step(banded[self.gauge]);
+        self.impulses.push(impulse);
     }
 
-    /// A in ms.
-    pub fn window_ms(&self) -> usize {
-        self.window_ms
+    /// What the window A = `window_ms`, 1 to [`MAX_WINDOW_MS`], says. No wavelength before it is full.
+    pub fn over(&self, window_ms: usize, travel: &Travel) -> Count {
+        let crossings = self.impulses.count(window_ms).unwrap_or(0);
+        // Half of A before now.
+        let velocity_mm_s = travel.velocity_mm_s(window_ms);
+        Count {
+            crossings,
+            velocity_mm_s,
+            wavelength_mm: wavelength_mm(velocity_mm_s, frequency_hz(crossings, window_ms)),
+            range: range(travel.velocity_mm_s(0), travel.velocity_mm_s(2 * window_ms)),
+        }
+    }
+}
+
+/// Counting as an [`Estimator`], with a fixed A.
+#[derive(Clone, Debug)]
+pub struct Counting {
+    window_ms: usize,
+    gauge: CountedGauge,
+}
+
+impl Counting {
+    /// Nothing counted yet.
+    pub fn new(configuration: &SensorConfiguration) -> Self {
+        Self {
+            window_ms: usize::from(configuration.window_ms).clamp(1, MAX_WINDOW_MS),
+            gauge: CountedGauge::new(configuration),
+        }
+    }
+}
+
+impl Estimator for Counting {
+    fn push(&mut self, touch: &Touch) {
+        self.gauge.push(touch);
+    }
+
+    fn find(&mut self, travel: &Travel) -> Finding {
+        self.gauge.find(self.window_ms, travel)
+    }
+}
+
+/// The counted gauge and its strength, over a window of any length.
+#[derive(Clone, Debug)]
+pub(crate) struct CountedGauge {
+    counted: Counted,
+    amplitude: Amplitude,
+    usable: bool,
+}
+
+impl CountedGauge {
+    pub(crate) fn new(configuration: &SensorConfiguration) -> Self {
+        Self {
+            counted: Counted::new(configuration),
+            amplitude: Amplitude::default(),
+            usable: false,
+        }
+    }
+
+    pub(crate) fn push(&mut self, touch: &Touch) {
+        let gauge = self.counted.gauge();
+        self.counted.push(&touch.banded);
+        self.amplitude.push(touch.banded[gauge]);
+        self.usable = touch.usable & 1 << gauge != 0;
+    }
+
+    /// λe of the last A = `window_ms`, and what speaks for it.
+    ///
+    /// Valid: in T1, with a crossing in a full window, a signal, and moving at t − A/2. The confidence is
+    /// then 1 − 1/n for n crossings, since a count that may as well have been one less is off by 1/n;
+    /// else 0.
+    pub(crate) fn find(&self, window_ms: usize, travel: &Travel) -> Finding {
+        let count = self.counted.over(window_ms, travel);
+        let amplitude_lsb = self.amplitude.over(window_ms);
+        let valid = count.wavelength_mm.is_some()
+            && count.range == Range::T1
+            && count.velocity_mm_s.abs() >= MIN_SPEED_MM_S
+            && amplitude_lsb >= MIN_AMPLITUDE_LSB
+            && self.usable;
+        Finding {
+            wavelength_mm: count.wavelength_mm,
+            valid,
+            confidence: if valid {
+                1.0 - 1.0 / f32::from(count.crossings)
+            } else {
+                0.0
+            },
+            amplitude_lsb,
+            gauges_used: 1 << self.counted.gauge(),
+        }
     }
 }
 
@@ -101,25 +248,28 @@ mod tests {
 
     #[test]
     fn has_no_count_before_the_window_is_full() {
-        let mut counting = Counting::new(80);
+        let mut impulses = Impulses::default();
         for _ in 0..79 {
-            counting.push(true);
-            assert_eq!(counting.count(), None);
+            impulses.push(true);
+            assert_eq!(impulses.count(80), None);
         }
-        counting.push(false);
-        assert_eq!(counting.count(), Some(79));
+        impulses.push(false);
+        assert_eq!(impulses.count(80), Some(79));
+        assert_eq!(impulses.count(81), None);
     }
 
     #[test]
     fn counts_the_impulses_of_exactly_the_window() {
-        for window_ms in [10, 80, 81, 200] {
-            let mut counting = Counting::new(window_ms);
-            let impulse = |ms: usize| ms * ms % 7 == 2 || ms.is_multiple_of(11);
-            for ms in 0..1_000 {
-                counting.push(impulse(ms));
-                let window = (ms + 1).saturating_sub(usize::from(window_ms))..=ms;
-                if let Some(count) = counting.count() {
+        let impulse = |ms: usize| ms * ms % 7 == 2 || ms.is_multiple_of(11);
+        let mut impulses = Impulses::default();
+        for ms in 0..1_000 {
+            impulses.push(impulse(ms));
+            for window_ms in [1, 10, 31, 32, 33, 80, 81, 200] {
+                let window = (ms + 1).saturating_sub(window_ms)..=ms;
+                if let Some(count) = impulses.count(window_ms) {
                     assert_eq!(usize::from(count), window.filter(|&ms| impulse(ms)).count());
+                } else {
+                    assert!(ms + 1 < window_ms);
                 }
             }
         }
@@ -127,10 +277,10 @@ mod tests {
 
     #[test]
     fn counts_a_steady_frequency_that_fits_the_window_without_spread() {
-        let mut counting = Counting::new(80);
+        let mut impulses = Impulses::default();
         for ms in 0..1_000 {
-            counting.push(ms % 10 == 3);
-            if let Some(count) = counting.count() {
+            impulses.push(ms % 10 == 3);
+            if let Some(count) = impulses.count(80) {
                 assert_eq!(count, 8);
                 assert_eq!(frequency_hz(count, 80), 50.0);
             }

@@ -1,8 +1,10 @@
 //! From 4 kHz scans to 1 kHz samples, without aliases.
 //!
 //! A linear-phase FIR low-pass: a sinc of 500 Hz under a Kaiser window, 31 coefficients. Only the
-//! scans' sums that become samples are computed (polyphase). The symmetry of the coefficients is not
-//! used: on a Cortex-M4F a pair costs two loads, an addition and a multiply-accumulate either way.
+//! scans' sums that become samples are computed (polyphase). A sinc of half the output's rate is 0 at
+//! every fourth scan from its middle: of each millisecond's last scan, only the middle one's is needed. The
+//! symmetry of the coefficients is not used: on a Cortex-M4F a pair costs two loads, an addition and a
+//! multiply-accumulate either way.
 
 use core::f64::consts::PI;
 
@@ -32,11 +34,21 @@ const _: () = assert!(
 /// Kaiser's rule for the window's shape, for attenuations above 50 dB.
 const KAISER_BETA: f64 = 0.1102 * (ATTENUATION_DB - 8.7);
 
+/// The scan of a group, oldest first, whose delays are those at which the sinc is 0, or its middle.
+const LAST: usize = SCANS_PER_SAMPLE - 1;
+/// The group with the middle scan.
+const MIDDLE_GROUP: usize = MIDDLE / SCANS_PER_SAMPLE;
+const _: () = assert!(
+    CUTOFF_HZ * 2.0 * SCANS_PER_SAMPLE as f64 == SCAN_RATE_HZ as f64,
+    "the sinc is 0 where `LAST` says"
+);
+
 /// The filter's coefficients, for any number of [`History`]s.
 #[derive(Clone, Debug)]
 pub struct AntiAlias {
-    /// Newest group first; within a group, oldest scan first, as the ADC delivers them.
-    taps: [[f32; SCANS_PER_SAMPLE]; GROUPS],
+    /// Newest group first; within a group, oldest scan first, as the ADC delivers them, without the last.
+    taps: [[f32; LAST]; GROUPS],
+    middle: f32,
 }
 
 /// The last scans, as differences from mid-rail.
@@ -64,13 +76,14 @@ impl AntiAlias {
                 * kaiser(from_middle / (MIDDLE - 1) as f64);
             sum += *tap;
         }
-        let mut taps = [[0.0; SCANS_PER_SAMPLE]; GROUPS];
+        let mut taps = [[0.0; LAST]; GROUPS];
         for (group, taps) in taps.iter_mut().enumerate() {
             for (scan, tap) in taps.iter_mut().enumerate() {
                 *tap = (ideal[group * SCANS_PER_SAMPLE + SCANS_PER_SAMPLE - 1 - scan] / sum) as f32;
             }
         }
-        Self { taps }
+        let middle = (ideal[MIDDLE] / sum) as f32;
+        Self { taps, middle }
     }
 
     /// Takes four scans, oldest first, and returns the sample of all channels that they complete,
@@ -78,7 +91,8 @@ impl AntiAlias {
     pub fn step(&self, history: &mut History, scans: &[Scan; SCANS_PER_SAMPLE]) -> [f32; CHANNELS] {
         history.newest = (history.newest + GROUPS - 1) % GROUPS;
         history.groups[history.newest] = scans.map(|scan| scan.map(from_mid_rail));
-        let mut sample = [0.0; CHANNELS];
+        let middle = &history.groups[(history.newest + MIDDLE_GROUP) % GROUPS][LAST];
+        let mut sample = middle.map(|code| self.middle * code);
         for (age, taps) in self.taps.iter().enumerate() {
             let group = &history.groups[(history.newest + age) % GROUPS];
             for (tap, scan) in taps.iter().zip(group) {
@@ -141,7 +155,9 @@ mod tests {
         let filter = AntiAlias::new();
         core::array::from_fn(|delay| {
             let tap = SCANS_PER_SAMPLE - 1 - delay % SCANS_PER_SAMPLE;
-            f64::from(filter.taps[delay / SCANS_PER_SAMPLE][tap])
+            let tap = filter.taps[delay / SCANS_PER_SAMPLE].get(tap);
+            let at_last = if delay == MIDDLE { filter.middle } else { 0.0 };
+            f64::from(*tap.unwrap_or(&at_last))
         })
     }
 

@@ -1,22 +1,29 @@
 //! The sensor board's logic, from ADC scans to λ: pure, no hardware, the same on the board and on a host.
 //!
 //! ```text
-//! 4 kHz scans ─> decimate ─> bandpass ×5 ─> crossing ─> counting ─┐
-//! encoder ─────> travel ──────────────────────────────────────────┴─> Estimate, 100 Hz
+//! 4 kHz scans ─> decimate ─┬─> bandpass ×5 ─┬─> counting, the paper's ──────────────┐
+//!                          └────────────────┴─> Touch ─> the estimator of the ──────┤
+//! encoder ─────> travel ──────────────────────> Touch ─> configured method ─────────┴─> Estimate, 100 Hz
 //! Motion ──────> arm ─> Drive
 //! ```
 //!
 //! [`Sensor::step`] is the whole of it, once per millisecond.
 #![no_std]
 
+pub mod adapted;
 pub mod amplitude;
 pub mod arm;
 pub mod bandpass;
 pub mod block;
 pub mod counting;
 pub mod crossing;
+pub mod crossings;
 pub mod decimate;
+pub mod estimator;
+pub mod landmarks;
+pub mod method;
 pub mod sensor;
+pub mod stroke;
 pub mod travel;
 
 pub use arm::Drive;

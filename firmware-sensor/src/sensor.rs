@@ -1,26 +1,21 @@
 //! The sensor board as a whole: scans, encoder and [`Motion`]s in; estimates, samples and the arm's
 //! drive out.
 
-use protocol::{Estimate, GAUGES, Gauges, Motion, Range, SensorConfiguration};
+use protocol::{
+    CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Gauges, Motion, SensorConfiguration,
+};
 
-use crate::amplitude::Amplitude;
 use crate::arm::{Arm, Drive};
 use crate::bandpass::{BAND, BandPass, Lane, ORDER};
 use crate::block::{Block, Place};
-use crate::counting::{self, Counting};
-use crate::crossing::Crossing;
+use crate::counting::{Counted, PAPERS_WINDOW_MS};
 use crate::decimate::{self, AntiAlias, History};
-use crate::travel::Travel;
+use crate::estimator::{Estimator, Touch};
+use crate::method::Running;
+use crate::travel::{ALIGNMENT_MS, Travel};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
-/// Below this speed, in mm/s, no estimate is valid: fingertip and surface stick (Okamoto et al. 2009,
-/// section III-C), and 5 µm counts make more than a tenth of it.
-const MIN_SPEED_MM_S: f32 = 2.0;
-/// Below this amplitude of the counted gauge, in ADC steps, no estimate is valid: a gauge that falls
-/// silent leaves a band-pass that rings on, and crosses zero, for seconds. It is ten times what the
-/// ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
-const MIN_AMPLITUDE_LSB: f32 = 1.0;
-/// Time after the start, in samples, until crossings are counted: three time constants of the
+/// Time after the start, in samples, until the estimators begin: three time constants of the
 /// band-pass' slowest poles, √2 / (2π · 5 Hz), so that 5 % of whatever the start stirred up are left.
 const SETTLING_SAMPLES: u32 = (3.0 * core::f64::consts::SQRT_2
     / (2.0 * core::f64::consts::PI * BAND.low_hz())
@@ -48,10 +43,12 @@ pub struct Sensor {
     band_pass: BandPass<ORDER>,
     /// None before the first scan.
     started: Option<Started>,
-    counting: Counting,
+    /// The paper's count, whatever the method.
+    counted: Counted,
+    estimator: Running,
     arm: Arm,
     block: Block,
-    /// Samples that are still to pass before crossings are counted.
+    /// Samples that are still to pass before the estimators begin.
     settling: u32,
     samples: u32,
     estimates: u32,
@@ -63,14 +60,6 @@ struct Started {
     history: History,
     lanes: [Lane<ORDER>; GAUGES],
     travel: Travel,
-    counted: Counted,
-}
-
-/// The counted gauge's past.
-#[derive(Clone, Debug, Default)]
-struct Counted {
-    crossing: Crossing,
-    amplitude: Amplitude,
 }
 
 impl Sensor {
@@ -81,7 +70,8 @@ impl Sensor {
             anti_alias: AntiAlias::new(),
             band_pass: BandPass::new(BAND),
             started: None,
-            counting: Counting::new(configuration.window_ms),
+            counted: Counted::new(&configuration),
+            estimator: Running::new(&configuration),
             arm: Arm::default(),
             block: Block::default(),
             settling: SETTLING_SAMPLES,
@@ -90,15 +80,13 @@ impl Sensor {
         }
     }
 
-    /// Takes another configuration, which must have passed its check. The estimator starts over: there
-    /// is no wavelength before a whole window has been counted. Filters, positions and arm go on.
+    /// Takes another configuration, which must have passed its check. The estimators start over: there
+    /// is no counted wavelength before a whole window has been counted. Filters, positions and arm go on.
     pub fn configure(&mut self, configuration: SensorConfiguration) {
         self.configuration = configuration;
-        self.counting = Counting::new(configuration.window_ms);
+        self.counted = Counted::new(&configuration);
+        self.estimator = Running::new(&configuration);
         self.block.clear();
-        if let Some(started) = &mut self.started {
-            started.counted = Counted::default();
-        }
     }
 
     /// The configuration in force.
@@ -136,26 +124,40 @@ impl Sensor {
         for ((y, x), lane) in banded.iter_mut().zip(sample).zip(&mut started.lanes) {
             *y = self.band_pass.step(lane, x);
         }
-        let gauge = usize::from(self.configuration.counted_gauge).min(GAUGES - 1);
-        let impulse = started.counted.crossing.step(banded[gauge]);
-        started.counted.amplitude.push(banded[gauge]);
+        let touch = started.touch(&sample, banded, self.configuration.gauges);
         if self.settling == 0 {
-            self.counting.push(impulse);
+            self.counted.push(&touch.banded);
+            self.estimator.push(&touch);
         }
         self.settling = self.settling.saturating_sub(1);
 
         let arm_um = started.travel.position_um(0);
-        let place = started.place(self.samples, instant_us);
+        let number = self.samples;
         self.samples = self.samples.wrapping_add(1);
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
-            let estimate = started.estimate(&self.counting, 1 << gauge, self.estimates, instant_us);
+            let finding = self.estimator.find(&started.travel);
+            let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
+            let sequence = self.estimates;
             self.estimates = self.estimates.wrapping_add(1);
-            Some(estimate)
+            Some(Estimate {
+                sequence,
+                instant_us,
+                wavelength_mm: finding.wavelength_mm,
+                valid: finding.valid,
+                confidence: finding.confidence,
+                amplitude_lsb: finding.amplitude_lsb,
+                counted_mm: count.wavelength_mm,
+                range: count.range,
+                contact: Contact::Unknown,
+                lag_um: None,
+                gauges_used: finding.gauges_used,
+                health: [GaugeHealth::Good; GAUGES],
+            })
         } else {
             None
         };
         let gauges = if self.configuration.stream_gauges {
-            self.block.push(place, &sample)
+            self.block.push(started.place(number, instant_us), &sample)
         } else {
             None
         };
@@ -178,7 +180,17 @@ impl Started {
                 band_pass.settled(decimate::from_mid_rail(first[gauge]))
             }),
             travel: Travel::new(encoder),
-            counted: Counted::default(),
+        }
+    }
+
+    /// What the estimator is to see of the sample that has just come out of the filters.
+    fn touch(&self, sample: &[f32; CHANNELS], banded: [f32; GAUGES], usable: u8) -> Touch {
+        Touch {
+            gauges: core::array::from_fn(|gauge| sample[gauge]),
+            place: self.travel.place(decimate::DELAY_MS),
+            banded,
+            banded_place: self.travel.place(ALIGNMENT_MS),
+            usable,
         }
     }
 
@@ -190,47 +202,6 @@ impl Started {
             instant_us: instant_us.saturating_sub(delay_us),
             position_um: self.travel.position_um(decimate::DELAY_MS),
             position_before_um: self.travel.position_um(decimate::DELAY_MS + 1),
-        }
-    }
-
-    /// The paper's estimate, and what speaks for it.
-    ///
-    /// Valid: in T1, with a crossing in a full window, a signal, and moving at t − A/2. The confidence is then
-    /// 1 − 1/n for n crossings, since a count that may as well have been one less is off by 1/n; else 0.
-    fn estimate(
-        &self,
-        counting: &Counting,
-        gauges_used: u8,
-        sequence: u32,
-        instant_us: u64,
-    ) -> Estimate {
-        let window_ms = counting.window_ms();
-        let count = counting.count().unwrap_or(0);
-        let velocity_mm_s = self.travel.velocity_mm_s(window_ms);
-        let wavelength_mm =
-            counting::wavelength_mm(velocity_mm_s, counting::frequency_hz(count, window_ms));
-        let range = counting::range(
-            self.travel.velocity_mm_s(0),
-            self.travel.velocity_mm_s(2 * window_ms),
-        );
-        let amplitude_lsb = self.counted.amplitude.over(window_ms);
-        let valid = wavelength_mm.is_some()
-            && range == Range::T1
-            && velocity_mm_s.abs() >= MIN_SPEED_MM_S
-            && amplitude_lsb >= MIN_AMPLITUDE_LSB;
-        Estimate {
-            sequence,
-            instant_us,
-            wavelength_mm,
-            valid,
-            amplitude_lsb,
-            confidence: if valid {
-                1.0 - 1.0 / f32::from(count)
-            } else {
-                0.0
-            },
-            range,
-            gauges_used,
         }
     }
 }

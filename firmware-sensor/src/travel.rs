@@ -1,5 +1,6 @@
 //! Where the arm is and was: the encoder's 16-bit counter without its wraps, and velocities from it.
 
+use crate::estimator::{PLACES_PER_UM, Place};
 use crate::{MICROMETRES_PER_COUNT, SAMPLE_RATE_HZ, counting, decimate};
 
 /// What the band-pass adds to [`decimate::DELAY_MS`], in ms: its group delay lies between 2.6 and 5.3 ms
@@ -21,15 +22,21 @@ const _: () = assert!(ALIGNMENT_MS + counting::MAX_WINDOW_MS + HALF_SPAN_MS < HI
 #[derive(Clone, Debug)]
 pub struct Travel {
     encoder: u16,
+    /// Where the arm is, in µm.
+    position_um: i64,
     newest: usize,
-    positions_um: [i64; HISTORY_MS],
+    /// The low 32 bits of each position: no two of them are 2³¹ µm apart.
+    positions_um: [i32; HISTORY_MS],
 }
+// 164 mm a millisecond at most, see `Travel::push`.
+const _: () = assert!(HISTORY_MS as i64 * 32_768 * (MICROMETRES_PER_COUNT as i64) < 1 << 31);
 
 impl Travel {
     /// An arm that has been standing at position 0, where its encoder reads `encoder`.
     pub fn new(encoder: u16) -> Self {
         Self {
             encoder,
+            position_um: 0,
             newest: 0,
             positions_um: [0; HISTORY_MS],
         }
@@ -39,15 +46,23 @@ impl Travel {
     pub fn push(&mut self, encoder: u16) {
         let counts = encoder.wrapping_sub(self.encoder).cast_signed();
         self.encoder = encoder;
-        let position_um =
-            self.position_um(0) + i64::from(counts) * i64::from(MICROMETRES_PER_COUNT);
+        self.position_um += i64::from(counts) * i64::from(MICROMETRES_PER_COUNT);
         self.newest = (self.newest + 1) % HISTORY_MS;
-        self.positions_um[self.newest] = position_um;
+        self.positions_um[self.newest] = self.position_um as i32;
     }
 
     /// Position `ms_ago`, below 256, in µm from where the arm stood at first.
     pub fn position_um(&self, ms_ago: usize) -> i64 {
-        self.positions_um[(self.newest + HISTORY_MS - ms_ago % HISTORY_MS) % HISTORY_MS]
+        self.position_um - i64::from(self.wrapped_um(0).wrapping_sub(self.wrapped_um(ms_ago)))
+    }
+
+    /// The same in quarters of a µm, wrapped.
+    pub fn place(&self, ms_ago: usize) -> Place {
+        self.wrapped_um(ms_ago).wrapping_mul(PLACES_PER_UM)
+    }
+
+    fn wrapped_um(&self, ms_ago: usize) -> i32 {
+        self.positions_um[self.newest.wrapping_sub(ms_ago) % HISTORY_MS]
     }
 
     /// Velocity in mm/s at `half_ms_ago` / 2 ms before the band-passed sample's instant (see
@@ -56,7 +71,9 @@ impl Travel {
     pub fn velocity_mm_s(&self, half_ms_ago: usize) -> f32 {
         let span_ms = 2 * HALF_SPAN_MS + half_ms_ago % 2;
         let newer_ms_ago = half_ms_ago / 2 + ALIGNMENT_MS - HALF_SPAN_MS;
-        let travel_um = self.position_um(newer_ms_ago) - self.position_um(newer_ms_ago + span_ms);
+        let travel_um = self
+            .wrapped_um(newer_ms_ago)
+            .wrapping_sub(self.wrapped_um(newer_ms_ago + span_ms));
         // µm per ms are mm/s.
         const _: () = assert!(SAMPLE_RATE_HZ == 1_000);
         travel_um as f32 / span_ms as f32
@@ -84,6 +101,25 @@ mod tests {
             assert_eq!(travel.position_um(0), position_um);
         }
         assert_eq!(travel.position_um(1), position_um + 9_876 * 5);
+    }
+
+    #[test]
+    fn keeps_differences_of_places_where_they_wrap() {
+        let mut travel = Travel::new(0);
+        // 2²⁹ µm, where places wrap, are passed after 5 369 steps of 100 mm; 2³¹ µm after 21 475.
+        let mut counter = 0_u16;
+        for step in 1..=22_000_i64 {
+            counter = counter.wrapping_add(20_000);
+            travel.push(counter);
+            assert_eq!(travel.position_um(0), step * 100_000);
+            assert_eq!(travel.position_um(200), (step - 200).max(0) * 100_000);
+            let moved = travel.place(0).wrapping_sub(travel.place(3));
+            assert_eq!(moved, 100_000 * 4 * step.min(3) as i32);
+            assert_eq!(
+                travel.velocity_mm_s(0),
+                100_000.0 * (step.min(16) as f32 / 16.0)
+            );
+        }
     }
 
     #[test]

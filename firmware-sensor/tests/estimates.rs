@@ -7,7 +7,7 @@ use firmware_sensor::{
     Drive, ESTIMATE_RATE_HZ, MICROMETRES_PER_COUNT, MID_RAIL_CODE, Output, SCAN_RATE_HZ,
     SCANS_PER_SAMPLE, Scan, Sensor,
 };
-use protocol::{Estimate, Gauges, Motion, Range, SensorConfiguration};
+use protocol::{Estimate, Gauges, Method, Motion, Range, SensorConfiguration};
 
 const WINDOW_S: f64 = 0.08;
 /// The codes that a gauge swings from mid-rail, and how far its rest may be off.
@@ -56,8 +56,14 @@ fn estimates(outputs: &[Output]) -> Vec<Estimate> {
         .collect()
 }
 
-fn default_sensor() -> Sensor {
-    Sensor::new(SensorConfiguration::default())
+/// The paper's method.
+const COUNTING: SensorConfiguration = SensorConfiguration {
+    method: Method::Counting,
+    ..SensorConfiguration::DEFAULT
+};
+
+fn counting_sensor() -> Sensor {
+    Sensor::new(COUNTING)
 }
 
 #[test]
@@ -67,7 +73,7 @@ fn every_cell_of_table_1_is_where_quantisation_puts_it() {
             for gauge in 0..5 {
                 let mut sensor = Sensor::new(SensorConfiguration {
                     counted_gauge: gauge,
-                    ..SensorConfiguration::default()
+                    ..COUNTING
                 });
                 let outputs = rub(&mut sensor, 2.5, wavelength_mm, |t_s| speed_mm_s * t_s);
                 let settled = &estimates(&outputs)[50..];
@@ -92,7 +98,7 @@ fn every_cell_of_table_1_is_where_quantisation_puts_it() {
 #[test]
 fn a_single_estimate_is_one_of_the_two_counts_that_fit() {
     // 30 mm/s on 3 mm: 1.6 crossings a window, so λe is 4.8 mm or 2.4 mm, and the speed 1 % off at most.
-    let outputs = rub(&mut default_sensor(), 2.5, 3.0, |t_s| 30.0 * t_s);
+    let outputs = rub(&mut counting_sensor(), 2.5, 3.0, |t_s| 30.0 * t_s);
     for estimate in &estimates(&outputs)[50..] {
         let got = f64::from(estimate.wavelength_mm.unwrap_or(f32::NAN));
         let fits = |want: f64| (got / want - 1.0).abs() <= 0.0105;
@@ -102,7 +108,7 @@ fn a_single_estimate_is_one_of_the_two_counts_that_fit() {
 
 #[test]
 fn estimates_come_at_100_hz_numbered_from_0() {
-    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
+    let outputs = rub(&mut counting_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
     let estimates = estimates(&outputs);
     assert_eq!(estimates.len(), ESTIMATE_RATE_HZ as usize);
     for (number, estimate) in estimates.iter().enumerate() {
@@ -114,7 +120,7 @@ fn estimates_come_at_100_hz_numbered_from_0() {
 
 #[test]
 fn nothing_is_valid_before_the_filters_have_settled_and_a_window_is_full() {
-    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
+    let outputs = rub(&mut counting_sensor(), 1.0, 2.0, |t_s| 50.0 * t_s);
     let estimates = estimates(&outputs);
     // 135 ms of settling and 80 ms of window.
     for estimate in &estimates {
@@ -131,12 +137,12 @@ fn nothing_is_valid_before_the_filters_have_settled_and_a_window_is_full() {
 
 #[test]
 fn a_new_configuration_is_counted_for_a_whole_window_first() {
-    let mut sensor = default_sensor();
+    let mut sensor = counting_sensor();
     rub(&mut sensor, 1.0, 2.0, |t_s| 50.0 * t_s);
     let configuration = SensorConfiguration {
         window_ms: 120,
         counted_gauge: 4,
-        ..SensorConfiguration::default()
+        ..COUNTING
     };
     sensor.configure(configuration);
     assert_eq!(sensor.configuration(), configuration);
@@ -159,7 +165,7 @@ fn a_new_configuration_is_counted_for_a_whole_window_first() {
 
 #[test]
 fn a_resting_sensor_has_no_valid_estimate() {
-    let outputs = rub(&mut default_sensor(), 1.0, 2.0, |_| 0.3);
+    let outputs = rub(&mut counting_sensor(), 1.0, 2.0, |_| 0.3);
     for estimate in estimates(&outputs) {
         assert!(!estimate.valid);
         assert_eq!(estimate.wavelength_mm, None);
@@ -171,7 +177,7 @@ fn a_resting_sensor_has_no_valid_estimate() {
 
 #[test]
 fn a_gauge_that_falls_silent_has_no_valid_estimate_once_the_filters_have_rung_out() {
-    let mut sensor = default_sensor();
+    let mut sensor = counting_sensor();
     rub(&mut sensor, 1.0, 2.0, |t_s| 50.0 * t_s);
     let silent = [[MID_RAIL_CODE + 40; 6]; SCANS_PER_SAMPLE];
     // 50 mm/s are 10 counts a millisecond.
@@ -195,7 +201,7 @@ fn a_gauge_that_falls_silent_has_no_valid_estimate_once_the_filters_have_rung_ou
 
 #[test]
 fn a_creeping_sensor_has_no_valid_estimate() {
-    let outputs = rub(&mut default_sensor(), 3.0, 0.1, |t_s| 1.5 * t_s);
+    let outputs = rub(&mut counting_sensor(), 3.0, 0.1, |t_s| 1.5 * t_s);
     let estimates = estimates(&outputs);
     assert!(
         estimates
@@ -209,7 +215,7 @@ fn a_creeping_sensor_has_no_valid_estimate() {
 fn the_amplitude_is_the_fundamentals_in_adc_steps() {
     // 50 mm/s on 1 mm: 50 Hz, whole cycles in a window. The band-pass takes 1.4 % of it and leaves 0.36 of
     // the third harmonic, which is 0.29 of the fundamental: 0.5 % more in RMS.
-    let outputs = rub(&mut default_sensor(), 2.0, 1.0, |t_s| 50.0 * t_s);
+    let outputs = rub(&mut counting_sensor(), 2.0, 1.0, |t_s| 50.0 * t_s);
     let want = SWING * (0.1 * PI).sin() / (0.1 * PI);
     for estimate in &estimates(&outputs)[50..] {
         let got = f64::from(estimate.amplitude_lsb);
@@ -223,7 +229,7 @@ fn a_rub_to_and_fro_is_in_t1_as_long_as_the_paper_says_and_valid_only_then() {
     let strokes_hz = 0.83;
     let position_mm =
         |t_s: f64| -70.0 / (2.0 * PI * strokes_hz) * (2.0 * PI * strokes_hz * t_s).cos();
-    let outputs = rub(&mut default_sensor(), 12.5, 2.0, position_mm);
+    let outputs = rub(&mut counting_sensor(), 12.5, 2.0, position_mm);
     let settled = &estimates(&outputs)[45..];
     let in_t1 = settled
         .iter()
@@ -248,7 +254,7 @@ fn a_rub_to_and_fro_is_in_t1_as_long_as_the_paper_says_and_valid_only_then() {
 fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
     let mut sensor = Sensor::new(SensorConfiguration {
         stream_gauges: true,
-        ..SensorConfiguration::default()
+        ..COUNTING
     });
     let speed_mm_s = 40.0;
     let outputs = rub(&mut sensor, 1.0, 4.0, |t_s| speed_mm_s * t_s);
@@ -281,7 +287,7 @@ fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
         }
     }
     assert!(
-        rub(&mut default_sensor(), 0.1, 4.0, |_| 0.0)
+        rub(&mut counting_sensor(), 0.1, 4.0, |_| 0.0)
             .iter()
             .all(|o| o.gauges.is_none())
     );
@@ -289,7 +295,7 @@ fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
 
 #[test]
 fn the_drive_follows_motions_and_stops_without_them() {
-    let mut sensor = default_sensor();
+    let mut sensor = counting_sensor();
     let still = rub(&mut sensor, 0.01, 2.0, |_| 0.0);
     assert!(still.iter().all(|output| output.drive.duty == 0));
     let motion = Motion {
@@ -314,6 +320,12 @@ fn the_drive_follows_motions_and_stops_without_them() {
 
 #[test]
 fn a_replay_is_the_same_bit_for_bit() {
-    let play = || rub(&mut default_sensor(), 1.0, 1.0, |t_s| 70.0 * t_s);
+    let play = || rub(&mut counting_sensor(), 1.0, 1.0, |t_s| 70.0 * t_s);
     assert_eq!(play(), play());
+}
+
+#[test]
+fn the_whole_state_is_within_8_kib() {
+    let bytes = size_of::<Sensor>();
+    assert!(bytes <= 8 * 1_024, "{bytes} bytes");
 }

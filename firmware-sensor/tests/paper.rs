@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 
+use firmware_sensor::adapted;
 use firmware_sensor::counting::predicted_mean_mm;
 
 /// A sinusoidal rub over a grating, seen through a window: what equations (3) to (11) are about.
@@ -256,6 +257,26 @@ fn table_1_is_mostly_the_counts_quantisation() {
         for (wavelength_mm, want) in wavelengths_mm.into_iter().zip(predicted) {
             let got = predicted_mean_mm(wavelength_mm, speed_mm_s, 0.08);
             assert!((got - want).abs() <= 0.000_500_001, "{got} is not {want}");
+        }
+    }
+}
+
+#[test]
+fn the_boards_window_is_where_equation_11_is_least() {
+    for wavelength_mm in [0.5, 1.0, 2.0, 3.0, 4.0, 8.0] {
+        for strokes_hz in [0.05, 0.2, 0.5, 0.83, 1.0, 2.0, 3.0] {
+            let want = best_window_s(wavelength_mm, strokes_hz);
+            let got = f64::from(adapted::best_window_s(
+                wavelength_mm as f32,
+                strokes_hz as f32,
+            ));
+            // The series' next terms, in A: less than x⁴/50.
+            let x = PI * want * strokes_hz;
+            let bound = want * (x.powi(4) / 50.0 + 1e-6);
+            assert!(
+                (got - want).abs() <= bound,
+                "{got} is not {want} at λ = {wavelength_mm}, fv = {strokes_hz}"
+            );
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod reaction;
 pub(crate) mod synthetic;
 pub mod track;
 mod voltage;
+pub mod words;
 
 use crate::recording::Recording;
 use crate::truth::Truth;

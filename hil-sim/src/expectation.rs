@@ -35,6 +35,11 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
             summary.valid_share,
         ),
         (
+            "wrong_share_max",
+            expect.wrong_share_max.map(|most| 0.0..=most),
+            summary.wrong_share,
+        ),
+        (
             "settling_ms",
             expect.settling_ms.map(most),
             summary.settling_ms,
@@ -86,6 +91,7 @@ mod tests {
         verdict.summary.bias_percent = Some(-1.5);
         verdict.summary.mean_mm = Some(2.02);
         verdict.summary.valid_share = Some(0.9);
+        verdict.summary.wrong_share = Some(0.002);
         verdict.actuators.frequency_hz = Some(25.1);
         verdict.actuators.truth_hz = Some(25.0);
         verdict
@@ -112,6 +118,7 @@ mod tests {
             e.wavelength_bias_percent = Some(1.5);
             e.mean_mm = Some(2.0);
             e.valid_share_min = Some(0.9);
+            e.wrong_share_max = Some(0.002);
             e.frequency_percent = Some(0.5);
         });
         assert!(unmet.is_empty(), "{unmet:?}");
@@ -124,6 +131,7 @@ mod tests {
             e.wavelength_bias_percent = Some(1.4);
             e.mean_mm = Some(2.06);
             e.valid_share_min = Some(0.91);
+            e.wrong_share_max = Some(0.001);
             e.frequency_percent = Some(0.3);
         });
         let keys: Vec<&str> = unmet
@@ -137,6 +145,7 @@ mod tests {
                 "wavelength_bias_percent",
                 "mean_mm",
                 "valid_share_min",
+                "wrong_share_max",
                 "frequency_percent"
             ]
         );

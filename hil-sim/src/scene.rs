@@ -237,10 +237,30 @@ pub struct Link {
 /// `[estimator]`: how λ is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Estimator {
-    /// `"default"` and `"counting"` are the paper's count of crossings.
+    /// `"default"` is the boards' own default.
     pub method: Method,
     /// The counting window A in ms, 10 to 200. Default 80, the paper's.
     pub window_ms: u16,
+    /// The gauge whose crossings are counted, 0 to 4. Default 2.
+    pub counted_gauge: u8,
+    /// Gauges that may take part in the estimate, at least one. Default all.
+    pub gauges: [bool; GAUGES],
+    /// Travel over which the bank averages, as percent of λ, 30 to 300 (`travel_wavelengths`, in λ).
+    /// Default 70.
+    pub travel_percent: u16,
+    /// Wavenumbers in the bank, 12 to 36. Default 28.
+    pub candidates: u8,
+    /// Where the fingertip's stiffness comes from. Default configured.
+    pub stiffness: Stiffness,
+}
+
+/// Where the sensor has the fingertip's shear stiffness from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stiffness {
+    /// It is told.
+    Configured,
+    /// It finds it out.
+    Estimated,
 }
 
 /// `[expect]`: bounds on the summary. One that is absent is not judged.
@@ -256,6 +276,8 @@ pub struct Expect {
     pub mean_tolerance_mm: f64,
     /// `valid_share` at least this, 0 to 1.
     pub valid_share_min: Option<f64>,
+    /// `wrong_share` at most this, 0 to 1.
+    pub wrong_share_max: Option<f64>,
     /// `settling_ms` at most this.
     pub settling_ms: Option<f64>,
     /// `latency_ms` at most this.
@@ -279,8 +301,9 @@ impl Scene {
         read::read(path, text)
     }
 
-    /// One specimen of `wavelength_mm`, a trapezoid, rubbed at `speed_mm_s` for 3 s without noise: a cell
-    /// of the paper's Table I. The values must be within the ranges of [`Specimen`] and [`Motion`].
+    /// One specimen of `wavelength_mm`, a trapezoid, rubbed at `speed_mm_s` for 3 s without noise, as in a
+    /// cell of the paper's Table I, estimated by the default method. The values must be within the
+    /// ranges of [`Specimen`] and [`Motion`].
     pub fn constant(wavelength_mm: f64, speed_mm_s: f64) -> Self {
         Self {
             name: format!("constant-{wavelength_mm}mm-{speed_mm_s}mm-s"),
@@ -308,10 +331,24 @@ impl Scene {
 
     /// What the scene asks of the sensor board.
     pub fn sensor_configuration(&self) -> SensorConfiguration {
+        let defaults = SensorConfiguration::DEFAULT;
+        let estimator = &self.estimator;
         SensorConfiguration {
-            method: self.estimator.method,
-            window_ms: self.estimator.window_ms,
-            ..SensorConfiguration::default()
+            method: estimator.method,
+            window_ms: estimator.window_ms,
+            counted_gauge: estimator.counted_gauge,
+            gauges: (0..GAUGES).fold(0, |set, gauge| {
+                set | u8::from(estimator.gauges[gauge]) << gauge
+            }),
+            bank_travel_percent: estimator.travel_percent,
+            bank_candidates: estimator.candidates,
+            force_channel: self.force.present,
+            force_mn_per_v: (1_000.0 * self.force.n_per_v).round() as u16,
+            stiffness_n_per_m: match estimator.stiffness {
+                Stiffness::Configured => self.force.stiffness_n_per_m.round() as u16,
+                Stiffness::Estimated => 0,
+            },
+            ..defaults
         }
     }
 
@@ -346,10 +383,15 @@ impl Default for Force {
 
 impl Default for Estimator {
     fn default() -> Self {
-        let defaults = SensorConfiguration::default();
+        let defaults = SensorConfiguration::DEFAULT;
         Self {
-            method: Method::Counting,
+            method: defaults.method,
             window_ms: defaults.window_ms,
+            counted_gauge: defaults.counted_gauge,
+            gauges: std::array::from_fn(|gauge| defaults.gauges >> gauge & 1 == 1),
+            travel_percent: defaults.bank_travel_percent,
+            candidates: defaults.bank_candidates,
+            stiffness: Stiffness::Configured,
         }
     }
 }
@@ -358,7 +400,10 @@ impl Estimator {
     /// The method's name in scenes and in the JSON.
     pub const fn method_name(&self) -> &'static str {
         match self.method {
+            Method::Bank => "bank",
             Method::Counting => "counting",
+            Method::AdaptedCounting => "counting-adapted",
+            Method::Crossings => "crossings",
         }
     }
 }

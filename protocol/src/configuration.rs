@@ -6,9 +6,15 @@ use serde::{Deserialize, Serialize};
 /// How λ is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Method {
-    /// The paper's count of zero crossings, equations (1), (2) and (5).
+    /// A bank of wavenumbers over the arm's travel.
     #[default]
+    Bank,
+    /// The paper's count of zero crossings in a fixed window, equations (1), (2) and (5).
     Counting,
+    /// The same in the window that equation (11) asks for at the hand's present frequency.
+    AdaptedCounting,
+    /// Zero crossings timed between samples, their spacing taken in position.
+    Crossings,
 }
 
 /// The sensor board's settings.
@@ -20,6 +26,19 @@ pub struct SensorConfiguration {
     pub window_ms: u16,
     /// The gauge whose crossings are counted, 0 to 4.
     pub counted_gauge: u8,
+    /// Bit g set: gauge g may take part in the estimate, 1 to 31.
+    pub gauges: u8,
+    /// Travel over which the bank averages, as percent of λ, 30 to 300: the knob between accuracy and
+    /// latency.
+    pub bank_travel_percent: u16,
+    /// Wavenumbers in the bank, 12 to 36.
+    pub bank_candidates: u8,
+    /// Whether the sixth channel carries the tangential force.
+    pub force_channel: bool,
+    /// Scale of the force channel in mN/V, 1 to 60 000; mid-rail is no force.
+    pub force_mn_per_v: u16,
+    /// Shear stiffness k of the fingertip in N/m, 10 to 60 000; 0 to estimate it.
+    pub stiffness_n_per_m: u16,
     /// Whether [`crate::Gauges`] blocks are sent.
     pub stream_gauges: bool,
     /// The arm's speed in µm/s at full PWM duty, 1 000 to 2 000 000.
@@ -29,9 +48,15 @@ pub struct SensorConfiguration {
 impl SensorConfiguration {
     /// What a board starts with: safe, and the paper's numbers where it gives some.
     pub const DEFAULT: Self = Self {
-        method: Method::Counting,
+        method: Method::Bank,
         window_ms: 80,
         counted_gauge: 2,
+        gauges: 0b11111,
+        bank_travel_percent: 70,
+        bank_candidates: 28,
+        force_channel: false,
+        force_mn_per_v: 1_000,
+        stiffness_n_per_m: 400,
         stream_gauges: false,
         arm_full_scale_um_s: 200_000,
     };
@@ -116,6 +141,16 @@ pub enum Setting {
     WindowMs,
     /// [`SensorConfiguration::counted_gauge`]
     CountedGauge,
+    /// [`SensorConfiguration::gauges`]
+    Gauges,
+    /// [`SensorConfiguration::bank_travel_percent`]
+    BankTravel,
+    /// [`SensorConfiguration::bank_candidates`]
+    BankCandidates,
+    /// [`SensorConfiguration::force_mn_per_v`]
+    ForceScale,
+    /// [`SensorConfiguration::stiffness_n_per_m`]
+    Stiffness,
     /// [`SensorConfiguration::arm_full_scale_um_s`]
     ArmFullScale,
     /// [`DisplayConfiguration::max_age_ms`]
@@ -135,6 +170,23 @@ impl SensorConfiguration {
     pub fn check(&self) -> Result<(), Setting> {
         within(self.window_ms.into(), 10, 200, Setting::WindowMs)?;
         within(self.counted_gauge.into(), 0, 4, Setting::CountedGauge)?;
+        within(self.gauges.into(), 1, 31, Setting::Gauges)?;
+        within(
+            self.bank_travel_percent.into(),
+            30,
+            300,
+            Setting::BankTravel,
+        )?;
+        within(self.bank_candidates.into(), 12, 36, Setting::BankCandidates)?;
+        within(self.force_mn_per_v.into(), 1, 60_000, Setting::ForceScale)?;
+        if self.stiffness_n_per_m != 0 {
+            within(
+                self.stiffness_n_per_m.into(),
+                10,
+                60_000,
+                Setting::Stiffness,
+            )?;
+        }
         within(
             self.arm_full_scale_um_s,
             1_000,

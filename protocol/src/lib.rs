@@ -23,8 +23,8 @@ pub use configuration::{
 pub use frame::MAX_FRAME;
 pub use hello::{HELLO_LENGTH, Hello, Role};
 pub use message::{
-    CHANNELS, Estimate, GAUGE_BLOCK, GAUGES, GaugeSample, Gauges, Message, Motion,
-    PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,
+    CHANNELS, Contact, Estimate, GAUGE_BLOCK, GAUGES, GaugeHealth, GaugeSample, Gauges, Message,
+    Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,
 };
 pub use port::Port;
 pub use receiver::{Event, Peer, Receiver};

@@ -3,7 +3,7 @@
 //! | message | from | rate | what for |
 //! | --- | --- | --- | --- |
 //! | [`Hello`] | all | at start, on request, once a second until answered | who is there, and do we understand each other |
-//! | [`Estimate`] | sensor | 100 Hz | the surface's wavelength |
+//! | [`Estimate`] | sensor | 100 Hz | the surface, the contact with it, the gauges' health |
 //! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
 //! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
 //! | [`Status`] | boards | 1 Hz | every counter |
@@ -23,7 +23,7 @@ use crate::hello::Hello;
 use crate::status::Status;
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
@@ -75,6 +75,38 @@ pub enum Range {
     T2,
 }
 
+/// What the fingertip does at the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Contact {
+    /// Nothing tells: the arm rests, or nothing can be seen without a force channel.
+    #[default]
+    Unknown,
+    /// The fingertip slips over the surface as the arm moves.
+    Slip,
+    /// The fingertip holds to the surface while the arm moves.
+    Stick,
+    /// Stick and slip in turn, many times a second: see [`Estimate::lag_um`] for what can be known of it.
+    StickSlip,
+}
+
+/// What is wrong with a gauge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum GaugeHealth {
+    /// Nothing.
+    #[default]
+    Good,
+    /// Says nothing, or next to nothing, while others do.
+    Dead,
+    /// Gives the same code for ever.
+    Stuck,
+    /// Is driven into the ends of its amplifier's or the converter's range.
+    Saturated,
+    /// Says something that has nothing to do with the surface.
+    Noisy,
+    /// Carries more mains hum than signal.
+    Hum,
+}
+
 /// One estimate of the surface under the sensor, at 100 Hz.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Estimate {
@@ -86,15 +118,25 @@ pub struct Estimate {
     pub wavelength_mm: Option<f32>,
     /// Whether the estimator stands by `wavelength_mm`. Never true without one.
     pub valid: bool,
-    /// RMS of the band-passed signal over the window times √2 (a sine's amplitude), in ADC steps
-    /// (3.3 V / 4096), mean over the gauges used; 0 or above.
-    pub amplitude_lsb: f32,
     /// From 0 (a guess) to 1 (certain).
     pub confidence: f32,
+    /// Amplitude of the surface's fundamental in ADC steps (3.3 V / 4096), RMS over the gauges used,
+    /// whatever the speed; 0 or above.
+    pub amplitude_lsb: f32,
+    /// λ in mm by the paper's count, A = 80 ms, equations (1), (2) and (5), of the counted gauge: made
+    /// beside every other method, to be watched next to it.
+    pub counted_mm: Option<f32>,
     /// The paper's range at this instant.
     pub range: Range,
+    /// What the fingertip does.
+    pub contact: Contact,
+    /// How far the fingertip's contact lags behind the arm, F/k, in µm, towards larger x if positive;
+    /// none without the force channel.
+    pub lag_um: Option<i32>,
     /// Bit g set: gauge g took part.
     pub gauges_used: u8,
+    /// What is wrong with each gauge.
+    pub health: [GaugeHealth; GAUGES],
 }
 
 /// The operator's hand, at 500 Hz.

@@ -5,7 +5,7 @@
 
 mod messages;
 
-use messages::{events, greeted_receiver, hello, samples};
+use messages::{CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples};
 use protocol::{Event, HELLO_LENGTH, Hello, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver};
 use protocol::{SCHEMA_HASH, frame};
 
@@ -17,16 +17,17 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c01156d9a580741bdc98c7353544d3332463432395a490101010101020106016b\
-         5eadbe00",
+        "030201065244474c0215bf44858c2e42a44b7353544d3332463432395a4901010101010201060196\
+         651f1400",
     ),
     (
         "estimate",
-        "0b020101ac02c08db701010101034001022002440109403f01042b8efb2a00",
+        "0b020101ac02c08db7010101010340010103403f0220034401010a2040010301ab02020108020305\
+         82748ad700",
     ),
     (
         "estimate without a wavelength",
-        "0402010103904e01010101010101010101061f7cbda36400",
+        "0402010103904e01010101010101010101010101021f0101010105f5fabcad00",
     ),
     ("motion", "14020102dc0bc08db701f1c001e0c5084a1aa3f300"),
     (
@@ -47,18 +48,21 @@ const GOLDEN: &[(&str, &str)] = &[
         "40020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
          07f107f207f307f40701904ea84601f4030203044fb28f1b00",
     ),
-    ("configure a sensor", "04020105010b500201c09a0c55a2fb4b00"),
+    (
+        "configure a sensor",
+        "04020105150150021796012401dc0b900301c09a0c43d6314f00",
+    ),
     (
         "configure a display",
         "120201050101f4031432dc0b882737898b4200",
     ),
     (
         "configuration taken",
-        "0402010601010b500201c09a0c7e733b8600",
+        "0402010601150150021796012401dc0b900301c09a0c5e2e49e400",
     ),
     (
         "configuration refused",
-        "1402010601080101f4031432dc0b882724bb88a400",
+        "14020106010d0101f4031432dc0b88276617dfd500",
     ),
     ("ping", "0a020107e807da39d20900"),
     ("pong", "0e020108e807d00f82102723874600"),
@@ -110,9 +114,23 @@ fn the_golden_frames_show_every_variant() {
 }
 
 #[test]
+fn every_choice_within_a_message_has_its_byte() {
+    fn bytes<T: serde::Serialize>(choices: &[T]) -> Vec<u8> {
+        postcard::to_stdvec(choices).expect("they encode")[1..].to_vec()
+    }
+    assert_eq!(bytes(&METHODS), [0, 1, 2, 3]);
+    assert_eq!(bytes(&CONTACTS), [0, 1, 2, 3]);
+    assert_eq!(bytes(&HEALTHS), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(
+        bytes(&SETTINGS),
+        std::array::from_fn::<u8, 14, _>(|n| n as u8)
+    );
+}
+
+#[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 1);
-    assert_eq!(SCHEMA_HASH, 0x8cc9_bd41_0758_9a6d);
+    assert_eq!(PROTOCOL_VERSION, 2);
+    assert_eq!(SCHEMA_HASH, 0x4ba4_422e_8c85_44bf);
 }
 
 #[test]

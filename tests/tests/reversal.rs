@@ -48,6 +48,9 @@ fn back_and_slower() -> Run {
         [motion]
         kind = "recorded"
         file = "motion.csv"
+
+        [estimator]
+        method = "counting"
         "#,
     ))
 }

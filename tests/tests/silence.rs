@@ -49,6 +49,9 @@ static DEAD_FOR_A_WHILE: LazyLock<Run> = LazyLock::new(|| {
         [gauges]
         kind = "recorded"
         file = "gauges.csv"
+
+        [estimator]
+        method = "counting"
         "#,
     ))
 });

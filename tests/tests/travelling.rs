@@ -23,6 +23,9 @@ static RUN: LazyLock<Run> = LazyLock::new(|| {
         [motion]
         speed_mm_s = {SPEED_MM_S}
 
+        [estimator]
+        method = "counting"
+
         [display]
         mode = "travelling"
         "#

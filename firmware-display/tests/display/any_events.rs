@@ -2,7 +2,7 @@
 
 use firmware_display::{Display, ZERO_VOLT};
 use proptest::prelude::*;
-use protocol::{DisplayConfiguration, Estimate, Mode, Range};
+use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
 
 /// Ticks in which a new amplitude is reached: 20 ms.
 const AMPLITUDE_REACHED: u32 = 40;
@@ -32,10 +32,24 @@ prop_compose! {
         instant_us in any::<u64>(),
         amplitude_lsb in any::<f32>(),
         confidence in any::<f32>(),
+        counted_mm in any::<Option<f32>>(),
+        lag_um in any::<Option<i32>>(),
         gauges_used in any::<u8>(),
     ) -> Estimate {
-        let range = Range::T2;
-        Estimate { sequence, instant_us, wavelength_mm, valid, amplitude_lsb, confidence, range, gauges_used }
+        Estimate {
+            sequence,
+            instant_us,
+            wavelength_mm,
+            valid,
+            confidence,
+            amplitude_lsb,
+            counted_mm,
+            range: Range::T2,
+            contact: Contact::Stick,
+            lag_um,
+            gauges_used,
+            health: [GaugeHealth::Noisy; GAUGES],
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A display with a hand and a sensor at its ends.
 
 use firmware_display::{ACTUATORS, Display};
-use protocol::{DisplayConfiguration, Estimate, Mode, Range};
+use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
 
 /// Volts of one DAC step.
 pub const VOLT_PER_STEP: f64 = 10.0 / 65_536.0;
@@ -80,9 +80,13 @@ pub fn valid(sequence: u32, wavelength_mm: f32) -> Estimate {
         instant_us: u64::from(sequence) * 10_000,
         wavelength_mm: Some(wavelength_mm),
         valid: true,
-        amplitude_lsb: 100.0,
         confidence: 1.0,
+        amplitude_lsb: 100.0,
+        counted_mm: None,
         range: Range::T1,
-        gauges_used: 4,
+        contact: Contact::Unknown,
+        lag_um: None,
+        gauges_used: 0b1_1111,
+        health: [GaugeHealth::Good; GAUGES],
     }
 }

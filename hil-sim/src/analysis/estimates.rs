@@ -1,9 +1,10 @@
 //! The estimates beside the truth.
 
+use protocol::{Contact, GAUGES, GaugeHealth, Range};
 use serde::Serialize;
 
 use crate::analysis::track::Track;
-use crate::analysis::{finite, mean, seconds};
+use crate::analysis::{finite, mean, seconds, words};
 use crate::recording::Recording;
 use crate::truth::Truth;
 
@@ -11,6 +12,8 @@ use crate::truth::Truth;
 pub const MOTION_MM_S: f64 = 5.0;
 /// Relative error within which an estimate counts as settled.
 pub const SETTLED: f64 = 0.1;
+/// Relative error above which a valid estimate counts as wrong.
+pub const WRONG: f64 = 0.1;
 /// Relative change of λ from one scan to the next that makes a boundary between specimens.
 const BOUNDARY: f64 = 1e-3;
 /// How long an estimate speaks for the surface, in s, if no other follows: one and a half of the
@@ -30,6 +33,23 @@ pub struct JudgedEstimate {
     pub confidence: Option<f64>,
     /// Whether the estimator stands by it.
     pub valid: bool,
+    /// λ in mm by the paper's count, beside whatever method the estimate is of.
+    pub counted_mm: Option<f64>,
+    /// The paper's range.
+    pub range: Range,
+    /// Amplitude of the surface's fundamental in ADC steps.
+    pub amplitude_lsb: Option<f64>,
+    /// What the fingertip does.
+    #[serde(serialize_with = "words::contact")]
+    pub contact: Contact,
+    /// How far the contact lags behind the arm, in µm.
+    pub lag_um: Option<i32>,
+    /// The gauges that took part, as a list of their numbers.
+    #[serde(serialize_with = "words::gauges")]
+    pub gauges_used: u8,
+    /// What is wrong with each gauge.
+    #[serde(serialize_with = "words::health")]
+    pub health: [GaugeHealth; GAUGES],
 }
 
 /// The estimates as a whole. Relative errors are (λ̂ − λ)/λ of each valid estimate at its instant.
@@ -44,9 +64,12 @@ pub struct Summary {
     /// Share of the time in motion (|v| > [`MOTION_MM_S`]) with a valid estimate, 0 to 1; none
     /// without motion.
     pub valid_share: Option<f64>,
-    /// Share of all estimates that are valid and yet more than [`SETTLED`] off, 0 to 1; none without
-    /// any estimate.
+    /// Share of all estimates that are valid and off by more than [`WRONG`], 0 to 1; none without an
+    /// estimate.
     pub wrong_share: Option<f64>,
+    /// Root of the mean square of the relative errors of the paper's count, in %, over the estimates
+    /// in T1 in which it has a λ: the ones the paper goes by.
+    pub counted_rms_percent: Option<f64>,
     /// From the last boundary between two specimens until every later valid estimate is within
     /// [`SETTLED`], in ms; none without a boundary, or if that never came.
     pub settling_ms: Option<f64>,
@@ -62,11 +85,11 @@ impl JudgedEstimate {
         Some((wavelength_mm - truth_mm) / truth_mm)
     }
 
-    /// Whether the estimator stands by something that is more than [`SETTLED`] off, or no number at
-    /// all. Never where there is no surface.
-    pub fn is_wrong(&self) -> bool {
-        let right = |error: f64| error.abs() <= SETTLED;
-        self.valid && self.truth_mm.is_some() && !self.relative_error().is_some_and(right)
+    /// The relative error of the paper's count where there is a surface, in T1.
+    pub fn counted_error(&self) -> Option<f64> {
+        let truth_mm = self.truth_mm?;
+        let counted_mm = self.counted_mm.filter(|_| self.range == Range::T1)?;
+        Some((counted_mm - truth_mm) / truth_mm)
     }
 }
 
@@ -78,18 +101,23 @@ pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summ
         .iter()
         .map(|record| {
             let t_s = seconds(record.made_ns);
+            let estimate = &record.estimate;
+            let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
             JudgedEstimate {
                 t_s,
                 truth_mm: arm
                     .position_mm(t_s)
                     .and_then(|x_mm| truth.wavelength_at(x_mm)),
-                wavelength_mm: record
-                    .estimate
-                    .wavelength_mm
-                    .map(f64::from)
-                    .and_then(finite),
-                confidence: finite(f64::from(record.estimate.confidence)),
-                valid: record.estimate.valid,
+                wavelength_mm: millimetres(estimate.wavelength_mm),
+                confidence: finite(estimate.confidence.into()),
+                valid: estimate.valid,
+                counted_mm: millimetres(estimate.counted_mm),
+                range: estimate.range,
+                amplitude_lsb: finite(estimate.amplitude_lsb.into()),
+                contact: estimate.contact,
+                lag_um: estimate.lag_um,
+                gauges_used: estimate.gauges_used,
+                health: estimate.health,
             }
         })
         .collect();
@@ -98,8 +126,10 @@ pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summ
         .estimates
         .iter()
         .filter_map(|record| Some((record.received_ns? as f64 - record.made_ns as f64) * 1e-6));
+    let counted = estimates.iter().filter_map(JudgedEstimate::counted_error);
+    let wrong = errors().filter(|error| error.abs() > WRONG).count();
     let summary = Summary {
-        rms_percent: mean(errors().map(|e| e * e)).map(|square| 100.0 * square.sqrt()),
+        rms_percent: rms_percent(errors()),
         bias_percent: mean(errors()).map(|e| 100.0 * e),
         mean_mm: mean(
             estimates
@@ -108,11 +138,17 @@ pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summ
                 .filter_map(|e| e.wavelength_mm),
         ),
         valid_share: valid_share(&arm, &estimates),
-        wrong_share: mean(estimates.iter().map(|e| f64::from(u8::from(e.is_wrong())))),
+        wrong_share: finite(wrong as f64 / estimates.len() as f64),
+        counted_rms_percent: rms_percent(counted),
         settling_ms: last_boundary_s(truth, &arm).and_then(|at_s| settling_ms(at_s, &estimates)),
         latency_ms: mean(received),
     };
     (estimates, summary)
+}
+
+/// Root of the mean square of relative errors, in %; none if there are none.
+fn rms_percent(errors: impl Iterator<Item = f64>) -> Option<f64> {
+    mean(errors.map(|e| e * e)).map(|square| 100.0 * square.sqrt())
 }
 
 /// Share of the time in motion for which the last estimate made is valid.
@@ -221,19 +257,46 @@ mod tests {
     }
 
     #[test]
-    fn wrong_are_the_valid_estimates_that_are_more_than_a_tenth_off() {
-        // λ = 2 mm: in turn 2.3 mm valid (wrong), 2.3 mm invalid, 1.9 mm valid, no number but valid (wrong).
+    fn wrong_are_the_valid_ones_off_by_more_than_a_tenth_of_all_estimates() {
+        // λ = 2 mm, in turn off by 9 %, by 11 %, by −50 %, and by 50 % without a promise.
         let run = Run {
             estimate: Box::new(|t_s| match (t_s * 100.0).round() as u32 % 4 {
-                0 => (2.3, true),
-                1 => (2.3, false),
-                2 => (1.9, true),
-                _ => (f32::NAN, true),
+                0 => (2.18, true),
+                1 => (2.22, true),
+                2 => (1.0, true),
+                _ => (3.0, false),
             }),
             duration_s: 2.01,
             ..Run::steady(50.0, 2.0)
         };
+        assert_eq!(run.record().estimates.len(), 200);
         assert_eq!(summary(&run).wrong_share, Some(0.5));
+        assert_eq!(summary(&Run::steady(50.0, 2.0)).wrong_share, Some(0.0));
+    }
+
+    #[test]
+    fn the_papers_count_is_judged_in_t1_whatever_the_estimate_is() {
+        let run = Run::steady(50.0, 2.0);
+        let mut recording = run.record();
+        for (index, record) in recording.estimates.iter_mut().enumerate() {
+            let estimate = &mut record.estimate;
+            estimate.valid = false;
+            // 10 % and 20 % off in turn; far off in T2; none.
+            (estimate.counted_mm, estimate.range) = match index % 4 {
+                0 => (Some(2.2), Range::T1),
+                1 => (Some(1.6), Range::T1),
+                2 => (Some(20.0), Range::T2),
+                _ => (None, Range::T1),
+            };
+        }
+        let (_, summary) = judge(&Truth::new("", "", &*run.surface_mm), &recording);
+        // 50 of either; λ is an f32.
+        let squares = (0.1f64.powi(2) + 0.2f64.powi(2)) / 2.0;
+        assert!(
+            near(summary.counted_rms_percent, 100.0 * squares.sqrt(), 1e-3),
+            "{summary:?}"
+        );
+        assert_eq!(summary.rms_percent, None);
     }
 
     #[test]

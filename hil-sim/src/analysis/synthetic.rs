@@ -1,6 +1,6 @@
 //! Recordings of a made-up run whose answers are known: a pair of boards without fault, a sine surface.
 
-use protocol::{CHANNELS, Estimate, GAUGES, Range};
+use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
 use crate::analysis::track::COUNT_MM;
 use crate::recording::{
@@ -10,6 +10,14 @@ use crate::recording::{
 pub const TICK_S: f64 = 500e-6;
 pub const SCAN_S: f64 = 250e-6;
 pub const ESTIMATE_S: f64 = 10e-3;
+/// One gauge is left out.
+const HEALTH: [GaugeHealth; GAUGES] = [
+    GaugeHealth::Good,
+    GaugeHealth::Dead,
+    GaugeHealth::Good,
+    GaugeHealth::Good,
+    GaugeHealth::Good,
+];
 const FADE_IN_S: f64 = 20e-3;
 
 /// A run to be made up. Every closure takes s since the start, [`Run::surface_mm`] takes mm.
@@ -121,10 +129,14 @@ impl Run {
                         instant_us: nanoseconds(t_s) / 1_000,
                         wavelength_mm: Some(wavelength_mm),
                         valid,
-                        amplitude_lsb: 400.0,
                         confidence: 0.75,
+                        amplitude_lsb: 400.0,
+                        counted_mm: Some(2.25),
                         range: Range::T1,
-                        gauges_used: 0b100,
+                        contact: Contact::Slip,
+                        lag_um: None,
+                        gauges_used: 0b1_1101,
+                        health: HEALTH,
                     },
                 }
             })

@@ -2,33 +2,40 @@
 
 use std::process::ExitCode;
 
-use hil_sim::elf::cost::count;
+use hil_sim::elf::cost::measure;
 
 use super::Cost;
 
 /// Milliseconds of samples that each part works through.
 const MILLISECONDS: u64 = 1_000;
 /// The parts, by number.
-const PARTS: [(u64, &str); 6] = [
+const PARTS: [(u64, &str); 9] = [
     (1, "band-pass and crossings of five gauges"),
     (2, "the same with the crate biquad"),
     (3, "the same with the crate idsp"),
     (0, "of each of these, crossings and loop"),
     (4, "anti-aliasing, six channels, 4 kHz to 1 kHz"),
-    (5, "the whole sensor: both, counting, arm"),
+    (5, "the whole sensor, counting"),
+    (6, "the whole sensor, adapted counting"),
+    (7, "the whole sensor, crossings"),
+    (8, "the whole sensor, bank"),
 ];
 
 impl Cost {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let taken = count(&self.elf)?;
-        println!("| part | instructions a millisecond |");
-        println!("| --- | ---: |");
+        let taken = measure(&self.elf)?;
+        println!("| part | instructions a millisecond | the longest millisecond |");
+        println!("| --- | ---: | ---: |");
+        let or_dash =
+            |count: Option<u64>| count.map_or("–".to_owned(), |count| count.to_string());
         for (part, name) in PARTS {
-            let count = taken.get(&part).map(|count| count.div_ceil(MILLISECONDS));
-            println!(
-                "| {name} | {} |",
-                count.map_or("–".to_owned(), |count| count.to_string())
-            );
+            let taken = taken.get(&part);
+            let mean = taken.map(|taken| taken.total.div_ceil(MILLISECONDS));
+            // A part that is measured in one piece has no longest one.
+            let largest = taken
+                .filter(|taken| taken.pieces > 1)
+                .map(|taken| taken.largest);
+            println!("| {name} | {} | {} |", or_dash(mean), or_dash(largest));
         }
         Ok(ExitCode::SUCCESS)
     }

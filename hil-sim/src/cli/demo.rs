@@ -8,6 +8,7 @@ use hil_sim::elf::{self, Firmwares};
 use hil_sim::outcome::Outcome;
 use hil_sim::report::html;
 use hil_sim::scene::Scene;
+use protocol::Method;
 
 use super::{Demo, number};
 
@@ -67,6 +68,7 @@ impl Demo {
 fn rub(wavelength_mm: f64, speed_mm_s: f64, firmwares: &Firmwares) -> anyhow::Result<Outcome> {
     let mut scene = Scene::constant(wavelength_mm, speed_mm_s);
     scene.duration_s = DURATION_S;
+    scene.estimator.method = Method::Counting;
     let (recording, _) = elf::run(&scene, firmwares)?;
     Ok(Outcome::new(scene, recording))
 }

@@ -31,10 +31,21 @@ impl Pins for Bare {
     }
 }
 
+/// The instructions of a part, which may come in pieces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// Of all pieces.
+    pub total: u64,
+    /// Of the largest piece.
+    pub largest: u64,
+    /// How many pieces.
+    pub pieces: u64,
+}
+
 #[derive(Default)]
 struct Marks {
     begun: BTreeMap<u64, u64>,
-    taken: BTreeMap<u64, u64>,
+    taken: BTreeMap<u64, Taken>,
     done: bool,
 }
 
@@ -67,7 +78,11 @@ impl Driver<Nucleo<Bare>> for Marks {
             .checked_sub(END)
             .and_then(|part| self.begun.get(&part))
         {
-            self.taken.insert(value - END, instruction_count - begun);
+            let piece = instruction_count - begun;
+            let taken = self.taken.entry(value - END).or_default();
+            taken.total += piece;
+            taken.largest = taken.largest.max(piece);
+            taken.pieces += 1;
         } else {
             self.begun.insert(value, instruction_count);
         }
@@ -88,6 +103,18 @@ impl Driver<Nucleo<Bare>> for Marks {
 /// # Errors
 /// If the file can't be read or placed, or does not come to its end.
 pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
+    let taken = measure(path)?;
+    Ok(taken
+        .into_iter()
+        .map(|(k, taken)| (k, taken.total))
+        .collect())
+}
+
+/// The same, piece by piece.
+///
+/// # Errors
+/// As [`count`].
+pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let board = |reason: String| ElfError::Board {
         board: "bare",
         reason,

@@ -19,7 +19,7 @@ pub struct Measurement {
     pub estimates: u32,
     /// Those that the estimator stands by.
     pub valid: u32,
-    /// Those of the valid that are more than [`estimates::SETTLED`] off.
+    /// Those of the valid that are more than [`estimates::WRONG`] off.
     pub wrong: u32,
 }
 
@@ -43,7 +43,11 @@ impl Measurement {
             valid_share: summary.valid_share.map(four_decimals),
             estimates: judged.len() as u32,
             valid: count(|estimate| estimate.valid),
-            wrong: count(JudgedEstimate::is_wrong),
+            wrong: count(|estimate| {
+                estimate
+                    .relative_error()
+                    .is_some_and(|error| error.abs() > estimates::WRONG)
+            }),
         })
     }
 

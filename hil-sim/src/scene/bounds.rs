@@ -73,6 +73,11 @@ pub(super) const HUM: Bounds = Bounds {
     give: "a number from 0 to 10, relative to the signal",
     allows: |ratio| (0.0..=10.0).contains(&ratio),
 };
+pub(super) const TRAVEL: Bounds = Bounds {
+    what: "a travel to average over",
+    give: "a number of wavelengths, 0.3 to 3",
+    allows: |wavelengths| (0.3..=3.0).contains(&wavelengths),
+};
 pub(super) const BOUND: Bounds = Bounds {
     what: "a bound",
     give: "a number above 0",

@@ -3,18 +3,18 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use protocol::{Method, Mode};
+use protocol::{GAUGES, Method, Mode};
 
 use super::bounds::{
     AMPLITUDE, BOUND, DAMPING, DELAY, DURATION, ENCODER_STEP, FORCE_SCALE, FREQUENCY, HUM, INSTANT,
     LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
-    WAVELENGTH,
+    TRAVEL, WAVELENGTH,
 };
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
     ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link,
-    Motion, Profile, Resonance, Scene, SceneError, Specimen, Surface,
+    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
 
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         ));
     }
     let link = link(root.table("link")?)?;
-    let estimator = estimator(root.table("estimator")?)?;
+    let estimator = estimator(root.table("estimator")?, &force)?;
     let display_mode = display(root.table("display")?)?;
     if let Some(fault) = root.tables("fault")?.first() {
         return Err(fault.refuse(
@@ -368,18 +368,60 @@ fn link(mut table: Table<'_>) -> Result<Link, SceneError> {
     Ok(link)
 }
 
-fn estimator(mut table: Table<'_>) -> Result<Estimator, SceneError> {
-    let built = [
-        ("default", Method::Counting),
-        ("counting", Method::Counting),
-    ];
-    let method = table.choice("method", &built, &["crossings", "bank"])?;
+fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneError> {
     let defaults = Estimator::default();
+    let methods = [
+        ("default", defaults.method),
+        ("bank", Method::Bank),
+        ("crossings", Method::Crossings),
+        ("counting", Method::Counting),
+        ("counting-adapted", Method::AdaptedCounting),
+    ];
+    let method = table.choice("method", &methods, &[])?;
     let window_ms = table
         .whole("window_ms", 10, 200)?
         .map_or(defaults.window_ms, |ms| ms as u16);
+    let counted_gauge = table
+        .whole("counted_gauge", 0, GAUGES as u64 - 1)?
+        .map_or(defaults.counted_gauge, |gauge| gauge as u8);
+    let named = table.gauges("gauges")?;
+    let gauges = match (table.contains("gauges"), named) {
+        (false, _) => defaults.gauges,
+        (true, named) if named.contains(&true) => named,
+        (true, _) => {
+            return Err(table.refuse("gauges", "there are none: name one or more of 0 to 4"));
+        }
+    };
+    let travel_percent = table
+        .number("travel_wavelengths", &TRAVEL)?
+        .map_or(defaults.travel_percent, |q| (100.0 * q).round() as u16);
+    let candidates = table
+        .whole("candidates", 12, 36)?
+        .map_or(defaults.candidates, |count| count as u8);
+    let stiffness = table.choice(
+        "stiffness",
+        &[
+            ("configured", Stiffness::Configured),
+            ("estimated", Stiffness::Estimated),
+        ],
+        &[],
+    )?;
+    if stiffness == Stiffness::Estimated && !force.present {
+        return Err(table.refuse(
+            "stiffness",
+            "cannot be estimated without the force channel: give tangential = true in [gauges]",
+        ));
+    }
     table.finish("")?;
-    Ok(Estimator { method, window_ms })
+    Ok(Estimator {
+        method,
+        window_ms,
+        counted_gauge,
+        gauges,
+        travel_percent,
+        candidates,
+        stiffness,
+    })
 }
 
 fn display(mut table: Table<'_>) -> Result<Mode, SceneError> {
@@ -407,6 +449,7 @@ fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
         mean_mm,
         mean_tolerance_mm: mean_tolerance_mm.unwrap_or(0.03),
         valid_share_min: table.number("valid_share_min", &SHARE)?,
+        wrong_share_max: table.number("wrong_share_max", &SHARE)?,
         settling_ms: table.number("settling_ms", &BOUND)?,
         latency_ms: table.number("latency_ms", &BOUND)?,
         frequency_percent: table.number("frequency_percent", &BOUND)?,

@@ -73,12 +73,18 @@ fn every_key_of_the_contract_parses() {
         reorder = 0.0
         corrupt = 0.0
         [estimator]
-        method = "default"
-        window_ms = 80
+        method = "crossings"
+        window_ms = 60
+        counted_gauge = 1
+        gauges = [0, 1, 4]
+        travel_wavelengths = 1.5
+        candidates = 36
+        stiffness = "estimated"
         [display]
         mode = "travelling"
         [expect]
         wavelength_rms_percent = 1.0
+        wrong_share_max = 0.001
         "#,
     )
     .unwrap();
@@ -123,6 +129,100 @@ fn every_key_of_the_contract_parses() {
     assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
     assert_eq!(scene.display_mode, Mode::Travelling);
     assert_eq!(scene.expect.wavelength_rms_percent, Some(1.0));
+    assert_eq!(scene.expect.wrong_share_max, Some(0.001));
+    assert_eq!(
+        scene.estimator,
+        Estimator {
+            method: Method::Crossings,
+            window_ms: 60,
+            counted_gauge: 1,
+            gauges: [true, true, false, false, true],
+            travel_percent: 150,
+            candidates: 36,
+            stiffness: Stiffness::Estimated,
+        }
+    );
+}
+
+#[test]
+fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
+    let scene = Scene::parse(
+        Path::new("x.toml"),
+        &format!(
+            "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
+             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n"
+        ),
+    )
+    .unwrap();
+    let configuration = scene.sensor_configuration();
+    assert_eq!(
+        configuration,
+        SensorConfiguration {
+            method: Method::AdaptedCounting,
+            window_ms: 60,
+            counted_gauge: 1,
+            gauges: 0b1_0011,
+            bank_travel_percent: 150,
+            bank_candidates: 36,
+            ..SensorConfiguration::DEFAULT
+        }
+    );
+    // Both ends of every range that a scene may give are in the sensor's.
+    for [travel, candidates, window_ms, gauge] in
+        [["0.3", "12", "10", "0"], ["3", "36", "200", "4"]]
+    {
+        let scene = Scene::parse(
+            Path::new("x.toml"),
+            &format!(
+                "{SURFACE}[estimator]\ntravel_wavelengths = {travel}\ncandidates = {candidates}\n\
+                 window_ms = {window_ms}\ncounted_gauge = {gauge}\ngauges = [{gauge}]\n"
+            ),
+        );
+        assert_eq!(scene.unwrap().sensor_configuration().check(), Ok(()));
+    }
+}
+
+#[test]
+fn the_force_channel_is_the_sensors_as_the_gauges_section_has_it() {
+    let configuration = |section: &str| {
+        let text = format!("{SURFACE}{section}");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        let configuration = scene.sensor_configuration();
+        assert_eq!(configuration.check(), Ok(()), "{section}");
+        (
+            configuration.force_channel,
+            configuration.force_mn_per_v,
+            configuration.stiffness_n_per_m,
+        )
+    };
+    let wired = "[gauges]\ntangential = true\n";
+    assert_eq!(configuration(wired), (true, 1_000, 400));
+    let other = format!("{wired}tangential_n_per_v = 1.5\nstiffness_n_per_m = 600\n");
+    assert_eq!(configuration(&other), (true, 1_500, 600));
+    let estimated = format!("{other}[estimator]\nstiffness = \"estimated\"\n");
+    assert_eq!(configuration(&estimated), (true, 1_500, 0));
+    // Both ends of what a scene may give.
+    for (n_per_v, n_per_m) in [("0.05", "10"), ("20", "10_000")] {
+        configuration(&format!(
+            "{wired}tangential_n_per_v = {n_per_v}\nstiffness_n_per_m = {n_per_m}\n"
+        ));
+    }
+}
+
+#[test]
+fn every_method_has_its_word_and_the_default_is_the_boards() {
+    for (word, method) in [
+        ("default", SensorConfiguration::DEFAULT.method),
+        ("bank", Method::Bank),
+        ("crossings", Method::Crossings),
+        ("counting", Method::Counting),
+        ("counting-adapted", Method::AdaptedCounting),
+    ] {
+        let text = format!("{SURFACE}[estimator]\nmethod = \"{word}\"");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        assert_eq!(scene.sensor_configuration().method, method);
+        assert!(word == "default" || scene.estimator.method_name() == word);
+    }
 }
 
 #[test]
@@ -156,13 +256,8 @@ fn all_but_the_specimens_has_a_default() {
     );
     assert!(matches!(scene.gauges, Gauges::Kinematic(k) if k == Kinematic::default()));
     assert_eq!(scene.link, Link::default());
-    assert_eq!(
-        scene.estimator,
-        Estimator {
-            method: Method::Counting,
-            window_ms: 80
-        }
-    );
+    assert_eq!(scene.estimator, Estimator::default());
+    assert_eq!(scene.sensor_configuration(), SensorConfiguration::DEFAULT);
     assert_eq!(
         scene.expect,
         Expect {
@@ -373,6 +468,38 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:4: estimator.window_ms: 9 is out of range",
         ),
         (
+            "[estimator]\ngauges = []",
+            "x.toml:4: estimator.gauges: there are none: name one or more of 0 to 4",
+        ),
+        (
+            "[estimator]\ngauges = [0, 7]",
+            "x.toml:4: estimator.gauges[1]: 7 is not a gauge",
+        ),
+        (
+            "[estimator]\ncounted_gauge = 5",
+            "x.toml:4: estimator.counted_gauge: 5 is out of range",
+        ),
+        (
+            "[estimator]\ntravel_wavelengths = 0.29",
+            "x.toml:4: estimator.travel_wavelengths: 0.29 is not a travel to average over",
+        ),
+        (
+            "[estimator]\ncandidates = 37",
+            "x.toml:4: estimator.candidates: 37 is out of range",
+        ),
+        (
+            "[estimator]\nstiffness = \"guessed\"",
+            "x.toml:4: estimator.stiffness: \"guessed\" is unknown",
+        ),
+        (
+            "[estimator]\nstiffness = \"estimated\"",
+            "x.toml:4: estimator.stiffness: cannot be estimated without the force channel",
+        ),
+        (
+            "[expect]\nwrong_share_max = 1.1",
+            "x.toml:4: expect.wrong_share_max: 1.1 is not a share",
+        ),
+        (
             "[expect]\nwavelength_rms_percent = 0",
             "x.toml:4: expect.wavelength_rms_percent: 0 is not a bound",
         ),
@@ -503,15 +630,8 @@ fn broken_toml_is_refused_at_its_line() {
 fn what_this_version_does_not_build_is_refused_as_such() {
     for (section, key) in [
         (
-            "[estimator]\nmethod = \"bank\"",
-            "x.toml:4: estimator.method: \"bank\"",
-        ),
-        (
-            "[estimator]\nmethod = \"crossings\"",
-            "x.toml:4: estimator.method: \"crossings\"",
-        ),
-        (
-            "[contact]\nmodel = \"rigid\"",
+            "[contact]
+model = \"rigid\"",
             "x.toml:4: contact.model: \"rigid\"",
         ),
         (

@@ -107,35 +107,86 @@ pub fn any_hello() -> impl Strategy<Value = Hello> {
         .prop_map(|(role, chip, version, asks)| Hello::new(role, &chip, version).asking(asks))
 }
 
+/// Every [`Method`], in the wire's order.
+pub const METHODS: [Method; 4] = [
+    Method::Bank,
+    Method::Counting,
+    Method::AdaptedCounting,
+    Method::Crossings,
+];
+/// Every [`Contact`], in the wire's order.
+pub const CONTACTS: [Contact; 4] = [
+    Contact::Unknown,
+    Contact::Slip,
+    Contact::Stick,
+    Contact::StickSlip,
+];
+/// Every [`GaugeHealth`], in the wire's order.
+pub const HEALTHS: [GaugeHealth; 6] = [
+    GaugeHealth::Good,
+    GaugeHealth::Dead,
+    GaugeHealth::Stuck,
+    GaugeHealth::Saturated,
+    GaugeHealth::Noisy,
+    GaugeHealth::Hum,
+];
+
+/// Every [`Setting`], in the wire's order.
+pub const SETTINGS: [Setting; 14] = [
+    Setting::Role,
+    Setting::WindowMs,
+    Setting::CountedGauge,
+    Setting::Gauges,
+    Setting::BankTravel,
+    Setting::BankCandidates,
+    Setting::ForceScale,
+    Setting::Stiffness,
+    Setting::ArmFullScale,
+    Setting::MaxAgeMs,
+    Setting::FadeInMs,
+    Setting::FadeOutMs,
+    Setting::PitchUm,
+    Setting::AmplitudeMv,
+];
+
 fn finite() -> impl Strategy<Value = f32> {
     proptest::num::f32::NORMAL | proptest::num::f32::ZERO | proptest::num::f32::SUBNORMAL
 }
 
 fn estimate() -> impl Strategy<Value = Estimate> {
     (
-        any::<(u32, u64, bool, u8)>(),
-        proptest::option::of(finite()),
-        finite(),
-        finite(),
-        prop_oneof![Just(Range::T1), Just(Range::T2)],
+        any::<(u32, u64, bool, u8, Option<i32>)>(),
+        [
+            proptest::option::of(finite()),
+            proptest::option::of(finite()),
+        ],
+        [finite(), finite()],
+        proptest::sample::select(vec![Range::T1, Range::T2]),
+        proptest::sample::select(CONTACTS.to_vec()),
+        proptest::array::uniform5(proptest::sample::select(HEALTHS.to_vec())),
     )
         .prop_map(
             |(
-                (sequence, instant_us, valid, gauges_used),
-                wavelength_mm,
-                amplitude_lsb,
-                confidence,
+                (sequence, instant_us, valid, gauges_used, lag_um),
+                [wavelength_mm, counted_mm],
+                [confidence, amplitude_lsb],
                 range,
+                contact,
+                health,
             )| {
                 Estimate {
                     sequence,
                     instant_us,
                     wavelength_mm,
                     valid,
-                    amplitude_lsb,
                     confidence,
+                    amplitude_lsb,
+                    counted_mm,
                     range,
+                    contact,
+                    lag_um,
                     gauges_used,
+                    health,
                 }
             },
         )
@@ -232,17 +283,40 @@ pub fn display_counters(n: [u32; 7]) -> DisplayCounters {
 
 fn configuration() -> impl Strategy<Value = Configuration> {
     prop_oneof![
-        any::<(u16, u8, bool, u32)>().prop_map(
-            |(window_ms, counted_gauge, stream_gauges, arm_full_scale_um_s)| {
-                Configuration::Sensor(SensorConfiguration {
-                    method: Method::Counting,
-                    window_ms,
-                    counted_gauge,
-                    stream_gauges,
-                    arm_full_scale_um_s,
-                })
-            }
-        ),
+        (
+            proptest::sample::select(METHODS.to_vec()),
+            any::<([u16; 4], [u8; 3], [bool; 2], u32)>()
+        )
+            .prop_map(
+                |(
+                    method,
+                    (
+                        [
+                            window_ms,
+                            bank_travel_percent,
+                            force_mn_per_v,
+                            stiffness_n_per_m,
+                        ],
+                        [counted_gauge, gauges, bank_candidates],
+                        [force_channel, stream_gauges],
+                        arm_full_scale_um_s,
+                    ),
+                )| {
+                    Configuration::Sensor(SensorConfiguration {
+                        method,
+                        window_ms,
+                        counted_gauge,
+                        gauges,
+                        bank_travel_percent,
+                        bank_candidates,
+                        force_channel,
+                        force_mn_per_v,
+                        stiffness_n_per_m,
+                        stream_gauges,
+                        arm_full_scale_um_s,
+                    })
+                }
+            ),
         (
             prop_oneof![Just(Mode::Uniform), Just(Mode::Travelling)],
             any::<[u16; 5]>()
@@ -263,17 +337,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
 }
 
 fn setting() -> impl Strategy<Value = Setting> {
-    proptest::sample::select(vec![
-        Setting::Role,
-        Setting::WindowMs,
-        Setting::CountedGauge,
-        Setting::ArmFullScale,
-        Setting::MaxAgeMs,
-        Setting::FadeInMs,
-        Setting::FadeOutMs,
-        Setting::PitchUm,
-        Setting::AmplitudeMv,
-    ])
+    proptest::sample::select(SETTINGS.to_vec())
 }
 
 /// The longest message of the same kind: every number where its varint is longest. The match names
@@ -286,10 +350,14 @@ pub fn longest_like(message: &Message) -> Message {
             instant_us: u64::MAX,
             wavelength_mm: Some(f32::MAX),
             valid: true,
-            amplitude_lsb: f32::MAX,
             confidence: f32::MAX,
+            amplitude_lsb: f32::MAX,
+            counted_mm: Some(f32::MAX),
             range: Range::T2,
+            contact: Contact::StickSlip,
+            lag_um: Some(i32::MIN),
             gauges_used: u8::MAX,
+            health: [GaugeHealth::Hum; GAUGES],
         }),
         Message::Motion(_) => Message::Motion(Motion {
             sequence: u32::MAX,
@@ -332,13 +400,18 @@ pub fn longest_like(message: &Message) -> Message {
 }
 
 fn longest_configuration() -> Configuration {
-    Configuration::Display(DisplayConfiguration {
-        mode: Mode::Travelling,
-        max_age_ms: u16::MAX,
-        fade_in_ms: u16::MAX,
-        fade_out_ms: u16::MAX,
-        pitch_um: u16::MAX,
-        amplitude_mv: u16::MAX,
+    Configuration::Sensor(SensorConfiguration {
+        method: Method::Crossings,
+        window_ms: u16::MAX,
+        counted_gauge: u8::MAX,
+        gauges: u8::MAX,
+        bank_travel_percent: u16::MAX,
+        bank_candidates: u8::MAX,
+        force_channel: true,
+        force_mn_per_v: u16::MAX,
+        stiffness_n_per_m: u16::MAX,
+        stream_gauges: true,
+        arm_full_scale_um_s: u32::MAX,
     })
 }
 
@@ -348,6 +421,12 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         method: Method::Counting,
         window_ms: 80,
         counted_gauge: 2,
+        gauges: 0b1_0111,
+        bank_travel_percent: 150,
+        bank_candidates: 36,
+        force_channel: true,
+        force_mn_per_v: 1_500,
+        stiffness_n_per_m: 400,
         stream_gauges: true,
         arm_full_scale_um_s: 200_000,
     });
@@ -378,10 +457,20 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 instant_us: 3_000_000,
                 wavelength_mm: Some(2.0),
                 valid: true,
-                amplitude_lsb: 512.5,
                 confidence: 0.75,
+                amplitude_lsb: 512.5,
+                counted_mm: Some(2.5),
                 range: Range::T2,
-                gauges_used: 0b0_0100,
+                contact: Contact::StickSlip,
+                lag_um: Some(-150),
+                gauges_used: 0b0_0010,
+                health: [
+                    GaugeHealth::Dead,
+                    GaugeHealth::Good,
+                    GaugeHealth::Stuck,
+                    GaugeHealth::Saturated,
+                    GaugeHealth::Hum,
+                ],
             }),
         ),
         (
@@ -391,10 +480,14 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 instant_us: 10_000,
                 wavelength_mm: None,
                 valid: false,
-                amplitude_lsb: 0.0,
                 confidence: 0.0,
+                amplitude_lsb: 0.0,
+                counted_mm: None,
                 range: Range::T1,
+                contact: Contact::Unknown,
+                lag_um: None,
                 gauges_used: 0b1_1111,
+                health: [GaugeHealth::Good; GAUGES],
             }),
         ),
         (

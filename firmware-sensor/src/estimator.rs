@@ -1,0 +1,65 @@
+//! What every estimator of λ is given and has to say.
+//!
+//! There is one for each [`protocol::Method`]; which of them runs is a matter of configuration.
+
+use protocol::GAUGES;
+
+use crate::travel::Travel;
+
+/// A place along x in quarters of a µm, which wraps freely: only differences mean anything, and phases,
+/// which wrap too.
+pub type Place = i32;
+/// [`Place`] units in a µm.
+pub const PLACES_PER_UM: i32 = 4;
+/// [`Place`] units in a mm.
+pub const PLACES_PER_MM: i32 = 1_000 * PLACES_PER_UM;
+
+/// Below this speed, in mm/s, there is nothing to estimate: fingertip and surface stick (Okamoto et al.
+/// 2009, section III-C), and 5 µm counts make more than a tenth of it.
+pub const MIN_SPEED_MM_S: f32 = 2.0;
+/// Below this amplitude of a gauge behind the band-pass, in ADC steps, there is nothing to estimate from:
+/// a gauge that falls silent leaves a band-pass that rings on, and crosses zero, for seconds. It is ten
+/// times what the ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
+pub const MIN_AMPLITUDE_LSB: f32 = 1.0;
+
+/// A millisecond's samples and where the fingertip was when they were taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Touch {
+    /// The gauges behind the anti-aliasing filter, hum taken out, in ADC steps from mid-rail.
+    pub gauges: [f32; GAUGES],
+    /// Where the fingertip's contact was at the instant of `gauges`, to the sample: the arm's position,
+    /// less its deflection F/k where the force channel tells it.
+    pub place: Place,
+    /// The gauges behind the band-pass, in ADC steps.
+    pub banded: [f32; GAUGES],
+    /// Where the contact was at the instant of `banded`, as far as a filter whose delay depends on
+    /// frequency can have one: see [`crate::travel::ALIGNMENT_MS`].
+    pub banded_place: Place,
+    /// Bit g set: gauge g is in good health and allowed to take part.
+    pub usable: u8,
+}
+
+/// What an estimator makes of all touches so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finding {
+    /// λ in mm, finite and above 0.
+    pub wavelength_mm: Option<f32>,
+    /// Whether the estimator stands by it. Never without a wavelength.
+    pub valid: bool,
+    /// From 0 (a guess) to 1 (certain).
+    pub confidence: f32,
+    /// Amplitude of the fundamental in ADC steps, RMS over the gauges used.
+    pub amplitude_lsb: f32,
+    /// Bit g set: gauge g took part.
+    pub gauges_used: u8,
+}
+
+/// An estimator of λ.
+pub trait Estimator {
+    /// Takes the next millisecond's touch. The first one finds the filters in front settled.
+    fn push(&mut self, touch: &Touch);
+
+    /// What can be said now. Asked for every tenth millisecond, so what is dear and not needed in
+    /// between is done here. `travel` is the arm's, with its velocities.
+    fn find(&mut self, travel: &Travel) -> Finding;
+}

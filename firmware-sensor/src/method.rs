@@ -1,0 +1,53 @@
+//! The estimator that the configuration asks for.
+
+use protocol::{Method, SensorConfiguration};
+
+use crate::adapted::AdaptedCounting;
+use crate::counting::Counting;
+use crate::crossings::Crossings;
+use crate::estimator::{Estimator, Finding, Touch};
+use crate::travel::Travel;
+
+/// One estimator of four, as large as the largest: which one is known at run time only, and there is no
+/// heap to put it on.
+#[derive(Clone, Debug)]
+pub enum Running {
+    /// [`Method::Counting`]
+    Counting(Counting),
+    /// [`Method::AdaptedCounting`]
+    AdaptedCounting(AdaptedCounting),
+    /// [`Method::Crossings`]
+    Crossings(Crossings),
+}
+
+impl Running {
+    /// The estimator that `configuration` asks for, which must have passed its check, before its first
+    /// touch.
+    pub fn new(configuration: &SensorConfiguration) -> Self {
+        match configuration.method {
+            Method::Counting => Self::Counting(Counting::new(configuration)),
+            Method::AdaptedCounting => Self::AdaptedCounting(AdaptedCounting::new(configuration)),
+            Method::Crossings => Self::Crossings(Crossings::new(configuration)),
+            // STAND-IN until there is a bank: this line is to become the bank's own.
+            Method::Bank => Self::Crossings(Crossings::new(configuration)),
+        }
+    }
+}
+
+impl Estimator for Running {
+    fn push(&mut self, touch: &Touch) {
+        match self {
+            Self::Counting(counting) => counting.push(touch),
+            Self::AdaptedCounting(counting) => counting.push(touch),
+            Self::Crossings(crossings) => crossings.push(touch),
+        }
+    }
+
+    fn find(&mut self, travel: &Travel) -> Finding {
+        match self {
+            Self::Counting(counting) => counting.find(travel),
+            Self::AdaptedCounting(counting) => counting.find(travel),
+            Self::Crossings(crossings) => crossings.find(travel),
+        }
+    }
+}
