@@ -258,7 +258,9 @@ mod tests {
         assert_eq!(log.nearest("fast"), None);
         let listed = Axis::listed("", Knob::Encoder, &[5.0, 10.0, 15.0, 200.0]);
         assert_eq!(listed.nearest("15"), Some(2));
-        assert_eq!(listed.along(20.0 / 2f64.sqrt() / 2.0), Some(0.5));
+        // √(5 · 10) is the middle of the first two.
+        let along = listed.along(50f64.sqrt()).unwrap();
+        assert!((along - 0.5).abs() < 1e-9, "{along}");
     }
 
     #[test]
