@@ -14,8 +14,8 @@ const RAIL_CODES: u16 = 8;
 const HIGHEST_CODE: u16 = 4_095;
 /// Time constant of everything that is averaged, in estimates.
 const FOLLOWED_ESTIMATES: f32 = 30.0;
-/// Share of scans at an end that makes a gauge saturated.
-const AT_RAILS: f32 = 0.02;
+/// Share of scans at an end that makes a gauge saturated; white noise at −6 dB clips less.
+const AT_RAILS: f32 = 0.1;
 /// Estimates without a change of the code after which a gauge is stuck, if others change.
 const STILL_ESTIMATES: u32 = 20;
 /// A stuck code this near mid-rail is a gauge that is not connected.
