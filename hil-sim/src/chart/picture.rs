@@ -5,6 +5,7 @@
 
 use std::fmt::Write;
 
+use super::efficiency::{GOAL, Row};
 use super::result::{ContestResult, Entry, WINDOWS, Window};
 
 const WIDTH: f64 = 1_000.0;
@@ -70,7 +71,11 @@ struct Scale {
 impl Scale {
     fn decades(low: f64, high: f64, label: &str) -> Self {
         // Where there is room, 2 and 5 are labelled too.
-        let steps: &[f64] = if high / low < 1e3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let steps: &[f64] = if high / low < 1e3 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
         let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
         let ticks = decades
             .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
@@ -144,11 +149,7 @@ pub fn draw(result: &ContestResult) -> String {
     let panels = result.families.len() + 1;
     let rows = panels.div_ceil(COLUMNS);
     let height = HEAD + rows as f64 * PANEL_HEIGHT + MARGIN;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
-         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"11\" fill=\"{INK}\">\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    );
+    let mut svg = page(height);
     legend(&mut svg);
     let cost = Scale::decades(700.0, 30_000.0, "instructions a ms");
     let error = Scale::decades(0.03, 300.0, "");
@@ -163,43 +164,148 @@ pub fn draw(result: &ContestResult) -> String {
             .position(|family| family.folder == "boundary");
         match result.families.get(index) {
             Some(family) if Some(index) == boundary => {
-                let panel = Panel { left, top, x: &cost, y: &settling };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &cost,
+                    y: &settling,
+                };
                 let title = format!("{}: settled within 10 %, ms", family.title);
                 axes(&mut svg, &panel, &title);
                 budget(&mut svg, &panel);
                 for goal_ms in goals_ms(family) {
                     goal(&mut svg, &panel, goal_ms, &format!("goal {goal_ms} ms"));
                 }
-                marks(&mut svg, &panel, result, |entry| {
-                    Some((entry.cost?.mean, entry.scores[index].settling_ms?))
-                }, index);
+                marks(
+                    &mut svg,
+                    &panel,
+                    result,
+                    |entry| Some((entry.cost?.mean, entry.scores[index].settling_ms?)),
+                    index,
+                );
             }
             Some(family) => {
-                let panel = Panel { left, top, x: &cost, y: &error };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &cost,
+                    y: &error,
+                };
                 axes(&mut svg, &panel, &format!("{}: RMS error, %", family.title));
                 budget(&mut svg, &panel);
                 bounds(&mut svg, &panel, family);
                 if let Some(percent) = family.goal_percent() {
                     goal(&mut svg, &panel, percent, &format!("goal {percent} %"));
                 }
-                marks(&mut svg, &panel, result, |entry| {
-                    Some((entry.cost?.mean, entry.scores[index].rms_percent?))
-                }, index);
+                marks(
+                    &mut svg,
+                    &panel,
+                    result,
+                    |entry| Some((entry.cost?.mean, entry.scores[index].rms_percent?)),
+                    index,
+                );
             }
             None => {
                 let time = Scale::even(0.0, 400.0, 100.0, "ms to settle after the boundary");
-                let panel = Panel { left, top, x: &time, y: &error };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &time,
+                    y: &error,
+                };
                 axes(&mut svg, &panel, "Table I, 20 dB: RMS error, %");
                 if let Some(boundary) = boundary {
-                    marks(&mut svg, &panel, result, |entry| {
-                        Some((entry.scores[boundary].settling_ms?, entry.scores[0].rms_percent?))
-                    }, 0);
+                    let place = |entry: &Entry| {
+                        let settling_ms = entry.scores[boundary].settling_ms?;
+                        Some((settling_ms, entry.scores[0].rms_percent?))
+                    };
+                    marks(&mut svg, &panel, result, place, 0);
+                    travels(&mut svg, &panel, result, place);
                 }
             }
         }
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// The bank's error over the Cramér–Rao bound, over frequency.
+pub fn draw_bound(rows: &[Row]) -> String {
+    let height = 32.0 + PANEL_HEIGHT + MARGIN;
+    let mut svg = page(height);
+    text(
+        &mut svg,
+        MARGIN + 8.0,
+        20.0,
+        &format!("font-size=\"12\" fill=\"{SOFT}\""),
+        "The bank’s RMS error over the Cramér–Rao bound for the travel that holds 99 % of its kernel; \
+         steady speed, 20 dB. Circles: a sine; squares: a trapezoid.",
+    );
+    let frequency = Scale::decades(4.0, 125.0, "v/λ, Hz");
+    let error = Scale::decades(0.02, 2.0, "");
+    let ratio = Scale::even(0.0, 5.0, 1.0, "");
+    let looks = [
+        ("sine", look("sine", "#0072B2", Shape::Circle)),
+        ("trapezoid", look("trapezoid", "#D55E00", Shape::Square)),
+    ];
+    type Value = fn(&Row) -> Option<f64>;
+    let panels: [(&str, usize, &Scale, Value); 3] = [
+        ("one gauge: error over bound", 1, &ratio, Row::ratio),
+        ("five gauges: error over bound", 5, &ratio, Row::ratio),
+        ("one gauge: RMS error, %", 1, &error, |row| row.rms_percent),
+    ];
+    for (column, (title, gauges, y, value)) in panels.into_iter().enumerate() {
+        let left = MARGIN + column as f64 * PANEL_WIDTH + AROUND[0];
+        let panel = Panel {
+            left,
+            top: 32.0 + AROUND[1],
+            x: &frequency,
+            y,
+        };
+        axes(&mut svg, &panel, title);
+        let shown = |profile| {
+            rows.iter()
+                .filter(move |row| row.gauges == gauges && row.profile == profile)
+        };
+        if y.logarithmic {
+            for bound in shown("sine").collect::<Vec<_>>().windows(2) {
+                let [from, to] = [bound[0], bound[1]]
+                    .map(|row| panel.at(row.frequency_hz, row.kernel_bound_percent));
+                line(
+                    &mut svg,
+                    from,
+                    to,
+                    "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
+                );
+            }
+        } else if gauges == 1 {
+            goal(&mut svg, &panel, GOAL, &format!("goal {GOAL}"));
+        }
+        for (profile, look) in &looks {
+            for row in shown(profile) {
+                if let Some(value) = value(row) {
+                    mark(
+                        &mut svg,
+                        panel.at(row.frequency_hz, value),
+                        look,
+                        false,
+                        1.0,
+                    );
+                }
+            }
+        }
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
+/// The beginning of a page.
+fn page(height: f64) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
+         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"11\" fill=\"{INK}\">\n\
+         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
+    )
 }
 
 fn goals_ms(family: &super::family::Family) -> Vec<f64> {
@@ -274,13 +380,19 @@ fn budget(svg: &mut String, panel: &Panel<'_>) {
     let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"1 3\"");
     line(svg, (x, panel.top), (x, bottom), &style);
     let style = format!("font-size=\"10\" fill=\"{SOFT}\"");
-    text(svg, x + 3.0, bottom - 4.0, &style, "5 % of the M4F");
+    text(svg, x + 3.0, panel.top + 9.0, &style, "5 % of the M4F");
 }
 
 fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
     let (left, top) = (panel.left, panel.top);
     let (right, bottom) = (left + Panel::WIDE, top + Panel::HIGH);
-    text(svg, left - 30.0, top - 9.0, "font-size=\"13\" font-weight=\"600\"", title);
+    text(
+        svg,
+        left - 30.0,
+        top - 9.0,
+        "font-size=\"13\" font-weight=\"600\"",
+        title,
+    );
     for (value, label) in &panel.x.ticks {
         let (x, _) = panel.at(*value, panel.y.low);
         line(svg, (x, top), (x, bottom), &format!("stroke=\"{FAINT}\""));
@@ -292,7 +404,13 @@ fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
         text(svg, left - 5.0, y + 4.0, "text-anchor=\"end\"", label);
     }
     let style = format!("text-anchor=\"middle\" fill=\"{SOFT}\"");
-    text(svg, (left + right) / 2.0, bottom + 27.0, &style, &panel.x.label);
+    text(
+        svg,
+        (left + right) / 2.0,
+        bottom + 27.0,
+        &style,
+        &panel.x.label,
+    );
     let _ = writeln!(
         svg,
         "<path d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\" fill=\"none\" stroke=\"{SOFT}\"/>"
@@ -303,7 +421,13 @@ fn goal(svg: &mut String, panel: &Panel<'_>, value: f64, words: &str) {
     let (left, y) = panel.at(panel.x.low, value);
     let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\"");
     line(svg, (left, y), (left + Panel::WIDE, y), &style);
-    text(svg, left + 3.0, y - 3.0, &format!("font-size=\"10\" fill=\"{SOFT}\""), words);
+    text(
+        svg,
+        left + 3.0,
+        y - 3.0,
+        &format!("font-size=\"10\" fill=\"{SOFT}\""),
+        words,
+    );
 }
 
 fn bounds(svg: &mut String, panel: &Panel<'_>, family: &super::family::Family) {
@@ -323,7 +447,13 @@ fn bounds(svg: &mut String, panel: &Panel<'_>, family: &super::family::Family) {
             (right, y),
             "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
         );
-        text(svg, right - 2.0, y - 3.0, "text-anchor=\"end\" font-size=\"10\"", &words);
+        text(
+            svg,
+            right - 2.0,
+            y - 3.0,
+            "text-anchor=\"end\" font-size=\"10\"",
+            &words,
+        );
     }
 }
 
@@ -370,9 +500,37 @@ fn marks(
         mark(svg, point, look, hollow, if rarely { 0.3 } else { 1.0 });
         if entry.method == "counting" && entry.value == 80 {
             // Below if there is no room above.
-            let aside = if point.1 < panel.top + 10.0 { 14.0 } else { -5.0 };
+            let aside = if point.1 < panel.top + 10.0 {
+                14.0
+            } else {
+                -5.0
+            };
             let style = "font-size=\"10\" font-style=\"italic\"";
-            text(svg, point.0 + 6.0, point.1 + aside, style, "the paper’s count");
+            text(
+                svg,
+                point.0 + 6.0,
+                point.1 + aside,
+                style,
+                "the paper’s count",
+            );
+        }
+    }
+}
+
+/// The values of the bank's travel beside their marks.
+fn travels(
+    svg: &mut String,
+    panel: &Panel<'_>,
+    result: &ContestResult,
+    place: impl Fn(&Entry) -> Option<(f64, f64)>,
+) {
+    for entry in &result.entries {
+        if entry.knob == "travel_percent"
+            && let Some((x, y)) = place(entry)
+        {
+            let (x, y) = panel.at(x, y);
+            let style = "text-anchor=\"middle\" font-size=\"10\"";
+            text(svg, x, y + 19.0, style, &format!("{} %", entry.value));
         }
     }
 }
@@ -447,7 +605,11 @@ mod tests {
     #[test]
     fn every_method_of_the_contest_has_a_look() {
         for contestant in crate::chart::contest::contestants() {
-            assert!(look_of(contestant.method()).is_some(), "{}", contestant.method());
+            assert!(
+                look_of(contestant.method()).is_some(),
+                "{}",
+                contestant.method()
+            );
         }
     }
 }
