@@ -45,7 +45,7 @@ impl AdaptedCounting {
 impl Estimator for AdaptedCounting {
     fn push(&mut self, touch: &Touch) {
         self.gauge.push(touch);
-        self.stroke.push(touch.banded_place);
+        self.stroke.push(touch.place);
     }
 
     fn find(&mut self, travel: &Travel) -> Finding {

@@ -36,7 +36,7 @@ const BLOCK: usize = 2;
 /// the encoder, so that one that dithers between counts does not wash out what was felt. The force
 /// channel's noise needs more.
 const PLAY_UM: i32 = 10;
-const PLAY_WITH_FORCE_UM: i32 = 30;
+const PLAY_WITH_FORCE_UM: i32 = 12;
 
 /// A wavelength is not stood by if the gauges hold more than this share of what it explains that
 /// neither it nor white noise does. A trapezoid's harmonics are up to 0.17, a second harmonic of half
@@ -51,7 +51,7 @@ const UNEXPLAINED_PER_NOISE: f32 = 0.2;
 const LEAST_FILLED: f32 = 0.8;
 /// Least determinant of the fit's matrix, 1 where constant, cosine and sine are told apart as well as
 /// they can be: it falls when the latest travel covers less than a wavelength.
-const LEAST_DETERMINED: f32 = 0.8;
+const LEAST_DETERMINED: f32 = 0.88;
 /// A peak must stand this far above what white noise alone leaves at a candidate, in power.
 const LEAST_OVER_NOISE: f32 = 8.0;
 /// λ̂ over the shorter kernel may differ by this share at most.
@@ -60,7 +60,7 @@ const MOST_DISAGREEMENT: f32 = 0.1;
 const LEAST_AMPLITUDE_LSB: f32 = 1.0;
 /// Power at high frequencies that is not stood by without a force channel, relative to the
 /// fundamental's: see [`Bank::jerky`].
-const MOST_JERK: f32 = 0.05;
+const MOST_JERK: f32 = 0.03;
 /// What the noise may add to it.
 const JERK_PER_NOISE: f32 = 0.5;
 /// Gain in power of the second difference for white noise behind the anti-aliasing filter.
@@ -78,6 +78,8 @@ const LEAST_WEIGHT: f32 = 1e-3;
 const LEAST_SOLVABLE: f32 = 0.02;
 /// Samples without travel after which nothing is stood by any more.
 const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
+/// A wavelength that differs by less from what was felt before is no change of surface.
+const LEAST_CHANGE: f32 = 0.25;
 /// Estimates after a valid one for which a change of surface may be told from the shorter kernel.
 const CHANGE_ESTIMATES: u8 = 30;
 
@@ -243,7 +245,8 @@ impl Bank {
         if *around.end() >= self.count {
             return None;
         }
-        let [x0, x1, x2] = [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
+        let [x0, x1, x2] =
+            [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
         let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
             let energy = energy(i).max(f32::MIN_POSITIVE);
             match kernel {
@@ -309,9 +312,8 @@ impl Bank {
         let vertex = self.vertex(kernel, number, |i| energies[i]);
         let wavelength_mm = vertex.unwrap_or(self.candidates[number].wavelength_mm);
         // What was felt before a change of surface is no sign of stick and slip after it.
-        let jerky = kernel == Kernel::Long
-            && !self.force_channel
-            && self.jerky(wavelength_mm, &agreement);
+        let jerky =
+            kernel == Kernel::Long && !self.force_channel && self.jerky(wavelength_mm, &agreement);
         Look {
             number,
             wavelength_mm: (energies[number] > 0.0).then_some(wavelength_mm),
@@ -438,7 +440,7 @@ impl Estimator for Bank {
         if self.since_valid <= CHANGE_ESTIMATES {
             let short = self.look(Kernel::Short);
             let changed = short.wavelength_mm.is_some_and(|wavelength_mm| {
-                (wavelength_mm / self.known_mm - 1.0).abs() > MOST_DISAGREEMENT
+                (wavelength_mm / self.known_mm - 1.0).abs() > LEAST_CHANGE
             });
             if short.stands && changed {
                 self.jerk = Jerk::default();

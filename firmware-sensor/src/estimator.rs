@@ -32,11 +32,6 @@ pub struct Touch {
     pub place: Place,
     /// The counted gauge behind the band-pass, as the paper has it: with whatever hum there is.
     pub counted: f32,
-    /// The gauges behind the band-pass, hum taken out, in ADC steps; 0 if the estimator does not want them.
-    pub banded: [f32; GAUGES],
-    /// Where the contact was at the instant of `banded`, as far as a filter whose delay depends on
-    /// frequency can have one: see [`crate::travel::ALIGNMENT_MS`].
-    pub banded_place: Place,
     /// Variance of the white noise in each of `gauges`, in ADC steps².
     pub noise: [f32; GAUGES],
     /// Amplitude in ADC steps of what may be hum in `gauges`, as long as that is not known; 0 once it is.

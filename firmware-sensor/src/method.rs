@@ -12,6 +12,10 @@ use crate::travel::Travel;
 /// One estimator of four, as large as the largest: which one is known at run time only, and there is no
 /// heap to put it on.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one Running on a board, and no heap to put its larger variant on"
+)]
 pub enum Running {
     /// [`Method::Bank`]
     Bank(Bank),
@@ -37,14 +41,9 @@ impl Running {
 }
 
 impl Running {
-    /// Whether the estimator looks at the gauges behind the band-pass ([`Touch::banded`]).
-    pub fn wants_band_pass(&self) -> bool {
-        matches!(self, Self::Crossings(_))
-    }
-
     /// Whether the estimator has to wait until the start has died down in the band-pass.
     pub fn waits(&self) -> bool {
-        !matches!(self, Self::Bank(_))
+        matches!(self, Self::Counting(_) | Self::AdaptedCounting(_))
     }
 }
 

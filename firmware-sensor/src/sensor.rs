@@ -14,7 +14,7 @@ use crate::hum::Hum;
 use crate::method::Running;
 use crate::noise::Noise;
 use crate::slip::Slip;
-use crate::travel::{ALIGNMENT_MS, Travel};
+use crate::travel::Travel;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
 /// Time after the start, in samples, until the estimators begin: three time constants of the
@@ -66,12 +66,8 @@ pub struct Sensor {
 #[derive(Clone, Debug)]
 struct Started {
     history: History,
-    /// The counted gauge, as the paper has it.
-    counted_lane: Lane<ORDER>,
-    /// All gauges without their hum, for estimators that want them band-passed.
-    lanes: [Lane<ORDER>; GAUGES],
-    /// The lanes are to be settled on the next sample.
-    resettle: bool,
+    /// The counted gauge's band-pass; none until it is settled on a sample.
+    lane: Option<Lane<ORDER>>,
     travel: Travel,
 }
 
@@ -101,15 +97,17 @@ impl Sensor {
     /// is no counted wavelength before a whole window has been counted. What is known of the gauges, the
     /// positions and the arm go on.
     pub fn configure(&mut self, configuration: SensorConfiguration) {
+        if configuration.counted_gauge != self.configuration.counted_gauge {
+            self.settling = SETTLING_SAMPLES;
+            if let Some(started) = &mut self.started {
+                started.lane = None;
+            }
+        }
         self.configuration = configuration;
         self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
         self.block.clear();
-        self.settling = SETTLING_SAMPLES;
-        if let Some(started) = &mut self.started {
-            started.resettle = true;
-        }
     }
 
     /// The configuration in force.
@@ -139,7 +137,7 @@ impl Sensor {
     ) -> Output {
         let started = self
             .started
-            .get_or_insert_with(|| Started::new(&self.band_pass, &scans[0], encoder));
+            .get_or_insert_with(|| Started::new(&scans[0], encoder));
         let sample = self.anti_alias.step(&mut started.history, scans);
         started.travel.push(encoder);
 
@@ -148,25 +146,18 @@ impl Sensor {
         self.health.push(scans, &raw);
         let usable = self.health.good() & self.configuration.gauges;
         let mut gauges = raw;
-        self.hum.remove(&mut gauges, usable);
+        self.hum.remove(&mut gauges);
 
         let arm = started.travel.place(decimate::DELAY_MS);
         let lag = self.slip.push(arm, sample[GAUGES]);
         let counted_gauge = usize::from(self.configuration.counted_gauge).min(GAUGES - 1);
-        let (counted, banded) = started.band_pass(
-            &self.band_pass,
-            raw[counted_gauge],
-            &gauges,
-            self.estimator.wants_band_pass(),
-        );
+        let counted = started.band_pass(&self.band_pass, raw[counted_gauge]);
         let touch = Touch {
             gauges,
             place: arm.wrapping_sub(lag),
             counted,
-            banded,
-            banded_place: started.travel.place(ALIGNMENT_MS).wrapping_sub(lag),
             noise: self.noise.variances(),
-            pickup_lsb: self.hum.pickup_lsb(usable),
+            pickup_lsb: self.hum.pickup_lsb(),
             usable,
         };
         if self.settling == 0 {
@@ -183,10 +174,11 @@ impl Sensor {
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
             let contact = contact(&self.slip, &started.travel, &finding);
-            self.hum.texture_at(frequency_hz(&started.travel, &finding));
+            self.hum
+                .renew(usable, frequency_hz(&started.travel, &finding));
             self.health.judge(&Signs {
                 noise: touch.noise,
-                hum_lsb: core::array::from_fn(|gauge| self.hum.own_lsb(gauge, usable)),
+                hum: self.hum.own_powers(usable),
                 misfits: finding.misfits,
                 agreed: finding.valid,
             });
@@ -227,35 +219,18 @@ impl Sensor {
 }
 
 impl Started {
-    fn new(band_pass: &BandPass<ORDER>, first: &Scan, encoder: u16) -> Self {
+    fn new(first: &Scan, encoder: u16) -> Self {
         Self {
             history: History::settled(first),
-            counted_lane: band_pass.settled(0.0),
-            lanes: [band_pass.settled(0.0); GAUGES],
-            resettle: true,
+            lane: None,
             travel: Travel::new(encoder),
         }
     }
 
-    /// Band-passes the counted gauge and, if they are `wanted`, all.
-    fn band_pass(
-        &mut self,
-        band_pass: &BandPass<ORDER>,
-        counted: f32,
-        gauges: &[f32; GAUGES],
-        wanted: bool,
-    ) -> (f32, [f32; GAUGES]) {
-        if core::mem::take(&mut self.resettle) {
-            self.counted_lane = band_pass.settled(counted);
-            self.lanes = gauges.map(|x| band_pass.settled(x));
-        }
-        let mut banded = [0.0; GAUGES];
-        if wanted {
-            for ((y, x), lane) in banded.iter_mut().zip(gauges).zip(&mut self.lanes) {
-                *y = band_pass.step(lane, *x);
-            }
-        }
-        (band_pass.step(&mut self.counted_lane, counted), banded)
+    /// Band-passes the counted gauge.
+    fn band_pass(&mut self, band_pass: &BandPass<ORDER>, x: f32) -> f32 {
+        let lane = self.lane.get_or_insert_with(|| band_pass.settled(x));
+        band_pass.step(lane, x)
     }
 
     /// Where and when the sample that has just come out of the anti-aliasing filter was taken.

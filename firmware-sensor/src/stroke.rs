@@ -90,8 +90,8 @@ impl Stroke {
         }
     }
 
-    /// fv in Hz: 0.01 or above, and falling towards it while nothing reverses. 1 Hz in the first half stroke after a
-    /// rest.
+    /// fv in Hz: 0.01 or above, and falling towards it while nothing reverses. 1 Hz in the first half
+    /// stroke after a rest.
     pub fn strokes_hz(&self) -> f32 {
         let half_stroke_ms = self.half_stroke_ms.max(self.elapsed_ms).max(1);
         SAMPLE_RATE_HZ as f32 / (2 * half_stroke_ms) as f32

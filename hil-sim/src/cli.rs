@@ -10,6 +10,7 @@ use protocol::Role;
 mod chart;
 mod cost;
 mod demo;
+mod map;
 mod run;
 mod size;
 
@@ -34,6 +35,9 @@ enum Command {
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
     Cost(Cost),
+    /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
+    /// heat maps. Run again, it goes on where it was stopped
+    Map(map::Maps),
     /// Draws what the estimators give against what they cost
     Chart(chart::Chart),
 }
@@ -123,6 +127,7 @@ impl Arguments {
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
+            Command::Map(maps) => maps.execute(),
             Command::Chart(chart) => chart.execute(),
         }
     }

@@ -8,7 +8,7 @@ use crate::scene;
 mod slider;
 mod stribeck;
 
-pub use slider::{DAMPING_N_S_PER_M, MASS_KG, SUB_STEP_S, Slider};
+pub use slider::{DAMPING_N_S_PER_M, MASS_KG, STEP_SHARE, Slider};
 pub use stribeck::{KINETIC, NORMAL_N, STRIBECK_M_S, Stribeck};
 
 const MM_PER_M: f64 = 1000.0;

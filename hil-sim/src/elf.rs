@@ -14,17 +14,14 @@ use std::sync::mpsc::sync_channel;
 use std::thread;
 use std::time::Instant;
 
-use protocol::port::Port;
-use protocol::{
-    Configuration, DisplayConfiguration, Hello, Message, Role, SensorConfiguration, Status,
-};
+use protocol::{Configuration, DisplayConfiguration, Message, Role, SensorConfiguration, Status};
 use rigless::emulator::{self, Start};
 use rigless::session::Session;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::time::VirtualNanos;
 
 pub use firmware::{Firmware, FirmwareError, Firmwares};
-pub use lockstep::{QUANTUM_NS, WARM_UP_NS};
+pub use lockstep::{QUANTUM_NS, Told, WARM_UP_NS};
 
 use crate::arm::Arm;
 use crate::digest::Digest;
@@ -75,6 +72,14 @@ pub enum ElfError {
         /// What was seen.
         reason: String,
     },
+    /// A board does not take the configuration that the scene asks for.
+    #[error("the {board} board does not run as the scene asks: {reason}")]
+    Configuration {
+        /// Which board.
+        board: &'static str,
+        /// What it answered.
+        reason: String,
+    },
     /// The firmware touched what the emulator has no model for.
     #[error(
         "the {board} board's firmware reached an address that no model answers for: {address:#010x}"
@@ -108,6 +113,10 @@ pub struct BoardFacts {
     pub clears: u32,
     /// Frames that a DAC81416 could not make sense of.
     pub dac_frame_errors: u64,
+    /// How the sensor board was configured over its console, if the scene does not want its default.
+    pub sensor_told: Option<Told>,
+    /// The same of the display board.
+    pub display_told: Option<Told>,
 }
 
 /// Runs `scene` on the two firmwares.
@@ -188,6 +197,8 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
         resets: sensor.resets + display.resets,
         clears: display.left.clears,
         dac_frame_errors: display.left.dac_frame_errors,
+        sensor_told: told("sensor", &sensor.driver)?,
+        display_told: told("display", &display.driver)?,
     };
     let (begun, warm_up_s) = match sensor.driver.warm {
         Some(warm) => (warm, WARM_UP_NS as f64 * 1e-9),
@@ -215,9 +226,23 @@ fn console_for(scene: &Scene, role: Role) -> Option<ConsoleHost> {
             (wanted != SensorConfiguration::DEFAULT).then_some(Configuration::Sensor(wanted))
         }
     }?;
-    Some(ConsoleHost {
-        port: Port::new(Hello::new(Role::Host, "hil-sim", [0, 1, 0])),
-        ask: Some(Message::Configure(wanted)),
+    Some(ConsoleHost::new(wanted))
+}
+
+/// What the board answered, if it was asked for anything.
+fn told(name: &'static str, driver: &Lockstep) -> Result<Option<Told>, ElfError> {
+    let reason = match driver.told() {
+        None if driver.is_asked() => {
+            "it has not answered by the scene's end: give a longer duration_s".to_owned()
+        }
+        told => match told.and_then(|told| told.report.refused) {
+            None => return Ok(told),
+            Some(setting) => format!("it refuses {setting:?}"),
+        },
+    };
+    Err(ElfError::Configuration {
+        board: name,
+        reason,
     })
 }
 

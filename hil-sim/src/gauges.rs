@@ -28,8 +28,8 @@ use pink::{Pink, Poles};
 pub use recorded::RecordedGauges;
 use resonance::{Resonance, Ring};
 use stream::Stream;
-pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 use trouble::Trouble;
+pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 
 /// Scans of all channels per second.
 pub const SCAN_RATE_HZ: u32 = 4_000;
@@ -82,6 +82,8 @@ struct Lane {
 #[derive(Clone, Debug)]
 struct Slow {
     drift_codes: f64,
+    /// Sine and cosine of each gauge's phase.
+    drift_ahead: [(f64, f64); GAUGES],
     offset_codes: [f32; GAUGES],
     pink: Option<(Pink, [Poles; GAUGES], Xoshiro256PlusPlus)>,
 }
@@ -116,6 +118,7 @@ impl KinematicGauges {
         } else {
             (self.hum_codes * hum_phase()) as f32
         };
+        let slow = self.slow.as_mut().map(|slow| slow.scan(t_s));
         let broken = self.trouble.is_on(t_s);
         let lanes = if broken { &self.broken } else { &self.sound };
         let mut codes = [0; GAUGES];
@@ -125,8 +128,8 @@ impl KinematicGauges {
                 let sample: f32 = StandardNormal.sample(&mut self.noise);
                 pickup += noise_codes * sample;
             }
-            if let Some(slow) = &mut self.slow {
-                pickup += slow.codes(gauge, t_s);
+            if let Some(slow) = &slow {
+                pickup += slow[gauge];
             }
             let mut signal = surface.feel(fingertip_mm + lane.place_mm, lane.advance);
             if let Some((resonance, rings)) = &mut self.resonance {
@@ -157,6 +160,9 @@ impl Slow {
     fn new(kinematic: &Kinematic, seed: u64) -> Self {
         Self {
             drift_codes: kinematic.drift * CODES_PER_UNIT,
+            drift_ahead: std::array::from_fn(|gauge| {
+                (TAU * gauge as f64 / GAUGES as f64).sin_cos()
+            }),
             offset_codes: OFFSET_SHARES
                 .map(|share| (share * kinematic.offset * CODES_PER_UNIT) as f32),
             pink: (kinematic.pink > 0.0).then(|| {
@@ -168,16 +174,21 @@ impl Slow {
         }
     }
 
-    /// What is added to a gauge's next scan. The drift of each gauge is a fifth of a turn ahead of the
-    /// one before.
-    fn codes(&mut self, gauge: usize, t_s: f64) -> f32 {
-        let mut codes = self.offset_codes[gauge];
+    /// What is added to the next scan. The drift of each gauge is a fifth of a turn ahead of the one
+    /// before.
+    fn scan(&mut self, t_s: f64) -> [f32; GAUGES] {
+        let mut codes = self.offset_codes;
         if self.drift_codes > 0.0 {
-            let turns = DRIFT_HZ * t_s + gauge as f64 / GAUGES as f64;
-            codes += (self.drift_codes * (TAU * turns).sin()) as f32;
+            let (sine, cosine) = (TAU * DRIFT_HZ * t_s).sin_cos();
+            for (code, (ahead_sine, ahead_cosine)) in codes.iter_mut().zip(self.drift_ahead) {
+                let drift = sine * ahead_cosine + cosine * ahead_sine;
+                *code += (self.drift_codes * drift) as f32;
+            }
         }
         if let Some((pink, poles, noise)) = &mut self.pink {
-            codes += pink.step(&mut poles[gauge], noise);
+            for (code, poles) in codes.iter_mut().zip(poles) {
+                *code += pink.step(poles, noise);
+            }
         }
         codes
     }

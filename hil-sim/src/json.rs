@@ -1,9 +1,12 @@
 //! A run in JSON: one object per scene.
 
+mod lines;
+
 use protocol::Status;
 use serde::Serialize;
 
 use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
+use crate::json::lines::Lines;
 use crate::recording::Recording;
 use crate::truth::Truth;
 
@@ -75,12 +78,17 @@ impl<'a> SceneResult<'a> {
     }
 }
 
-/// The JSON of several runs: a list, indented, closed by a line break.
+/// The JSON of several runs: a list, indented, a line for each estimate, closed by a line break.
 ///
 /// # Errors
 /// None in practice: there are no maps here whose keys are not text.
 pub fn to_json(results: &[SceneResult]) -> serde_json::Result<String> {
-    Ok(serde_json::to_string_pretty(results)? + "\n")
+    let mut bytes = Vec::new();
+    let mut out = serde_json::Serializer::with_formatter(&mut bytes, Lines::default());
+    results.serialize(&mut out)?;
+    bytes.push(b'\n');
+    // A serializer of JSON writes nothing but UTF-8.
+    String::from_utf8(bytes).map_err(serde::ser::Error::custom)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod expectation;
 pub mod gauges;
 pub mod json;
 pub mod listener;
+pub mod map;
 pub mod motion;
 pub mod native;
 pub mod outcome;

@@ -7,14 +7,15 @@ pub const MM_PER_COUNT: f64 = 0.005;
 
 /// The 16-bit counter of an encoder at `position_mm`: counts of 5 µm, wrapping.
 pub fn encoder(position_mm: f64) -> u16 {
-    // Two's complement: a negative position wraps downwards.
-    (position_mm / MM_PER_COUNT).floor() as i64 as u16
+    coarse_encoder(position_mm, 1)
 }
 
-/// The same of an encoder that moves on by `step_counts` at a time.
+/// The same of an encoder that goes on by `step_counts` at a time, 1 or more.
 pub fn coarse_encoder(position_mm: f64, step_counts: u16) -> u16 {
-    let step_mm = MM_PER_COUNT * f64::from(step_counts);
-    ((position_mm / step_mm).floor() as i64).wrapping_mul(step_counts.into()) as u16
+    let counts = (position_mm / MM_PER_COUNT).floor() as i64;
+    let step_counts = i64::from(step_counts);
+    // Two's complement: a negative position wraps downwards.
+    (counts.div_euclid(step_counts) * step_counts) as u16
 }
 
 impl Motion {

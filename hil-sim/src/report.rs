@@ -4,6 +4,7 @@ mod chart;
 mod crossings;
 pub mod palette;
 mod plots;
+mod senses;
 mod tables;
 mod thin;
 
@@ -157,10 +158,10 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_has_four_plots_and_its_numbers() {
+    fn a_scene_has_five_plots_and_its_numbers() {
         let page = page(&Run::steady(50.0, 2.0), "steady", Mode::Uniform, &[]);
-        assert_eq!(page.matches("<svg ").count(), 4);
-        assert_eq!(page.matches("</svg>").count(), 4);
+        assert_eq!(page.matches("<svg ").count(), 5);
+        assert_eq!(page.matches("</svg>").count(), 5);
         assert!(page.contains("href=\"#scene-0\"") && page.contains("id=scene-0"));
         assert!(page.contains("rms_percent 3 &gt; 1"));
         assert!(!page.contains("NaN"));

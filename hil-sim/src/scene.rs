@@ -342,8 +342,10 @@ impl Scene {
             }),
             bank_travel_percent: estimator.travel_percent,
             bank_candidates: estimator.candidates,
+            force_channel: self.force.present,
+            force_mn_per_v: (1_000.0 * self.force.n_per_v).round() as u16,
             stiffness_n_per_m: match estimator.stiffness {
-                Stiffness::Configured => defaults.stiffness_n_per_m,
+                Stiffness::Configured => self.force.stiffness_n_per_m.round() as u16,
                 Stiffness::Estimated => 0,
             },
             ..defaults

@@ -1,7 +1,8 @@
 //! What a scene knows and the firmware does not: the ground on which a recording is judged.
 
 use firmware_display::array;
-use protocol::{DisplayConfiguration, Mode, SensorConfiguration};
+use firmware_sensor::counting::PAPERS_WINDOW_MS;
+use protocol::{DisplayConfiguration, Method, Mode, SensorConfiguration};
 
 /// The truth behind a [`crate::recording::Recording`], lent by the scene that was run.
 ///
@@ -43,9 +44,19 @@ impl<'a> Truth<'a> {
         (wavelength_mm.is_finite() && wavelength_mm > 0.0).then_some(wavelength_mm)
     }
 
-    /// The counting window A, in s.
+    /// The counting window A, in s: the configured one if that is what estimates, else that of the
+    /// paper's count, which runs beside every other method.
     pub fn window_s(&self) -> f64 {
-        f64::from(self.sensor.window_ms) * 1e-3
+        1e-3 * match self.sensor.method {
+            Method::Counting => f64::from(self.sensor.window_ms),
+            Method::Bank | Method::AdaptedCounting | Method::Crossings => PAPERS_WINDOW_MS as f64,
+        }
+    }
+
+    /// Whether the paper's count and the estimate are two things.
+    pub fn counts_beside(&self) -> bool {
+        let paper_s = PAPERS_WINDOW_MS as f64 * 1e-3;
+        self.sensor.method != Method::Counting || self.window_s() != paper_s
     }
 
     /// How far the reference actuator is from the fingertip's middle along the scan, in mm, where

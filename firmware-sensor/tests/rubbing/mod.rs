@@ -11,7 +11,7 @@ use firmware_sensor::{
 };
 use protocol::{Estimate, GAUGES, Method, SensorConfiguration};
 
-const GAINS: [f64; GAUGES] = [1.0, 0.8, 1.1, 0.6, 0.9];
+pub const GAINS: [f64; GAUGES] = [1.0, 0.8, 1.1, 0.6, 0.9];
 const PLACES_MM: [f64; GAUGES] = [-3.0, -1.5, 0.0, 1.5, 3.0];
 const PHASES_RAD: [f64; GAUGES] = [0.0, 0.4, -0.7, 1.1, -0.3];
 /// ADC steps of a fundamental of amplitude 1 at unit gain.

@@ -4,7 +4,7 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
 
-use protocol::port::Port;
+use protocol::{Configuration, ConfigurationReport, Hello, MAX_FRAME, Message, Peer, Port, Role};
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -23,6 +23,9 @@ pub const QUANTUM_NS: u64 = 500_000;
 pub const WARM_UP_NS: u64 = 500_000_000;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
+/// How long the host on the console waits for an answer before it asks again: ten times what the two
+/// frames, a board's tasks and the exchange at the end of every quantum take together.
+const PATIENCE_NS: u64 = 50_000_000;
 
 /// What the driver does for one board's pins beyond the seam itself.
 pub trait Watched: Pins {
@@ -54,12 +57,24 @@ pub struct Cable {
     pub from_peer: Receiver<Vec<TimedByte>>,
 }
 
-/// A host on the console that wants something of the board.
+/// A host on the console that wants the board configured.
 pub struct ConsoleHost {
-    /// The host's end of the console.
-    pub port: Port,
-    /// What it asks for, as soon as the board has introduced itself.
-    pub ask: Option<protocol::Message>,
+    port: Port,
+    wanted: Configuration,
+    /// When it last asked.
+    asked_ns: Option<u64>,
+    told: Option<Told>,
+}
+
+/// What a host on the console asked of a board, and the board's answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Told {
+    /// When the host began to ask, in ns since the scene's start.
+    pub asked_ns: u64,
+    /// When the host had the answer, in ns since the scene's start.
+    pub answered_ns: u64,
+    /// The answer.
+    pub report: ConfigurationReport,
 }
 
 /// Runs one board of a pair.
@@ -105,6 +120,16 @@ impl Lockstep {
         }
     }
 
+    /// Whether a host on the console wants the board configured.
+    pub fn is_asked(&self) -> bool {
+        self.console.is_some()
+    }
+
+    /// What came of it.
+    pub fn told(&self) -> Option<Told> {
+        self.console.as_ref().and_then(|host| host.told)
+    }
+
     /// The board's log.
     pub fn log_lines(&self) -> Vec<(u64, String)> {
         self.log.as_ref().map(Log::lines).unwrap_or_default()
@@ -134,23 +159,40 @@ impl Lockstep {
 }
 
 impl ConsoleHost {
+    /// A host that asks for `wanted` as soon as the board has introduced itself.
+    pub fn new(wanted: Configuration) -> Self {
+        Self {
+            port: Port::new(Hello::new(Role::Host, "hil-sim", [0, 1, 0])),
+            wanted,
+            asked_ns: None,
+            told: None,
+        }
+    }
+
     fn serve<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) {
         let wire = board.wire(CONSOLE_UART);
         let bytes: Vec<u8> = wire.take_sent().into_iter().map(|(_, byte)| byte).collect();
-        let mut answered = false;
+        let mut answer = None;
         self.port.receive(now_ns / 1_000, &bytes, |message| {
-            answered |= matches!(message, protocol::Message::Configuration(_));
+            if let Message::Configuration(report) = message {
+                answer = Some(report);
+            }
         });
-        if answered {
-            self.ask = None;
+        if let (Some(report), Some(asked_ns), None) = (answer, self.asked_ns, self.told) {
+            self.told = Some(Told {
+                asked_ns,
+                answered_ns: now_ns,
+                report,
+            });
         }
-        if let Some(ask) = &self.ask
-            && matches!(self.port.peer(), protocol::receiver::Peer::Known(_))
-            && !self.port.has_bytes()
-        {
-            self.port.post(ask);
+        let due = self
+            .asked_ns
+            .is_none_or(|asked_ns| now_ns - asked_ns >= PATIENCE_NS);
+        if self.told.is_none() && due && matches!(self.port.peer(), Peer::Known(_)) {
+            self.port.post(&Message::Configure(self.wanted));
+            self.asked_ns = Some(now_ns);
         }
-        let mut out = [0; 256];
+        let mut out = [0; MAX_FRAME];
         loop {
             let count = self.port.take(&mut out);
             if count == 0 {

@@ -161,10 +161,174 @@ fn at_a_boundary_each_gauge_feels_what_lies_under_its_own_place() {
     let both = Surface::new(&scene, 0.0);
     scene.specimens.truncate(1);
     let first = Surface::new(&scene, 0.0);
-    let feel =
-        |surface| KinematicGauges::new(&Kinematic::default(), 1).scan(surface, 0.0, 60.2);
+    let feel = |surface| KinematicGauges::new(&Kinematic::default(), 1).scan(surface, 0.0, 60.2);
     let (both, first) = (feel(&both), feel(&first));
     // Places −3 and −1.5 mm are still before 60 mm.
     assert_eq!(both[..2], first[..2]);
     assert!((2..5).all(|gauge| both[gauge] != first[gauge]));
+}
+
+/// Gauge `gauge` of ten seconds of `kinematic`, in units of the fundamental, without rounding's half code.
+fn units(kinematic: Kinematic, gauge: usize) -> Vec<f64> {
+    lane(&scans(kinematic, 1), gauge)
+        .into_iter()
+        .map(|code| (code - 2047.5) / CODES_PER_UNIT)
+        .collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+#[test]
+fn a_stuck_a_noisy_and_a_humming_gauge_are_so_and_the_others_stay_as_they_were() {
+    let mut broken = Kinematic {
+        snr_db: Some(20.0),
+        ..Kinematic::default()
+    };
+    let whole = scans(broken, 5);
+    broken.stuck[0] = true;
+    broken.noisy[2] = true;
+    broken.humming[4] = true;
+    let broken = scans(broken, 5);
+    assert!(broken.iter().all(|codes| codes[0] == STUCK_CODE));
+    let added = |gauge: usize| -> Vec<f64> {
+        lane(&broken, gauge)
+            .iter()
+            .zip(lane(&whole, gauge))
+            .map(|(broken, whole)| (broken - whole) / CODES_PER_UNIT)
+            .collect()
+    };
+    // The ends of the converter, ± 5.5, cut off what lies beyond 1.8 σ: less than 10 % of the RMS; σ of
+    // the RMS itself is 0.35 %.
+    let noise = rms(&added(2));
+    assert!((2.7..3.0).contains(&noise), "{noise}");
+    let (hum, phase) = tone(&added(4), 50.0);
+    assert!((hum - 2.0).abs() < 0.01 && phase.abs() < 1e-2, "{hum}");
+    for gauge in [1, 3] {
+        assert_eq!(lane(&broken, gauge), lane(&whole, gauge));
+    }
+}
+
+#[test]
+fn troubles_come_and_go() {
+    let sound = Kinematic {
+        snr_db: Some(20.0),
+        ..Kinematic::default()
+    };
+    let mut broken = Kinematic {
+        trouble_from_s: 2.0,
+        trouble_for_s: Some(0.5),
+        ..sound
+    };
+    broken.dead[0] = true;
+    broken.saturated[1] = true;
+    broken.stuck[2] = true;
+    broken.noisy[3] = true;
+    broken.humming[4] = true;
+    let (sound, broken) = (scans(sound, 1), scans(broken, 1));
+    assert_eq!(broken[..8_000], sound[..8_000]);
+    assert_eq!(broken[10_000..], sound[10_000..]);
+    for gauge in 0..GAUGES {
+        let during = 8_000..10_000;
+        let same = during
+            .filter(|&scan| broken[scan][gauge] == sound[scan][gauge])
+            .count();
+        // A curve meets another, now and then.
+        assert!(same < 100, "{gauge}: {same} of 2000 scans are as if sound");
+    }
+}
+
+#[test]
+fn drift_and_offset_are_what_they_are_said_to_be() {
+    let offset = Kinematic {
+        offset: 2.0,
+        ..Kinematic::default()
+    };
+    let drift = Kinematic {
+        drift: 0.2,
+        ..Kinematic::default()
+    };
+    let quiet = scans(Kinematic::default(), 1);
+    for gauge in 0..GAUGES {
+        let quiet: Vec<f64> = lane(&quiet, gauge)
+            .into_iter()
+            .map(|code| (code - 2047.5) / CODES_PER_UNIT)
+            .collect();
+        // A code is 0.0027 units.
+        let offset = units(offset, gauge);
+        let share = [-2.0, -1.0, 0.0, 1.0, 2.0][gauge];
+        for (offset, quiet) in offset.iter().zip(&quiet) {
+            assert!((offset - quiet - share).abs() < 0.003);
+        }
+        let drift = units(drift, gauge);
+        for (scan, (drift, quiet)) in drift.iter().zip(&quiet).enumerate() {
+            let turns = 0.11 * scan as f64 / 4000.0 + gauge as f64 / 5.0;
+            assert!((drift - quiet - 0.2 * (TAU * turns).sin()).abs() < 0.003);
+        }
+    }
+}
+
+#[test]
+fn pink_noise_has_its_rms_its_slope_and_its_own_stream() {
+    let pink = Kinematic {
+        pink: 0.5,
+        snr_db: Some(20.0),
+        ..Kinematic::default()
+    };
+    let white = Kinematic { pink: 0.0, ..pink };
+    let (mut power, mut slow, mut fast) = (0.0, 0.0, 0.0);
+    for gauge in 0..GAUGES {
+        let noise: Vec<f64> = units(pink, gauge)
+            .iter()
+            .zip(units(white, gauge))
+            .map(|(pink, white)| pink - white)
+            .collect();
+        power += rms(&noise).powi(2) / 5.0;
+        // An octave from 20 of its tones.
+        let octave = |low_hz: f64| -> f64 {
+            (0..20)
+                .map(|tenth| {
+                    tone(&noise, low_hz * (1.0 + f64::from(tenth) / 20.0))
+                        .0
+                        .powi(2)
+                        * low_hz
+                })
+                .sum()
+        };
+        slow += octave(2.0);
+        fast += octave(128.0);
+    }
+    // Most of the power lies below 10 Hz, some hundred degrees of freedom in all: 5 σ are 60 %.
+    assert!((0.1..0.4).contains(&power), "{power} for 0.25");
+    // Octaves of 1/f hold the same. 5 · 2 · 20 degrees of freedom in each: σ = 14 % of the ratio; 4 σ and
+    // a decibel of ripple.
+    assert!((0.45..1.8).contains(&(slow / fast)), "{slow} to {fast}");
+}
+
+#[test]
+fn a_resonance_delays_the_texture_and_lifts_what_is_near_it() {
+    let ringing = Kinematic {
+        resonance: Some(crate::scene::Resonance {
+            hz: 180.0,
+            damping: 0.15,
+        }),
+        ..Kinematic::default()
+    };
+    let (quiet, ringing) = (units(Kinematic::default(), 0), units(ringing, 0));
+    // 25 Hz of 2 mm at 50 mm/s, and its 7th harmonic close to the resonance; the start rings away.
+    let answer = |n: f64| {
+        let (quiet, ringing) = (
+            tone(&quiet[4_000..], 25.0 * n),
+            tone(&ringing[4_000..], 25.0 * n),
+        );
+        (ringing.0 / quiet.0, quiet.1 - ringing.1)
+    };
+    let ratio: f64 = 25.0 / 180.0;
+    let (real, imaginary) = (1.0 - ratio * ratio, 0.3 * ratio);
+    let (gain, phase) = answer(1.0);
+    // Rounding to codes, 1/375 of the amplitude.
+    assert!((gain * real.hypot(imaginary) - 1.0).abs() < 2e-3, "{gain}");
+    assert!((phase - imaginary.atan2(real)).abs() < 2e-3, "{phase}");
+    assert!(answer(7.0).0 > 2.5);
 }

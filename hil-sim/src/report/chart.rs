@@ -29,10 +29,14 @@ pub struct Axis {
 pub enum Mark {
     /// A line through points.
     Line(Colour, Vec<(f64, f64)>),
+    /// A thinner line through points.
+    Thin(Colour, Vec<(f64, f64)>),
     /// A dot at each point.
     Dots(Colour, Vec<(f64, f64)>),
     /// Upright strokes at x, from one y to another.
     Strokes(Colour, Vec<f64>, Range<f64>),
+    /// Rectangles: stretches of x, each from one y to another.
+    Bars(Colour, Vec<(Range<f64>, Range<f64>)>),
     /// Stretches of x over the whole height.
     Shade(Colour, Vec<Range<f64>>),
 }
@@ -120,6 +124,17 @@ fn draw_into(
             Mark::Line(colour, points) => {
                 let style = colour.drawn().stroke_width(4);
                 chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
+            }
+            Mark::Thin(colour, points) => {
+                let style = colour.drawn().stroke_width(2);
+                chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
+            }
+            Mark::Bars(colour, bars) => {
+                let style = colour.drawn().filled();
+                chart
+                    .draw_series(bars.iter().map(|(x, y)| {
+                        Rectangle::new([(x.start, y.start), (x.end, y.end)], style)
+                    }))?;
             }
             Mark::Dots(colour, points) => {
                 let style = colour.drawn().filled();

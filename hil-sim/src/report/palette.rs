@@ -43,6 +43,12 @@ pub const REFUSED: Colour = Colour {
     light: (0xc8, 0x4a, 0x1f),
     dark: (0xf2, 0x8c, 0x5a),
 };
+/// What stands beside the main thing, for comparison.
+pub const QUIET: Colour = Colour {
+    name: "quiet",
+    light: (0x98, 0xa1, 0xab),
+    dark: (0x76, 0x80, 0x8b),
+};
 /// A stretch of time set off from the rest.
 pub const SHADE: Colour = Colour {
     name: "shade",
@@ -50,7 +56,7 @@ pub const SHADE: Colour = Colour {
     dark: (0x4a, 0x40, 0x22),
 };
 
-const ALL: [Colour; 6] = [INK, GRID, FIRST, SECOND, REFUSED, SHADE];
+const ALL: [Colour; 7] = [INK, GRID, FIRST, SECOND, REFUSED, QUIET, SHADE];
 
 impl Colour {
     /// The colour as plots are drawn in.

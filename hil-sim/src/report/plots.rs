@@ -1,16 +1,17 @@
-//! The four charts of a run.
+//! The charts of a run.
 
 use std::ops::Range;
 
-use protocol::{GAUGES, Mode};
+use protocol::{Contact, GAUGES, Mode};
 
-use crate::analysis::seconds;
 use crate::analysis::track::Track;
+use crate::analysis::{JudgedEstimate, seconds};
 use crate::recording::{Recording, volts};
 use crate::report::Chapter;
 use crate::report::chart::{Axis, Mark, draw};
 use crate::report::crossings::banded;
-use crate::report::palette::{Colour, FIRST, REFUSED, SECOND, SHADE};
+use crate::report::palette::{Colour, FIRST, QUIET, REFUSED, SECOND, SHADE};
+use crate::report::senses::{self, stretches};
 use crate::report::thin::{DOTS, LINE_POINTS, stride, thin};
 use crate::truth::Truth;
 
@@ -48,6 +49,7 @@ pub fn figures(chapter: &Chapter) -> Result<Vec<Figure>, String> {
     Ok(vec![
         signal(truth, recording)?,
         wavelength(chapter)?,
+        senses::figure(chapter)?,
         velocity(truth, recording)?,
         voltages(truth, recording)?,
     ])
@@ -126,25 +128,64 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
         thin(&points, DOTS)
     };
     let nth = stride(verdict.estimates.len(), DOTS);
-    let marks = [
+    let held = stretches(&verdict.estimates, |e| match e.contact {
+        Contact::Stick | Contact::StickSlip => Some(()),
+        Contact::Slip | Contact::Unknown => None,
+    });
+    let mut legend = vec![
+        (SECOND, "true λ under the sensor"),
+        (FIRST, "valid estimate"),
+        (REFUSED, "estimate marked invalid"),
+    ];
+    let mut marks = Vec::new();
+    if !held.is_empty() {
+        legend.push((
+            SHADE,
+            "the fingertip sticks, or sticks and slips, by the sensor's word",
+        ));
+        let held = held.into_iter().map(|(stretch, ())| stretch).collect();
+        marks.push(Mark::Shade(SHADE, held));
+    }
+    if truth.counts_beside() {
+        legend.push((QUIET, "the paper's count beside it, A = 80 ms, in T1"));
+        let lines = counted(&verdict.estimates, y.range.end);
+        marks.extend(lines.into_iter().map(|line| Mark::Thin(QUIET, line)));
+    }
+    marks.extend([
         Mark::Dots(REFUSED, dots(false)),
         Mark::Dots(FIRST, dots(true)),
         Mark::Line(SECOND, with_steps(&truths)),
-    ];
+    ]);
     let mut note = String::from("What lies above the chart is drawn at its upper edge.");
     if nth > 1 {
         note += " Of many estimates only some are drawn.";
     }
     Ok(Figure {
         title: "Wavelength, estimated and true".into(),
-        legend: vec![
-            (SECOND, "true λ under the sensor"),
-            (FIRST, "valid estimate"),
-            (REFUSED, "estimate marked invalid"),
-        ],
+        legend,
         svg: draw(620, &whole(recording), &y, &marks)?,
         note,
     })
+}
+
+/// The paper's count as lines that break where it has nothing to say or is in T2.
+fn counted(estimates: &[JudgedEstimate], top_mm: f64) -> Vec<Vec<(f64, f64)>> {
+    let thinned = thin(estimates, LINE_POINTS);
+    let lines = thinned.chunk_by(|one, next| speaks(one) && speaks(next));
+    lines
+        .map(|line| {
+            let points = line.iter().filter(|estimate| speaks(estimate));
+            points
+                .filter_map(|e| Some((e.t_s, e.counted_mm?.min(top_mm))))
+                .collect::<Vec<_>>()
+        })
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// Whether the paper's count has a λ that the paper would go by.
+fn speaks(estimate: &JudgedEstimate) -> bool {
+    estimate.counted_mm.is_some() && estimate.range == protocol::Range::T1
 }
 
 /// The hand's velocity, and the arm's where it is another; the paper's range T2 shaded.
@@ -189,7 +230,7 @@ fn velocity(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
             &Axis::new("velocity v in mm/s", low - margin..high + margin),
             &marks,
         )?,
-        note: format!("The window A is {} ms.", truth.sensor.window_ms),
+        note: format!("The window A is {:.0} ms.", 1e3 * truth.window_s()),
     })
 }
 

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
-use protocol::{RoleCounters, Status};
+use protocol::{GAUGES, GaugeHealth, RoleCounters, Status};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::analysis::{JudgedEstimate, words};
 use crate::report::{Chapter, escape};
 
 /// Log lines shown, at most.
@@ -32,7 +33,7 @@ pub fn index(chapters: &[Chapter]) -> String {
         let _ = writeln!(
             rows,
             "<tr><th scope=row><a href=\"#scene-{at}\">{}</a></th><td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             escape(truth.name),
             if chapter.unmet.is_empty() {
                 ""
@@ -43,6 +44,7 @@ pub fn index(chapters: &[Chapter]) -> String {
             escape(truth.method),
             number(summary.mean_mm, 3, " mm"),
             number(summary.rms_percent, 2, " %"),
+            number(summary.wrong_share.map(|share| 100.0 * share), 2, " %"),
             number(actuators.frequency_hz, 3, " Hz"),
             number(actuators.truth_hz, 3, " Hz"),
             number(recording.realtime_factor(), 1, " ×"),
@@ -50,7 +52,7 @@ pub fn index(chapters: &[Chapter]) -> String {
     }
     format!(
         "<div class=wide><table><thead><tr><th>scene</th><th></th><th>engine</th><th>method</th><th>mean λ̂</th>\
-         <th>RMS error</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
+         <th>RMS error</th><th>valid, wrong</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
          <tbody>{rows}</tbody></table></div>\n"
     )
 }
@@ -68,6 +70,14 @@ pub fn summary(chapter: &Chapter) -> String {
         ("bias of λ̂", number(s.bias_percent, 2, " %")),
         ("mean λ̂", number(s.mean_mm, 4, " mm")),
         ("valid while in motion", percent(s.valid_share)),
+        (
+            "valid and more than 10 % off",
+            number(s.wrong_share.map(|share| 100.0 * share), 2, " %"),
+        ),
+        (
+            "RMS error of the paper's count in T1",
+            number(s.counted_rms_percent, 2, " %"),
+        ),
         (
             "settled after the last boundary",
             number(s.settling_ms, 0, " ms"),
@@ -94,10 +104,61 @@ pub fn summary(chapter: &Chapter) -> String {
         ("hand to output, longest", reaction(|r| r.max_ms)),
     ];
     format!(
-        "<div class=pair>{}{}</div>\n",
+        "<div class=pair>{}{}{}</div>\n",
         facts("Estimates", &estimates),
-        facts("Actuators", &actuators)
+        facts("Actuators", &actuators),
+        facts("Contact and gauges", &senses(&chapter.verdict.estimates)),
     )
+}
+
+/// What the sensor says of the contact and of each gauge, as shares of the estimates.
+fn senses(estimates: &[JudgedEstimate]) -> Vec<(&'static str, String)> {
+    const NAMES: [&str; GAUGES] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4"];
+    let mut lines = vec![(
+        "contact",
+        shares(estimates.iter().map(|e| words::of_contact(e.contact))),
+    )];
+    let lags = estimates.iter().filter_map(|e| e.lag_um);
+    if let Some(most) = lags.map(i32::unsigned_abs).max() {
+        lines.push((
+            "largest lag behind the arm",
+            number(Some(f64::from(most) * 1e-3), 3, " mm"),
+        ));
+    }
+    for (gauge, name) in NAMES.into_iter().enumerate() {
+        let said = estimates.iter().map(|e| match e.health[gauge] {
+            GaugeHealth::Good if e.gauges_used >> gauge & 1 == 1 => "takes part",
+            GaugeHealth::Good => "sound but unused",
+            other => words::of_health(other),
+        });
+        lines.push((name, shares(said)));
+    }
+    lines
+}
+
+/// How often each word was said, the most frequent first: "slip 93.2 %, stick 6.8 %".
+fn shares(said: impl Iterator<Item = &'static str>) -> String {
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for word in said {
+        match counts.iter_mut().find(|(known, _)| *known == word) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((word, 1)),
+        }
+    }
+    let total: usize = counts.iter().map(|(_, count)| count).sum();
+    if total == 0 {
+        return number(None, 0, "");
+    }
+    counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
+    let share = |count: usize| 100.0 * count as f64 / total as f64;
+    let words: Vec<String> = counts
+        .into_iter()
+        .map(|(word, count)| match count {
+            all if all == total => word.to_owned(),
+            some => format!("{word} {:.1} %", share(some)),
+        })
+        .collect();
+    words.join(", ")
 }
 
 fn facts(caption: &str, facts: &[(&str, String)]) -> String {

@@ -13,8 +13,8 @@ use super::bounds::{
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link, Motion,
-    Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link,
+    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
 
@@ -38,7 +38,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         ));
     }
     let link = link(root.table("link")?)?;
-    let estimator = estimator(root.table("estimator")?)?;
+    let estimator = estimator(root.table("estimator")?, &force)?;
     let display_mode = display(root.table("display")?)?;
     if let Some(fault) = root.tables("fault")?.first() {
         return Err(fault.refuse(
@@ -368,7 +368,7 @@ fn link(mut table: Table<'_>) -> Result<Link, SceneError> {
     Ok(link)
 }
 
-fn estimator(mut table: Table<'_>) -> Result<Estimator, SceneError> {
+fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneError> {
     let defaults = Estimator::default();
     let methods = [
         ("default", defaults.method),
@@ -406,6 +406,12 @@ fn estimator(mut table: Table<'_>) -> Result<Estimator, SceneError> {
         ],
         &[],
     )?;
+    if stiffness == Stiffness::Estimated && !force.present {
+        return Err(table.refuse(
+            "stiffness",
+            "cannot be estimated without the force channel: give tangential = true in [gauges]",
+        ));
+    }
     table.finish("")?;
     Ok(Estimator {
         method,

@@ -42,16 +42,30 @@ fn every_key_of_the_contract_parses() {
         [arm]
         follows = "motion"
         lag_ms = 0.0
+        encoder_um = 50
         [contact]
         model = "auto"
-        friction = "none"
+        friction = "strong"
         [gauges]
         snr_db = 20.0
         hum_50_hz = 0.0
         dead = []
         saturated = []
-        tangential = false
+        tangential = true
+        tangential_n_per_v = 0.5
+        stiffness_n_per_m = 800
         second_harmonic = 0.15
+        stuck = [0]
+        noisy = [1]
+        humming = [2]
+        trouble_from_s = 1
+        trouble_for_s = 0.5
+        resonance_hz = 180
+        resonance_damping = 0.2
+        pink = 0.1
+        drift = 0.3
+        offset = 5
+        skew_us = -250
         [link]
         delay_ms = 0.0
         jitter_ms = 0.0
@@ -80,7 +94,37 @@ fn every_key_of_the_contract_parses() {
         panic!("not kinematic")
     };
     assert_eq!(gauges.snr_db, Some(20.0));
-    assert_eq!(gauges.second_harmonic, 0.15);
+    assert_eq!(
+        gauges,
+        Kinematic {
+            snr_db: Some(20.0),
+            second_harmonic: 0.15,
+            stuck: [true, false, false, false, false],
+            noisy: [false, true, false, false, false],
+            humming: [false, false, true, false, false],
+            trouble_from_s: 1.0,
+            trouble_for_s: Some(0.5),
+            resonance: Some(Resonance {
+                hz: 180.0,
+                damping: 0.2
+            }),
+            pink: 0.1,
+            drift: 0.3,
+            offset: 5.0,
+            skew_us: -250.0,
+            ..Kinematic::default()
+        }
+    );
+    assert_eq!(
+        scene.force,
+        Force {
+            present: true,
+            n_per_v: 0.5,
+            stiffness_n_per_m: 800.0
+        }
+    );
+    assert_eq!(scene.contact, Contact::StickSlip(Friction::Strong));
+    assert_eq!(scene.arm.encoder_um, 50);
     assert_eq!(scene.surface.specimens.len(), 2);
     assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
     assert_eq!(scene.display_mode, Mode::Travelling);
@@ -106,8 +150,7 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
         Path::new("x.toml"),
         &format!(
             "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
-             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n\
-             stiffness = \"estimated\"\n"
+             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n"
         ),
     )
     .unwrap();
@@ -121,7 +164,6 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             gauges: 0b1_0011,
             bank_travel_percent: 150,
             bank_candidates: 36,
-            stiffness_n_per_m: 0,
             ..SensorConfiguration::DEFAULT
         }
     );
@@ -137,6 +179,33 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             ),
         );
         assert_eq!(scene.unwrap().sensor_configuration().check(), Ok(()));
+    }
+}
+
+#[test]
+fn the_force_channel_is_the_sensors_as_the_gauges_section_has_it() {
+    let configuration = |section: &str| {
+        let text = format!("{SURFACE}{section}");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        let configuration = scene.sensor_configuration();
+        assert_eq!(configuration.check(), Ok(()), "{section}");
+        (
+            configuration.force_channel,
+            configuration.force_mn_per_v,
+            configuration.stiffness_n_per_m,
+        )
+    };
+    let wired = "[gauges]\ntangential = true\n";
+    assert_eq!(configuration(wired), (true, 1_000, 400));
+    let other = format!("{wired}tangential_n_per_v = 1.5\nstiffness_n_per_m = 600\n");
+    assert_eq!(configuration(&other), (true, 1_500, 600));
+    let estimated = format!("{other}[estimator]\nstiffness = \"estimated\"\n");
+    assert_eq!(configuration(&estimated), (true, 1_500, 0));
+    // Both ends of what a scene may give.
+    for (n_per_v, n_per_m) in [("0.05", "10"), ("20", "10_000")] {
+        configuration(&format!(
+            "{wired}tangential_n_per_v = {n_per_v}\nstiffness_n_per_m = {n_per_m}\n"
+        ));
     }
 }
 
@@ -196,6 +265,26 @@ fn all_but_the_specimens_has_a_default() {
             ..Expect::default()
         }
     );
+}
+
+#[test]
+fn friction_decides_the_contact_where_it_is_left_open() {
+    let contact = |section: &str| {
+        let text = format!("{SURFACE}[contact]\n{section}");
+        Scene::parse(Path::new("x.toml"), &text).unwrap().contact
+    };
+    assert_eq!(contact(""), Contact::Kinematic);
+    assert_eq!(contact("model = \"kinematic\""), Contact::Kinematic);
+    for (word, friction) in [
+        ("mild", Friction::Mild),
+        ("strong", Friction::Strong),
+        ("severe", Friction::Severe),
+    ] {
+        let given = format!("friction = \"{word}\"");
+        assert_eq!(contact(&given), Contact::StickSlip(friction));
+        let both = format!("{given}\nmodel = \"stick-slip\"");
+        assert_eq!(contact(&both), Contact::StickSlip(friction));
+    }
 }
 
 #[test]
@@ -299,6 +388,82 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:5: gauges.saturated: gauge 3 is dead already",
         ),
         (
+            "[gauges]\nstuck = [2, 3]\nhumming = [3]",
+            "x.toml:5: gauges.humming: gauge 3 is stuck already",
+        ),
+        (
+            "[gauges]\nnoisy = [0]\nsaturated = [0]",
+            "x.toml:4: gauges.noisy: gauge 0 is saturated already",
+        ),
+        (
+            "[gauges]\ntrouble_from_s = 1",
+            "x.toml:4: gauges.trouble_from_s: there is no trouble",
+        ),
+        (
+            "[gauges]\ndead = [1]\ntrouble_for_s = 0",
+            "x.toml:5: gauges.trouble_for_s: no trouble lasts 0 s",
+        ),
+        (
+            "[gauges]\ndead = [1]\ntrouble_from_s = -1",
+            "x.toml:5: gauges.trouble_from_s: -1 is not an instant",
+        ),
+        (
+            "[gauges]\nresonance_damping = 0.1",
+            "x.toml:4: gauges.resonance_damping: has nothing to damp",
+        ),
+        (
+            "[gauges]\nresonance_hz = 180\nresonance_damping = 1",
+            "x.toml:5: gauges.resonance_damping: 1 is not a damping ratio",
+        ),
+        (
+            "[gauges]\nresonance_hz = 5",
+            "x.toml:4: gauges.resonance_hz: 5 is not a resonance",
+        ),
+        (
+            "[gauges]\npink = -0.1",
+            "x.toml:4: gauges.pink: -0.1 is not a disturbance",
+        ),
+        (
+            "[gauges]\ndrift = 11",
+            "x.toml:4: gauges.drift: 11 is not a disturbance",
+        ),
+        (
+            "[gauges]\noffset = -1",
+            "x.toml:4: gauges.offset: -1 is not a disturbance",
+        ),
+        (
+            "[gauges]\nskew_us = 5001",
+            "x.toml:4: gauges.skew_us: 5001 is not a skew",
+        ),
+        (
+            "[gauges]\ntangential_n_per_v = 0",
+            "x.toml:4: gauges.tangential_n_per_v: 0 is not a scale",
+        ),
+        (
+            "[gauges]\nstiffness_n_per_m = 1",
+            "x.toml:4: gauges.stiffness_n_per_m: 1 is not a fingertip's stiffness",
+        ),
+        (
+            "[arm]\nencoder_um = 7",
+            "x.toml:4: arm.encoder_um: 7 is not an encoder's resolution: give a whole multiple of 5",
+        ),
+        (
+            "[arm]\nencoder_um = 505",
+            "x.toml:4: arm.encoder_um: 505 is not an encoder's resolution",
+        ),
+        (
+            "[contact]\nmodel = \"kinematic\"\nfriction = \"mild\"",
+            "x.toml:5: contact.friction: a \"kinematic\" contact knows no friction",
+        ),
+        (
+            "[contact]\nmodel = \"stick-slip\"",
+            "x.toml:3: contact.friction: without friction nothing sticks",
+        ),
+        (
+            "[contact]\nmodel = \"stick-slip\"\nfriction = \"none\"",
+            "x.toml:5: contact.friction: without friction nothing sticks",
+        ),
+        (
             "[estimator]\nwindow_ms = 9",
             "x.toml:4: estimator.window_ms: 9 is out of range",
         ),
@@ -325,6 +490,10 @@ fn impossible_values_are_refused_at_their_line_and_key() {
         (
             "[estimator]\nstiffness = \"guessed\"",
             "x.toml:4: estimator.stiffness: \"guessed\" is unknown",
+        ),
+        (
+            "[estimator]\nstiffness = \"estimated\"",
+            "x.toml:4: estimator.stiffness: cannot be estimated without the force channel",
         ),
         (
             "[expect]\nwrong_share_max = 1.1",

@@ -138,6 +138,46 @@ fn recorded_gauges_are_played_and_refused_below_a_kilohertz() {
 }
 
 #[test]
+fn a_recorded_force_is_played_unless_it_is_taken_out() {
+    const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("force");
+    let rows = |force: &str| -> String {
+        (0..=3000)
+            .map(|ms| format!("{},0,1,1,1,1{force}\n", f64::from(ms) / 1000.0))
+            .collect()
+    };
+    let with = format!("t_s,g0,g1,g2,g3,g4,tangential\n{}", rows(",2.475"));
+    let without = format!("t_s,g0,g1,g2,g3,g4\n{}", rows(""));
+    for (keys, csv, present, code) in [
+        ("", &with, true, 3072),
+        ("tangential = true", &with, true, 3072),
+        ("tangential = false", &with, false, 2048),
+        ("", &without, false, 2048),
+        ("tangential = false", &without, false, 2048),
+    ] {
+        let keys = format!("{GAUGES}{keys}\ntangential_n_per_v = 2\nstiffness_n_per_m = 500\n");
+        let scene = folder.load(&keys, csv).unwrap();
+        let force = scene.force;
+        assert_eq!(
+            (force.present, force.n_per_v, force.stiffness_n_per_m),
+            (present, 2.0, 500.0)
+        );
+        let mut world = crate::world::World::new(&scene).unwrap();
+        assert_eq!(world.codes(1.0, 0.0)[5], code);
+    }
+    let refusal = folder.refusal(&format!("{GAUGES}tangential = true"), &without);
+    assert!(
+        refusal.starts_with("x.toml:6: gauges.tangential: true, but the file has no column"),
+        "{refusal}"
+    );
+    let refusal = folder.refusal(&format!("{GAUGES}[contact]\nfriction = \"mild\""), &with);
+    assert!(
+        refusal.contains("does not apply to recorded gauges"),
+        "{refusal}"
+    );
+}
+
+#[test]
 fn a_recorded_profile_must_cover_the_travel() {
     let folder = Folder::new("profile");
     let profile = "profile = \"recorded\"\nfile = \"data.csv\"\n";

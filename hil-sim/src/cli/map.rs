@@ -1,0 +1,165 @@
+//! `hil-sim map`.
+
+use std::num::NonZero;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::thread;
+
+use hil_sim::map::survey::whole_methods;
+use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing};
+use indicatif::{ProgressBar, ProgressStyle};
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Maps {
+    /// Maps, all of them if none is named
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// Methods to compare, as scenes write them [default: bank, crossings, counting]
+    #[arg(long = "method", value_name = "METHOD")]
+    methods: Vec<String>,
+    /// Folder for the CSV files and pictures
+    #[arg(long, value_name = "DIR", default_value = "target/map")]
+    out: PathBuf,
+    /// Run the i-th of n parts only, into a file of its own
+    #[arg(long, value_name = "I/N")]
+    shard: Option<String>,
+    /// Scenes to run at a time [default: one per core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZero<usize>>,
+    /// Join shards' files and draw, but run nothing
+    #[arg(long, conflicts_with = "shard")]
+    merge: bool,
+    /// Throw away what was measured on another grid or by another version, instead of refusing it
+    #[arg(long)]
+    renew: bool,
+    /// List the maps, their axes and their numbers of cells
+    #[arg(long)]
+    list: bool,
+    /// Print the scene of the cell nearest to X,Y, to be run by itself
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    scene: Option<String>,
+}
+
+impl Maps {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let maps = if self.names.is_empty() {
+            catalogue()
+        } else {
+            let mut named: Vec<Map> = Vec::new();
+            for name in &self.names {
+                let map = find(name)?;
+                if named.iter().all(|other| other.name != map.name) {
+                    named.push(map);
+                }
+            }
+            named
+        };
+        // Naming one twice runs it once.
+        let mut methods: Vec<String> = Vec::new();
+        for method in self.methods {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
+        }
+        if methods.is_empty() {
+            methods = METHODS.map(str::to_owned).to_vec();
+        }
+        if self.list {
+            list(&maps);
+            return Ok(ExitCode::SUCCESS);
+        }
+        if let Some(place) = self.scene {
+            print_scene(&maps, &place, &methods)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let plan = Plan {
+            methods,
+            folder: self.out,
+            shard: self.shard.as_deref().map(str::parse::<Shard>).transpose()?,
+            threads: match self.jobs {
+                Some(jobs) => jobs,
+                None => thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN),
+            },
+            renew: self.renew,
+        };
+        // All of it first: a refusal is not to come after half an hour.
+        for map in &maps {
+            plan.check(map)?;
+        }
+        let mut table = vec![standing::HEADER.to_owned()];
+        for map in &maps {
+            table.extend(make(map, &plan, self.merge)?);
+        }
+        if plan.shard.is_none() {
+            println!("{}", table.join("\n"));
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Makes one map and gives its lines of the table.
+fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Vec<String>> {
+    let mut survey = Survey::open(map, plan)?;
+    if merge {
+        survey.complete()?;
+    }
+    let bar = progress(map.name, survey.missing());
+    survey.run(|| bar.inc(1))?;
+    bar.finish_and_clear();
+    let (files, rows) = survey.finish()?;
+    eprintln!("{}", files.csv.display());
+    if let Some(picture) = files.picture {
+        eprintln!("{}", picture.display());
+    }
+    let lines = whole_methods(map, &rows)
+        .into_iter()
+        .map(|method| standing::line(map, method, &rows))
+        .collect();
+    Ok(lines)
+}
+
+/// A bar on stderr; none if that is no terminal.
+fn progress(name: &'static str, runs: usize) -> ProgressBar {
+    let bar = ProgressBar::new(runs as u64);
+    let template = "{msg:20} {bar:40} {pos}/{len} runs, {elapsed} so far, {eta} to go";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_message(name);
+    bar
+}
+
+fn list(maps: &[Map]) {
+    println!("| map | cells | along x | along y | in all cells |");
+    println!("| --- | ---: | --- | --- | --- |");
+    for map in maps {
+        let axis = |axis: &hil_sim::map::axis::Axis| {
+            format!(
+                "{}: {} steps, {}",
+                axis.label,
+                axis.steps.len(),
+                axis.places()
+            )
+        };
+        println!(
+            "| {} | {} | {} | {} | {} |",
+            map.name,
+            map.len(),
+            axis(&map.x),
+            axis(&map.y),
+            map.conditions
+        );
+    }
+}
+
+fn print_scene(maps: &[Map], place: &str, methods: &[String]) -> anyhow::Result<()> {
+    let ([map], Some((x, y))) = (maps, place.split_once(',')) else {
+        anyhow::bail!(
+            "--scene: give one map and a place on its axes, such as hil-sim map snr-wavelength --scene 20,2.0"
+        );
+    };
+    let cell = map.nearest(x.trim(), y.trim())?;
+    let method = methods.first().map_or(METHODS[0], String::as_str);
+    print!("{}", map.scene_text(cell, method));
+    Ok(())
+}

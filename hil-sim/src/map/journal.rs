@@ -1,0 +1,208 @@
+//! A map's CSV file: rows are added as runs finish, in any order, and sorted when the last has come.
+//!
+//! A row is written by one call, so a killed process leaves at most one line cut off; that line is
+//! dropped when the file is next opened, and its run is made again.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::Map;
+use super::error::MapError;
+use super::fingerprint::Fingerprints;
+use super::row::{Row, header, rank};
+
+/// Rows by method and cell.
+pub type Rows = BTreeMap<(String, usize), Row>;
+
+/// An open CSV file that no other process writes.
+pub struct Journal<'a> {
+    map: &'a Map,
+    path: PathBuf,
+    file: File,
+    /// Held until the journal is dropped.
+    _lock: File,
+}
+
+impl<'a> Journal<'a> {
+    /// Opens the file or makes it, and reads what is in it. With `renew`, rows of another grid or version
+    /// are thrown away instead of refused.
+    ///
+    /// # Errors
+    /// If another process has it open, if it holds anything else than rows of this map and version, or
+    /// if it cannot be read and written.
+    pub fn open(
+        map: &'a Map,
+        path: &Path,
+        keys: &mut Fingerprints,
+        renew: bool,
+    ) -> Result<(Self, Rows), MapError> {
+        let lock = lock(path)?;
+        let mut rows = Rows::new();
+        if path.exists() {
+            let content = read(map, path, keys, renew)?;
+            rows = content.rows;
+            if !content.sound {
+                replace(map, path, keys, &rows)?;
+            }
+        } else {
+            replace(map, path, keys, &rows)?;
+        }
+        let file = OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(MapError::file(
+                path,
+                "cannot be written: give another --out",
+            ))?;
+        let journal = Self {
+            map,
+            path: path.to_owned(),
+            file,
+            _lock: lock,
+        };
+        Ok((journal, rows))
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn append(&mut self, row: &Row, keys: &mut Fingerprints) -> Result<(), MapError> {
+        let line = line(self.map, row, keys)?;
+        self.file.write_all(line.as_bytes()).map_err(MapError::file(
+            &self.path,
+            "cannot be written: make room and run again, nothing that is in it is lost",
+        ))
+    }
+
+    /// Writes all rows anew, sorted. The file is replaced at once, not piece by piece.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn sort(&mut self, rows: &Rows, keys: &mut Fingerprints) -> Result<(), MapError> {
+        replace(self.map, &self.path, keys, rows)
+    }
+}
+
+/// Takes the right to write a CSV file: a lock on a file beside it, since the CSV itself is replaced.
+/// The right ends with the process, however it ends.
+pub fn lock(path: &Path) -> Result<File, MapError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let lock_path = path.with_file_name(format!(".{name}.lock"));
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&lock_path)
+        .map_err(MapError::file(
+            &lock_path,
+            "cannot be written: give another --out",
+        ))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(MapError::Busy {
+            path: path.to_owned(),
+        }),
+        Err(TryLockError::Error(source)) => Err(MapError::File {
+            path: lock_path,
+            doing: "cannot be locked: give an --out on a file system with locks",
+            source,
+        }),
+    }
+}
+
+/// What is in a CSV file.
+pub struct Content {
+    /// Its rows. Of two for the same run, the first.
+    pub rows: Rows,
+    /// Whether there is nothing else in it: no cut-off line, nothing that `renew` passed over.
+    pub sound: bool,
+}
+
+/// Reads a CSV file. A last line without an end is passed over; with `renew`, so is whatever is not of
+/// this grid and version.
+///
+/// # Errors
+/// If it cannot be read, or holds anything else.
+pub fn read(
+    map: &Map,
+    path: &Path,
+    keys: &mut Fingerprints,
+    renew: bool,
+) -> Result<Content, MapError> {
+    let bytes = fs::read(path).map_err(MapError::file(path, "cannot be read"))?;
+    let whole = bytes
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |end| end + 1);
+    let text = String::from_utf8_lossy(&bytes[..whole]);
+    let foreign = |line: usize, what: String| MapError::Foreign {
+        path: path.to_owned(),
+        line,
+        what,
+    };
+    let mut content = Content {
+        rows: Rows::new(),
+        sound: whole == bytes.len() && whole > 0,
+    };
+    let expected = header(map);
+    for (index, line) in text.lines().enumerate() {
+        if index == 0 {
+            if line != expected.trim_end() {
+                if renew {
+                    content.sound = false;
+                    break;
+                }
+                let what = format!("the header is not that of {}", map.name);
+                return Err(foreign(1, what));
+            }
+            continue;
+        }
+        let row = Row::parse(map, line).and_then(|(row, key)| match keys.of(&row.method) {
+            Ok(own) if own == key => Ok(row),
+            Ok(own) => Err(format!(
+                "measured on another grid or by another version (key {key:016x}, here {own:016x})"
+            )),
+            Err(_) => Err(format!("method {:?} is unknown here", row.method)),
+        });
+        match row {
+            Ok(row) => {
+                content
+                    .rows
+                    .entry((row.method.clone(), row.cell))
+                    .or_insert(row);
+            }
+            Err(_) if renew => content.sound = false,
+            Err(what) => return Err(foreign(index + 1, what)),
+        }
+    }
+    Ok(content)
+}
+
+/// Replaces a CSV file by one with these rows, sorted by method and cell.
+fn replace(map: &Map, path: &Path, keys: &mut Fingerprints, rows: &Rows) -> Result<(), MapError> {
+    let mut sorted: Vec<&Row> = rows.values().collect();
+    sorted.sort_by_key(|row| (rank(&row.method), row.cell));
+    let mut text = header(map);
+    for row in sorted {
+        text += &line(map, row, keys)?;
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let new = path.with_file_name(format!(".{name}.new"));
+    fs::write(&new, text)
+        .and_then(|()| fs::rename(&new, path))
+        .map_err(MapError::file(
+            path,
+            "cannot be written: give another --out",
+        ))
+}
+
+fn line(map: &Map, row: &Row, keys: &mut Fingerprints) -> Result<String, MapError> {
+    let key = keys.of(&row.method).map_err(|source| MapError::Scene {
+        map: map.name,
+        source,
+    })?;
+    Ok(row.line(map, key))
+}

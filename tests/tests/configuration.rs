@@ -1,0 +1,130 @@
+//! What a scene's `[estimator]` and `[gauges]` say reaches the sensor board's own configuration.
+
+use hil_sim::elf::{self, ElfError};
+use hil_sim::scene::Scene;
+use protocol::{Configuration, ConfigurationReport, SensorConfiguration};
+use tests::elves;
+use tests::run::{Run, scene};
+
+/// What a sensor board answers to the configuration that a scene with `sections` asks of it, or none if
+/// it is not asked.
+fn answer(sections: &str) -> (Scene, Option<ConfigurationReport>, Run) {
+    let scene = scene(&format!(
+        "duration_s = 0.2\n[surface]\nspecimens = [{{ wavelength_mm = 2.0 }}]\n{sections}"
+    ));
+    let run = Run::of(scene.clone());
+    let report = run.facts.sensor_told.map(|told| told.report);
+    (scene, report, run)
+}
+
+/// That the board confirms what the scene asks for.
+fn assert_taken(sections: &str) -> SensorConfiguration {
+    let (scene, report, _) = answer(sections);
+    let wanted = scene.sensor_configuration();
+    let taken = ConfigurationReport {
+        refused: None,
+        configuration: Configuration::Sensor(wanted),
+    };
+    assert_eq!(report, Some(taken), "{sections}");
+    wanted
+}
+
+#[test]
+fn the_board_runs_by_its_default_and_nobody_asks_it() {
+    let (scene, report, run) = answer("");
+    assert_eq!(report, None);
+    assert_eq!(scene.sensor_configuration(), SensorConfiguration::DEFAULT);
+    assert_eq!(run.facts.display_told, None);
+}
+
+#[test]
+fn every_method_of_a_scene_becomes_the_boards() {
+    for method in ["crossings", "counting", "counting-adapted"] {
+        let taken = assert_taken(&format!("[estimator]\nmethod = \"{method}\"\n"));
+        assert_ne!(taken.method, SensorConfiguration::DEFAULT.method);
+    }
+}
+
+#[test]
+fn every_other_setting_of_the_estimator_becomes_the_boards() {
+    let taken = assert_taken(
+        r#"
+        [gauges]
+        tangential = true
+        tangential_n_per_v = 1.5
+        stiffness_n_per_m = 600
+
+        [estimator]
+        method = "bank"
+        window_ms = 60
+        counted_gauge = 1
+        gauges = [0, 1, 4]
+        travel_wavelengths = 1.5
+        candidates = 20
+        "#,
+    );
+    let expected = SensorConfiguration {
+        window_ms: 60,
+        counted_gauge: 1,
+        gauges: 0b1_0011,
+        bank_travel_percent: 150,
+        bank_candidates: 20,
+        force_channel: true,
+        force_mn_per_v: 1_500,
+        stiffness_n_per_m: 600,
+        ..SensorConfiguration::DEFAULT
+    };
+    assert_eq!(taken, expected);
+}
+
+#[test]
+fn no_gauge_takes_part_that_the_scene_leaves_out() {
+    let run = Run::of(scene(
+        r#"
+        duration_s = 1.5
+
+        [surface]
+        specimens = [{ wavelength_mm = 2.0 }]
+
+        [estimator]
+        gauges = [0, 3]
+        "#,
+    ));
+    let told = run.facts.sensor_told.expect("it is not the default");
+    let after = run.recording.estimates.iter().filter(|record| {
+        // The next estimate may be half made.
+        record.made_ns > told.answered_ns + 20_000_000
+    });
+    let used: Vec<u8> = after.map(|record| record.estimate.gauges_used).collect();
+    assert!(used.iter().all(|used| used & !0b0_1001 == 0), "{used:?}");
+    assert_eq!(used.last(), Some(&0b0_1001));
+}
+
+#[test]
+fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
+    let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
+    scene.estimator.candidates = 37;
+    let error = elf::run(&scene, elves::both()).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            ElfError::Configuration {
+                board: "sensor",
+                ..
+            }
+        ),
+        "{error:?}"
+    );
+    assert!(error.to_string().contains("BankCandidates"), "{error}");
+}
+
+#[test]
+fn a_scene_too_short_for_the_board_to_answer_is_no_result() {
+    let mut scene = scene(
+        "duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n\
+         [estimator]\nmethod = \"counting\"\n",
+    );
+    scene.duration_s = 0.001;
+    let error = elf::run(&scene, elves::both()).unwrap_err();
+    assert!(error.to_string().contains("longer duration_s"), "{error}");
+}
