@@ -17,6 +17,7 @@ pub mod costs;
 pub mod efficiency;
 pub mod family;
 pub mod fourier;
+mod panel;
 pub mod parts;
 pub mod picture;
 pub mod pitch;

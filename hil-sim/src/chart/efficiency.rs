@@ -1,6 +1,8 @@
 //! How near the bank comes to the Cramér–Rao bound for the travel that it used: steady speeds, 5–100 Hz,
 //! 20 dB, one gauge and five, a sine and a trapezoid.
 
+pub mod picture;
+
 use crate::scene::{Gauges, Kinematic, Motion, Profile, Scene, SceneError};
 
 use super::bound::{Tone, bank_equivalent_mm, bank_travel_mm};

@@ -1,49 +1,16 @@
 //! The picture of a contest: a panel for each family, error over instructions, both axes logarithmic.
-//!
-//! Written as SVG by hand: its coordinates are fractions of a pixel and its marks of ten shapes, which the
-//! report's charts have no use for.
 
 use std::fmt::Write;
 
-use super::efficiency::{GOAL, Row};
+use super::family::Family;
+use super::panel::{
+    AROUND, COLUMNS, Look, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes,
+    goal, line, look, mark, page, text,
+};
 use super::result::{ContestResult, Entry, WINDOWS, Window};
 
-const WIDTH: f64 = 1_000.0;
-const COLUMNS: usize = 3;
-const MARGIN: f64 = 8.0;
+/// Above the panels, for the legend.
 const HEAD: f64 = 96.0;
-const PANEL_HEIGHT: f64 = 236.0;
-const PANEL_WIDTH: f64 = (WIDTH - 2.0 * MARGIN) / COLUMNS as f64;
-/// Around a panel's axes: left, top, right, below.
-const AROUND: [f64; 4] = [40.0, 24.0, 8.0, 34.0];
-const INK: &str = "#24292f";
-const FAINT: &str = "#d9dde2";
-const SOFT: &str = "#6a737d";
-
-/// What a method looks like.
-#[derive(Clone, Copy, Debug)]
-struct Look {
-    method: &'static str,
-    colour: &'static str,
-    shape: Shape,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Shape {
-    Circle,
-    Square,
-    Up,
-    Down,
-    Diamond,
-}
-
-const fn look(method: &'static str, colour: &'static str, shape: Shape) -> Look {
-    Look {
-        method,
-        colour,
-        shape,
-    }
-}
 
 /// Okabe and Ito's colours, which the colour-blind tell apart; no two methods share shape and colour.
 const LOOKS: [Look; 10] = [
@@ -58,91 +25,6 @@ const LOOKS: [Look; 10] = [
     look("YIN", "#B58900", Shape::Circle),
     look("McLeod", "#B58900", Shape::Diamond),
 ];
-
-/// An axis.
-struct Scale {
-    low: f64,
-    high: f64,
-    logarithmic: bool,
-    ticks: Vec<(f64, String)>,
-    label: String,
-}
-
-impl Scale {
-    fn decades(low: f64, high: f64, label: &str) -> Self {
-        // Where there is room, 2 and 5 are labelled too.
-        let steps: &[f64] = if high / low < 1e3 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
-        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
-        let ticks = decades
-            .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
-            .filter(|tick| (low..=high * 1.001).contains(tick))
-            .map(|tick| (tick, short(tick)))
-            .collect();
-        Self {
-            low,
-            high,
-            logarithmic: true,
-            ticks,
-            label: label.to_owned(),
-        }
-    }
-
-    fn even(low: f64, high: f64, step: f64, label: &str) -> Self {
-        let count = ((high - low) / step).floor() as u32;
-        Self {
-            low,
-            high,
-            logarithmic: false,
-            ticks: (0..=count)
-                .map(|index| low + f64::from(index) * step)
-                .map(|tick| (tick, short(tick)))
-                .collect(),
-            label: label.to_owned(),
-        }
-    }
-
-    /// Where a value is on it, 0 to 1; what lies beyond is put at the end.
-    fn place(&self, value: f64) -> f64 {
-        let share = if self.logarithmic {
-            (value / self.low).ln() / (self.high / self.low).ln()
-        } else {
-            (value - self.low) / (self.high - self.low)
-        };
-        share.clamp(0.0, 1.0)
-    }
-}
-
-fn short(value: f64) -> String {
-    if value >= 1_000.0 {
-        format!("{}k", value / 1_000.0)
-    } else {
-        format!("{value}")
-    }
-}
-
-/// A panel's axes on the page.
-struct Panel<'a> {
-    left: f64,
-    top: f64,
-    x: &'a Scale,
-    y: &'a Scale,
-}
-
-impl Panel<'_> {
-    const WIDE: f64 = PANEL_WIDTH - AROUND[0] - AROUND[2];
-    const HIGH: f64 = PANEL_HEIGHT - AROUND[1] - AROUND[3];
-
-    fn at(&self, x: f64, y: f64) -> (f64, f64) {
-        (
-            self.left + Self::WIDE * self.x.place(x),
-            self.top + Self::HIGH * (1.0 - self.y.place(y)),
-        )
-    }
-}
 
 /// Draws it.
 pub fn draw(result: &ContestResult) -> String {
@@ -229,86 +111,7 @@ pub fn draw(result: &ContestResult) -> String {
     svg
 }
 
-/// The bank's error over the Cramér–Rao bound, over frequency.
-pub fn draw_bound(rows: &[Row]) -> String {
-    let height = 32.0 + PANEL_HEIGHT + MARGIN;
-    let mut svg = page(height);
-    text(
-        &mut svg,
-        MARGIN + 8.0,
-        20.0,
-        &format!("font-size=\"12\" fill=\"{SOFT}\""),
-        "The bank’s RMS error over the Cramér–Rao bound for the travel that holds 99 % of its kernel; \
-         steady speed, 20 dB. Circles: a sine; squares: a trapezoid.",
-    );
-    let frequency = Scale::decades(4.0, 125.0, "v/λ, Hz");
-    let error = Scale::decades(0.02, 2.0, "");
-    let ratio = Scale::even(0.0, 5.0, 1.0, "");
-    let looks = [
-        ("sine", look("sine", "#0072B2", Shape::Circle)),
-        ("trapezoid", look("trapezoid", "#D55E00", Shape::Square)),
-    ];
-    type Value = fn(&Row) -> Option<f64>;
-    let panels: [(&str, usize, &Scale, Value); 3] = [
-        ("one gauge: error over bound", 1, &ratio, Row::ratio),
-        ("five gauges: error over bound", 5, &ratio, Row::ratio),
-        ("one gauge: RMS error, %", 1, &error, |row| row.rms_percent),
-    ];
-    for (column, (title, gauges, y, value)) in panels.into_iter().enumerate() {
-        let left = MARGIN + column as f64 * PANEL_WIDTH + AROUND[0];
-        let panel = Panel {
-            left,
-            top: 32.0 + AROUND[1],
-            x: &frequency,
-            y,
-        };
-        axes(&mut svg, &panel, title);
-        let shown = |profile| {
-            rows.iter()
-                .filter(move |row| row.gauges == gauges && row.profile == profile)
-        };
-        if y.logarithmic {
-            for bound in shown("sine").collect::<Vec<_>>().windows(2) {
-                let [from, to] = [bound[0], bound[1]]
-                    .map(|row| panel.at(row.frequency_hz, row.kernel_bound_percent));
-                line(
-                    &mut svg,
-                    from,
-                    to,
-                    "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
-                );
-            }
-        } else if gauges == 1 {
-            goal(&mut svg, &panel, GOAL, &format!("goal {GOAL}"));
-        }
-        for (profile, look) in &looks {
-            for row in shown(profile) {
-                if let Some(value) = value(row) {
-                    mark(
-                        &mut svg,
-                        panel.at(row.frequency_hz, value),
-                        look,
-                        false,
-                        1.0,
-                    );
-                }
-            }
-        }
-    }
-    svg.push_str("</svg>\n");
-    svg
-}
-
-/// The beginning of a page.
-fn page(height: f64) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
-         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"11\" fill=\"{INK}\">\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    )
-}
-
-fn goals_ms(family: &super::family::Family) -> Vec<f64> {
+fn goals_ms(family: &Family) -> Vec<f64> {
     let mut goals: Vec<f64> = family
         .scenes
         .iter()
@@ -317,23 +120,6 @@ fn goals_ms(family: &super::family::Family) -> Vec<f64> {
     goals.sort_by(f64::total_cmp);
     goals.dedup();
     goals
-}
-
-fn text(svg: &mut String, x: f64, y: f64, style: &str, words: &str) {
-    // A white edge keeps it legible over lines.
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" stroke=\"#ffffff\" stroke-width=\"3\" \
-         paint-order=\"stroke\" {style}>{words}</text>"
-    );
-}
-
-fn line(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &str) {
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" fill=\"none\" {style}/>",
-        from.0, from.1, to.0, to.1
-    );
 }
 
 fn legend(svg: &mut String) {
@@ -383,54 +169,7 @@ fn budget(svg: &mut String, panel: &Panel<'_>) {
     text(svg, x + 3.0, panel.top + 9.0, &style, "5 % of the M4F");
 }
 
-fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
-    let (left, top) = (panel.left, panel.top);
-    let (right, bottom) = (left + Panel::WIDE, top + Panel::HIGH);
-    text(
-        svg,
-        left - 30.0,
-        top - 9.0,
-        "font-size=\"13\" font-weight=\"600\"",
-        title,
-    );
-    for (value, label) in &panel.x.ticks {
-        let (x, _) = panel.at(*value, panel.y.low);
-        line(svg, (x, top), (x, bottom), &format!("stroke=\"{FAINT}\""));
-        text(svg, x, bottom + 14.0, "text-anchor=\"middle\"", label);
-    }
-    for (value, label) in &panel.y.ticks {
-        let (_, y) = panel.at(panel.x.low, *value);
-        line(svg, (left, y), (right, y), &format!("stroke=\"{FAINT}\""));
-        text(svg, left - 5.0, y + 4.0, "text-anchor=\"end\"", label);
-    }
-    let style = format!("text-anchor=\"middle\" fill=\"{SOFT}\"");
-    text(
-        svg,
-        (left + right) / 2.0,
-        bottom + 27.0,
-        &style,
-        &panel.x.label,
-    );
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\" fill=\"none\" stroke=\"{SOFT}\"/>"
-    );
-}
-
-fn goal(svg: &mut String, panel: &Panel<'_>, value: f64, words: &str) {
-    let (left, y) = panel.at(panel.x.low, value);
-    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\"");
-    line(svg, (left, y), (left + Panel::WIDE, y), &style);
-    text(
-        svg,
-        left + 3.0,
-        y - 3.0,
-        &format!("font-size=\"10\" fill=\"{SOFT}\""),
-        words,
-    );
-}
-
-fn bounds(svg: &mut String, panel: &Panel<'_>, family: &super::family::Family) {
+fn bounds(svg: &mut String, panel: &Panel<'_>, family: &Family) {
     for window in WINDOWS {
         let Some(percent) = window.bound_percent(family) else {
             continue;
@@ -560,47 +299,9 @@ fn knob_dash(knob: &str) -> &'static str {
     }
 }
 
-fn mark(svg: &mut String, (x, y): (f64, f64), look: &Look, hollow: bool, opacity: f64) {
-    let shape = match look.shape {
-        Shape::Circle => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\""),
-        Shape::Square => polygon(x, y, &[(-3.6, -3.6), (3.6, -3.6), (3.6, 3.6), (-3.6, 3.6)]),
-        Shape::Up => polygon(x, y, &[(0.0, -5.0), (4.6, 3.4), (-4.6, 3.4)]),
-        Shape::Down => polygon(x, y, &[(0.0, 5.0), (4.6, -3.4), (-4.6, -3.4)]),
-        Shape::Diamond => polygon(x, y, &[(0.0, -5.2), (5.2, 0.0), (0.0, 5.2), (-5.2, 0.0)]),
-    };
-    let (fill, stroke) = if hollow {
-        ("#ffffff", look.colour)
-    } else {
-        (look.colour, "#ffffff")
-    };
-    let width = if hollow { 1.8 } else { 0.8 };
-    let _ = writeln!(
-        svg,
-        "{shape} fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\" opacity=\"{opacity}\"/>"
-    );
-}
-
-fn polygon(x: f64, y: f64, corners: &[(f64, f64)]) -> String {
-    let mut points = String::new();
-    for (across, down) in corners {
-        let _ = write!(points, "{:.1},{:.1} ", x + across, y + down);
-    }
-    format!("<polygon points=\"{}\"", points.trim_end())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_scale_puts_its_ends_and_what_lies_beyond_at_0_and_1() {
-        let scale = Scale::decades(0.1, 1_000.0, "");
-        assert_eq!(scale.place(0.1), 0.0);
-        assert_eq!(scale.place(1e9), 1.0);
-        assert!((scale.place(1.0) - 0.25).abs() < 1e-12);
-        let ticks: Vec<&str> = scale.ticks.iter().map(|tick| &*tick.1).collect();
-        assert_eq!(ticks, ["0.1", "1", "10", "100", "1k"]);
-    }
 
     #[test]
     fn every_method_of_the_contest_has_a_look() {

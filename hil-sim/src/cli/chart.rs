@@ -138,7 +138,10 @@ impl Bound {
             );
         }
         write(&self.out.join("bound.csv"), &efficiency::csv(&rows)?)?;
-        write(&self.out.join("bound.svg"), &picture::draw_bound(&rows))?;
+        write(
+            &self.out.join("bound.svg"),
+            &efficiency::picture::draw(&rows),
+        )?;
         let met = rows.iter().all(|row| row.meets_goal() != Some(false));
         Ok(ExitCode::from(u8::from(!met)))
     }
