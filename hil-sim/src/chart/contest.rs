@@ -205,13 +205,15 @@ impl Visitor for Field {
 }
 
 /// Runs every contestant over every scene, on all cores: for each scene, in the order given, a summary
-/// for each contestant, in theirs. `done` is told after each scene.
+/// for each contestant, in theirs. What is said before `from_s` of a scene, in s, is not judged. `done` is
+/// told after each scene.
 ///
 /// # Errors
 /// If a scene can't be run.
 pub fn run(
     contestants: &[Contestant],
     scenes: &[&Scene],
+    from_s: impl Fn(&Scene) -> f64 + Sync,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Vec<Summary>>, SceneError> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -223,7 +225,7 @@ pub fn run(
                 while let index = next.fetch_add(1, Ordering::Relaxed)
                     && let Some(scene) = scenes.get(index)
                 {
-                    let result = run_scene(contestants, scene);
+                    let result = run_scene(contestants, scene, from_s(scene));
                     results.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(result);
                     done();
                 }
@@ -234,7 +236,11 @@ pub fn run(
     results.into_iter().flatten().collect()
 }
 
-fn run_scene(contestants: &[Contestant], scene: &Scene) -> Result<Vec<Summary>, SceneError> {
+fn run_scene(
+    contestants: &[Contestant],
+    scene: &Scene,
+    from_s: f64,
+) -> Result<Vec<Summary>, SceneError> {
     let mut recording = native::run(scene)?;
     let surface = Surface::new(&scene.surface, 0.0);
     let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
@@ -246,6 +252,9 @@ fn run_scene(contestants: &[Contestant], scene: &Scene) -> Result<Vec<Summary>, 
                 &mut *contestant.start(scene.sensor_configuration()),
                 &recording,
             );
+            recording
+                .estimates
+                .retain(|record| record.made_ns as f64 * 1e-9 >= from_s);
             estimates::judge(&truth, &recording).1
         })
         .collect())
@@ -393,11 +402,11 @@ mod tests {
         let scenes = [Scene::constant(2.0, 50.0), Scene::constant(3.0, 70.0)];
         let scenes: Vec<&Scene> = scenes.iter().collect();
         let field = contestants();
-        let first = run(&field, &scenes, || {}).unwrap();
-        assert_eq!(first, run(&field, &scenes, || {}).unwrap());
+        let first = run(&field, &scenes, |_| 0.0, || {}).unwrap();
+        assert_eq!(first, run(&field, &scenes, |_| 0.0, || {}).unwrap());
         assert_eq!(first.len(), 2);
         let backwards: Vec<&Scene> = scenes.iter().rev().copied().collect();
-        let second = run(&field, &backwards, || {}).unwrap();
+        let second = run(&field, &backwards, |_| 0.0, || {}).unwrap();
         assert_eq!(first[0], second[1]);
         assert_eq!(first[0].len(), field.len());
     }

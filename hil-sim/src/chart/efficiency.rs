@@ -38,7 +38,7 @@ pub struct Row {
     pub rms_percent: Option<f64>,
     /// The part of it that stays, in %: the root of the mean square of the wavelengths' biases.
     pub bias_percent: Option<f64>,
-    /// Mean share of valid estimates.
+    /// Mean share of valid estimates, the kernel's first travel counted as without.
     pub valid_share: f64,
     /// The bound in % for the travel that holds 99 % of the kernel's weight.
     pub kernel_bound_percent: f64,
@@ -85,7 +85,7 @@ pub fn measure(done: impl Fn() + Sync) -> Result<Vec<Row>, SceneError> {
         })
         .collect();
     let scenes: Vec<&Scene> = scenes.iter().collect();
-    let summaries = contest::run(&contestants, &scenes, done)?;
+    let summaries = contest::run(&contestants, &scenes, kernel_s, done)?;
     let mut rows = Vec::new();
     for (asked, (_, gauges)) in ASKED.iter().enumerate() {
         let mut cells = summaries.chunks(WAVELENGTHS_MM.len());
@@ -126,12 +126,18 @@ fn scene(profile: &Profile, wavelength_mm: f64, frequency_hz: f64) -> Scene {
         snr_db: Some(SNR_DB),
         ..Kinematic::default()
     });
-    let travel_percent = SensorConfiguration::DEFAULT.bank_travel_percent;
-    let kernel_s = bank_travel_mm(travel_percent, 1.0) / frequency_hz;
-    scene.duration_s = (KERNELS * kernel_s).clamp(DURATION_S.0, DURATION_S.1);
+    scene.duration_s = (KERNELS * kernel_s(&scene)).clamp(DURATION_S.0, DURATION_S.1);
     // A seed of its own for each.
     scene.seed = (wavelength_mm * 10.0 + frequency_hz * 1_000.0) as u64;
     scene
+}
+
+/// How long the travel of the kernel takes in a steady scene, in s. Before that the bank has used less of
+/// it than the bound is of.
+fn kernel_s(scene: &Scene) -> f64 {
+    let travel_percent = SensorConfiguration::DEFAULT.bank_travel_percent;
+    let wavelength_mm = scene.surface.specimens[0].wavelength_mm;
+    bank_travel_mm(travel_percent, wavelength_mm) / scene.motion.velocity_mm_s(0.0)
 }
 
 /// The bound over the wavelengths, for a travel of the default bank.

@@ -81,7 +81,7 @@ impl Estimators {
 
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
         let progress = Progress::default();
-        let summaries = contest::run(&contestants, &scenes, || progress.step())?;
+        let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.step())?;
         progress.end();
 
         let entries = contestants
