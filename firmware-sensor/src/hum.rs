@@ -7,8 +7,8 @@
 
 use protocol::GAUGES;
 
-use crate::SAMPLE_RATE_HZ;
 use crate::phasor::phasor;
+use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
 /// The mains' frequency in Hz.
 pub const MAINS_HZ: u32 = 50;
@@ -35,6 +35,11 @@ const COMMON: f32 = 0.6;
 const DOUBTFUL: f32 = 0.4;
 /// How near v/λ may come to the mains' frequency, in Hz, before a texture may be taken for hum.
 const NEAR_HZ: f32 = 4.0;
+/// Part of a gauge's component at the mains' frequency that may be of a texture which was near it, up to
+/// which the component is the gauge's own: e^(−2.3), after 0.7 s for one that stayed there long.
+const REMEMBERED: f32 = 0.1;
+/// How much of what is remembered of the texture is followed with every estimate.
+const FOLLOWED_PER_ESTIMATE: f32 = (SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ) as f32 / FOLLOWED_SAMPLES;
 
 /// What is known of the hum so far.
 #[derive(Clone, Debug)]
@@ -43,7 +48,8 @@ pub struct Hum {
     phasors: [[f32; 2]; GAUGES],
     before: [[f32; GAUGES]; HALF],
     samples: u32,
-    near: bool,
+    /// Share of what is followed in which a texture was near the mains' frequency, or may have been.
+    remembered: f32,
     pickup_lsb: f32,
     /// What is taken out of each gauge, renewed with every estimate.
     removed: [[f32; 2]; GAUGES],
@@ -55,7 +61,7 @@ impl Default for Hum {
             phasors: [[0.0; 2]; GAUGES],
             before: [[0.0; GAUGES]; HALF],
             samples: 0,
-            near: true,
+            remembered: 1.0,
             pickup_lsb: 0.0,
             removed: [[0.0; 2]; GAUGES],
         }
@@ -94,7 +100,8 @@ impl Hum {
     /// Renews what is taken out, once an estimate: `usable` are the gauges that what is common is taken
     /// from, `texture_hz` the texture's frequency v/λ̂, if λ̂ can be relied on.
     pub fn renew(&mut self, usable: u8, texture_hz: Option<f32>) {
-        self.near = texture_hz.is_none_or(|hz| (hz - MAINS_HZ as f32).abs() < NEAR_HZ);
+        let near = texture_hz.is_none_or(|hz| (hz - MAINS_HZ as f32).abs() < NEAR_HZ);
+        self.remembered += FOLLOWED_PER_ESTIMATE * (f32::from(u8::from(near)) - self.remembered);
         let (common, share) = self.common(usable);
         let learned = self.samples >= LEARNED_SAMPLES;
         self.pickup_lsb = if self.samples < FORGOTTEN_SAMPLES && share >= DOUBTFUL {
@@ -104,7 +111,7 @@ impl Hum {
         };
         self.removed = if !learned {
             [[0.0; 2]; GAUGES]
-        } else if self.near {
+        } else if self.may_be_texture() {
             let trust = ((share - DOUBTFUL) / (COMMON - DOUBTFUL)).clamp(0.0, 1.0);
             [common.map(|z| trust * z); GAUGES]
         } else {
@@ -121,7 +128,7 @@ impl Hum {
     /// Power of each gauge's own hum in ADC steps², beyond what is common to the `usable` ones; 0 as
     /// long as it may be texture.
     pub fn own_powers(&self, usable: u8) -> [f32; GAUGES] {
-        if self.near || self.samples < SURE_SAMPLES {
+        if self.may_be_texture() || self.samples < SURE_SAMPLES {
             return [0.0; GAUGES];
         }
         let (common, _) = self.common(usable);
@@ -139,6 +146,11 @@ impl Hum {
         })
     }
 
+    /// Whether what is at the mains' frequency may be of a texture, the present one or one before it.
+    fn may_be_texture(&self) -> bool {
+        self.remembered > REMEMBERED
+    }
+
     /// The usable gauges' mean phasor, and the share of their power in it.
     fn common(&self, usable: u8) -> ([f32; 2], f32) {
         let (mut sum, mut power) = ([0.0; 2], 0.0);
@@ -152,5 +164,70 @@ impl Hum {
         let mean = sum.map(|sum| sum / count);
         let common = count * (mean[0] * mean[0] + mean[1] * mean[1]);
         (mean, if power > 0.0 { common / power } else { 0.0 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AMPLITUDE: f32 = 400.0;
+    const ALL: u8 = 0b1_1111;
+    const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
+
+    /// Feeds `samples` in which gauge g has `amplitudes[g]` at the mains' frequency, with a phase of g
+    /// radians, and looks at the hum after each estimate.
+    fn feed(
+        hum: &mut Hum,
+        samples: u32,
+        amplitudes: [f32; GAUGES],
+        texture_hz: f32,
+        mut look: impl FnMut(&Hum),
+    ) {
+        for sample in 1..=samples {
+            let cycles = f64::from(hum.samples % CYCLE as u32) / CYCLE as f64;
+            let mut gauges = core::array::from_fn(|gauge| {
+                let phase = core::f64::consts::TAU * cycles + gauge as f64;
+                amplitudes[gauge] * libm::cos(phase) as f32
+            });
+            hum.remove(&mut gauges);
+            if sample.is_multiple_of(SAMPLES_PER_ESTIMATE) {
+                hum.renew(ALL, Some(texture_hz));
+                look(hum);
+            }
+        }
+    }
+
+    #[test]
+    fn a_texture_that_leaves_the_mains_frequency_is_not_taken_for_hum_of_the_gauges() {
+        let mut hum = Hum::default();
+        let none = |hum: &Hum| assert_eq!(hum.own_powers(ALL), [0.0; GAUGES]);
+        feed(&mut hum, 2_000, [AMPLITUDE; GAUGES], 50.0, none);
+        // 1 mm at 50 mm/s goes over into 4 mm. It is remembered in steps of an estimate, which go a
+        // little faster than what is followed goes in steps of a sample.
+        let left = 1.1 * REMEMBERED * AMPLITUDE;
+        // Off from a mean of up to as much, which lacks its own fifth.
+        let own = 2.0 * left * 5.0 / 4.0;
+        let most = 0.5 * own * own;
+        feed(&mut hum, 2_000, [0.0; GAUGES], 12.5, |hum| {
+            let powers = hum.own_powers(ALL);
+            assert!(powers.iter().all(|&power| power <= most), "{powers:?}");
+            let removed = hum.removed.map(|z| libm::hypotf(z[0], z[1]));
+            assert!(removed.iter().all(|&z| z <= left), "{removed:?}");
+        });
+    }
+
+    #[test]
+    fn a_gauges_own_hum_is_known_for_what_it_is_once_no_texture_can_be_it() {
+        let mut hum = Hum::default();
+        let one = [0.0, AMPLITUDE, 0.0, 0.0, 0.0];
+        feed(&mut hum, SURE_SAMPLES, one, 12.5, |_| {});
+        let powers = hum.own_powers(ALL);
+        // A mean over at least three cycles of the mains is within some percent of a steady amplitude.
+        assert!(powers[1] > 0.8 * 0.5 * AMPLITUDE * AMPLITUDE, "{powers:?}");
+        for gauge in [0, 2, 3, 4] {
+            // Of the mean, a fifth of one gauge's, each is as far as that; taken for four fifths of it.
+            assert!(powers[gauge] < 0.1 * powers[1], "{powers:?}");
+        }
     }
 }
