@@ -240,7 +240,7 @@ impl Bank {
 
     /// The wavelength at the peak around candidate `number`, in mm: none at the bank's ends, and none if
     /// there is no peak between the neighbours.
-    fn vertex(&self, kernel: Kernel, number: usize, energy: impl Fn(usize) -> f32) -> Option<f32> {
+    fn vertex(&self, kernel: Kernel, number: usize) -> Option<f32> {
         let around = number.checked_sub(1)?..=number + 1;
         if *around.end() >= self.count {
             return None;
@@ -248,10 +248,12 @@ impl Bank {
         let [x0, x1, x2] =
             [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
         let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
-            let energy = energy(i).max(f32::MIN_POSITIVE);
+            let power = self.candidates[i]
+                .power(kernel, self.touch.usable)
+                .max(f32::MIN_POSITIVE);
             match kernel {
-                Kernel::Short => 1.0 / energy,
-                Kernel::Long => 1.0 / libm::sqrtf(energy),
+                Kernel::Short => 1.0 / power,
+                Kernel::Long => 1.0 / libm::sqrtf(power),
             }
         });
         let rise = (y1 - y0) / (x1 - x0);
@@ -309,7 +311,7 @@ impl Bank {
     fn look(&self, kernel: Kernel) -> Look {
         let (energies, number) = self.spectrum(kernel, self.touch.usable);
         let agreement = self.agreement(kernel, number);
-        let vertex = self.vertex(kernel, number, |i| energies[i]);
+        let vertex = self.vertex(kernel, number);
         let wavelength_mm = vertex.unwrap_or(self.candidates[number].wavelength_mm);
         // What was felt before a change of surface is no sign of stick and slip after it.
         let jerky =
@@ -425,9 +427,7 @@ impl Estimator for Bank {
         self.since_valid = self.since_valid.saturating_add(1);
 
         let long = self.look(Kernel::Long);
-        let short_mm = self.vertex(Kernel::Short, long.number, |i| {
-            self.candidates[i].energy(Kernel::Short, self.touch.usable)
-        });
+        let short_mm = self.vertex(Kernel::Short, long.number);
         let agree = long
             .wavelength_mm
             .zip(short_mm)
@@ -487,6 +487,21 @@ impl Candidate {
         let sums = self.sums(kernel);
         Fit::of(sums).map_or(0.0, |fit| {
             gauges_of(gauges).map(|gauge| fit.energy(sums, gauge)).sum()
+        })
+    }
+
+    /// What the peak is found by: the geometric mean of the energy that the fit explains and of its
+    /// amplitude squared, each summed over `gauges`. As the latest travel covers a little more or less
+    /// than whole waves both ripple, in opposite ways; their mean does half as much.
+    fn power(&self, kernel: Kernel, gauges: u8) -> f32 {
+        let sums = self.sums(kernel);
+        Fit::of(sums).map_or(0.0, |fit| {
+            let (mut energy, mut squares) = (0.0, 0.0);
+            for gauge in gauges_of(gauges) {
+                energy += fit.energy(sums, gauge);
+                squares += fit.amplitude_squared(sums, gauge);
+            }
+            libm::sqrtf(energy * squares)
         })
     }
 
@@ -575,6 +590,19 @@ impl Fit {
         let direct = self.p * (s0 * s0 + s1 * s1);
         let image = r0 * (s0 * s0 - s1 * s1) + 2.0 * r1 * s0 * s1;
         (self.scale * (direct - image)).max(0.0)
+    }
+
+    /// The wave's amplitude in the gauge, squared.
+    fn amplitude_squared(&self, sums: &Sums, gauge: usize) -> f32 {
+        let mean = sums[MEAN + gauge];
+        let s0 = sums[2 * gauge] - mean * self.first[0];
+        let s1 = sums[2 * gauge + 1] - mean * self.first[1];
+        let [r0, r1] = self.r;
+        // (P S − R S*) / (P² − |R|²)
+        let a0 = self.p * s0 - (r0 * s0 + r1 * s1);
+        let a1 = self.p * s1 - (r1 * s0 - r0 * s1);
+        let scale = 2.0 / self.determinant;
+        scale * scale * (a0 * a0 + a1 * a1)
     }
 
     /// The gauge's variance, per weight.
