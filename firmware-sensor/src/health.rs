@@ -16,14 +16,19 @@ const HIGHEST_CODE: u16 = 4_095;
 const FOLLOWED_ESTIMATES: f32 = 30.0;
 /// Share of scans at an end that makes a gauge saturated.
 const AT_RAILS: f32 = 0.02;
-/// Estimates without a change of the code after which a gauge is stuck, if others change.
+/// Estimates without a change of the code after which a gauge is stuck, if another speaks.
 const STILL_ESTIMATES: u32 = 20;
 /// A stuck code this near mid-rail is a gauge that is not connected.
 const MID_RAIL: core::ops::RangeInclusive<u16> = 2_048 - 16..=2_048 + 16;
-/// Power of a gauge relative to the strongest below which it says next to nothing.
+/// Power of a gauge relative to the second strongest below which it says next to nothing. To the second,
+/// since one alone may have been pushed or be at fault.
 const SILENT: f32 = 1e-4;
-/// The strongest gauge must have this power, in ADC steps², before any is called silent.
+/// Power from which on a gauge speaks, in ADC steps², beyond twice its noise. Where none does, as on a
+/// smooth surface or at rest, there is nothing to tell a silent or a stuck gauge by.
 const SPEAKING: f32 = 100.0;
+/// The typical gauge's power is taken for no less, in ADC steps²: noise and hum that are below it do no
+/// harm, and a power near 0 is what rounding leaves of its offset.
+const LEAST_TYPICAL: f32 = 4.0;
 /// White noise, relative to the typical gauge's whole power, above which a gauge is of no use.
 const TOO_NOISY: f32 = 3.0;
 /// Own hum's power, relative to the typical gauge's, above which a gauge is left out.
@@ -76,6 +81,9 @@ pub struct Signs {
     pub misfits: u8,
     /// The others agree on one.
     pub agreed: bool,
+    /// Bit g set: gauge g is allowed to take part. The others are judged too, but not the measure of
+    /// anything: they may not be connected.
+    pub allowed: u8,
 }
 
 impl Health {
@@ -115,10 +123,7 @@ impl Health {
         for history in &mut self.gauges {
             history.follow(samples, follow);
         }
-        let mut powers = self.gauges.map(|history| history.power);
-        powers.sort_unstable_by(f32::total_cmp);
-        let (typical, strongest) = (powers[GAUGES / 2], powers[GAUGES - 1]);
-        let changing = self.gauges.iter().any(|history| history.still == 0);
+        let measure = Measure::of(&self.gauges, signs);
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             let misfit = signs.misfits >> gauge & 1 == 1;
             if signs.agreed {
@@ -130,17 +135,17 @@ impl Health {
             }
             let fault = if history.at_rails > AT_RAILS {
                 GaugeHealth::Saturated
-            } else if history.still >= STILL_ESTIMATES && changing {
+            } else if history.still >= STILL_ESTIMATES && measure.speaks {
                 if MID_RAIL.contains(&history.last) {
                     GaugeHealth::Dead
                 } else {
                     GaugeHealth::Stuck
                 }
-            } else if strongest > SPEAKING && history.power < SILENT * strongest {
+            } else if history.power < measure.silent {
                 GaugeHealth::Dead
-            } else if signs.noise[gauge] > TOO_NOISY * typical {
+            } else if signs.noise[gauge] > TOO_NOISY * measure.typical {
                 GaugeHealth::Noisy
-            } else if signs.hum[gauge] > TOO_MUCH_HUM * typical {
+            } else if signs.hum[gauge] > TOO_MUCH_HUM * measure.typical {
                 GaugeHealth::Hum
             } else if history.misfits >= MISFIT_ESTIMATES {
                 GaugeHealth::Noisy
@@ -170,6 +175,43 @@ impl Health {
             good |= u8::from(history.health == GaugeHealth::Good) << gauge;
         }
         good
+    }
+}
+
+/// What a gauge is measured by: the allowed ones that are neither at an end of the range nor stuck.
+struct Measure {
+    /// Their median power, in ADC steps², and no less than [`LEAST_TYPICAL`].
+    typical: f32,
+    /// Power below which a gauge is silent while others speak; 0 if they do not.
+    silent: f32,
+    /// One of them at least speaks.
+    speaks: bool,
+}
+
+impl Measure {
+    fn of(gauges: &[History; GAUGES], signs: &Signs) -> Self {
+        let mut powers = [0.0; GAUGES];
+        let (mut count, mut speaking) = (0, 0);
+        for (gauge, history) in gauges.iter().enumerate() {
+            let allowed = signs.allowed >> gauge & 1 == 1;
+            if allowed && history.at_rails <= AT_RAILS && history.still < STILL_ESTIMATES {
+                powers[count] = history.power;
+                count += 1;
+                speaking += u8::from(history.power > SPEAKING + 2.0 * signs.noise[gauge]);
+            }
+        }
+        let powers = &mut powers[..count];
+        powers.sort_unstable_by(f32::total_cmp);
+        let typical = powers.get(count / 2).copied().unwrap_or(0.0);
+        let second = match powers {
+            [.., second, _] => *second,
+            _ => 0.0,
+        };
+        Self {
+            typical: typical.max(LEAST_TYPICAL),
+            silent: if speaking >= 2 { SILENT * second } else { 0.0 },
+            speaks: speaking > 0,
+        }
     }
 }
 

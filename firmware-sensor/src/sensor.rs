@@ -181,6 +181,7 @@ impl Sensor {
                 hum: self.hum.own_powers(usable),
                 misfits: finding.misfits,
                 agreed: finding.valid,
+                allowed: self.configuration.gauges,
             });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
             let sequence = self.estimates;
