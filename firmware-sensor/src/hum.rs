@@ -24,6 +24,8 @@ const _: () = assert!(SAMPLE_RATE_HZ.is_multiple_of(2 * MAINS_HZ));
 const FOLLOWED_SAMPLES: f32 = 300.0;
 /// Samples from the start until hum has been told from what else is at its frequency for the moment.
 const LEARNED_SAMPLES: u32 = 400;
+/// Samples from the start until what was felt before is forgotten for the most part.
+const FORGOTTEN_SAMPLES: u32 = LEARNED_SAMPLES + 100;
 /// Samples from the start until a gauge may be blamed for its own hum: three time constants.
 const SURE_SAMPLES: u32 = 3 * FOLLOWED_SAMPLES as u32;
 /// Share of the gauges' power at the mains' frequency that is common to them, from which on it is taken
@@ -94,12 +96,15 @@ impl Hum {
     pub fn renew(&mut self, usable: u8, texture_hz: Option<f32>) {
         self.near = texture_hz.is_none_or(|hz| (hz - MAINS_HZ as f32).abs() < NEAR_HZ);
         let (common, share) = self.common(usable);
-        self.pickup_lsb = if self.samples < LEARNED_SAMPLES && share >= COMMON {
+        let learned = self.samples >= LEARNED_SAMPLES;
+        self.pickup_lsb = if self.samples < FORGOTTEN_SAMPLES && share >= DOUBTFUL {
             libm::sqrtf(common[0] * common[0] + common[1] * common[1])
         } else {
             0.0
         };
-        self.removed = if self.near {
+        self.removed = if !learned {
+            [[0.0; 2]; GAUGES]
+        } else if self.near {
             let trust = ((share - DOUBTFUL) / (COMMON - DOUBTFUL)).clamp(0.0, 1.0);
             [common.map(|z| trust * z); GAUGES]
         } else {
@@ -107,7 +112,7 @@ impl Hum {
         };
     }
 
-    /// Amplitude in ADC steps of what may be hum or texture and is not told apart yet; 0 from 0.4 s
+    /// Amplitude in ADC steps of what may be hum or texture and is not told apart yet; 0 from 0.5 s
     /// after the start on.
     pub fn pickup_lsb(&self) -> f32 {
         self.pickup_lsb
