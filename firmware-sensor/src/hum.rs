@@ -154,3 +154,183 @@ impl Hum {
         (mean, if power > 0.0 { common / power } else { 0.0 })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: u8 = 0b11111;
+    const TAU: f64 = 2.0 * core::f64::consts::PI;
+    const AMPLITUDE: f64 = 500.0;
+
+    /// What is left after `ms` of signals of gauge and s, with what is taken out renewed as on the board;
+    /// each gauge's largest amount over the last cycle of the mains, in ADC steps.
+    fn left(
+        hum: &mut Hum,
+        ms: u32,
+        texture_hz: Option<f32>,
+        mut signal: impl FnMut(usize, f64) -> f64,
+    ) -> [f64; GAUGES] {
+        let mut left = [0.0_f64; GAUGES];
+        for n in 0..ms {
+            let t_s = f64::from(n) * 1e-3;
+            let mut gauges = core::array::from_fn(|gauge| signal(gauge, t_s) as f32);
+            hum.remove(&mut gauges);
+            if n % 10 == 9 {
+                hum.renew(ALL, texture_hz);
+            }
+            if n + CYCLE as u32 >= ms {
+                for (left, x) in left.iter_mut().zip(gauges) {
+                    *left = left.max(f64::from(x.abs()));
+                }
+            }
+        }
+        left
+    }
+
+    /// The mains at a phase.
+    fn mains(t_s: f64, phase: f64) -> f64 {
+        AMPLITUDE * libm::cos(TAU * 50.0 * t_s + phase)
+    }
+
+    /// What a phasor's own ripple at 100 Hz leaves of hum: 1/300 beside 2 sin(π 100/1 000), and a little
+    /// for the cosine's table and the mean that it began with, e^(−700/300) of 1/300 / sin(18°).
+    fn ripple() -> f64 {
+        let follow = f64::from(1.0 / FOLLOWED_SAMPLES);
+        let sin = libm::sin(TAU * 50.0 / 1_000.0);
+        AMPLITUDE * (follow / (2.0 * sin) + 0.1 * follow / sin + 2e-4)
+    }
+
+    #[test]
+    fn common_hum_of_any_phase_is_gone_within_a_second() {
+        for step in 0..16 {
+            let phase = TAU * f64::from(step) / 16.0;
+            let left = left(&mut Hum::default(), 1_000, None, |_, t_s| mains(t_s, phase));
+            for left in left {
+                assert!(left <= ripple(), "{left} at {phase}");
+            }
+        }
+    }
+
+    #[test]
+    fn mains_a_twentieth_of_a_hertz_off_leave_a_tenth() {
+        // A first-order follower of time constant τ lags behind by Δω τ = 2π · 0.05 · 0.3 = 0.094 rad.
+        let lag = TAU * 0.05 * f64::from(FOLLOWED_SAMPLES) / 1e3;
+        for off_hz in [-0.05, 0.05] {
+            let left = left(&mut Hum::default(), 4_000, None, |_, t_s| {
+                mains(t_s, TAU * off_hz * t_s)
+            });
+            for left in left {
+                assert!(left <= lag * AMPLITUDE + ripple(), "{left}");
+                assert!(left >= 0.8 * lag * AMPLITUDE, "{left}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_offset_and_what_is_at_twice_the_mains_pass_unchanged() {
+        let mut hum = Hum::default();
+        let mut gauges_before = [0.0; GAUGES];
+        for n in 0..2_000 {
+            let twice = [0.0, 3.0, -2.0, -3.0, 2.0, 0.0, 3.0, -2.0, -3.0, 2.0][n % 10];
+            let gauges: [f32; GAUGES] =
+                core::array::from_fn(|gauge| 700.0 * gauge as f32 - 1_500.0 + twice);
+            let mut out = gauges;
+            hum.remove(&mut out);
+            hum.renew(ALL, if n % 3 == 0 { None } else { Some(20.0) });
+            // Exactly: the difference over half a cycle is 0.
+            assert_eq!(out, gauges);
+            gauges_before = out;
+        }
+        assert!(gauges_before[4] > 1_000.0);
+    }
+
+    #[test]
+    fn a_texture_at_the_mains_frequency_that_meets_the_gauges_in_turn_is_left_alone() {
+        // Evenly spread phases have no mean; a share of 0.3 is below what is doubtful.
+        for phases in [[0.0, 1.3, 2.5, 3.8, 5.0], [0.0, 3.54, -0.7, 4.24, -0.3]] {
+            let mut hum = Hum::default();
+            for n in 0..3_000 {
+                let t_s = f64::from(n) * 1e-3;
+                let gauges: [f32; GAUGES] =
+                    core::array::from_fn(|gauge| mains(t_s, phases[gauge]) as f32);
+                let mut out = gauges;
+                hum.remove(&mut out);
+                assert_eq!(out, gauges, "at {n} ms");
+                if n % 10 == 9 {
+                    hum.renew(ALL, Some(50.0));
+                }
+            }
+            assert!(hum.common(ALL).1 < DOUBTFUL);
+        }
+    }
+
+    #[test]
+    fn one_gauges_own_hum_is_removed_and_named_once_the_texture_is_known_to_be_elsewhere() {
+        let own = |gauge: usize, t_s: f64| if gauge == 3 { mains(t_s, 1.0) } else { 0.0 };
+        let mut hum = Hum::default();
+        // Alone, its share of what is common is a fifth.
+        let left_near = left(&mut hum, 1_000, None, own);
+        assert!(
+            (left_near[3] - AMPLITUDE).abs() < 0.06 * AMPLITUDE,
+            "{left_near:?}"
+        );
+        assert_eq!(hum.own_powers(ALL), [0.0; GAUGES]);
+        let left_far = left(&mut hum, 100, Some(30.0), own);
+        for left in left_far {
+            assert!(left <= ripple(), "{left_far:?}");
+        }
+        let powers = hum.own_powers(ALL).map(f64::from);
+        let want = AMPLITUDE * AMPLITUDE / 2.0;
+        assert!((powers[3] / want - 1.0).abs() < 0.03, "{powers:?}");
+        for gauge in [0, 1, 2, 4] {
+            // Their distance from a mean to which the fifth contributes: (¼ A)² / 2.
+            assert!(powers[gauge] <= 1.05 * want / 16.0, "{powers:?}");
+        }
+        // Left out, it does not stand against the others.
+        let powers = hum.own_powers(0b10111);
+        assert!(powers[0] < 1.0 && powers[3] > 1e5, "{powers:?}");
+    }
+
+    #[test]
+    fn what_is_common_stands_in_the_way_until_it_is_learned() {
+        let mut hum = Hum::default();
+        for n in 0..1_000_u32 {
+            let mut gauges = [mains(f64::from(n) * 1e-3, 0.3) as f32; GAUGES];
+            hum.remove(&mut gauges);
+            if n % 10 == 9 {
+                hum.renew(ALL, None);
+                let pickup = f64::from(hum.pickup_lsb());
+                if n + 1 >= FORGOTTEN_SAMPLES {
+                    assert_eq!(pickup, 0.0);
+                } else if n >= 50 {
+                    // A plain mean over n samples, with up to 1 / sin(18°) of them over: 3.24.
+                    let bound = AMPLITUDE * 3.3 / f64::from((n - HALF as u32).min(300));
+                    assert!((pickup - AMPLITUDE).abs() <= bound, "{pickup} at {n}");
+                }
+            }
+        }
+        // Phases of their own are no pickup.
+        let mut hum = Hum::default();
+        for n in 0..300 {
+            let t_s = f64::from(n) * 1e-3;
+            let mut gauges = core::array::from_fn(|gauge| mains(t_s, 1.2566 * gauge as f64) as f32);
+            hum.remove(&mut gauges);
+            hum.renew(ALL, None);
+            assert!(n < 60 || hum.pickup_lsb() == 0.0, "{n}");
+        }
+    }
+
+    #[test]
+    fn the_count_of_samples_wraps_at_the_same_phase() {
+        let mut hum = Hum::default();
+        left(&mut hum, 1_000, None, |_, t_s| mains(t_s, 0.3));
+        // 1 000 is a multiple of 20, and so is this.
+        hum.samples = WRAP_SAMPLES / 20 * 20 - 100;
+        let left = left(&mut hum, 120 + 20, None, |_, t_s| mains(t_s, 0.3));
+        assert!(hum.samples < WRAP_SAMPLES - 100_000);
+        for left in left {
+            assert!(left <= ripple(), "{left}");
+        }
+    }
+}
