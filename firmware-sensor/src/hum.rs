@@ -3,12 +3,13 @@
 //! Each gauge's component at the mains' frequency is followed slowly (a notch some 1 Hz wide). A texture
 //! may be at that frequency too, v/λ = 50 Hz. So as long as that may be, only what all gauges have in
 //! common is taken for hum and out: hum enters the amplifiers alike, while a texture meets the gauges
-//! with a different phase each.
+//! with a different phase each. What a gauge holds of its own is forgotten each time a texture has been at
+//! the mains' frequency or has passed it.
 
 use protocol::GAUGES;
 
-use crate::SAMPLE_RATE_HZ;
 use crate::phasor::phasor;
+use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
 /// The mains' frequency in Hz.
 pub const MAINS_HZ: u32 = 50;
@@ -26,8 +27,10 @@ const FOLLOWED_SAMPLES: f32 = 300.0;
 const LEARNED_SAMPLES: u32 = 400;
 /// Samples from the start until what was felt before is forgotten for the most part.
 const FORGOTTEN_SAMPLES: u32 = LEARNED_SAMPLES + 100;
-/// Samples from the start until a gauge may be blamed for its own hum: three time constants.
-const SURE_SAMPLES: u32 = 3 * FOLLOWED_SAMPLES as u32;
+/// Estimates in a row without a texture that is known to be at the mains' frequency, before a gauge may
+/// be blamed for its own hum: three time constants.
+const SURE_ESTIMATES: u16 =
+    (3 * FOLLOWED_SAMPLES as u32 * ESTIMATE_RATE_HZ / SAMPLE_RATE_HZ) as u16;
 /// Share of the gauges' power at the mains' frequency that is common to them, from which on it is taken
 /// for hum, and up to which for texture. Five gauges of random phases have 0.2.
 const COMMON: f32 = 0.6;
@@ -44,6 +47,12 @@ pub struct Hum {
     before: [[f32; GAUGES]; HALF],
     samples: u32,
     near: bool,
+    /// How far the texture was from the mains' frequency last, in Hz; 0 if it was not known.
+    off_hz: f32,
+    /// Estimates since it was known to be near.
+    clean: u16,
+    /// It was, and the phasors hold it.
+    tainted: bool,
     pickup_lsb: f32,
     /// What is taken out of each gauge, renewed with every estimate.
     removed: [[f32; 2]; GAUGES],
@@ -56,6 +65,9 @@ impl Default for Hum {
             before: [[0.0; GAUGES]; HALF],
             samples: 0,
             near: true,
+            off_hz: 0.0,
+            clean: 0,
+            tainted: false,
             pickup_lsb: 0.0,
             removed: [[0.0; 2]; GAUGES],
         }
@@ -94,8 +106,26 @@ impl Hum {
     /// Renews what is taken out, once an estimate: `usable` are the gauges that what is common is taken
     /// from, `texture_hz` the texture's frequency v/λ̂, if λ̂ can be relied on.
     pub fn renew(&mut self, usable: u8, texture_hz: Option<f32>) {
-        self.near = texture_hz.is_none_or(|hz| (hz - MAINS_HZ as f32).abs() < NEAR_HZ);
+        let off_hz = texture_hz.map_or(0.0, |hz| hz - MAINS_HZ as f32);
+        // A stroke may pass the mains' frequency between two estimates.
+        let passed = off_hz * self.off_hz < 0.0;
+        self.off_hz = off_hz;
+        self.near = off_hz.abs() < NEAR_HZ || passed;
+        let known_near = self.near && texture_hz.is_some();
         let (common, share) = self.common(usable);
+        let trust = ((share - DOUBTFUL) / (COMMON - DOUBTFUL)).clamp(0.0, 1.0);
+        let common_hum = [common.map(|z| trust * z); GAUGES];
+        if known_near {
+            self.clean = 0;
+            self.tainted = true;
+        } else {
+            if self.tainted && !self.near {
+                // What the gauges hold of their own is the texture's.
+                self.phasors = common_hum;
+                self.tainted = false;
+            }
+            self.clean = self.clean.saturating_add(1);
+        }
         let learned = self.samples >= LEARNED_SAMPLES;
         self.pickup_lsb = if self.samples < FORGOTTEN_SAMPLES && share >= DOUBTFUL {
             libm::sqrtf(common[0] * common[0] + common[1] * common[1])
@@ -105,8 +135,7 @@ impl Hum {
         self.removed = if !learned {
             [[0.0; 2]; GAUGES]
         } else if self.near {
-            let trust = ((share - DOUBTFUL) / (COMMON - DOUBTFUL)).clamp(0.0, 1.0);
-            [common.map(|z| trust * z); GAUGES]
+            common_hum
         } else {
             self.phasors
         };
@@ -121,7 +150,7 @@ impl Hum {
     /// Power of each gauge's own hum in ADC steps², beyond what is common to the `usable` ones; 0 as
     /// long as it may be texture.
     pub fn own_powers(&self, usable: u8) -> [f32; GAUGES] {
-        if self.near || self.samples < SURE_SAMPLES {
+        if self.near || self.clean < SURE_ESTIMATES {
             return [0.0; GAUGES];
         }
         let (common, _) = self.common(usable);
