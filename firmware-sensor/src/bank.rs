@@ -625,3 +625,6 @@ fn second_difference_gain(frequency_hz: f32) -> f32 {
 fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
     (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
 }
+
+#[cfg(test)]
+mod tests;
