@@ -225,3 +225,256 @@ fn every_candidates_energy_is_that_of_a_direct_least_squares_fit() {
     }
     assert!(compared > 200, "{compared}");
 }
+
+/// λ from 0.7 to 6 mm, off the bank's grid, evenly in log λ.
+fn wavelengths_mm(count: u32) -> impl Iterator<Item = f64> {
+    (0..count).map(move |i| 0.7 * libm::pow(6.0 / 0.7, f64::from(i) / f64::from(count - 1)))
+}
+
+#[test]
+fn a_sine_of_any_wavelength_is_found_without_bias() {
+    let mut worst: f64 = 0.0;
+    for wavelength_mm in wavelengths_mm(97) {
+        let mut rub = Rub::new();
+        // Ten wavelengths, seven of the kernel's constants.
+        rub.rub((12.0 * wavelength_mm / 0.04) as u32, 40.0, sine(wavelength_mm));
+        // And over the next one, since what is left of the image turns with the phase.
+        for _ in 0..(wavelength_mm / 0.04) as u32 {
+            rub.step(40.0, sine(wavelength_mm));
+            let error = rub.wavelength_mm() / wavelength_mm - 1.0;
+            worst = worst.max(error.abs());
+        }
+    }
+    // What the vertex owes to the kernel's steps of 2 ms and to the image at −k; measured 7e-4.
+    assert!(worst <= 1e-3, "{worst}");
+}
+
+#[test]
+fn the_same_surface_has_the_same_wavelength_however_it_is_stroked() {
+    let mut worst: f64 = 0.0;
+    for wavelength_mm in [0.8, 1.37, 2.71, 4.4] {
+        let profiles: [fn(f64) -> f64; 6] = [
+            |_| 30.0,
+            |_| -30.0,
+            |_| 90.0,
+            |t_s| 50.0 + 45.0 * libm::sin(TAU * 3.0 * t_s),
+            |t_s| 70.0 * libm::sin(TAU * 2.0 * t_s),
+            |t_s| -100.0 * libm::sin(TAU * 1.0 * t_s),
+        ];
+        for profile in profiles {
+            let mut rub = Rub::new();
+            for ms in 0..4_000 {
+                let finding = rub.step(profile(f64::from(ms) * 1e-3), trapezoid(wavelength_mm));
+                if let Some(finding) = finding.filter(|finding| finding.valid) {
+                    let found_mm = f64::from(finding.wavelength_mm.unwrap());
+                    worst = worst.max((found_mm / wavelength_mm - 1.0).abs());
+                }
+            }
+        }
+    }
+    std::println!("profiles: {worst}");
+    assert!(worst <= 3e-2, "{worst}");
+}
+
+#[test]
+fn offsets_and_gain_do_not_matter() {
+    for wavelength_mm in [0.8, 2.71, 4.4] {
+        let plain = trapezoid(wavelength_mm);
+        let found = [(1.0, 0.0), (1.0, 900.0), (0.1, 0.0), (4.0, -600.0)].map(|(gain, offset)| {
+            let mut rub = Rub::new();
+            let (finding, _) = rub.rub(1_503, 50.0, |gauge, x_mm| {
+                gain * plain(gauge, x_mm) + offset * (gauge as f64 - 2.0)
+            });
+            assert!(finding.valid);
+            (
+                f64::from(finding.wavelength_mm.unwrap()),
+                f64::from(finding.amplitude_lsb) / gain,
+                f64::from(finding.confidence),
+            )
+        });
+        for found in &found[1..] {
+            std::println!("{:?}", (found.0 / wavelength_mm, found.1, found.2));
+        }
+    }
+}
+
+#[test]
+fn places_may_wrap() {
+    let mut found = [0.0; 3];
+    // 40 mm, in which the wrap comes after 30 or 35.
+    let starts = [0, i32::MAX - 30 * PLACES_PER_MM, i32::MIN + 5 * PLACES_PER_MM];
+    for (found, (start, speed)) in found.iter_mut().zip([
+        (starts[0], 40.0),
+        (starts[1], 40.0),
+        (starts[2], -40.0),
+    ]) {
+        let mut rub = Rub::new();
+        rub.start = start;
+        let (finding, valid) = rub.rub(1_000, speed, trapezoid(1.37));
+        assert!(finding.valid && valid > 80, "{valid}");
+        *found = f64::from(finding.wavelength_mm.unwrap());
+    }
+    std::println!("wrap {found:?}");
+}
+
+#[test]
+fn nothing_changes_at_rest() {
+    let mut rub = Rub::new();
+    rub.rub(1_000, 50.0, trapezoid(2.0));
+    let before = rub.energies();
+    let mut random = Uniform(1);
+    for _ in 0..10_000 {
+        rub.step(0.0, |_, _| 2_000.0 * random.next());
+    }
+    assert_eq!(rub.energies(), before);
+    assert!(!rub.finding.valid);
+}
+
+#[test]
+fn an_encoder_that_dithers_at_rest_does_not_wash_out_what_was_felt() {
+    for sign in [1.0, -1.0] {
+        let mut rub = Rub::new();
+        rub.rub(1_000, sign * 50.0, trapezoid(2.0));
+        let mut random = Uniform(2);
+        let mut energies = None;
+        for n in 0..10_000 {
+            // ±1 count of 5 µm, in a random order.
+            let to_mm = sign * 50.0 + 0.005 * libm::round(1.4 * random.next());
+            let speed_mm_s = (to_mm - rub.x_mm) * 1e3;
+            rub.step(speed_mm_s, |_, _| 2_000.0 * random.next());
+            // The first time may take up what the play has left.
+            if n == 20 {
+                energies = Some(rub.energies());
+            }
+        }
+        assert_eq!(Some(rub.energies()), energies);
+        let found_mm = rub.wavelength_mm();
+        assert!((found_mm / 2.0 - 1.0).abs() < 5e-3, "{found_mm}");
+    }
+}
+
+#[test]
+fn a_wavelength_beyond_the_banks_ends_is_never_stood_by() {
+    for wavelength_mm in [0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 7.2, 8.0, 10.0, 13.0, 20.0, 40.0] {
+        for speed_mm_s in [10.0, 50.0, 100.0] {
+            let mut rub = Rub::new();
+            let (finding, valid) = rub.rub(5_000, speed_mm_s, sine(wavelength_mm));
+            std::println!("{wavelength_mm} {speed_mm_s} {valid} {:?}", finding.wavelength_mm);
+            let mut rub = Rub::new();
+            let (finding, valid) = rub.rub(5_000, speed_mm_s, trapezoid(wavelength_mm));
+            std::println!("t {wavelength_mm} {speed_mm_s} {valid} {:?}", finding.wavelength_mm);
+        }
+    }
+}
+
+#[test]
+fn noise_alone_is_never_stood_by() {
+    for (seed, speed_mm_s) in [(1, 10.0), (2, 30.0), (3, 50.0), (4, 100.0)] {
+        let mut random = Uniform(seed);
+        let mut rub = Rub::new();
+        // As large as the ADC's own, and as a texture.
+        for level in [3.0, 500.0] {
+            rub.touch.noise = [(level * level / 3.0) as f32; GAUGES];
+            let mut valid = 0;
+            for _ in 0..60_000 {
+                let finding = rub.step(speed_mm_s, |_, _| level * random.next());
+                valid += u32::from(finding.is_some_and(|finding| finding.valid));
+            }
+            std::println!("noise {speed_mm_s} {level} {valid}");
+        }
+    }
+}
+
+#[test]
+fn two_wavelengths_on_two_halves_of_the_gauges_are_not_stood_by() {
+    for (one_mm, other_mm) in [(2.0, 3.0), (1.0, 4.0), (2.0, 2.4)] {
+        for usable in [0b11111, 0b11011, 0b00101] {
+            let mut rub = Rub::new();
+            rub.touch.usable = usable;
+            let (_, valid) = rub.rub(5_000, 50.0, |gauge, x_mm| {
+                trapezoid(if gauge < 2 { one_mm } else { other_mm })(gauge, x_mm)
+            });
+            std::println!("halves {one_mm} {other_mm} {usable:05b} {valid}");
+        }
+    }
+}
+
+#[test]
+fn after_a_change_of_surface_the_new_wavelength_is_stood_by_within_some_travel() {
+    for from_mm in [1.0, 2.0, 3.0, 4.0] {
+        for to_mm in [1.0, 2.0, 3.0, 4.0] {
+            if from_mm == to_mm {
+                continue;
+            }
+            let mut worst_mm: f64 = 0.0;
+            for part in 0..8 {
+                let boundary_mm = 40.0 + to_mm * f64::from(part) / 8.0;
+                let surface = |gauge: usize, x_mm: f64| {
+                    let wavelength_mm = if x_mm < boundary_mm { from_mm } else { to_mm };
+                    trapezoid(wavelength_mm)(gauge, x_mm)
+                };
+                let mut rub = Rub::new();
+                let mut right_from_mm = f64::INFINITY;
+                while rub.x_mm < boundary_mm + 30.0 {
+                    let Some(finding) = rub.step(50.0, surface) else {
+                        continue;
+                    };
+                    let right = finding.valid
+                        && (f64::from(finding.wavelength_mm.unwrap()) / to_mm - 1.0).abs() < 0.1;
+                    if !right {
+                        right_from_mm = f64::INFINITY;
+                    } else if right_from_mm.is_infinite() {
+                        right_from_mm = rub.x_mm;
+                    }
+                }
+                worst_mm = worst_mm.max(right_from_mm - boundary_mm);
+            }
+            std::println!("{from_mm} to {to_mm}: {worst_mm} mm, {:.2} λ", worst_mm / to_mm);
+        }
+    }
+}
+
+#[test]
+fn the_amplitude_is_the_fundamentals_within_1_percent_at_every_speed() {
+    let square: f64 = GAINS.iter().map(|gain| gain * gain).sum::<f64>() / 5.0;
+    let want = AMPLITUDE * libm::sqrt(square);
+    for wavelength_mm in [1.0, 1.37, 2.0, 4.4] {
+        for speed_mm_s in [10.0, 20.0, 50.0, 100.0] {
+            let mut rub = Rub::new();
+            let mut off: f64 = 0.0;
+            for _ in 0..(30.0 * wavelength_mm / speed_mm_s * 1e3) as u32 {
+                let finding = rub.step(speed_mm_s, trapezoid(wavelength_mm));
+                if let Some(finding) = finding.filter(|_| rub.x_mm > 12.0 * wavelength_mm) {
+                    off = off.max((f64::from(finding.amplitude_lsb) / want - 1.0).abs());
+                }
+            }
+            std::println!("amplitude {wavelength_mm} {speed_mm_s}: {off}");
+        }
+    }
+}
+
+#[test]
+fn the_gauge_that_says_something_else_is_named_also_when_it_is_left_out() {
+    for odd in 0..GAUGES {
+        for usable in [ALL, ALL & !(1 << odd)] {
+            // The strongest alone holds as much as would be stood against.
+            let valid = odd != 2 || usable != ALL;
+            let mut rub = Rub::new();
+            rub.touch.usable = usable;
+            let surface = |gauge: usize, x_mm: f64| {
+                trapezoid(if gauge == odd { 2.9 } else { 2.0 })(gauge, x_mm)
+            };
+            // 25 λ, in which the two have come apart.
+            rub.rub(1_000, 50.0, surface);
+            for _ in 0..1_000 {
+                if let Some(finding) = rub.step(50.0, surface) {
+                    assert_eq!(finding.valid, valid, "gauge {odd} of {usable:05b}");
+                    assert_eq!(finding.misfits, 1 << odd, "of {usable:05b}");
+                    assert_eq!(finding.gauges_used, usable);
+                    let error = finding.wavelength_mm.unwrap() / 2.0 - 1.0;
+                    assert!(error.abs() < 0.01, "{error}");
+                }
+            }
+        }
+    }
+}
