@@ -9,8 +9,6 @@
 //!
 //! [`Sensor::step`] is the whole of it, once per millisecond.
 #![no_std]
-#[cfg(test)]
-extern crate std;
 
 pub mod adapted;
 pub mod amplitude;
