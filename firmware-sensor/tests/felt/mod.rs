@@ -61,7 +61,9 @@ impl Bench {
                 let mut scan: Scan = [MID_RAIL_CODE; 6];
                 for (gauge, code) in scan.iter_mut().enumerate().take(GAUGES) {
                     let level = signal(gauge, self.x_mm, t_s) + self.noise_lsb * self.normal();
-                    *code = (f64::from(MID_RAIL_CODE) + level).round().clamp(0.0, 4_095.0) as u16;
+                    *code = (f64::from(MID_RAIL_CODE) + level)
+                        .round()
+                        .clamp(0.0, 4_095.0) as u16;
                 }
                 scan
             });
