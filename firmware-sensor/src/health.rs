@@ -127,6 +127,8 @@ impl Health {
         for history in &mut self.gauges {
             history.follow(samples, follow);
         }
+        // Powers of a few samples are anything.
+        let settled = f32::from(self.judgements) >= FOLLOWED_ESTIMATES;
         let measure = Measure::of(&self.gauges, signs);
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             let misfit = signs.misfits >> gauge & 1 == 1;
@@ -147,7 +149,7 @@ impl Health {
                 }
             } else if history.power < measure.silent {
                 GaugeHealth::Dead
-            } else if signs.noise[gauge] > TOO_NOISY * measure.typical {
+            } else if settled && signs.noise[gauge] > TOO_NOISY * measure.typical {
                 GaugeHealth::Noisy
             } else if signs.hum[gauge] > TOO_MUCH_HUM * measure.typical {
                 GaugeHealth::Hum

@@ -36,6 +36,9 @@ const SURE_ESTIMATES: u16 =
 const COMMON: f32 = 0.6;
 /// See [`COMMON`].
 const DOUBTFUL: f32 = 0.4;
+/// Power at the mains' frequency relative to the median of three gauges or more, from which on it is hum of
+/// the gauge's own whatever the texture does: that would be in all of them.
+const OUTSTANDING: f32 = 16.0;
 /// How near v/λ may come to the mains' frequency, in Hz, before a texture may be taken for hum.
 const NEAR_HZ: f32 = 4.0;
 
@@ -150,8 +153,11 @@ impl Hum {
     /// Power of each gauge's own hum in ADC steps², beyond what is common to the `usable` ones; 0 as
     /// long as it may be texture.
     pub fn own_powers(&self, usable: u8) -> [f32; GAUGES] {
-        if self.near || self.clean < SURE_ESTIMATES {
+        if self.samples < LEARNED_SAMPLES {
             return [0.0; GAUGES];
+        }
+        if self.near || self.clean < SURE_ESTIMATES {
+            return self.outstanding(usable);
         }
         let (common, _) = self.common(usable);
         let count = usable.count_ones() as f32;
@@ -166,6 +172,26 @@ impl Hum {
             };
             0.5 * part * part * (re * re + im * im)
         })
+    }
+
+    /// Power of those gauges that have far more of it than the `usable` ones.
+    fn outstanding(&self, usable: u8) -> [f32; GAUGES] {
+        let powers = self.phasors.map(|z| 0.5 * (z[0] * z[0] + z[1] * z[1]));
+        let mut sorted = [0.0; GAUGES];
+        let mut count = 0;
+        for (gauge, power) in powers.iter().enumerate() {
+            if usable >> gauge & 1 == 1 {
+                sorted[count] = *power;
+                count += 1;
+            }
+        }
+        if count < 3 {
+            return [0.0; GAUGES];
+        }
+        let sorted = &mut sorted[..count];
+        sorted.sort_unstable_by(f32::total_cmp);
+        let most = OUTSTANDING * sorted[count / 2];
+        powers.map(|power| if power > most { power } else { 0.0 })
     }
 
     /// The usable gauges' mean phasor, and the share of their power in it.
@@ -304,13 +330,16 @@ mod tests {
             (left_near[3] - AMPLITUDE).abs() < 0.06 * AMPLITUDE,
             "{left_near:?}"
         );
-        assert_eq!(hum.own_powers(ALL), [0.0; GAUGES]);
+        // No texture is in one gauge alone.
+        let powers = hum.own_powers(ALL).map(f64::from);
+        let want = AMPLITUDE * AMPLITUDE / 2.0;
+        assert!((powers[3] / want - 1.0).abs() < 0.1, "{powers:?}");
+        assert_eq!([powers[0], powers[1], powers[2], powers[4]], [0.0; 4]);
         let left_far = left(&mut hum, 100, Some(30.0), own);
         for left in left_far {
             assert!(left <= ripple(), "{left_far:?}");
         }
         let powers = hum.own_powers(ALL).map(f64::from);
-        let want = AMPLITUDE * AMPLITUDE / 2.0;
         assert!((powers[3] / want - 1.0).abs() < 0.03, "{powers:?}");
         for gauge in [0, 1, 2, 4] {
             // Their distance from a mean to which the fifth contributes: (¼ A)² / 2.

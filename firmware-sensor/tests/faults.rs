@@ -32,30 +32,30 @@ fn hum(t_s: f64) -> f64 {
 #[test]
 fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_go_on() {
     let faults: [(GaugeHealth, fn(f64, f64) -> f64, f64, f64); 5] = [
-        // Within 0.2 s without a change of code, of an input whose noise is shut off as well, below.
-        (GaugeHealth::Stuck, |_, _| -2_500.0, 0.3, 1.3),
+        // At an end of the range, whether driven there or broken off. Averages over 0.3 s fall from 1 to
+        // 0.1 in 0.7 s, and 0.5 s have to be without a fault.
+        (GaugeHealth::Saturated, |_, _| -2_500.0, 0.1, 1.3),
         (
             GaugeHealth::Saturated,
             |x_mm, _| 20.0 * CODES * (TAU * x_mm / 2.0).sin(),
             0.1,
-            1.5,
+            1.3,
         ),
-        // Own hum: three time constants of 0.3 s until it may be blamed, but the wave does not fit it
-        // before that.
-        (GaugeHealth::Hum, |_, t_s| 2.0 * hum(t_s), 1.2, 2.5),
-        // Another surface.
+        // Own hum beside which the others have none; averages over 0.3 s.
+        (GaugeHealth::Hum, |_, t_s| 2.0 * hum(t_s), 0.3, 1.5),
+        // Another surface: thirty estimates that it does not fit, once the two have come apart.
         (
             GaugeHealth::Noisy,
             |x_mm, _| CODES * (TAU * x_mm / 2.9).sin(),
-            0.9,
-            1.5,
+            0.6,
+            1.0,
         ),
         // A texture's power, of noise that lies in the scans' upper half as well.
         (
             GaugeHealth::Noisy,
             |x_mm, t_s| 1_900.0 * (1e7 * (x_mm + t_s)).sin(),
-            0.6,
-            2.5,
+            0.3,
+            2.0,
         ),
     ];
     for (which, (health, fault, found_s, well_s)) in faults.into_iter().enumerate() {
@@ -65,12 +65,9 @@ fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_g
         let estimates = bench.rub(4_000, |_| 40.0, but(1, 2.0, fault));
         let left_out = estimates.iter().find(|e| e.health[1] != GaugeHealth::Good);
         let found = left_out.unwrap().instant_us as f64 * 1e-6 - began_s;
-        println!("{which} {health:?}: found after {found:.2} s");
         assert!(found <= found_s, "{which} {health:?} after {found} s");
         let (last, others) = (estimates.last().unwrap(), [0, 2, 3, 4]);
-        if health != GaugeHealth::Stuck {
-            assert_eq!(last.health[1], health, "{which}");
-        }
+        assert_eq!(last.health[1], health, "{which}");
         assert_eq!(last.gauges_used, 0b11101);
         for gauge in others {
             assert!(
@@ -81,16 +78,14 @@ fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_g
         }
         // Valid nearly all the time, and never wrong.
         let (valid, worst) = valid_and_worst(&estimates, 2.0);
-        println!("    valid {valid:.3}, worst {worst:.4}");
         assert!(
-            valid >= 0.8 && worst < 0.05,
+            valid >= 0.9 && worst < 0.03,
             "{which} {health:?}: {valid} {worst}"
         );
         let began_s = bench.t_s();
         let estimates = bench.rub(4_000, |_| 40.0, texture(2.0));
         let back = estimates.iter().find(|e| e.gauges_used == 0b11111).unwrap();
         let well = back.instant_us as f64 * 1e-6 - began_s;
-        println!("    back after {well:.2} s");
         assert!(
             (0.5..=well_s).contains(&well),
             "{which} {health:?} until {well} s"
@@ -166,7 +161,6 @@ fn hum_that_all_gauges_have_does_not_disturb_once_it_is_learned() {
             |gauge, x_mm, t_s| texture(gauge, x_mm, t_s) + hum(t_s),
         );
         let (valid, worst) = valid_and_worst(&estimates[100..], 2.0);
-        println!("{speed_mm_s}: {valid} {worst}");
         assert!(
             valid >= 0.95 && worst < 0.03,
             "{speed_mm_s}: {valid} {worst}"
@@ -193,7 +187,6 @@ fn a_texture_that_was_at_the_mains_frequency_is_not_taken_for_hum_afterwards() {
         let after = bench.rub(2_000, |_| then_mm_s, texture(1.0));
         for estimates in [at, after] {
             let (valid, worst) = valid_and_worst(&estimates, 1.0);
-            println!("{first_mm_s} {then_mm_s}: {valid} {worst}");
             assert!(valid >= 0.98 && worst < 0.01, "{valid} {worst}");
             let faults = estimates
                 .iter()
@@ -210,7 +203,6 @@ fn strokes_that_pass_the_mains_frequency_again_and_again_blame_no_gauge() {
         let velocity = |t_s: f64| 100.0 * (TAU * 2.0 * t_s).sin();
         let estimates = bench.rub(5_000, velocity, texture(wavelength_mm));
         let (valid, worst) = valid_and_worst(&estimates[50..], wavelength_mm);
-        println!("{wavelength_mm}: {valid} {worst}");
         assert!(
             valid >= 0.95 && worst < 0.03,
             "{wavelength_mm}: {valid} {worst}"
