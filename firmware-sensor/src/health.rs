@@ -375,6 +375,9 @@ mod tests {
         }
     }
 
+    /// A broken gauge's signal, of s and a noise of ±1.
+    type Fault = fn(f64, f64) -> f64;
+
     const GOOD: [GaugeHealth; GAUGES] = [GaugeHealth::Good; GAUGES];
 
     #[test]
@@ -396,7 +399,7 @@ mod tests {
         let ratio = 19.0 / 3.0;
         let noisy = 50.0 * libm::log(ratio / (ratio - 1.3));
         let quiet_again = 50.0 * libm::log(1.3 * ratio);
-        let faults: [(usize, GaugeHealth, fn(f64, f64) -> f64, u32, f64); 5] = [
+        let faults: [(usize, GaugeHealth, Fault, u32, f64); 5] = [
             (1, GaugeHealth::Dead, |_, _| 3.0, still, 1.0),
             (2, GaugeHealth::Stuck, |_, _| 700.0, still, 1.0),
             (3, GaugeHealth::Stuck, |_, _| -1_900.0, still, 1.0),

@@ -25,13 +25,16 @@ fn but(
     }
 }
 
+/// A broken gauge's signal, of x in mm and s.
+type Fault = fn(f64, f64) -> f64;
+
 fn hum(t_s: f64) -> f64 {
     CODES * (TAU * 50.0 * t_s + 0.4).sin()
 }
 
 #[test]
 fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_go_on() {
-    let faults: [(GaugeHealth, fn(f64, f64) -> f64, f64, f64); 5] = [
+    let faults: [(GaugeHealth, Fault, f64, f64); 5] = [
         // At an end of the range, whether driven there or broken off. Averages over 0.3 s fall from 1 to
         // 0.1 in 0.7 s, and 0.5 s have to be without a fault.
         (GaugeHealth::Saturated, |_, _| -2_500.0, 0.1, 1.3),
