@@ -169,12 +169,13 @@ struct Fit {
     determinant: f32,
 }
 
-/// What a candidate's fit says of the usable gauges.
+/// What a candidate's fit says of the gauges, the usable ones unless said.
 #[derive(Clone, Copy, Debug, Default)]
 struct Agreement {
     /// Bit g set: the wave explains gauge g.
     fitting: u8,
-    /// Bit g set: the wave explains less than half of gauge g, noise left out.
+    /// Bit g set: the wave explains less than half of gauge g, noise left out. Also of one that is not
+    /// usable: it is not taken back as long as it does not fit.
     misfits: u8,
     /// The wave explains the gauges as a whole.
     whole: bool,
@@ -276,14 +277,20 @@ impl Bank {
             unexplained <= most * explained + UNEXPLAINED_PER_NOISE * noise
         };
         let mut agreement = Agreement::default();
-        for gauge in gauges_of(self.touch.usable) {
+        for gauge in 0..GAUGES {
+            let usable = self.touch.usable >> gauge & 1 == 1;
             let explained = fit.energy(sums, gauge);
             let noise = self.touch.noise[gauge];
             let unexplained = fit.variance(sums, gauge) - explained - noise;
-            if fits(explained, unexplained, noise) {
-                agreement.fitting |= 1 << gauge;
-            } else if unexplained > explained {
+            let fits = fits(explained, unexplained, noise);
+            if !fits && unexplained > explained {
                 agreement.misfits |= 1 << gauge;
+            }
+            if !usable {
+                continue;
+            }
+            if fits {
+                agreement.fitting |= 1 << gauge;
             }
             agreement.explained += explained;
             agreement.unexplained += unexplained;
@@ -316,14 +323,33 @@ impl Bank {
         // What was felt before a change of surface is no sign of stick and slip after it.
         let jerky =
             kernel == Kernel::Long && !self.force_channel && self.jerky(wavelength_mm, &agreement);
+        let stands =
+            vertex.is_some() && !jerky && self.stands(kernel, number, wavelength_mm, &agreement);
+        let whole = agreement.whole || kernel == Kernel::Short;
+        let others = self.touch.usable & !agreement.misfits;
         Look {
             number,
             wavelength_mm: (energies[number] > 0.0).then_some(wavelength_mm),
+            amplitude_lsb: self.amplitude_lsb(&agreement)
+                * self.detuned(kernel, number, wavelength_mm),
             jerky,
-            stands: vertex.is_some()
-                && !jerky
-                && self.stands(kernel, number, wavelength_mm, &agreement),
+            stands: stands && whole,
+            odd_one_out: stands
+                && !whole
+                && agreement.misfits.is_power_of_two()
+                && agreement.fitting == others,
             agreement,
+        }
+    }
+
+    /// Amplitude of a sine of `wavelength_mm`, relative to what candidate `number` shows of it.
+    fn detuned(&self, kernel: Kernel, number: usize, wavelength_mm: f32) -> f32 {
+        let off = self.candidates[number].wavelength_mm / wavelength_mm - 1.0;
+        let radians = 2.0 * core::f32::consts::PI * self.travel_wavelengths * off;
+        let square = 1.0 + radians * radians;
+        match kernel {
+            Kernel::Short => libm::sqrtf(square),
+            Kernel::Long => square,
         }
     }
 
@@ -332,7 +358,7 @@ impl Bank {
             wavelength_mm: look.wavelength_mm,
             valid,
             confidence: look.agreement.confidence(),
-            amplitude_lsb: self.amplitude_lsb(&look.agreement),
+            amplitude_lsb: look.amplitude_lsb,
             gauges_used: self.touch.usable,
             misfits: if valid { look.agreement.misfits } else { 0 },
             jerky: look.jerky,
@@ -368,7 +394,6 @@ impl Bank {
         let noise = 2.0 * agreement.noise * per_sample_mm / kernel_mm;
         let amplitude_lsb = self.amplitude_lsb(agreement);
         2 * fitting > usable
-            && (agreement.whole || kernel == Kernel::Short)
             && self.rested < REST_SAMPLES
             && fit.weight >= LEAST_FILLED
             && fit.determined() >= LEAST_DETERMINED
@@ -383,7 +408,10 @@ struct Look {
     number: usize,
     wavelength_mm: Option<f32>,
     agreement: Agreement,
+    amplitude_lsb: f32,
     stands: bool,
+    /// It would, were it not for one gauge that says something else than all others.
+    odd_one_out: bool,
     jerky: bool,
 }
 
@@ -432,6 +460,12 @@ impl Estimator for Bank {
             .wavelength_mm
             .zip(short_mm)
             .is_some_and(|(long, short)| (short / long - 1.0).abs() < MOST_DISAGREEMENT);
+        if long.odd_one_out && agree {
+            return Finding {
+                misfits: long.agreement.misfits,
+                ..self.finding(&long, false)
+            };
+        }
         if long.stands && agree {
             self.since_valid = 0;
             self.known_mm = long.wavelength_mm.unwrap_or(0.0);
@@ -653,3 +687,6 @@ fn second_difference_gain(frequency_hz: f32) -> f32 {
 fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
     (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
 }
+
+#[cfg(test)]
+mod tests;
