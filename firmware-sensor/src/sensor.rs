@@ -180,7 +180,8 @@ impl Sensor {
                 noise: touch.noise,
                 hum: self.hum.own_powers(usable),
                 misfits: finding.misfits,
-                agreed: finding.valid,
+                agreed: finding.valid || finding.misfits != 0,
+                allowed: self.configuration.gauges,
             });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
             let sequence = self.estimates;
