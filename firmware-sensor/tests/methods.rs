@@ -187,7 +187,7 @@ fn crossings_say_next_to_nothing_where_there_is_no_texture() {
 }
 
 #[test]
-fn crossings_need_three_gauges_that_agree() {
+fn crossings_need_gauges_that_agree() {
     for (name, rubs) in families() {
         if !(name.contains("dead") || name.contains("saturated") || name.contains("harmonic")) {
             continue;
@@ -199,14 +199,14 @@ fn crossings_need_three_gauges_that_agree() {
         assert_eq!(largest(&all, |j| j.wrong_share), 0.0, "{name}");
         assert!(smallest(&all, |j| j.valid_share) >= 0.94, "{name}");
     }
-    for dead in [vec![0, 1, 2], vec![0, 1, 2, 3, 4]] {
-        let rub = &table_1(|rub| rub.dead.clone_from(&dead))[5];
-        assert!(
-            rub.estimates(with(Method::Crossings))
-                .iter()
-                .all(|estimate| !estimate.valid)
-        );
-    }
+    // With three gauges left out as dead, the two that are left have to agree; with none left nothing is
+    // stood by.
+    let two = &table_1(|rub| rub.dead = vec![0, 1, 2])[5];
+    let judgement = two.judge(with(Method::Crossings));
+    assert!(judgement.rms_percent < 0.6, "{}", judgement.rms_percent);
+    let none = &table_1(|rub| rub.dead = vec![0, 1, 2, 3, 4])[5];
+    let estimates = none.estimates(with(Method::Crossings));
+    assert!(estimates.iter().all(|estimate| !estimate.valid));
 }
 
 #[test]
