@@ -34,6 +34,8 @@ const SURE_ESTIMATES: u16 =
 /// Share of the gauges' power at the mains' frequency that is common to them, from which on it is taken
 /// for hum, and up to which for texture. Five gauges of random phases have 0.2.
 const COMMON: f32 = 0.6;
+/// Gauges that must speak before anything can be common to them.
+const LEAST_WITNESSES: u32 = 3;
 /// See [`COMMON`].
 const DOUBTFUL: f32 = 0.4;
 /// Power at the mains' frequency relative to the median of three gauges or more, from which on it is hum of
@@ -194,7 +196,7 @@ impl Hum {
         powers.map(|power| if power > most { power } else { 0.0 })
     }
 
-    /// The usable gauges' mean phasor, and the share of their power in it.
+    /// The usable gauges' mean phasor, and the share of their power in it; 0 if they are too few to tell.
     fn common(&self, usable: u8) -> ([f32; 2], f32) {
         let (mut sum, mut power) = ([0.0; 2], 0.0);
         for (gauge, z) in self.phasors.iter().enumerate() {
@@ -206,7 +208,8 @@ impl Hum {
         let count = usable.count_ones().max(1) as f32;
         let mean = sum.map(|sum| sum / count);
         let common = count * (mean[0] * mean[0] + mean[1] * mean[1]);
-        (mean, if power > 0.0 { common / power } else { 0.0 })
+        let tell = power > 0.0 && usable.count_ones() >= LEAST_WITNESSES;
+        (mean, if tell { common / power } else { 0.0 })
     }
 }
 
