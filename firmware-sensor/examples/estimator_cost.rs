@@ -43,10 +43,10 @@ mod board {
     use protocol::{CHANNELS, GAUGES, SensorConfiguration};
 
     use crate::parts::{FRONT, MILLISECONDS, RIVALS_FROM, SETTINGS_FROM, TRANSFORM};
-    use crate::rivals::roster::{Visitor, show_all};
-    use crate::rivals::spectrum::{LENGTH, LINES, Transform};
     use crate::rivals::Rival;
     use crate::rivals::entrant::Entrant;
+    use crate::rivals::roster::{Visitor, show_all};
+    use crate::rivals::spectrum::{LENGTH, LINES, Transform};
     use crate::settings::SETTINGS;
 
     /// The CRC unit's data register.
@@ -74,8 +74,7 @@ mod board {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         enable_marks();
-        let signal =
-            cortex_m::singleton!(: Signal = [[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS as usize]);
+        let signal = cortex_m::singleton!(: Signal = [[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS as usize]);
         if let Some(signal) = signal {
             rub(signal);
             run(signal);
@@ -128,11 +127,7 @@ mod board {
 
     /// Part `number`: `step` on every millisecond of two seconds, the second one counted.
     #[inline(never)]
-    fn part_of(
-        number: u32,
-        signal: &Signal,
-        mut step: impl FnMut(usize, &Millisecond, u16),
-    ) {
+    fn part_of(number: u32, signal: &Signal, mut step: impl FnMut(usize, &Millisecond, u16)) {
         for second in 0..2 {
             for (ms, scans) in black_box(signal).iter().enumerate() {
                 let ms = second * signal.len() + ms;

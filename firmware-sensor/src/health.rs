@@ -12,12 +12,12 @@ use crate::{SCANS_PER_SAMPLE, Scan};
 /// Codes so near the converter's ends are at an end: amplifiers do not reach the rails.
 const RAIL_CODES: u16 = 8;
 const HIGHEST_CODE: u16 = 4_095;
-/// Time constant of everything that is averaged, in samples.
-const FOLLOWED_SAMPLES: f32 = 300.0;
-/// Share of scans at an end that makes a gauge saturated.
-const AT_RAILS: f32 = 0.02;
-/// Samples without a change of the code after which a gauge is stuck, if the others change.
-const STILL_SAMPLES: u32 = 200;
+/// Time constant of everything that is averaged, in estimates.
+const FOLLOWED_ESTIMATES: f32 = 30.0;
+/// Share of scans at an end that makes a gauge saturated; white noise at −6 dB clips less.
+const AT_RAILS: f32 = 0.1;
+/// Estimates without a change of the code after which a gauge is stuck, if others change.
+const STILL_ESTIMATES: u32 = 20;
 /// A stuck code this near mid-rail is a gauge that is not connected.
 const MID_RAIL: core::ops::RangeInclusive<u16> = 2_048 - 16..=2_048 + 16;
 /// Power of a gauge relative to the strongest below which it says next to nothing.
@@ -37,12 +37,24 @@ const SOUND_ESTIMATES: u8 = 50;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Health {
     gauges: [History; GAUGES],
-    samples: u32,
+    /// Whose codes are looked at next.
+    next: usize,
+    /// Since the last judgement.
+    samples: u16,
+    judgements: u16,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct History {
     last: u16,
+    /// The code has changed since the last judgement.
+    changed: bool,
+    /// Looks at its codes since then, four scans each, and how many of them were at an end of the range.
+    looks: u16,
+    ends: u16,
+    /// Sums of the samples and their squares since then.
+    sum: f32,
+    squares: f32,
     still: u32,
     at_rails: f32,
     mean: f32,
@@ -58,8 +70,8 @@ struct History {
 pub struct Signs {
     /// Variance of each gauge's white noise, in ADC steps².
     pub noise: [f32; GAUGES],
-    /// Amplitude of each gauge's own hum, in ADC steps.
-    pub hum_lsb: [f32; GAUGES],
+    /// Power of each gauge's own hum, in ADC steps².
+    pub hum: [f32; GAUGES],
     /// Bit g set: gauge g does not fit the wave that the others agree on.
     pub misfits: u8,
     /// The others agree on one.
@@ -69,38 +81,40 @@ pub struct Signs {
 impl Health {
     /// Takes a millisecond's scans and what the anti-aliasing filter makes of them.
     pub fn push(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], sample: &[f32; GAUGES]) {
-        if self.samples == 0 {
-            for (history, x) in self.gauges.iter_mut().zip(sample) {
-                history.mean = *x;
-            }
+        // The codes of one gauge a millisecond: what is looked for lasts longer than that.
+        let history = &mut self.gauges[self.next];
+        for scan in scans {
+            let code = scan[self.next];
+            history.changed |= code != history.last;
+            history.last = code;
+            // One comparison for both ends.
+            let from_low = code.wrapping_sub(RAIL_CODES);
+            history.ends += u16::from(from_low > HIGHEST_CODE - 2 * RAIL_CODES);
         }
-        self.samples = self.samples.saturating_add(1);
-        let follow = 1.0 / (self.samples as f32).min(FOLLOWED_SAMPLES);
-        for (gauge, history) in self.gauges.iter_mut().enumerate() {
-            let mut changed = false;
-            let mut at_rails = 0.0;
-            for scan in scans {
-                let code = scan[gauge];
-                changed |= code != history.last;
-                history.last = code;
-                if !(RAIL_CODES..=HIGHEST_CODE - RAIL_CODES).contains(&code) {
-                    at_rails += 1.0 / SCANS_PER_SAMPLE as f32;
-                }
-            }
-            history.still = if changed {
-                0
-            } else {
-                history.still.saturating_add(1)
-            };
-            history.at_rails += follow * (at_rails - history.at_rails);
-            let away = sample[gauge] - history.mean;
-            history.mean += follow * away;
-            history.power += follow * (away * away - history.power);
+        history.looks += 1;
+        self.next = if self.next + 1 == GAUGES {
+            0
+        } else {
+            self.next + 1
+        };
+        self.samples += 1;
+        for (history, x) in self.gauges.iter_mut().zip(sample) {
+            history.sum += x;
+            history.squares += x * x;
         }
     }
 
     /// Judges every gauge anew, once an estimate.
     pub fn judge(&mut self, signs: &Signs) {
+        let samples = core::mem::take(&mut self.samples);
+        if samples == 0 {
+            return;
+        }
+        self.judgements = self.judgements.saturating_add(1);
+        let follow = 1.0 / f32::from(self.judgements).min(FOLLOWED_ESTIMATES);
+        for history in &mut self.gauges {
+            history.follow(samples, follow);
+        }
         let mut powers = self.gauges.map(|history| history.power);
         powers.sort_unstable_by(f32::total_cmp);
         let (typical, strongest) = (powers[GAUGES / 2], powers[GAUGES - 1]);
@@ -114,10 +128,9 @@ impl Health {
                     0
                 };
             }
-            let hum = signs.hum_lsb[gauge] * signs.hum_lsb[gauge] / 2.0;
             let fault = if history.at_rails > AT_RAILS {
                 GaugeHealth::Saturated
-            } else if history.still >= STILL_SAMPLES && changing {
+            } else if history.still >= STILL_ESTIMATES && changing {
                 if MID_RAIL.contains(&history.last) {
                     GaugeHealth::Dead
                 } else {
@@ -127,7 +140,7 @@ impl Health {
                 GaugeHealth::Dead
             } else if signs.noise[gauge] > TOO_NOISY * typical {
                 GaugeHealth::Noisy
-            } else if hum > TOO_MUCH_HUM * typical {
+            } else if signs.hum[gauge] > TOO_MUCH_HUM * typical {
                 GaugeHealth::Hum
             } else if history.misfits >= MISFIT_ESTIMATES {
                 GaugeHealth::Noisy
@@ -157,5 +170,29 @@ impl Health {
             good |= u8::from(history.health == GaugeHealth::Good) << gauge;
         }
         good
+    }
+}
+
+impl History {
+    /// Takes what has been summed over `samples` into the averages.
+    fn follow(&mut self, samples: u16, follow: f32) {
+        let count = f32::from(samples);
+        let looks = core::mem::take(&mut self.looks);
+        if looks > 0 {
+            self.still = if core::mem::take(&mut self.changed) {
+                0
+            } else {
+                self.still.saturating_add(1)
+            };
+            let ends = f32::from(core::mem::take(&mut self.ends));
+            let ends = ends / (f32::from(looks) * SCANS_PER_SAMPLE as f32);
+            self.at_rails += follow * (ends - self.at_rails);
+        }
+        let mean = core::mem::take(&mut self.sum) / count;
+        let square = core::mem::take(&mut self.squares) / count;
+        self.mean += follow * (mean - self.mean);
+        // About the mean of the last 0.3 s: a slow texture's swing over 10 ms counts too.
+        let power = square - 2.0 * mean * self.mean + self.mean * self.mean;
+        self.power += follow * (power.max(0.0) - self.power);
     }
 }

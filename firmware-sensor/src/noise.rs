@@ -10,32 +10,36 @@ use crate::{SCANS_PER_SAMPLE, Scan, decimate};
 
 /// Power gain of the third difference for white noise.
 const DIFFERENCE_GAIN: f32 = 20.0;
-/// Time constant in samples.
-const FOLLOWED_SAMPLES: f32 = 300.0;
+/// Time constant in looks at a gauge: one gauge has its turn each millisecond.
+const FOLLOWED_LOOKS: f32 = 100.0;
 
 /// Variances so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Noise {
     variances: [f32; GAUGES],
-    samples: u32,
+    next: usize,
+    looks: u32,
 }
 
 impl Noise {
     /// Takes a millisecond's scans.
     pub fn push(&mut self, scans: &[Scan; SCANS_PER_SAMPLE]) {
-        self.samples = self.samples.saturating_add(1);
-        let follow = 1.0 / (self.samples as f32).min(FOLLOWED_SAMPLES);
-        for (gauge, variance) in self.variances.iter_mut().enumerate() {
-            let [a, b, c, d] = scans.map(|scan| i32::from(scan[gauge]));
-            let third = (d - a - 3 * (c - b)) as f32;
-            *variance += follow * (third * third - *variance);
+        let gauge = self.next;
+        if gauge == 0 {
+            self.looks = self.looks.saturating_add(1);
         }
+        self.next = if gauge + 1 == GAUGES { 0 } else { gauge + 1 };
+        let follow = 1.0 / (self.looks as f32).min(FOLLOWED_LOOKS);
+        let [a, b, c, d] = scans.map(|scan| i32::from(scan[gauge]));
+        let third = (d - a - 3 * (c - b)) as f32;
+        let variance = third * third * (decimate::NOISE_GAIN / DIFFERENCE_GAIN);
+        self.variances[gauge] += follow * (variance - self.variances[gauge]);
     }
 
-    /// Variance of the white noise in each gauge behind the anti-aliasing filter, in ADC steps².
+    /// Variance of the white noise in each gauge behind the anti-aliasing filter, in ADC steps². 0 for
+    /// a gauge that has not had its turn.
     pub fn variances(&self) -> [f32; GAUGES] {
         self.variances
-            .map(|variance| variance * (decimate::NOISE_GAIN / DIFFERENCE_GAIN))
     }
 }
 
@@ -66,8 +70,8 @@ mod tests {
         // Uniform over ±60: variance 60²/3, and 1/12 of the rounding.
         let variance = run(|_| 2_048.0 + 120.0 * (uniform() - 0.5));
         let want = (60.0 * 60.0 / 3.0 + 1.0 / 12.0) * f64::from(decimate::NOISE_GAIN);
-        // 600 squares in the mean, each as uncertain as it is large, √2: six of their deviations.
-        let bound = 6.0 * libm::sqrt(2.0 / 600.0);
+        // 200 squares in the mean, each as uncertain as it is large, √2: six of their deviations.
+        let bound = 6.0 * libm::sqrt(2.0 / 200.0);
         assert!(
             (f64::from(variance) / want - 1.0).abs() < bound,
             "{variance} not {want}"

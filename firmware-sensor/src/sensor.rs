@@ -146,7 +146,7 @@ impl Sensor {
         self.health.push(scans, &raw);
         let usable = self.health.good() & self.configuration.gauges;
         let mut gauges = raw;
-        self.hum.remove(&mut gauges, usable);
+        self.hum.remove(&mut gauges);
 
         let arm = started.travel.place(decimate::DELAY_MS);
         let lag = self.slip.push(arm, sample[GAUGES]);
@@ -157,7 +157,7 @@ impl Sensor {
             place: arm.wrapping_sub(lag),
             counted,
             noise: self.noise.variances(),
-            pickup_lsb: self.hum.pickup_lsb(usable),
+            pickup_lsb: self.hum.pickup_lsb(),
             usable,
         };
         if self.settling == 0 {
@@ -174,10 +174,11 @@ impl Sensor {
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
             let contact = contact(&self.slip, &started.travel, &finding);
-            self.hum.texture_at(frequency_hz(&started.travel, &finding));
+            self.hum
+                .renew(usable, frequency_hz(&started.travel, &finding));
             self.health.judge(&Signs {
                 noise: touch.noise,
-                hum_lsb: core::array::from_fn(|gauge| self.hum.own_lsb(gauge, usable)),
+                hum: self.hum.own_powers(usable),
                 misfits: finding.misfits,
                 agreed: finding.valid,
             });

@@ -23,8 +23,9 @@ const STICKING: f32 = 0.75;
 const STIFFER: f32 = 1.15;
 /// How much of a sticking contact's slope goes into k.
 const LEARNING: f32 = 0.2;
-/// Stiffness in N/m that is believed.
-const BELIEVED_N_PER_M: core::ops::RangeInclusive<f32> = 10.0..=60_000.0;
+/// Stiffness in N/m that is believed: below, a stretch's change of force is not far above the channel's
+/// noise; fingertips have a few hundred.
+const BELIEVED_N_PER_M: core::ops::RangeInclusive<f32> = 100.0..=60_000.0;
 /// Contact and arm are compared over this many ms.
 const COMPARED_MS: usize = 8;
 /// The contact sticks if it moves less than this share of the arm's movement.

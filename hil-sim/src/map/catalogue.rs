@@ -60,7 +60,7 @@ pub fn catalogue() -> Vec<Map> {
             name: "skew-wavelength",
             title: "Skew between gauges and position × wavelength",
             conditions: "v = 70 mm/s · sin(2π 0.83 Hz t), 20 dB",
-            x: Axis::linear_in("gauges late by, in ms", Knob::Skew, 1000.0, -5.0, 5.0, 21),
+            x: Axis::linear_in("gauges late by, in ms", Knob::Skew, 1000.0, -3.0, 3.0, 25),
             y: wavelength(-3..=19),
             base: vec![noise(), Knob::Reversal.at(FIG_7_HZ)],
         },

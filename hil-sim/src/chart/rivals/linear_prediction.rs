@@ -47,10 +47,7 @@ impl<const N: usize> Rival for LinearPrediction<N> {
         let (mut near, mut far) = (0.0, 0.0);
         for gauge in 0..GAUGES {
             let samples = self.window.samples(gauge);
-            let triples = samples[2 * LAG..]
-                .iter()
-                .zip(&samples[LAG..])
-                .zip(&samples);
+            let triples = samples[2 * LAG..].iter().zip(&samples[LAG..]).zip(&samples);
             for ((new, middle), old) in triples {
                 near += middle * (new + old);
                 far += new * old;

@@ -83,8 +83,7 @@ impl Rival for PhaseLock {
     }
 
     fn frequency_hz(&mut self) -> Option<f32> {
-        self.is_locked()
-            .then_some(self.speed_rad_s / (2.0 * PI))
+        self.is_locked().then_some(self.speed_rad_s / (2.0 * PI))
     }
 
     /// The loop's integrator follows with a delay of 2ζ/ω_n.
