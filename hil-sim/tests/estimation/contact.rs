@@ -108,13 +108,24 @@ fn each_of(name: &str) -> Vec<Comparison> {
 #[test]
 fn stick_and_slip_are_told_as_they_are_and_the_lag_with_them() {
     for comparison in each_of("estimation/stick-slip-force") {
-        assert!(comparison.told > 0.9, "{}", comparison.name);
+        let name = &comparison.name;
+        assert!(comparison.told > 0.99, "{name}: {}", comparison.told);
+        // Measured: 0.926 to 0.949. What is missed lies at the transitions, which 7 ms blur: there are
+        // 50 to 70 a second.
+        assert!(comparison.agree > 0.9, "{name}: {}", comparison.agree);
+        // 2 mN of noise at 400 N/m are 5 µm.
+        assert!(comparison.lag_error_um < 7.0, "{name}: {}", comparison.lag_error_um);
     }
 }
 
 #[test]
-fn a_stiffness_that_has_to_be_found_does_as_well() {
+fn a_stiffness_that_has_to_be_found_does_nearly_as_well() {
     for comparison in each_of("stiffness") {
-        assert!(comparison.told > 0.9, "{}", comparison.name);
+        let name = &comparison.name;
+        assert!(comparison.told > 0.99, "{name}: {}", comparison.told);
+        assert!(comparison.agree > 0.9, "{name}: {}", comparison.agree);
+        // A stiffness that is wrong by a share makes the lag as wrong: of its spread, 0.2 to 0.4 mm.
+        let share = comparison.lag_error_um / comparison.lag_spread_um;
+        assert!(share < 0.35, "{name}: {share}");
     }
 }

@@ -21,6 +21,8 @@ const OFFSETS: [f64; GAUGES] = [5.0, -3.0, 0.5, -5.0, 2.0];
 /// With an offset of 5 and noise at 0 dB a gauge comes to 1.65 ± 1.6 V: nothing clips.
 const VOLTS_PER_UNIT: f64 = 0.12;
 const MID_RAIL_V: f64 = 1.65;
+/// Rows per second that recordings have: the least that a scene may, and a row for every scan.
+pub const RECORDED_HZ: [usize; 2] = [1_000, 4_000];
 const STEPS_PER_S: usize = 20_000;
 const STEP_S: f64 = 1.0 / STEPS_PER_S as f64;
 const RESONANCE_HZ: f64 = 180.0;
@@ -60,8 +62,6 @@ pub struct Stranger {
     pub rows_per_s: usize,
     /// What follows in the scene.
     pub rest_of_scene: &'static str,
-    /// Resonance, 1/f noise, drift and offset, too.
-    pub warts: bool,
     /// In s.
     pub duration_s: f64,
     /// Where the dice begin.
@@ -76,9 +76,8 @@ impl Default for Stranger {
             friction: None,
             force: false,
             snr_db: 20.0,
-            rows_per_s: 4_000,
+            rows_per_s: RECORDED_HZ[1],
             rest_of_scene: "",
-            warts: true,
             duration_s: 8.0,
             seed: 1,
         }
@@ -169,13 +168,10 @@ impl Stranger {
             for gauge in 0..GAUGES {
                 let phase = self.phase(arm_mm - stretch_mm + PLACES_MM[gauge]);
                 let texture = GAINS[gauge] * ridges(phase + PHASES_RAD[gauge]) / fundamental;
-                let mut felt = texture;
-                if self.warts {
-                    felt = rings[gauge].step(texture);
-                    felt += OFFSETS[gauge] + PINK * pink[gauge].value();
-                    felt += DRIFT * (TAU * DRIFT_HZ * t_s + 1.3 * gauge as f64).sin();
-                }
+                let rung = rings[gauge].step(texture);
                 if row {
+                    let drift = DRIFT * (TAU * DRIFT_HZ * t_s + 1.3 * gauge as f64).sin();
+                    let felt = rung + OFFSETS[gauge] + drift + PINK * pink[gauge].value();
                     let volts = MID_RAIL_V + VOLTS_PER_UNIT * (felt + noise * dice.gaussian());
                     assert!((0.0..3.3).contains(&volts), "{volts} V: the synthesis clips");
                     write!(csv, ",{volts:.6}").unwrap();
