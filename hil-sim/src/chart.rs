@@ -8,13 +8,16 @@
 //! | [`contest`] | all of them on the same samples, [`score`] |
 //! | [`costs`], [`tally`], [`parts`] | instructions on the Cortex-M4F |
 //! | [`bound`] | the Cramér–Rao bound |
+//! | [`efficiency`] | how near the bank comes to it |
 //! | [`result`], [`picture`] | CSV and SVG |
 
 pub mod bound;
 pub mod contest;
 pub mod costs;
+pub mod efficiency;
 pub mod family;
 pub mod fourier;
+mod panel;
 pub mod parts;
 pub mod picture;
 pub mod pitch;

@@ -48,7 +48,8 @@ impl Tone<'_> {
                     .map(|&gauge| {
                         let own = TAU * PLACES_MM[gauge] / self.wavelength_mm + PHASES_RAD[gauge];
                         let (sine, cosine) = (common + own).sin_cos();
-                        let about = cc * cosine * cosine + 2.0 * cs * cosine * sine + ss * sine * sine;
+                        let about =
+                            cc * cosine * cosine + 2.0 * cs * cosine * sine + ss * sine * sine;
                         GAINS[gauge].powi(2) * about
                     })
                     .sum();

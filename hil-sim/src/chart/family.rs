@@ -151,7 +151,11 @@ fn tone(scene: &Scene) -> Option<Tone<'static>> {
     let sound = kinematic.hum_50_hz == 0.0
         && kinematic.second_harmonic == 0.0
         && scene.contact == Contact::Kinematic
-        && !kinematic.dead.iter().chain(&kinematic.saturated).any(|bad| *bad);
+        && !kinematic
+            .dead
+            .iter()
+            .chain(&kinematic.saturated)
+            .any(|bad| *bad);
     sound.then_some(Tone {
         wavelength_mm: specimen.wavelength_mm,
         speed_mm_s: *speed_mm_s,
@@ -203,7 +207,12 @@ mod tests {
         for family in load(&root()).unwrap() {
             let bound = ["table-1-20-db", "table-1-0-db", "off-grid", "slow-fast"];
             let got = family.bound_percent(|_, _| 0.08);
-            assert_eq!(got.is_some(), bound.contains(&family.folder), "{}", family.folder);
+            assert_eq!(
+                got.is_some(),
+                bound.contains(&family.folder),
+                "{}",
+                family.folder
+            );
         }
     }
 

@@ -1,48 +1,16 @@
 //! The picture of a contest: a panel for each family, error over instructions, both axes logarithmic.
-//!
-//! Written as SVG by hand: its coordinates are fractions of a pixel and its marks of ten shapes, which the
-//! report's charts have no use for.
 
 use std::fmt::Write;
 
+use super::family::Family;
+use super::panel::{
+    AROUND, COLUMNS, Look, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes,
+    goal, line, look, mark, page, text,
+};
 use super::result::{ContestResult, Entry, WINDOWS, Window};
 
-const WIDTH: f64 = 1_000.0;
-const COLUMNS: usize = 3;
-const MARGIN: f64 = 8.0;
+/// Above the panels, for the legend.
 const HEAD: f64 = 96.0;
-const PANEL_HEIGHT: f64 = 236.0;
-const PANEL_WIDTH: f64 = (WIDTH - 2.0 * MARGIN) / COLUMNS as f64;
-/// Around a panel's axes: left, top, right, below.
-const AROUND: [f64; 4] = [40.0, 24.0, 8.0, 34.0];
-const INK: &str = "#24292f";
-const FAINT: &str = "#d9dde2";
-const SOFT: &str = "#6a737d";
-
-/// What a method looks like.
-#[derive(Clone, Copy, Debug)]
-struct Look {
-    method: &'static str,
-    colour: &'static str,
-    shape: Shape,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Shape {
-    Circle,
-    Square,
-    Up,
-    Down,
-    Diamond,
-}
-
-const fn look(method: &'static str, colour: &'static str, shape: Shape) -> Look {
-    Look {
-        method,
-        colour,
-        shape,
-    }
-}
 
 /// Okabe and Ito's colours, which the colour-blind tell apart; no two methods share shape and colour.
 const LOOKS: [Look; 10] = [
@@ -58,97 +26,12 @@ const LOOKS: [Look; 10] = [
     look("McLeod", "#B58900", Shape::Diamond),
 ];
 
-/// An axis.
-struct Scale {
-    low: f64,
-    high: f64,
-    logarithmic: bool,
-    ticks: Vec<(f64, String)>,
-    label: String,
-}
-
-impl Scale {
-    fn decades(low: f64, high: f64, label: &str) -> Self {
-        // Where there is room, 2 and 5 are labelled too.
-        let steps: &[f64] = if high / low < 1e3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
-        let ticks = decades
-            .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
-            .filter(|tick| (low..=high * 1.001).contains(tick))
-            .map(|tick| (tick, short(tick)))
-            .collect();
-        Self {
-            low,
-            high,
-            logarithmic: true,
-            ticks,
-            label: label.to_owned(),
-        }
-    }
-
-    fn even(low: f64, high: f64, step: f64, label: &str) -> Self {
-        let count = ((high - low) / step).floor() as u32;
-        Self {
-            low,
-            high,
-            logarithmic: false,
-            ticks: (0..=count)
-                .map(|index| low + f64::from(index) * step)
-                .map(|tick| (tick, short(tick)))
-                .collect(),
-            label: label.to_owned(),
-        }
-    }
-
-    /// Where a value is on it, 0 to 1; what lies beyond is put at the end.
-    fn place(&self, value: f64) -> f64 {
-        let share = if self.logarithmic {
-            (value / self.low).ln() / (self.high / self.low).ln()
-        } else {
-            (value - self.low) / (self.high - self.low)
-        };
-        share.clamp(0.0, 1.0)
-    }
-}
-
-fn short(value: f64) -> String {
-    if value >= 1_000.0 {
-        format!("{}k", value / 1_000.0)
-    } else {
-        format!("{value}")
-    }
-}
-
-/// A panel's axes on the page.
-struct Panel<'a> {
-    left: f64,
-    top: f64,
-    x: &'a Scale,
-    y: &'a Scale,
-}
-
-impl Panel<'_> {
-    const WIDE: f64 = PANEL_WIDTH - AROUND[0] - AROUND[2];
-    const HIGH: f64 = PANEL_HEIGHT - AROUND[1] - AROUND[3];
-
-    fn at(&self, x: f64, y: f64) -> (f64, f64) {
-        (
-            self.left + Self::WIDE * self.x.place(x),
-            self.top + Self::HIGH * (1.0 - self.y.place(y)),
-        )
-    }
-}
-
 /// Draws it.
 pub fn draw(result: &ContestResult) -> String {
     let panels = result.families.len() + 1;
     let rows = panels.div_ceil(COLUMNS);
     let height = HEAD + rows as f64 * PANEL_HEIGHT + MARGIN;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
-         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"11\" fill=\"{INK}\">\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    );
+    let mut svg = page(height);
     legend(&mut svg);
     let cost = Scale::decades(700.0, 30_000.0, "instructions a ms");
     let error = Scale::decades(0.03, 300.0, "");
@@ -163,37 +46,63 @@ pub fn draw(result: &ContestResult) -> String {
             .position(|family| family.folder == "boundary");
         match result.families.get(index) {
             Some(family) if Some(index) == boundary => {
-                let panel = Panel { left, top, x: &cost, y: &settling };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &cost,
+                    y: &settling,
+                };
                 let title = format!("{}: settled within 10 %, ms", family.title);
                 axes(&mut svg, &panel, &title);
                 budget(&mut svg, &panel);
                 for goal_ms in goals_ms(family) {
                     goal(&mut svg, &panel, goal_ms, &format!("goal {goal_ms} ms"));
                 }
-                marks(&mut svg, &panel, result, |entry| {
-                    Some((entry.cost?.mean, entry.scores[index].settling_ms?))
-                }, index);
+                marks(
+                    &mut svg,
+                    &panel,
+                    result,
+                    |entry| Some((entry.cost?.mean, entry.scores[index].settling_ms?)),
+                    index,
+                );
             }
             Some(family) => {
-                let panel = Panel { left, top, x: &cost, y: &error };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &cost,
+                    y: &error,
+                };
                 axes(&mut svg, &panel, &format!("{}: RMS error, %", family.title));
                 budget(&mut svg, &panel);
                 bounds(&mut svg, &panel, family);
                 if let Some(percent) = family.goal_percent() {
                     goal(&mut svg, &panel, percent, &format!("goal {percent} %"));
                 }
-                marks(&mut svg, &panel, result, |entry| {
-                    Some((entry.cost?.mean, entry.scores[index].rms_percent?))
-                }, index);
+                marks(
+                    &mut svg,
+                    &panel,
+                    result,
+                    |entry| Some((entry.cost?.mean, entry.scores[index].rms_percent?)),
+                    index,
+                );
             }
             None => {
                 let time = Scale::even(0.0, 400.0, 100.0, "ms to settle after the boundary");
-                let panel = Panel { left, top, x: &time, y: &error };
+                let panel = Panel {
+                    left,
+                    top,
+                    x: &time,
+                    y: &error,
+                };
                 axes(&mut svg, &panel, "Table I, 20 dB: RMS error, %");
                 if let Some(boundary) = boundary {
-                    marks(&mut svg, &panel, result, |entry| {
-                        Some((entry.scores[boundary].settling_ms?, entry.scores[0].rms_percent?))
-                    }, 0);
+                    let place = |entry: &Entry| {
+                        let settling_ms = entry.scores[boundary].settling_ms?;
+                        Some((settling_ms, entry.scores[0].rms_percent?))
+                    };
+                    marks(&mut svg, &panel, result, place, 0);
+                    travels(&mut svg, &panel, result, place);
                 }
             }
         }
@@ -202,7 +111,7 @@ pub fn draw(result: &ContestResult) -> String {
     svg
 }
 
-fn goals_ms(family: &super::family::Family) -> Vec<f64> {
+fn goals_ms(family: &Family) -> Vec<f64> {
     let mut goals: Vec<f64> = family
         .scenes
         .iter()
@@ -211,23 +120,6 @@ fn goals_ms(family: &super::family::Family) -> Vec<f64> {
     goals.sort_by(f64::total_cmp);
     goals.dedup();
     goals
-}
-
-fn text(svg: &mut String, x: f64, y: f64, style: &str, words: &str) {
-    // A white edge keeps it legible over lines.
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" stroke=\"#ffffff\" stroke-width=\"3\" \
-         paint-order=\"stroke\" {style}>{words}</text>"
-    );
-}
-
-fn line(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &str) {
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" fill=\"none\" {style}/>",
-        from.0, from.1, to.0, to.1
-    );
 }
 
 fn legend(svg: &mut String) {
@@ -274,39 +166,10 @@ fn budget(svg: &mut String, panel: &Panel<'_>) {
     let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"1 3\"");
     line(svg, (x, panel.top), (x, bottom), &style);
     let style = format!("font-size=\"10\" fill=\"{SOFT}\"");
-    text(svg, x + 3.0, bottom - 4.0, &style, "5 % of the M4F");
+    text(svg, x + 3.0, panel.top + 9.0, &style, "5 % of the M4F");
 }
 
-fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
-    let (left, top) = (panel.left, panel.top);
-    let (right, bottom) = (left + Panel::WIDE, top + Panel::HIGH);
-    text(svg, left - 30.0, top - 9.0, "font-size=\"13\" font-weight=\"600\"", title);
-    for (value, label) in &panel.x.ticks {
-        let (x, _) = panel.at(*value, panel.y.low);
-        line(svg, (x, top), (x, bottom), &format!("stroke=\"{FAINT}\""));
-        text(svg, x, bottom + 14.0, "text-anchor=\"middle\"", label);
-    }
-    for (value, label) in &panel.y.ticks {
-        let (_, y) = panel.at(panel.x.low, *value);
-        line(svg, (left, y), (right, y), &format!("stroke=\"{FAINT}\""));
-        text(svg, left - 5.0, y + 4.0, "text-anchor=\"end\"", label);
-    }
-    let style = format!("text-anchor=\"middle\" fill=\"{SOFT}\"");
-    text(svg, (left + right) / 2.0, bottom + 27.0, &style, &panel.x.label);
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\" fill=\"none\" stroke=\"{SOFT}\"/>"
-    );
-}
-
-fn goal(svg: &mut String, panel: &Panel<'_>, value: f64, words: &str) {
-    let (left, y) = panel.at(panel.x.low, value);
-    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\"");
-    line(svg, (left, y), (left + Panel::WIDE, y), &style);
-    text(svg, left + 3.0, y - 3.0, &format!("font-size=\"10\" fill=\"{SOFT}\""), words);
-}
-
-fn bounds(svg: &mut String, panel: &Panel<'_>, family: &super::family::Family) {
+fn bounds(svg: &mut String, panel: &Panel<'_>, family: &Family) {
     for window in WINDOWS {
         let Some(percent) = window.bound_percent(family) else {
             continue;
@@ -323,7 +186,13 @@ fn bounds(svg: &mut String, panel: &Panel<'_>, family: &super::family::Family) {
             (right, y),
             "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
         );
-        text(svg, right - 2.0, y - 3.0, "text-anchor=\"end\" font-size=\"10\"", &words);
+        text(
+            svg,
+            right - 2.0,
+            y - 3.0,
+            "text-anchor=\"end\" font-size=\"10\"",
+            &words,
+        );
     }
 }
 
@@ -370,9 +239,37 @@ fn marks(
         mark(svg, point, look, hollow, if rarely { 0.3 } else { 1.0 });
         if entry.method == "counting" && entry.value == 80 {
             // Below if there is no room above.
-            let aside = if point.1 < panel.top + 10.0 { 14.0 } else { -5.0 };
+            let aside = if point.1 < panel.top + 10.0 {
+                14.0
+            } else {
+                -5.0
+            };
             let style = "font-size=\"10\" font-style=\"italic\"";
-            text(svg, point.0 + 6.0, point.1 + aside, style, "the paper’s count");
+            text(
+                svg,
+                point.0 + 6.0,
+                point.1 + aside,
+                style,
+                "the paper’s count",
+            );
+        }
+    }
+}
+
+/// The values of the bank's travel beside their marks.
+fn travels(
+    svg: &mut String,
+    panel: &Panel<'_>,
+    result: &ContestResult,
+    place: impl Fn(&Entry) -> Option<(f64, f64)>,
+) {
+    for entry in &result.entries {
+        if entry.knob == "travel_percent"
+            && let Some((x, y)) = place(entry)
+        {
+            let (x, y) = panel.at(x, y);
+            let style = "text-anchor=\"middle\" font-size=\"10\"";
+            text(svg, x, y + 19.0, style, &format!("{} %", entry.value));
         }
     }
 }
@@ -402,52 +299,18 @@ fn knob_dash(knob: &str) -> &'static str {
     }
 }
 
-fn mark(svg: &mut String, (x, y): (f64, f64), look: &Look, hollow: bool, opacity: f64) {
-    let shape = match look.shape {
-        Shape::Circle => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\""),
-        Shape::Square => polygon(x, y, &[(-3.6, -3.6), (3.6, -3.6), (3.6, 3.6), (-3.6, 3.6)]),
-        Shape::Up => polygon(x, y, &[(0.0, -5.0), (4.6, 3.4), (-4.6, 3.4)]),
-        Shape::Down => polygon(x, y, &[(0.0, 5.0), (4.6, -3.4), (-4.6, -3.4)]),
-        Shape::Diamond => polygon(x, y, &[(0.0, -5.2), (5.2, 0.0), (0.0, 5.2), (-5.2, 0.0)]),
-    };
-    let (fill, stroke) = if hollow {
-        ("#ffffff", look.colour)
-    } else {
-        (look.colour, "#ffffff")
-    };
-    let width = if hollow { 1.8 } else { 0.8 };
-    let _ = writeln!(
-        svg,
-        "{shape} fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\" opacity=\"{opacity}\"/>"
-    );
-}
-
-fn polygon(x: f64, y: f64, corners: &[(f64, f64)]) -> String {
-    let mut points = String::new();
-    for (across, down) in corners {
-        let _ = write!(points, "{:.1},{:.1} ", x + across, y + down);
-    }
-    format!("<polygon points=\"{}\"", points.trim_end())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_scale_puts_its_ends_and_what_lies_beyond_at_0_and_1() {
-        let scale = Scale::decades(0.1, 1_000.0, "");
-        assert_eq!(scale.place(0.1), 0.0);
-        assert_eq!(scale.place(1e9), 1.0);
-        assert!((scale.place(1.0) - 0.25).abs() < 1e-12);
-        let ticks: Vec<&str> = scale.ticks.iter().map(|tick| &*tick.1).collect();
-        assert_eq!(ticks, ["0.1", "1", "10", "100", "1k"]);
-    }
-
-    #[test]
     fn every_method_of_the_contest_has_a_look() {
         for contestant in crate::chart::contest::contestants() {
-            assert!(look_of(contestant.method()).is_some(), "{}", contestant.method());
+            assert!(
+                look_of(contestant.method()).is_some(),
+                "{}",
+                contestant.method()
+            );
         }
     }
 }

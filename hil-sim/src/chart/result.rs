@@ -133,8 +133,20 @@ impl ContestResult {
                 let bound = field(Some(bound), 4);
                 let empty = "";
                 table.write_record([
-                    family.folder, "Cramér–Rao", knob, &value, empty, empty, empty, &bound, empty,
-                    empty, empty, empty, empty, empty,
+                    family.folder,
+                    "Cramér–Rao",
+                    knob,
+                    &value,
+                    empty,
+                    empty,
+                    empty,
+                    &bound,
+                    empty,
+                    empty,
+                    empty,
+                    empty,
+                    empty,
+                    empty,
                 ])?;
             }
         }
@@ -147,4 +159,87 @@ impl ContestResult {
 
 fn field(value: Option<f64>, decimals: usize) -> String {
     value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::settings::{Knob, SETTINGS};
+    use crate::scene::{Gauges, Kinematic, Scene};
+
+    #[test]
+    fn the_csv_has_a_line_for_each_contestant_and_bound_of_a_family() {
+        let mut scene = Scene::constant(1.0, 50.0);
+        scene.gauges = Gauges::Kinematic(Kinematic {
+            snr_db: Some(20.0),
+            ..Kinematic::default()
+        });
+        let family = |folder, scene| Family {
+            folder,
+            title: "",
+            scenes: vec![scene],
+        };
+        let entry = |method, knob, worst| Entry {
+            method,
+            knob,
+            value: 70,
+            setting: None,
+            cost: Some(Cost {
+                mean: 1_234.4,
+                worst,
+            }),
+            scores: vec![
+                Score {
+                    rms_percent: Some(0.25),
+                    worst: Some((0.5, "a".to_owned())),
+                    valid_share: Some(0.99),
+                    wrong_share: Some(0.0),
+                    ..Score::default()
+                },
+                Score {
+                    settling_ms: Some(90.0),
+                    longest_settling_ms: Some(100.0),
+                    ..Score::default()
+                },
+            ],
+        };
+        let result = ContestResult {
+            families: vec![
+                family("steady", scene),
+                family("clean", Scene::constant(1.0, 50.0)),
+            ],
+            entries: vec![
+                entry("bank", "travel_percent", Some(5_000.0)),
+                entry("YIN", "", None),
+            ],
+        };
+        let csv = result.csv().unwrap();
+        let lines: Vec<&str> = csv.lines().skip(1).collect();
+        assert_eq!(lines.len(), 4 + WINDOWS.len());
+        assert_eq!(
+            lines[0],
+            "steady,bank,travel_percent,70,1234,5000,counted,0.2500,0.5000,a,0.9900,0.00000,,"
+        );
+        assert_eq!(
+            lines[1],
+            "steady,YIN,,,1234,,estimated,0.2500,0.5000,a,0.9900,0.00000,,"
+        );
+        // 50 Hz at 20 dB, five gauges, 80 ms: see the bound's own tests.
+        assert_eq!(lines[3], "steady,Cramér–Rao,window_ms,80,,,,0.0778,,,,,,");
+        assert_eq!(
+            lines[4 + 1],
+            "clean,bank,travel_percent,70,1234,5000,counted,,,,,,90.0,100.0"
+        );
+    }
+
+    #[test]
+    fn the_default_is_one_point_of_each_sweep_of_the_bank() {
+        for knob in [Knob::Travel, Knob::Candidates, Knob::Gauges] {
+            let defaults = SETTINGS.iter().filter(|setting| {
+                let default = SensorConfiguration::DEFAULT;
+                setting.knob == knob && setting.on(default) == default
+            });
+            assert_eq!(defaults.count(), 1, "{knob:?}");
+        }
+    }
 }

@@ -40,8 +40,7 @@ impl Score {
             settling_ms: settling
                 .as_ref()
                 .and_then(|times| mean(times.iter().copied())),
-            longest_settling_ms: settling
-                .and_then(|times| times.into_iter().reduce(f64::max)),
+            longest_settling_ms: settling.and_then(|times| times.into_iter().reduce(f64::max)),
         }
     }
 }
@@ -64,7 +63,9 @@ mod tests {
     }
 
     fn scenes(count: usize) -> Vec<Scene> {
-        (1..=count).map(|mm| Scene::constant(mm as f64, 50.0)).collect()
+        (1..=count)
+            .map(|mm| Scene::constant(mm as f64, 50.0))
+            .collect()
     }
 
     #[test]

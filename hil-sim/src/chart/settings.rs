@@ -10,8 +10,10 @@ pub enum Knob {
     Travel,
     /// Wavenumbers in the bank.
     Candidates,
-    /// Gauges that take part.
+    /// How many gauges take part.
     Gauges,
+    /// Which gauges take part, bit g for gauge g.
+    GaugeSet,
     /// The counting window A in ms.
     Window,
     /// Nothing.
@@ -82,6 +84,7 @@ impl Setting {
                     _ => 0b11111,
                 }
             }
+            Knob::GaugeSet => configuration.gauges = self.value as u8,
             Knob::Window => configuration.window_ms = self.value,
             Knob::Fixed => {}
         }
@@ -104,6 +107,7 @@ impl Setting {
             Knob::Travel => "travel_percent",
             Knob::Candidates => "candidates",
             Knob::Gauges => "gauges",
+            Knob::GaugeSet => "gauge_set",
             Knob::Window => "window_ms",
             Knob::Fixed => "",
         }

@@ -9,11 +9,14 @@ use anyhow::Context;
 use clap::Subcommand;
 use hil_sim::chart::contest::{self, contestants};
 use hil_sim::chart::costs::Costs;
+use hil_sim::chart::efficiency;
 use hil_sim::chart::family;
 use hil_sim::chart::picture;
 use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
+
+use super::number;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -27,12 +30,26 @@ enum What {
     /// every scene, against the instructions they take on an emulated Cortex-M4F. Writes estimators.csv
     /// and estimators.svg
     Estimators(Estimators),
+    /// The bank's error over the Cramér–Rao bound for the travel it used, 5–100 Hz: exit status 1 if one
+    /// gauge's is above 1.2 anywhere. Writes bound.csv and bound.svg
+    Bound(Bound),
+}
+
+#[derive(Debug, clap::Args)]
+struct Bound {
+    /// Where to write CSV and SVG
+    #[arg(long, value_name = "FOLDER", default_value = "target/chart")]
+    out: PathBuf,
 }
 
 #[derive(Debug, clap::Args)]
 struct Estimators {
     /// The scenes: a folder with a folder for each family
-    #[arg(long, value_name = "FOLDER", default_value = "hil-sim/scenes/estimation")]
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        default_value = "hil-sim/scenes/estimation"
+    )]
     scenes: PathBuf,
     /// Where to write CSV and SVG
     #[arg(long, value_name = "FOLDER", default_value = "target/chart")]
@@ -49,27 +66,23 @@ struct Estimators {
 impl Chart {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         match self.what {
-            What::Estimators(estimators) => estimators.execute()?,
+            What::Estimators(estimators) => estimators.execute(),
+            What::Bound(bound) => bound.execute(),
         }
-        Ok(ExitCode::SUCCESS)
     }
 }
 
 impl Estimators {
-    fn execute(self) -> anyhow::Result<()> {
+    fn execute(self) -> anyhow::Result<ExitCode> {
         let families = family::load(&self.scenes)?;
         create_folder(&self.out)?;
         let costs = Costs::count(&self.elf)?;
         let contestants = contestants();
 
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
-        let done = AtomicUsize::new(0);
-        let summaries = contest::run(&contestants, &scenes, || {
-            let done = 1 + done.fetch_add(1, Ordering::Relaxed);
-            eprint!("\r{done} of {} scenes", scenes.len());
-            let _ = std::io::stderr().flush();
-        })?;
-        eprintln!();
+        let progress = Progress::default();
+        let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.step())?;
+        progress.end();
 
         let entries = contestants
             .iter()
@@ -97,13 +110,66 @@ impl Estimators {
         let result = ContestResult { families, entries };
         write(&self.out.join("estimators.csv"), &result.csv()?)?;
         write(&self.out.join("estimators.svg"), &picture::draw(&result))?;
-        Ok(())
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Bound {
+    fn execute(self) -> anyhow::Result<ExitCode> {
+        create_folder(&self.out)?;
+        let progress = Progress::default();
+        let rows = efficiency::measure(|| progress.step())?;
+        progress.end();
+        println!(
+            "| profile | v/λ, Hz | one gauge: rms % | of it bias % | bound % | ratio | five gauges: ratio |"
+        );
+        println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+        let (one, five) = rows.split_at(rows.len() / 2);
+        for (one, five) in one.iter().zip(five) {
+            println!(
+                "| {} | {} | {} | {} | {:.3} | {} | {} |",
+                one.profile,
+                one.frequency_hz,
+                number(one.rms_percent, 3),
+                number(one.bias_percent, 3),
+                one.kernel_bound_percent,
+                number(one.ratio(), 2),
+                number(five.ratio(), 2),
+            );
+        }
+        write(&self.out.join("bound.csv"), &efficiency::csv(&rows)?)?;
+        write(
+            &self.out.join("bound.svg"),
+            &efficiency::picture::draw(&rows),
+        )?;
+        let met = rows.iter().all(|row| row.meets_goal() != Some(false));
+        Ok(ExitCode::from(u8::from(!met)))
+    }
+}
+
+/// Scenes done, counted on standard error.
+#[derive(Default)]
+struct Progress(AtomicUsize);
+
+impl Progress {
+    fn step(&self) {
+        let done = 1 + self.0.fetch_add(1, Ordering::Relaxed);
+        eprint!("\r{done} scenes");
+        let _ = std::io::stderr().flush();
+    }
+
+    fn end(&self) {
+        eprintln!();
     }
 }
 
 fn create_folder(folder: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("{}: can't be made: give another with --out", folder.display()))
+    std::fs::create_dir_all(folder).with_context(|| {
+        format!(
+            "{}: can't be made: give another with --out",
+            folder.display()
+        )
+    })
 }
 
 fn write(path: &Path, text: &str) -> anyhow::Result<()> {
