@@ -160,9 +160,10 @@ fn a_stuck_gauge_is_found_and_forgiven() {
 #[test]
 fn a_saturated_gauge_is_found_and_forgiven() {
     // Three quarters of all codes are at the ends, and a tenth is enough, 0.14 time constants of 0.3 s
-    // in; down to a tenth again it takes 2 time constants, before the half second counts.
+    // in; down to a tenth again it takes 2 time constants, before the half second counts. What was heard
+    // until then raises doubts for a while: measured 0.75 and 0.83.
     is_found_and_forgiven("saturated", &[GaugeHealth::Saturated], 0.070, 1.2);
-    goes_on("saturated", 0.8);
+    goes_on("saturated", 0.7);
 }
 
 #[test]
