@@ -169,12 +169,13 @@ struct Fit {
     determinant: f32,
 }
 
-/// What a candidate's fit says of the usable gauges.
+/// What a candidate's fit says of the gauges, the usable ones unless said.
 #[derive(Clone, Copy, Debug, Default)]
 struct Agreement {
     /// Bit g set: the wave explains gauge g.
     fitting: u8,
-    /// Bit g set: the wave explains less than half of gauge g, noise left out.
+    /// Bit g set: the wave explains less than half of gauge g, noise left out. Also of one that is not
+    /// usable: it is not taken back as long as it does not fit.
     misfits: u8,
     /// The wave explains the gauges as a whole.
     whole: bool,
@@ -240,7 +241,7 @@ impl Bank {
 
     /// The wavelength at the peak around candidate `number`, in mm: none at the bank's ends, and none if
     /// there is no peak between the neighbours.
-    fn vertex(&self, kernel: Kernel, number: usize, energy: impl Fn(usize) -> f32) -> Option<f32> {
+    fn vertex(&self, kernel: Kernel, number: usize) -> Option<f32> {
         let around = number.checked_sub(1)?..=number + 1;
         if *around.end() >= self.count {
             return None;
@@ -248,10 +249,12 @@ impl Bank {
         let [x0, x1, x2] =
             [number - 1, number, number + 1].map(|i| self.candidates[i].wavelength_mm);
         let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
-            let energy = energy(i).max(f32::MIN_POSITIVE);
+            let power = self.candidates[i]
+                .power(kernel, self.touch.usable)
+                .max(f32::MIN_POSITIVE);
             match kernel {
-                Kernel::Short => 1.0 / energy,
-                Kernel::Long => 1.0 / libm::sqrtf(energy),
+                Kernel::Short => 1.0 / power,
+                Kernel::Long => 1.0 / libm::sqrtf(power),
             }
         });
         let rise = (y1 - y0) / (x1 - x0);
@@ -274,14 +277,20 @@ impl Bank {
             unexplained <= most * explained + UNEXPLAINED_PER_NOISE * noise
         };
         let mut agreement = Agreement::default();
-        for gauge in gauges_of(self.touch.usable) {
+        for gauge in 0..GAUGES {
+            let usable = self.touch.usable >> gauge & 1 == 1;
             let explained = fit.energy(sums, gauge);
             let noise = self.touch.noise[gauge];
             let unexplained = fit.variance(sums, gauge) - explained - noise;
-            if fits(explained, unexplained, noise) {
-                agreement.fitting |= 1 << gauge;
-            } else if unexplained > explained {
+            let fits = fits(explained, unexplained, noise);
+            if !fits && unexplained > explained {
                 agreement.misfits |= 1 << gauge;
+            }
+            if !usable {
+                continue;
+            }
+            if fits {
+                agreement.fitting |= 1 << gauge;
             }
             agreement.explained += explained;
             agreement.unexplained += unexplained;
@@ -309,19 +318,38 @@ impl Bank {
     fn look(&self, kernel: Kernel) -> Look {
         let (energies, number) = self.spectrum(kernel, self.touch.usable);
         let agreement = self.agreement(kernel, number);
-        let vertex = self.vertex(kernel, number, |i| energies[i]);
+        let vertex = self.vertex(kernel, number);
         let wavelength_mm = vertex.unwrap_or(self.candidates[number].wavelength_mm);
         // What was felt before a change of surface is no sign of stick and slip after it.
         let jerky =
             kernel == Kernel::Long && !self.force_channel && self.jerky(wavelength_mm, &agreement);
+        let stands =
+            vertex.is_some() && !jerky && self.stands(kernel, number, wavelength_mm, &agreement);
+        let whole = agreement.whole || kernel == Kernel::Short;
+        let others = self.touch.usable & !agreement.misfits;
         Look {
             number,
             wavelength_mm: (energies[number] > 0.0).then_some(wavelength_mm),
+            amplitude_lsb: self.amplitude_lsb(&agreement)
+                * self.detuned(kernel, number, wavelength_mm),
             jerky,
-            stands: vertex.is_some()
-                && !jerky
-                && self.stands(kernel, number, wavelength_mm, &agreement),
+            stands: stands && whole,
+            odd_one_out: stands
+                && !whole
+                && agreement.misfits.is_power_of_two()
+                && agreement.fitting == others,
             agreement,
+        }
+    }
+
+    /// Amplitude of a sine of `wavelength_mm`, relative to what candidate `number` shows of it.
+    fn detuned(&self, kernel: Kernel, number: usize, wavelength_mm: f32) -> f32 {
+        let off = self.candidates[number].wavelength_mm / wavelength_mm - 1.0;
+        let radians = 2.0 * core::f32::consts::PI * self.travel_wavelengths * off;
+        let square = 1.0 + radians * radians;
+        match kernel {
+            Kernel::Short => libm::sqrtf(square),
+            Kernel::Long => square,
         }
     }
 
@@ -330,7 +358,7 @@ impl Bank {
             wavelength_mm: look.wavelength_mm,
             valid,
             confidence: look.agreement.confidence(),
-            amplitude_lsb: self.amplitude_lsb(&look.agreement),
+            amplitude_lsb: look.amplitude_lsb,
             gauges_used: self.touch.usable,
             misfits: if valid { look.agreement.misfits } else { 0 },
             jerky: look.jerky,
@@ -366,7 +394,6 @@ impl Bank {
         let noise = 2.0 * agreement.noise * per_sample_mm / kernel_mm;
         let amplitude_lsb = self.amplitude_lsb(agreement);
         2 * fitting > usable
-            && (agreement.whole || kernel == Kernel::Short)
             && self.rested < REST_SAMPLES
             && fit.weight >= LEAST_FILLED
             && fit.determined() >= LEAST_DETERMINED
@@ -381,7 +408,10 @@ struct Look {
     number: usize,
     wavelength_mm: Option<f32>,
     agreement: Agreement,
+    amplitude_lsb: f32,
     stands: bool,
+    /// It would, were it not for one gauge that says something else than all others.
+    odd_one_out: bool,
     jerky: bool,
 }
 
@@ -425,13 +455,17 @@ impl Estimator for Bank {
         self.since_valid = self.since_valid.saturating_add(1);
 
         let long = self.look(Kernel::Long);
-        let short_mm = self.vertex(Kernel::Short, long.number, |i| {
-            self.candidates[i].energy(Kernel::Short, self.touch.usable)
-        });
+        let short_mm = self.vertex(Kernel::Short, long.number);
         let agree = long
             .wavelength_mm
             .zip(short_mm)
             .is_some_and(|(long, short)| (short / long - 1.0).abs() < MOST_DISAGREEMENT);
+        if long.odd_one_out && agree {
+            return Finding {
+                misfits: long.agreement.misfits,
+                ..self.finding(&long, false)
+            };
+        }
         if long.stands && agree {
             self.since_valid = 0;
             self.known_mm = long.wavelength_mm.unwrap_or(0.0);
@@ -487,6 +521,21 @@ impl Candidate {
         let sums = self.sums(kernel);
         Fit::of(sums).map_or(0.0, |fit| {
             gauges_of(gauges).map(|gauge| fit.energy(sums, gauge)).sum()
+        })
+    }
+
+    /// What the peak is found by: the geometric mean of the energy that the fit explains and of its
+    /// amplitude squared, each summed over `gauges`. As the latest travel covers a little more or less
+    /// than whole waves both ripple, in opposite ways; their mean does half as much.
+    fn power(&self, kernel: Kernel, gauges: u8) -> f32 {
+        let sums = self.sums(kernel);
+        Fit::of(sums).map_or(0.0, |fit| {
+            let (mut energy, mut squares) = (0.0, 0.0);
+            for gauge in gauges_of(gauges) {
+                energy += fit.energy(sums, gauge);
+                squares += fit.amplitude_squared(sums, gauge);
+            }
+            libm::sqrtf(energy * squares)
         })
     }
 
@@ -577,6 +626,19 @@ impl Fit {
         (self.scale * (direct - image)).max(0.0)
     }
 
+    /// The wave's amplitude in the gauge, squared.
+    fn amplitude_squared(&self, sums: &Sums, gauge: usize) -> f32 {
+        let mean = sums[MEAN + gauge];
+        let s0 = sums[2 * gauge] - mean * self.first[0];
+        let s1 = sums[2 * gauge + 1] - mean * self.first[1];
+        let [r0, r1] = self.r;
+        // (P S − R S*) / (P² − |R|²)
+        let a0 = self.p * s0 - (r0 * s0 + r1 * s1);
+        let a1 = self.p * s1 - (r1 * s0 - r0 * s1);
+        let scale = 2.0 / self.determinant;
+        scale * scale * (a0 * a0 + a1 * a1)
+    }
+
     /// The gauge's variance, per weight.
     fn variance(&self, sums: &Sums, gauge: usize) -> f32 {
         let mean = sums[MEAN + gauge] / self.weight;
@@ -625,3 +687,6 @@ fn second_difference_gain(frequency_hz: f32) -> f32 {
 fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
     (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
 }
+
+#[cfg(test)]
+mod tests;

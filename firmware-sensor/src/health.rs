@@ -16,14 +16,21 @@ const HIGHEST_CODE: u16 = 4_095;
 const FOLLOWED_ESTIMATES: f32 = 30.0;
 /// Share of scans at an end that makes a gauge saturated; white noise at −6 dB clips less.
 const AT_RAILS: f32 = 0.1;
-/// Estimates without a change of the code after which a gauge is stuck, if others change.
+/// Estimates without a change of the code after which a gauge is stuck, if another speaks.
 const STILL_ESTIMATES: u32 = 20;
 /// A stuck code this near mid-rail is a gauge that is not connected.
 const MID_RAIL: core::ops::RangeInclusive<u16> = 2_048 - 16..=2_048 + 16;
-/// Power of a gauge relative to the strongest below which it says next to nothing.
+/// Power of a gauge relative to the second strongest below which it says next to nothing. To the second,
+/// since one alone may have been pushed or be at fault.
 const SILENT: f32 = 1e-4;
-/// The strongest gauge must have this power, in ADC steps², before any is called silent.
+/// Power from which on a gauge speaks, in ADC steps², beyond what its noise may be in 10 ms. Where none does, as on a
+/// smooth surface or at rest, there is nothing to tell a silent or a stuck gauge by.
 const SPEAKING: f32 = 100.0;
+/// Ten samples of white noise have more than so many times their variance once in 25 000 times.
+const SPEAKING_PER_NOISE: f32 = 4.0;
+/// The typical gauge's power is taken for no less, in ADC steps²: noise and hum that are below it do no
+/// harm, and a power near 0 is what rounding leaves of its offset.
+const LEAST_TYPICAL: f32 = 4.0;
 /// White noise, relative to the typical gauge's whole power, above which a gauge is of no use.
 const TOO_NOISY: f32 = 3.0;
 /// Own hum's power, relative to the typical gauge's, above which a gauge is left out.
@@ -59,6 +66,8 @@ struct History {
     at_rails: f32,
     mean: f32,
     power: f32,
+    /// Power over the time since the judgement before, about the mean of that time.
+    now: f32,
     misfits: u8,
     /// Estimates until it is taken back.
     sentence: u8,
@@ -76,6 +85,9 @@ pub struct Signs {
     pub misfits: u8,
     /// The others agree on one.
     pub agreed: bool,
+    /// Bit g set: gauge g is allowed to take part. The others are judged too, but not the measure of
+    /// anything: they may not be connected.
+    pub allowed: u8,
 }
 
 impl Health {
@@ -115,10 +127,9 @@ impl Health {
         for history in &mut self.gauges {
             history.follow(samples, follow);
         }
-        let mut powers = self.gauges.map(|history| history.power);
-        powers.sort_unstable_by(f32::total_cmp);
-        let (typical, strongest) = (powers[GAUGES / 2], powers[GAUGES - 1]);
-        let changing = self.gauges.iter().any(|history| history.still == 0);
+        // Powers of a few samples are anything.
+        let settled = f32::from(self.judgements) >= FOLLOWED_ESTIMATES;
+        let measure = Measure::of(&self.gauges, signs);
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             let misfit = signs.misfits >> gauge & 1 == 1;
             if signs.agreed {
@@ -130,17 +141,17 @@ impl Health {
             }
             let fault = if history.at_rails > AT_RAILS {
                 GaugeHealth::Saturated
-            } else if history.still >= STILL_ESTIMATES && changing {
+            } else if history.still >= STILL_ESTIMATES && measure.speaks_now {
                 if MID_RAIL.contains(&history.last) {
                     GaugeHealth::Dead
                 } else {
                     GaugeHealth::Stuck
                 }
-            } else if strongest > SPEAKING && history.power < SILENT * strongest {
+            } else if history.power < measure.silent {
                 GaugeHealth::Dead
-            } else if signs.noise[gauge] > TOO_NOISY * typical {
+            } else if settled && signs.noise[gauge] > TOO_NOISY * measure.typical {
                 GaugeHealth::Noisy
-            } else if signs.hum[gauge] > TOO_MUCH_HUM * typical {
+            } else if signs.hum[gauge] > TOO_MUCH_HUM * measure.typical {
                 GaugeHealth::Hum
             } else if history.misfits >= MISFIT_ESTIMATES {
                 GaugeHealth::Noisy
@@ -173,6 +184,45 @@ impl Health {
     }
 }
 
+/// What a gauge is measured by: the allowed ones that are neither at an end of the range nor stuck.
+struct Measure {
+    /// Their median power, in ADC steps², and no less than [`LEAST_TYPICAL`].
+    typical: f32,
+    /// Power below which a gauge is silent while others speak; 0 if they do not.
+    silent: f32,
+    /// One of them at least speaks now: codes stand still at rest, too.
+    speaks_now: bool,
+}
+
+impl Measure {
+    fn of(gauges: &[History; GAUGES], signs: &Signs) -> Self {
+        let mut powers = [0.0; GAUGES];
+        let (mut count, mut speaking, mut speaks_now) = (0, 0, false);
+        for (gauge, history) in gauges.iter().enumerate() {
+            let allowed = signs.allowed >> gauge & 1 == 1;
+            if allowed && history.at_rails <= AT_RAILS && history.still < STILL_ESTIMATES {
+                powers[count] = history.power;
+                count += 1;
+                let speaks = SPEAKING + SPEAKING_PER_NOISE * signs.noise[gauge];
+                speaking += u8::from(history.power > speaks);
+                speaks_now |= history.health == GaugeHealth::Good && history.now > speaks;
+            }
+        }
+        let powers = &mut powers[..count];
+        powers.sort_unstable_by(f32::total_cmp);
+        let typical = powers.get(count / 2).copied().unwrap_or(0.0);
+        let second = match powers {
+            [.., second, _] => *second,
+            _ => 0.0,
+        };
+        Self {
+            typical: typical.max(LEAST_TYPICAL),
+            silent: if speaking >= 2 { SILENT * second } else { 0.0 },
+            speaks_now,
+        }
+    }
+}
+
 impl History {
     /// Takes what has been summed over `samples` into the averages.
     fn follow(&mut self, samples: u16, follow: f32) {
@@ -194,5 +244,341 @@ impl History {
         // About the mean of the last 0.3 s: a slow texture's swing over 10 ms counts too.
         let power = square - 2.0 * mean * self.mean + self.mean * self.mean;
         self.power += follow * (power.max(0.0) - self.power);
+        self.now = square - mean * mean;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::Noise;
+    use protocol::CHANNELS;
+
+    const ALL: u8 = 0b11111;
+    const PI: f64 = core::f64::consts::PI;
+
+    /// Gauges that are watched, and what becomes of their signals.
+    struct Ward {
+        health: Health,
+        noise: Noise,
+        signs: Signs,
+        ms: u32,
+        random: u64,
+        /// How often a verdict has changed.
+        changes: u32,
+    }
+
+    impl Ward {
+        fn new() -> Self {
+            Self {
+                health: Health::default(),
+                noise: Noise::default(),
+                signs: Signs {
+                    allowed: ALL,
+                    ..Signs::default()
+                },
+                ms: 0,
+                random: 1,
+                changes: 0,
+            }
+        }
+
+        /// Evenly over ±1, of variance ⅓.
+        fn uniform(&mut self) -> f64 {
+            self.random = self
+                .random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (self.random >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+
+        /// An estimate's time of signals, in steps from mid-rail: of gauge, s and a noise of ±1.
+        fn estimate(&mut self, signal: &impl Fn(usize, f64, f64) -> f64) -> [GaugeHealth; GAUGES] {
+            for _ in 0..10 {
+                let scans = core::array::from_fn(|scan| {
+                    let t_s = f64::from(self.ms) * 1e-3 + scan as f64 * 0.25e-3;
+                    let mut codes = [2_048; CHANNELS];
+                    for (gauge, code) in codes.iter_mut().enumerate().take(GAUGES) {
+                        let level = 2_048.0 + signal(gauge, t_s, self.uniform());
+                        *code = libm::round(level.clamp(0.0, 4_095.0)) as u16;
+                    }
+                    codes
+                });
+                // As much of the noise as the anti-aliasing filter leaves, nearly.
+                let sample = core::array::from_fn(|gauge| {
+                    scans
+                        .iter()
+                        .map(|scan: &Scan| f32::from(scan[gauge]) - 2_048.0)
+                        .sum::<f32>()
+                        / 4.0
+                });
+                self.noise.push(&scans);
+                self.health.push(&scans, &sample);
+                self.ms += 1;
+            }
+            let before = self.health.verdicts();
+            self.signs.noise = self.noise.variances();
+            self.health.judge(&self.signs);
+            self.changes += u32::from(self.health.verdicts() != before);
+            self.health.verdicts()
+        }
+
+        fn estimates(
+            &mut self,
+            count: u32,
+            signal: impl Fn(usize, f64, f64) -> f64,
+        ) -> [GaugeHealth; GAUGES] {
+            for _ in 0..count {
+                self.estimate(&signal);
+            }
+            self.health.verdicts()
+        }
+
+        /// Estimates until `gauge` is `health`, and the others are as good as before all the while.
+        fn until(
+            &mut self,
+            gauge: usize,
+            health: GaugeHealth,
+            signal: impl Fn(usize, f64, f64) -> f64,
+        ) -> u32 {
+            let mut want = self.health.verdicts();
+            want[gauge] = health;
+            for estimates in 1..1_000 {
+                let verdicts = self.estimate(&signal);
+                if verdicts == want {
+                    return estimates;
+                }
+                let mut others = verdicts;
+                others[gauge] = health;
+                assert_eq!(others, want, "after {estimates} estimates");
+            }
+            panic!("gauge {gauge} is never {health:?}");
+        }
+    }
+
+    /// A texture at 35 Hz, 20 dB above its noise in the band to 500 Hz, with an offset each.
+    fn texture(gauge: usize, t_s: f64, noise: f64) -> f64 {
+        let gain = [1.0, 0.8, 1.1, 0.6, 0.9][gauge];
+        gain * 185.0 * libm::sin(2.0 * PI * 35.0 * t_s + gauge as f64)
+            + 25.0 * noise * libm::sqrt(3.0)
+            + 100.0 * (gauge as f64 - 2.0)
+    }
+
+    /// The same, but one gauge's is `fault`.
+    fn but(gauge: usize, fault: impl Fn(f64, f64) -> f64) -> impl Fn(usize, f64, f64) -> f64 {
+        move |at, t_s, noise| {
+            if at == gauge {
+                fault(t_s, noise)
+            } else {
+                texture(at, t_s, noise)
+            }
+        }
+    }
+
+    /// A broken gauge's signal, of s and a noise of ±1.
+    type Fault = fn(f64, f64) -> f64;
+
+    const GOOD: [GaugeHealth; GAUGES] = [GaugeHealth::Good; GAUGES];
+
+    #[test]
+    fn gauges_that_are_well_stay_so() {
+        let mut ward = Ward::new();
+        assert_eq!(ward.estimates(1_000, texture), GOOD);
+        assert_eq!(ward.changes, 0);
+        assert_eq!(ward.health.good(), ALL);
+    }
+
+    #[test]
+    fn each_fault_is_found_in_time_left_out_and_forgiven_in_time() {
+        // 20 estimates without a change of code, and the one in which the signal broke off.
+        let still = 21;
+        // The mean over 0.3 s falls from 0.85 of the scans at the ends, at most, to 0.1.
+        let off_the_rails = 30.0 * libm::log(0.85 / 0.1);
+        // ±1 900 evenly, of which 0.22 of the power is left in the band, is 19 times the median power of the
+        // others; the threshold is at 3, the time constant 50 estimates. Three deviations of 200 squares.
+        let ratio = 19.0 / 3.0;
+        let noisy = 50.0 * libm::log(ratio / (ratio - 1.3));
+        let quiet_again = 50.0 * libm::log(1.3 * ratio);
+        let faults: [(usize, GaugeHealth, Fault, u32, f64); 5] = [
+            (1, GaugeHealth::Dead, |_, _| 3.0, still, 1.0),
+            (2, GaugeHealth::Stuck, |_, _| 700.0, still, 1.0),
+            (3, GaugeHealth::Stuck, |_, _| -1_900.0, still, 1.0),
+            (
+                0,
+                GaugeHealth::Saturated,
+                |t_s, noise| 20.0 * texture(2, t_s, noise),
+                5,
+                off_the_rails,
+            ),
+            (
+                4,
+                GaugeHealth::Noisy,
+                |_, noise| 1_900.0 * noise,
+                noisy as u32 + 1,
+                quiet_again,
+            ),
+        ];
+        for (gauge, health, fault, found, well) in faults {
+            let mut ward = Ward::new();
+            ward.estimates(200, texture);
+            let estimates = ward.until(gauge, health, but(gauge, fault));
+            assert!(estimates <= found, "{health:?} after {estimates}");
+            assert_eq!(ward.health.good(), ALL & !(1 << gauge));
+            ward.estimates(300, but(gauge, fault));
+            assert_eq!(ward.health.good(), ALL & !(1 << gauge));
+            let estimates = ward.until(gauge, GaugeHealth::Good, texture);
+            let forgiven = well as u32 + 1 + u32::from(SOUND_ESTIMATES) + 1;
+            assert!(estimates <= forgiven, "{health:?} until {estimates}");
+            assert!(estimates > u32::from(SOUND_ESTIMATES), "{estimates}");
+            assert_eq!(ward.health.verdicts(), GOOD);
+        }
+    }
+
+    #[test]
+    fn a_gauge_that_others_speak_beside_is_dead_even_if_its_code_flickers() {
+        let mut ward = Ward::new();
+        ward.estimates(200, texture);
+        // The power falls to 1e-4 of the second strongest's, all but 1e-5 in noise: 30 ln(1e4) estimates.
+        let estimates = ward.until(1, GaugeHealth::Dead, but(1, |_, noise| noise));
+        assert!(estimates <= 290, "{estimates}");
+    }
+
+    #[test]
+    fn a_smooth_surface_makes_none_dead() {
+        for level in [0.1, 0.6, 3.0] {
+            let mut ward = Ward::new();
+            let verdicts = ward.estimates(1_000, |gauge, t_s, noise| {
+                level * (noise + libm::sin(2.0 * PI * 20.0 * t_s + gauge as f64))
+                    + 700.3 * (gauge as f64 - 2.0)
+            });
+            assert_eq!(verdicts, GOOD, "at {level}");
+            assert_eq!(ward.changes, 0, "at {level}");
+        }
+    }
+
+    #[test]
+    fn codes_that_do_not_change_at_rest_are_no_fault() {
+        // The codes of one gauge lie at an edge and flicker, the others' do not.
+        let mut ward = Ward::new();
+        let rest = |gauge: usize, _: f64, noise: f64| {
+            700.0 * (gauge as f64 - 2.0) + if gauge == 2 { 0.5 } else { 0.0 } + 0.3 * noise
+        };
+        assert_eq!(ward.estimates(500, rest), GOOD);
+        // Rubbing and rest in turn.
+        for _ in 0..5 {
+            assert_eq!(ward.estimates(100, texture), GOOD);
+            assert_eq!(ward.estimates(100, rest), GOOD);
+        }
+        assert_eq!(ward.changes, 0);
+    }
+
+    #[test]
+    fn a_noisy_gauge_at_rest_does_not_make_the_quiet_ones_dead() {
+        // Codes that flicker are a measure; where none does, there is nothing to call it noisy by.
+        for (quiet, noisy) in [(0.7, GaugeHealth::Noisy), (0.1, GaugeHealth::Good)] {
+            let mut ward = Ward::new();
+            let verdicts = ward.estimates(500, |gauge, _, noise| {
+                noise * if gauge == 3 { 1_000.0 } else { quiet }
+            });
+            let mut want = GOOD;
+            want[3] = noisy;
+            assert_eq!(verdicts, want);
+        }
+    }
+
+    #[test]
+    fn a_push_on_one_gauge_does_not_make_small_ones_dead() {
+        // A step of 1 500 is in the power for a while, 2.2e6; 1e-4 of it is more than 10²/2.
+        let mut ward = Ward::new();
+        ward.estimates(200, |gauge, t_s, noise| 0.05 * texture(gauge, t_s, noise));
+        ward.estimates(200, |gauge, t_s, noise| {
+            0.05 * texture(gauge, t_s, noise) + if gauge == 1 { 1_500.0 } else { 0.0 }
+        });
+        assert_eq!(ward.changes, 0);
+    }
+
+    #[test]
+    fn whatever_number_of_gauges_is_left_is_judged_by_its_own_measure() {
+        for alive in 0..=ALL {
+            for allowed in [ALL, alive] {
+                // Those that are not alive have no amplifier: a code that is not at mid-rail.
+                let mut ward = Ward::new();
+                ward.signs.allowed = allowed;
+                ward.estimates(300, |gauge, t_s, noise| {
+                    if alive >> gauge & 1 == 1 {
+                        texture(gauge, t_s, noise)
+                    } else {
+                        -500.0
+                    }
+                });
+                let want = if alive == 0 { ALL } else { alive };
+                // Nobody is there to tell a dead gauge by if all are.
+                assert_eq!(ward.health.good(), want, "{alive:05b} of {allowed:05b}");
+            }
+        }
+    }
+
+    #[test]
+    fn gauges_that_are_not_allowed_are_no_measure() {
+        let mut ward = Ward::new();
+        ward.signs.allowed = 0b00101;
+        // The others are inputs that hang in the air and hum.
+        ward.estimates(300, |gauge, t_s, noise| match gauge {
+            0 => 0.02 * texture(gauge, t_s, noise),
+            2 => 0.03 * texture(gauge, t_s, noise),
+            _ => 1_900.0 * libm::sin(2.0 * PI * 50.0 * t_s),
+        });
+        assert_eq!(ward.health.good() & 0b00101, 0b00101);
+        assert_eq!(ward.changes, 0);
+    }
+
+    #[test]
+    fn a_gauge_that_comes_and_goes_stays_out() {
+        let mut ward = Ward::new();
+        ward.estimates(100, texture);
+        ward.changes = 0;
+        // At the ends for 50 ms in every 200 ms.
+        for _ in 0..50 {
+            ward.estimates(5, but(2, |_, _| 2_040.0));
+            ward.estimates(15, texture);
+        }
+        assert_eq!(ward.health.verdicts()[2], GaugeHealth::Saturated);
+        assert_eq!(ward.changes, 1);
+    }
+
+    #[test]
+    fn a_gauge_that_does_not_fit_is_blamed_after_three_tenths_of_a_second_as_long_as_that_lasts() {
+        let mut ward = Ward::new();
+        ward.signs.agreed = true;
+        ward.estimates(100, texture);
+        // One that fits now and then is not.
+        for _ in 0..10 {
+            ward.signs.misfits = 0b01000;
+            ward.estimates(29, texture);
+            ward.signs.misfits = 0;
+            ward.estimates(1, texture);
+        }
+        assert_eq!(ward.changes, 0);
+        ward.signs.misfits = 0b01000;
+        assert_eq!(ward.until(3, GaugeHealth::Noisy, texture), 30);
+        // Nothing is learned while nothing is agreed on.
+        ward.signs.agreed = false;
+        ward.signs.misfits = 0;
+        ward.estimates(200, texture);
+        assert_eq!(ward.health.good(), 0b10111);
+        ward.signs.agreed = true;
+        assert_eq!(ward.until(3, GaugeHealth::Good, texture), 51);
+    }
+
+    #[test]
+    fn hum_of_its_own_is_a_fault_from_half_the_typical_power_on() {
+        let mut ward = Ward::new();
+        ward.estimates(200, texture);
+        // The median of the gauges' powers: gain 0.9 of 185, and noise.
+        let typical = 166.5 * 166.5 / 2.0 + 25.0 * 25.0 / 4.0;
+        ward.signs.hum[1] = 0.45 * typical;
+        assert_eq!(ward.estimates(100, texture), GOOD);
+        ward.signs.hum[1] = 0.55 * typical;
+        assert_eq!(ward.until(1, GaugeHealth::Hum, texture), 1);
     }
 }

@@ -41,9 +41,9 @@ impl Running {
 }
 
 impl Running {
-    /// Whether the estimator has to wait until the start has died down in the band-pass.
+    /// Whether the estimator has to wait until the start has died down in the filters.
     pub fn waits(&self) -> bool {
-        matches!(self, Self::Counting(_) | Self::AdaptedCounting(_))
+        !matches!(self, Self::Bank(_))
     }
 }
 

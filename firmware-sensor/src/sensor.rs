@@ -174,13 +174,16 @@ impl Sensor {
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
             let contact = contact(&self.slip, &started.travel, &finding);
+            // Gauges that may not take part are witnesses nevertheless.
+            let witnesses = self.health.good();
             self.hum
-                .renew(usable, frequency_hz(&started.travel, &finding));
+                .renew(witnesses, frequency_hz(&started.travel, &finding));
             self.health.judge(&Signs {
                 noise: touch.noise,
-                hum: self.hum.own_powers(usable),
+                hum: self.hum.own_powers(witnesses),
                 misfits: finding.misfits,
-                agreed: finding.valid,
+                agreed: finding.valid || finding.misfits != 0,
+                allowed: self.configuration.gauges,
             });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
             let sequence = self.estimates;

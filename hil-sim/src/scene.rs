@@ -248,7 +248,7 @@ pub struct Estimator {
     /// Travel over which the bank averages, as percent of λ, 30 to 300 (`travel_wavelengths`, in λ).
     /// Default 70.
     pub travel_percent: u16,
-    /// Wavenumbers in the bank, 12 to 36. Default 28.
+    /// Wavenumbers in the bank, 12 to 24. Default 24.
     pub candidates: u8,
     /// Where the fingertip's stiffness comes from. Default configured.
     pub stiffness: Stiffness,

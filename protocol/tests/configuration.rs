@@ -49,7 +49,7 @@ fn each_of_the_sensors_settings_is_taken_in_its_range_and_refused_beside_it() {
     assert_range(Setting::BankTravel, 30, 300, |n| {
         sensor(|c| c.bank_travel_percent = n as u16)
     });
-    assert_range(Setting::BankCandidates, 12, 36, |n| {
+    assert_range(Setting::BankCandidates, 12, 24, |n| {
         sensor(|c| c.bank_candidates = n as u8)
     });
     assert_range(Setting::ForceScale, 1, 60_000, |n| {

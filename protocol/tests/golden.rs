@@ -50,7 +50,7 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configure a sensor",
-        "04020105150150021796012401dc0b900301c09a0c43d6314f00",
+        "04020105150150021796011401dc0b900301c09a0c7b54c22700",
     ),
     (
         "configure a display",
@@ -58,7 +58,7 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configuration taken",
-        "0402010601150150021796012401dc0b900301c09a0c5e2e49e400",
+        "0402010601150150021796011401dc0b900301c09a0c66acba8c00",
     ),
     (
         "configuration refused",

@@ -13,6 +13,10 @@ const TAKEN_NS: u64 = 100_000;
 /// status follows an estimate once a second; no two frames are longer than this.
 const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
 
+/// Histories followed at a time. Estimates that hardly differ while the hand hardly moves, about a
+/// turning point, can be taken in any of ten ticks each, and no word tells.
+const MOST_HISTORIES: usize = 100;
+
 /// How a display board came to its words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replay {
@@ -145,7 +149,8 @@ fn difference(due: Option<&[u16; ACTUATORS]>, seen: Option<&[u16; ACTUATORS]>) -
     }
 }
 
-/// Of those histories that have become equal, keeps the one with the fewest held up.
+/// Of those histories that have become equal, keeps the one with the fewest held up; of the others the
+/// [`MOST_HISTORIES`] with the fewest.
 fn merge(histories: &mut Vec<History>) {
     if histories.len() < 2 {
         return;
@@ -163,4 +168,5 @@ fn merge(histories: &mut Vec<History>) {
         }
         news
     });
+    histories.truncate(MOST_HISTORIES);
 }

@@ -103,7 +103,7 @@ fn no_gauge_takes_part_that_the_scene_leaves_out() {
 #[test]
 fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
     let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
-    scene.estimator.candidates = 37;
+    scene.estimator.candidates = 25;
     let error = elf::run(&scene, elves::both()).unwrap_err();
     assert!(
         matches!(

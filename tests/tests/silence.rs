@@ -22,9 +22,11 @@ const WINDOW_S: f64 = 0.08;
 const POLE_S: f64 = std::f64::consts::SQRT_2 / (TAU * 5.0);
 const TICK_NS: u64 = 1_000_000_000 / firmware_display::TICK_RATE_HZ as u64;
 
-/// 25 Hz, as 2 mm at 50 mm/s give, with a pause in which all gauges rest.
-static DEAD_FOR_A_WHILE: LazyLock<Run> = LazyLock::new(|| {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("silence");
+/// 25 Hz, as 2 mm at 50 mm/s give, with a pause in which all gauges rest; estimated by `method`.
+fn dead_for_a_while(method: &str) -> Run {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("silence")
+        .join(method);
     fs::create_dir_all(&folder).unwrap();
     let mut csv = "t_s,g0,g1,g2,g3,g4\n".to_owned();
     for row in 0..=10_400 {
@@ -40,21 +42,25 @@ static DEAD_FOR_A_WHILE: LazyLock<Run> = LazyLock::new(|| {
     fs::write(folder.join("gauges.csv"), csv).unwrap();
     Run::of(scene_in(
         &folder,
-        r#"
-        duration_s = 2.6
+        &format!(
+            r#"
+            duration_s = 2.6
 
-        [surface]
-        specimens = [{ wavelength_mm = 2.0 }]
+            [surface]
+            specimens = [{{ wavelength_mm = 2.0 }}]
 
-        [gauges]
-        kind = "recorded"
-        file = "gauges.csv"
+            [gauges]
+            kind = "recorded"
+            file = "gauges.csv"
 
-        [estimator]
-        method = "counting"
-        "#,
+            [estimator]
+            method = "{method}"
+            "#
+        ),
     ))
-});
+}
+
+static DEAD_FOR_A_WHILE: LazyLock<Run> = LazyLock::new(|| dead_for_a_while("counting"));
 
 fn is_silent(output: &OutputRecord) -> bool {
     output.words.iter().all(|&word| word == ZERO_VOLT)
@@ -72,16 +78,16 @@ fn outputs(from_ns: u64, to_ns: u64) -> &'static [OutputRecord] {
     &all[at(from_ns)..at(to_ns)]
 }
 
-/// When the valid estimates arrived, in ns.
-fn valid_ns() -> Vec<u64> {
-    let estimates = &DEAD_FOR_A_WHILE.recording.estimates;
+/// When the valid estimates of a run arrived, in ns.
+fn valid_ns(run: &Run) -> Vec<u64> {
+    let estimates = &run.recording.estimates;
     let valid = estimates.iter().filter(|record| record.estimate.valid);
     valid.filter_map(|record| record.received_ns).collect()
 }
 
 /// The arrivals of the last valid estimate before the pause, and of the first one after it, in ns.
-fn pause_ns() -> (u64, u64) {
-    let valid_ns = valid_ns();
+fn pause_ns(run: &Run) -> (u64, u64) {
+    let valid_ns = valid_ns(run);
     let dead_to_ns = (DEAD_TO_S * 1e9) as u64;
     let after = valid_ns.partition_point(|&at_ns| at_ns < dead_to_ns);
     (valid_ns[after - 1], valid_ns[after])
@@ -107,7 +113,7 @@ fn a_dead_link_leaves_all_outputs_at_zero_volt() {
 
 #[test]
 fn outputs_are_at_zero_volt_until_the_first_valid_estimate_and_then_fade_in() {
-    let first_ns = valid_ns()[0];
+    let first_ns = valid_ns(&DEAD_FOR_A_WHILE)[0];
     assert!(outputs(0, first_ns).iter().all(is_silent));
     let DisplayConfiguration { fade_in_ms, .. } = DisplayConfiguration::DEFAULT;
     // In the n-th tick the gain is n parts of the fade's ticks, and the next valid estimate changes
@@ -129,7 +135,7 @@ fn outputs_are_at_zero_volt_until_the_first_valid_estimate_and_then_fade_in() {
 
 #[test]
 fn a_silent_gauge_gives_no_valid_estimate_once_the_filters_have_rung_out() {
-    let (last_ns, next_ns) = pause_ns();
+    let (last_ns, next_ns) = pause_ns(&DEAD_FOR_A_WHILE);
     let last_s = last_ns as f64 * 1e-9;
     // Below one step of the ADC after ln(amplitude) time constants, over the whole of a window; 10 ms
     // to the next estimate, 1 ms on the wire.
@@ -144,13 +150,29 @@ fn a_silent_gauge_gives_no_valid_estimate_once_the_filters_have_rung_out() {
 }
 
 #[test]
+fn no_other_method_stands_by_a_silent_gauge_longer() {
+    for method in ["default", "crossings", "counting-adapted"] {
+        let (last_ns, next_ns) = pause_ns(&dead_for_a_while(method));
+        let (last_s, next_s) = (last_ns as f64 * 1e-9, next_ns as f64 * 1e-9);
+        // The counting method's bound with its longest window, 0.2 s.
+        let rung_out_s = DEAD_FROM_S + POLE_S * SIGNAL_LSB.ln() + 0.2 + 0.011;
+        assert!(
+            (DEAD_FROM_S - 0.1..rung_out_s).contains(&last_s),
+            "{method}: {last_s} s of {rung_out_s} s"
+        );
+        // It has to be sure again within half a second.
+        assert!(next_s < DEAD_TO_S + 0.5, "{method}: {next_s} s");
+    }
+}
+
+#[test]
 fn an_estimate_too_old_fades_the_stimulus_to_zero_volt_in_time() {
     let DisplayConfiguration {
         max_age_ms,
         fade_out_ms,
         ..
     } = DisplayConfiguration::DEFAULT;
-    let (last_ns, next_ns) = pause_ns();
+    let (last_ns, next_ns) = pause_ns(&DEAD_FOR_A_WHILE);
     let old_ns = last_ns + u64::from(max_age_ms) * 1_000_000;
     // The last λ̂ is that of a single crossing at most, 8 mm: a crest every 80 ms of 50 mm/s.
     let held = outputs(old_ns - 90_000_000, old_ns);
@@ -169,7 +191,7 @@ fn an_estimate_too_old_fades_the_stimulus_to_zero_volt_in_time() {
 
 #[test]
 fn the_stimulus_comes_back_with_the_signal() {
-    let (_, next_ns) = pause_ns();
+    let (_, next_ns) = pause_ns(&DEAD_FOR_A_WHILE);
     let back = outputs(next_ns, u64::MAX);
     assert!(highest_v(back) >= 4.99, "{}", highest_v(back));
     let status = DEAD_FOR_A_WHILE.recording.display_status.unwrap();

@@ -25,6 +25,8 @@ const UNIFORM: [usize; 3] = [0, 24, 49];
 const TRAVELLING: [usize; 5] = [20, 22, 24, 26, 28];
 /// Distance between two actuators' zero lines, in V: 5 V up, 5 V down and a gap.
 const LANE_V: f64 = 13.0;
+/// How long, in s, a fingertip that sticks is worth a shade.
+const HELD_S: f64 = 0.049;
 /// A difference between hand and arm worth a line of its own, in mm.
 const APART_MM: f64 = 0.1;
 
@@ -115,8 +117,14 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
         .filter(|e| e.valid)
         .filter_map(|e| e.wavelength_mm);
     let true_mm = largest(&mut truths.iter().map(|point| point.1));
+    let count = &mut verdict
+        .estimates
+        .iter()
+        .filter(|e| speaks(e) && truth.counts_beside())
+        .filter_map(|e| e.counted_mm);
     // Guesses at a near standstill can be huge: they stay at the upper edge.
-    let top_mm = (1.25 * true_mm).max((1.1 * largest(valid)).min(2.0 * true_mm));
+    let shown_mm = (1.1 * largest(valid).max(largest(count))).min(2.0 * true_mm);
+    let top_mm = (1.25 * true_mm).max(shown_mm);
     let y = Axis::new("wavelength λ in mm", 0.0..top_mm);
     let dots = |valid: bool| {
         let points: Vec<_> = verdict
@@ -128,10 +136,12 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
         thin(&points, DOTS)
     };
     let nth = stride(verdict.estimates.len(), DOTS);
-    let held = stretches(&verdict.estimates, |e| match e.contact {
+    let mut held = stretches(&verdict.estimates, |e| match e.contact {
         Contact::Stick | Contact::StickSlip => Some(()),
         Contact::Slip | Contact::Unknown => None,
     });
+    // What alternates faster is in the strip of contact.
+    held.retain(|(stretch, ())| stretch.end - stretch.start > HELD_S);
     let mut legend = vec![
         (SECOND, "true λ under the sensor"),
         (FIRST, "valid estimate"),
@@ -141,7 +151,7 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
     if !held.is_empty() {
         legend.push((
             SHADE,
-            "the fingertip sticks, or sticks and slips, by the sensor's word",
+            "the fingertip sticks, or sticks and slips, for 50 ms or more by the sensor's word",
         ));
         let held = held.into_iter().map(|(stretch, ())| stretch).collect();
         marks.push(Mark::Shade(SHADE, held));

@@ -1,5 +1,6 @@
 //! What the sensor says of its contact and of its gauges, over time: a strip for each.
 
+use std::fmt::Write;
 use std::ops::Range;
 
 use protocol::{Contact, GAUGES, GaugeHealth};
@@ -9,7 +10,7 @@ use crate::report::Chapter;
 use crate::report::chart::{Axis, Mark, draw};
 use crate::report::palette::{Colour, FIRST, QUIET, REFUSED, SECOND, SHADE};
 use crate::report::plots::Figure;
-use crate::report::thin::DOTS;
+use crate::report::thin::{DOTS, stride};
 
 /// From one estimate to the next, in s.
 const ESTIMATE_S: f64 = 1.0 / firmware_sensor::ESTIMATE_RATE_HZ as f64;
@@ -56,6 +57,12 @@ pub fn figure(chapter: &Chapter) -> Result<Figure, String> {
         .into_iter()
         .map(|((colour, _), bars)| Mark::Bars(colour, bars))
         .collect();
+    let mut note = String::from("Where there is no strip, the sensor cannot tell.");
+    let nth = stride(estimates.len(), DOTS);
+    if nth > 1 {
+        // Writing to a String cannot fail.
+        let _ = write!(note, " Of {nth} estimates the one that says most is drawn.");
+    }
     Ok(Figure {
         title: "Contact and gauges, by the sensor's word".into(),
         legend,
@@ -65,7 +72,7 @@ pub fn figure(chapter: &Chapter) -> Result<Figure, String> {
             &y,
             &marks,
         )?,
-        note: "Where there is no strip, the sensor cannot tell.".into(),
+        note,
     })
 }
 
@@ -113,7 +120,7 @@ pub fn stretches<T: Copy + Ord>(
     say: impl Fn(&JudgedEstimate) -> Option<T>,
 ) -> Vec<(Range<f64>, T)> {
     let mut stretches: Vec<(Range<f64>, T)> = Vec::new();
-    for group in estimates.chunks(estimates.len().div_ceil(DOTS).max(1)) {
+    for group in estimates.chunks(stride(estimates.len(), DOTS)) {
         let (Some(first), Some(last)) = (group.first(), group.last()) else {
             continue;
         };

@@ -155,6 +155,7 @@ fn shares(said: impl Iterator<Item = &'static str>) -> String {
         .into_iter()
         .map(|(word, count)| match count {
             all if all == total => word.to_owned(),
+            some if share(some) < 0.05 => format!("{word} below 0.1 %"),
             some => format!("{word} {:.1} %", share(some)),
         })
         .collect();

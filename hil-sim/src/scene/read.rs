@@ -396,7 +396,7 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
         .number("travel_wavelengths", &TRAVEL)?
         .map_or(defaults.travel_percent, |q| (100.0 * q).round() as u16);
     let candidates = table
-        .whole("candidates", 12, 36)?
+        .whole("candidates", 12, 24)?
         .map_or(defaults.candidates, |count| count as u8);
     let stiffness = table.choice(
         "stiffness",

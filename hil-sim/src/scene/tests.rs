@@ -78,7 +78,7 @@ fn every_key_of_the_contract_parses() {
         counted_gauge = 1
         gauges = [0, 1, 4]
         travel_wavelengths = 1.5
-        candidates = 36
+        candidates = 20
         stiffness = "estimated"
         [display]
         mode = "travelling"
@@ -138,7 +138,7 @@ fn every_key_of_the_contract_parses() {
             counted_gauge: 1,
             gauges: [true, true, false, false, true],
             travel_percent: 150,
-            candidates: 36,
+            candidates: 20,
             stiffness: Stiffness::Estimated,
         }
     );
@@ -150,7 +150,7 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
         Path::new("x.toml"),
         &format!(
             "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
-             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 36\n"
+             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 20\n"
         ),
     )
     .unwrap();
@@ -163,13 +163,13 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             counted_gauge: 1,
             gauges: 0b1_0011,
             bank_travel_percent: 150,
-            bank_candidates: 36,
+            bank_candidates: 20,
             ..SensorConfiguration::DEFAULT
         }
     );
     // Both ends of every range that a scene may give are in the sensor's.
     for [travel, candidates, window_ms, gauge] in
-        [["0.3", "12", "10", "0"], ["3", "36", "200", "4"]]
+        [["0.3", "12", "10", "0"], ["3", "24", "200", "4"]]
     {
         let scene = Scene::parse(
             Path::new("x.toml"),
@@ -484,8 +484,8 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:4: estimator.travel_wavelengths: 0.29 is not a travel to average over",
         ),
         (
-            "[estimator]\ncandidates = 37",
-            "x.toml:4: estimator.candidates: 37 is out of range",
+            "[estimator]\ncandidates = 25",
+            "x.toml:4: estimator.candidates: 25 is out of range",
         ),
         (
             "[estimator]\nstiffness = \"guessed\"",

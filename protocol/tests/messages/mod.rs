@@ -423,7 +423,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         counted_gauge: 2,
         gauges: 0b1_0111,
         bank_travel_percent: 150,
-        bank_candidates: 36,
+        bank_candidates: 20,
         force_channel: true,
         force_mn_per_v: 1_500,
         stiffness_n_per_m: 400,

@@ -1,0 +1,251 @@
+//! What becomes of the estimates of the whole [`firmware_sensor::Sensor`] as gauges fail and recover,
+//! mains hum comes in, and settings change on the way.
+
+mod felt;
+
+use felt::{Bench, CODES, texture, valid_and_worst};
+use protocol::{GAUGES, GaugeHealth, Method, SensorConfiguration};
+use std::f64::consts::TAU;
+
+const DEFAULT: SensorConfiguration = SensorConfiguration::DEFAULT;
+
+/// `texture` on all gauges but one, which says `fault` of x and s.
+fn but(
+    gauge: usize,
+    wavelength_mm: f64,
+    fault: impl Fn(f64, f64) -> f64,
+) -> impl Fn(usize, f64, f64) -> f64 {
+    let texture = texture(wavelength_mm);
+    move |at, x_mm, t_s| {
+        if at == gauge {
+            fault(x_mm, t_s)
+        } else {
+            texture(at, x_mm, t_s)
+        }
+    }
+}
+
+/// A broken gauge's signal, of x in mm and s.
+type Fault = fn(f64, f64) -> f64;
+
+fn hum(t_s: f64) -> f64 {
+    CODES * (TAU * 50.0 * t_s + 0.4).sin()
+}
+
+#[test]
+fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_go_on() {
+    let faults: [(GaugeHealth, Fault, f64, f64); 5] = [
+        // At an end of the range, whether driven there or broken off. Averages over 0.3 s fall from 1 to
+        // 0.1 in 0.7 s, and 0.5 s have to be without a fault.
+        (GaugeHealth::Saturated, |_, _| -2_500.0, 0.1, 1.3),
+        (
+            GaugeHealth::Saturated,
+            |x_mm, _| 20.0 * CODES * (TAU * x_mm / 2.0).sin(),
+            0.1,
+            1.3,
+        ),
+        // Own hum beside which the others have none; averages over 0.3 s.
+        (GaugeHealth::Hum, |_, t_s| 2.0 * hum(t_s), 0.3, 1.5),
+        // Another surface: thirty estimates that it does not fit, once the two have come apart.
+        (
+            GaugeHealth::Noisy,
+            |x_mm, _| CODES * (TAU * x_mm / 2.9).sin(),
+            0.6,
+            1.0,
+        ),
+        // A texture's power, of noise that lies in the scans' upper half as well.
+        (
+            GaugeHealth::Noisy,
+            |x_mm, t_s| 1_900.0 * (1e7 * (x_mm + t_s)).sin(),
+            0.3,
+            2.0,
+        ),
+    ];
+    for (which, (health, fault, found_s, well_s)) in faults.into_iter().enumerate() {
+        let mut bench = Bench::new(DEFAULT);
+        bench.rub(2_000, |_| 40.0, texture(2.0));
+        let began_s = bench.t_s();
+        let estimates = bench.rub(4_000, |_| 40.0, but(1, 2.0, fault));
+        let left_out = estimates.iter().find(|e| e.health[1] != GaugeHealth::Good);
+        let found = left_out.unwrap().instant_us as f64 * 1e-6 - began_s;
+        assert!(found <= found_s, "{which} {health:?} after {found} s");
+        let (last, others) = (estimates.last().unwrap(), [0, 2, 3, 4]);
+        assert_eq!(last.health[1], health, "{which}");
+        assert_eq!(last.gauges_used, 0b11101);
+        for gauge in others {
+            assert!(
+                estimates
+                    .iter()
+                    .all(|e| e.health[gauge] == GaugeHealth::Good)
+            );
+        }
+        // Valid nearly all the time, and never wrong.
+        let (valid, worst) = valid_and_worst(&estimates, 2.0);
+        assert!(
+            valid >= 0.9 && worst < 0.03,
+            "{which} {health:?}: {valid} {worst}"
+        );
+        let began_s = bench.t_s();
+        let estimates = bench.rub(4_000, |_| 40.0, texture(2.0));
+        let back = estimates.iter().find(|e| e.gauges_used == 0b11111).unwrap();
+        let well = back.instant_us as f64 * 1e-6 - began_s;
+        assert!(
+            (0.5..=well_s).contains(&well),
+            "{which} {health:?} until {well} s"
+        );
+        let last = estimates.last().unwrap();
+        assert_eq!(last.health, [GaugeHealth::Good; GAUGES]);
+        assert!(last.valid);
+    }
+}
+
+#[test]
+fn one_two_three_or_four_dead_gauges_leave_the_others_as_they_are() {
+    for dead in [0b00001, 0b00110, 0b11010, 0b11110, 0b01111_u8] {
+        let mut bench = Bench::new(DEFAULT);
+        bench.noise_lsb = 0.0;
+        let texture = texture(2.0);
+        let estimates = bench.rub(
+            3_000,
+            |_| 40.0,
+            |gauge, x_mm, t_s| {
+                if dead >> gauge & 1 == 1 {
+                    0.0
+                } else {
+                    texture(gauge, x_mm, t_s)
+                }
+            },
+        );
+        let last = estimates.last().unwrap();
+        assert_eq!(last.gauges_used, 0b11111 & !dead, "{dead:05b}");
+        for gauge in 0..GAUGES {
+            let is_dead = last.health[gauge] == GaugeHealth::Dead;
+            assert_eq!(is_dead, dead >> gauge & 1 == 1, "{dead:05b}");
+        }
+        let (valid, worst) = valid_and_worst(&estimates[50..], 2.0);
+        assert!(valid == 1.0 && worst < 0.01, "{dead:05b}: {valid} {worst}");
+    }
+}
+
+#[test]
+fn of_dead_gauges_alone_nothing_is_stood_by() {
+    for (level, noise_lsb) in [(0.0, 0.0), (0.0, 0.5), (-2_500.0, 0.0), (2_500.0, 3.0)] {
+        let mut bench = Bench::new(DEFAULT);
+        bench.rub(1_000, |_| 40.0, texture(2.0));
+        bench.noise_lsb = noise_lsb;
+        // The kernel still holds the texture for a few waves.
+        bench.rub(1_500, |_| 40.0, |_, _, _| level);
+        let estimates = bench.rub(5_000, |_| 40.0, |_, _, _| level);
+        assert!(estimates.iter().all(|e| !e.valid), "{level} ± {noise_lsb}");
+    }
+}
+
+#[test]
+fn a_surface_without_texture_has_no_wavelength_and_no_faults() {
+    for noise_lsb in [0.0, 0.3, 1.0, 50.0] {
+        let mut bench = Bench::new(DEFAULT);
+        bench.noise_lsb = noise_lsb;
+        let estimates = bench.rub(20_000, |_| 40.0, |gauge, _, _| 300.3 * (gauge as f64 - 2.0));
+        for estimate in estimates {
+            assert!(!estimate.valid);
+            assert_eq!(estimate.health, [GaugeHealth::Good; GAUGES], "±{noise_lsb}");
+        }
+    }
+}
+
+#[test]
+fn hum_that_all_gauges_have_does_not_disturb_once_it_is_learned() {
+    for speed_mm_s in [30.0, 50.0, 70.0, 95.0, 100.0, 105.0] {
+        let mut bench = Bench::new(DEFAULT);
+        let texture = texture(2.0);
+        let estimates = bench.rub(
+            3_000,
+            |_| speed_mm_s,
+            |gauge, x_mm, t_s| texture(gauge, x_mm, t_s) + hum(t_s),
+        );
+        let (valid, worst) = valid_and_worst(&estimates[100..], 2.0);
+        assert!(
+            valid >= 0.95 && worst < 0.03,
+            "{speed_mm_s}: {valid} {worst}"
+        );
+    }
+}
+
+#[test]
+fn hum_alone_is_never_taken_for_a_surface() {
+    for speed_mm_s in [10.0, 50.0, 100.0, 200.0] {
+        let mut bench = Bench::new(DEFAULT);
+        let estimates = bench.rub(5_000, |_| speed_mm_s, |_, _, t_s| hum(t_s));
+        let valid = estimates.iter().filter(|e| e.valid).count();
+        assert_eq!(valid, 0, "{speed_mm_s}");
+    }
+}
+
+#[test]
+fn a_texture_that_was_at_the_mains_frequency_is_not_taken_for_hum_afterwards() {
+    for (first_mm_s, then_mm_s) in [(50.0, 60.0), (50.0, 70.0), (50.0, 30.0), (49.0, 45.0)] {
+        let mut bench = Bench::new(DEFAULT);
+        bench.rub(500, |_| 30.0, texture(1.0));
+        let at = bench.rub(2_000, |_| first_mm_s, texture(1.0));
+        let after = bench.rub(2_000, |_| then_mm_s, texture(1.0));
+        for estimates in [at, after] {
+            let (valid, worst) = valid_and_worst(&estimates, 1.0);
+            assert!(valid >= 0.98 && worst < 0.01, "{valid} {worst}");
+            let faults = estimates
+                .iter()
+                .filter(|e| e.health != [GaugeHealth::Good; GAUGES]);
+            assert_eq!(faults.count(), 0, "{first_mm_s} and {then_mm_s} mm/s");
+        }
+    }
+}
+
+#[test]
+fn strokes_that_pass_the_mains_frequency_again_and_again_blame_no_gauge() {
+    for wavelength_mm in [0.8, 1.0, 1.5] {
+        let mut bench = Bench::new(DEFAULT);
+        let velocity = |t_s: f64| 100.0 * (TAU * 2.0 * t_s).sin();
+        let estimates = bench.rub(5_000, velocity, texture(wavelength_mm));
+        let (valid, worst) = valid_and_worst(&estimates[50..], wavelength_mm);
+        assert!(
+            valid >= 0.95 && worst < 0.03,
+            "{wavelength_mm}: {valid} {worst}"
+        );
+        assert!(
+            estimates
+                .iter()
+                .all(|e| e.health == [GaugeHealth::Good; GAUGES])
+        );
+    }
+}
+
+#[test]
+fn a_new_configuration_on_the_way_starts_the_estimator_over_and_nothing_else() {
+    let mut bench = Bench::new(DEFAULT);
+    bench.noise_lsb = 0.0;
+    // Gauge 1 is stuck, and known to be.
+    let before = bench.rub(2_000, |_| 40.0, but(1, 2.0, |_, _| 500.0));
+    assert_eq!(before.last().unwrap().gauges_used, 0b11101);
+    for (method, settled_ms) in [(Method::Bank, 250), (Method::Crossings, 250)] {
+        let configuration = SensorConfiguration {
+            method,
+            gauges: 0b11011,
+            ..DEFAULT
+        };
+        bench.sensor.configure(configuration);
+        assert_eq!(bench.sensor.configuration(), configuration);
+        let estimates = bench.rub(1_000, |_| 40.0, but(1, 2.0, |_, _| 500.0));
+        for (number, estimate) in estimates.iter().enumerate() {
+            assert_eq!(estimate.health[1], GaugeHealth::Stuck, "{method:?}");
+            assert_eq!(estimate.gauges_used & !0b11001, 0, "{method:?}");
+            if number * 10 >= settled_ms {
+                assert!(estimate.valid, "{method:?} {number}");
+            }
+            if estimate.valid {
+                let error = estimate.wavelength_mm.unwrap() / 2.0 - 1.0;
+                assert!(error.abs() < 0.03, "{method:?} {error}");
+            }
+        }
+        // At once it knows nothing.
+        assert!(!estimates[0].valid);
+    }
+}
