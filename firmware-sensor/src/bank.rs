@@ -19,7 +19,9 @@
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{Estimator, Finding, PLACES_PER_MM, PLACES_PER_UM, Place, Touch};
+use crate::estimator::{
+    Estimator, Finding, MOST_PICKUP, PLACES_PER_MM, PLACES_PER_UM, Place, Touch,
+};
 use crate::phasor::phasor;
 use crate::travel::Travel;
 
@@ -71,8 +73,6 @@ const JERK_SAMPLES: f32 = 300.0;
 const SPEED_KEPT: f32 = 0.967;
 /// Speed that the kernel's number of samples is reckoned with at least, in mm/s.
 const SLOWEST_MM_S: f32 = 2.0;
-/// Hum that may not have been told from signal yet, relative to the amplitude.
-const MOST_PICKUP: f32 = 0.1;
 /// Weight below which nothing is fitted, and determinant relative to its square.
 const LEAST_WEIGHT: f32 = 1e-3;
 const LEAST_SOLVABLE: f32 = 0.02;

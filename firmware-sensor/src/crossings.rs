@@ -20,7 +20,7 @@ use core::f32::consts::PI;
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::estimator::{
-    Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, PLACES_PER_MM, Place, Touch,
+    Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, MOST_PICKUP, PLACES_PER_MM, Place, Touch,
 };
 use crate::landmarks::{LONGEST, Landmarks, MARKS};
 use crate::travel::Travel;
@@ -61,6 +61,7 @@ pub struct Crossings {
     wavenumber: f32,
     started: bool,
     usable: u8,
+    pickup_lsb: f32,
     /// Calls of `find` at rest, up to [`HELD`].
     resting: u32,
 }
@@ -110,6 +111,7 @@ impl Crossings {
             wavenumber: 0.0,
             started: false,
             usable: 0,
+            pickup_lsb: 0.0,
             resting: HELD,
         }
     }
@@ -155,6 +157,7 @@ impl Estimator for Crossings {
             lane.push(x, &step);
         }
         self.usable = touch.usable;
+        self.pickup_lsb = touch.pickup_lsb;
     }
 
     /// Valid: most of the gauges that have something to say agree, no less than [`QUORUM`] or all usable
@@ -203,6 +206,7 @@ impl Estimator for Crossings {
                 ..Finding::default()
             };
         }
+        let amplitude_lsb = libm::sqrtf(2.0 * powers / agreeing as f32);
         let half_wave = sum / agreeing as f32;
         self.wavenumber = PI / half_wave;
         let usable = self.usable.count_ones() as usize;
@@ -210,7 +214,8 @@ impl Estimator for Crossings {
             && agreeing >= QUORUM.min(usable)
             && 2 * agreeing > count
             // Few witnesses have at least to agree with themselves.
-            && (agreeing >= QUORUM || even);
+            && (agreeing >= QUORUM || even)
+            && self.pickup_lsb <= MOST_PICKUP * amplitude_lsb;
         Finding {
             wavelength_mm: Some(2.0 * half_wave / PLACES_PER_MM as f32),
             valid,
@@ -219,7 +224,7 @@ impl Estimator for Crossings {
             } else {
                 0.0
             },
-            amplitude_lsb: libm::sqrtf(2.0 * powers / agreeing as f32),
+            amplitude_lsb,
             gauges_used,
             ..Finding::default()
         }

@@ -22,6 +22,10 @@ pub const MIN_SPEED_MM_S: f32 = 2.0;
 /// times what the ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
 pub const MIN_AMPLITUDE_LSB: f32 = 1.0;
 
+/// Hum that may not have been told from signal yet ([`Touch::pickup_lsb`]), relative to the amplitude,
+/// above which nothing is stood by.
+pub const MOST_PICKUP: f32 = 0.1;
+
 /// A millisecond's samples and where the fingertip was when they were taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touch {

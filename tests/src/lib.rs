@@ -5,3 +5,4 @@
 pub mod elves;
 pub mod history;
 pub mod run;
+pub mod sensing;

@@ -14,6 +14,8 @@ use protocol::{Method, SensorConfiguration};
 pub const FREQUENCIES_HZ: [f64; 10] = [5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 56.0, 80.0, 100.0];
 /// The wavelengths at each, in mm: not the bank's own.
 const WAVELENGTHS_MM: [f64; 3] = [1.1, 1.6, 2.3];
+/// Scenes that [`measure`] runs: both profiles, each frequency, each wavelength.
+pub const SCENES: u64 = 2 * (FREQUENCIES_HZ.len() * WAVELENGTHS_MM.len()) as u64;
 /// The goal: error over bound, one gauge.
 pub const GOAL: f64 = 1.2;
 const SNR_DB: f64 = 20.0;

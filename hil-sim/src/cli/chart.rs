@@ -1,9 +1,7 @@
 //! `hil-sim chart`.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::Context;
 use clap::Subcommand;
@@ -15,6 +13,7 @@ use hil_sim::chart::picture;
 use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use super::number;
 
@@ -80,9 +79,9 @@ impl Estimators {
         let contestants = contestants();
 
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
-        let progress = Progress::default();
-        let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.step())?;
-        progress.end();
+        let progress = progress(scenes.len() as u64);
+        let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.inc(1))?;
+        progress.finish_and_clear();
 
         let entries = contestants
             .iter()
@@ -117,9 +116,9 @@ impl Estimators {
 impl Bound {
     fn execute(self) -> anyhow::Result<ExitCode> {
         create_folder(&self.out)?;
-        let progress = Progress::default();
-        let rows = efficiency::measure(|| progress.step())?;
-        progress.end();
+        let progress = progress(efficiency::SCENES);
+        let rows = efficiency::measure(|| progress.inc(1))?;
+        progress.finish_and_clear();
         println!(
             "| profile | v/λ, Hz | one gauge: rms % | of it bias % | bound % | ratio | five gauges: ratio |"
         );
@@ -147,20 +146,12 @@ impl Bound {
     }
 }
 
-/// Scenes done, counted on standard error.
-#[derive(Default)]
-struct Progress(AtomicUsize);
-
-impl Progress {
-    fn step(&self) {
-        let done = 1 + self.0.fetch_add(1, Ordering::Relaxed);
-        eprint!("\r{done} scenes");
-        let _ = std::io::stderr().flush();
-    }
-
-    fn end(&self) {
-        eprintln!();
-    }
+/// A bar for `scenes`, on standard error; none if that is not a terminal.
+fn progress(scenes: u64) -> ProgressBar {
+    ProgressBar::new(scenes).with_style(
+        ProgressStyle::with_template("{bar:40} {pos} of {len} scenes, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
 }
 
 fn create_folder(folder: &Path) -> anyhow::Result<()> {
