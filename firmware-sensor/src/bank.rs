@@ -19,9 +19,7 @@
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{
-    Estimator, Finding, MOST_PICKUP, PLACES_PER_MM, PLACES_PER_UM, Place, Touch,
-};
+use crate::estimator::{Estimator, Finding, PLACES_PER_MM, PLACES_PER_UM, Place, Touch};
 use crate::phasor::phasor;
 use crate::travel::Travel;
 
@@ -393,13 +391,14 @@ impl Bank {
         let per_sample_mm = self.speed_mm_s.max(SLOWEST_MM_S) / SAMPLE_RATE_HZ as f32;
         let noise = 2.0 * agreement.noise * per_sample_mm / kernel_mm;
         let amplitude_lsb = self.amplitude_lsb(agreement);
+        let frequency_hz = self.speed_mm_s / wavelength_mm;
         2 * fitting > usable
             && self.rested < REST_SAMPLES
             && fit.weight >= LEAST_FILLED
             && fit.determined() >= LEAST_DETERMINED
             && agreement.explained >= LEAST_OVER_NOISE * noise
             && amplitude_lsb >= LEAST_AMPLITUDE_LSB
-            && amplitude_lsb * MOST_PICKUP >= self.touch.pickup_lsb
+            && !self.touch.pickup.hides(amplitude_lsb, frequency_hz)
     }
 }
 

@@ -20,8 +20,9 @@ use core::f32::consts::PI;
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::estimator::{
-    Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, MOST_PICKUP, PLACES_PER_MM, Place, Touch,
+    Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, PLACES_PER_MM, Place, Touch,
 };
+use crate::hum::Pickup;
 use crate::landmarks::{LONGEST, Landmarks, MARKS};
 use crate::travel::Travel;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
@@ -61,7 +62,7 @@ pub struct Crossings {
     wavenumber: f32,
     started: bool,
     usable: u8,
-    pickup_lsb: f32,
+    pickup: Pickup,
     /// Calls of `find` at rest, up to [`HELD`].
     resting: u32,
 }
@@ -111,7 +112,7 @@ impl Crossings {
             wavenumber: 0.0,
             started: false,
             usable: 0,
-            pickup_lsb: 0.0,
+            pickup: Pickup::default(),
             resting: HELD,
         }
     }
@@ -157,7 +158,7 @@ impl Estimator for Crossings {
             lane.push(x, &step);
         }
         self.usable = touch.usable;
-        self.pickup_lsb = touch.pickup_lsb;
+        self.pickup = touch.pickup;
     }
 
     /// Valid: most of the gauges that have something to say agree, no less than [`QUORUM`] or all usable
@@ -208,6 +209,7 @@ impl Estimator for Crossings {
         }
         let amplitude_lsb = libm::sqrtf(2.0 * powers / agreeing as f32);
         let half_wave = sum / agreeing as f32;
+        let frequency_hz = travel.velocity_mm_s(0).abs() * PLACES_PER_MM as f32 / (2.0 * half_wave);
         self.wavenumber = PI / half_wave;
         let usable = self.usable.count_ones() as usize;
         let valid = self.resting < HELD
@@ -215,7 +217,7 @@ impl Estimator for Crossings {
             && 2 * agreeing > count
             // Few witnesses have at least to agree with themselves.
             && (agreeing >= QUORUM || even)
-            && self.pickup_lsb <= MOST_PICKUP * amplitude_lsb;
+            && !self.pickup.hides(amplitude_lsb, frequency_hz);
         Finding {
             wavelength_mm: Some(2.0 * half_wave / PLACES_PER_MM as f32),
             valid,

@@ -4,6 +4,7 @@
 
 use protocol::GAUGES;
 
+use crate::hum::Pickup;
 use crate::travel::Travel;
 
 /// A place along x in quarters of a µm, which wraps freely: only differences mean anything, and phases,
@@ -22,10 +23,6 @@ pub const MIN_SPEED_MM_S: f32 = 2.0;
 /// times what the ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).
 pub const MIN_AMPLITUDE_LSB: f32 = 1.0;
 
-/// Hum that may not have been told from signal yet ([`Touch::pickup_lsb`]), relative to the amplitude,
-/// above which nothing is stood by.
-pub const MOST_PICKUP: f32 = 0.1;
-
 /// A millisecond's samples and where the fingertip was when they were taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touch {
@@ -38,8 +35,8 @@ pub struct Touch {
     pub counted: f32,
     /// Variance of the white noise in each of `gauges`, in ADC steps².
     pub noise: [f32; GAUGES],
-    /// Amplitude in ADC steps of what may be hum in `gauges`, as long as that is not known; 0 once it is.
-    pub pickup_lsb: f32,
+    /// What may be hum in `gauges`, as long as that is not known.
+    pub pickup: Pickup,
     /// Bit g set: gauge g is in good health and allowed to take part.
     pub usable: u8,
 }

@@ -34,6 +34,10 @@ const SURE_ESTIMATES: u16 =
 /// Share of the gauges' power at the mains' frequency that is common to them, from which on it is taken
 /// for hum, and up to which for texture. Five gauges of random phases have 0.2.
 const COMMON: f32 = 0.6;
+/// Hum that does no harm, relative to the texture's amplitude.
+const HARMLESS: f32 = 0.1;
+/// Distance from the mains' frequency from which on a texture is elsewhere, in Hz.
+const ELSEWHERE_HZ: f32 = 10.0;
 /// Gauges that must speak before anything can be common to them.
 const LEAST_WITNESSES: u32 = 3;
 /// See [`COMMON`].
@@ -43,6 +47,30 @@ const DOUBTFUL: f32 = 0.4;
 const OUTSTANDING: f32 = 16.0;
 /// How near v/λ may come to the mains' frequency, in Hz, before a texture may be taken for hum.
 const NEAR_HZ: f32 = 4.0;
+
+/// What all gauges have in common at the mains' frequency, before it is known whether that is hum.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pickup {
+    /// Amplitude in ADC steps.
+    lsb: f32,
+    /// Time that it has been heard for, in s.
+    heard_s: f32,
+}
+
+impl Pickup {
+    /// Whether it may be hum that a texture of `amplitude_lsb`, in ADC steps, at `frequency_hz` is not
+    /// to be told from. A mean over a time T holds up to 1/(π |f − 50 Hz| T) of a texture that is
+    /// elsewhere; one that seems to be at the mains' frequency may be the hum itself.
+    pub fn hides(&self, amplitude_lsb: f32, frequency_hz: f32) -> bool {
+        let away_hz = (frequency_hz - MAINS_HZ as f32).abs();
+        let held = if away_hz > ELSEWHERE_HZ {
+            1.0 / (core::f32::consts::PI * away_hz * self.heard_s)
+        } else {
+            0.0
+        };
+        self.lsb > (HARMLESS + held) * amplitude_lsb
+    }
+}
 
 /// What is known of the hum so far.
 #[derive(Clone, Debug)]
@@ -58,7 +86,7 @@ pub struct Hum {
     clean: u16,
     /// It was, and the phasors hold it.
     tainted: bool,
-    pickup_lsb: f32,
+    pickup: Pickup,
     /// What is taken out of each gauge, renewed with every estimate.
     removed: [[f32; 2]; GAUGES],
 }
@@ -73,7 +101,7 @@ impl Default for Hum {
             off_hz: 0.0,
             clean: 0,
             tainted: false,
-            pickup_lsb: 0.0,
+            pickup: Pickup::default(),
             removed: [[0.0; 2]; GAUGES],
         }
     }
@@ -132,10 +160,14 @@ impl Hum {
             self.clean = self.clean.saturating_add(1);
         }
         let learned = self.samples >= LEARNED_SAMPLES;
-        self.pickup_lsb = if self.samples < FORGOTTEN_SAMPLES && share >= DOUBTFUL {
-            libm::sqrtf(common[0] * common[0] + common[1] * common[1])
-        } else {
-            0.0
+        let early = self.samples < FORGOTTEN_SAMPLES && share >= DOUBTFUL;
+        self.pickup = Pickup {
+            lsb: if early {
+                libm::sqrtf(common[0] * common[0] + common[1] * common[1])
+            } else {
+                0.0
+            },
+            heard_s: self.samples.min(FORGOTTEN_SAMPLES) as f32 / SAMPLE_RATE_HZ as f32,
         };
         self.removed = if !learned {
             [[0.0; 2]; GAUGES]
@@ -146,10 +178,9 @@ impl Hum {
         };
     }
 
-    /// Amplitude in ADC steps of what may be hum or texture and is not told apart yet; 0 from 0.5 s
-    /// after the start on.
-    pub fn pickup_lsb(&self) -> f32 {
-        self.pickup_lsb
+    /// What may be hum or texture and is not told apart yet; nothing from 0.5 s after the start on.
+    pub fn pickup(&self) -> Pickup {
+        self.pickup
     }
 
     /// Power of each gauge's own hum in ADC steps², beyond what is common to the `usable` ones; 0 as
@@ -361,7 +392,7 @@ mod tests {
             hum.remove(&mut gauges);
             if n % 10 == 9 {
                 hum.renew(ALL, None);
-                let pickup = f64::from(hum.pickup_lsb());
+                let pickup = f64::from(hum.pickup().lsb);
                 if n + 1 >= FORGOTTEN_SAMPLES {
                     assert_eq!(pickup, 0.0);
                 } else if n >= 50 {
@@ -378,7 +409,7 @@ mod tests {
             let mut gauges = core::array::from_fn(|gauge| mains(t_s, 1.2566 * gauge as f64) as f32);
             hum.remove(&mut gauges);
             hum.renew(ALL, None);
-            assert!(n < 60 || hum.pickup_lsb() == 0.0, "{n}");
+            assert!(n < 60 || hum.pickup().lsb == 0.0, "{n}");
         }
     }
 

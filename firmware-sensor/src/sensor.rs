@@ -157,7 +157,7 @@ impl Sensor {
             place: arm.wrapping_sub(lag),
             counted,
             noise: self.noise.variances(),
-            pickup_lsb: self.hum.pickup_lsb(),
+            pickup: self.hum.pickup(),
             usable,
         };
         if self.settling == 0 {
