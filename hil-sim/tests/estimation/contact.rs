@@ -1,6 +1,6 @@
 //! What the force channel tells: stick and slip, the contact's lag, the fingertip's stiffness.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use hil_sim::arm::Arm;
 use hil_sim::contact::Touch;
@@ -49,11 +49,16 @@ struct Comparison {
     lag_spread_um: f64,
 }
 
-fn compare(path: &PathBuf) -> Comparison {
+fn compare(path: &Path) -> Comparison {
     let scene = Scene::load(path).unwrap();
     let touches = touches(&scene);
     let outcome = run(scene);
-    assert!(outcome.unmet.is_empty(), "{}: {:?}", path.display(), outcome.unmet);
+    assert!(
+        outcome.unmet.is_empty(),
+        "{}: {:?}",
+        path.display(),
+        outcome.unmet
+    );
     let (mut count, mut told, mut agree, mut agree_now, mut stuck) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut squares, mut lags, mut lag_squares) = (0.0, 0.0, 0.0);
     let estimates = outcome.verdict.estimates.iter();
@@ -102,7 +107,7 @@ fn compare(path: &PathBuf) -> Comparison {
 fn each_of(name: &str) -> Vec<Comparison> {
     let paths = scenes_in(&folder(name));
     assert!(paths.len() >= 6, "{paths:?}");
-    of_each(&paths, compare)
+    of_each(&paths, |path| compare(path))
 }
 
 #[test]
@@ -114,7 +119,11 @@ fn stick_and_slip_are_told_as_they_are_and_the_lag_with_them() {
         // 50 to 70 a second.
         assert!(comparison.agree > 0.9, "{name}: {}", comparison.agree);
         // 2 mN of noise at 400 N/m are 5 µm.
-        assert!(comparison.lag_error_um < 7.0, "{name}: {}", comparison.lag_error_um);
+        assert!(
+            comparison.lag_error_um < 7.0,
+            "{name}: {}",
+            comparison.lag_error_um
+        );
     }
 }
 

@@ -173,12 +173,16 @@ impl Stranger {
                     let drift = DRIFT * (TAU * DRIFT_HZ * t_s + 1.3 * gauge as f64).sin();
                     let felt = rung + OFFSETS[gauge] + drift + PINK * pink[gauge].value();
                     let volts = MID_RAIL_V + VOLTS_PER_UNIT * (felt + noise * dice.gaussian());
-                    assert!((0.0..3.3).contains(&volts), "{volts} V: the synthesis clips");
+                    assert!(
+                        (0.0..3.3).contains(&volts),
+                        "{volts} V: the synthesis clips"
+                    );
                     write!(csv, ",{volts:.6}").unwrap();
                 }
             }
             if row && self.force {
-                let newton = STIFFNESS_N_PER_M * stretch_mm * 1e-3 + force_noise_n * dice.gaussian();
+                let newton =
+                    STIFFNESS_N_PER_M * stretch_mm * 1e-3 + force_noise_n * dice.gaussian();
                 write!(csv, ",{:.6}", MID_RAIL_V + newton / NEWTON_PER_V).unwrap();
             }
             if row {

@@ -231,15 +231,33 @@ fn stick_and_slip_with_the_force_channel_are_right_within_two_percent() {
     };
     let recordings = [
         ("force-mild-1.1mm-65mm-s", sticky(MILD, "", 1.1, at_65)),
-        ("force-mild-2.3mm-40mm-s-slowly", slowly(sticky(MILD, "", 2.3, at_40))),
+        (
+            "force-mild-2.3mm-40mm-s-slowly",
+            slowly(sticky(MILD, "", 2.3, at_40)),
+        ),
         ("force-mild-3.9mm-hand", sticky(MILD, "", 3.9, hand)),
         ("force-strong-1.1mm-40mm-s", sticky(STRONG, "", 1.1, at_40)),
         ("force-strong-2.3mm-65mm-s", sticky(STRONG, "", 2.3, at_65)),
-        ("force-strong-2.3mm-hand-slowly", slowly(sticky(STRONG, "", 2.3, hand))),
-        ("found-mild-1.1mm-65mm-s", sticky(MILD, FIND_STIFFNESS, 1.1, at_65)),
-        ("found-mild-2.3mm-hand", sticky(MILD, FIND_STIFFNESS, 2.3, hand)),
-        ("found-strong-1.1mm-40mm-s-slowly", slowly(sticky(STRONG, FIND_STIFFNESS, 1.1, at_40))),
-        ("found-strong-3.9mm-hand", sticky(STRONG, FIND_STIFFNESS, 3.9, hand)),
+        (
+            "force-strong-2.3mm-hand-slowly",
+            slowly(sticky(STRONG, "", 2.3, hand)),
+        ),
+        (
+            "found-mild-1.1mm-65mm-s",
+            sticky(MILD, FIND_STIFFNESS, 1.1, at_65),
+        ),
+        (
+            "found-mild-2.3mm-hand",
+            sticky(MILD, FIND_STIFFNESS, 2.3, hand),
+        ),
+        (
+            "found-strong-1.1mm-40mm-s-slowly",
+            slowly(sticky(STRONG, FIND_STIFFNESS, 1.1, at_40)),
+        ),
+        (
+            "found-strong-3.9mm-hand",
+            sticky(STRONG, FIND_STIFFNESS, 3.9, hand),
+        ),
     ];
     meet(goal, &recordings);
 }
@@ -253,7 +271,10 @@ fn strong_stick_slip_without_the_force_channel_is_wrong_in_three_percent_at_most
     let recordings = [
         ("blind-strong-1.1mm-65mm-s", blind(STRONG, 1.1, at_65)),
         ("blind-strong-1.1mm-hand", blind(STRONG, 1.1, hand)),
-        ("blind-strong-2.3mm-40mm-s-slowly", slowly(blind(STRONG, 2.3, at_40))),
+        (
+            "blind-strong-2.3mm-40mm-s-slowly",
+            slowly(blind(STRONG, 2.3, at_40)),
+        ),
         ("blind-strong-3.9mm-40mm-s", blind(STRONG, 3.9, at_40)),
         ("blind-strong-3.9mm-hand", blind(STRONG, 3.9, hand)),
     ];
@@ -269,7 +290,10 @@ fn so_is_strong_stick_slip_over_a_short_texture_by_hand() {
     };
     let recordings = [
         ("force-strong-1.1mm-hand", sticky(STRONG, "", 1.1, hand)),
-        ("found-strong-1.1mm-hand", sticky(STRONG, FIND_STIFFNESS, 1.1, hand)),
+        (
+            "found-strong-1.1mm-hand",
+            sticky(STRONG, FIND_STIFFNESS, 1.1, hand),
+        ),
     ];
     meet(goal, &recordings);
 }
