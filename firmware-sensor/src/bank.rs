@@ -65,6 +65,18 @@ const MOST_JERK: f32 = 0.03;
 const JERK_PER_NOISE: f32 = 0.5;
 /// Gain in power of the second difference for white noise behind the anti-aliasing filter.
 const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
+/// The same for noise that is white up to 500 Hz, as in a recording of one row a millisecond.
+const SECOND_DIFFERENCE_WHITE_GAIN: f32 = 6.0;
+/// Share of the samples that are the quiet ones, the step that their bound is followed in, and its least,
+/// relative to the mean.
+const QUIET_SHARE: f32 = 0.1;
+/// See [`QUIET_SHARE`].
+const QUIET_STEP: f32 = 0.03;
+/// See [`QUIET_SHARE`].
+const QUIET_LEAST: f32 = 1e-6;
+/// The tenth percentile of χ² over its mean, with one to five degrees of freedom: white noise's quiet
+/// bound, by the number of gauges.
+const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
 /// Time constant of the high-frequency power, in samples.
 const JERK_SAMPLES: f32 = 300.0;
 /// What is kept of the highest speed from one estimate to the next, e^(−10 / 300): as long as the jerk is.
@@ -154,6 +166,8 @@ struct Play {
 struct Jerk {
     before: [[f32; GAUGES]; 2],
     power: f32,
+    /// The power that a tenth of the samples are below.
+    quiet: f32,
     samples: u32,
 }
 
@@ -274,11 +288,12 @@ impl Bank {
         let fits = |explained: f32, unexplained: f32, noise: f32| {
             unexplained <= most * explained + UNEXPLAINED_PER_NOISE * noise
         };
+        let more_noise = self.noise_below_1_khz();
         let mut agreement = Agreement::default();
         for gauge in 0..GAUGES {
             let usable = self.touch.usable >> gauge & 1 == 1;
             let explained = fit.energy(sums, gauge);
-            let noise = self.touch.noise[gauge];
+            let noise = self.touch.noise[gauge] + more_noise;
             let unexplained = fit.variance(sums, gauge) - explained - noise;
             let fits = fits(explained, unexplained, noise);
             if !fits && unexplained > explained {
@@ -298,6 +313,17 @@ impl Bank {
         agreement
     }
 
+    /// Variance of noise in each usable gauge beyond [`Touch::noise`], in ADC steps²: a recording of few
+    /// rows has none above 1 kHz, where that is looked for.
+    fn noise_below_1_khz(&self) -> f32 {
+        let usable = self.touch.usable.count_ones();
+        let steady = self.jerk.steady(usable) / SECOND_DIFFERENCE_WHITE_GAIN;
+        let known: f32 = gauges_of(self.touch.usable)
+            .map(|gauge| self.touch.noise[gauge])
+            .sum();
+        (steady - known).max(0.0) / usable.max(1) as f32
+    }
+
     /// Whether the gauges hold more power at high frequencies than a wave with sharp edges would make at
     /// this speed: a fingertip that sticks and slips is fast while it slips, whatever the arm does.
     fn jerky(&self, wavelength_mm: f32, agreement: &Agreement) -> bool {
@@ -306,7 +332,8 @@ impl Bank {
             + second_difference_gain(2.0 * frequency_hz) / 10.0
             + second_difference_gain(3.0 * frequency_hz) / 9.0
             + second_difference_gain(5.0 * frequency_hz) / 25.0;
-        let power = self.jerk.power - SECOND_DIFFERENCE_NOISE_GAIN * agreement.noise;
+        let steady = self.jerk.steady(self.touch.usable.count_ones());
+        let power = self.jerk.power - steady.max(SECOND_DIFFERENCE_NOISE_GAIN * agreement.noise);
         power > (smooth + MOST_JERK) * agreement.explained + JERK_PER_NOISE * agreement.noise
     }
 }
@@ -669,8 +696,24 @@ impl Jerk {
         self.samples = self.samples.saturating_add(1);
         // The first two differences are with nothing.
         if let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) {
-            self.power += (power - self.power) / (samples as f32).min(JERK_SAMPLES);
+            let samples = samples as f32;
+            self.power += (power - self.power) / samples.min(JERK_SAMPLES);
+            // A quantile in steps of its own size: so many up as down once a share of the powers is below.
+            let step = (1.0 / samples).max(QUIET_STEP);
+            self.quiet *= if power > self.quiet {
+                1.0 + step * QUIET_SHARE
+            } else {
+                1.0 - step * (1.0 - QUIET_SHARE)
+            };
+            self.quiet = self.quiet.max(self.power * QUIET_LEAST);
         }
+    }
+
+    /// What the mean power would be if it were always as in the quiet moments, white noise in `gauges`
+    /// gauges: a fingertip that sticks and slips is quiet in between, noise is not.
+    fn steady(&self, gauges: u32) -> f32 {
+        let gauges = (gauges as usize).clamp(1, GAUGES);
+        (self.quiet / QUIET_OF_MEAN[gauges - 1]).min(self.power)
     }
 }
 
