@@ -5,11 +5,13 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
+use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
 mod chart;
 mod cost;
 mod demo;
+mod goals;
 mod map;
 mod run;
 mod size;
@@ -38,6 +40,9 @@ enum Command {
     /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
     /// heat maps. Run again, it goes on where it was stopped
     Map(map::Maps),
+    /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
+    /// exit status 1 if a scene is not as expected
+    Goals(goals::Goals),
     /// Draws what the estimators give against what they cost
     Chart(chart::Chart),
 }
@@ -128,6 +133,7 @@ impl Arguments {
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
             Command::Map(maps) => maps.execute(),
+            Command::Goals(goals) => goals.execute(),
             Command::Chart(chart) => chart.execute(),
         }
     }
@@ -136,4 +142,12 @@ impl Arguments {
 /// A number with so many decimals, or a dash.
 fn number(number: Option<f64>, decimals: usize) -> String {
     number.map_or("–".to_owned(), |number| format!("{number:.decimals$}"))
+}
+
+/// A bar for `scenes`, on standard error; none if that is not a terminal.
+fn progress(scenes: u64) -> ProgressBar {
+    ProgressBar::new(scenes).with_style(
+        ProgressStyle::with_template("{bar:40} {pos} of {len} scenes, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
 }

@@ -13,9 +13,8 @@ use hil_sim::chart::picture;
 use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::number;
+use super::{number, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -144,14 +143,6 @@ impl Bound {
         let met = rows.iter().all(|row| row.meets_goal() != Some(false));
         Ok(ExitCode::from(u8::from(!met)))
     }
-}
-
-/// A bar for `scenes`, on standard error; none if that is not a terminal.
-fn progress(scenes: u64) -> ProgressBar {
-    ProgressBar::new(scenes).with_style(
-        ProgressStyle::with_template("{bar:40} {pos} of {len} scenes, {eta} to go")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    )
 }
 
 fn create_folder(folder: &Path) -> anyhow::Result<()> {

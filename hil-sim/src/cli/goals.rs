@@ -1,0 +1,148 @@
+//! `hil-sim goals`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use hil_sim::analysis::Summary;
+use hil_sim::chart::family::{self, Family};
+use hil_sim::elf::Firmwares;
+use hil_sim::outcome::Outcome;
+use hil_sim::scene::Scene;
+use hil_sim::{elf, native};
+
+use super::{Elves, EngineName, number, progress};
+
+/// Every family of scenes, judged by what its scenes expect, as a table
+#[derive(Debug, clap::Args)]
+pub(super) struct Goals {
+    /// The scenes: a folder with a folder for each family
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        default_value = "hil-sim/scenes/estimation"
+    )]
+    scenes: PathBuf,
+    /// What runs the firmware
+    #[arg(long, value_enum, default_value_t = EngineName::Native)]
+    engine: EngineName,
+    #[command(flatten)]
+    elves: Elves,
+}
+
+/// A scene's numbers, and what it did not meet.
+#[derive(Clone, Debug)]
+struct Judged {
+    summary: Summary,
+    unmet: Vec<String>,
+}
+
+impl Goals {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let families = family::load(&self.scenes)?;
+        let firmwares = match self.engine {
+            EngineName::Native => None,
+            EngineName::Elf => Some(self.elves.read()?),
+        };
+        let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
+        let judged = run(&scenes, firmwares.as_ref())?;
+
+        println!("{HEADER}");
+        let mut rest = &judged[..];
+        for family in &families {
+            let (these, others) = rest.split_at(family.scenes.len());
+            rest = others;
+            println!("{}", row(family, these));
+        }
+        let mut met = true;
+        for (scene, judged) in scenes.iter().zip(&judged) {
+            for line in &judged.unmet {
+                met = false;
+                println!("{}: not as expected: {line}", scene.name);
+            }
+        }
+        Ok(if met {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(1)
+        })
+    }
+}
+
+/// Runs the scenes, on all cores: an emulated pair keeps two of them half busy.
+fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<Judged>> {
+    let bar = progress(scenes.len() as u64);
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(scenes.len()));
+    let work = || -> anyhow::Result<()> {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(scene) = scenes.get(index) else {
+                return Ok(());
+            };
+            let recording = match firmwares {
+                None => native::run(scene)?,
+                Some(firmwares) => elf::run(scene, firmwares)?.0,
+            };
+            let outcome = Outcome::new((*scene).clone(), recording);
+            let judged = Judged {
+                summary: outcome.verdict.summary,
+                unmet: outcome.unmet,
+            };
+            bar.inc(1);
+            let mut done = done
+                .lock()
+                .map_err(|_| anyhow::anyhow!("another scene's run broke off"))?;
+            done.push((index, judged));
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        workers
+            .into_iter()
+            .map(|worker| match worker.join() {
+                Ok(result) => result,
+                Err(_) => Err(anyhow::anyhow!("a scene's run broke off")),
+            })
+            .collect::<anyhow::Result<Vec<()>>>()
+    })?;
+    bar.finish_and_clear();
+    let mut done = done
+        .into_inner()
+        .map_err(|_| anyhow::anyhow!("a scene's run broke off"))?;
+    done.sort_by_key(|(index, _)| *index);
+    Ok(done.into_iter().map(|(_, judged)| judged).collect())
+}
+
+const HEADER: &str = "\
+| scenes | how many | worst rms, % | goal | least valid share | valid yet > 10 % off, worst, % | longest to settle, ms | the paper's count, worst rms, % |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |";
+
+fn row(family: &Family, judged: &[Judged]) -> String {
+    let most = |number: fn(&Summary) -> Option<f64>| {
+        judged
+            .iter()
+            .filter_map(|judged| number(&judged.summary))
+            .reduce(f64::max)
+    };
+    let least_valid = judged
+        .iter()
+        .filter_map(|judged| judged.summary.valid_share)
+        .reduce(f64::min);
+    format!(
+        "| {} | {} | {} | {} | {} | {} | {} | {} |",
+        family.title,
+        judged.len(),
+        number(most(|summary| summary.rms_percent), 2),
+        number(family.goal_percent(), 1),
+        number(least_valid, 3),
+        number(
+            most(|summary| summary.wrong_share).map(|share| 100.0 * share),
+            2
+        ),
+        number(most(|summary| summary.settling_ms), 0),
+        number(most(|summary| summary.counted_rms_percent), 0),
+    )
+}
