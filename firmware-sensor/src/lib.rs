@@ -1,9 +1,10 @@
 //! The sensor board's logic, from ADC scans to λ: pure, no hardware, the same on the board and on a host.
 //!
 //! ```text
-//! 4 kHz scans ─> decimate ─┬─> bandpass ×5 ─┬─> counting, the paper's ──────────────┐
-//!                          └────────────────┴─> Touch ─> the estimator of the ──────┤
-//! encoder ─────> travel ──────────────────────> Touch ─> configured method ─────────┴─> Estimate, 100 Hz
+//! 4 kHz scans ─┬─> noise, health
+//!              └─> decimate ─┬─> hum ──────────┬─> Touch ─> the configured estimator ──┬─> Estimate, 100 Hz
+//! encoder ─────> travel ─────┼─> slip: x − F/k ┘    (bank, crossings, counting)        │
+//!                            └─> bandpass ─> crossing ─> counting: the paper's, always ─┘
 //! Motion ──────> arm ─> Drive
 //! ```
 //!
