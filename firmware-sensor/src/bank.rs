@@ -34,8 +34,9 @@ pub const LONGEST_MM: f32 = 6.5;
 const BLOCK: usize = 2;
 /// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
 /// the encoder, so that one that dithers between counts does not wash out what was felt. The force
-/// channel's noise needs more.
+/// channel's noise, some 5 µm, needs a little more.
 const PLAY_UM: i32 = 10;
+/// See [`PLAY_UM`].
 const PLAY_WITH_FORCE_UM: i32 = 12;
 
 /// A wavelength is not stood by if the gauges hold more than this share of what it explains that
@@ -336,9 +337,7 @@ impl Bank {
         let power = self.jerk.power - steady.max(SECOND_DIFFERENCE_NOISE_GAIN * agreement.noise);
         power > (smooth + MOST_JERK) * agreement.explained + JERK_PER_NOISE * agreement.noise
     }
-}
 
-impl Bank {
     /// The wavelength that explains most over one of the kernels, and whether it can be stood by.
     fn look(&self, kernel: Kernel) -> Look {
         let (energies, number) = self.spectrum(kernel, self.touch.usable);
