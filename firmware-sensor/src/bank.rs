@@ -61,7 +61,7 @@ const MOST_DISAGREEMENT: f32 = 0.1;
 const LEAST_AMPLITUDE_LSB: f32 = 1.0;
 /// Power at high frequencies that is not stood by without a force channel, relative to the
 /// fundamental's: see [`Bank::jerky`].
-const MOST_JERK: f32 = 0.03;
+const MOST_JERK: f32 = 0.02;
 /// What the noise may add to it.
 const JERK_PER_NOISE: f32 = 0.5;
 /// Gain in power of the second difference for white noise behind the anti-aliasing filter.
@@ -72,9 +72,11 @@ const SECOND_DIFFERENCE_WHITE_GAIN: f32 = 6.0;
 /// relative to the mean.
 const QUIET_SHARE: f32 = 0.1;
 /// See [`QUIET_SHARE`].
-const QUIET_STEP: f32 = 0.03;
+const QUIET_STEP: f32 = 0.02;
 /// See [`QUIET_SHARE`].
-const QUIET_LEAST: f32 = 1e-6;
+const QUIET_LEAST: f32 = 1e-3;
+/// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
+const STEADY_DOUBT: f32 = 1.3;
 /// The tenth percentile of χ² over its mean, with one to five degrees of freedom: white noise's quiet
 /// bound, by the number of gauges.
 const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
@@ -334,7 +336,8 @@ impl Bank {
             + second_difference_gain(3.0 * frequency_hz) / 9.0
             + second_difference_gain(5.0 * frequency_hz) / 25.0;
         let steady = self.jerk.steady(self.touch.usable.count_ones());
-        let power = self.jerk.power - steady.max(SECOND_DIFFERENCE_NOISE_GAIN * agreement.noise);
+        let quiet = STEADY_DOUBT * steady;
+        let power = self.jerk.power - quiet.max(SECOND_DIFFERENCE_NOISE_GAIN * agreement.noise);
         power > (smooth + MOST_JERK) * agreement.explained + JERK_PER_NOISE * agreement.noise
     }
 
@@ -697,6 +700,9 @@ impl Jerk {
         if let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) {
             let samples = samples as f32;
             self.power += (power - self.power) / samples.min(JERK_SAMPLES);
+            if samples == 1.0 {
+                self.quiet = power;
+            }
             // A quantile in steps of its own size: so many up as down once a share of the powers is below.
             let step = (1.0 / samples).max(QUIET_STEP);
             self.quiet *= if power > self.quiet {
