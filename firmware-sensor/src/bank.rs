@@ -76,7 +76,7 @@ const QUIET_STEP: f32 = 0.02;
 /// See [`QUIET_SHARE`].
 const QUIET_LEAST: f32 = 1e-3;
 /// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
-const STEADY_DOUBT: f32 = 1.3;
+const STEADY_DOUBT: f32 = 1.2;
 /// The tenth percentile of χ² over its mean, with one to five degrees of freedom: white noise's quiet
 /// bound, by the number of gauges.
 const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
