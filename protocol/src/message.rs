@@ -128,7 +128,8 @@ pub struct Estimate {
     pub counted_mm: Option<f32>,
     /// The paper's range at this instant.
     pub range: Range,
-    /// What the fingertip does.
+    /// What the fingertip did some 7.5 ms before: the force comes 4 ms late out of its filter, and how arm
+    /// and contact moved is looked at over 7 ms.
     pub contact: Contact,
     /// How far the fingertip's contact lags behind the arm, F/k, in µm, towards larger x if positive;
     /// none without the force channel.
