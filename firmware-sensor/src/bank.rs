@@ -19,9 +19,21 @@
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{Estimator, Finding, PLACES_PER_MM, PLACES_PER_UM, Place, Touch};
-use crate::phasor::phasor;
+use crate::estimator::{Estimator, Finding, PLACES_PER_UM, Touch};
 use crate::travel::Travel;
+
+use candidate::{BLOCK, Candidate, Fit, Kernel, Rest, Weighed, gauges_of};
+use jerk::{
+    Jerk, SECOND_DIFFERENCE_NOISE_GAIN, SECOND_DIFFERENCE_WHITE_GAIN, STEADY_DOUBT,
+    second_difference_gain,
+};
+use play::Play;
+
+mod candidate;
+mod jerk;
+mod play;
+#[cfg(test)]
+mod tests;
 
 /// The most candidates that a configuration can ask for.
 pub const MAX_CANDIDATES: usize = 24;
@@ -30,8 +42,6 @@ pub const SHORTEST_MM: f32 = 0.65;
 /// See [`SHORTEST_MM`].
 pub const LONGEST_MM: f32 = 6.5;
 
-/// Touches that are taken up together: half the work, for a kernel in steps of 2 ms of travel.
-const BLOCK: usize = 2;
 /// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
 /// the encoder, so that one that dithers between counts does not wash out what was felt. The force
 /// channel's noise, some 5 µm, needs a little more.
@@ -64,57 +74,16 @@ const LEAST_AMPLITUDE_LSB: f32 = 1.0;
 const MOST_JERK: f32 = 0.02;
 /// What the noise may add to it.
 const JERK_PER_NOISE: f32 = 0.5;
-/// Gain in power of the second difference for white noise behind the anti-aliasing filter.
-const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
-/// The same for noise that is white up to 500 Hz, as in a recording of one row a millisecond.
-const SECOND_DIFFERENCE_WHITE_GAIN: f32 = 6.0;
-/// Share of the samples that are the quiet ones, the step that their bound is followed in, and its least,
-/// relative to the mean.
-const QUIET_SHARE: f32 = 0.1;
-/// See [`QUIET_SHARE`].
-const QUIET_STEP: f32 = 0.02;
-/// See [`QUIET_SHARE`].
-const QUIET_LEAST: f32 = 1e-3;
-/// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
-const STEADY_DOUBT: f32 = 1.2;
-/// The tenth percentile of χ² over its mean, with one to five degrees of freedom: white noise's quiet
-/// bound, by the number of gauges.
-const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
-/// Time constant of the high-frequency power, in samples.
-const JERK_SAMPLES: f32 = 300.0;
 /// What is kept of the highest speed from one estimate to the next, e^(−10 / 300): as long as the jerk is.
 const SPEED_KEPT: f32 = 0.967;
 /// Speed that the kernel's number of samples is reckoned with at least, in mm/s.
 const SLOWEST_MM_S: f32 = 2.0;
-/// Weight below which nothing is fitted, and determinant relative to its square.
-const LEAST_WEIGHT: f32 = 1e-3;
-const LEAST_SOLVABLE: f32 = 0.02;
 /// Samples without travel after which nothing is stood by any more.
 const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
 /// A wavelength that differs by less from what was felt before is no change of surface.
 const LEAST_CHANGE: f32 = 0.25;
 /// Estimates after a valid one for which a change of surface may be told from the shorter kernel.
 const CHANGE_ESTIMATES: u8 = 30;
-
-/// What a candidate sums up over its kernel, of weights w, gauge samples s and phases θ = 2πx/λ. In this
-/// order: Re and Im of Σ w s exp(−jθ) for each gauge; Σ w s for each; Σ w s² for each; Re and Im of
-/// Σ w exp(−jθ); Re and Im of Σ w exp(−2jθ); Σ w.
-const SUMS: usize = 4 * GAUGES + 5;
-const MEAN: usize = 2 * GAUGES;
-const SQUARE: usize = 3 * GAUGES;
-const FIRST: usize = 4 * GAUGES;
-const SECOND: usize = FIRST + 2;
-const WEIGHT: usize = FIRST + 4;
-type Sums = [f32; SUMS];
-
-/// The two kernels of a candidate, by the low-pass they are taken behind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kernel {
-    /// Behind the first: exp(−s/a)/a. Forgets sooner, tells wavelengths apart less.
-    Short,
-    /// Behind both: s·exp(−s/a)/a².
-    Long,
-}
 
 /// The estimator.
 #[derive(Clone, Debug)]
@@ -134,54 +103,6 @@ pub struct Bank {
     /// Estimates since the last one that was stood by over the long kernel, and its wavelength.
     since_valid: u8,
     known_mm: f32,
-}
-
-/// A wavelength and what it has summed up.
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    wavelength_mm: f32,
-    /// Phase of a place unit in 2⁻³² cycles: times a wrapping place it gives a wrapping phase, exact for
-    /// any travel.
-    increment: u32,
-    /// 1/a, in 1/places.
-    per_place: f32,
-    short: Sums,
-    long: Sums,
-}
-
-/// A touch and its weight.
-#[derive(Clone, Copy, Debug, Default)]
-struct Weighed {
-    place: Place,
-    weight: f32,
-    gauges: [f32; GAUGES],
-}
-
-/// A follower with play: moves only once the place has moved more than the play's half width.
-#[derive(Clone, Copy, Debug)]
-struct Play {
-    at: Option<Place>,
-    half: i32,
-}
-
-/// The power of the second difference in time, which high frequencies dominate.
-#[derive(Clone, Copy, Debug, Default)]
-struct Jerk {
-    before: [[f32; GAUGES]; 2],
-    power: f32,
-    /// The power that a tenth of the samples are below.
-    quiet: f32,
-    samples: u32,
-}
-
-/// The matrix of a candidate's fit, common to all gauges.
-struct Fit {
-    weight: f32,
-    first: [f32; 2],
-    p: f32,
-    r: [f32; 2],
-    scale: f32,
-    determinant: f32,
 }
 
 /// What a candidate's fit says of the gauges, the usable ones unless said.
@@ -222,10 +143,7 @@ impl Bank {
             count,
             travel_wavelengths,
             force_channel: configuration.force_channel,
-            play: Play {
-                at: None,
-                half: play_um * PLACES_PER_UM,
-            },
+            play: Play::new(play_um * PLACES_PER_UM),
             block: [Weighed::default(); BLOCK],
             filled: 0,
             touch: Touch::default(),
@@ -524,216 +442,3 @@ impl Agreement {
         }
     }
 }
-
-impl Candidate {
-    fn new(wavelength_mm: f32, travel_wavelengths: f32) -> Self {
-        let places = wavelength_mm * PLACES_PER_MM as f32;
-        Self {
-            wavelength_mm,
-            increment: (4_294_967_296.0 / f64::from(places)) as u32,
-            per_place: 1.0 / (travel_wavelengths * places),
-            short: [0.0; SUMS],
-            long: [0.0; SUMS],
-        }
-    }
-
-    fn sums(&self, kernel: Kernel) -> &Sums {
-        match kernel {
-            Kernel::Short => &self.short,
-            Kernel::Long => &self.long,
-        }
-    }
-
-    /// Energy in `gauges` that this wavelength explains, summed over them.
-    fn energy(&self, kernel: Kernel, gauges: u8) -> f32 {
-        let sums = self.sums(kernel);
-        Fit::of(sums).map_or(0.0, |fit| {
-            gauges_of(gauges).map(|gauge| fit.energy(sums, gauge)).sum()
-        })
-    }
-
-    /// What the peak is found by: the geometric mean of the energy that the fit explains and of its
-    /// amplitude squared, each summed over `gauges`. As the latest travel covers a little more or less
-    /// than whole waves both ripple, in opposite ways; their mean does half as much.
-    fn power(&self, kernel: Kernel, gauges: u8) -> f32 {
-        let sums = self.sums(kernel);
-        Fit::of(sums).map_or(0.0, |fit| {
-            let (mut energy, mut squares) = (0.0, 0.0);
-            for gauge in gauges_of(gauges) {
-                energy += fit.energy(sums, gauge);
-                squares += fit.amplitude_squared(sums, gauge);
-            }
-            libm::sqrtf(energy * squares)
-        })
-    }
-
-    /// Takes up a block of `travel` places, above 0.
-    #[inline]
-    fn take_up(&mut self, block: &[Weighed; BLOCK], rest: &Rest, travel: f32) {
-        let mut sums = [0.0; SUMS];
-        for weighed in block {
-            let [cos, sin] = phasor((weighed.place as u32).wrapping_mul(self.increment));
-            let (re, im) = (weighed.weight * cos, -weighed.weight * sin);
-            for (gauge, x) in weighed.gauges.iter().enumerate() {
-                sums[2 * gauge] += re * x;
-                sums[2 * gauge + 1] += im * x;
-            }
-            sums[FIRST] += re;
-            sums[FIRST + 1] += im;
-            sums[SECOND] += re * cos + im * sin;
-            sums[SECOND + 1] += im * cos - re * sin;
-        }
-        sums[MEAN..FIRST].copy_from_slice(&rest.0);
-        sums[WEIGHT] = travel;
-        // exp(−z), to within 2 % for whatever z ≥ 0, and within z³/6 for the small ones.
-        let z = travel * self.per_place;
-        let keep = 1.0 / (1.0 + z * (1.0 + 0.5 * z));
-        let take = 1.0 - keep;
-        let scale = take / travel;
-        for ((short, long), sum) in self.short.iter_mut().zip(&mut self.long).zip(sums) {
-            *short = keep * *short + scale * sum;
-            *long = keep * *long + take * *short;
-        }
-    }
-}
-
-/// The sums of a block that are the same for every candidate: Σ w s and Σ w s² of each gauge.
-struct Rest([f32; 2 * GAUGES]);
-
-impl Rest {
-    fn of(block: &[Weighed; BLOCK]) -> Self {
-        let mut sums = [0.0; 2 * GAUGES];
-        for weighed in block {
-            for (gauge, x) in weighed.gauges.iter().enumerate() {
-                sums[gauge] += weighed.weight * x;
-                sums[GAUGES + gauge] += weighed.weight * x * x;
-            }
-        }
-        Self(sums)
-    }
-}
-
-impl Fit {
-    /// The normal equations with the constant eliminated: of S = Σ w s e^(−jθ), C, Q, W the sums in the
-    /// order of [`SUMS`], D = Σ w s and the wave's complex amplitude A, s ≈ d + Re(A e^(jθ)):
-    /// P A + R A* = 2 (S − D C / W) with P = W − |C|²/W and R = Q − C²/W. None if constant, cosine and
-    /// sine can't be told apart at all.
-    fn of(sums: &Sums) -> Option<Self> {
-        let weight = sums[WEIGHT];
-        if weight < LEAST_WEIGHT {
-            return None;
-        }
-        let (c0, c1) = (sums[FIRST], sums[FIRST + 1]);
-        let p = weight - (c0 * c0 + c1 * c1) / weight;
-        let r0 = sums[SECOND] - (c0 * c0 - c1 * c1) / weight;
-        let r1 = sums[SECOND + 1] - 2.0 * c0 * c1 / weight;
-        let determinant = p * p - r0 * r0 - r1 * r1;
-        (determinant > LEAST_SOLVABLE * weight * weight).then_some(Self {
-            weight,
-            first: [c0 / weight, c1 / weight],
-            p,
-            r: [r0, r1],
-            scale: 2.0 / (determinant * weight),
-            determinant,
-        })
-    }
-
-    /// The determinant, 1 if the travel covers whole waves evenly.
-    fn determined(&self) -> f32 {
-        self.determinant / (self.weight * self.weight)
-    }
-
-    /// Energy in the gauge that the wave explains, per weight: half its amplitude squared.
-    fn energy(&self, sums: &Sums, gauge: usize) -> f32 {
-        let mean = sums[MEAN + gauge];
-        let s0 = sums[2 * gauge] - mean * self.first[0];
-        let s1 = sums[2 * gauge + 1] - mean * self.first[1];
-        let [r0, r1] = self.r;
-        let direct = self.p * (s0 * s0 + s1 * s1);
-        let image = r0 * (s0 * s0 - s1 * s1) + 2.0 * r1 * s0 * s1;
-        (self.scale * (direct - image)).max(0.0)
-    }
-
-    /// The wave's amplitude in the gauge, squared.
-    fn amplitude_squared(&self, sums: &Sums, gauge: usize) -> f32 {
-        let mean = sums[MEAN + gauge];
-        let s0 = sums[2 * gauge] - mean * self.first[0];
-        let s1 = sums[2 * gauge + 1] - mean * self.first[1];
-        let [r0, r1] = self.r;
-        // (P S − R S*) / (P² − |R|²)
-        let a0 = self.p * s0 - (r0 * s0 + r1 * s1);
-        let a1 = self.p * s1 - (r1 * s0 - r0 * s1);
-        let scale = 2.0 / self.determinant;
-        scale * scale * (a0 * a0 + a1 * a1)
-    }
-
-    /// The gauge's variance, per weight.
-    fn variance(&self, sums: &Sums, gauge: usize) -> f32 {
-        let mean = sums[MEAN + gauge] / self.weight;
-        sums[SQUARE + gauge] / self.weight - mean * mean
-    }
-}
-
-impl Play {
-    /// The place's movement beyond the play, in places.
-    fn follow(&mut self, place: Place) -> i32 {
-        let at = self.at.get_or_insert(place);
-        let away = place.wrapping_sub(*at);
-        let travel = away - away.clamp(-self.half, self.half);
-        *at = at.wrapping_add(travel);
-        travel
-    }
-}
-
-impl Jerk {
-    fn push(&mut self, touch: &Touch) {
-        let [before, older] = self.before;
-        let power = gauges_of(touch.usable)
-            .map(|gauge| {
-                let second = touch.gauges[gauge] - 2.0 * before[gauge] + older[gauge];
-                second * second
-            })
-            .sum::<f32>();
-        self.before = [touch.gauges, before];
-        self.samples = self.samples.saturating_add(1);
-        // The first two differences are with nothing.
-        if let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) {
-            let samples = samples as f32;
-            self.power += (power - self.power) / samples.min(JERK_SAMPLES);
-            if samples == 1.0 {
-                self.quiet = power;
-            }
-            // A quantile in steps of its own size: so many up as down once a share of the powers is below.
-            let step = (1.0 / samples).max(QUIET_STEP);
-            self.quiet *= if power > self.quiet {
-                1.0 + step * QUIET_SHARE
-            } else {
-                1.0 - step * (1.0 - QUIET_SHARE)
-            };
-            self.quiet = self.quiet.max(self.power * QUIET_LEAST);
-        }
-    }
-
-    /// What the mean power would be if it were always as in the quiet moments, white noise in `gauges`
-    /// gauges: a fingertip that sticks and slips is quiet in between, noise is not.
-    fn steady(&self, gauges: u32) -> f32 {
-        let gauges = (gauges as usize).clamp(1, GAUGES);
-        (self.quiet / QUIET_OF_MEAN[gauges - 1]).min(self.power)
-    }
-}
-
-/// Power gain of the second difference at 1 kHz, (2 sin(πf/fs))⁴, up to half the sample rate.
-fn second_difference_gain(frequency_hz: f32) -> f32 {
-    let half_turns = (frequency_hz / SAMPLE_RATE_HZ as f32).min(0.5);
-    let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
-    let square = 4.0 * sin * sin;
-    square * square
-}
-
-/// The gauges whose bit is set.
-fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
-    (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
-}
-
-#[cfg(test)]
-mod tests;

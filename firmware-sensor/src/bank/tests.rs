@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::MICROMETRES_PER_COUNT;
+use crate::estimator::{PLACES_PER_MM, Place};
 
 const ALL: u8 = 0b11111;
 const TAU: f64 = 2.0 * core::f64::consts::PI;
