@@ -2,7 +2,7 @@
 //! runs here works through the same second of a fingertip on a 2 mm grating at 50 mm/s, 20 dB, after
 //! another second that lets it start.
 //!
-//! A mark is a 32-bit write to the CRC unit's data register, [`MARKS`]: k before each millisecond of part k,
+//! A mark is a 32-bit write to the CRC unit's data register, `marks`: k before each millisecond of part k,
 //! k + 100 after it, 999 when all is done. The parts' numbers, the settings and the
 //! rivals are the simulator's own files.
 //!
@@ -32,11 +32,15 @@ mod rivals;
 mod settings;
 
 #[cfg(target_os = "none")]
+mod marks;
+
+#[cfg(target_os = "none")]
 mod board {
     use core::f32::consts::PI;
     use core::hint::black_box;
 
     // The memory map, the vector table and the logger that the linker scripts ask for.
+    use crate::marks::{DONE, enable_marks, mark};
     use defmt_rtt as _;
     use embassy_stm32 as _;
     use firmware_sensor::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan, Sensor};
@@ -48,13 +52,6 @@ mod board {
     use crate::rivals::roster::{Visitor, show_all};
     use crate::rivals::spectrum::{LENGTH, LINES, Transform};
     use crate::settings::SETTINGS;
-
-    /// The CRC unit's data register.
-    const MARKS: *mut u32 = 0x4002_3000 as *mut u32;
-    /// RCC_AHB1ENR and the bit that gives the CRC unit its clock.
-    const AHB1_CLOCKS: *mut u32 = 0x4002_3830 as *mut u32;
-    const CRC_CLOCK: u32 = 1 << 12;
-    const DONE: u32 = 999;
 
     type Millisecond = [Scan; SCANS_PER_SAMPLE];
     /// One second, which fits its end to its beginning.
@@ -184,24 +181,6 @@ mod board {
                 *power += line.re * line.re + line.im * line.im;
             }
         }
-    }
-
-    #[allow(
-        unsafe_code,
-        reason = "a volatile access to registers that nothing else here uses"
-    )]
-    fn enable_marks() {
-        // SAFETY: RCC_AHB1ENR exists on every STM32F4, and nothing else has been set up yet.
-        unsafe { AHB1_CLOCKS.write_volatile(AHB1_CLOCKS.read_volatile() | CRC_CLOCK) };
-    }
-
-    #[allow(
-        unsafe_code,
-        reason = "a volatile access to registers that nothing else here uses"
-    )]
-    fn mark(number: u32) {
-        // SAFETY: the CRC unit has its clock, takes any word and touches no memory.
-        unsafe { MARKS.write_volatile(number) };
     }
 
     /// Xorshift, 32 bits.

@@ -1,7 +1,7 @@
 //! What the filters and the estimators cost on the board, in instructions: each part is run for 1 000 ms
 //! of a signal, between two marks that an emulator can see.
 //!
-//! A mark is a 32-bit write to the CRC unit's data register, [`MARKS`]: k at the start of part k, k + 100
+//! A mark is a 32-bit write to the CRC unit's data register, `marks`: k at the start of part k, k + 100
 //! at its end, 999 when all is done. The whole sensors have their marks around each millisecond, so that
 //! the longest of them can be told.
 //!
@@ -28,12 +28,16 @@
 fn main() {}
 
 #[cfg(target_os = "none")]
+mod marks;
+
+#[cfg(target_os = "none")]
 mod board {
     use core::f32::consts::TAU;
     use core::hint::black_box;
 
     use biquad::Biquad;
     // The memory map, the vector table and the logger that the linker scripts ask for.
+    use crate::marks::{DONE, enable_marks, mark};
     use defmt_rtt as _;
     use dsp_process::SplitProcess;
     use embassy_stm32 as _;
@@ -46,12 +50,6 @@ mod board {
     use protocol::{CHANNELS, GAUGES, Method, SensorConfiguration};
 
     const MILLISECONDS: usize = 1_000;
-    /// The CRC unit's data register.
-    const MARKS: *mut u32 = 0x4002_3000 as *mut u32;
-    /// RCC_AHB1ENR and the bit that gives the CRC unit its clock.
-    const AHB1_CLOCKS: *mut u32 = 0x4002_3830 as *mut u32;
-    const CRC_CLOCK: u32 = 1 << 12;
-    const DONE: u32 = 999;
 
     type Millisecond = [Scan; SCANS_PER_SAMPLE];
     type Signal = [Millisecond; MILLISECONDS];
@@ -187,24 +185,6 @@ mod board {
             black_box(impulses);
         }
         mark(number + 100);
-    }
-
-    #[allow(
-        unsafe_code,
-        reason = "a volatile access to registers that nothing else here uses"
-    )]
-    fn enable_marks() {
-        // SAFETY: RCC_AHB1ENR exists on every STM32F4, and nothing else has been set up yet.
-        unsafe { AHB1_CLOCKS.write_volatile(AHB1_CLOCKS.read_volatile() | CRC_CLOCK) };
-    }
-
-    #[allow(
-        unsafe_code,
-        reason = "a volatile access to registers that nothing else here uses"
-    )]
-    fn mark(number: u32) {
-        // SAFETY: the CRC unit has its clock, takes any word and touches no memory.
-        unsafe { MARKS.write_volatile(number) };
     }
 
     /// Xorshift, 32 bits.
