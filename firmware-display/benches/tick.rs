@@ -19,6 +19,7 @@ fn estimate(sequence: u32, wavelength_mm: f32) -> Estimate {
         counted_mm: None,
         range: Range::T1,
         contact: Contact::Unknown,
+        velocity_um_s: 70_000,
         lag_um: None,
         gauges_used: 0b1_1111,
         health: [GaugeHealth::Good; GAUGES],

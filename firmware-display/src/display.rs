@@ -189,7 +189,7 @@ impl Display {
     }
 
     fn aim_pattern(&mut self) {
-        let half_pitch_um = f64::from(self.configuration.pitch_um) / 2.0;
+        let half_pitch_um = f64::from(protocol::actuators::DEFAULT_PITCH_UM) / 2.0;
         self.pattern
             .aim(match (self.configuration.mode, self.wavelength) {
                 (Mode::Travelling, Some(wavelength)) => wavelength.phase_of(half_pitch_um),

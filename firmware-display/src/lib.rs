@@ -20,15 +20,16 @@ pub mod fade;
 pub mod hand;
 pub mod pattern;
 pub mod phase;
+pub mod settings;
 pub mod sine;
 
 pub use array::{Array, Place, Polarity, Trim};
 pub use display::Display;
+pub use protocol::ACTUATORS;
+pub use settings::Settings;
 
 /// Output ticks per second: ten samples a cycle at 200 Hz.
 pub const TICK_RATE_HZ: u32 = 2_000;
-/// Actuators on the fingertip (Okamoto et al. 2009, section IV): [`array::ROWS`] × [`array::COLUMNS`].
-pub const ACTUATORS: usize = 50;
 /// Rate of [`protocol::Motion`], in Hz.
 pub const MOTION_RATE_HZ: u32 = 500;
 /// Travel of the hand for one count of its encoder, in µm.

@@ -1,6 +1,6 @@
 //! The display board's tasks and what they pass to each other.
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
 use embassy_stm32::usart::RingBufferedUartRx;
@@ -8,13 +8,12 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
-use firmware_display::Display;
+use firmware_display::{Display, Settings};
 use nucleo::care::care;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
 use protocol::{
-    Configuration, ConfigurationReport, DisplayConfiguration, DisplayCounters, Estimate, Hello,
-    Message, RoleCounters, Setting, Stop,
+    DisplayConfiguration, DisplayCounters, Estimate, Hello, Message, RoleCounters, Stop,
 };
 use static_cell::StaticCell;
 
@@ -24,10 +23,10 @@ use crate::chain::Fault;
 /// From the ports to the output task: the latest counts.
 static ESTIMATE: Signal<CriticalSectionRawMutex, Estimate> = Signal::new();
 static STOP: Signal<CriticalSectionRawMutex, Stop> = Signal::new();
-static CONFIGURE: Signal<CriticalSectionRawMutex, DisplayConfiguration> = Signal::new();
-/// The configuration in force, whichever port it came from.
-static CONFIGURATION: Mutex<CriticalSectionRawMutex, Cell<DisplayConfiguration>> =
-    Mutex::new(Cell::new(DisplayConfiguration::DEFAULT));
+static CONFIGURE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// What is in force, whichever port it came from.
+static SETTINGS: Mutex<CriticalSectionRawMutex, RefCell<Settings>> =
+    Mutex::new(RefCell::new(Settings::DEFAULT));
 /// What the output task has counted so far.
 static COUNTERS: Mutex<CriticalSectionRawMutex, Cell<DisplayCounters>> =
     Mutex::new(Cell::new(DisplayCounters::ZERO));
@@ -84,8 +83,8 @@ async fn drive(mut ticks: Ticks, mut dacs: Dacs) {
         if STOP.try_take().is_some() {
             display.stop();
         }
-        if let Some(configuration) = CONFIGURE.try_take() {
-            display.configure(configuration);
+        if CONFIGURE.try_take().is_some() {
+            SETTINGS.lock(|settings| display.configure(*settings.borrow().configuration()));
         }
         if let Some(estimate) = ESTIMATE.try_take() {
             display.on_estimate(&estimate);
@@ -113,23 +112,17 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
         .listen(side, uart, |message| match message {
             Message::Estimate(estimate) => ESTIMATE.signal(estimate),
             Message::Stop(stop) => STOP.signal(stop),
+            Message::Actuators(block) => {
+                let refused = SETTINGS.lock(|settings| settings.borrow_mut().on_actuators(&block));
+                if let Some(answer) = refused {
+                    let _ = OUTBOX.try_send(Message::Configuration(answer));
+                }
+            }
             Message::Configure(asked) => {
-                let refused = match asked {
-                    Configuration::Display(asked) => match asked.check() {
-                        Ok(()) => {
-                            CONFIGURATION.lock(|current| current.set(asked));
-                            CONFIGURE.signal(asked);
-                            None
-                        }
-                        Err(setting) => Some(setting),
-                    },
-                    Configuration::Sensor(_) => Some(Setting::Role),
-                };
-                let configuration = Configuration::Display(CONFIGURATION.lock(Cell::get));
-                let answer = ConfigurationReport {
-                    refused,
-                    configuration,
-                };
+                let answer = SETTINGS.lock(|settings| settings.borrow_mut().on_configure(&asked));
+                if answer.refused.is_none() {
+                    CONFIGURE.signal(());
+                }
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));
             }

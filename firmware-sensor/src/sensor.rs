@@ -198,6 +198,7 @@ impl Sensor {
                 counted_mm: count.wavelength_mm,
                 range: count.range,
                 contact,
+                velocity_um_s: velocity_um_s(&started.travel),
                 lag_um: self.slip.lag_um(),
                 gauges_used: finding.gauges_used,
                 health: self.health.verdicts(),
@@ -252,6 +253,13 @@ impl Started {
 fn frequency_hz(travel: &Travel, finding: &Finding) -> Option<f32> {
     let wavelength_mm = finding.wavelength_mm.filter(|_| finding.valid)?;
     Some(travel.velocity_mm_s(0).abs() / wavelength_mm)
+}
+
+/// The arm's mean velocity over the last estimate's period, in µm/s.
+fn velocity_um_s(travel: &Travel) -> i32 {
+    let travelled_um = travel.position_um(0) - travel.position_um(SAMPLES_PER_ESTIMATE as usize);
+    // 164 mm a millisecond at most.
+    travelled_um as i32 * ESTIMATE_RATE_HZ as i32
 }
 
 /// What the fingertip does: as the force channel tells; without one, it slips where a wavelength is stood

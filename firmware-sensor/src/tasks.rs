@@ -14,7 +14,7 @@ use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
 use protocol::{
     Configuration, ConfigurationReport, Hello, Message, Motion, RoleCounters, SensorConfiguration,
-    SensorCounters, Setting,
+    SensorCounters, Refusal, Setting,
 };
 use static_cell::StaticCell;
 
@@ -122,13 +122,19 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                             CONFIGURE.signal(asked);
                             None
                         }
-                        Err(setting) => Some(setting),
+                        Err(refusal) => Some(refusal),
                     },
-                    Configuration::Display(_) => Some(Setting::Role),
+                    Configuration::Display(_) => Some(Refusal {
+                        setting: Setting::Role,
+                        index: 0,
+                        low: 0,
+                        high: 0,
+                    }),
                 };
                 let configuration = Configuration::Sensor(CONFIGURATION.lock(Cell::get));
                 let answer = ConfigurationReport {
                     refused,
+                    hash: configuration.hash(),
                     configuration,
                 };
                 // Full only if the thread is held up: the host asks again.

@@ -65,7 +65,7 @@ impl<'a> Truth<'a> {
         match self.display.mode {
             Mode::Uniform => 0.0,
             Mode::Travelling => {
-                let place = array::place(self.reference_actuator, self.display.pitch_um);
+                let place = array::place(self.reference_actuator, protocol::actuators::DEFAULT_PITCH_UM);
                 f64::from(place.x_um) * 1e-3
             }
         }

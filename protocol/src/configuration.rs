@@ -3,6 +3,9 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::actuators::{self, DEFAULT_ACTUATORS};
+use crate::frame::{CRC_32, MAX_PAYLOAD};
+
 /// How λ is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Method {
@@ -78,32 +81,66 @@ pub enum Mode {
     Travelling,
 }
 
+/// How often the actuators get new voltages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum UpdateRate {
+    /// Ten times a cycle of 200 Hz.
+    #[default]
+    Hz2000,
+    /// Twenty times.
+    Hz4000,
+}
+
+impl UpdateRate {
+    /// Updates per second.
+    pub const fn hz(self) -> u32 {
+        match self {
+            Self::Hz2000 => 2_000,
+            Self::Hz4000 => 4_000,
+        }
+    }
+}
+
 /// The display board's settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DisplayConfiguration {
     /// How the actuators share the stimulus.
     pub mode: Mode,
+    /// How often they get new voltages.
+    pub update_rate: UpdateRate,
     /// Age of the last valid estimate, in ms, at which the stimulus fades out, 20 to 5 000.
     pub max_age_ms: u16,
     /// Time from 0 to full stimulus, in ms, 1 to 1 000.
     pub fade_in_ms: u16,
     /// Time from full stimulus to 0, in ms, 1 to 1 000.
     pub fade_out_ms: u16,
-    /// Distance between neighbouring actuators, in µm, 100 to 10 000.
-    pub pitch_um: u16,
+    /// Time in which the wavenumber 1/λ glides to that of a new estimate, in ms, 0 to 500.
+    pub glide_ms: u16,
     /// The stimulus' amplitude in mV, 0 to 5 000; the paper's is 5 000 (equation (12)).
     pub amplitude_mv: u16,
+    /// The surface's amplitude ([`crate::Estimate::amplitude_lsb`]) that is played at `amplitude_mv`, in
+    /// ADC steps, 1 to 2 000; weaker surfaces are played weaker in proportion. 0: all surfaces alike.
+    pub reference_lsb: u16,
+    /// Longest time in s that the hand may rub without a rest, 10 to 3 600.
+    pub full_drive_s: u16,
+    /// [`crate::actuators::hash`] of the actuators' description: that of the one in force, or of the
+    /// one that [`crate::Message::Actuators`] have sent.
+    pub actuators: u32,
 }
 
 impl DisplayConfiguration {
     /// What a board starts with: safe, and the paper's numbers where it gives some.
     pub const DEFAULT: Self = Self {
         mode: Mode::Uniform,
+        update_rate: UpdateRate::Hz2000,
         max_age_ms: 500,
         fade_in_ms: 20,
         fade_out_ms: 50,
-        pitch_um: 1_500,
+        glide_ms: 20,
         amplitude_mv: 5_000,
+        reference_lsb: 0,
+        full_drive_s: 600,
+        actuators: actuators::hash(&DEFAULT_ACTUATORS),
     };
 }
 
@@ -122,14 +159,39 @@ pub enum Configuration {
     Display(DisplayConfiguration),
 }
 
+impl Configuration {
+    /// Names a configuration: the CRC-32 over its postcard bytes.
+    pub fn hash(&self) -> u32 {
+        let mut bytes = [0; MAX_PAYLOAD];
+        // No payload is longer, so nothing is cut off.
+        let bytes = postcard::to_slice(self, &mut bytes).unwrap_or_default();
+        CRC_32.checksum(bytes)
+    }
+}
+
 /// A board's answer to [`crate::Message::Configure`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ConfigurationReport {
     /// None if the configuration asked for is now in force; else the first setting that was out of
     /// its range, and nothing was changed.
-    pub refused: Option<Setting>,
+    pub refused: Option<Refusal>,
+    /// [`Configuration::hash`] of the configuration in force.
+    pub hash: u32,
     /// The configuration in force.
     pub configuration: Configuration,
+}
+
+/// Why a configuration was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Refusal {
+    /// The setting.
+    pub setting: Setting,
+    /// The actuator it is of; 0 for other settings.
+    pub index: u8,
+    /// The lowest value that would be taken.
+    pub low: i64,
+    /// The highest value that would be taken.
+    pub high: i64,
 }
 
 /// A setting that was refused.
@@ -159,15 +221,29 @@ pub enum Setting {
     FadeInMs,
     /// [`DisplayConfiguration::fade_out_ms`]
     FadeOutMs,
-    /// [`DisplayConfiguration::pitch_um`]
-    PitchUm,
+    /// [`DisplayConfiguration::glide_ms`]
+    GlideMs,
     /// [`DisplayConfiguration::amplitude_mv`]
     AmplitudeMv,
+    /// [`DisplayConfiguration::reference_lsb`]
+    ReferenceLsb,
+    /// [`DisplayConfiguration::full_drive_s`]
+    FullDriveS,
+    /// [`DisplayConfiguration::actuators`]: neither the description in force nor the one sent.
+    Actuators,
+    /// [`crate::Actuators::first`]
+    ActuatorsFirst,
+    /// [`crate::Actuator::x_um`]
+    ActuatorX,
+    /// [`crate::Actuator::y_um`]
+    ActuatorY,
+    /// [`crate::Actuator::gain_q15`]
+    ActuatorGain,
 }
 
 impl SensorConfiguration {
     /// Checks every range; the first setting outside of its own is the error.
-    pub fn check(&self) -> Result<(), Setting> {
+    pub fn check(&self) -> Result<(), Refusal> {
         within(self.window_ms.into(), 10, 200, Setting::WindowMs)?;
         within(self.counted_gauge.into(), 0, 4, Setting::CountedGauge)?;
         within(self.gauges.into(), 1, 31, Setting::Gauges)?;
@@ -198,19 +274,26 @@ impl SensorConfiguration {
 
 impl DisplayConfiguration {
     /// Checks every range; the first setting outside of its own is the error.
-    pub fn check(&self) -> Result<(), Setting> {
+    pub fn check(&self) -> Result<(), Refusal> {
         within(self.max_age_ms.into(), 20, 5_000, Setting::MaxAgeMs)?;
         within(self.fade_in_ms.into(), 1, 1_000, Setting::FadeInMs)?;
         within(self.fade_out_ms.into(), 1, 1_000, Setting::FadeOutMs)?;
-        within(self.pitch_um.into(), 100, 10_000, Setting::PitchUm)?;
-        within(self.amplitude_mv.into(), 0, 5_000, Setting::AmplitudeMv)
+        within(self.glide_ms.into(), 0, 500, Setting::GlideMs)?;
+        within(self.amplitude_mv.into(), 0, 5_000, Setting::AmplitudeMv)?;
+        within(self.reference_lsb.into(), 0, 2_000, Setting::ReferenceLsb)?;
+        within(self.full_drive_s.into(), 10, 3_600, Setting::FullDriveS)
     }
 }
 
-fn within(value: u32, low: u32, high: u32, setting: Setting) -> Result<(), Setting> {
+fn within(value: u32, low: u32, high: u32, setting: Setting) -> Result<(), Refusal> {
     if (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(setting)
+        Err(Refusal {
+            setting,
+            index: 0,
+            low: low.into(),
+            high: high.into(),
+        })
     }
 }

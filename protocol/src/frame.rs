@@ -30,7 +30,7 @@ pub const MAX_PAYLOAD: usize = max_encoded(Message::SCHEMA);
 /// Longest frame of this version, in bytes, its closing 0x00 included.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(SEQUENCE + MAX_PAYLOAD + CRC) + 1;
 
-const CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+pub(crate) const CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a frame could not be taken apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

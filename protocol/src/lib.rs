@@ -4,6 +4,7 @@
 //! No DSP, no hardware, no allocation: the same code runs on both boards and on every host.
 #![no_std]
 
+pub mod actuators;
 pub mod clock;
 pub mod configuration;
 pub mod frame;
@@ -11,14 +12,16 @@ pub mod hello;
 pub mod message;
 pub mod port;
 pub mod receiver;
+pub mod safety;
 pub mod sender;
 mod sequence;
 pub mod status;
 
+pub use actuators::{ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN};
 pub use clock::ClockOffset;
 pub use configuration::{
-    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, SensorConfiguration,
-    Setting,
+    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, Refusal,
+    SensorConfiguration, Setting, UpdateRate,
 };
 pub use frame::MAX_FRAME;
 pub use hello::{HELLO_LENGTH, Hello, Role};
@@ -28,5 +31,6 @@ pub use message::{
 };
 pub use port::Port;
 pub use receiver::{Event, Peer, Receiver};
+pub use safety::{DisplayState, Hold, Safety, Trip};
 pub use sender::Sender;
 pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};

@@ -8,7 +8,9 @@
 //! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
 //! | [`Status`] | boards | 1 Hz | every counter |
 //! | [`Message::Configure`] | host | – | asks for a configuration |
-//! | [`ConfigurationReport`] | boards | – | answers it |
+//! | [`Actuators`] | host | – | a part of the fingertip's description, for the next configuration |
+//! | [`ConfigurationReport`] | boards | – | answers both |
+//! | [`Safety`] | display | at each change | the supervisor's state |
 //! | [`Ping`], [`Pong`] | all | – | round trip and clock offset |
 //! | [`Stop`] | host | – | no more stimulus |
 //!
@@ -18,12 +20,14 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::actuators::Actuators;
 use crate::configuration::{Configuration, ConfigurationReport};
 use crate::hello::Hello;
+use crate::safety::Safety;
 use crate::status::Status;
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 2;
+pub const PROTOCOL_VERSION: u16 = 3;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
@@ -56,14 +60,18 @@ pub enum Message {
     Status(Status),
     /// Asks a board to take this configuration as a whole.
     Configure(Configuration),
-    /// A board's configuration as it stands, after a [`Message::Configure`].
+    /// A board's configuration as it stands, after a [`Message::Configure`] or refused [`Actuators`].
     Configuration(ConfigurationReport),
     /// Asks for a [`Pong`].
     Ping(Ping),
     /// Answers a [`Ping`].
     Pong(Pong),
-    /// Ends the stimulus until the display board is restarted.
+    /// Ends the stimulus until the display board's reset button or power.
     Stop(Stop),
+    /// Describes ten actuators, for a [`Message::Configure`] to come. Answered only if refused.
+    Actuators(Actuators),
+    /// The display's supervisor has changed its state.
+    Safety(Safety),
 }
 
 /// Which of the paper's ranges an instant is in, equation (8): T1 while v(t)·v(t−A) ≥ 0.
@@ -131,6 +139,8 @@ pub struct Estimate {
     /// What the fingertip did some 7.5 ms before: the force comes 4 ms late out of its filter, and how arm
     /// and contact moved is looked at over 7 ms.
     pub contact: Contact,
+    /// The arm's velocity in µm/s over the last 10 ms, positive towards larger x.
+    pub velocity_um_s: i32,
     /// How far the fingertip's contact lags behind the arm, F/k, in µm, towards larger x if positive;
     /// none without the force channel.
     pub lag_um: Option<i32>,
@@ -202,7 +212,8 @@ pub enum StopReason {
     Host,
 }
 
-/// Ends the stimulus: obeyed at the next output tick and kept until the display board restarts.
+/// Ends the stimulus: obeyed at the next output tick and kept until the display board's reset button or
+/// power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Stop {
     /// Why.

@@ -3,6 +3,8 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
+use crate::safety::DisplayState;
+
 /// Why a board started last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ResetCause {
@@ -115,6 +117,22 @@ pub struct DisplayCounters {
     pub fades: u32,
     /// SPI transfers that failed.
     pub spi_errors: u32,
+    /// Estimates that can't be true: jumping, or contradicting themselves.
+    pub implausible: u32,
+    /// Estimates that came faster than a sensor sends them, and were not used.
+    pub flooded: u32,
+    /// Times that the hand's encoder jumped further than a hand moves.
+    pub encoder_jumps: u32,
+    /// Times that the converters did not hold what was written to them, or raised their alarm.
+    pub converter_faults: u32,
+    /// Times that CLR fell by itself, because ticks were not served.
+    pub clears: u32,
+    /// Motions that found no room because the tasks behind the ports were held up.
+    pub unheard: u32,
+    /// Times that a state of the supervisor began.
+    pub changes: u32,
+    /// The supervisor's state now.
+    pub state: DisplayState,
 }
 
 impl DisplayCounters {
@@ -127,6 +145,14 @@ impl DisplayCounters {
         refused_estimates: 0,
         fades: 0,
         spi_errors: 0,
+        implausible: 0,
+        flooded: 0,
+        encoder_jumps: 0,
+        converter_faults: 0,
+        clears: 0,
+        unheard: 0,
+        changes: 0,
+        state: DisplayState::Boot,
     };
 }
 

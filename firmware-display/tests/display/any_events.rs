@@ -33,6 +33,7 @@ prop_compose! {
         amplitude_lsb in any::<f32>(),
         confidence in any::<f32>(),
         counted_mm in any::<Option<f32>>(),
+        velocity_um_s in any::<i32>(),
         lag_um in any::<Option<i32>>(),
         gauges_used in any::<u8>(),
     ) -> Estimate {
@@ -46,6 +47,7 @@ prop_compose! {
             counted_mm,
             range: Range::T2,
             contact: Contact::Stick,
+            velocity_um_s,
             lag_um,
             gauges_used,
             health: [GaugeHealth::Noisy; GAUGES],
@@ -59,11 +61,21 @@ prop_compose! {
         max_age_ms in 20..=5_000_u16,
         fade_in_ms in 1..=1_000_u16,
         fade_out_ms in 1..=1_000_u16,
-        pitch_um in 100..=10_000_u16,
+        glide_ms in 0..=500_u16,
         amplitude_mv in 0..=5_000_u16,
+        reference_lsb in 0..=2_000_u16,
     ) -> DisplayConfiguration {
         let mode = if travelling { Mode::Travelling } else { Mode::Uniform };
-        DisplayConfiguration { mode, max_age_ms, fade_in_ms, fade_out_ms, pitch_um, amplitude_mv }
+        DisplayConfiguration {
+            mode,
+            max_age_ms,
+            fade_in_ms,
+            fade_out_ms,
+            glide_ms,
+            amplitude_mv,
+            reference_lsb,
+            ..DisplayConfiguration::DEFAULT
+        }
     }
 }
 

@@ -258,7 +258,6 @@ fn a_new_configuration_makes_no_jump() {
     };
     let loud = DisplayConfiguration {
         mode: Mode::Travelling,
-        pitch_um: 2_345,
         ..Default::default()
     };
     let mut rig = Rig::with(quiet);

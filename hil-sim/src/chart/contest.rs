@@ -288,6 +288,7 @@ fn estimate(answer: Answer, sequence: u32, instant_us: u64) -> Estimate {
         counted_mm: None,
         range: Range::T1,
         contact: Contact::Unknown,
+        velocity_um_s: 0,
         lag_um: None,
         gauges_used: 0,
         health: [GaugeHealth::Good; GAUGES],

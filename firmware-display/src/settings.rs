@@ -1,0 +1,206 @@
+//! The board's configuration: taken as a whole or not at all.
+
+use protocol::actuators::{self, ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS};
+use protocol::{
+    Actuators, Configuration, ConfigurationReport, DisplayConfiguration, Refusal, Setting,
+};
+
+/// What is in force, and the description of the actuators that is being sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    configuration: DisplayConfiguration,
+    actuators: [Actuator; ACTUATORS],
+    sent: [Actuator; ACTUATORS],
+}
+
+impl Settings {
+    /// What a board starts with.
+    pub const DEFAULT: Self = Self {
+        configuration: DisplayConfiguration::DEFAULT,
+        actuators: DEFAULT_ACTUATORS,
+        sent: DEFAULT_ACTUATORS,
+    };
+
+    /// The configuration in force.
+    pub const fn configuration(&self) -> &DisplayConfiguration {
+        &self.configuration
+    }
+
+    /// The actuators in force.
+    pub const fn actuators(&self) -> &[Actuator; ACTUATORS] {
+        &self.actuators
+    }
+
+    /// Keeps a block of a description until a configuration asks for it; None if there is nothing to
+    /// say, else the answer.
+    pub fn on_actuators(&mut self, block: &Actuators) -> Option<ConfigurationReport> {
+        let first = usize::from(block.first);
+        if first < ACTUATORS && first.is_multiple_of(ACTUATOR_BLOCK) {
+            self.sent[first..first + ACTUATOR_BLOCK].copy_from_slice(&block.actuators);
+            return None;
+        }
+        Some(self.report(Some(Refusal {
+            setting: Setting::ActuatorsFirst,
+            index: block.first,
+            low: 0,
+            high: (ACTUATORS - ACTUATOR_BLOCK) as i64,
+        })))
+    }
+
+    /// Takes a configuration whose every value, and whose every actuator's, is in its range; any other
+    /// changes nothing. The answer names what is in force then.
+    pub fn on_configure(&mut self, asked: &Configuration) -> ConfigurationReport {
+        let taken = self.take(asked);
+        self.report(taken.err())
+    }
+
+    fn take(&mut self, asked: &Configuration) -> Result<(), Refusal> {
+        let refuse = |setting| Refusal {
+            setting,
+            index: 0,
+            low: 0,
+            high: 0,
+        };
+        let Configuration::Display(asked) = asked else {
+            return Err(refuse(Setting::Role));
+        };
+        asked.check()?;
+        if asked.actuators != self.configuration.actuators {
+            let sent = actuators::hash(&self.sent);
+            if asked.actuators != sent {
+                return Err(Refusal {
+                    low: sent.into(),
+                    high: sent.into(),
+                    ..refuse(Setting::Actuators)
+                });
+            }
+            actuators::check(&self.sent)?;
+            self.actuators = self.sent;
+        }
+        self.configuration = *asked;
+        Ok(())
+    }
+
+    fn report(&self, refused: Option<Refusal>) -> ConfigurationReport {
+        let configuration = Configuration::Display(self.configuration);
+        ConfigurationReport {
+            refused,
+            hash: configuration.hash(),
+            configuration,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::SensorConfiguration;
+    use protocol::actuators::grid;
+
+    use super::*;
+
+    fn send(settings: &mut Settings, described: &[Actuator; ACTUATORS]) {
+        for first in (0..ACTUATORS).step_by(ACTUATOR_BLOCK) {
+            let block = Actuators {
+                first: first as u8,
+                actuators: described[first..first + ACTUATOR_BLOCK].try_into().unwrap(),
+            };
+            assert_eq!(settings.on_actuators(&block), None);
+        }
+    }
+
+    fn asking_for(described: &[Actuator; ACTUATORS]) -> Configuration {
+        Configuration::Display(DisplayConfiguration {
+            amplitude_mv: 1_234,
+            actuators: actuators::hash(described),
+            ..DisplayConfiguration::DEFAULT
+        })
+    }
+
+    #[test]
+    fn a_description_comes_into_force_with_the_configuration_that_names_it_and_not_before() {
+        let mut settings = Settings::DEFAULT;
+        let described = grid(700);
+        send(&mut settings, &described);
+        assert_eq!(settings.actuators(), &DEFAULT_ACTUATORS);
+        let asked = asking_for(&described);
+        let report = settings.on_configure(&asked);
+        assert_eq!((report.refused, report.configuration), (None, asked));
+        assert_eq!(report.hash, asked.hash());
+        assert_eq!(settings.actuators(), &described);
+    }
+
+    #[test]
+    fn the_description_in_force_is_kept_by_a_configuration_that_names_it() {
+        let mut settings = Settings::DEFAULT;
+        send(&mut settings, &grid(700));
+        let report = settings.on_configure(&asking_for(&DEFAULT_ACTUATORS));
+        assert_eq!(report.refused, None);
+        assert_eq!(settings.actuators(), &DEFAULT_ACTUATORS);
+    }
+
+    #[test]
+    fn nothing_changes_when_one_block_was_lost() {
+        let mut settings = Settings::DEFAULT;
+        let described = grid(700);
+        let block = Actuators {
+            first: 20,
+            actuators: described[20..30].try_into().unwrap(),
+        };
+        assert_eq!(settings.on_actuators(&block), None);
+        let report = settings.on_configure(&asking_for(&described));
+        let refused = report.refused.unwrap();
+        assert_eq!(refused.setting, Setting::Actuators);
+        let in_force = Configuration::Display(DisplayConfiguration::DEFAULT);
+        assert_eq!(report.configuration, in_force);
+        assert_eq!(report.hash, in_force.hash());
+        assert_eq!(settings.actuators(), &DEFAULT_ACTUATORS);
+    }
+
+    #[test]
+    fn an_actuator_out_of_its_range_is_named_and_nothing_changes() {
+        for (change, setting, low, high) in [
+            (
+                (|a| a.x_um = 20_001) as fn(&mut Actuator),
+                Setting::ActuatorX,
+                -20_000,
+                20_000,
+            ),
+            (|a| a.y_um = -20_001, Setting::ActuatorY, -20_000, 20_000),
+            (|a| a.gain_q15 = 32_769, Setting::ActuatorGain, 0, 32_768),
+        ] {
+            let mut settings = Settings::DEFAULT;
+            let mut described = grid(1_000);
+            change(&mut described[37]);
+            send(&mut settings, &described);
+            let before = (*settings.configuration(), *settings.actuators());
+            let report = settings.on_configure(&asking_for(&described));
+            let expected = Refusal {
+                setting,
+                index: 37,
+                low,
+                high,
+            };
+            assert_eq!(report.refused, Some(expected));
+            assert_eq!(before, (*settings.configuration(), *settings.actuators()));
+        }
+    }
+
+    #[test]
+    fn the_other_boards_configuration_and_a_block_that_fits_nowhere_are_refused() {
+        let mut settings = Settings::DEFAULT;
+        let report = settings.on_configure(&Configuration::Sensor(SensorConfiguration::DEFAULT));
+        assert_eq!(report.refused.unwrap().setting, Setting::Role);
+        for first in [5, 50, 255] {
+            let block = Actuators {
+                first,
+                actuators: [Actuator::at(0, 0); ACTUATOR_BLOCK],
+            };
+            let refused = settings.on_actuators(&block).unwrap().refused.unwrap();
+            assert_eq!(
+                (refused.setting, refused.index, refused.high),
+                (Setting::ActuatorsFirst, first, 40)
+            );
+        }
+        assert_eq!(settings, Settings::DEFAULT);
+    }
+}
