@@ -18,6 +18,7 @@ pub mod dac81416;
 pub mod display;
 pub mod fade;
 pub mod hand;
+pub mod look;
 pub mod pattern;
 pub mod phase;
 pub mod senses;
