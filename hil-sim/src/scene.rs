@@ -6,9 +6,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
+use protocol::{DisplayConfiguration, GAUGES, Method, SensorConfiguration};
 
 mod bounds;
+mod display;
 mod error;
 mod read;
 mod series;
@@ -16,6 +17,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub use display::Display;
 pub use error::SceneError;
 pub use series::Series;
 
@@ -45,8 +47,8 @@ pub struct Scene {
     pub link: Link,
     /// What the sensor makes of it.
     pub estimator: Estimator,
-    /// How the fifty actuators share the stimulus (`[display] mode`). Default uniform.
-    pub display_mode: Mode,
+    /// How the display board is set.
+    pub display: Display,
     /// What must come out.
     pub expect: Expect,
 }
@@ -324,7 +326,7 @@ impl Scene {
             force: Force::default(),
             link: Link::default(),
             estimator: Estimator::default(),
-            display_mode: Mode::Uniform,
+            display: Display::default(),
             expect: Expect::default(),
         }
     }
@@ -354,10 +356,7 @@ impl Scene {
 
     /// What the scene asks of the display board.
     pub fn display_configuration(&self) -> DisplayConfiguration {
-        DisplayConfiguration {
-            mode: self.display_mode,
-            ..DisplayConfiguration::default()
-        }
+        self.display.configuration
     }
 }
 

@@ -23,6 +23,7 @@ fn assert_taken(sections: &str) -> SensorConfiguration {
     let wanted = scene.sensor_configuration();
     let taken = ConfigurationReport {
         refused: None,
+        hash: Configuration::Sensor(wanted).hash(),
         configuration: Configuration::Sensor(wanted),
     };
     assert_eq!(report, Some(taken), "{sections}");
