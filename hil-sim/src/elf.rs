@@ -241,10 +241,7 @@ fn told(name: &'static str, driver: &Lockstep) -> Result<Option<Told>, ElfError>
         }
         told => match told.and_then(|told| told.report.refused) {
             None => return Ok(told),
-            Some(refusal) => format!(
-                "it refuses {:?}: {} to {} are taken",
-                refusal.setting, refusal.low, refusal.high
-            ),
+            Some(refusal) => refusal.to_string(),
         },
     };
     Err(ElfError::Configuration {
