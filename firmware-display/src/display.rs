@@ -1,13 +1,13 @@
 //! The display: estimates and encoder readings in, fifty DAC words out.
 
-use protocol::{DisplayConfiguration, DisplayCounters, Estimate, Mode, Motion};
+use protocol::actuators::DEFAULT_ACTUATORS;
+use protocol::{DisplayConfiguration, DisplayCounters, Estimate, Motion};
 
-use crate::array::{Array, FULL_LEVEL, Trim};
 use crate::fade::Fade;
 use crate::hand::Hand;
-use crate::pattern::Pattern;
-use crate::phase::{Phase, Wavelength};
-use crate::{ACTUATORS, ZERO_VOLT, ticks};
+use crate::phase::Wavelength;
+use crate::stimulus::Stimulus;
+use crate::{ACTUATORS, ticks};
 
 /// An estimate is late, and refused, if it is behind the last by at most this many: 10 s.
 const LATE_AT_MOST: u32 = 1_000;
@@ -16,11 +16,6 @@ const LATE_AT_MOST: u32 = 1_000;
 const BEGINNING: u32 = 10;
 /// The link puts estimates out of order by no more than this many.
 const REORDERED_AT_MOST: u32 = 32;
-/// A new amplitude is reached at this rate: the whole of 5 V in 20 ms.
-const AMPLITUDE_PER_TICK: u32 = FULL_LEVEL / ticks(20);
-/// The largest amplitude, in mV, and the voltage of [`FULL_LEVEL`].
-const FULL_LEVEL_MV: u16 = 5_000;
-
 /// The display board's state, stepped once per output tick of 500 µs.
 ///
 /// 0 V at start and until the first valid estimate, then fades in and follows the hand by the last
@@ -30,74 +25,46 @@ const FULL_LEVEL_MV: u16 = 5_000;
 #[derive(Clone, Debug)]
 pub struct Display {
     configuration: DisplayConfiguration,
-    array: Array,
+    stimulus: Stimulus,
     hand: Hand,
-    phase: Phase,
-    wavelength: Option<Wavelength>,
-    pattern: Pattern,
     fade: Fade,
-    /// Amplitude in force, in Q16 DAC steps, on its way to the configuration's.
-    amplitude: u32,
     /// Ticks since the last valid estimate.
     age_ticks: u32,
     following: bool,
     last_sequence: Option<u32>,
     stopped: bool,
     send_anyway: bool,
-    drawn: Drawn,
-    words: [u16; ACTUATORS],
     counters: DisplayCounters,
-}
-
-/// All that the words depend on, apart from the trims. The default is 0 V.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Drawn {
-    level: u32,
-    turns: u32,
-    pattern: Pattern,
 }
 
 impl Display {
     /// A display at 0 V that has seen neither hand nor surface. `configuration` is checked.
     pub fn new(configuration: DisplayConfiguration) -> Self {
         Self {
-            array: Array::new(&[Trim::default(); ACTUATORS]),
+            stimulus: Stimulus::new(&configuration, &DEFAULT_ACTUATORS),
             hand: Hand::default(),
-            phase: Phase::default(),
-            wavelength: None,
-            pattern: Pattern::default(),
             fade: Fade::new(configuration.fade_in_ms, configuration.fade_out_ms),
-            amplitude: 0,
             age_ticks: u32::MAX,
             following: false,
             last_sequence: None,
             stopped: false,
             send_anyway: false,
-            drawn: Drawn::default(),
-            words: [ZERO_VOLT; ACTUATORS],
             counters: DisplayCounters::default(),
             configuration,
         }
     }
 
-    /// Takes a checked configuration. Nothing jumps: a new amplitude is reached at 5 V in 20 ms, a new
-    /// mode or pitch as a new λ is (see [`crate::pattern`]).
+    /// Takes a checked configuration; see [`Stimulus::configure`].
     pub fn configure(&mut self, configuration: DisplayConfiguration) {
         self.configuration = configuration;
         self.fade
             .set_times(configuration.fade_in_ms, configuration.fade_out_ms);
-        self.aim_pattern();
+        self.stimulus.configure(&configuration, &DEFAULT_ACTUATORS);
     }
 
     /// The configuration in force.
     pub fn configuration(&self) -> DisplayConfiguration {
         self.configuration
-    }
-
-    /// Takes each actuator's gain and polarity, at once: for start-up.
-    pub fn trim(&mut self, trims: &[Trim; ACTUATORS]) {
-        self.array = Array::new(trims);
-        self.send_anyway = true;
     }
 
     /// Takes what the sensor says.
@@ -122,9 +89,7 @@ impl Display {
         };
         self.counters.estimates = self.counters.estimates.wrapping_add(1);
         self.age_ticks = 0;
-        self.wavelength = Some(wavelength);
-        self.phase.follow(wavelength);
-        self.aim_pattern();
+        self.stimulus.follow(wavelength, estimate.amplitude_lsb);
     }
 
     /// 0 V from the next tick on, and for good.
@@ -143,16 +108,13 @@ impl Display {
     pub fn tick(&mut self, encoder: u16) -> bool {
         self.counters.ticks = self.counters.ticks.wrapping_add(1);
         let travel = self.hand.read(encoder);
-        self.phase.advance(travel);
-        let silent = self.fade.gain() == 0;
         self.supervise();
-        self.approach(silent, travel);
-        let drawn = self.next_drawn();
         let mut send = core::mem::take(&mut self.send_anyway);
-        if send || drawn != self.drawn {
-            let sines = drawn.pattern.sines(drawn.turns);
-            send |= self.array.draw(drawn.level, &sines, &mut self.words);
-            self.drawn = drawn;
+        if self.stopped {
+            send |= self.words() != &[crate::ZERO_VOLT; ACTUATORS];
+            self.stimulus.silence();
+        } else {
+            send |= self.stimulus.tick(travel, self.fade.gain());
         }
         self.counters.updates = self.counters.updates.wrapping_add(u32::from(send));
         send
@@ -160,7 +122,7 @@ impl Display {
 
     /// The words of the last tick: [`ZERO_VOLT`] is 0 V, a step 10 V / 65 536.
     pub fn words(&self) -> &[u16; ACTUATORS] {
-        &self.words
+        self.stimulus.words()
     }
 
     /// The hand's [`Motion`] after every fourth tick; see [`Hand::motion`].
@@ -188,15 +150,6 @@ impl Display {
         self.counters.refused_estimates = self.counters.refused_estimates.wrapping_add(1);
     }
 
-    fn aim_pattern(&mut self) {
-        let half_pitch_um = f64::from(protocol::actuators::DEFAULT_PITCH_UM) / 2.0;
-        self.pattern
-            .aim(match (self.configuration.mode, self.wavelength) {
-                (Mode::Travelling, Some(wavelength)) => wavelength.phase_of(half_pitch_um),
-                _ => 0,
-            });
-    }
-
     /// Ages the last valid estimate and fades accordingly.
     fn supervise(&mut self) {
         self.age_ticks = self.age_ticks.saturating_add(1);
@@ -206,34 +159,5 @@ impl Display {
         }
         self.following = fresh;
         self.fade.step(fresh);
-    }
-
-    /// Takes amplitude and pattern on to where they are to be: at once while nobody feels it.
-    fn approach(&mut self, silent: bool, travel: i16) {
-        let amplitude_mv = self.configuration.amplitude_mv.min(FULL_LEVEL_MV);
-        let amplitude =
-            (u64::from(FULL_LEVEL) * u64::from(amplitude_mv) / u64::from(FULL_LEVEL_MV)) as u32;
-        if silent {
-            self.amplitude = amplitude;
-            self.pattern.settle();
-            return;
-        }
-        let low = self.amplitude.saturating_sub(AMPLITUDE_PER_TICK);
-        let high = self.amplitude.saturating_add(AMPLITUDE_PER_TICK);
-        self.amplitude = amplitude.clamp(low, high);
-        let turned = u32::from(travel.unsigned_abs()).saturating_mul(self.phase.per_count());
-        self.pattern.glide(turned);
-    }
-
-    fn next_drawn(&self) -> Drawn {
-        let level = ((u64::from(self.amplitude) * u64::from(self.fade.gain())) >> 31) as u32;
-        if self.stopped || level == 0 {
-            return Drawn::default();
-        }
-        Drawn {
-            level,
-            turns: self.phase.turns(),
-            pattern: self.pattern,
-        }
     }
 }
