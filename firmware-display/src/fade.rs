@@ -93,7 +93,11 @@ mod tests {
                 let mut fade = Fade::new(ms, ms);
                 for (aim, end) in [(Aim::In, FULL), (Aim::Out, 0)] {
                     let ticks = u32::from(ms) * rate.hz() / 1_000;
-                    assert_eq!(ticks_to(&mut fade, aim, rate, end), ticks, "{ms} ms, {aim:?}");
+                    assert_eq!(
+                        ticks_to(&mut fade, aim, rate, end),
+                        ticks,
+                        "{ms} ms, {aim:?}"
+                    );
                 }
             }
         }

@@ -15,8 +15,7 @@ const DOUBLE_VELOCITY_PER_COUNT: i32 =
 /// No hand at a fingertip's stage is faster, in mm/s: several times a quick stroke.
 pub const FASTEST_MM_S: u32 = 2_000;
 /// Its counts in a quarter of a millisecond: 100.
-const MOST_PER_QUARTER: u32 =
-    FASTEST_MM_S * 1_000 / MICROMETRES_PER_COUNT as u32 / quarters(1_000);
+const MOST_PER_QUARTER: u32 = FASTEST_MM_S * 1_000 / MICROMETRES_PER_COUNT as u32 / quarters(1_000);
 
 const _: () = assert!(quarters(1_000).is_multiple_of(MOTION_RATE_HZ));
 const _: () = assert!(MOTION_QUARTERS.is_multiple_of(per_tick(UpdateRate::Hz2000)));

@@ -7,9 +7,9 @@
 //! | limit | why it is not met by a stimulus that works |
 //! | --- | --- |
 //! | voltage: the configured amplitude | each word is within it |
-//! | slew: [`MOST_SLEW_V_PER_MS`] | the stimulus' own is 8 V/ms; the fastest fade adds 5 V/ms |
+//! | slew: [`MOST_SLEW_V_PER_MS`] | the stimulus never exceeds [`crate::stimulus::MOST_V_PER_MS`] |
 //! | energy: a mean of V² over about 1 s, [`MOST_ENERGY_V2`] | a full sine has 12.5 V²; a hand that swings to and fro over half a wavelength makes 17.6 V² of it |
-//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away with a time constant of 0.25 s, so that ∫V dt is within ±5 V · 0.25 s of where it is at rest |
+//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away with a time constant τ of a quarter of it, so that ∫V dt is within ±5 V · τ |
 
 use protocol::UpdateRate;
 
@@ -17,7 +17,7 @@ use crate::pace::{per_tick, quarters};
 use crate::{ACTUATORS, ZERO_VOLT};
 
 /// The steepest slew, in V/ms.
-pub const MOST_SLEW_V_PER_MS: i32 = 16;
+pub const MOST_SLEW_V_PER_MS: i32 = 10;
 /// The largest mean of V², in V².
 pub const MOST_ENERGY_V2: i32 = 20;
 /// The largest mean of V, in V.
@@ -27,7 +27,7 @@ const MEAN_SHIFT: u32 = 12;
 /// Fraction bits of the mean of V.
 const FRACTION: u32 = 14;
 /// A lower amplitude is reached within this time.
-const SETTLING_QUARTERS: u32 = quarters(50);
+const SETTLING_QUARTERS: u32 = quarters(250);
 
 /// DAC steps of 10 V.
 const STEPS_PER_10_V: i32 = 1 << 16;
@@ -85,7 +85,7 @@ impl Limits {
         }
     }
 
-    /// Takes another rate and amplitude, of which a lower one has 50 ms to be reached.
+    /// Takes another rate and amplitude, of which a lower one has 250 ms to be reached.
     pub const fn set(&mut self, rate: UpdateRate, amplitude_mv: u16) {
         self.quarters = per_tick(rate);
         self.amplitude = steps(amplitude_mv);
@@ -153,6 +153,7 @@ mod tests {
     use core::f64::consts::TAU;
 
     use super::*;
+    use crate::balance::TIME_CONSTANT_S;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
     const VOLT: f64 = 6_553.6;
@@ -196,17 +197,20 @@ mod tests {
 
     #[test]
     fn no_standing_voltage_that_is_balanced_away_breaks_the_limit() {
-        // Whatever the sine s is: y = s − m, m' = y/τ, so that ∫y = τ Δm, within 10 V · 0.25 s; weighed
-        // with a mean of 1.024 s it is no more than 2.44 V. The worst is met by a crest that follows a
-        // trough.
+        // Whatever the sine s is: y = s − m, m' = y/τ, so that ∫y = τ Δm, within 10 V · τ; in a mean of
+        // four times τ it is no more than 2.5 V. The worst is met by a crest that follows a trough.
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
             let mut worst = 0.0_f64;
-            let (mut m, dt_s) = (0.0, 1.0 / f64::from(rate.hz()));
+            let (mut mean, dt_s) = (0.0, 1.0 / f64::from(rate.hz()));
             for tick in 0..20 * rate.hz() {
-                let s = if tick / (2 * rate.hz()) % 2 == 0 { 5.0 } else { -5.0 };
-                let y: f64 = (s - m_of(m)).clamp(-5.0, 5.0);
-                m += y * dt_s / 0.25;
+                let s = if tick / (2 * rate.hz()) % 2 == 0 {
+                    5.0
+                } else {
+                    -5.0
+                };
+                let y: f64 = (s - mean).clamp(-5.0, 5.0);
+                mean += y * dt_s / TIME_CONSTANT_S;
                 let words = [word(y); ACTUATORS];
                 // The steps of s are no hand's.
                 limits.before = words;
@@ -214,13 +218,11 @@ mod tests {
                 let standing = f64::from(limits.standing[0]) / f64::from(1 << FRACTION) / VOLT;
                 worst = worst.max(standing.abs());
             }
-            assert!((1.0..2.44).contains(&worst), "{worst} V");
+            assert!(
+                (1.0..10.0 * TIME_CONSTANT_S / 1.024).contains(&worst),
+                "{worst} V"
+            );
         }
-    }
-
-    /// The servo's own state: its mean.
-    fn m_of(m: f64) -> f64 {
-        m
     }
 
     #[test]
@@ -243,13 +245,13 @@ mod tests {
     }
 
     #[test]
-    fn a_lower_amplitude_has_fifty_milliseconds_to_be_reached_and_a_higher_one_is_allowed_at_once() {
+    fn a_lower_amplitude_has_a_quarter_of_a_second_and_a_higher_one_is_allowed_at_once() {
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
             let high = [word(5.0); ACTUATORS];
             limits.before = high;
             limits.set(rate, 1_000);
-            let settling = 50 * rate.hz() / 1_000;
+            let settling = 250 * rate.hz() / 1_000;
             for _ in 1..settling {
                 assert_eq!(limits.check(&high), Ok(()));
             }
@@ -264,7 +266,13 @@ mod tests {
         for rate in RATES {
             let most_v = f64::from(MOST_SLEW_V_PER_MS) * 1_000.0 / f64::from(rate.hz());
             for (step_v, expected) in [(most_v - 0.01, None), (most_v + 0.01, Some(Breach::Slew))] {
-                let up_and_down = |t: f64| if t < 0.01 { -step_v / 2.0 } else { step_v / 2.0 };
+                let up_and_down = |t: f64| {
+                    if t < 0.01 {
+                        -step_v / 2.0
+                    } else {
+                        step_v / 2.0
+                    }
+                };
                 let found = play(rate, 0.02, up_and_down);
                 assert_eq!(found.map(|(_, breach)| breach), expected);
             }

@@ -4,6 +4,8 @@
 use protocol::actuators::Actuator;
 use protocol::{ACTUATORS, DisplayConfiguration};
 
+use crate::stimulus::Stimulus;
+
 /// Actuators compared in a tick: all of them within 17 ticks, 8.5 ms at 2 kHz.
 const PER_TICK: usize = 3;
 
@@ -29,32 +31,22 @@ impl Memory {
         }
     }
 
-    /// Compares the configuration and the next few actuators with their second copies. False if one of
-    /// them has changed.
-    pub fn agrees(
-        &mut self,
-        configuration: &DisplayConfiguration,
-        actuators: &[Actuator; ACTUATORS],
-    ) -> bool {
-        let mut differences = differences(&settings(configuration), &self.settings);
+    /// Compares the configuration, and the next few actuators that the stimulus is made with, with their
+    /// second copies. False if one of them has changed.
+    pub fn agrees(&mut self, configuration: &DisplayConfiguration, stimulus: &Stimulus) -> bool {
+        let mut agrees = differences(&settings(configuration), &self.settings) == 0;
         for _ in 0..PER_TICK {
             let next = self.next;
             self.next = if next + 1 < ACTUATORS { next + 1 } else { 0 };
-            differences |= differences_of(actuators, &self.actuators, next);
+            // An index that is none is itself a fault of memory.
+            agrees &= match (stimulus.actuators().get(next), self.actuators.get(next)) {
+                (Some(actuator), Some(copy)) => {
+                    differences(&traits(actuator), copy) == 0 && stimulus.follows_from(next)
+                }
+                _ => false,
+            };
         }
-        differences == 0
-    }
-}
-
-fn differences_of(
-    actuators: &[Actuator; ACTUATORS],
-    copies: &[[u32; TRAITS]; ACTUATORS],
-    index: usize,
-) -> u32 {
-    // An index that is none is itself a fault of memory.
-    match (actuators.get(index), copies.get(index)) {
-        (Some(actuator), Some(copy)) => differences(&traits(actuator), copy),
-        _ => u32::MAX,
+        agrees
     }
 }
 
@@ -83,4 +75,70 @@ fn traits(actuator: &Actuator) -> [u32; TRAITS] {
 
 fn pair(low: u16, high: u16) -> u32 {
     u32::from(low) | u32::from(high) << 16
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::actuators::DEFAULT_ACTUATORS;
+    use protocol::{Mode, UpdateRate};
+
+    use super::*;
+
+    const CONFIGURATION: DisplayConfiguration = DisplayConfiguration::DEFAULT;
+
+    /// Ticks until a memory of the default settings notices that the stimulus is made with others.
+    fn noticed(
+        configuration: &DisplayConfiguration,
+        actuators: &[Actuator; ACTUATORS],
+    ) -> Option<usize> {
+        let mut memory = Memory::of(&CONFIGURATION, &DEFAULT_ACTUATORS);
+        let stimulus = Stimulus::new(&CONFIGURATION, actuators);
+        (1..1_000).find(|_| !memory.agrees(configuration, &stimulus))
+    }
+
+    #[test]
+    fn what_did_not_change_agrees() {
+        assert_eq!(noticed(&CONFIGURATION, &DEFAULT_ACTUATORS), None);
+    }
+
+    #[test]
+    fn any_setting_that_changed_is_noticed_in_the_next_tick() {
+        let changes: [fn(&mut DisplayConfiguration); 10] = [
+            |c| c.mode = Mode::Travelling,
+            |c| c.update_rate = UpdateRate::Hz4000,
+            |c| c.max_age_ms ^= 1,
+            |c| c.fade_in_ms ^= 1 << 15,
+            |c| c.fade_out_ms ^= 2,
+            |c| c.glide_ms ^= 4,
+            |c| c.amplitude_mv ^= 8,
+            |c| c.reference_lsb ^= 16,
+            |c| c.full_drive_s ^= 32,
+            |c| c.actuators ^= 64,
+        ];
+        for change in changes {
+            let mut changed = CONFIGURATION;
+            change(&mut changed);
+            assert_eq!(noticed(&changed, &DEFAULT_ACTUATORS), Some(1));
+        }
+    }
+
+    #[test]
+    fn any_trait_of_any_actuator_that_changed_is_noticed_within_nine_milliseconds() {
+        let changes: [fn(&mut Actuator); 5] = [
+            |a| a.x_um ^= 1,
+            |a| a.y_um ^= 1 << 14,
+            |a| a.gain_q15 ^= 2,
+            |a| a.phase ^= 4,
+            |a| a.inverted ^= true,
+        ];
+        for change in changes {
+            for index in 0..ACTUATORS {
+                let mut actuators = DEFAULT_ACTUATORS;
+                change(&mut actuators[index]);
+                let ticks = noticed(&CONFIGURATION, &actuators).unwrap();
+                assert_eq!(ticks, index / PER_TICK + 1);
+                assert!(ticks <= 9 * 2);
+            }
+        }
+    }
 }

@@ -50,6 +50,11 @@ impl Watch {
         self.alarmed == LOOKS
     }
 
+    /// Whether the words sent last are not in the converters.
+    pub const fn words_are_missing(&self) -> bool {
+        self.transfers > 0
+    }
+
     /// Whether the tasks behind the ports are held up.
     pub const fn is_unheard(&self) -> bool {
         self.unheard > 0

@@ -2,5 +2,4 @@
 
 mod any_events;
 mod rig;
-mod stimulus;
 mod supervisor;
