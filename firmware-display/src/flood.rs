@@ -70,8 +70,9 @@ mod tests {
 
     #[test]
     fn one_estimate_in_each_tick_is_a_flood_within_thirty_milliseconds() {
-        // At 2 kHz four of five stay in the bucket, so the 51st is the 41st in it; at 4 kHz nine of ten.
-        assert_eq!(flooded_after(2), Some(2 * 50));
+        // The nth finds 10 n − 2 (n − 1) quarters of a millisecond in the bucket at 2 kHz, and
+        // 10 n − (n − 1) at 4 kHz: more than 400 at the 50th and the 45th.
+        assert_eq!(flooded_after(2), Some(2 * 49));
         assert_eq!(flooded_after(1), Some(44));
     }
 

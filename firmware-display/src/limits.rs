@@ -202,14 +202,14 @@ mod tests {
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
             let mut worst = 0.0_f64;
-            let (mut mean, dt_s) = (0.0, 1.0 / f64::from(rate.hz()));
+            let (mut mean, dt_s) = (0.0_f64, 1.0 / f64::from(rate.hz()));
             for tick in 0..20 * rate.hz() {
                 let s = if tick / (2 * rate.hz()) % 2 == 0 {
                     5.0
                 } else {
                     -5.0
                 };
-                let y: f64 = (s - mean).clamp(-5.0, 5.0);
+                let y = (s - mean).clamp(-5.0, 5.0);
                 mean += y * dt_s / TIME_CONSTANT_S;
                 let words = [word(y); ACTUATORS];
                 // The steps of s are no hand's.
@@ -297,8 +297,8 @@ mod tests {
     fn a_square_wave_is_found_by_its_energy() {
         // 25 V² reach 20 V² after ln 5 time constants.
         for rate in RATES {
-            let square = |t: f64| (200.0 * (TAU * 20.0 * t).sin()).clamp(-4.99, 4.99);
-            let slowed = |t: f64| (12.0 * (TAU * 20.0 * t).sin()).clamp(-4.99, 4.99);
+            let square = |t: f64| (200.0 * (TAU * 20.0 * t + 0.1).sin()).clamp(-4.99, 4.99);
+            let slowed = |t: f64| (40.0 * (TAU * 20.0 * t).sin()).clamp(-4.99, 4.99);
             assert_eq!(play(rate, 3.0, square).unwrap().1, Breach::Slew);
             let (at_s, breach) = play(rate, 3.0, slowed).unwrap();
             assert_eq!(breach, Breach::Energy);

@@ -225,7 +225,7 @@ mod tests {
                 state = after;
             }
         }
-        assert!(drives > 10_000 && fades > 5_000, "{drives} {fades}");
+        assert!(drives > 5_000 && fades > 3_000, "{drives} {fades}");
     }
 
     fn is_stopped(state: &DisplayState) -> bool {
