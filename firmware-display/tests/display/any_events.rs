@@ -1,5 +1,6 @@
 //! Whatever happens, in whatever order: 1 000 lives of up to 200 random events each.
 
+use firmware_display::pace::{per_tick, quarters};
 use firmware_display::{Display, Readback, Senses, Transfer, ZERO_VOLT};
 use proptest::prelude::*;
 use protocol::{
@@ -148,7 +149,7 @@ struct Watched {
     /// The amplitude before the last change, in force until it is reached.
     before_mv: u16,
     since_change: u32,
-    /// Ticks since a quick hold began.
+    /// The same, and since a quick hold began, in quarters of a millisecond.
     since_hold: u32,
     ticks: u32,
 }
@@ -166,8 +167,8 @@ impl Watched {
         }
     }
 
-    fn ms(&self, ms: u32) -> u32 {
-        ms * self.display.configuration().update_rate.hz() / 1_000
+    fn quarters_per_tick(&self) -> u32 {
+        per_tick(self.display.configuration().update_rate)
     }
 
     fn undergo(&mut self, event: &Event) -> Result<(), TestCaseError> {
@@ -181,7 +182,7 @@ impl Watched {
             Event::Configure(configuration) => {
                 // Until a change is through, the largest of those under way counts.
                 let now_mv = self.display.configuration().amplitude_mv;
-                let under_way = self.since_change < self.ms(AMPLITUDE_REACHED_MS);
+                let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
                 self.before_mv = if under_way {
                     self.before_mv.max(now_mv)
                 } else {
@@ -232,13 +233,13 @@ impl Watched {
 
         // A quick hold is through in time; it may begin anew only out of Driving.
         let quick = matches!(state, DisplayState::Fading(hold) if hold != Hold::Stale);
-        self.since_hold = if quick { self.since_hold + 1 } else { 0 };
-        prop_assert!(self.since_hold < self.ms(QUICK_MS));
+        self.since_hold = if quick { self.since_hold + self.quarters_per_tick() } else { 0 };
+        prop_assert!(self.since_hold < quarters(QUICK_MS));
 
         // No word is beyond the amplitude, and none changes without being sent.
-        self.since_change = self.since_change.saturating_add(1);
+        self.since_change = self.since_change.saturating_add(self.quarters_per_tick());
         let now_mv = self.display.configuration().amplitude_mv;
-        let under_way = self.since_change < self.ms(AMPLITUDE_REACHED_MS);
+        let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
         let most = allowed(if under_way {
             now_mv.max(self.before_mv)
         } else {
