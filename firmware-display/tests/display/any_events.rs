@@ -233,7 +233,11 @@ impl Watched {
 
         // A quick hold is through in time; it may begin anew only out of Driving.
         let quick = matches!(state, DisplayState::Fading(hold) if hold != Hold::Stale);
-        self.since_hold = if quick { self.since_hold + self.quarters_per_tick() } else { 0 };
+        self.since_hold = if quick {
+            self.since_hold + self.quarters_per_tick()
+        } else {
+            0
+        };
         prop_assert!(self.since_hold < quarters(QUICK_MS));
 
         // No word is beyond the amplitude, and none changes without being sent.

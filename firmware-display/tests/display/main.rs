@@ -5,5 +5,6 @@ mod any_events;
 mod estimates;
 mod link;
 mod rig;
+mod strokes;
 mod supervisor;
 mod zero_volt;
