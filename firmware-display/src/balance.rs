@@ -69,8 +69,11 @@ impl Balance {
         // gain/τ in Q32.
         let part = i64::from(gain >> (shift - 2));
         for (lane, mean) in lanes.iter_mut().zip(&mut self.means) {
-            // A mean that is still being learnt may ask for more than there is.
-            let rest = (*lane - *mean).clamp(-ONE, ONE - 1);
+            let rest = lane.saturating_sub(*mean);
+            // The mean is learnt a tick late, for which fast waves come out larger by 1/2τ.
+            let rest = rest - (rest >> (shift + 1));
+            // One that is still being learnt may ask for more than there is.
+            let rest = rest.clamp(-ONE, ONE - 1);
             *mean += ((i64::from(rest) * part) >> 32) as i32;
             *lane = rest;
         }

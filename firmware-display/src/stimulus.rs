@@ -104,18 +104,15 @@ impl Stimulus {
     /// Follows a surface of this λ and amplitude (in ADC steps) from here on, gliding.
     pub fn follow(&mut self, wavelength: Wavelength, amplitude_lsb: f32) {
         self.level.follow(amplitude_lsb, self.rate);
-        if self.wavelength == Some(wavelength) {
-            return;
+        if self.wavelength != Some(wavelength) {
+            self.wavelength = Some(wavelength);
+            let glide = ticks_at(self.rate, self.glide_ms);
+            self.phase.follow(wavelength, glide);
+            let glide = glide.max(ticks_at(self.rate, LEAST_GLIDE_MS));
+            self.pattern.aim(wavelength.phase_per_micrometre(), glide);
         }
-        self.wavelength = Some(wavelength);
-        let per_micrometre = wavelength.phase_per_micrometre();
-        self.phase
-            .follow(wavelength, ticks_at(self.rate, self.glide_ms));
-        let glide_ms = self.glide_ms.max(LEAST_GLIDE_MS);
-        self.pattern
-            .aim(per_micrometre, ticks_at(self.rate, glide_ms));
         if self.silent {
-            self.phase.settle();
+            self.settle();
         }
     }
 
@@ -143,7 +140,7 @@ impl Stimulus {
     fn gain(&mut self, travel: i16, turned: i32, supervisors: u32) -> u32 {
         self.level.tick(turned, self.rate);
         self.rest.tick(travel, self.rate);
-        let open = !self.rest.is_resting() && self.waiting.is_none();
+        let open = !self.rest.is_resting() && self.waiting.is_none() && supervisors > 0;
         self.gate.tick(open, self.rate);
         let gain = (u64::from(self.gate.gain()) * u64::from(supervisors)) >> 31;
         ((gain * u64::from(self.level.roll_off(self.rate))) >> 30) as u32
