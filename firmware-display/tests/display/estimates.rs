@@ -237,10 +237,10 @@ fn five_that_cannot_be_true_within_half_a_second_are_distrusted() {
         let no_number = sound(0, f32::NAN);
         assert_eq!(distrusted_after(driving(), |_| Some(no_number)), Some(5));
         // Each jump is found out by the next, which is another one.
-        let jumps = |n: u32| Some(sound(0, if n % 2 == 0 { 9.0 } else { 0.3 }));
+        let jumps = |n: u32| Some(sound(0, if n.is_multiple_of(2) { 9.0 } else { 0.3 }));
         assert_eq!(distrusted_after(driving(), jumps), Some(6));
         // Every second one.
-        let every_second = |n: u32| (n % 2 == 0).then_some(no_gauges);
+        let every_second = |n: u32| n.is_multiple_of(2).then_some(no_gauges);
         assert_eq!(distrusted_after(driving(), every_second), Some(10));
         // The first and the fifth are half a second apart, or more.
         let every = |every: u32| move |n: u32| n.is_multiple_of(every).then_some(no_gauges);
