@@ -17,14 +17,16 @@ pub struct Array {
 impl Array {
     /// Gains, more than 1 counting as 1, and polarities of these actuators.
     pub fn new(actuators: &[Actuator; ACTUATORS]) -> Self {
-        let gains_q30 = actuators.map(|actuator| {
-            let gain = i32::from(actuator.gain_q15.min(UNITY_GAIN)) << 15;
-            if actuator.inverted { -gain } else { gain }
-        });
+        let gains_q30 = actuators.map(gain);
         Self {
             gains_q30,
             alike: gains_q30.iter().all(|gain| *gain == gains_q30[0]),
         }
+    }
+
+    /// Whether gain and polarity of one actuator, of those there are, follow from its description.
+    pub const fn is_of(&self, index: usize, actuator: &Actuator) -> bool {
+        self.gains_q30[index] == gain(*actuator)
     }
 
     /// Writes each actuator's word, 0 V + round(level · gain · its lane), but no further from what was there
@@ -65,6 +67,17 @@ impl Array {
         }
         differences != 0
     }
+}
+
+/// The gain in Q30, negative for the opposite voltage.
+const fn gain(actuator: Actuator) -> i32 {
+    let gain_q15 = if actuator.gain_q15 < UNITY_GAIN {
+        actuator.gain_q15
+    } else {
+        UNITY_GAIN
+    };
+    let gain = (gain_q15 as i32) << 15;
+    if actuator.inverted { -gain } else { gain }
 }
 
 /// The word of a lane.

@@ -46,6 +46,13 @@ impl Pattern {
         pattern
     }
 
+    /// Whether mode, place and trim of one actuator, of those there are, follow from its description.
+    pub fn is_of(&self, index: usize, mode: Mode, actuator: &Actuator) -> bool {
+        self.travelling == (mode == Mode::Travelling)
+            && self.places_um[index] == actuator.x_um
+            && self.trims[index] == actuator.phase
+    }
+
     /// Lies as a wave of `per_micrometre` (turns / 2³²) does after `ticks` ticks, one at least.
     pub fn aim(&mut self, per_micrometre: u32, ticks: u32) {
         if !self.travelling || !self.set_targets(per_micrometre) {

@@ -179,6 +179,24 @@ impl Stimulus {
         &self.words
     }
 
+    /// The description of the actuators that was asked for last.
+    pub fn actuators(&self) -> &[Actuator; ACTUATORS] {
+        let asked = self.waiting.as_ref().unwrap_or(&self.description);
+        &asked.actuators
+    }
+
+    /// Whether what the words are made with still follows from the description of `actuator` in force.
+    pub fn follows_from(&self, actuator: usize) -> bool {
+        let description = &self.description;
+        description
+            .actuators
+            .get(actuator)
+            .is_some_and(|described| {
+                self.array.is_of(actuator, described)
+                    && self.pattern.is_of(actuator, description.mode, described)
+            })
+    }
+
     /// Whether the hand rests, see [`Rest`].
     pub const fn is_resting(&self) -> bool {
         self.rest.is_resting()
