@@ -47,7 +47,7 @@ pub struct Display {
 
 impl Display {
     /// A display at 0 V that has seen neither hand nor surface, in [`DisplayState::Boot`]; stopped for
-    /// good if a trip was `persisted` from before the reset, see [`supervisor::persisted`].
+    /// good if a trip was `persisted` from before the reset.
     pub fn new(settings: &Settings, persisted: Option<Trip>) -> Self {
         let configuration = *settings.configuration();
         let actuators = settings.actuators();
