@@ -47,7 +47,7 @@ pub struct Display {
 
 impl Display {
     /// A display at 0 V that has seen neither hand nor surface, in [`DisplayState::Boot`]; stopped for
-    /// good if a trip was `persisted` from before the reset, see [`supervisor::persisted`].
+    /// good if a trip was `persisted` from before the reset.
     pub fn new(settings: &Settings, persisted: Option<Trip>) -> Self {
         let configuration = *settings.configuration();
         let actuators = settings.actuators();
@@ -301,4 +301,90 @@ fn is_sound(settings: &Settings) -> bool {
 
 fn count(counter: &mut u32, happened: bool) {
     *counter = counter.wrapping_add(u32::from(happened));
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::actuators::{Actuator, DEFAULT_ACTUATORS};
+    use protocol::{Contact, GAUGES, GaugeHealth, Range};
+
+    use super::*;
+
+    /// One that has followed a hand of 70 mm/s for 100 ms.
+    fn driving() -> (Display, u16) {
+        let mut display = Display::new(&Settings::DEFAULT, None);
+        display.started(Ok(()));
+        display.on_estimate(&Estimate {
+            sequence: 1,
+            instant_us: 0,
+            wavelength_mm: Some(2.0),
+            valid: true,
+            confidence: 1.0,
+            amplitude_lsb: 100.0,
+            counted_mm: None,
+            range: Range::T1,
+            contact: Contact::Slip,
+            velocity_um_s: 70_000,
+            lag_um: None,
+            gauges_used: 1,
+            health: [GaugeHealth::Good; GAUGES],
+        });
+        for tick in 1..=200 {
+            display.tick(tick * 7, &Senses::default());
+        }
+        assert_eq!(display.state(), DisplayState::Driving);
+        (display, 200 * 7)
+    }
+
+    /// Ticks until it has stopped, in which it is at 0 V and no word was beyond `most` steps before.
+    fn stopped_after(display: &mut Display, mut encoder: u16, most: u16) -> (u32, Trip) {
+        for tick in 1..1_000 {
+            encoder += 7;
+            let output = display.tick(encoder, &Senses::default());
+            if let DisplayState::Stopped(trip) = display.state() {
+                assert!(output.send && !output.release);
+                assert_eq!(*display.words(), [ZERO_VOLT; ACTUATORS]);
+                return (tick, trip);
+            }
+            assert!(
+                display
+                    .words()
+                    .iter()
+                    .all(|w| w.abs_diff(ZERO_VOLT) <= most)
+            );
+        }
+        panic!("never stopped");
+    }
+
+    #[test]
+    fn a_setting_that_changed_by_itself_stops_in_the_next_tick() {
+        let (mut display, encoder) = driving();
+        display.configuration.amplitude_mv ^= 1 << 9;
+        let stopped = stopped_after(&mut display, encoder, 32_767);
+        assert_eq!(stopped, (1, Trip::Memory));
+    }
+
+    #[test]
+    fn an_actuator_that_changed_by_itself_stops_within_nine_milliseconds() {
+        let change: fn(&mut Actuator) = |actuator| actuator.gain_q15 ^= 1 << 14;
+        for index in 0..ACTUATORS {
+            let (mut display, encoder) = driving();
+            let mut changed = DEFAULT_ACTUATORS;
+            change(&mut changed[index]);
+            display.stimulus = Stimulus::new(&display.configuration, &changed);
+            let (ticks, trip) = stopped_after(&mut display, encoder, 32_767);
+            assert_eq!(trip, Trip::Memory);
+            assert!(ticks <= 18, "{ticks}");
+        }
+    }
+
+    #[test]
+    fn words_beyond_a_limit_do_not_go_out() {
+        let (mut display, encoder) = driving();
+        display.limits = Limits::new(display.configuration.update_rate, 1_000);
+        // A quarter of 28.6 ms, in which the wave has a crest.
+        let (ticks, trip) = stopped_after(&mut display, encoder, 6_554);
+        assert_eq!(trip, Trip::Limit);
+        assert!(ticks <= 29, "{ticks}");
+    }
 }

@@ -135,7 +135,7 @@ fn a_sensor_that_restarts_is_followed_at_once_on_whatever_surface() {
 
 #[test]
 fn a_boundary_between_specimens_costs_one_estimate() {
-    for (before_mm, after_mm) in [(1.0, 4.0), (4.0, 1.0), (1.0, 2.0), (3.0, 1.9)] {
+    for (before_mm, after_mm) in [(1.0, 4.0), (4.0, 1.0), (1.0, 2.2), (3.0, 1.4)] {
         let told = on_wavelengths([before_mm, before_mm, after_mm, after_mm, after_mm]);
         let [before, after] = [before_mm, after_mm].map(trusted);
         assert_eq!(told, [before, before, Verdict::Idle, after, after]);
@@ -152,8 +152,9 @@ fn a_boundary_between_specimens_costs_one_estimate() {
 }
 
 #[test]
-fn a_difference_of_a_half_is_followed_at_once() {
-    for (before_mm, after_mm) in [(2.0, 3.0), (3.0, 2.0), (1.0, 1.5), (1.5, 1.0)] {
+fn a_count_of_one_instead_of_two_is_followed_at_once() {
+    // λ = 2 v A / n at 30 mm/s, A = 80 ms.
+    for (before_mm, after_mm) in [(2.4, 4.8), (4.8, 2.4), (1.6, 2.4), (2.4, 1.6)] {
         assert_eq!(on_wavelengths([before_mm, after_mm])[1], trusted(after_mm));
     }
 }
