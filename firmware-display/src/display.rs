@@ -12,7 +12,7 @@ use crate::limits::Limits;
 use crate::memory::Memory;
 use crate::pace::per_tick;
 use crate::plausibility::{Plausibility, Verdict};
-use crate::senses::{ConverterFault, Output, Readback, Senses};
+use crate::senses::{ConverterFault, Output, Readback, Senses, Transfer};
 use crate::settings::Settings;
 use crate::stimulus::Stimulus;
 use crate::supervisor::{self, Event};
@@ -177,7 +177,7 @@ impl Display {
         self.state
     }
 
-    /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
+    /// What was counted since the start.
     pub fn counters(&self) -> DisplayCounters {
         DisplayCounters {
             state: self.state,
@@ -239,6 +239,15 @@ impl Display {
             differs || self.watch.alarm_begins(),
         );
         count(&mut counters.unheard, senses.unheard);
+        count(
+            &mut counters.spi_errors,
+            senses.transfer == Transfer::Failed,
+        );
+        let stalled = u32::from(senses.transfer == Transfer::Stalled);
+        counters.deadline_misses = counters
+            .deadline_misses
+            .wrapping_add(senses.missed_ticks)
+            .wrapping_add(stalled);
         count(&mut counters.encoder_jumps, travel.is_err());
         let forgot = !self.memory.agrees(&self.configuration, &self.stimulus);
         for trip in [
