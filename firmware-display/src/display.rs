@@ -2,7 +2,6 @@
 
 use protocol::{
     DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason, Trip,
-    actuators,
 };
 
 use crate::endurance::Endurance;
@@ -69,7 +68,7 @@ impl Display {
         if let Some(trip) = persisted {
             display.on(Event::Trip(trip));
         }
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             display.on(Event::Trip(Trip::Memory));
         }
         display
@@ -90,7 +89,7 @@ impl Display {
     /// [`Stimulus::configure`] for how they come into force; the board paces the ticks by
     /// [`update_rate`](DisplayConfiguration::update_rate) from the next one on.
     pub fn configure(&mut self, settings: &Settings) {
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             self.ask(Trip::Memory);
             return;
         }
@@ -299,13 +298,6 @@ impl Display {
         }
         core::mem::take(&mut self.send_anyway) || changed
     }
-}
-
-/// Whether settings are what [`Settings`] lets through.
-fn is_sound(settings: &Settings) -> bool {
-    let configuration = settings.configuration();
-    let described = actuators::hash(settings.actuators()) == configuration.actuators;
-    described && configuration.check().is_ok()
 }
 
 fn count(counter: &mut u32, happened: bool) {
