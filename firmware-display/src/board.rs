@@ -42,7 +42,7 @@ bind_interrupts!(struct Irqs {
     TIM3 => TickHandler;
 });
 
-/// A frame of 27 bytes in 10.3 µs; the DAC81416 takes up to 50 MHz.
+/// A frame of 27 bytes in 5.1 µs; the DAC81416 takes up to 50 MHz, SPI1 gives up to 45.
 const SPI_CLOCK: Hertz = Hertz(dac81416::MAX_CLOCK_HZ);
 /// Bytes of each port's ring. On a line without a gap half of it passes before anyone is told, 2.8 ms:
 /// with that a Stop is obeyed within 5 ms.

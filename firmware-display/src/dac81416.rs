@@ -3,8 +3,8 @@
 //! Facts are from TI's datasheet SLASEO0 as published drivers for the chip carry them, and from TI's
 //! forum where said; none of it has been tried on silicon here.
 //!
-//! SPI mode 1 (clock idles low, data taken at the falling edge), most significant bit first, at most
-//! 21 MHz (the STM32F429's SPI1 at 84 MHz / 4). A write is three bytes under one chip select: the
+//! SPI mode 1 (clock idles low, data taken at the falling edge), most significant bit first, at 42 MHz
+//! (the STM32F429's SPI1 at 84 MHz / 2; the chip takes 50 MHz), and read at a quarter of that. A write is three bytes under one chip select: the
 //! register's address, then 16 bits of data. Bit 7 of the address byte asks for a read; the answer
 //! comes with the next frame, unless the chip is streaming: see [`crate::look`].
 //!
@@ -30,7 +30,7 @@ const _: () = assert!((CHIPS - 1) * CHANNELS_PER_CHIP < ACTUATORS);
 /// Channels that the chip has (DAC0 to DAC15).
 pub const CHANNELS: usize = 16;
 /// Fastest SPI clock used, in Hz.
-pub const MAX_CLOCK_HZ: u32 = 21_000_000;
+pub const MAX_CLOCK_HZ: u32 = 42_000_000;
 /// DEVICEID bits 15 to 2 of a DAC81416 (0x29C).
 pub const PRODUCT: u16 = 668;
 

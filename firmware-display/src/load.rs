@@ -12,7 +12,7 @@ use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals::PC6;
 
 /// From the tick to the edge. The slowest tick measured has its words out some microseconds before.
-pub const OFFSET_US: u32 = 95;
+pub const OFFSET_US: u32 = 150;
 
 const CHANNEL: usize = 0;
 const PIN: usize = 6;
