@@ -14,10 +14,8 @@
 use protocol::UpdateRate;
 
 use crate::ACTUATORS;
-use crate::gate::OPEN;
+use crate::sine::ONE;
 
-/// One, in a lane's Q30.
-pub const ONE: i32 = 1 << 30;
 /// τ in ticks is 2 to this at 2 kHz.
 const SHIFT: u32 = 9;
 /// τ, at either rate.
@@ -53,11 +51,10 @@ impl Balance {
         self.shared
     }
 
-    /// Takes its mean off each of `lanes` (Q30, within ± [`ONE`]), to within ± [`ONE`] again, and learns.
+    /// Takes its mean off each of `lanes` (Q28, within ± [`ONE`]), to within ± [`ONE`] again, and learns.
     /// `gain` (Q30, 0 to [`OPEN`]) is what they are going to be multiplied with; without it nothing is
     /// learnt. A single lane stands for all channels, and only may while [`Balance::is_shared`].
     pub fn remove(&mut self, lanes: &mut [i32], gain: u32, rate: UpdateRate) {
-        const { assert!(OPEN == ONE as u32) };
         if self.shared && lanes.len() > 1 {
             self.means = [self.means[0]; ACTUATORS];
             self.shared = false;
@@ -66,10 +63,10 @@ impl Balance {
             UpdateRate::Hz2000 => SHIFT,
             UpdateRate::Hz4000 => SHIFT + 1,
         };
-        // gain/τ in Q32.
-        let part = i64::from(gain >> (shift - 2));
+        // gain/τ in Q34.
+        let part = i64::from(gain >> (shift - 4));
         for (lane, mean) in lanes.iter_mut().zip(&mut self.means) {
-            let rest = lane.saturating_sub(*mean);
+            let rest = *lane - (*mean >> 2);
             // The mean is learnt a tick late, for which fast waves come out larger by 1/2τ.
             let rest = rest - (rest >> (shift + 1));
             // One that is still being learnt may ask for more than there is.
@@ -86,6 +83,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::gate::OPEN;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
 
@@ -147,8 +145,8 @@ mod tests {
         for rate in RATES {
             let samples = balanced(rate, 10.0, wobble, gain);
             let last_second = &samples[9 * rate.hz() as usize..];
-            // Learning is rounded down, by half a step of 2⁻³⁰ per tick on average.
-            let bound = TIME_CONSTANT_S * f64::from(rate.hz()) / f64::from(ONE) + 1e-7;
+            // Learning is rounded down, by less than 2⁻³⁰ a tick.
+            let bound = TIME_CONSTANT_S * f64::from(rate.hz()) / 2_f64.powi(30) + 1e-7;
             assert!(mean(last_second).abs() <= bound, "{}", mean(last_second));
         }
     }
@@ -178,7 +176,7 @@ mod tests {
             for sample in samples {
                 integral_s += sample / f64::from(rate.hz());
                 // Rounding down loses less than 2⁻³⁰ of m a tick.
-                let lost_s = 8.0 * f64::from(rate.hz()) * TIME_CONSTANT_S / f64::from(ONE);
+                let lost_s = 8.0 * f64::from(rate.hz()) * TIME_CONSTANT_S / 2_f64.powi(30);
                 assert!(integral_s.abs() <= TIME_CONSTANT_S + lost_s);
             }
         }

@@ -37,6 +37,7 @@ fn in_steady_motion_none_over_whole_cycles() {
 #[test]
 fn in_the_papers_strokes_none_over_whole_strokes() {
     const STROKE_HZ: f64 = 0.83;
+    let mut worst: f64 = 0.0;
     for rate in RATES {
         for mode in MODES {
             for wavelength_mm in [1.0, 2.0, 3.0] {
@@ -49,6 +50,7 @@ fn in_the_papers_strokes_none_over_whole_strokes() {
                 // Wherever the stroke is taken to begin.
                 for from in (rig.ticks(3.0)..volts.len() - stroke).step_by(97) {
                     let mean = largest(&means(&volts[from..from + stroke]));
+                    worst = worst.max(mean);
                     assert!(
                         mean <= MOST_V,
                         "{rate:?} {mode:?} {wavelength_mm} mm: {mean} V"
@@ -57,6 +59,7 @@ fn in_the_papers_strokes_none_over_whole_strokes() {
             }
         }
     }
+    println!("strokes: {:.2} mV at most", worst * 1e3);
 }
 
 #[test]
