@@ -5,10 +5,12 @@ use hil_sim::recording::{ACTUATORS, EstimateRecord, Recording};
 use hil_sim::weather::BYTE_NS;
 use protocol::MAX_FRAME;
 
-/// From an estimate's last byte at the UART until the output task has it, in ns, if the line is idle
-/// then: a byte's time (11 µs) until it counts as idle, as much of the simulator's own, and the
-/// listening task, which takes some 10 µs and may be held up by an output tick of 60 µs.
-const TAKEN_NS: u64 = 100_000;
+/// From an estimate's last byte at the UART until it shows in a tick, in ns, if the line is idle then: a
+/// byte's time (11 µs) until it counts as idle, as much of the simulator's own, the listening task, which
+/// takes some 10 µs and may be held up by an output tick of 60 µs, and then the rest of the tick in
+/// which the output task takes it, after its words.
+const TAKEN_NS: u64 = 100_000 + TICK_NS;
+const TICK_NS: u64 = 500_000;
 /// The same, if other frames follow without a gap: the port is read when the line falls idle. A
 /// status follows an estimate once a second; no two frames are longer than this.
 const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
@@ -30,7 +32,7 @@ pub struct Replay {
 #[derive(Clone)]
 struct History {
     display: Display,
-    /// How many of the estimates that arrived have been taken, or overwritten by a later one.
+    /// How many of the estimates that arrived have been taken.
     taken: usize,
     /// One that arrived is not taken although it could be.
     waiting: bool,
@@ -42,8 +44,7 @@ struct History {
 ///
 /// An estimate that arrives just before a tick may be taken at this tick or at a later one: all
 /// histories are followed up until the words tell, and of those that do, the one with the fewest
-/// held up counts. Of two that arrive between two ticks the task sees the later one only. Estimates
-/// older than one that has arrived before are never taken.
+/// held up counts. Estimates older than one that has arrived before are never taken.
 ///
 /// # Errors
 /// The first word that no history explains.
@@ -72,10 +73,10 @@ pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, Stri
         for history in &histories {
             for taken in must.max(history.taken)..=may {
                 let mut history = history.clone();
-                if taken > history.taken {
-                    history.display.on_estimate(&arrived[taken - 1].1.estimate);
-                    history.taken = taken;
+                for (_, record) in &arrived[history.taken..taken] {
+                    history.display.on_estimate(&record.estimate);
                 }
+                history.taken = taken;
                 if history.waiting != (usual > taken) {
                     history.waiting = usual > taken;
                     history.held_up += usize::from(history.waiting);
