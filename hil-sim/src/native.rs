@@ -96,13 +96,14 @@ impl Pair {
     fn step(&mut self, step: u64) {
         let now_ns = step * STEP_NS;
         let t_s = step as f64 / f64::from(firmware_sensor::SCAN_RATE_HZ);
-        self.hear(now_ns);
         self.sensor_end.greet(now_ns, &mut self.tape.digest);
         self.display_end.greet(now_ns, &mut self.tape.digest);
         self.scan(step, now_ns, t_s);
         if step.is_multiple_of(self.steps_per_tick) {
             self.tick(now_ns, t_s);
         }
+        // As on the board: what has come is heard once the words are on their way.
+        self.hear(now_ns);
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
             self.sensor_end

@@ -157,7 +157,7 @@ impl Run {
             let t_s = pair[1].at_ns as f64 / 1e9;
             let in_force = estimates
                 .iter()
-                .rfind(|e| e.estimate.valid && e.received_ns.is_some_and(|at| at <= pair[1].at_ns));
+                .rfind(|e| e.estimate.valid && e.received_ns.is_some_and(|at| at <= pair[0].at_ns));
             let Some(wavelength_mm) = in_force.and_then(|e| e.estimate.wavelength_mm) else {
                 continue;
             };
