@@ -8,9 +8,12 @@ use std::sync::Arc;
 
 use protocol::{DisplayConfiguration, GAUGES, Method, SensorConfiguration};
 
+use crate::fault::Fault;
+
 mod bounds;
 mod display;
 mod error;
+mod fault;
 mod read;
 mod series;
 mod table;
@@ -49,6 +52,8 @@ pub struct Scene {
     pub estimator: Estimator,
     /// How the display board is set.
     pub display: Display,
+    /// What breaks, and when, in the order of the file.
+    pub faults: Vec<Fault>,
     /// What must come out.
     pub expect: Expect,
 }
@@ -327,6 +332,7 @@ impl Scene {
             link: Link::default(),
             estimator: Estimator::default(),
             display: Display::default(),
+            faults: Vec::new(),
             expect: Expect::default(),
         }
     }
