@@ -6,7 +6,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use protocol::{DisplayConfiguration, GAUGES, Method, SensorConfiguration};
+use firmware_display::Settings;
+use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
 
 use crate::fault::Fault;
 
@@ -358,6 +359,14 @@ impl Scene {
             },
             ..defaults
         }
+    }
+
+    /// What a display board holds that has taken what the scene asks of it.
+    ///
+    /// # Errors
+    /// The first value out of its range: none, in a scene that was loaded.
+    pub fn display_settings(&self) -> Result<Settings, Refusal> {
+        Settings::new(self.display.configuration, &self.display.actuators)
     }
 
     /// What the scene asks of the display board.
