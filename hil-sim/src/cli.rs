@@ -11,6 +11,7 @@ use protocol::Role;
 mod chart;
 mod cost;
 mod demo;
+mod faults;
 mod goals;
 mod map;
 mod run;
@@ -43,6 +44,9 @@ enum Command {
     /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
     /// exit status 1 if a scene is not as expected
     Goals(goals::Goals),
+    /// Lists the kinds of faults that a scene may have: what they mean, where they are injected, their
+    /// keys and defaults, and what is expected of the boards
+    Faults,
     /// Draws what the estimators give against what they cost
     Chart(chart::Chart),
 }
@@ -134,6 +138,7 @@ impl Arguments {
             Command::Cost(cost) => cost.execute(),
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
+            Command::Faults => faults::execute(),
             Command::Chart(chart) => chart.execute(),
         }
     }

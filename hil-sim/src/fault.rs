@@ -11,6 +11,7 @@
 
 pub mod campaign;
 pub mod catalogue;
+mod clock;
 mod forger;
 mod gauges;
 mod hand;
@@ -20,7 +21,8 @@ mod signs;
 mod way;
 
 pub use catalogue::{Class, Key, Lasts, Row};
-pub use forger::Forger;
+pub use clock::Clock;
+use forger::Forger;
 pub use gauges::GaugeFaults;
 pub use hand::HandFault;
 pub use kind::Kind;

@@ -13,6 +13,7 @@ use rigless::soc::stm32f427::peripherals::tim;
 
 use super::nucleo::Pins;
 use crate::dac81416::Dac81416;
+use crate::fault::HandFault;
 use crate::motion::encoder;
 use crate::recording::{OutputRecord, TickRecord};
 use crate::world::World;
@@ -81,6 +82,8 @@ pub struct DisplayRecords {
     pub outputs: Vec<OutputRecord>,
     /// How often CLR fell, after it was released for the first time.
     pub clears: u32,
+    /// When they were, in ns since the scene's start.
+    pub clears_ns: Vec<u64>,
     /// Frames that a converter could not make sense of.
     pub dac_frame_errors: u64,
 }
@@ -89,15 +92,17 @@ pub struct DisplayRecords {
 #[derive(Debug)]
 pub struct DisplayPins {
     world: World,
+    hand: HandFault,
     clear: Option<Level>,
     records: DisplayRecords,
 }
 
 impl DisplayPins {
     /// The surroundings that `world` describes.
-    pub fn new(world: World) -> Self {
+    pub fn new(world: World, hand: HandFault) -> Self {
         Self {
             world,
+            hand,
             clear: None,
             records: DisplayRecords::default(),
         }
@@ -179,7 +184,7 @@ fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
 impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
-        let encoder = encoder(position_mm);
+        let encoder = self.hand.counts(at_ns, encoder(position_mm));
         self.records.ticks.push(TickRecord {
             at_ns,
             encoder,
@@ -198,6 +203,7 @@ impl Pins for DisplayPins {
         }
         if self.clear == Some(Level::High) {
             self.records.clears += 1;
+            self.records.clears_ns.push(at_ns);
         }
         self.clear = Some(level);
         for chip in 0..CHIPS {

@@ -7,6 +7,7 @@
 use std::fmt::Debug;
 use std::num::{NonZeroU32, NonZeroU64};
 
+use rigless::chip::uart::Rate;
 use rigless::device::{ErasedDevice, Level, ResetCause};
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
@@ -63,6 +64,7 @@ pub struct Wired<P> {
     part: Stm32f427,
     pins: P,
     triggers: u64,
+    loses_power: bool,
 }
 
 impl<P: Pins> Nucleo<P> {
@@ -79,6 +81,7 @@ impl<P: Pins> Nucleo<P> {
                 part,
                 pins,
                 triggers: 0,
+                loses_power: false,
             },
         })
     }
@@ -86,6 +89,29 @@ impl<P: Pins> Nucleo<P> {
     /// What is on the pins, and the part.
     pub fn pins(&mut self) -> (&mut P, &mut Stm32f427) {
         (&mut self.mcu.pins, &mut self.mcu.part)
+    }
+
+    /// What the next reset comes from is the supply: to be called before it.
+    pub fn lose_power(&mut self) {
+        self.mcu.loses_power = true;
+    }
+
+    /// Sets or clears bits of a register, whatever the firmware thinks of them; false if there is no
+    /// such register.
+    pub fn set_bits(&mut self, at: VirtualNanos, address: u64, bits: u64, set: bool) -> bool {
+        let part = &mut self.mcu.part;
+        let Ok(value) = part.peek(at, address, Width::W32) else {
+            return false;
+        };
+        let value = if set { value | bits } else { value & !bits };
+        part.write(at, address, Width::W32, value).is_ok()
+    }
+
+    /// Gives every byte that comes from the peer a framing error, or none.
+    pub fn break_line(&mut self, broken: bool) {
+        let framing = &mut self.mcu.part.usart[PEER_UART].errors_mut().framing;
+        framing.name = "wire-stuck-low";
+        framing.per_million = if broken { Rate::EVERY_WORD } else { 0 };
     }
 
     /// The far end of one of the UARTs.
@@ -130,6 +156,11 @@ impl<P: Pins> Mcu for Wired<P> {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        let cause = if std::mem::take(&mut self.loses_power) {
+            ResetCause::PowerOn
+        } else {
+            cause
+        };
         self.part.reset(at, cause);
         self.triggers = 0;
     }
