@@ -8,6 +8,7 @@ use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
+mod campaign;
 mod chart;
 mod cost;
 mod demo;
@@ -47,6 +48,9 @@ enum Command {
     /// Lists the kinds of faults that a scene may have: what they mean, where they are injected, their
     /// keys and defaults, and what is expected of the boards
     Faults,
+    /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
+    /// 1 if a goal is missed
+    Campaign(campaign::Campaign),
     /// Draws what the estimators give against what they cost
     Chart(chart::Chart),
 }
@@ -139,6 +143,7 @@ impl Arguments {
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
             Command::Faults => faults::execute(),
+            Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
         }
     }

@@ -14,6 +14,7 @@ use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::TIM4;
+use rigless::soc::stm32f427::generated::rcc::{Register, csr};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
@@ -156,12 +157,14 @@ impl<P: Pins> Mcu for Wired<P> {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        let cause = if std::mem::take(&mut self.loses_power) {
-            ResetCause::PowerOn
-        } else {
-            cause
-        };
         self.part.reset(at, cause);
+        if std::mem::take(&mut self.loses_power) {
+            // The emulator's part knows no power-on of its own: what tells it from the pin is its flags
+            // (RM0090, 6.3.21).
+            let (_, registers) = self.part.clocks();
+            let flags = csr::PORRSTF.mask() | csr::BORRSTF.mask() | csr::PADRSTF.mask();
+            registers.set(Register::Csr, flags);
+        }
         self.triggers = 0;
     }
 

@@ -1,1 +1,227 @@
-//! Every kind at random instants.
+//! Every kind of fault at random instants, on the two ELFs, counted.
+//!
+//! Many faults share a run, which is translated once: each has a window of its own, and before the next
+//! one both boards lose their power and all that they hold.
+//!
+//! ```text
+//! power ── boots, drives ── fault ── looked on ── power ── …
+//! ```
+
+mod tally;
+
+pub use tally::{Tally, unmet};
+
+use protocol::{DisplayConfiguration, Mode};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::judge::{Finding, judge};
+use super::{Fault, Kind};
+use crate::elf::{self, ElfError, Firmwares};
+use crate::scene::{Display, Motion, Scene};
+
+/// From power on until the stimulus can be driving, and the latest instant of a fault, in s: room for a
+/// hand that swings to be in motion.
+const DRIVES_S: f64 = 0.65;
+const LATEST_S: f64 = 1.25;
+/// How long a hand that swings has been fast when a fault comes, in s, and how fast, of 1.
+const IN_MOTION_S: f64 = 0.25;
+const IN_MOTION: f64 = 0.5;
+/// Runs are about so long, in s: the translation of the firmware at their start is then a small part.
+const RUN_S: f64 = 60.0;
+const WAVELENGTH_MM: f64 = 2.0;
+/// The paper's hand (section V): 70 mm/s at most, 0.83 Hz.
+const SWINGING: Motion = Motion::Sinusoid {
+    amplitude_mm_s: 70.0,
+    frequency_hz: 0.83,
+};
+const STEADY: Motion = Motion::Constant { speed_mm_s: 50.0 };
+
+/// What is to be tried.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Which kinds.
+    pub kinds: Vec<Kind>,
+    /// How many times each.
+    pub instants: usize,
+    /// Decides the instants, and what the kinds leave to chance.
+    pub seed: u64,
+}
+
+/// A run of many windows.
+#[derive(Clone, Debug)]
+pub struct Shift {
+    /// What is run.
+    pub scene: Scene,
+    /// Which of the scene's faults are tried; the others are the power between them.
+    pub tried: Vec<usize>,
+}
+
+/// A fault that was tried.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// How the hand moved.
+    pub motion: &'static str,
+    /// How the actuators shared the stimulus.
+    pub mode: &'static str,
+    /// The run's name.
+    pub scene: String,
+    /// What became of it.
+    pub finding: Finding,
+}
+
+impl Plan {
+    /// The runs that try everything, a kind's instants spread evenly over moving and swinging hands,
+    /// uniform and travelling.
+    pub fn shifts(&self) -> Vec<Shift> {
+        let variants = [
+            (STEADY, Mode::Uniform),
+            (SWINGING, Mode::Travelling),
+            (STEADY, Mode::Travelling),
+            (SWINGING, Mode::Uniform),
+        ];
+        let mut draws = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let mut shifts = Vec::new();
+        for (variant, (motion, mode)) in variants.into_iter().enumerate() {
+            let mut open: Option<Shift> = None;
+            for (place, &kind) in self.kinds.iter().enumerate() {
+                let turns = (0..self.instants).filter(|turn| (turn + place) % 4 == variant);
+                for _ in turns {
+                    let shift = open.get_or_insert_with(|| {
+                        self.shift(shifts.len(), motion.clone(), mode)
+                    });
+                    shift.add(kind, &mut draws);
+                    if shift.scene.duration_s >= RUN_S {
+                        shifts.extend(open.take());
+                    }
+                }
+            }
+            shifts.extend(open);
+        }
+        shifts
+    }
+
+    fn shift(&self, number: usize, motion: Motion, mode: Mode) -> Shift {
+        let configuration = DisplayConfiguration {
+            mode,
+            ..DisplayConfiguration::DEFAULT
+        };
+        Shift {
+            scene: Scene {
+                name: format!("campaign-{number}"),
+                seed: self.seed.wrapping_add(number as u64),
+                duration_s: 0.0,
+                motion,
+                display: Display {
+                    configuration,
+                    ..Display::default()
+                },
+                ..Scene::constant(WAVELENGTH_MM, 50.0)
+            },
+            tried: Vec::new(),
+        }
+    }
+}
+
+impl Shift {
+    /// A window for a fault of `kind` at the end.
+    fn add(&mut self, kind: Kind, draws: &mut Xoshiro256PlusPlus) {
+        let scene = &mut self.scene;
+        let from_s = scene.duration_s;
+        if from_s > 0.0 {
+            scene.faults.push(Fault::new(Kind::PowerCycle, from_s));
+        }
+        let mut at_s;
+        loop {
+            // Whole microseconds, that a scene's file can say it as it is.
+            let after_s: f64 = draws.random_range(DRIVES_S..LATEST_S);
+            at_s = from_s + (after_s * 1e6).round() * 1e-6;
+            let is_fast = |t_s| match scene.motion {
+                Motion::Sinusoid { amplitude_mm_s, .. } => {
+                    scene.motion.velocity_mm_s(t_s).abs() > IN_MOTION * amplitude_mm_s
+                }
+                _ => true,
+            };
+            if is_fast(at_s) && is_fast(at_s - IN_MOTION_S) {
+                break;
+            }
+        }
+        let mut fault = Fault::new(kind, at_s);
+        for (value, key) in fault.values.iter_mut().zip(kind.row().keys) {
+            if let Some((low, high)) = key.drawn {
+                let drawn: f64 = draws.random_range(low..=high);
+                *value = if key.whole { drawn.round() } else { drawn };
+            }
+        }
+        self.tried.push(scene.faults.len());
+        scene.faults.push(fault);
+        scene.duration_s = ((at_s + kind.row().watch_s) * 1e3).ceil() * 1e-3;
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// If the boards can't be run.
+    pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
+        let (recording, _) = elf::run(&self.scene, firmwares)?;
+        let findings = judge(&self.scene.faults, &recording);
+        let tried = self.tried.iter().map(|&index| findings[index].clone());
+        Ok(tried
+            .map(|finding| Trial {
+                motion: match self.scene.motion {
+                    Motion::Constant { .. } => "constant",
+                    _ => "sinusoid",
+                },
+                mode: match self.scene.display.configuration.mode {
+                    Mode::Uniform => "uniform",
+                    Mode::Travelling => "travelling",
+                },
+                scene: self.scene.name.clone(),
+                finding,
+            })
+            .collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    fn plan() -> Plan {
+        Plan {
+            kinds: Kind::all().collect(),
+            instants: 6,
+            seed: 3,
+        }
+    }
+
+    #[test]
+    fn every_kind_is_tried_so_many_times_in_a_window_of_its_own() {
+        let mut tried: HashMap<Kind, usize> = HashMap::new();
+        for shift in plan().shifts() {
+            let faults = &shift.scene.faults;
+            for &index in &shift.tried {
+                let fault = &faults[index];
+                *tried.entry(fault.kind).or_default() += 1;
+                let ends_s = fault.at_s + fault.kind.row().watch_s;
+                let next = faults.get(index + 1);
+                assert!(next.is_none_or(|next| next.kind == Kind::PowerCycle));
+                assert!(next.map_or(shift.scene.duration_s, |next| next.at_s) >= ends_s);
+            }
+        }
+        assert_eq!(tried.len(), Kind::all().count());
+        assert!(tried.values().all(|&times| times == 6));
+    }
+
+    #[test]
+    fn the_seed_decides_the_instants() {
+        let faults = |plan: Plan| -> Vec<Fault> {
+            let shifts = plan.shifts().into_iter();
+            shifts.flat_map(|shift| shift.scene.faults).collect()
+        };
+        assert_eq!(faults(plan()), faults(plan()));
+        assert_ne!(faults(plan()), faults(Plan { seed: 4, ..plan() }));
+    }
+}

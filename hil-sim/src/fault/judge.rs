@@ -16,6 +16,8 @@ const STANDING_NS: u64 = 20_000_000;
 /// How long before a fault an output has to have been driven for the stimulus to be called on: half a
 /// cycle of 25 Hz passes 0 V once.
 const DRIVEN_NS: u64 = 20_000_000;
+/// All outputs at 0 V for so long, in ns, is no wave's passing: ten ticks.
+const SILENCE_NS: u64 = 5_000_000;
 
 /// What became of one fault.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,7 +122,7 @@ fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
     let resets = recording.signs.resets.iter().filter(|reset| {
         reset.role == Role::Display && (from_ns..until_ns).contains(&reset.at_ns)
     });
-    let answered_ns = silent_from(outputs, from_ns, from_ns + STANDING_NS).unwrap_or(until_ns);
+    let answered_ns = answered(outputs, from_ns, until_ns).unwrap_or(until_ns);
     Finding {
         fault: *fault,
         was_driving: is_driven(outputs, from_ns.saturating_sub(DRIVEN_NS), from_ns),
@@ -160,6 +162,19 @@ fn silent_from(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> Option<
     }
 }
 
+/// From when on all outputs were at 0 V for longer than a wave that passes it.
+fn answered(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> Option<u64> {
+    let held = within(outputs, from_ns, until_ns);
+    let ends_ns = held.iter().skip(1).map(|next| next.at_ns).chain([until_ns]);
+    let silent = held
+        .iter()
+        .zip(ends_ns)
+        .filter(|(output, _)| is_silent(output))
+        .map(|(output, end_ns)| (output.at_ns.max(from_ns), end_ns));
+    let mut long = silent.filter(|(at_ns, end_ns)| end_ns - at_ns >= SILENCE_NS);
+    long.next().map(|(at_ns, _)| at_ns)
+}
+
 /// Outputs that are driven 20 ms after a fault that can put out a wrong voltage, or that stand at a
 /// voltage for longer than that.
 fn stuck(fault: &Fault, outputs: &[OutputRecord], rest_ns: u64, until_ns: u64) -> usize {
@@ -171,7 +186,7 @@ fn stuck(fault: &Fault, outputs: &[OutputRecord], rest_ns: u64, until_ns: u64) -
             let word = |output: &OutputRecord| output.words[actuator];
             let is_late = is_dangerous
                 && late_ns < rest_ns
-                && within(outputs, late_ns, rest_ns)
+                && within(outputs, late_ns, late_ns)
                     .iter()
                     .any(|output| word(output) != ZERO_VOLT);
             is_late || longest_standing_ns(outputs, from_ns, until_ns, word) > STANDING_NS
