@@ -1,162 +1,178 @@
-//! The fifty actuators: where each sits, how strongly and which way round it is driven, and the DAC
-//! words that come of it.
+//! The fifty actuators' gains and polarities, and the DAC words that come of them.
 
-use crate::sine::Sine;
+use protocol::actuators::{Actuator, UNITY_GAIN};
+
+use crate::balance::ONE;
+use crate::level::FULL;
 use crate::{ACTUATORS, ZERO_VOLT};
 
-/// Actuators along the scan, x.
-pub const COLUMNS: usize = 10;
-/// Actuators across the scan, y.
-pub const ROWS: usize = 5;
-
-const _: () = assert!(COLUMNS * ROWS == ACTUATORS);
-
-/// A gain of 1, in Q15.
-pub const UNITY_GAIN: u16 = 1 << 15;
-/// The level of 5 V, in DAC steps (10 V / 65 536) of Q16.
-pub const FULL_LEVEL: u32 = 1 << 31;
-/// The largest word above and below [`ZERO_VOLT`]: as far down as up, so that no mean is left.
-const LARGEST_OFFSET: i32 = 32_767;
-
-/// Which way round an actuator is wired.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Polarity {
-    /// A positive voltage bends it towards the skin.
-    #[default]
-    Normal,
-    /// A positive voltage bends it away from the skin: it gets the opposite voltage.
-    Inverted,
-}
-
-/// What is particular to one actuator.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Trim {
-    /// Gain in Q15, 0 to [`UNITY_GAIN`]; more counts as [`UNITY_GAIN`].
-    pub gain_q15: u16,
-    /// Which way round it is wired.
-    pub polarity: Polarity,
-}
-
-impl Default for Trim {
-    fn default() -> Self {
-        Self {
-            gain_q15: UNITY_GAIN,
-            polarity: Polarity::Normal,
-        }
-    }
-}
-
-/// Where an actuator sits, from the middle of the fingertip, in µm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// Along the scan.
-    pub x_um: f32,
-    /// Across the scan.
-    pub y_um: f32,
-}
-
-/// Where `actuator` sits: counted along x first, from the lowest x and y, `pitch_um` apart.
-pub const fn place(actuator: usize, pitch_um: u16) -> Place {
-    let half_pitch_um = pitch_um as f32 / 2.0;
-    Place {
-        x_um: half_pitches_from_middle(actuator % COLUMNS, COLUMNS) as f32 * half_pitch_um,
-        y_um: half_pitches_from_middle(actuator / COLUMNS, ROWS) as f32 * half_pitch_um,
-    }
-}
-
-/// How far the `index`th of `count` evenly spaced places is from their middle, in half pitches: odd
-/// numbers for an even count, even numbers for an odd one.
-pub(crate) const fn half_pitches_from_middle(index: usize, count: usize) -> i32 {
-    2 * index as i32 - (count as i32 - 1)
-}
-
-/// The actuators' gains and polarities.
+/// The gains and polarities.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
-    gains_q15: [u32; ACTUATORS],
-    /// 0 or −1, to be combined with [`Sine::sign`].
+    gains_q31: [u32; ACTUATORS],
+    /// 0, or −1 for the opposite voltage.
     flips: [i32; ACTUATORS],
+    /// Whether all are alike.
+    alike: bool,
+}
+
+/// What [`Array::draw`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// Whether any word differs from what was there.
+    pub changed: bool,
+    /// Whether all words are 0 V.
+    pub silent: bool,
 }
 
 impl Array {
-    /// The actuators with these trims.
-    pub fn new(trims: &[Trim; ACTUATORS]) -> Self {
+    /// Gains, more than 1 counting as 1, and polarities of these actuators.
+    pub fn new(actuators: &[Actuator; ACTUATORS]) -> Self {
+        let alike = |actuator: &Actuator| {
+            (gain(*actuator), flip(*actuator)) == (gain(actuators[0]), flip(actuators[0]))
+        };
         Self {
-            gains_q15: trims.map(|trim| u32::from(trim.gain_q15.min(UNITY_GAIN))),
-            flips: trims.map(|trim| match trim.polarity {
-                Polarity::Normal => 0,
-                Polarity::Inverted => -1,
-            }),
+            gains_q31: actuators.map(gain),
+            flips: actuators.map(flip),
+            alike: actuators.iter().all(alike),
         }
     }
 
-    /// Writes each actuator's word, 0 V + round(level · gain · polarity · sine of its column), and
-    /// returns whether any differs from what was there. `level` is at most [`FULL_LEVEL`].
+    /// Whether gain and polarity of one actuator, of those there are, follow from its description.
+    pub const fn is_of(&self, index: usize, actuator: &Actuator) -> bool {
+        self.gains_q31[index] == gain(*actuator) && self.flips[index] == flip(*actuator)
+    }
+
+    /// Writes each actuator's word, 0 V + round(level · gain · polarity · its lane), but no further from
+    /// what was there than `most` steps.
     ///
-    /// Magnitudes are rounded and the sign is put on afterwards, so that rounding moves no mean; the
-    /// word stays within ±32 767 of 0 V, which costs the peak of a full-scale sine half a step.
+    /// `lanes` are within ± 1 in Q30, a single one stands for all; `level` is in Q16 DAC steps, [`FULL`] at
+    /// most, so that no word is further than 32 767 steps from 0 V. Rounding is symmetric, half a step
+    /// away from 0, so that it moves no mean.
     pub fn draw(
         &self,
         level: u32,
-        columns: &[Sine; COLUMNS],
+        lanes: &[i32],
+        most: i32,
         words: &mut [u16; ACTUATORS],
-    ) -> bool {
-        const HALF: u64 = 1 << 46;
-        let mut difference = 0;
-        let rows = words.chunks_exact_mut(COLUMNS);
-        let gains = self.gains_q15.chunks_exact(COLUMNS);
-        let flips = self.flips.chunks_exact(COLUMNS);
-        for ((row, gains), flips) in rows.zip(gains).zip(flips) {
-            for (((word, gain), flip), sine) in row.iter_mut().zip(gains).zip(flips).zip(columns) {
-                // Q16 × Q15, back to Q16; then Q16 × Q31, rounded to whole steps.
-                let peak = ((u64::from(level) * u64::from(*gain)) >> 15) as u32;
-                let steps = ((u64::from(peak) * u64::from(sine.magnitude) + HALF) >> 47) as i32;
-                let steps = steps.min(LARGEST_OFFSET);
-                let sign = sine.sign ^ flip;
-                let new = ZERO_VOLT.wrapping_add(((steps ^ sign) - sign) as u16);
-                difference |= new ^ *word;
+    ) -> Drawn {
+        let mut seen = Seen::default();
+        if let &[lane] = lanes {
+            if self.alike && words.iter().all(|word| *word == words[0]) {
+                let word = self.word(0, level, lane, most, words[0]);
+                seen.note(words[0], word);
+                *words = [word; ACTUATORS];
+            } else {
+                for (actuator, word) in words.iter_mut().enumerate() {
+                    let new = self.word(actuator, level, lane, most, *word);
+                    seen.note(*word, new);
+                    *word = new;
+                }
+            }
+        } else {
+            for ((actuator, word), lane) in words.iter_mut().enumerate().zip(lanes) {
+                let new = self.word(actuator, level, *lane, most, *word);
+                seen.note(*word, new);
                 *word = new;
             }
         }
-        difference != 0
+        seen.drawn()
+    }
+
+    #[inline]
+    fn word(&self, actuator: usize, level: u32, lane: i32, most: i32, before: u16) -> u16 {
+        // Q16 × Q31 is Q15 in the upper word, that and Q30 Q13.
+        let peak = ((u64::from(level) * u64::from(self.gains_q31[actuator])) >> 32) as i32;
+        let fine = ((i64::from(peak) * i64::from(lane) + (1 << 31)) >> 32) as i32;
+        let steps = (fine + (1 << 12) + (fine >> 31)) >> 13;
+        let flip = self.flips[actuator];
+        let steps = (steps ^ flip) - flip;
+        let before = i32::from(before) - i32::from(ZERO_VOLT);
+        let steps = before + (steps - before).clamp(-most, most);
+        ZERO_VOLT.wrapping_add(steps as u16)
+    }
+}
+
+const fn gain(actuator: Actuator) -> u32 {
+    let gain_q15 = if actuator.gain_q15 < UNITY_GAIN {
+        actuator.gain_q15
+    } else {
+        UNITY_GAIN
+    };
+    (gain_q15 as u32) << 16
+}
+
+const fn flip(actuator: Actuator) -> i32 {
+    -(actuator.inverted as i32)
+}
+
+const _: () = assert!(FULL >> 1 <= i32::MAX as u32 && ONE == 1 << 30);
+
+/// Differences between words.
+#[derive(Default)]
+struct Seen {
+    changes: u16,
+    voltages: u16,
+}
+
+impl Seen {
+    #[inline]
+    fn note(&mut self, before: u16, after: u16) {
+        self.changes |= before ^ after;
+        self.voltages |= after ^ ZERO_VOLT;
+    }
+
+    const fn drawn(&self) -> Drawn {
+        Drawn {
+            changed: self.changes != 0,
+            silent: self.voltages == 0,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use protocol::actuators::DEFAULT_ACTUATORS;
+
     use super::*;
+    use crate::sine::Sine;
 
     const QUARTER: u32 = 1 << 30;
+    const NO_LIMIT: i32 = 65_536;
 
-    fn drawn(array: &Array, level: u32, turns: u32) -> [u16; ACTUATORS] {
+    fn offsets(array: &Array, level: u32, lanes: &[i32]) -> [i32; ACTUATORS] {
         let mut words = [ZERO_VOLT; ACTUATORS];
-        array.draw(level, &[Sine::of(turns); COLUMNS], &mut words);
-        words
+        array.draw(level, lanes, NO_LIMIT, &mut words);
+        words.map(|word| i32::from(word) - 32_768)
     }
 
     #[test]
     fn full_scale_reaches_as_far_down_as_up() {
-        let array = Array::new(&[Trim::default(); ACTUATORS]);
-        assert_eq!(drawn(&array, FULL_LEVEL, QUARTER), [65_535; ACTUATORS]);
-        assert_eq!(drawn(&array, FULL_LEVEL, 3 * QUARTER), [1; ACTUATORS]);
-        assert_eq!(drawn(&array, FULL_LEVEL, 0), [ZERO_VOLT; ACTUATORS]);
+        let array = Array::new(&DEFAULT_ACTUATORS);
+        for (lane, expected) in [(ONE, 32_767), (-ONE, -32_767), (0, 0)] {
+            assert_eq!(offsets(&array, FULL, &[lane]), [expected; ACTUATORS]);
+            assert_eq!(
+                offsets(&array, FULL, &[lane; ACTUATORS]),
+                [expected; ACTUATORS]
+            );
+        }
     }
 
     #[test]
     fn each_word_is_the_exact_sine_to_half_a_step() {
-        let array = Array::new(&[Trim::default(); ACTUATORS]);
-        for level in [FULL_LEVEL, FULL_LEVEL / 3, 12_345_678] {
+        let array = Array::new(&DEFAULT_ACTUATORS);
+        for level in [FULL, FULL / 3, 12_345_678] {
             for i in 0..20_000_u32 {
                 let turns = i.wrapping_mul(214_749);
                 let peak = f64::from(level) / 65_536.0;
                 let exact =
                     peak * (f64::from(turns) / 2_f64.powi(32) * core::f64::consts::TAU).sin();
-                let word = f64::from(drawn(&array, level, turns)[7]) - 32_768.0;
-                // Half a step of rounding, the sine's 2⁻¹⁸ of the peak, half a step lost at the top.
-                let bound =
-                    0.5 + peak / 2_f64.powi(18) + if exact.abs() > 32_767.0 { 0.5 } else { 0.0 };
+                let word = offsets(&array, level, &[Sine::of(turns).q30()])[7];
+                // Half a step of rounding, a 2¹⁴th of one before, the sine's 2⁻¹⁸ of the peak, and the
+                // peak's own 2⁻¹⁵ steps.
+                let bound = 0.5 + 2_f64.powi(-14) + peak / 2_f64.powi(18) + 2_f64.powi(-15);
                 assert!(
-                    (word - exact).abs() <= bound,
+                    (f64::from(word) - exact).abs() <= bound,
                     "level {level} phase {turns}: {word} {exact}"
                 );
             }
@@ -164,49 +180,81 @@ mod tests {
     }
 
     #[test]
+    fn rounding_moves_no_mean() {
+        let array = Array::new(&DEFAULT_ACTUATORS);
+        // Every phase has its opposite: what is rounded up there is rounded down here.
+        let mut errors = 0.0;
+        for i in 0..50_000_u32 {
+            let turns = i.wrapping_mul(85_899);
+            let [here, there] = [turns, turns.wrapping_add(1 << 31)].map(|turns| {
+                let lane = Sine::of(turns).q30();
+                let exact = f64::from(lane) / f64::from(ONE) * f64::from(FULL) / 65_536.0;
+                (f64::from(offsets(&array, FULL, &[lane])[0]), exact)
+            });
+            assert_eq!(here.0, -there.0);
+            errors += here.0 - here.1;
+        }
+        // Independent errors of a step's width have a mean of √(1/12/n) of a step, four times that is
+        // never seen.
+        let mean = errors / 50_000.0;
+        assert!(
+            mean.abs() <= 4.0 * (1.0_f64 / 12.0 / 50_000.0).sqrt(),
+            "{mean}"
+        );
+    }
+
+    #[test]
     fn gain_and_polarity_are_each_actuators_own() {
-        let mut trims = [Trim::default(); ACTUATORS];
-        trims[3].gain_q15 = UNITY_GAIN / 2;
-        trims[4].polarity = Polarity::Inverted;
-        trims[5].gain_q15 = 0;
-        trims[6].gain_q15 = u16::MAX;
-        let words = drawn(&Array::new(&trims), FULL_LEVEL / 2, QUARTER);
-        let offsets: std::vec::Vec<i32> = words.iter().map(|&w| i32::from(w) - 32_768).collect();
-        assert_eq!(offsets[2..8], [16_384, 8_192, -16_384, 0, 16_384, 16_384]);
+        let mut actuators = DEFAULT_ACTUATORS;
+        actuators[3].gain_q15 = UNITY_GAIN / 2;
+        actuators[4].inverted = true;
+        actuators[5].gain_q15 = 0;
+        actuators[6].gain_q15 = u16::MAX;
+        let lane = Sine::of(QUARTER).q30();
+        for lanes in [&[lane][..], &[lane; ACTUATORS][..]] {
+            let offsets = offsets(&Array::new(&actuators), 16_384 << 16, lanes);
+            assert_eq!(offsets[2..8], [16_384, 8_192, -16_384, 0, 16_384, 16_384]);
+        }
     }
 
     #[test]
-    fn tells_whether_a_word_changed() {
-        let array = Array::new(&[Trim::default(); ACTUATORS]);
+    fn an_inverted_actuator_gets_exactly_the_opposite_voltage() {
+        let mut actuators = DEFAULT_ACTUATORS;
+        actuators[1].inverted = true;
+        let array = Array::new(&actuators);
+        for i in 0..10_000_u32 {
+            let lane = (i.wrapping_mul(429_497) as i32) >> 1;
+            let offsets = offsets(&array, FULL, &[lane]);
+            assert_eq!(offsets[1], -offsets[0]);
+        }
+    }
+
+    #[test]
+    fn no_word_goes_further_in_a_tick_than_allowed() {
+        let array = Array::new(&DEFAULT_ACTUATORS);
         let mut words = [ZERO_VOLT; ACTUATORS];
-        let columns = [Sine::of(QUARTER); COLUMNS];
-        assert!(array.draw(FULL_LEVEL, &columns, &mut words));
-        assert!(!array.draw(FULL_LEVEL, &columns, &mut words));
-        assert!(array.draw(FULL_LEVEL - (2 << 16), &columns, &mut words));
+        for expected in [10_000, 20_000, 30_000, 32_767, 32_767] {
+            array.draw(FULL, &[ONE], 10_000, &mut words);
+            assert_eq!(words, [ZERO_VOLT + expected; ACTUATORS]);
+        }
+        array.draw(FULL, &[-ONE; ACTUATORS], 10_000, &mut words);
+        assert_eq!(words, [ZERO_VOLT + 22_767; ACTUATORS]);
     }
 
     #[test]
-    fn places_are_centred_and_a_pitch_apart() {
-        let sum = (0..ACTUATORS).fold((0.0, 0.0), |(x, y), i| {
-            let place = place(i, 1_501);
-            (x + place.x_um, y + place.y_um)
-        });
-        assert_eq!(sum, (0.0, 0.0));
-        assert_eq!(
-            place(0, 1_501),
-            Place {
-                x_um: -6_754.5,
-                y_um: -3_002.0
-            }
-        );
-        assert_eq!(
-            place(49, 1_501),
-            Place {
-                x_um: 6_754.5,
-                y_um: 3_002.0
-            }
-        );
-        assert_eq!(place(1, 1_500).x_um - place(0, 1_500).x_um, 1_500.0);
-        assert_eq!(place(10, 1_500).y_um - place(0, 1_500).y_um, 1_500.0);
+    fn tells_whether_a_word_changed_and_whether_all_are_silent() {
+        let array = Array::new(&DEFAULT_ACTUATORS);
+        let mut words = [ZERO_VOLT; ACTUATORS];
+        let mut lanes = [0; ACTUATORS];
+        let mut told = |lanes: &[i32]| {
+            let drawn = array.draw(FULL, lanes, NO_LIMIT, &mut words);
+            (drawn.changed, drawn.silent)
+        };
+        assert_eq!(told(&lanes), (false, true));
+        assert_eq!(told(&[ONE]), (true, false));
+        assert_eq!(told(&[ONE]), (false, false));
+        assert_eq!(told(&lanes), (true, true));
+        lanes[49] = ONE;
+        assert_eq!(told(&lanes), (true, false));
     }
 }

@@ -56,6 +56,12 @@ impl Sine {
             sign: turns as i32 >> 31,
         }
     }
+
+    /// The sine in Q30, −2³⁰ to 2³⁰, cut towards 0.
+    #[inline]
+    pub const fn q30(self) -> i32 {
+        ((self.magnitude >> 1) as i32 ^ self.sign) - self.sign
+    }
 }
 
 /// The product of a Q32 fraction and a number, in the number's own scale.

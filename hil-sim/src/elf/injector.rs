@@ -32,7 +32,6 @@ const ADON: u64 = 1;
 const OUTPUT_TASK: &str = "tasks5drive4POOL";
 const SAMPLING_TASK: &str = "tasks6sample4POOL";
 const THREAD_TASK: &str = "ports6report4POOL";
-const SETTINGS: [&str; 2] = ["SETTINGS", OUTPUT_TASK];
 
 /// What breaks one board, and when.
 pub struct Injector {
@@ -176,7 +175,7 @@ impl Injector {
             .is_some_and(|traps| traps.lead(task, trap, host))
     }
 
-    /// Turns a bit of the amplitude in one of the places that hold the settings: their 16-bit numbers lie
+    /// Turns a bit of the amplitude in one of the places where the output task holds the settings: their 16-bit numbers lie
     /// in the order of their declaration.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
         let Some(traps) = &self.traps else {
@@ -190,7 +189,7 @@ impl Injector {
             .chain(&behind)
             .flat_map(|number| number.to_le_bytes())
             .collect();
-        let places = traps.places(&SETTINGS, &pattern, host);
+        let places = traps.places(&[OUTPUT_TASK], &pattern, host);
         let [copy, bit] = fault.values.map(|value| value as usize);
         let Some(place) = places.get(copy % places.len().max(1)) else {
             return false;

@@ -54,6 +54,11 @@ impl Watched for DisplayPins {
         let (pins, part) = board.pins();
         pins.on_write(part, address, value, at_ns);
     }
+
+    fn break_pins(board: &mut Nucleo<Self>, fault: &Fault, begins: bool, at_ns: u64) {
+        let (pins, part) = board.pins();
+        pins.break_by(part, fault, begins, at_ns);
+    }
 }
 
 /// The ends of the channels to the other board's thread.

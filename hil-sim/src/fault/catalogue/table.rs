@@ -341,7 +341,7 @@ static ROWS: [Row; 46] = [
         kind: Kind::DacIgnoresWords,
         name: "dac-ignores-words",
         meaning: "a converter no longer takes words",
-        injected: "the chip's select never falls: its outputs stay as they are, its SDO is idle",
+        injected: "the chip hears no frame and says nothing on SDO: its outputs stay as they are",
         lasts: Lasts::ForGood,
         keys: &[CHIP],
         expected: "readback differs; stopped: converter, by CLR, which the chip still obeys",
@@ -360,18 +360,19 @@ static ROWS: [Row; 46] = [
         kind: Kind::DacAlarm,
         name: "dac-alarm",
         meaning: "a converter raises its alarm",
-        injected: "ALMOUT (D3) is pulled low",
+        injected: "the chip is too hot: its STATUS says so and it pulls ALMOUT (D3) low",
         lasts: Lasts::For(0.05),
+        keys: &[CHIP],
         expected: "stopped: converter",
         ..DANGEROUS
     },
     Row {
         kind: Kind::LdacStuck,
         name: "ldac-stuck",
-        meaning: "LDAC's wire is broken",
-        injected: "no edge of the pin reaches the chips: they take words and don't play them",
+        meaning: "LDAC's wire is held high: the chips take words and don't play them",
+        injected: "LDAC (D16) is high whatever TIM3 drives, at the chips and at the pin",
         lasts: Lasts::ForGood,
-        expected: "no voltage stands: stopped, or loaded in another way",
+        expected: "stopped: transfer or converter",
         ..DANGEROUS
     },
     Row {
@@ -476,7 +477,7 @@ static ROWS: [Row; 46] = [
         kind: Kind::MemoryChanged,
         name: "memory-changed",
         meaning: "a bit of the settings in RAM turns",
-        injected: "one bit of the amplitude, in one of the places in RAM that hold the settings",
+        injected: "one bit of the amplitude, in one of the places where the output task holds the settings",
         keys: &[
             Key {
                 name: "copy",
