@@ -127,6 +127,7 @@ pub struct DisplayPins {
     load: Option<Level>,
     load_stuck: Option<Level>,
     clear_stuck: bool,
+    button_open: bool,
     alarm: bool,
     records: DisplayRecords,
 }
@@ -141,6 +142,7 @@ impl DisplayPins {
             load: None,
             load_stuck: None,
             clear_stuck: false,
+            button_open: false,
             alarm: false,
             records: DisplayRecords::default(),
         }
@@ -169,6 +171,7 @@ impl DisplayPins {
 
     /// Presses the emergency stop, which opens its contact, or releases it.
     pub fn set_stop_button(&mut self, part: &mut Stm32f427, at_ns: u64, open: bool) {
+        self.button_open = open;
         BUTTON.drive(part, at_ns, (!open).then_some(Level::Low));
     }
 
@@ -336,6 +339,14 @@ impl Pins for DisplayPins {
             position_mm,
         });
         counted
+    }
+
+    fn on_reset(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        self.load = None;
+        self.alarm = false;
+        self.set_stop_button(part, at_ns, self.button_open);
+        self.on_stop(part, at_ns);
+        self.follow_alarm(part, at_ns);
     }
 
     fn on_stop(&mut self, part: &mut Stm32f427, at_ns: u64) {

@@ -49,6 +49,9 @@ pub trait Pins: Debug + Send + 'static {
     /// After [`Pins::on_trigger`] and the latching of the counter.
     fn after_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
 
+    /// The part has been reset at `at_ns`: what is put on its pins from outside has to be put there anew.
+    fn on_reset(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
+
     /// At every stop of the emulation.
     fn on_stop(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
 }
@@ -166,6 +169,7 @@ impl<P: Pins> Mcu for Wired<P> {
             registers.set(Register::Csr, flags);
         }
         self.triggers = 0;
+        self.pins.on_reset(&mut self.part, at.0);
     }
 
     fn poll(&mut self, now: VirtualNanos) {

@@ -22,8 +22,8 @@ use crate::scene::{Display, Motion, Scene};
 
 /// From power on until the stimulus can be driving, and the latest instant of a fault, in s: room for a
 /// hand that swings to be in motion.
-const DRIVES_S: f64 = 0.65;
-const LATEST_S: f64 = 1.25;
+const DRIVES_S: f64 = 0.3;
+const LATEST_S: f64 = 0.9;
 /// How long a hand that swings has been fast when a fault comes, in s, and how fast, of 1.
 const IN_MOTION_S: f64 = 0.25;
 const IN_MOTION: f64 = 0.5;

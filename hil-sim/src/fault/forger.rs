@@ -47,6 +47,12 @@ impl Forger {
         }
     }
 
+    /// The last estimate that went out.
+    #[cfg(test)]
+    pub fn estimate(&self) -> Estimate {
+        self.estimate
+    }
+
     /// Whether frames have to be numbered anew.
     pub fn renumbers(&self) -> bool {
         self.shift != 0 || self.estimate_shift != 0

@@ -147,8 +147,10 @@ impl Way {
 
     fn take(&mut self, at_ns: u64, byte: u8) {
         if self.frame.is_empty() {
-            self.holds_frame =
-                self.forger.renumbers() || self.on(at_ns, changes_frames).next().is_some();
+            // Bytes that go straight through would run into frames that come later.
+            self.holds_frame = self.forger.renumbers()
+                || !self.held.is_empty()
+                || self.on(at_ns, changes_frames).next().is_some();
         }
         let is_cut = self.on(at_ns, cuts).next().is_some();
         let mut carried = byte;
@@ -184,7 +186,10 @@ impl Way {
         }
         match (fault.map(|fault| (fault.kind, fault.values[0])), passed) {
             (Some((Kind::LinkReplay, back_ms)), _) => {
-                let then_ns = at_ns.saturating_sub(nanoseconds(back_ms * 1e-3));
+                // What had been heard before the fault, again and again.
+                let from_ns = fault.map_or(0, |fault| fault.begins_ns());
+                let back_ns = nanoseconds(back_ms * 1e-3);
+                let then_ns = (from_ns + (at_ns - from_ns) % back_ns).saturating_sub(back_ns);
                 let old = self.history.partition_point(|&(old_ns, _)| old_ns < then_ns);
                 if let Some((_, frame)) = self.history.get(old).cloned() {
                     self.emit(at_ns, &frame);
@@ -301,3 +306,6 @@ fn changes_frames(kind: Kind) -> bool {
             | Kind::SensorSilent
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -151,10 +151,10 @@ static ROWS: [Row; 46] = [
         kind: Kind::LinkReplay,
         name: "link-replay",
         meaning: "old frames come again in place of new ones",
-        injected: "in place of each frame the one of back_ms before, either way",
+        injected: "in place of each frame one of the back_ms before the fault, again and again, either way",
         keys: &[Key {
             name: "back_ms",
-            meaning: "age of the frames, in ms, 20 to 1000",
+            meaning: "how much is replayed, in ms, 20 to 1000",
             default: 200.0,
             low: 20.0,
             high: 1_000.0,
