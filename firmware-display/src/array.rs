@@ -2,132 +2,97 @@
 
 use protocol::actuators::{Actuator, UNITY_GAIN};
 
-use crate::balance::ONE;
 use crate::level::FULL;
+use crate::sine::ONE;
 use crate::{ACTUATORS, ZERO_VOLT};
 
-/// The gains and polarities.
+/// The gains, negative for the opposite voltage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
-    gains_q31: [u32; ACTUATORS],
-    /// 0, or −1 for the opposite voltage.
-    flips: [i32; ACTUATORS],
+    gains_q30: [i32; ACTUATORS],
     /// Whether all are alike.
     alike: bool,
-}
-
-/// What [`Array::draw`] did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Drawn {
-    /// Whether any word differs from what was there.
-    pub changed: bool,
-    /// Whether all words are 0 V.
-    pub silent: bool,
 }
 
 impl Array {
     /// Gains, more than 1 counting as 1, and polarities of these actuators.
     pub fn new(actuators: &[Actuator; ACTUATORS]) -> Self {
-        let alike = |actuator: &Actuator| {
-            (gain(*actuator), flip(*actuator)) == (gain(actuators[0]), flip(actuators[0]))
-        };
+        let gains_q30 = actuators.map(gain);
         Self {
-            gains_q31: actuators.map(gain),
-            flips: actuators.map(flip),
-            alike: actuators.iter().all(alike),
+            gains_q30,
+            alike: gains_q30.iter().all(|gain| *gain == gains_q30[0]),
         }
     }
 
     /// Whether gain and polarity of one actuator, of those there are, follow from its description.
     pub const fn is_of(&self, index: usize, actuator: &Actuator) -> bool {
-        self.gains_q31[index] == gain(*actuator) && self.flips[index] == flip(*actuator)
+        self.gains_q30[index] == gain(*actuator)
     }
 
-    /// Writes each actuator's word, 0 V + round(level · gain · polarity · its lane), but no further from
-    /// what was there than `most` steps.
+    /// Writes each actuator's word, 0 V + round(level · gain · its lane), but no further from what was there
+    /// than `most` steps. True if any changed.
     ///
-    /// `lanes` are within ± 1 in Q30, a single one stands for all; `level` is in Q16 DAC steps, [`FULL`] at
-    /// most, so that no word is further than 32 767 steps from 0 V. Rounding is symmetric, half a step
-    /// away from 0, so that it moves no mean.
-    pub fn draw(
-        &self,
-        level: u32,
-        lanes: &[i32],
-        most: i32,
-        words: &mut [u16; ACTUATORS],
-    ) -> Drawn {
-        let mut seen = Seen::default();
+    /// `lanes` are within ± [`ONE`]; a single one stands for all, and may as long as one has since all words
+    /// were 0 V. `level` is in Q16 DAC steps, [`FULL`] at most, so that no word is further than 32 767 steps
+    /// from 0 V. Nothing is rounded but the word itself, half up: the product has 42 bits behind the point, so
+    /// that halves as such do not occur and rounding moves no mean.
+    pub fn draw(&self, level: u32, lanes: &[i32], most: i32, words: &mut [u16; ACTUATORS]) -> bool {
+        // The last two bits, which a gain of 1 would cut off, would do so downwards for either polarity.
+        let level = (level & !0b11) as i32;
         if let &[lane] = lanes {
-            if self.alike && words.iter().all(|word| *word == words[0]) {
-                let word = self.word(0, level, lane, most, words[0]);
-                seen.note(words[0], word);
+            if self.alike {
+                let word = drawn(level, self.gains_q30[0], lane, most, words[0]);
+                let changed = word != words[0];
                 *words = [word; ACTUATORS];
-            } else {
-                for (actuator, word) in words.iter_mut().enumerate() {
-                    let new = self.word(actuator, level, lane, most, *word);
-                    seen.note(*word, new);
-                    *word = new;
-                }
+                return changed;
             }
-        } else {
-            for ((actuator, word), lane) in words.iter_mut().enumerate().zip(lanes) {
-                let new = self.word(actuator, level, *lane, most, *word);
-                seen.note(*word, new);
-                *word = new;
-            }
+            return self.draw_each(level, core::iter::repeat(&lane), most, words);
         }
-        seen.drawn()
+        self.draw_each(level, lanes.iter(), most, words)
     }
 
     #[inline]
-    fn word(&self, actuator: usize, level: u32, lane: i32, most: i32, before: u16) -> u16 {
-        // Q16 × Q31 is Q15 in the upper word, that and Q30 Q13.
-        let peak = ((u64::from(level) * u64::from(self.gains_q31[actuator])) >> 32) as i32;
-        let fine = ((i64::from(peak) * i64::from(lane) + (1 << 31)) >> 32) as i32;
-        let steps = (fine + (1 << 12) + (fine >> 31)) >> 13;
-        let flip = self.flips[actuator];
-        let steps = (steps ^ flip) - flip;
-        let before = i32::from(before) - i32::from(ZERO_VOLT);
-        let steps = before + (steps - before).clamp(-most, most);
-        ZERO_VOLT.wrapping_add(steps as u16)
+    fn draw_each<'a>(
+        &self,
+        level: i32,
+        lanes: impl Iterator<Item = &'a i32>,
+        most: i32,
+        words: &mut [u16; ACTUATORS],
+    ) -> bool {
+        let mut differences = 0;
+        for ((word, gain), lane) in words.iter_mut().zip(&self.gains_q30).zip(lanes) {
+            let new = drawn(level, *gain, *lane, most, *word);
+            differences |= new ^ *word;
+            *word = new;
+        }
+        differences != 0
     }
 }
 
-const fn gain(actuator: Actuator) -> u32 {
+/// The gain in Q30, negative for the opposite voltage.
+const fn gain(actuator: Actuator) -> i32 {
     let gain_q15 = if actuator.gain_q15 < UNITY_GAIN {
         actuator.gain_q15
     } else {
         UNITY_GAIN
     };
-    (gain_q15 as u32) << 16
+    let gain = (gain_q15 as i32) << 15;
+    if actuator.inverted { -gain } else { gain }
 }
 
-const fn flip(actuator: Actuator) -> i32 {
-    -(actuator.inverted as i32)
-}
-
-const _: () = assert!(FULL >> 1 <= i32::MAX as u32 && ONE == 1 << 30);
-
-/// Differences between words.
-#[derive(Default)]
-struct Seen {
-    changes: u16,
-    voltages: u16,
-}
-
-impl Seen {
-    #[inline]
-    fn note(&mut self, before: u16, after: u16) {
-        self.changes |= before ^ after;
-        self.voltages |= after ^ ZERO_VOLT;
-    }
-
-    const fn drawn(&self) -> Drawn {
-        Drawn {
-            changed: self.changes != 0,
-            silent: self.voltages == 0,
-        }
-    }
+/// The word of a lane.
+#[inline]
+fn drawn(level: i32, gain: i32, lane: i32, most: i32, before: u16) -> u16 {
+    // Bits behind the point: 16 of the level and 30 of the gain, of which the upper word has 14; and
+    // 28 of the lane, so 10. 0 V and the half that rounds are added to them.
+    const BITS: u32 = 10;
+    const ZERO_AND_HALF: i32 = ((ZERO_VOLT as i32) << BITS) + (1 << (BITS - 1));
+    const { assert!(FULL <= i32::MAX as u32 && ONE == 1 << 28) };
+    let peak = ((i64::from(level) * i64::from(gain)) >> 32) as i32;
+    let fine = ZERO_AND_HALF + ((i64::from(peak) * i64::from(lane)) >> 32) as i32;
+    let before = i32::from(before);
+    let step = (fine >> BITS) - before;
+    (before + step.clamp(-most, most)) as u16
 }
 
 #[cfg(test)]
@@ -135,7 +100,7 @@ mod tests {
     use protocol::actuators::DEFAULT_ACTUATORS;
 
     use super::*;
-    use crate::sine::Sine;
+    use crate::sine::sine;
 
     const QUARTER: u32 = 1 << 30;
     const NO_LIMIT: i32 = 65_536;
@@ -167,10 +132,9 @@ mod tests {
                 let peak = f64::from(level) / 65_536.0;
                 let exact =
                     peak * (f64::from(turns) / 2_f64.powi(32) * core::f64::consts::TAU).sin();
-                let word = offsets(&array, level, &[Sine::of(turns).q30()])[7];
-                // Half a step of rounding, a 2¹⁴th of one before, the sine's 2⁻¹⁸ of the peak, and the
-                // peak's own 2⁻¹⁵ steps.
-                let bound = 0.5 + 2_f64.powi(-14) + peak / 2_f64.powi(18) + 2_f64.powi(-15);
+                let word = offsets(&array, level, &[sine(turns)])[7];
+                // Half a step of rounding, the sine's 6.1·10⁻⁷ of the peak, and the peak's own 2⁻¹⁴ steps.
+                let bound = 0.5 + 6.1e-7 * peak + 2_f64.powi(-14);
                 assert!(
                     (f64::from(word) - exact).abs() <= bound,
                     "level {level} phase {turns}: {word} {exact}"
@@ -180,27 +144,40 @@ mod tests {
     }
 
     #[test]
-    fn rounding_moves_no_mean() {
+    fn rounding_is_symmetric_and_moves_no_mean() {
         let array = Array::new(&DEFAULT_ACTUATORS);
-        // Every phase has its opposite: what is rounded up there is rounded down here.
-        let mut errors = 0.0;
-        for i in 0..50_000_u32 {
-            let turns = i.wrapping_mul(85_899);
-            let [here, there] = [turns, turns.wrapping_add(1 << 31)].map(|turns| {
-                let lane = Sine::of(turns).q30();
-                let exact = f64::from(lane) / f64::from(ONE) * f64::from(FULL) / 65_536.0;
-                (f64::from(offsets(&array, FULL, &[lane])[0]), exact)
-            });
-            assert_eq!(here.0, -there.0);
-            errors += here.0 - here.1;
+        for level in [FULL, FULL / 7] {
+            let mut errors = 0.0;
+            for i in 0..50_000_u32 {
+                let lane = sine(i.wrapping_mul(85_899));
+                let [word, opposite] = [lane, -lane].map(|lane| offsets(&array, level, &[lane])[0]);
+                assert_eq!(
+                    word, -opposite,
+                    "what is rounded up there is rounded down here"
+                );
+                let exact = f64::from(lane) / f64::from(ONE) * f64::from(level) / 65_536.0;
+                errors += f64::from(word) - exact;
+            }
+            // Independent errors of a step's width have a mean of √(1/12/n) of a step; four times that is
+            // never seen.
+            let mean = errors / 50_000.0;
+            let most = 4.0 * (1.0_f64 / 12.0 / 50_000.0).sqrt();
+            assert!(mean.abs() <= most, "{mean} steps");
         }
-        // Independent errors of a step's width have a mean of √(1/12/n) of a step, four times that is
-        // never seen.
-        let mean = errors / 50_000.0;
-        assert!(
-            mean.abs() <= 4.0 * (1.0_f64 / 12.0 / 50_000.0).sqrt(),
-            "{mean}"
-        );
+    }
+
+    #[test]
+    fn the_rounding_errors_of_a_cycle_add_up_to_nothing() {
+        let array = Array::new(&DEFAULT_ACTUATORS);
+        // Each of 400 places of a cycle has its opposite in it.
+        let sum: i32 = (0..400_u32)
+            .map(|place| {
+                let turns = (u64::from(place) << 32) / 400;
+                offsets(&array, FULL, &[sine(turns as u32)])[0]
+            })
+            .sum();
+        // But for a place whose sine is cut off across a border between two words: one in 2¹⁴.
+        assert!(sum.abs() <= 1, "{sum} steps");
     }
 
     #[test]
@@ -210,7 +187,7 @@ mod tests {
         actuators[4].inverted = true;
         actuators[5].gain_q15 = 0;
         actuators[6].gain_q15 = u16::MAX;
-        let lane = Sine::of(QUARTER).q30();
+        let lane = sine(QUARTER);
         for lanes in [&[lane][..], &[lane; ACTUATORS][..]] {
             let offsets = offsets(&Array::new(&actuators), 16_384 << 16, lanes);
             assert_eq!(offsets[2..8], [16_384, 8_192, -16_384, 0, 16_384, 16_384]);
@@ -242,19 +219,16 @@ mod tests {
     }
 
     #[test]
-    fn tells_whether_a_word_changed_and_whether_all_are_silent() {
+    fn tells_whether_a_word_changed() {
         let array = Array::new(&DEFAULT_ACTUATORS);
         let mut words = [ZERO_VOLT; ACTUATORS];
         let mut lanes = [0; ACTUATORS];
-        let mut told = |lanes: &[i32]| {
-            let drawn = array.draw(FULL, lanes, NO_LIMIT, &mut words);
-            (drawn.changed, drawn.silent)
-        };
-        assert_eq!(told(&lanes), (false, true));
-        assert_eq!(told(&[ONE]), (true, false));
-        assert_eq!(told(&[ONE]), (false, false));
-        assert_eq!(told(&lanes), (true, true));
+        let mut changed = |lanes: &[i32]| array.draw(FULL, lanes, NO_LIMIT, &mut words);
+        assert!(!changed(&lanes));
+        assert!(changed(&[ONE]));
+        assert!(!changed(&[ONE]));
+        assert!(changed(&lanes));
         lanes[49] = ONE;
-        assert_eq!(told(&lanes), (true, false));
+        assert!(changed(&lanes));
     }
 }

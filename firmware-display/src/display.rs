@@ -2,7 +2,6 @@
 
 use protocol::{
     DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason, Trip,
-    actuators,
 };
 
 use crate::endurance::Endurance;
@@ -12,7 +11,7 @@ use crate::limits::Limits;
 use crate::memory::Memory;
 use crate::pace::per_tick;
 use crate::plausibility::{Plausibility, Verdict};
-use crate::senses::{ConverterFault, Output, Readback, Senses};
+use crate::senses::{ConverterFault, Output, Readback, Senses, Transfer};
 use crate::settings::Settings;
 use crate::stimulus::Stimulus;
 use crate::supervisor::{self, Event};
@@ -47,7 +46,7 @@ pub struct Display {
 
 impl Display {
     /// A display at 0 V that has seen neither hand nor surface, in [`DisplayState::Boot`]; stopped for
-    /// good if a trip was `persisted` from before the reset, see [`supervisor::persisted`].
+    /// good if a trip was `persisted` from before the reset.
     pub fn new(settings: &Settings, persisted: Option<Trip>) -> Self {
         let configuration = *settings.configuration();
         let actuators = settings.actuators();
@@ -69,7 +68,7 @@ impl Display {
         if let Some(trip) = persisted {
             display.on(Event::Trip(trip));
         }
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             display.on(Event::Trip(Trip::Memory));
         }
         display
@@ -90,7 +89,7 @@ impl Display {
     /// [`Stimulus::configure`] for how they come into force; the board paces the ticks by
     /// [`update_rate`](DisplayConfiguration::update_rate) from the next one on.
     pub fn configure(&mut self, settings: &Settings) {
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             self.ask(Trip::Memory);
             return;
         }
@@ -177,7 +176,7 @@ impl Display {
         self.state
     }
 
-    /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
+    /// What was counted since the start.
     pub fn counters(&self) -> DisplayCounters {
         DisplayCounters {
             state: self.state,
@@ -239,6 +238,15 @@ impl Display {
             differs || self.watch.alarm_begins(),
         );
         count(&mut counters.unheard, senses.unheard);
+        count(
+            &mut counters.spi_errors,
+            senses.transfer == Transfer::Failed,
+        );
+        let stalled = u32::from(senses.transfer == Transfer::Stalled);
+        counters.deadline_misses = counters
+            .deadline_misses
+            .wrapping_add(senses.missed_ticks)
+            .wrapping_add(stalled);
         count(&mut counters.encoder_jumps, travel.is_err());
         let forgot = !self.memory.agrees(&self.configuration, &self.stimulus);
         for trip in [
@@ -292,13 +300,92 @@ impl Display {
     }
 }
 
-/// Whether settings are what [`Settings`] lets through.
-fn is_sound(settings: &Settings) -> bool {
-    let configuration = settings.configuration();
-    let described = actuators::hash(settings.actuators()) == configuration.actuators;
-    described && configuration.check().is_ok()
-}
-
 fn count(counter: &mut u32, happened: bool) {
     *counter = counter.wrapping_add(u32::from(happened));
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::actuators::{Actuator, DEFAULT_ACTUATORS};
+    use protocol::{Contact, GAUGES, GaugeHealth, Range};
+
+    use super::*;
+
+    /// One that has followed a hand of 70 mm/s for 100 ms.
+    fn driving() -> (Display, u16) {
+        let mut display = Display::new(&Settings::DEFAULT, None);
+        display.started(Ok(()));
+        display.on_estimate(&Estimate {
+            sequence: 1,
+            instant_us: 0,
+            wavelength_mm: Some(2.0),
+            valid: true,
+            confidence: 1.0,
+            amplitude_lsb: 100.0,
+            counted_mm: None,
+            range: Range::T1,
+            contact: Contact::Slip,
+            velocity_um_s: 70_000,
+            lag_um: None,
+            gauges_used: 1,
+            health: [GaugeHealth::Good; GAUGES],
+        });
+        for tick in 1..=200 {
+            display.tick(tick * 7, &Senses::default());
+        }
+        assert_eq!(display.state(), DisplayState::Driving);
+        (display, 200 * 7)
+    }
+
+    /// Ticks until it has stopped, in which it is at 0 V and no word was beyond `most` steps before.
+    fn stopped_after(display: &mut Display, mut encoder: u16, most: u16) -> (u32, Trip) {
+        for tick in 1..1_000 {
+            encoder += 7;
+            let output = display.tick(encoder, &Senses::default());
+            if let DisplayState::Stopped(trip) = display.state() {
+                assert!(output.send && !output.release);
+                assert_eq!(*display.words(), [ZERO_VOLT; ACTUATORS]);
+                return (tick, trip);
+            }
+            assert!(
+                display
+                    .words()
+                    .iter()
+                    .all(|w| w.abs_diff(ZERO_VOLT) <= most)
+            );
+        }
+        panic!("never stopped");
+    }
+
+    #[test]
+    fn a_setting_that_changed_by_itself_stops_in_the_next_tick() {
+        let (mut display, encoder) = driving();
+        display.configuration.amplitude_mv ^= 1 << 9;
+        let stopped = stopped_after(&mut display, encoder, 32_767);
+        assert_eq!(stopped, (1, Trip::Memory));
+    }
+
+    #[test]
+    fn an_actuator_that_changed_by_itself_stops_within_nine_milliseconds() {
+        let change: fn(&mut Actuator) = |actuator| actuator.gain_q15 ^= 1 << 14;
+        for index in 0..ACTUATORS {
+            let (mut display, encoder) = driving();
+            let mut changed = DEFAULT_ACTUATORS;
+            change(&mut changed[index]);
+            display.stimulus = Stimulus::new(&display.configuration, &changed);
+            let (ticks, trip) = stopped_after(&mut display, encoder, 32_767);
+            assert_eq!(trip, Trip::Memory);
+            assert!(ticks <= 18, "{ticks}");
+        }
+    }
+
+    #[test]
+    fn words_beyond_a_limit_do_not_go_out() {
+        let (mut display, encoder) = driving();
+        display.limits = Limits::new(display.configuration.update_rate, 1_000);
+        // A quarter of 28.6 ms, in which the wave has a crest.
+        let (ticks, trip) = stopped_after(&mut display, encoder, 6_554);
+        assert_eq!(trip, Trip::Limit);
+        assert!(ticks <= 29, "{ticks}");
+    }
 }

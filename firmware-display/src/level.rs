@@ -112,13 +112,18 @@ impl Level {
             UpdateRate::Hz2000 => SHIFT,
             UpdateRate::Hz4000 => SHIFT + 1,
         };
-        // Neither can be further from 0 than 2³⁰, see `Phase::advance`.
+        // Either is nearer to 0 than 2³⁰, see `Phase::advance`.
         self.turn += (turn - self.turn) >> shift;
     }
 
     /// The amplitude in Q16 DAC steps, 0 to [`FULL`], whatever the frequency.
     pub const fn amplitude(&self) -> u32 {
         self.value
+    }
+
+    /// The wave's turn a tick, averaged over 4 ms, in turns / 2³².
+    pub const fn turn(&self) -> i32 {
+        self.turn
     }
 
     /// The gain at the wave's frequency, in Q30, 0 to [`OPEN`].
@@ -197,12 +202,25 @@ mod tests {
     }
 
     #[test]
+    fn a_hand_that_is_torn_to_and_fro_overflows_nothing() {
+        for rate in RATES {
+            let mut level = Level::new(&DisplayConfiguration::DEFAULT);
+            for tick in 0..2_000 {
+                let turn = (1 << 30) - 1;
+                level.tick(if tick / 500 % 2 == 0 { turn } else { -turn }, rate);
+                assert!(level.roll_off(rate) <= OPEN);
+            }
+        }
+    }
+
+    #[test]
     fn the_whole_is_played_up_to_250_hz_and_nothing_from_500_hz_on_both_ways() {
         for rate in RATES {
+            const MOST: f64 = ((1 << 30) - 1) as f64;
             let gain_at = |hz: f64| {
                 let mut level = Level::new(&DisplayConfiguration::DEFAULT);
                 let turn = (hz / f64::from(rate.hz()) * 2_f64.powi(32)).round();
-                (0..400).for_each(|_| level.tick(turn.min(2_f64.powi(30)) as i32, rate));
+                (0..400).for_each(|_| level.tick(turn.clamp(-MOST, MOST) as i32, rate));
                 f64::from(level.roll_off(rate)) / f64::from(OPEN)
             };
             for hz in [0.0, 5.0, 200.0, 249.9] {

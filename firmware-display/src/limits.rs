@@ -9,7 +9,7 @@
 //! | voltage: the configured amplitude | each word is within it |
 //! | slew: [`MOST_SLEW_V_PER_MS`] | the stimulus never exceeds [`crate::stimulus::MOST_V_PER_MS`] |
 //! | energy: a mean of V² over about 1 s, [`MOST_ENERGY_V2`] | a full sine has 12.5 V²; a hand that swings to and fro over half a wavelength makes 17.6 V² of it |
-//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away with a time constant τ of a quarter of it, so that ∫V dt is within ±5 V · τ |
+//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away so that ∫V dt is within ±5 V · [`crate::balance::MOST_S`] |
 
 use protocol::UpdateRate;
 
@@ -21,9 +21,12 @@ pub const MOST_SLEW_V_PER_MS: i32 = 10;
 /// The largest mean of V², in V².
 pub const MOST_ENERGY_V2: i32 = 20;
 /// The largest mean of V, in V.
-pub const MOST_STANDING_V: f32 = 2.5;
+pub const MOST_STANDING_V: f32 = 3.5;
 /// The time constant of both means, in ticks at 4 kHz, as a power of two: 1.024 s.
 const MEAN_SHIFT: u32 = 12;
+/// Channels whose means are looked at in a tick.
+const HALF: usize = ACTUATORS / 2;
+const _: () = assert!(2 * HALF == ACTUATORS);
 /// Fraction bits of the mean of V.
 const FRACTION: u32 = 14;
 /// A lower amplitude is reached within this time.
@@ -65,6 +68,7 @@ pub struct Limits {
     allowed: i32,
     settling: u32,
     before: [u16; ACTUATORS],
+    second_half: bool,
     /// Means of V² in squared steps, and of V in steps of Q14.
     energies: [i32; ACTUATORS],
     standing: [i32; ACTUATORS],
@@ -80,6 +84,7 @@ impl Limits {
             allowed: amplitude,
             settling: 0,
             before: [ZERO_VOLT; ACTUATORS],
+            second_half: false,
             energies: [0; ACTUATORS],
             standing: [0; ACTUATORS],
         }
@@ -104,31 +109,62 @@ impl Limits {
         if self.settling == 0 {
             self.allowed = self.amplitude;
         }
-        let shift = MEAN_SHIFT - self.quarters.ilog2();
-        let (mut widest, mut steepest, mut hottest, mut leaning) = (0, 0, 0, 0);
-        let means = self.energies.iter_mut().zip(&mut self.standing);
-        for ((word, before), (energy, standing)) in words.iter().zip(&self.before).zip(means) {
+        let within = self.steps_within(words) | self.means_within(words);
+        let result = if within < 0 {
+            Err(self.breach(words))
+        } else {
+            Ok(())
+        };
+        self.before = *words;
+        result
+    }
+
+    /// Voltage and slew: negative if a channel broke either.
+    fn steps_within(&self, words: &[u16; ACTUATORS]) -> i32 {
+        let (allowed, most_slew) = (self.allowed, MOST_SLEW * self.quarters as i32);
+        let pairs = words.iter().zip(&self.before);
+        pairs.fold(0, |within, (word, before)| {
             let offset = i32::from(*word) - i32::from(ZERO_VOLT);
             let step = i32::from(*word) - i32::from(*before);
-            widest = offset.abs().max(widest);
-            steepest = step.abs().max(steepest);
+            within | room(offset, allowed) | room(step, most_slew)
+        })
+    }
+
+    /// Energy and standing voltage: negative if a channel broke either. One half of the channels is looked
+    /// at in this tick, the other one in the next: V² has nothing above the 500 Hz of which 1 000 looks a
+    /// second would make a constant.
+    fn means_within(&mut self, words: &[u16; ACTUATORS]) -> i32 {
+        self.second_half = !self.second_half;
+        let start = if self.second_half { HALF } else { 0 };
+        let shift = MEAN_SHIFT - 1 - self.quarters.ilog2();
+        let means = self.energies.iter_mut().zip(&mut self.standing);
+        let half = words.iter().zip(means).skip(start).take(HALF);
+        half.fold(0, |within, (word, (energy, standing))| {
+            let offset = i32::from(*word) - i32::from(ZERO_VOLT);
             // Below 2³¹ each, as is what is added: both ends of the difference are.
             *energy += (offset * offset - *energy) >> shift;
             *standing += ((offset << FRACTION) - *standing) >> shift;
-            hottest = hottest.max(*energy);
-            leaning = standing.abs().max(leaning);
-        }
-        self.before = *words;
-        if widest > self.allowed {
-            Err(Breach::Voltage)
-        } else if steepest > MOST_SLEW * self.quarters as i32 {
-            Err(Breach::Slew)
-        } else if hottest > MOST_ENERGY {
-            Err(Breach::Energy)
-        } else if leaning > MOST_STANDING {
-            Err(Breach::Standing)
+            within | (MOST_ENERGY - *energy) | room(*standing, MOST_STANDING)
+        })
+    }
+
+    /// The first limit that one of these words breaks.
+    fn breach(&self, words: &[u16; ACTUATORS]) -> Breach {
+        let most_slew = MOST_SLEW * self.quarters as i32;
+        let mut pairs = words.iter().zip(&self.before);
+        if words
+            .iter()
+            .any(|word| room(i32::from(*word) - i32::from(ZERO_VOLT), self.allowed) < 0)
+        {
+            Breach::Voltage
+        } else if pairs
+            .any(|(word, before)| room(i32::from(*word) - i32::from(*before), most_slew) < 0)
+        {
+            Breach::Slew
+        } else if self.energies.iter().any(|energy| *energy > MOST_ENERGY) {
+            Breach::Energy
         } else {
-            Ok(())
+            Breach::Standing
         }
     }
 
@@ -136,6 +172,11 @@ impl Limits {
     pub const fn cleared(&mut self) {
         self.before = [ZERO_VOLT; ACTUATORS];
     }
+}
+
+/// Negative where `value` is beyond ± `most`: the signs of many of these can be looked at as one.
+const fn room(value: i32, most: i32) -> i32 {
+    (most - value) | (most + value)
 }
 
 /// An amplitude in DAC steps, rounded up.
@@ -153,7 +194,8 @@ mod tests {
     use core::f64::consts::TAU;
 
     use super::*;
-    use crate::balance::TIME_CONSTANT_S;
+    use crate::balance::{Balance, MOST_S};
+    use crate::sine::ONE;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
     const VOLT: f64 = 6_553.6;
@@ -177,7 +219,7 @@ mod tests {
     #[test]
     fn a_full_sine_of_any_frequency_played_breaks_no_limit() {
         for rate in RATES {
-            for hz in [2.0, 5.0, 20.0, 35.0, 100.0, 200.0, 250.0] {
+            for hz in [2.0, 5.0, 20.0, 35.0, 100.0, 200.0, 249.0, 250.0] {
                 assert_eq!(play(rate, 10.0, |t| 5.0 * (TAU * hz * t).sin()), None);
             }
         }
@@ -197,20 +239,18 @@ mod tests {
 
     #[test]
     fn no_standing_voltage_that_is_balanced_away_breaks_the_limit() {
-        // Whatever the sine s is: y = s − m, m' = y/τ, so that ∫y = τ Δm, within 10 V · τ; in a mean of
-        // four times τ it is no more than 2.5 V. The worst is met by a crest that follows a trough.
+        // Whatever the sine is, ∫y stays within ± 5 V · MOST_S: from the one end to the other it adds no
+        // more than that over the time constant to the mean, 3.3 V. The worst is met by a crest that
+        // follows a trough.
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
             let mut worst = 0.0_f64;
-            let (mut mean, dt_s) = (0.0_f64, 1.0 / f64::from(rate.hz()));
+            let mut balance = Balance::default();
             for tick in 0..20 * rate.hz() {
-                let s = if tick / (2 * rate.hz()) % 2 == 0 {
-                    5.0
-                } else {
-                    -5.0
-                };
-                let y = (s - mean).clamp(-5.0, 5.0);
-                mean += y * dt_s / TIME_CONSTANT_S;
+                let crest = tick / (2 * rate.hz()) % 2 == 0;
+                let mut lane = [if crest { ONE - 1 } else { -ONE }];
+                balance.remove(&mut lane, 1 << 30, 0, rate);
+                let y = 5.0 * f64::from(lane[0]) / f64::from(ONE);
                 let words = [word(y); ACTUATORS];
                 // The steps of s are no hand's.
                 limits.before = words;
@@ -218,10 +258,7 @@ mod tests {
                 let standing = f64::from(limits.standing[0]) / f64::from(1 << FRACTION) / VOLT;
                 worst = worst.max(standing.abs());
             }
-            assert!(
-                (1.0..10.0 * TIME_CONSTANT_S / 1.024).contains(&worst),
-                "{worst} V"
-            );
+            assert!((1.0..10.0 * MOST_S / 1.024).contains(&worst), "{worst} V");
         }
     }
 
@@ -281,10 +318,10 @@ mod tests {
 
     #[test]
     fn a_standing_voltage_is_found_before_it_has_done_harm() {
-        // 5 V after ln(1/(1 − 2.5/5)) time constants, 3 V after ln(1/(1 − 2.5/3)).
+        // 5 V after ln(1/(1 − 3.5/5)) time constants, 4 V after ln(1/(1 − 3.5/4)).
         for rate in RATES {
-            for volts in [5.0_f64, -5.0, 3.0, -3.0] {
-                let expected_s = -1.024 * (1.0 - 2.5 / volts.abs()).ln();
+            for volts in [5.0_f64, -5.0, 4.0, -4.0] {
+                let expected_s = -1.024 * (1.0 - 3.5 / volts.abs()).ln();
                 let ramp = |t: f64| volts * (t / 0.001).min(1.0);
                 let (at_s, breach) = play(rate, 3.0, ramp).unwrap();
                 assert_eq!(breach, Breach::Standing);

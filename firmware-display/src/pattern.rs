@@ -10,7 +10,7 @@
 use protocol::actuators::Actuator;
 use protocol::{ACTUATORS, Mode};
 
-use crate::sine::Sine;
+use crate::sine::sine;
 
 /// Each actuator's phase ahead of the middle, on its way to where it is to be.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,10 +121,10 @@ impl Pattern {
         self.flat && self.ticks_left == 0
     }
 
-    /// The actuators' sines in Q30, from the first one on, with `turns` / 2³² in the fingertip's middle.
+    /// The actuators' sines in Q28, from the first one on, with `turns` / 2³² in the fingertip's middle.
     pub fn sines(&self, turns: u32, lanes: &mut [i32]) {
         for (lane, ahead) in lanes.iter_mut().zip(&self.ahead) {
-            *lane = Sine::of(turns.wrapping_add(*ahead)).q30();
+            *lane = sine(turns.wrapping_add(*ahead));
         }
     }
 }

@@ -87,8 +87,8 @@ impl Phase {
     }
 
     /// One tick in which the hand moves by `counts` of the encoder, back if negative. Before the first
-    /// [`Phase::follow`] nothing moves. Returns by how much the phase turned, in turns / 2³², no further
-    /// from 0 than a quarter of a turn.
+    /// [`Phase::follow`] nothing moves. Returns by how much the phase turned, in turns / 2³², or almost a
+    /// quarter of a turn if it was more.
     pub fn advance(&mut self, counts: i16) -> i32 {
         match self.ticks_left {
             0 => {}
@@ -98,12 +98,13 @@ impl Phase {
                 self.ticks_left -= 1;
             }
         }
-        const QUARTER: i64 = 1 << 30;
+        // Two of them may be subtracted from each other.
+        const MOST: i64 = (1 << 30) - 1;
         let turned = i64::from(counts) * i64::from(self.per_count);
         // Two's complement: modulo 2³² a negative count takes the phase back by as much as the
         // positive one took it forward.
         self.turns = self.turns.wrapping_add(turned as u32);
-        turned.clamp(-QUARTER, QUARTER) as i32
+        turned.clamp(-MOST, MOST) as i32
     }
 
     /// The phase, in turns / 2³².
@@ -213,8 +214,8 @@ mod tests {
             let turned = phase.advance(counts);
             assert_eq!(phase.turns().wrapping_sub(before) as i32, turned);
         }
-        assert_eq!(phase.advance(i16::MAX), 1 << 30);
-        assert_eq!(phase.advance(i16::MIN), -1 << 30);
+        assert_eq!(phase.advance(i16::MAX), (1 << 30) - 1);
+        assert_eq!(phase.advance(i16::MIN), 1 - (1 << 30));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! | out of range | it is valid, and λ is missing, not finite or not a [`Wavelength`] | not used; counts as distrust |
 //! | implausible | it contradicts itself, see [`contradicts_itself`] | not used; counts as distrust |
 //! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held |
-//! | surprising | λ differs from the one held by more than a factor of 1.5 | kept until the next valid one: if that is within a tenth of it, that one is trusted; if not, the surprise counts as distrust |
+//! | surprising | λ differs from the one held by more than a factor of 2.1 | kept until the next valid one: if that is within a tenth of it, that one is trusted; if not, the surprise counts as distrust |
 //! | trusted | none of these | λ is followed |
 //!
 //! Five that count as distrust within half a second are a hold, until half a second has passed without.
@@ -25,8 +25,9 @@ const LATE_AT_MOST: u32 = 1_000;
 const BEGINNING: u32 = 10;
 /// The link puts estimates out of order by no more than this many.
 const REORDERED_AT_MOST: u32 = 32;
-/// A λ that differs from the one held by more than this factor is a surprise.
-const SURPRISE: f32 = 1.5;
+/// A λ that differs from the one held by more than this factor is a surprise. The paper's count is a
+/// whole number: from one estimate to the next it may go from 1 to 2 and back.
+const SURPRISE: f32 = 2.1;
 /// One that differs from the surprise before by no more than this factor confirms it.
 const CONFIRMATION: f32 = 1.1;
 /// So many that count as distrust, within [`DISTRUST_QUARTERS`], are too many.

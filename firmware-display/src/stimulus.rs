@@ -47,6 +47,8 @@ pub struct Stimulus {
     rest: Rest,
     gate: Gate,
     balance: Balance,
+    /// What the actuators do, before gains: of a tick, and only the first of it if they all do the same.
+    lanes: [i32; ACTUATORS],
     /// Whether all words are 0 V and nothing was to be heard in the last tick.
     silent: bool,
     words: [u16; ACTUATORS],
@@ -78,6 +80,7 @@ impl Stimulus {
             rest: Rest::default(),
             gate: Gate::default(),
             balance: Balance::default(),
+            lanes: [0; ACTUATORS],
             silent: true,
             words: [ZERO_VOLT; ACTUATORS],
         }
@@ -125,15 +128,17 @@ impl Stimulus {
             self.settle();
             return false;
         }
-        let mut lanes = [0; ACTUATORS];
-        let lanes = self.lanes(&mut lanes);
-        self.balance.remove(lanes, gain, self.rate);
+        self.pattern.glide();
+        let shared = self.pattern.is_flat() && self.balance.is_shared();
+        let most = self.most_steps();
+        let lanes = &mut self.lanes[..if shared { 1 } else { ACTUATORS }];
+        self.pattern.sines(self.phase.turns(), lanes);
+        self.balance
+            .remove(lanes, gain, self.level.turn(), self.rate);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
-        let drawn = self
-            .array
-            .draw(level as u32, lanes, self.most_steps(), &mut self.words);
-        self.silent = drawn.silent && gain == 0;
-        drawn.changed
+        let changed = self.array.draw(level as u32, lanes, most, &mut self.words);
+        self.silent = gain == 0 && are_silent(&self.words);
+        changed
     }
 
     /// What all lanes are multiplied with in this tick, in Q30.
@@ -144,15 +149,6 @@ impl Stimulus {
         self.gate.tick(open, self.rate);
         let gain = (u64::from(self.gate.gain()) * u64::from(supervisors)) >> 31;
         ((gain * u64::from(self.level.roll_off(self.rate))) >> 30) as u32
-    }
-
-    /// The actuators' sines: a single one if they are all the same.
-    fn lanes<'a>(&mut self, lanes: &'a mut [i32; ACTUATORS]) -> &'a mut [i32] {
-        self.pattern.glide();
-        let shared = self.pattern.is_flat() && self.balance.is_shared();
-        let lanes = &mut lanes[..if shared { 1 } else { ACTUATORS }];
-        self.pattern.sines(self.phase.turns(), lanes);
-        lanes
     }
 
     /// The most that a word changes in a tick.
@@ -214,4 +210,10 @@ impl Stimulus {
         self.balance.clear();
         self.silent = true;
     }
+}
+
+/// Not inlined, since it would be worked out for nothing while there is a gain.
+#[inline(never)]
+fn are_silent(words: &[u16; ACTUATORS]) -> bool {
+    words.iter().all(|word| *word == ZERO_VOLT)
 }

@@ -10,7 +10,7 @@
 //!     any ── Trip ──> Stopped(Trip), for good
 //! ```
 
-use protocol::{DisplayState, Hold, ResetCause, Trip};
+use protocol::{DisplayState, Hold, Trip};
 
 use crate::fade::Aim;
 
@@ -62,17 +62,6 @@ pub const fn aim(state: DisplayState) -> Aim {
 /// converters hold.
 pub const fn releases(state: DisplayState) -> bool {
     !matches!(state, DisplayState::Boot | DisplayState::Stopped(_))
-}
-
-/// The trip to start with after a reset, of what was `recorded` before it: a stop outlasts what the
-/// board does to itself, and ends with what a person does to it. A watchdog that bit, or a reset by
-/// software, without a record is a trip of its own.
-pub const fn persisted(reset: ResetCause, recorded: Option<Trip>) -> Option<Trip> {
-    match (reset, recorded) {
-        (ResetCause::Power | ResetCause::Pin, _) => None,
-        (ResetCause::Watchdog | ResetCause::Software, None) => Some(Trip::Watchdog),
-        (ResetCause::Watchdog | ResetCause::Software, trip) => trip,
-    }
 }
 
 #[cfg(test)]
@@ -230,18 +219,5 @@ mod tests {
 
     fn is_stopped(state: &DisplayState) -> bool {
         matches!(state, Stopped(_))
-    }
-
-    #[test]
-    fn a_trip_outlasts_the_watchdog_and_ends_with_the_reset_button_or_power() {
-        for trip in TRIPS {
-            for reset in [ResetCause::Watchdog, ResetCause::Software] {
-                assert_eq!(persisted(reset, Some(trip)), Some(trip));
-                assert_eq!(persisted(reset, None), Some(Trip::Watchdog));
-            }
-            for reset in [ResetCause::Power, ResetCause::Pin] {
-                assert_eq!(persisted(reset, Some(trip)), None);
-            }
-        }
     }
 }

@@ -135,7 +135,7 @@ fn a_sensor_that_restarts_is_followed_at_once_on_whatever_surface() {
 
 #[test]
 fn a_boundary_between_specimens_costs_one_estimate() {
-    for (before_mm, after_mm) in [(1.0, 4.0), (4.0, 1.0), (1.0, 2.0), (3.0, 1.9)] {
+    for (before_mm, after_mm) in [(1.0, 4.0), (4.0, 1.0), (1.0, 2.2), (3.0, 1.4)] {
         let told = on_wavelengths([before_mm, before_mm, after_mm, after_mm, after_mm]);
         let [before, after] = [before_mm, after_mm].map(trusted);
         assert_eq!(told, [before, before, Verdict::Idle, after, after]);
@@ -152,8 +152,9 @@ fn a_boundary_between_specimens_costs_one_estimate() {
 }
 
 #[test]
-fn a_difference_of_a_half_is_followed_at_once() {
-    for (before_mm, after_mm) in [(2.0, 3.0), (3.0, 2.0), (1.0, 1.5), (1.5, 1.0)] {
+fn a_count_of_one_instead_of_two_is_followed_at_once() {
+    // λ = 2 v A / n at 30 mm/s, A = 80 ms.
+    for (before_mm, after_mm) in [(2.4, 4.8), (4.8, 2.4), (1.6, 2.4), (2.4, 1.6)] {
         assert_eq!(on_wavelengths([before_mm, after_mm])[1], trusted(after_mm));
     }
 }
@@ -237,10 +238,10 @@ fn five_that_cannot_be_true_within_half_a_second_are_distrusted() {
         let no_number = sound(0, f32::NAN);
         assert_eq!(distrusted_after(driving(), |_| Some(no_number)), Some(5));
         // Each jump is found out by the next, which is another one.
-        let jumps = |n: u32| Some(sound(0, if n % 2 == 0 { 9.0 } else { 0.3 }));
+        let jumps = |n: u32| Some(sound(0, if n.is_multiple_of(2) { 9.0 } else { 0.3 }));
         assert_eq!(distrusted_after(driving(), jumps), Some(6));
         // Every second one.
-        let every_second = |n: u32| (n % 2 == 0).then_some(no_gauges);
+        let every_second = |n: u32| n.is_multiple_of(2).then_some(no_gauges);
         assert_eq!(distrusted_after(driving(), every_second), Some(10));
         // The first and the fifth are half a second apart, or more.
         let every = |every: u32| move |n: u32| n.is_multiple_of(every).then_some(no_gauges);

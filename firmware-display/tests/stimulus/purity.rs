@@ -104,6 +104,7 @@ fn spurs_are_below_minus_80_dbc_from_5_to_200_hz_uniform_and_travelling() {
 
 #[test]
 fn phases_and_gains_of_their_own_add_none() {
+    let mut worst: f64 = 0.0;
     for rate in RATES {
         for mode in MODES {
             for (counts, lambda_counts) in [(1, 400), (7, 166), (5, 50)] {
@@ -115,6 +116,7 @@ fn phases_and_gains_of_their_own_add_none() {
                 };
                 let rig = Rig::with(configuration, trimmed());
                 let spur = spur_of(rig, counts, lambda_counts, &[0, 23, 49]);
+                worst = worst.max(spur);
                 assert!(
                     spur <= SPUR,
                     "{rate:?} {mode:?} {counts}/{lambda_counts}: {spur:e}"
@@ -122,6 +124,7 @@ fn phases_and_gains_of_their_own_add_none() {
             }
         }
     }
+    println!("worst spur with trims {:.1} dBc", 20.0 * worst.log10());
 }
 
 /// The encoder knows the hand to 5 µm: a phase that rises evenly rises by whole counts, with a saw-tooth of

@@ -255,6 +255,30 @@ fn a_new_configuration_or_description_makes_none_beyond_the_gates_and_the_levels
 }
 
 #[test]
+fn another_rate_makes_none() {
+    for mode in MODES {
+        for tick in 0..40 {
+            let mut rig = Rig::new(mode, UpdateRate::Hz2000);
+            rig.follow(2.0);
+            let mut volts = rig.rub(200 + tick, 8);
+            for (update_rate, counts) in [(UpdateRate::Hz4000, 4), (UpdateRate::Hz2000, 8)] {
+                rig.configure(DisplayConfiguration {
+                    update_rate,
+                    ..rig.configuration
+                });
+                volts.extend(rig.rub(301, counts));
+            }
+            let natural = Natural {
+                turns: turns(8, 2.0),
+                ramps: 0.0,
+            };
+            // The start is the gate's.
+            assert!(largest_step(&volts[30..]) <= natural.volts(&rig));
+        }
+    }
+}
+
+#[test]
 fn a_surface_of_another_amplitude_makes_none_beyond_the_levels() {
     for update_rate in RATES {
         for mode in MODES {

@@ -5,6 +5,8 @@ use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::device::Level;
 use rigless::snapshot::Store;
+use rigless::mcu::Operate;
+use rigless::soc::Width;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::TIM3;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
@@ -12,7 +14,7 @@ use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::stm32f427::peripherals::tim;
 use rigless::time::VirtualNanos;
 
-use super::nucleo::Pins;
+use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
 use crate::dac81416::{Dac81416, Defects};
 use crate::fault::{Fault, HandFault, Kind};
 use crate::motion::encoder;
@@ -35,6 +37,7 @@ const BUTTON: Line = Line(5, 14);
 /// Index of TIM3, and the bytes of its registers.
 const TIM3_INDEX: usize = 1;
 const TIM3_SIZE: u64 = 0x400;
+const CCR1: u64 = 0x34;
 const EIGHT_BITS: u8 = 8;
 
 /// A pin with a wire on it: the port's index and the pin's.
@@ -129,6 +132,8 @@ pub struct DisplayPins {
     clear_stuck: bool,
     button_open: bool,
     alarm: bool,
+    /// When the encoder was read last.
+    ticked_ns: u64,
     records: DisplayRecords,
 }
 
@@ -144,6 +149,7 @@ impl DisplayPins {
             clear_stuck: false,
             button_open: false,
             alarm: false,
+            ticked_ns: 0,
             records: DisplayRecords::default(),
         }
     }
@@ -254,12 +260,27 @@ impl DisplayPins {
             return;
         }
         self.load = Some(level);
+        let at_ns = self.exactly(part, at_ns);
         LOAD.drive_function(part, at_ns, level);
         for chip in 0..CHIPS {
             on_bus(part, chip).drive(at_ns, |dac| dac.ldac(level == Level::High));
         }
         if level == Level::Low {
             self.record(part, at_ns);
+        }
+    }
+
+    /// When TIM3's channel changed that is seen to have at `at_ns`: at its match, if that is just over.
+    fn exactly(&self, part: &mut Stm32f427, at_ns: u64) -> u64 {
+        let at = VirtualNanos(at_ns);
+        let Ok(compare) = part.peek(at, TIM3.base + CCR1, Width::W32) else {
+            return at_ns;
+        };
+        let due_ns = self.ticked_ns + (compare * 1_000).div_ceil(TIM3_CLOCK_MHZ);
+        if (due_ns..due_ns + LATE_NS).contains(&at_ns) {
+            due_ns
+        } else {
+            at_ns
         }
     }
 
@@ -333,6 +354,7 @@ impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
         let counted = self.hand.counts(at_ns, encoder(position_mm));
+        self.ticked_ns = at_ns;
         self.records.ticks.push(TickRecord {
             at_ns,
             encoder: counted,

@@ -13,8 +13,8 @@ use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::generated::TIM4;
 use rigless::soc::stm32f427::generated::rcc::{Register, csr};
+use rigless::soc::stm32f427::generated::{TIM3 as TIM3_REGISTERS, TIM4};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
@@ -40,6 +40,12 @@ const TIM4_INDEX: usize = 2;
 /// The internal trigger by which TIM4 hears TIM3.
 const ITR_OF_TIM3: u8 = 2;
 const CNT: u64 = 0x24;
+
+/// The emulation stops for an event at the end of the instruction that it falls into, within two of them.
+pub const LATE_NS: u64 = 20;
+/// TIM3's clock: APB1's, doubled.
+pub const TIM3_CLOCK_MHZ: u64 = 84;
+const ARR: u64 = 0x2C;
 
 /// What is wired to a board's pins.
 pub trait Pins: Debug + Send + 'static {
@@ -69,6 +75,8 @@ pub struct Wired<P> {
     pins: P,
     triggers: u64,
     loses_power: bool,
+    /// When the last trigger came.
+    triggered_ns: u64,
 }
 
 impl<P: Pins> Nucleo<P> {
@@ -86,6 +94,7 @@ impl<P: Pins> Nucleo<P> {
                 pins,
                 triggers: 0,
                 loses_power: false,
+                triggered_ns: 0,
             },
         })
     }
@@ -135,7 +144,8 @@ impl<P: Pins> Wired<P> {
         if !came {
             return;
         }
-        let count = self.pins.on_trigger(&mut self.part, at.0);
+        self.triggered_ns = self.exactly(at);
+        let count = self.pins.on_trigger(&mut self.part, self.triggered_ns);
         // While the counter's clock is off, before the firmware enables it, there is nothing to set.
         let _ = self
             .part
@@ -147,6 +157,19 @@ impl<P: Pins> Wired<P> {
                 });
         }
         self.pins.after_trigger(&mut self.part, at.0);
+    }
+
+    /// When the trigger came that is seen at `at`: a period after the last one, if that is just over.
+    fn exactly(&mut self, at: VirtualNanos) -> u64 {
+        let Ok(reload) = self.part.peek(at, TIM3_REGISTERS.base + ARR, Width::W32) else {
+            return at.0;
+        };
+        let due_ns = self.triggered_ns + (reload + 1) * 1_000 / TIM3_CLOCK_MHZ;
+        if (due_ns..due_ns + LATE_NS).contains(&at.0) {
+            due_ns
+        } else {
+            at.0
+        }
     }
 }
 

@@ -621,6 +621,7 @@ static ROWS: [Row; 46] = [
             whole: false,
             drawn: Some((-200.0, 200.0)),
         }],
+        needs: Needs::Nothing,
         is_to_be_seen: false,
         class: Class::Holds,
         expected: "nothing: the display goes by its own clock",
