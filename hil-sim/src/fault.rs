@@ -81,7 +81,7 @@ impl Fault {
     /// Whether power of the board of `role` goes with it.
     pub fn cuts_power(&self, role: Role) -> bool {
         match self.kind {
-            Kind::PowerCycle => true,
+            Kind::PowerCycle => role == Role::Display || self.values[0] != 0.0,
             Kind::BrownOut => role == Role::Display,
             Kind::SensorBrownOut => role == Role::Sensor,
             _ => false,

@@ -32,7 +32,11 @@ fn what_needs_no_board_comes_out_as_the_table_says() {
         let finding = judge(&scene.faults, &recording).remove(0);
         assert!(finding.was_driving, "{kind:?}");
         if !finding.unmet().is_empty() {
-            unmet.push(format!("{}: {:?}, {finding:?}", kind.name(), finding.unmet()));
+            unmet.push(format!(
+                "{}: {:?}, {finding:?}",
+                kind.name(),
+                finding.unmet()
+            ));
         }
         // What fades for good in the scene has faded; what holds has held.
         if kind.row().class == Class::Holds {
@@ -90,7 +94,15 @@ fn the_json_lists_every_fault_in_the_order_of_the_scene() {
     assert_eq!(faults[0]["kind"], "hand-encoder-jump");
     assert_eq!(faults[0]["at_s"], 1.6);
     // One tick, half a millisecond, and the tick that the jump fell into.
-    assert!(faults[0]["safe_ms"].as_f64().unwrap() <= 1.0, "{}", faults[0]);
-    assert!(faults[0]["detected_ms"].as_f64().unwrap() <= 1.0, "{}", faults[0]);
+    assert!(
+        faults[0]["safe_ms"].as_f64().unwrap() <= 1.0,
+        "{}",
+        faults[0]
+    );
+    assert!(
+        faults[0]["detected_ms"].as_f64().unwrap() <= 1.0,
+        "{}",
+        faults[0]
+    );
     assert_eq!(faults[1]["kind"], "nothing");
 }

@@ -27,7 +27,11 @@ fn every_kind_comes_out_as_the_table_says() {
             .map(|shift| scope.spawn(move || shift.run(firmwares)))
             .collect();
         runs.into_iter()
-            .flat_map(|run| run.join().unwrap().unwrap_or_else(|error| panic!("{error}")))
+            .flat_map(|run| {
+                run.join()
+                    .unwrap()
+                    .unwrap_or_else(|error| panic!("{error}"))
+            })
             .collect()
     });
     let tallies: Vec<Tally> = plan
@@ -67,9 +71,15 @@ fn power_goes_at_the_very_instant_and_the_board_comes_back() {
     assert!(signs.clears_ns[0] - begins_ns <= INSTRUCTION_NS);
     let back_ns = brown_out.ends_ns().unwrap();
     let is_driven = |at_ns: u64| at_ns > back_ns;
-    let after = recording.outputs.iter().filter(|output| is_driven(output.at_ns));
+    let after = recording
+        .outputs
+        .iter()
+        .filter(|output| is_driven(output.at_ns));
     assert!(after.count() > 100);
-    let off = recording.ticks.iter().filter(|tick| (begins_ns..back_ns).contains(&tick.at_ns));
+    let off = recording
+        .ticks
+        .iter()
+        .filter(|tick| (begins_ns..back_ns).contains(&tick.at_ns));
     assert_eq!(off.count(), 0);
 }
 

@@ -173,9 +173,10 @@ fn line(tally: &Tally) -> String {
         tally.driving,
         tally.seen,
         times(tally.detected_ms),
-        tally
-            .safe_within_ms
-            .map_or("–".to_owned(), |_| format!("{}/{}", tally.safe, tally.injected)),
+        tally.safe_within_ms.map_or("–".to_owned(), |_| format!(
+            "{}/{}",
+            tally.safe, tally.injected
+        )),
         times(tally.safe_ms),
         tally.stuck,
         tally.resets,

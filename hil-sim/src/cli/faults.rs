@@ -23,7 +23,11 @@ fn entry(row: &Row) -> String {
     let _ = writeln!(text, "    done      {}", row.injected);
     let _ = writeln!(text, "    lasts     {lasts}");
     for key in row.keys {
-        let _ = writeln!(text, "    {:<9} {} (default {})", key.name, key.meaning, key.default);
+        let _ = writeln!(
+            text,
+            "    {:<9} {} (default {})",
+            key.name, key.meaning, key.default
+        );
     }
     let engine = match row.needs {
         Needs::Nothing => "native, elf",

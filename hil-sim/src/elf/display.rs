@@ -4,8 +4,8 @@
 use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::device::Level;
-use rigless::snapshot::Store;
 use rigless::mcu::Operate;
+use rigless::snapshot::Store;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::TIM3;

@@ -55,7 +55,11 @@ impl Injector {
     /// What `scene` does to the board of `role`, which runs `elf` by `clock`.
     pub fn new(scene: &Scene, role: Role, elf: &[u8], clock: Clock) -> Self {
         let mut steps = Vec::new();
-        for fault in scene.faults.iter().filter(|fault| breaks(fault.kind, role)) {
+        for fault in scene
+            .faults
+            .iter()
+            .filter(|fault| fault.cuts_power(role) || breaks(fault.kind, role))
+        {
             steps.push((fault.begins_ns(), *fault, true));
             steps.extend(fault.ends_ns().map(|at_ns| (at_ns, *fault, false)));
         }
@@ -182,7 +186,12 @@ impl Injector {
             return false;
         };
         let set = &self.settings;
-        let before = [set.max_age_ms, set.fade_in_ms, set.fade_out_ms, set.glide_ms];
+        let before = [
+            set.max_age_ms,
+            set.fade_in_ms,
+            set.fade_out_ms,
+            set.glide_ms,
+        ];
         let behind = [set.amplitude_mv, set.reference_lsb, set.full_drive_s];
         let pattern: Vec<u8> = before
             .iter()
@@ -202,15 +211,12 @@ impl Injector {
     }
 }
 
-/// Whether a kind breaks something on the board of `role`.
+/// Whether a kind breaks something on the board of `role`, other than its power.
 fn breaks(kind: Kind, role: Role) -> bool {
     match kind {
-        Kind::PowerCycle => true,
-        Kind::SensorBrownOut
-        | Kind::SensorHang
-        | Kind::SensorPanic
-        | Kind::AdcStopped
-        | Kind::UartOverrun => role == Role::Sensor,
+        Kind::SensorHang | Kind::SensorPanic | Kind::AdcStopped | Kind::UartOverrun => {
+            role == Role::Sensor
+        }
         Kind::WireStuckLow
         | Kind::EmergencyStop
         | Kind::DacIgnoresWords
@@ -227,8 +233,7 @@ fn breaks(kind: Kind, role: Role) -> bool {
         | Kind::Panic
         | Kind::HardFault
         | Kind::StackOverflow
-        | Kind::MemoryChanged
-        | Kind::BrownOut => role == Role::Display,
+        | Kind::MemoryChanged => role == Role::Display,
         _ => false,
     }
 }

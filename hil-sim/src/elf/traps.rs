@@ -87,7 +87,8 @@ impl Traps {
             0xB672, 0xE7FE, // hang
             0xDE00, 0xBF00, // undefined
             0xB5F0, 0xF7FF, 0xFFFD, 0xBF00, // recursion
-            0x2032, 0x2132, 0x4A01, 0x4B02, 0x4718, 0xBF00, // panic: r0, r1, [location], [panic]
+            0x2032, 0x2132, 0x4A01, 0x4B02, 0x4718,
+            0xBF00, // panic: r0, r1, [location], [panic]
         ];
         let here = BASE + 2 * halves.len() as u64;
         let location = here + 8;

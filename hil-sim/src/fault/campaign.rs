@@ -1,10 +1,12 @@
 //! Every kind of fault at random instants, on the two ELFs, counted.
 //!
-//! Many faults share a run, which is translated once: each has a window of its own, and before the next
-//! one both boards lose their power and all that they hold.
+//! Many faults share a run, for its translation takes seconds: each has a window of its own. After one
+//! that stops the display for good, the display and its converters lose their power and all that they
+//! hold; after any other, a second passes in which the boards recover and tell their counters.
 //!
 //! ```text
-//! power ── boots, drives ── fault ── looked on ── power ── …
+//! boots, drives ── fault ── looked on ─┬─ power ── boots, drives ──┬─ fault ── …
+//!                                      └─ recovers, tells counters ┘
 //! ```
 
 mod tally;
@@ -15,15 +17,20 @@ use protocol::{DisplayConfiguration, Mode};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::judge::{Finding, judge};
-use super::{Fault, Kind};
+use super::catalogue::{Class, Lasts};
+use super::judge::{Finding, finding};
+use super::{Fault, Kind, nanoseconds};
 use crate::elf::{self, ElfError, Firmwares};
 use crate::scene::{Display, Motion, Scene};
 
-/// From power on until the stimulus can be driving, and the latest instant of a fault, in s: room for a
-/// hand that swings to be in motion.
-const DRIVES_S: f64 = 0.3;
-const LATEST_S: f64 = 0.9;
+/// From power on until the stimulus can be driving, in s: of both boards, and of the display alone.
+const STARTS_S: f64 = 0.3;
+const RESTARTS_S: f64 = 0.15;
+/// The boards tell their counters once a second; what has just been tried is not to be in those that tell
+/// of the next.
+const TELLS_S: f64 = 1.05;
+/// An instant is drawn from so long: room for a hand that swings to be in motion.
+const DRAWN_S: f64 = 0.6;
 /// How long a hand that swings has been fast when a fault comes, in s, and how fast, of 1.
 const IN_MOTION_S: f64 = 0.25;
 const IN_MOTION: f64 = 0.5;
@@ -53,8 +60,8 @@ pub struct Plan {
 pub struct Shift {
     /// What is run.
     pub scene: Scene,
-    /// Which of the scene's faults are tried; the others are the power between them.
-    pub tried: Vec<usize>,
+    /// Which of the scene's faults are tried, and until when, in s; the others are the power between.
+    pub tried: Vec<(usize, f64)>,
 }
 
 /// A fault that was tried.
@@ -87,9 +94,8 @@ impl Plan {
             for (place, &kind) in self.kinds.iter().enumerate() {
                 let turns = (0..self.instants).filter(|turn| (turn + place) % 4 == variant);
                 for _ in turns {
-                    let shift = open.get_or_insert_with(|| {
-                        self.shift(shifts.len(), motion.clone(), mode)
-                    });
+                    let shift =
+                        open.get_or_insert_with(|| self.shift(shifts.len(), motion.clone(), mode));
                     shift.add(kind, &mut draws);
                     if shift.scene.duration_s >= RUN_S {
                         shifts.extend(open.take());
@@ -127,15 +133,26 @@ impl Shift {
     /// A window for a fault of `kind` at the end.
     fn add(&mut self, kind: Kind, draws: &mut Xoshiro256PlusPlus) {
         let scene = &mut self.scene;
-        let from_s = scene.duration_s;
-        if from_s > 0.0 {
-            scene.faults.push(Fault::new(Kind::PowerCycle, from_s));
-        }
+        let before = self
+            .tried
+            .last()
+            .map(|&(index, _)| scene.faults[index].kind);
+        let from_s = scene.duration_s
+            + match before {
+                None => STARTS_S,
+                Some(before) if before.row().class == Class::Stops => {
+                    let mut power = Fault::new(Kind::PowerCycle, scene.duration_s);
+                    power.values[0] = 0.0;
+                    scene.faults.push(power);
+                    RESTARTS_S
+                }
+                Some(_) => TELLS_S,
+            };
         let mut at_s;
         loop {
             // Whole microseconds, that a scene's file can say it as it is.
-            let after_s: f64 = draws.random_range(DRIVES_S..LATEST_S);
-            at_s = from_s + (after_s * 1e6).round() * 1e-6;
+            let after_s: f64 = draws.random_range(0.0..DRAWN_S);
+            at_s = ((from_s + after_s) * 1e6).round() * 1e-6;
             let is_fast = |t_s| match scene.motion {
                 Motion::Sinusoid { amplitude_mm_s, .. } => {
                     scene.motion.velocity_mm_s(t_s).abs() > IN_MOTION * amplitude_mm_s
@@ -153,9 +170,13 @@ impl Shift {
                 *value = if key.whole { drawn.round() } else { drawn };
             }
         }
-        self.tried.push(scene.faults.len());
+        let row = kind.row();
+        scene.duration_s = ((at_s + row.watch_s) * 1e3).ceil() * 1e-3;
+        if row.lasts == Lasts::ForGood && row.class != Class::Stops {
+            fault.for_s = Some(row.watch_s);
+        }
+        self.tried.push((scene.faults.len(), scene.duration_s));
         scene.faults.push(fault);
-        scene.duration_s = ((at_s + kind.row().watch_s) * 1e3).ceil() * 1e-3;
     }
 
     /// Runs it.
@@ -164,8 +185,9 @@ impl Shift {
     /// If the boards can't be run.
     pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
         let (recording, _) = elf::run(&self.scene, firmwares)?;
-        let findings = judge(&self.scene.faults, &recording);
-        let tried = self.tried.iter().map(|&index| findings[index].clone());
+        let tried = self.tried.iter().map(|&(index, until_s)| {
+            finding(&self.scene.faults[index], nanoseconds(until_s), &recording)
+        });
         Ok(tried
             .map(|finding| Trial {
                 motion: match self.scene.motion {
@@ -202,13 +224,16 @@ mod tests {
         let mut tried: HashMap<Kind, usize> = HashMap::new();
         for shift in plan().shifts() {
             let faults = &shift.scene.faults;
-            for &index in &shift.tried {
+            for &(index, until_s) in &shift.tried {
                 let fault = &faults[index];
                 *tried.entry(fault.kind).or_default() += 1;
-                let ends_s = fault.at_s + fault.kind.row().watch_s;
+                assert!(until_s >= fault.at_s + fault.kind.row().watch_s - 1e-9);
                 let next = faults.get(index + 1);
-                assert!(next.is_none_or(|next| next.kind == Kind::PowerCycle));
-                assert!(next.map_or(shift.scene.duration_s, |next| next.at_s) >= ends_s);
+                assert!(next.map_or(shift.scene.duration_s, |next| next.at_s) >= until_s);
+                // What stops for good is ended by nothing but power.
+                if fault.kind.row().class == Class::Stops {
+                    assert!(next.is_none_or(|next| next.kind == Kind::PowerCycle));
+                }
             }
         }
         assert_eq!(tried.len(), Kind::all().count());

@@ -24,7 +24,11 @@ impl Clock {
 
     /// What the board's clock says when the scene's says `true_ns`.
     pub fn local_ns(&self, true_ns: u64) -> u64 {
-        let ahead_ns: f64 = self.drifts.iter().map(|drift| ahead_ns(drift, true_ns)).sum();
+        let ahead_ns: f64 = self
+            .drifts
+            .iter()
+            .map(|drift| ahead_ns(drift, true_ns))
+            .sum();
         true_ns.saturating_add_signed(ahead_ns.round() as i64)
     }
 
@@ -41,7 +45,9 @@ impl Clock {
 }
 
 fn ahead_ns(drift: &Fault, true_ns: u64) -> f64 {
-    let to_ns = drift.ends_ns().map_or(true_ns, |end_ns| end_ns.min(true_ns));
+    let to_ns = drift
+        .ends_ns()
+        .map_or(true_ns, |end_ns| end_ns.min(true_ns));
     to_ns.saturating_sub(drift.begins_ns()) as f64 * drift.values[0] * 1e-6
 }
 

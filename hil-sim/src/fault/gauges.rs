@@ -19,8 +19,12 @@ pub struct GaugeFaults {
 impl GaugeFaults {
     /// The wires under a scene's `faults`.
     pub fn new(faults: &[Fault]) -> Self {
-        let of_gauges =
-            |fault: &&Fault| matches!(fault.kind, Kind::GaugeOpen | Kind::GaugeShort | Kind::AdcStuck);
+        let of_gauges = |fault: &&Fault| {
+            matches!(
+                fault.kind,
+                Kind::GaugeOpen | Kind::GaugeShort | Kind::AdcStuck
+            )
+        };
         Self {
             faults: faults.iter().filter(of_gauges).copied().collect(),
             last: [MID_RAIL; CHANNELS],

@@ -28,9 +28,10 @@ impl HandFault {
 
     /// The counter at `at_ns`, where a sound one has `counts`. To be asked for in order.
     pub fn counts(&mut self, at_ns: u64, counts: u16) -> u16 {
-        let jumps = self.faults.iter().filter(|fault| {
-            fault.kind == Kind::HandEncoderJump && fault.begins_ns() <= at_ns
-        });
+        let jumps = self
+            .faults
+            .iter()
+            .filter(|fault| fault.kind == Kind::HandEncoderJump && fault.begins_ns() <= at_ns);
         for jump in jumps.skip(self.jumped) {
             self.jumped += 1;
             self.offset = self.offset.wrapping_add(jump.values[0] as u16);

@@ -67,7 +67,11 @@ impl Finding {
             unmet.push(format!(
                 "restarted against the table: {} resets{}",
                 self.resets,
-                if self.drives_again { ", drives again" } else { "" }
+                if self.drives_again {
+                    ", drives again"
+                } else {
+                    ""
+                }
             ));
         }
         unmet
@@ -108,7 +112,8 @@ pub fn judge(faults: &[Fault], recording: &Recording) -> Vec<Finding> {
         .collect()
 }
 
-fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
+/// Judges one fault of a recording by what came before `until_ns`.
+pub fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
     let from_ns = fault.begins_ns();
     let outputs = &recording.outputs;
     let rest_ns = fault.ends_ns().unwrap_or(until_ns);
@@ -119,9 +124,10 @@ fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
     };
     let safe_ns = silent_from(outputs, from_ns, rest_ns);
     let sign = first_sign(fault, until_ns, &recording.signs);
-    let resets = recording.signs.resets.iter().filter(|reset| {
-        reset.role == Role::Display && (from_ns..until_ns).contains(&reset.at_ns)
-    });
+    let resets =
+        recording.signs.resets.iter().filter(|reset| {
+            reset.role == Role::Display && (from_ns..until_ns).contains(&reset.at_ns)
+        });
     let answered_ns = answered(outputs, from_ns, until_ns).unwrap_or(until_ns);
     Finding {
         fault: *fault,
@@ -224,20 +230,31 @@ fn longest_standing_ns(
 fn first_sign(fault: &Fault, until_ns: u64, signs: &Signs) -> Option<(u64, String)> {
     let from_ns = fault.begins_ns();
     let is_due = |at_ns: u64| (from_ns..until_ns).contains(&at_ns);
-    let clear = signs.clears_ns.iter().copied().filter(|&at_ns| is_due(at_ns));
-    let resets = signs.resets.iter().filter(|reset| {
-        !reset.is_injected && is_due(reset.at_ns)
-    });
+    let clear = signs
+        .clears_ns
+        .iter()
+        .copied()
+        .filter(|&at_ns| is_due(at_ns));
+    let resets = signs
+        .resets
+        .iter()
+        .filter(|reset| !reset.is_injected && is_due(reset.at_ns));
     let mut found: Vec<(u64, String)> = clear
         .map(|at_ns| (at_ns, "CLR fell".to_owned()))
         .chain(resets.map(|reset| (reset.at_ns, format!("{} reset", reset.role.name()))))
         .collect();
-    for (said, role) in [(&signs.display, Role::Display), (&signs.sensor, Role::Sensor)] {
+    for (said, role) in [
+        (&signs.display, Role::Display),
+        (&signs.sensor, Role::Sensor),
+    ] {
         let mut before = before(said, from_ns);
-        let first = said.iter().filter(|said| is_due(said.at_ns)).find_map(|said| {
-            let sign = sign_of(fault, &said.message, &mut before)?;
-            Some((said.at_ns, format!("{}: {sign}", role.name())))
-        });
+        let first = said
+            .iter()
+            .filter(|said| is_due(said.at_ns))
+            .find_map(|said| {
+                let sign = sign_of(fault, &said.message, &mut before)?;
+                Some((said.at_ns, format!("{}: {sign}", role.name())))
+            });
         found.extend(first);
     }
     found.into_iter().min_by_key(|&(at_ns, _)| at_ns)
@@ -307,9 +324,10 @@ fn counted(fault: &Fault, status: &Status, before: Option<Status>) -> Option<Str
     let ports = |status: &Status| [port(&status.peer), port(&status.console)].concat();
     let now = [ports(status), role(&status.role)].concat();
     let then = before.map(|status| [ports(&status), role(&status.role)].concat());
-    let risen = now.iter().enumerate().find(|(place, (_, count))| {
-        *count > then.as_ref().map_or(0, |then| then[*place].1)
-    });
+    let risen = now
+        .iter()
+        .enumerate()
+        .find(|(place, (_, count))| *count > then.as_ref().map_or(0, |then| then[*place].1));
     if let Some((_, (name, count))) = risen {
         return Some(format!("{name} {count}"));
     }

@@ -20,7 +20,7 @@ pub struct Way {
     faults: Vec<Fault>,
     draws: Xoshiro256PlusPlus,
     forger: Forger,
-    /// When the sender's power goes: it numbers from 0 again.
+    /// When the sender's power goes: it numbers from 0 again, and what was on its way is gone.
     restarts_ns: VecDeque<u64>,
     /// Whether any fault makes it necessary to know what went by.
     listens: bool,
@@ -132,6 +132,8 @@ impl Way {
                 self.restarts_ns.pop_front();
                 self.forger = Forger::new();
                 self.history.clear();
+                self.held.clear();
+                continue;
             }
             if next_ns == held_ns {
                 if let Some((_, frame)) = self.held.pop_first() {
@@ -190,7 +192,9 @@ impl Way {
                 let from_ns = fault.map_or(0, |fault| fault.begins_ns());
                 let back_ns = nanoseconds(back_ms * 1e-3);
                 let then_ns = (from_ns + (at_ns - from_ns) % back_ns).saturating_sub(back_ns);
-                let old = self.history.partition_point(|&(old_ns, _)| old_ns < then_ns);
+                let old = self
+                    .history
+                    .partition_point(|&(old_ns, _)| old_ns < then_ns);
                 if let Some((_, frame)) = self.history.get(old).cloned() {
                     self.emit(at_ns, &frame);
                 }

@@ -97,7 +97,10 @@ pub fn unmet(tallies: &[Tally]) -> Vec<String> {
         let kind = tally.kind;
         let injected = tally.injected;
         if tally.driving < injected {
-            unmet.push(format!("{kind}: the stimulus was on in {} of {injected}", tally.driving));
+            unmet.push(format!(
+                "{kind}: the stimulus was on in {} of {injected}",
+                tally.driving
+            ));
         }
         if !tally.is_to_be_seen && tally.seen > 0 {
             unmet.push(format!("{kind}: {} false alarms", tally.seen));
@@ -106,13 +109,18 @@ pub fn unmet(tallies: &[Tally]) -> Vec<String> {
             && tally.safe < injected
         {
             let safe = tally.safe;
-            unmet.push(format!("{kind}: at 0 V within {within_ms} ms in {safe} of {injected}"));
+            unmet.push(format!(
+                "{kind}: at 0 V within {within_ms} ms in {safe} of {injected}"
+            ));
         }
         if tally.stuck > 0 {
             unmet.push(format!("{kind}: {} outputs stuck", tally.stuck));
         }
         if tally.restarts > 0 {
-            unmet.push(format!("{kind}: {} restarts against the table", tally.restarts));
+            unmet.push(format!(
+                "{kind}: {} restarts against the table",
+                tally.restarts
+            ));
         }
     }
     unmet

@@ -47,7 +47,10 @@ fn arrive(fault: Fault) -> Arrived {
     // As an engine does: in steps, and never back.
     for now_ns in (0..=FRAMES * PERIOD_NS + 1_000_000_000).step_by(250_000) {
         while let Some((at_ns, byte)) = way.pop(now_ns) {
-            assert!(at_ns >= last_ns + BYTE_NS || last_ns == 0, "{last_ns} {at_ns}");
+            assert!(
+                at_ns >= last_ns + BYTE_NS || last_ns == 0,
+                "{last_ns} {at_ns}"
+            );
             last_ns = at_ns;
             arrived.receiver.receive(&[byte], |event| {
                 if let Event::Message(message) = event {
@@ -103,7 +106,11 @@ fn garbage_is_counted_and_never_taken_for_a_message() {
 fn corruption_spoils_frames() {
     let arrived = arrive(fault(Kind::LinkCorrupt));
     assert!(arrived.receiver.counters().corrupt > 3);
-    assert!(estimates(&arrived).iter().all(|e| e.wavelength_mm == Some(2.0)));
+    assert!(
+        estimates(&arrived)
+            .iter()
+            .all(|e| e.wavelength_mm == Some(2.0))
+    );
 }
 
 #[test]
@@ -113,7 +120,11 @@ fn a_flood_is_of_good_frames_at_line_rate_and_leaves_no_gap_in_their_numbers() {
     let estimates = estimates(&arrived);
     // A frame of an estimate has some 40 bytes: 2 300 a second.
     assert!(estimates.len() > 200, "{}", estimates.len());
-    assert!(estimates.windows(2).all(|two| two[1].sequence > two[0].sequence));
+    assert!(
+        estimates
+            .windows(2)
+            .all(|two| two[1].sequence > two[0].sequence)
+    );
     assert_eq!((counters.late, counters.duplicated), (0, 0), "{counters:?}");
     assert!(counters.lost <= 10, "{counters:?}");
 }
@@ -141,7 +152,10 @@ fn late_frames_come_late_and_are_overtaken() {
 fn a_break_is_zeros_that_are_no_frames() {
     let arrived = arrive(fault(Kind::WireStuckLow));
     let counters = arrived.receiver.counters();
-    assert!(counters.corrupt <= 1 && counters.overlong == 0, "{counters:?}");
+    assert!(
+        counters.corrupt <= 1 && counters.overlong == 0,
+        "{counters:?}"
+    );
     assert!(estimates(&arrived).len() as u64 >= FRAMES - 1 - 11);
 }
 
@@ -177,7 +191,11 @@ fn a_jumping_wavelength_is_never_confirmed_by_the_next() {
         .filter_map(|estimate| estimate.wavelength_mm)
         .filter(|&mm| mm != 2.0)
         .collect();
-    assert!(jumped.windows(2).all(|two| (two[1] / two[0]).ln().abs() > 2.0));
+    assert!(
+        jumped
+            .windows(2)
+            .all(|two| (two[1] / two[0]).ln().abs() > 2.0)
+    );
 }
 
 #[test]

@@ -39,19 +39,21 @@ fn every_kind_parses_with_its_defaults_and_with_every_key_of_its_own() {
 
 #[test]
 fn faults_are_kept_in_the_order_of_the_file() {
-    let kinds: Vec<Kind> = faults(
-        "[[fault]]\nat_s = 2\nkind = \"link-down\"\n[[fault]]\nat_s = 1\nkind = \"panic\"",
-    )
-    .iter()
-    .map(|fault| fault.kind)
-    .collect();
+    let kinds: Vec<Kind> =
+        faults("[[fault]]\nat_s = 2\nkind = \"link-down\"\n[[fault]]\nat_s = 1\nkind = \"panic\"")
+            .iter()
+            .map(|fault| fault.kind)
+            .collect();
     assert_eq!(kinds, [Kind::LinkDown, Kind::Panic]);
 }
 
 #[test]
 fn what_is_wrong_with_a_fault_is_refused_with_line_and_key() {
     for (section, want) in [
-        ("[[fault]]\nkind = \"panic\"", "x.toml:3: fault[0].at_s: is missing"),
+        (
+            "[[fault]]\nkind = \"panic\"",
+            "x.toml:3: fault[0].at_s: is missing",
+        ),
         ("[[fault]]\nat_s = 1", "x.toml:3: fault[0].kind: is missing"),
         (
             "[[fault]]\nat_s = 1\nkind = \"gremlin\"",
@@ -89,7 +91,10 @@ fn what_is_wrong_with_a_fault_is_refused_with_line_and_key() {
             "[[fault]]\nat_s = 1\nkind = \"link-corrupt\"\nshare = 2",
             "x.toml:6: fault[0].share: 2 is out of range: give a number from 0 to 1",
         ),
-        ("fault = 1", "x.toml:1: fault: holds a whole number: give an array of tables"),
+        (
+            "fault = 1",
+            "x.toml:1: fault: holds a whole number: give an array of tables",
+        ),
     ] {
         let refusal = if section.starts_with("fault") {
             super::refusal(&format!("{section}\n{SURFACE}"))
