@@ -8,9 +8,11 @@ use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
+mod campaign;
 mod chart;
 mod cost;
 mod demo;
+mod faults;
 mod goals;
 mod map;
 mod run;
@@ -43,6 +45,12 @@ enum Command {
     /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
     /// exit status 1 if a scene is not as expected
     Goals(goals::Goals),
+    /// Lists the kinds of faults that a scene may have: what they mean, where they are injected, their
+    /// keys and defaults, and what is expected of the boards
+    Faults,
+    /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
+    /// 1 if a goal is missed
+    Campaign(campaign::Campaign),
     /// Draws what the estimators give against what they cost
     Chart(chart::Chart),
 }
@@ -134,6 +142,8 @@ impl Arguments {
             Command::Cost(cost) => cost.execute(),
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
+            Command::Faults => faults::execute(),
+            Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
         }
     }

@@ -3,6 +3,7 @@
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
 use crate::analysis::track::COUNT_MM;
+use crate::fault::Signs;
 use crate::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
@@ -93,6 +94,7 @@ impl Run {
             sensor_status: None,
             display_status: None,
             log: Vec::new(),
+            signs: Signs::default(),
         }
     }
 
