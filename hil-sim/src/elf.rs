@@ -1,6 +1,7 @@
 //! The `elf` engine: the two ELFs that a user would flash, on two emulated Nucleo-F429ZI boards joined
 //! by a UART.
 
+pub mod alone;
 pub mod cost;
 mod display;
 mod firmware;
