@@ -1,13 +1,17 @@
 //! The display: estimates and encoder readings in, fifty DAC words out.
 
-use protocol::{DisplayConfiguration, DisplayCounters, Estimate, Mode, Motion};
+use protocol::{
+    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Mode, Motion, StopReason, Trip,
+};
 
 use crate::array::{Array, FULL_LEVEL, Trim};
 use crate::fade::Fade;
 use crate::hand::Hand;
 use crate::pattern::Pattern;
 use crate::phase::{Phase, Wavelength};
-use crate::{ACTUATORS, ZERO_VOLT, ticks};
+use crate::{
+    ACTUATORS, ConverterFault, Output, Readback, Senses, Settings, Transfer, ZERO_VOLT, ticks,
+};
 
 /// An estimate is late, and refused, if it is behind the last by at most this many: 10 s.
 const LATE_AT_MOST: u32 = 1_000;
@@ -42,7 +46,7 @@ pub struct Display {
     age_ticks: u32,
     following: bool,
     last_sequence: Option<u32>,
-    stopped: bool,
+    state: DisplayState,
     send_anyway: bool,
     drawn: Drawn,
     words: [u16; ACTUATORS],
@@ -58,8 +62,10 @@ struct Drawn {
 }
 
 impl Display {
-    /// A display at 0 V that has seen neither hand nor surface. `configuration` is checked.
-    pub fn new(configuration: DisplayConfiguration) -> Self {
+    /// A display at 0 V that has seen neither hand nor surface, in [`DisplayState::Boot`]; stopped for
+    /// good if a trip was `persisted` from before the reset.
+    pub fn new(settings: &Settings, persisted: Option<Trip>) -> Self {
+        let configuration = *settings.configuration();
         Self {
             array: Array::new(&[Trim::default(); ACTUATORS]),
             hand: Hand::default(),
@@ -71,7 +77,7 @@ impl Display {
             age_ticks: u32::MAX,
             following: false,
             last_sequence: None,
-            stopped: false,
+            state: persisted.map_or(DisplayState::Boot, DisplayState::Stopped),
             send_anyway: false,
             drawn: Drawn::default(),
             words: [ZERO_VOLT; ACTUATORS],
@@ -80,9 +86,19 @@ impl Display {
         }
     }
 
-    /// Takes a checked configuration. Nothing jumps: a new amplitude is reached at 5 V in 20 ms, a new
-    /// mode or pitch as a new λ is (see [`crate::pattern`]).
-    pub fn configure(&mut self, configuration: DisplayConfiguration) {
+    /// The converters have been started and read back, or failed to: without it nothing is driven.
+    pub fn started(&mut self, converters: Result<(), ConverterFault>) {
+        match converters {
+            Ok(()) if self.state == DisplayState::Boot => self.enter(DisplayState::Ready),
+            Ok(()) => {}
+            Err(_) => self.trip(Trip::Converter),
+        }
+    }
+
+    /// Takes settings, which are checked. Nothing jumps: a new amplitude is reached at 5 V in 20 ms, a
+    /// new mode or place as a new λ is.
+    pub fn configure(&mut self, settings: &Settings) {
+        let configuration = *settings.configuration();
         self.configuration = configuration;
         self.fade
             .set_times(configuration.fade_in_ms, configuration.fade_out_ms);
@@ -128,20 +144,23 @@ impl Display {
     }
 
     /// 0 V from the next tick on, and for good.
-    pub fn stop(&mut self) {
-        self.stopped = true;
+    pub fn stop(&mut self, reason: StopReason) {
+        self.trip(match reason {
+            StopReason::Operator => Trip::Operator,
+            StopReason::Host => Trip::Host,
+        });
     }
 
-    /// Makes the next tick send its words even if they are the last ones: for when the chips may hold
-    /// others, after a failed transfer or a CLR.
-    pub fn resend(&mut self) {
-        self.send_anyway = true;
-    }
-
-    /// One output tick, every 500 µs, with the hand encoder's counter. True if any of
-    /// [`Display::words`] changed and all are to be sent; a hand at rest sends nothing.
-    pub fn tick(&mut self, encoder: u16) -> bool {
+    /// One output tick with the hand encoder's counter and the board as it is.
+    pub fn tick(&mut self, encoder: u16, senses: &Senses) -> Output {
         self.counters.ticks = self.counters.ticks.wrapping_add(1);
+        if senses.stop_input_open {
+            self.trip(Trip::EmergencyStop);
+        }
+        if senses.alarm || senses.readback == Readback::Differs {
+            self.trip(Trip::Converter);
+        }
+        self.send_anyway |= senses.clear_fell || senses.transfer != Transfer::Done;
         let travel = self.hand.read(encoder);
         self.phase.advance(travel);
         let silent = self.fade.gain() == 0;
@@ -155,7 +174,10 @@ impl Display {
             self.drawn = drawn;
         }
         self.counters.updates = self.counters.updates.wrapping_add(u32::from(send));
-        send
+        Output {
+            send,
+            release: !matches!(self.state, DisplayState::Boot | DisplayState::Stopped(_)),
+        }
     }
 
     /// The words of the last tick: [`ZERO_VOLT`] is 0 V, a step 10 V / 65 536.
@@ -171,6 +193,23 @@ impl Display {
     /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
     pub fn counters(&self) -> DisplayCounters {
         self.counters
+    }
+
+    /// The supervisor's state.
+    pub fn state(&self) -> DisplayState {
+        self.state
+    }
+
+    fn enter(&mut self, state: DisplayState) {
+        self.counters.changes = self.counters.changes.wrapping_add(1);
+        self.counters.state = state;
+        self.state = state;
+    }
+
+    fn trip(&mut self, trip: Trip) {
+        if !matches!(self.state, DisplayState::Stopped(_)) {
+            self.enter(DisplayState::Stopped(trip));
+        }
     }
 
     /// Whether `sequence` was sent before, or with, the last one seen.
@@ -227,7 +266,7 @@ impl Display {
 
     fn next_drawn(&self) -> Drawn {
         let level = ((u64::from(self.amplitude) * u64::from(self.fade.gain())) >> 31) as u32;
-        if self.stopped || level == 0 {
+        if matches!(self.state, DisplayState::Boot | DisplayState::Stopped(_)) || level == 0 {
             return Drawn::default();
         }
         Drawn {

@@ -20,12 +20,14 @@ pub mod fade;
 pub mod hand;
 pub mod pattern;
 pub mod phase;
+pub mod senses;
 pub mod settings;
 pub mod sine;
 
 pub use array::{Array, Place, Polarity, Trim};
 pub use display::Display;
 pub use protocol::ACTUATORS;
+pub use senses::{ConverterFault, Output, Readback, Senses, Transfer};
 pub use settings::Settings;
 
 /// Output ticks per second: ten samples a cycle at 200 Hz.

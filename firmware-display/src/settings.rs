@@ -21,6 +21,22 @@ impl Settings {
         sent: DEFAULT_ACTUATORS,
     };
 
+    /// A board that has taken `configuration`, which names `actuators` by their hash.
+    ///
+    /// # Errors
+    /// The first value out of its range.
+    pub fn new(
+        configuration: DisplayConfiguration,
+        actuators: &[Actuator; ACTUATORS],
+    ) -> Result<Self, Refusal> {
+        let mut settings = Self {
+            sent: *actuators,
+            ..Self::DEFAULT
+        };
+        settings.take(&Configuration::Display(configuration))?;
+        Ok(settings)
+    }
+
     /// The configuration in force.
     pub const fn configuration(&self) -> &DisplayConfiguration {
         &self.configuration

@@ -217,17 +217,21 @@ fn is_abandoned(error: &ElfError) -> bool {
 
 /// A host on the console, if the scene wants of the board what is not its default.
 fn console_for(scene: &Scene, role: Role) -> Option<ConsoleHost> {
-    let wanted = match role {
+    match role {
         Role::Display => {
             let wanted = scene.display_configuration();
-            (wanted != DisplayConfiguration::DEFAULT).then_some(Configuration::Display(wanted))
+            (wanted != DisplayConfiguration::DEFAULT).then(|| {
+                let described = (wanted.actuators != DisplayConfiguration::DEFAULT.actuators)
+                    .then_some(&*scene.display.actuators);
+                ConsoleHost::new(Configuration::Display(wanted), described)
+            })
         }
         _ => {
             let wanted = scene.sensor_configuration();
-            (wanted != SensorConfiguration::DEFAULT).then_some(Configuration::Sensor(wanted))
+            (wanted != SensorConfiguration::DEFAULT)
+                .then(|| ConsoleHost::new(Configuration::Sensor(wanted), None))
         }
-    }?;
-    Some(ConsoleHost::new(wanted))
+    }
 }
 
 /// What the board answered, if it was asked for anything.
@@ -238,7 +242,7 @@ fn told(name: &'static str, driver: &Lockstep) -> Result<Option<Told>, ElfError>
         }
         told => match told.and_then(|told| told.report.refused) {
             None => return Ok(told),
-            Some(setting) => format!("it refuses {setting:?}"),
+            Some(refusal) => refusal.to_string(),
         },
     };
     Err(ElfError::Configuration {

@@ -19,7 +19,7 @@ use crate::recording::{
 use crate::scene::{Scene, SceneError};
 use crate::weather::{BYTE_NS, Weather};
 use crate::world::World;
-use firmware_display::Display;
+use firmware_display::{Display, Senses};
 use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
 use protocol::{
     CHANNELS, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
@@ -27,7 +27,6 @@ use protocol::{
 };
 
 const STEP_NS: u64 = 1_000_000_000 / firmware_sensor::SCAN_RATE_HZ as u64;
-const STEPS_PER_TICK: u64 = (firmware_sensor::SCAN_RATE_HZ / firmware_display::TICK_RATE_HZ) as u64;
 const STEPS_PER_STATUS: u64 = firmware_sensor::SCAN_RATE_HZ as u64;
 /// What a host calls itself in a Hello.
 const CHIP: &str = "host";
@@ -65,6 +64,8 @@ struct Pair {
     drive: Drive,
     sensor_counters: SensorCounters,
     display: Display,
+    /// Scans in an output tick.
+    steps_per_tick: u64,
     sensor_end: End,
     display_end: End,
     tape: Tape,
@@ -82,7 +83,10 @@ impl Pair {
             scans: [[0; CHANNELS]; SCANS_PER_SAMPLE],
             drive: Drive::default(),
             sensor_counters: SensorCounters::default(),
-            display: Display::new(scene.display_configuration()),
+            steps_per_tick: u64::from(
+                firmware_sensor::SCAN_RATE_HZ / scene.display_configuration().update_rate.hz(),
+            ),
+            display: display_of(scene)?,
             sensor_end: end(Role::Sensor, b'S', 0),
             display_end: end(Role::Display, b'D', 1),
             tape: Tape::new(scene.duration_s),
@@ -96,7 +100,7 @@ impl Pair {
         self.sensor_end.greet(now_ns, &mut self.tape.digest);
         self.display_end.greet(now_ns, &mut self.tape.digest);
         self.scan(step, now_ns, t_s);
-        if step.is_multiple_of(STEPS_PER_TICK) {
+        if step.is_multiple_of(self.steps_per_tick) {
             self.tick(now_ns, t_s);
         }
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
@@ -134,7 +138,7 @@ impl Pair {
                     tape.received(&estimate, due_ns);
                     display.on_estimate(&estimate);
                 }
-                Message::Stop(_) => display.stop(),
+                Message::Stop(stop) => display.stop(stop.reason),
                 _ => {}
             },
         );
@@ -189,7 +193,7 @@ impl Pair {
             encoder,
             position_mm,
         });
-        if self.display.tick(encoder) {
+        if self.display.tick(encoder, &Senses::default()).send {
             self.tape.output(now_ns, self.display.words());
         }
         if let Some(motion) = self.display.motion(now_ns / 1_000) {
@@ -244,6 +248,19 @@ impl Pair {
             log: Vec::new(),
         }
     }
+}
+
+/// A display whose converters have started, set as the scene asks.
+fn display_of(scene: &Scene) -> Result<Display, SceneError> {
+    let settings = scene.display_settings().map_err(|refusal| SceneError {
+        file: scene.name.clone(),
+        line: None,
+        key: "display".to_owned(),
+        message: refusal.to_string(),
+    })?;
+    let mut display = Display::new(&settings, None);
+    display.started(Ok(()));
+    Ok(display)
 }
 
 /// A board's port towards the other board, and the wire that leads away from it.

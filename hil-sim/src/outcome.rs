@@ -63,6 +63,7 @@ fn truth<'a>(scene: &'a Scene, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Truth<'
     Truth {
         sensor: scene.sensor_configuration(),
         display: scene.display_configuration(),
+        actuators: *scene.display.actuators,
         ..Truth::new(&scene.name, scene.estimator.method_name(), wavelength_mm)
     }
 }

@@ -6,9 +6,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
+use firmware_display::Settings;
+use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
 
 mod bounds;
+mod display;
 mod error;
 mod read;
 mod series;
@@ -16,6 +18,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub use display::Display;
 pub use error::SceneError;
 pub use series::Series;
 
@@ -45,8 +48,8 @@ pub struct Scene {
     pub link: Link,
     /// What the sensor makes of it.
     pub estimator: Estimator,
-    /// How the fifty actuators share the stimulus (`[display] mode`). Default uniform.
-    pub display_mode: Mode,
+    /// How the display board is set.
+    pub display: Display,
     /// What must come out.
     pub expect: Expect,
 }
@@ -324,7 +327,7 @@ impl Scene {
             force: Force::default(),
             link: Link::default(),
             estimator: Estimator::default(),
-            display_mode: Mode::Uniform,
+            display: Display::default(),
             expect: Expect::default(),
         }
     }
@@ -352,12 +355,17 @@ impl Scene {
         }
     }
 
+    /// What a display board holds that has taken what the scene asks of it.
+    ///
+    /// # Errors
+    /// The first value out of its range: none, in a scene that was loaded.
+    pub fn display_settings(&self) -> Result<Settings, Refusal> {
+        Settings::new(self.display.configuration, &self.display.actuators)
+    }
+
     /// What the scene asks of the display board.
     pub fn display_configuration(&self) -> DisplayConfiguration {
-        DisplayConfiguration {
-            mode: self.display_mode,
-            ..DisplayConfiguration::default()
-        }
+        self.display.configuration
     }
 }
 

@@ -1,8 +1,9 @@
 //! What a scene knows and the firmware does not: the ground on which a recording is judged.
 
-use firmware_display::array;
 use firmware_sensor::counting::PAPERS_WINDOW_MS;
-use protocol::{DisplayConfiguration, Method, Mode, SensorConfiguration};
+use protocol::{
+    ACTUATORS, Actuator, DEFAULT_ACTUATORS, DisplayConfiguration, Method, Mode, SensorConfiguration,
+};
 
 /// The truth behind a [`crate::recording::Recording`], lent by the scene that was run.
 ///
@@ -20,6 +21,8 @@ pub struct Truth<'a> {
     pub sensor: SensorConfiguration,
     /// How the display board was set.
     pub display: DisplayConfiguration,
+    /// The display's actuators.
+    pub actuators: [Actuator; ACTUATORS],
     /// The actuator whose voltage is measured, below [`crate::recording::ACTUATORS`].
     pub reference_actuator: usize,
 }
@@ -34,6 +37,7 @@ impl<'a> Truth<'a> {
             wavelength_mm,
             sensor: SensorConfiguration::default(),
             display: DisplayConfiguration::default(),
+            actuators: DEFAULT_ACTUATORS,
             reference_actuator: 24,
         }
     }
@@ -64,10 +68,7 @@ impl<'a> Truth<'a> {
     pub fn reference_place_mm(&self) -> f64 {
         match self.display.mode {
             Mode::Uniform => 0.0,
-            Mode::Travelling => {
-                let place = array::place(self.reference_actuator, protocol::actuators::DEFAULT_PITCH_UM);
-                f64::from(place.x_um) * 1e-3
-            }
+            Mode::Travelling => f64::from(self.actuators[self.reference_actuator].x_um) * 1e-3,
         }
     }
 }

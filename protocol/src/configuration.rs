@@ -194,6 +194,37 @@ pub struct Refusal {
     pub high: i64,
 }
 
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self {
+            setting,
+            index,
+            low,
+            high,
+        } = self;
+        match setting {
+            Setting::Role => write!(f, "the configuration is for the other board"),
+            Setting::Actuators => write!(
+                f,
+                "Actuators names neither the description in force nor the one that was sent, {low:#010x}"
+            ),
+            Setting::ActuatorsFirst => {
+                write!(
+                    f,
+                    "no block of actuators begins at {index}: give a multiple of ten up to {high}"
+                )
+            }
+            Setting::ActuatorX | Setting::ActuatorY | Setting::ActuatorGain => {
+                write!(
+                    f,
+                    "{setting:?} of actuator {index} is out of range: give {low} to {high}"
+                )
+            }
+            _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
+        }
+    }
+}
+
 /// A setting that was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Setting {

@@ -17,7 +17,9 @@ pub mod sender;
 mod sequence;
 pub mod status;
 
-pub use actuators::{ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN};
+pub use actuators::{
+    ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN,
+};
 pub use clock::ClockOffset;
 pub use configuration::{
     Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, Refusal,

@@ -1,29 +1,38 @@
 //! What a board takes as its configuration, and which setting it names if it does not.
 
-use protocol::{DisplayConfiguration, SensorConfiguration, Setting};
+use protocol::actuators::{self, grid};
+use protocol::{
+    Configuration, DEFAULT_ACTUATORS, DisplayConfiguration, Refusal, SensorConfiguration, Setting,
+};
 
 /// The answer to the sensor's default configuration with one change.
-fn sensor(change: impl FnOnce(&mut SensorConfiguration)) -> Result<(), Setting> {
+fn sensor(change: impl FnOnce(&mut SensorConfiguration)) -> Result<(), Refusal> {
     let mut configuration = SensorConfiguration::DEFAULT;
     change(&mut configuration);
     configuration.check()
 }
 
 /// The answer to the display's default configuration with one change.
-fn display(change: impl FnOnce(&mut DisplayConfiguration)) -> Result<(), Setting> {
+fn display(change: impl FnOnce(&mut DisplayConfiguration)) -> Result<(), Refusal> {
     let mut configuration = DisplayConfiguration::DEFAULT;
     change(&mut configuration);
     configuration.check()
 }
 
 /// That `check` takes both ends of `low..=high` and refuses their neighbours by the name of `setting`.
-fn assert_range(setting: Setting, low: u32, high: u32, check: impl Fn(u32) -> Result<(), Setting>) {
+fn assert_range(setting: Setting, low: u32, high: u32, check: impl Fn(u32) -> Result<(), Refusal>) {
+    let refusal = Refusal {
+        setting,
+        index: 0,
+        low: low.into(),
+        high: high.into(),
+    };
     assert_eq!(check(low), Ok(()), "{setting:?} {low}");
     assert_eq!(check(high), Ok(()), "{setting:?} {high}");
     if let Some(below) = low.checked_sub(1) {
-        assert_eq!(check(below), Err(setting), "{below}");
+        assert_eq!(check(below), Err(refusal), "{below}");
     }
-    assert_eq!(check(high + 1), Err(setting), "{}", high + 1);
+    assert_eq!(check(high + 1), Err(refusal), "{}", high + 1);
 }
 
 #[test]
@@ -79,8 +88,14 @@ fn each_of_the_displays_settings_is_taken_in_its_range_and_refused_beside_it() {
     assert_range(Setting::FadeOutMs, 1, 1_000, |n| {
         display(|c| c.fade_out_ms = n as u16)
     });
-    assert_range(Setting::PitchUm, 100, 10_000, |n| {
-        display(|c| c.pitch_um = n as u16)
+    assert_range(Setting::GlideMs, 0, 500, |n| {
+        display(|c| c.glide_ms = n as u16)
+    });
+    assert_range(Setting::ReferenceLsb, 0, 2_000, |n| {
+        display(|c| c.reference_lsb = n as u16)
+    });
+    assert_range(Setting::FullDriveS, 10, 3_600, |n| {
+        display(|c| c.full_drive_s = n as u16)
     });
     assert_range(Setting::AmplitudeMv, 0, 5_000, |n| {
         display(|c| c.amplitude_mv = n as u16)
@@ -94,5 +109,63 @@ fn the_first_setting_out_of_its_range_is_named() {
         c.bank_candidates = 0;
         c.arm_full_scale_um_s = 0;
     });
-    assert_eq!(refused, Err(Setting::Gauges));
+    assert_eq!(
+        refused.map_err(|refusal| refusal.setting),
+        Err(Setting::Gauges)
+    );
+}
+
+#[test]
+fn every_change_of_a_configuration_gives_it_another_hash() {
+    let default = Configuration::Display(DisplayConfiguration::DEFAULT);
+    let of = |change: fn(&mut DisplayConfiguration)| {
+        let mut configuration = DisplayConfiguration::DEFAULT;
+        change(&mut configuration);
+        Configuration::Display(configuration).hash()
+    };
+    let hashes = [
+        default.hash(),
+        Configuration::Sensor(SensorConfiguration::DEFAULT).hash(),
+        of(|c| c.amplitude_mv -= 1),
+        of(|c| c.glide_ms += 1),
+        of(|c| c.actuators ^= 1),
+        of(|c| c.mode = protocol::Mode::Travelling),
+    ];
+    for (at, hash) in hashes.iter().enumerate() {
+        assert!(!hashes[..at].contains(hash), "{at}");
+    }
+}
+
+#[test]
+fn the_default_grid_is_centred_and_its_neighbours_are_a_pitch_apart() {
+    let actuators = grid(1_500);
+    assert_eq!(actuators, DEFAULT_ACTUATORS);
+    let sums = actuators.iter().fold((0, 0), |(x, y), a| {
+        (x + i32::from(a.x_um), y + i32::from(a.y_um))
+    });
+    assert_eq!(sums, (0, 0));
+    assert_eq!((actuators[0].x_um, actuators[0].y_um), (-6_750, -3_000));
+    assert_eq!(actuators[1].x_um - actuators[0].x_um, 1_500);
+    assert_eq!(actuators[10].y_um - actuators[0].y_um, 1_500);
+    assert_eq!(actuators::check(&actuators), Ok(()));
+    assert_eq!(actuators::check(&grid(4_000)), Ok(()));
+}
+
+#[test]
+fn every_property_of_every_actuator_shows_in_the_hash() {
+    let before = actuators::hash(&DEFAULT_ACTUATORS);
+    for index in 0..DEFAULT_ACTUATORS.len() {
+        let changes: [fn(&mut protocol::Actuator); 5] = [
+            |a| a.x_um += 1,
+            |a| a.y_um -= 1,
+            |a| a.gain_q15 -= 1,
+            |a| a.phase += 1,
+            |a| a.inverted = true,
+        ];
+        for change in changes {
+            let mut actuators = DEFAULT_ACTUATORS;
+            change(&mut actuators[index]);
+            assert_ne!(actuators::hash(&actuators), before, "{index}");
+        }
+    }
 }

@@ -5,7 +5,9 @@
 
 mod messages;
 
-use messages::{CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples};
+use messages::{
+    CONTACTS, HEALTHS, HOLDS, METHODS, SETTINGS, TRIPS, events, greeted_receiver, hello, samples,
+};
 use protocol::{Event, HELLO_LENGTH, Hello, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver};
 use protocol::{SCHEMA_HASH, frame};
 
@@ -17,17 +19,17 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c0215bf44858c2e42a44b7353544d3332463432395a4901010101010201060196\
-         651f1400",
+        "030201065244474c0315b86bcc75a20842907353544d3332463432395a49010101010102010601b9\
+         81eec200",
     ),
     (
         "estimate",
-        "0b020101ac02c08db7010101010340010103403f0220034401010a2040010301ab02020108020305\
-         82748ad700",
+        "0b020101ac02c08db7010101010340010103403f0220034401010d20400103e0c50801ab02020108\
+         0203054fa43c1d00",
     ),
     (
         "estimate without a wavelength",
-        "0402010103904e01010101010101010101010101021f0101010105f5fabcad00",
+        "0402010103904e0101010101010101010101010101021f01010101058d096e7c00",
     ),
     ("motion", "14020102dc0bc08db701f1c001e0c5084a1aa3f300"),
     (
@@ -45,8 +47,8 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "display's status",
-        "40020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
-         07f107f207f307f40701904ea84601f4030203044fb28f1b00",
+        "49020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
+         07f107f207f307f40701904ea84601f40302030405060708090a0b04021658282500",
     ),
     (
         "configure a sensor",
@@ -54,20 +56,30 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configure a display",
-        "120201050101f4031432dc0b882737898b4200",
+        "1b020105010101f4031432148827ac02d804f8acd19101b14f891300",
     ),
     (
         "configuration taken",
-        "0402010601150150021796011401dc0b900301c09a0c66acba8c00",
+        "0402010606f8d2bac101150150021796011401dc0b900301c09a0c72295c2300",
     ),
     (
         "configuration refused",
-        "14020106010d0101f4031432dc0b88276617dfd500",
+        "28020106011225bfb802c0b80284868808010101f4031432148827ac02d804f8acd19101bd07c38c\
+         00",
     ),
     ("ping", "0a020107e807da39d20900"),
     ("pong", "0e020108e807d00f82102723874600"),
     ("stop by the operator", "0402010905e9c64d5b00"),
     ("stop by the host", "09020109017ff64a2c00"),
+    (
+        "actuators",
+        "0502010a1409f80a80800280800116b717f80a80800280800101ef2ef80a80800280800116a746f8\
+         0a80800280800101df5df80a808002808001179775f80a80800280800101cf8c01f80a8080028080\
+         011887a401f80a80800280800101bfbb01f80a80800280800111f7d201f80a808002808001017c31\
+         6d4000",
+    ),
+    ("safety: driving", "0d02010bc08db70102a61d952a00"),
+    ("safety: stopped", "0e02010bc08db7010404d21faabc00"),
 ];
 
 fn bytes(hexadecimal: &str) -> Vec<u8> {
@@ -104,13 +116,13 @@ fn every_golden_frame_is_received_as_its_message() {
 
 #[test]
 fn the_golden_frames_show_every_variant() {
-    // Variant bytes 0 to 9, the largest of them the number of variants less one.
+    // Variant bytes 0 to 11, the largest of them the number of variants less one.
     let mut variants: Vec<u8> = samples()
         .iter()
         .map(|(_, message)| postcard::to_stdvec(message).expect("it encodes")[0])
         .collect();
     variants.dedup();
-    assert_eq!(variants, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
+    assert_eq!(variants, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 }
 
 #[test]
@@ -123,14 +135,16 @@ fn every_choice_within_a_message_has_its_byte() {
     assert_eq!(bytes(&HEALTHS), [0, 1, 2, 3, 4, 5]);
     assert_eq!(
         bytes(&SETTINGS),
-        std::array::from_fn::<u8, 14, _>(|n| n as u8)
+        std::array::from_fn::<u8, 21, _>(|n| n as u8)
     );
+    assert_eq!(bytes(&HOLDS), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(bytes(&TRIPS), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 }
 
 #[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 2);
-    assert_eq!(SCHEMA_HASH, 0x4ba4_422e_8c85_44bf);
+    assert_eq!(PROTOCOL_VERSION, 3);
+    assert_eq!(SCHEMA_HASH, 0x9042_08a2_75cc_6bb8);
 }
 
 #[test]

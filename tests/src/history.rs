@@ -1,9 +1,9 @@
 //! Replays what a display board did with its own library, word for word.
 
-use firmware_display::Display;
+use firmware_display::{Display, Senses, Settings};
 use hil_sim::recording::{ACTUATORS, EstimateRecord, Recording};
 use hil_sim::weather::BYTE_NS;
-use protocol::{DisplayConfiguration, MAX_FRAME};
+use protocol::MAX_FRAME;
 
 /// From an estimate's last byte at the UART until the output task has it, in ns, if the line is idle
 /// then: a byte's time (11 µs) until it counts as idle, as much of the simulator's own, and the
@@ -47,13 +47,12 @@ struct History {
 ///
 /// # Errors
 /// The first word that no history explains.
-pub fn replay(
-    recording: &Recording,
-    configuration: DisplayConfiguration,
-) -> Result<Replay, String> {
+pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, String> {
     let arrived = arrived(recording);
+    let mut display = Display::new(settings, None);
+    display.started(Ok(()));
     let mut histories = vec![History {
-        display: Display::new(configuration),
+        display,
         taken: 0,
         waiting: false,
         held_up: 0,
@@ -81,7 +80,7 @@ pub fn replay(
                     history.waiting = usual > taken;
                     history.held_up += usize::from(history.waiting);
                 }
-                let sent = history.display.tick(tick.encoder);
+                let sent = history.display.tick(tick.encoder, &Senses::default()).send;
                 let wanted = output.map(|output| &output.words);
                 match difference(sent.then(|| history.display.words()), wanted) {
                     // The run may end between a tick and its edge.

@@ -96,7 +96,7 @@ fn the_replay_finds_a_single_wrong_bit_of_an_estimate() {
 #[test]
 fn the_dacs_words_are_those_of_the_library_fed_with_the_same_encoder_and_estimates() {
     let recording = &RUBBED.recording;
-    let replay = history::replay(recording, RUBBED.scene.display_configuration()).unwrap();
+    let replay = history::replay(recording, &RUBBED.scene.display_settings().unwrap()).unwrap();
     assert_eq!(replay.outputs, recording.outputs.len());
     // 2 kHz for ten seconds, less what a hand near its turning point leaves unchanged.
     assert!(replay.outputs > 18_000, "{replay:?}");
@@ -109,7 +109,7 @@ fn the_replay_finds_a_single_wrong_bit() {
     let mut recording = RUBBED.recording.clone();
     let place = recording.outputs.len() / 2;
     recording.outputs[place].words[37] ^= 1;
-    let error = history::replay(&recording, RUBBED.scene.display_configuration()).unwrap_err();
+    let error = history::replay(&recording, &RUBBED.scene.display_settings().unwrap()).unwrap_err();
     assert!(error.contains("actuator 37"), "{error}");
     assert!(
         error.contains(&format!("after {place} equal outputs")),

@@ -1,8 +1,11 @@
-//! What a scene's `[estimator]` and `[gauges]` say reaches the sensor board's own configuration.
+//! What a scene says of the boards reaches their own configurations, as a whole or not at all.
 
 use hil_sim::elf::{self, ElfError};
 use hil_sim::scene::Scene;
-use protocol::{Configuration, ConfigurationReport, SensorConfiguration};
+use protocol::{
+    Configuration, ConfigurationReport, DisplayConfiguration, Mode, SensorConfiguration,
+    UpdateRate, actuators,
+};
 use tests::elves;
 use tests::run::{Run, scene};
 
@@ -23,6 +26,7 @@ fn assert_taken(sections: &str) -> SensorConfiguration {
     let wanted = scene.sensor_configuration();
     let taken = ConfigurationReport {
         refused: None,
+        hash: Configuration::Sensor(wanted).hash(),
         configuration: Configuration::Sensor(wanted),
     };
     assert_eq!(report, Some(taken), "{sections}");
@@ -115,7 +119,8 @@ fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
         ),
         "{error:?}"
     );
-    assert!(error.to_string().contains("BankCandidates"), "{error}");
+    let wanted = "BankCandidates is out of range: give 12 to 24";
+    assert!(error.to_string().contains(wanted), "{error}");
 }
 
 #[test]
@@ -127,4 +132,66 @@ fn a_scene_too_short_for_the_board_to_answer_is_no_result() {
     scene.duration_s = 0.001;
     let error = elf::run(&scene, elves::both()).unwrap_err();
     assert!(error.to_string().contains("longer duration_s"), "{error}");
+}
+
+/// A scene that asks the display board for what `change` makes of its default, and what came of it.
+fn display_asked(change: impl FnOnce(&mut hil_sim::scene::Display)) -> Result<(), String> {
+    let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
+    change(&mut scene.display);
+    scene.display.configuration.actuators = actuators::hash(&scene.display.actuators);
+    let wanted = Configuration::Display(scene.display.configuration);
+    let answer = elf::run(&scene, elves::both()).map(|(_, facts)| {
+        let report = facts.display_told.expect("it is not the default").report;
+        let taken = ConfigurationReport {
+            refused: None,
+            hash: wanted.hash(),
+            configuration: wanted,
+        };
+        assert_eq!(report, taken);
+    });
+    answer.map_err(|error| error.to_string())
+}
+
+#[test]
+fn every_setting_of_a_scene_becomes_the_display_boards_and_is_acknowledged_with_its_hash() {
+    let answer = display_asked(|display| {
+        display.configuration = DisplayConfiguration {
+            mode: Mode::Travelling,
+            update_rate: UpdateRate::Hz4000,
+            max_age_ms: 300,
+            fade_in_ms: 10,
+            fade_out_ms: 30,
+            glide_ms: 15,
+            amplitude_mv: 4_000,
+            reference_lsb: 250,
+            full_drive_s: 60,
+            actuators: 0,
+        };
+        *display.actuators = actuators::grid(700);
+        display.actuators[49].inverted = true;
+    });
+    assert_eq!(answer, Ok(()));
+}
+
+#[test]
+fn the_display_board_refuses_what_is_out_of_range_by_name_and_range() {
+    let cases: [(&dyn Fn(&mut hil_sim::scene::Display), &str); 3] = [
+        (
+            &|display| display.configuration.amplitude_mv = 5_001,
+            "AmplitudeMv is out of range: give 0 to 5000",
+        ),
+        (
+            &|display| display.actuators[37].gain_q15 = 32_769,
+            "ActuatorGain of actuator 37 is out of range: give 0 to 32768",
+        ),
+        (
+            &|display| display.actuators[3].x_um = -20_001,
+            "ActuatorX of actuator 3 is out of range: give -20000 to 20000",
+        ),
+    ];
+    for (change, wanted) in cases {
+        let answer = display_asked(change);
+        let error = answer.unwrap_err();
+        assert!(error.contains(wanted), "{error}\nwanted {wanted}");
+    }
 }

@@ -75,11 +75,11 @@ fn each_column_is_ahead_by_its_place_over_the_wavelength() {
     // Five counts a tick: a common edge in every tick of the measurement.
     let ticks = (TO_NS - FROM_NS) * u64::from(firmware_display::TICK_RATE_HZ) / 1_000_000_000;
     assert_eq!(measured().len() as u64, ticks);
-    let pitch_um = RUN.scene.display_configuration().pitch_um;
+    let actuators = &RUN.scene.display.actuators;
     let (_, first) = tone(0, hz);
     for actuator in 0..ACTUATORS {
         let (amplitude_v, phase) = tone(actuator, hz);
-        let ahead_mm = f64::from(place(actuator, pitch_um).x_um - place(0, pitch_um).x_um) * 1e-3;
+        let ahead_mm = f64::from(actuators[actuator].x_um - actuators[0].x_um) * 1e-3;
         let off = phase - first - ahead_mm / wavelength_mm;
         let off = off - off.round();
         // Words are rounded to 0.15 mV of 5 V; edges come within 20 µs of the same time after a tick.

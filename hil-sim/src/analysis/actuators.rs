@@ -253,7 +253,7 @@ mod tests {
         let mut truth = Truth::new("", "", &*run.surface_mm);
         truth.reference_actuator = 3;
         truth.display.mode = Mode::Travelling;
-        truth.display.pitch_um = 300;
+        truth.actuators = protocol::actuators::grid(300);
         let actuators = judge(&truth, &run.record());
         assert!(
             actuators.phase_error_rms_cycles.unwrap() < 0.0025,

@@ -134,6 +134,7 @@ impl Run {
                         counted_mm: Some(2.25),
                         range: Range::T1,
                         contact: Contact::Slip,
+                        velocity_um_s: 0,
                         lag_um: None,
                         gauges_used: 0b1_1101,
                         health: HEALTH,

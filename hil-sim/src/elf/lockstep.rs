@@ -4,7 +4,10 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
 
-use protocol::{Configuration, ConfigurationReport, Hello, MAX_FRAME, Message, Peer, Port, Role};
+use protocol::{
+    ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, Configuration, ConfigurationReport, Hello,
+    MAX_FRAME, Message, Peer, Port, Role,
+};
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -60,6 +63,8 @@ pub struct Cable {
 /// A host on the console that wants the board configured.
 pub struct ConsoleHost {
     port: Port,
+    /// What is to be sent before the configuration that names it.
+    described: Vec<Actuators>,
     wanted: Configuration,
     /// When it last asked.
     asked_ns: Option<u64>,
@@ -159,10 +164,17 @@ impl Lockstep {
 }
 
 impl ConsoleHost {
-    /// A host that asks for `wanted` as soon as the board has introduced itself.
-    pub fn new(wanted: Configuration) -> Self {
+    /// A host that asks for `wanted` as soon as the board has introduced itself, and sends the actuators
+    /// `described` before.
+    pub fn new(wanted: Configuration, described: Option<&[Actuator; ACTUATORS]>) -> Self {
+        let (blocks, _) = described.map_or(&[][..], |all| &all[..]).as_chunks();
+        let described = (0_u8..)
+            .step_by(ACTUATOR_BLOCK)
+            .zip(blocks)
+            .map(|(first, &actuators)| Actuators { first, actuators });
         Self {
             port: Port::new(Hello::new(Role::Host, "hil-sim", [0, 1, 0])),
+            described: described.collect(),
             wanted,
             asked_ns: None,
             told: None,
@@ -189,6 +201,9 @@ impl ConsoleHost {
             .asked_ns
             .is_none_or(|asked_ns| now_ns - asked_ns >= PATIENCE_NS);
         if self.told.is_none() && due && matches!(self.port.peer(), Peer::Known(_)) {
+            for &block in &self.described {
+                self.port.post(&Message::Actuators(block));
+            }
             self.port.post(&Message::Configure(self.wanted));
             self.asked_ns = Some(now_ns);
         }

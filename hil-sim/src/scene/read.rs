@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use protocol::{GAUGES, Method, Mode};
+use protocol::{GAUGES, Method};
 
 use super::bounds::{
     AMPLITUDE, BOUND, DAMPING, DELAY, DURATION, ENCODER_STEP, FORCE_SCALE, FREQUENCY, HUM, INSTANT,
     LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
     TRAVEL, WAVELENGTH,
 };
+use super::display;
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
@@ -39,7 +40,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     }
     let link = link(root.table("link")?)?;
     let estimator = estimator(root.table("estimator")?, &force)?;
-    let display_mode = display(root.table("display")?)?;
+    let display = display::read(root.table("display")?)?;
     if let Some(fault) = root.tables("fault")?.first() {
         return Err(fault.refuse(
             "kind",
@@ -63,7 +64,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         force,
         link,
         estimator,
-        display_mode,
+        display,
         expect,
     })
 }
@@ -424,16 +425,6 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
     })
 }
 
-fn display(mut table: Table<'_>) -> Result<Mode, SceneError> {
-    let mode = table.choice(
-        "mode",
-        &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
-        &[],
-    )?;
-    table.finish("")?;
-    Ok(mode)
-}
-
 fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
     let mean_mm = table.number("mean_mm", &WAVELENGTH)?;
     let mean_tolerance_mm = table.number("mean_tolerance_mm", &BOUND)?;
@@ -460,7 +451,7 @@ fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
 }
 
 /// The CSV file that `table` names.
-fn series(
+pub(super) fn series(
     table: &mut Table<'_>,
     headers: &[&str],
     check: impl Fn(Option<&[f64]>, &[f64]) -> Result<(), (usize, String)>,

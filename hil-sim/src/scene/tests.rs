@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::*;
 
+mod display;
 mod recorded;
 
 const SURFACE: &str = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
@@ -127,7 +128,7 @@ fn every_key_of_the_contract_parses() {
     assert_eq!(scene.arm.encoder_um, 50);
     assert_eq!(scene.surface.specimens.len(), 2);
     assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
-    assert_eq!(scene.display_mode, Mode::Travelling);
+    assert_eq!(scene.display.configuration.mode, protocol::Mode::Travelling);
     assert_eq!(scene.expect.wavelength_rms_percent, Some(1.0));
     assert_eq!(scene.expect.wrong_share_max, Some(0.001));
     assert_eq!(

@@ -77,12 +77,18 @@ pub fn content() -> impl Strategy<Value = Message> {
         gauges().prop_map(Message::Gauges),
         status().prop_map(Message::Status),
         configuration().prop_map(Message::Configure),
-        (proptest::option::of(setting()), configuration()).prop_map(|(refused, configuration)| {
-            Message::Configuration(ConfigurationReport {
-                refused,
-                configuration,
-            })
-        }),
+        (
+            proptest::option::of(refusal()),
+            any::<u32>(),
+            configuration()
+        )
+            .prop_map(|(refused, hash, configuration)| {
+                Message::Configuration(ConfigurationReport {
+                    refused,
+                    hash,
+                    configuration,
+                })
+            }),
         any::<u64>().prop_map(|sent_us| Message::Ping(Ping { sent_us })),
         any::<[u64; 3]>().prop_map(|[sent_us, received_us, answered_us]| {
             Message::Pong(Pong {
@@ -93,6 +99,18 @@ pub fn content() -> impl Strategy<Value = Message> {
         }),
         prop_oneof![Just(StopReason::Operator), Just(StopReason::Host)]
             .prop_map(|reason| Message::Stop(Stop { reason })),
+        (
+            any::<u8>(),
+            any::<[(i16, i16, u16, u16, bool); ACTUATOR_BLOCK]>()
+        )
+            .prop_map(|(first, actuators)| {
+                Message::Actuators(Actuators {
+                    first,
+                    actuators: actuators.map(actuator),
+                })
+            }),
+        (any::<u64>(), state())
+            .prop_map(|(instant_us, state)| Message::Safety(Safety { instant_us, state })),
     ]
 }
 
@@ -131,8 +149,32 @@ pub const HEALTHS: [GaugeHealth; 6] = [
     GaugeHealth::Hum,
 ];
 
+/// Every [`Hold`], in the wire's order.
+pub const HOLDS: [Hold; 6] = [
+    Hold::Stale,
+    Hold::Distrust,
+    Hold::Flood,
+    Hold::Contradiction,
+    Hold::Unheard,
+    Hold::FullDrive,
+];
+/// Every [`Trip`], in the wire's order.
+pub const TRIPS: [Trip; 12] = [
+    Trip::Operator,
+    Trip::Host,
+    Trip::EmergencyStop,
+    Trip::HandEncoder,
+    Trip::Converter,
+    Trip::Transfer,
+    Trip::Limit,
+    Trip::Memory,
+    Trip::Watchdog,
+    Trip::Panic,
+    Trip::Fault,
+    Trip::StackOverflow,
+];
 /// Every [`Setting`], in the wire's order.
-pub const SETTINGS: [Setting; 14] = [
+pub const SETTINGS: [Setting; 21] = [
     Setting::Role,
     Setting::WindowMs,
     Setting::CountedGauge,
@@ -145,8 +187,15 @@ pub const SETTINGS: [Setting; 14] = [
     Setting::MaxAgeMs,
     Setting::FadeInMs,
     Setting::FadeOutMs,
-    Setting::PitchUm,
+    Setting::GlideMs,
     Setting::AmplitudeMv,
+    Setting::ReferenceLsb,
+    Setting::FullDriveS,
+    Setting::Actuators,
+    Setting::ActuatorsFirst,
+    Setting::ActuatorX,
+    Setting::ActuatorY,
+    Setting::ActuatorGain,
 ];
 
 fn finite() -> impl Strategy<Value = f32> {
@@ -155,7 +204,7 @@ fn finite() -> impl Strategy<Value = f32> {
 
 fn estimate() -> impl Strategy<Value = Estimate> {
     (
-        any::<(u32, u64, bool, u8, Option<i32>)>(),
+        any::<(u32, u64, bool, u8, i32, Option<i32>)>(),
         [
             proptest::option::of(finite()),
             proptest::option::of(finite()),
@@ -167,7 +216,7 @@ fn estimate() -> impl Strategy<Value = Estimate> {
     )
         .prop_map(
             |(
-                (sequence, instant_us, valid, gauges_used, lag_um),
+                (sequence, instant_us, valid, gauges_used, velocity_um_s, lag_um),
                 [wavelength_mm, counted_mm],
                 [confidence, amplitude_lsb],
                 range,
@@ -184,6 +233,7 @@ fn estimate() -> impl Strategy<Value = Estimate> {
                     counted_mm,
                     range,
                     contact,
+                    velocity_um_s,
                     lag_um,
                     gauges_used,
                     health,
@@ -236,7 +286,7 @@ pub fn port(n: [u32; 13]) -> PortCounters {
 fn status() -> impl Strategy<Value = Status> {
     let role = prop_oneof![
         any::<[u32; 6]>().prop_map(|n| RoleCounters::Sensor(sensor_counters(n))),
-        any::<[u32; 7]>().prop_map(|n| RoleCounters::Display(display_counters(n))),
+        any::<[u32; 14]>().prop_map(|n| RoleCounters::Display(display_counters(n))),
     ];
     let reset = prop_oneof![
         Just(ResetCause::Power),
@@ -268,8 +318,8 @@ pub fn sensor_counters(n: [u32; 6]) -> SensorCounters {
     }
 }
 
-/// Display counters from seven numbers, in their order.
-pub fn display_counters(n: [u32; 7]) -> DisplayCounters {
+/// Display counters from fourteen numbers, in their order, and the longest state.
+pub fn display_counters(n: [u32; 14]) -> DisplayCounters {
     DisplayCounters {
         ticks: n[0],
         updates: n[1],
@@ -278,6 +328,14 @@ pub fn display_counters(n: [u32; 7]) -> DisplayCounters {
         refused_estimates: n[4],
         fades: n[5],
         spi_errors: n[6],
+        implausible: n[7],
+        flooded: n[8],
+        encoder_jumps: n[9],
+        converter_faults: n[10],
+        clears: n[11],
+        unheard: n[12],
+        changes: n[13],
+        state: DisplayState::Stopped(Trip::EmergencyStop),
     }
 }
 
@@ -319,25 +377,71 @@ fn configuration() -> impl Strategy<Value = Configuration> {
             ),
         (
             prop_oneof![Just(Mode::Uniform), Just(Mode::Travelling)],
-            any::<[u16; 5]>()
+            prop_oneof![Just(UpdateRate::Hz2000), Just(UpdateRate::Hz4000)],
+            any::<([u16; 7], u32)>()
         )
             .prop_map(
-                |(mode, [max_age_ms, fade_in_ms, fade_out_ms, pitch_um, amplitude_mv])| {
+                |(
+                    mode,
+                    update_rate,
+                    (
+                        [
+                            max_age_ms,
+                            fade_in_ms,
+                            fade_out_ms,
+                            glide_ms,
+                            amplitude_mv,
+                            reference_lsb,
+                            full_drive_s,
+                        ],
+                        actuators,
+                    ),
+                )| {
                     Configuration::Display(DisplayConfiguration {
                         mode,
+                        update_rate,
                         max_age_ms,
                         fade_in_ms,
                         fade_out_ms,
-                        pitch_um,
+                        glide_ms,
                         amplitude_mv,
+                        reference_lsb,
+                        full_drive_s,
+                        actuators,
                     })
                 }
             ),
     ]
 }
 
-fn setting() -> impl Strategy<Value = Setting> {
-    proptest::sample::select(SETTINGS.to_vec())
+fn refusal() -> impl Strategy<Value = Refusal> {
+    let setting = proptest::sample::select(SETTINGS.to_vec());
+    (setting, any::<(u8, i64, i64)>()).prop_map(|(setting, (index, low, high))| Refusal {
+        setting,
+        index,
+        low,
+        high,
+    })
+}
+
+fn actuator((x_um, y_um, gain_q15, phase, inverted): (i16, i16, u16, u16, bool)) -> Actuator {
+    Actuator {
+        x_um,
+        y_um,
+        gain_q15,
+        phase,
+        inverted,
+    }
+}
+
+fn state() -> impl Strategy<Value = DisplayState> {
+    prop_oneof![
+        Just(DisplayState::Boot),
+        Just(DisplayState::Ready),
+        Just(DisplayState::Driving),
+        proptest::sample::select(HOLDS.to_vec()).prop_map(DisplayState::Fading),
+        proptest::sample::select(TRIPS.to_vec()).prop_map(DisplayState::Stopped),
+    ]
 }
 
 /// The longest message of the same kind: every number where its varint is longest. The match names
@@ -355,6 +459,7 @@ pub fn longest_like(message: &Message) -> Message {
             counted_mm: Some(f32::MAX),
             range: Range::T2,
             contact: Contact::StickSlip,
+            velocity_um_s: i32::MIN,
             lag_um: Some(i32::MIN),
             gauges_used: u8::MAX,
             health: [GaugeHealth::Hum; GAUGES],
@@ -380,11 +485,17 @@ pub fn longest_like(message: &Message) -> Message {
             watchdog_resets: u32::MAX,
             peer: port([u32::MAX; 13]),
             console: port([u32::MAX; 13]),
-            role: RoleCounters::Display(display_counters([u32::MAX; 7])),
+            role: RoleCounters::Display(display_counters([u32::MAX; 14])),
         }),
         Message::Configure(_) => Message::Configure(longest_configuration()),
         Message::Configuration(_) => Message::Configuration(ConfigurationReport {
-            refused: Some(Setting::AmplitudeMv),
+            refused: Some(Refusal {
+                setting: Setting::ActuatorGain,
+                index: u8::MAX,
+                low: i64::MIN,
+                high: i64::MIN,
+            }),
+            hash: u32::MAX,
             configuration: longest_configuration(),
         }),
         Message::Ping(_) => Message::Ping(Ping { sent_us: u64::MAX }),
@@ -395,6 +506,14 @@ pub fn longest_like(message: &Message) -> Message {
         }),
         Message::Stop(_) => Message::Stop(Stop {
             reason: StopReason::Host,
+        }),
+        Message::Actuators(_) => Message::Actuators(Actuators {
+            first: u8::MAX,
+            actuators: [actuator((i16::MIN, i16::MIN, u16::MAX, u16::MAX, true)); ACTUATOR_BLOCK],
+        }),
+        Message::Safety(_) => Message::Safety(Safety {
+            instant_us: u64::MAX,
+            state: DisplayState::Stopped(Trip::StackOverflow),
         }),
     }
 }
@@ -432,11 +551,15 @@ pub fn samples() -> Vec<(&'static str, Message)> {
     });
     let display = Configuration::Display(DisplayConfiguration {
         mode: Mode::Travelling,
+        update_rate: UpdateRate::Hz4000,
         max_age_ms: 500,
         fade_in_ms: 20,
         fade_out_ms: 50,
-        pitch_um: 1_500,
+        glide_ms: 20,
         amplitude_mv: 5_000,
+        reference_lsb: 300,
+        full_drive_s: 600,
+        actuators: 0x1234_5678,
     });
     let status = |role| {
         Message::Status(Status {
@@ -462,6 +585,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 counted_mm: Some(2.5),
                 range: Range::T2,
                 contact: Contact::StickSlip,
+                velocity_um_s: 70_000,
                 lag_um: Some(-150),
                 gauges_used: 0b0_0010,
                 health: [
@@ -485,6 +609,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 counted_mm: None,
                 range: Range::T1,
                 contact: Contact::Unknown,
+                velocity_um_s: 0,
                 lag_um: None,
                 gauges_used: 0b1_1111,
                 health: [GaugeHealth::Good; GAUGES],
@@ -520,7 +645,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         (
             "display's status",
             status(RoleCounters::Display(display_counters([
-                10_000, 9_000, 1, 500, 2, 3, 4,
+                10_000, 9_000, 1, 500, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11,
             ]))),
         ),
         ("configure a sensor", Message::Configure(sensor)),
@@ -529,13 +654,20 @@ pub fn samples() -> Vec<(&'static str, Message)> {
             "configuration taken",
             Message::Configuration(ConfigurationReport {
                 refused: None,
+                hash: sensor.hash(),
                 configuration: sensor,
             }),
         ),
         (
             "configuration refused",
             Message::Configuration(ConfigurationReport {
-                refused: Some(Setting::AmplitudeMv),
+                refused: Some(Refusal {
+                    setting: Setting::ActuatorX,
+                    index: 37,
+                    low: -20_000,
+                    high: 20_000,
+                }),
+                hash: 0x0102_0304,
                 configuration: display,
             }),
         ),
@@ -558,6 +690,30 @@ pub fn samples() -> Vec<(&'static str, Message)> {
             "stop by the host",
             Message::Stop(Stop {
                 reason: StopReason::Host,
+            }),
+        ),
+        (
+            "actuators",
+            Message::Actuators(Actuators {
+                first: 20,
+                actuators: core::array::from_fn(|i| {
+                    let i = i as i16;
+                    actuator((-1_500 * i, 700, 0x8000, 0x4000, i % 2 == 1))
+                }),
+            }),
+        ),
+        (
+            "safety: driving",
+            Message::Safety(Safety {
+                instant_us: 3_000_000,
+                state: DisplayState::Driving,
+            }),
+        ),
+        (
+            "safety: stopped",
+            Message::Safety(Safety {
+                instant_us: 3_000_000,
+                state: DisplayState::Stopped(Trip::Converter),
             }),
         ),
     ]

@@ -7,17 +7,17 @@ use super::super::{Scene, SceneError};
 use super::SURFACE;
 
 /// A folder of its own for a test's CSV files, removed at the end.
-struct Folder(PathBuf);
+pub(super) struct Folder(PathBuf);
 
 impl Folder {
-    fn new(test: &str) -> Self {
+    pub(super) fn new(test: &str) -> Self {
         let path = std::env::temp_dir().join(format!("hil-sim-{}-{test}", std::process::id()));
         fs::create_dir_all(&path).unwrap();
         Self(path)
     }
 
     /// Loads a scene with `section`, whose CSV file `data.csv` holds `csv`.
-    fn load(&self, section: &str, csv: &str) -> Result<Scene, SceneError> {
+    pub(super) fn load(&self, section: &str, csv: &str) -> Result<Scene, SceneError> {
         fs::write(self.0.join("data.csv"), csv).unwrap();
         let scene = self.0.join("x.toml");
         fs::write(&scene, format!("{SURFACE}{section}")).unwrap();
