@@ -2,6 +2,7 @@
 
 pub mod actuators;
 mod cycles;
+pub mod edges;
 pub mod estimates;
 pub mod mean;
 pub mod phase;

@@ -71,7 +71,9 @@ mod tests {
         let held = Held::new(&edges, &volts);
         // The window ends between two ticks, of which the hold makes an error of half a tick's step
         // at most: 5 V · 2π 5.4 / 2 kHz · 0.25 ms per second.
-        let whole = held.farthest_mean((1.0, 4.5), about_a_second_s(5.4)).unwrap();
+        let whole = held
+            .farthest_mean((1.0, 4.5), about_a_second_s(5.4))
+            .unwrap();
         assert!(whole.abs() < 2.2e-5, "{whole}");
         // 5.4 cycles: the mean of the 0.4 left over is at most 5 V sin(π 0.4) / (π 5.4).
         let second = held.farthest_mean((1.0, 4.5), 1.0).unwrap();
@@ -90,7 +92,10 @@ mod tests {
     #[test]
     fn a_window_longer_than_what_is_looked_at_has_no_mean() {
         let (edges, volts) = held(|_| 1.0);
-        assert_eq!(Held::new(&edges, &volts).farthest_mean((0.0, 0.5), 1.0), None);
+        assert_eq!(
+            Held::new(&edges, &volts).farthest_mean((0.0, 0.5), 1.0),
+            None
+        );
     }
 
     #[test]

@@ -77,10 +77,7 @@ pub fn spectra(
                 sum[bin].0 += step * turn.0;
                 sum[bin].1 += step * turn.1;
             }
-            turn = (
-                turn.0 * cos + turn.1 * sin,
-                turn.1 * cos - turn.0 * sin,
-            );
+            turn = (turn.0 * cos + turn.1 * sin, turn.1 * cos - turn.0 * sin);
         }
     }
     sums.into_iter()
@@ -133,7 +130,10 @@ impl Spectrum {
     /// The highest peak within [`LOBE_BINS`] of `frequency_hz`.
     pub fn line(&self, frequency_hz: f64) -> Option<Line> {
         let middle = (frequency_hz / self.bin_hz).round() as usize;
-        self.highest(middle.saturating_sub(LOBE_BINS)..middle + LOBE_BINS + 1, |_| true)
+        self.highest(
+            middle.saturating_sub(LOBE_BINS)..middle + LOBE_BINS + 1,
+            |_| true,
+        )
     }
 
     /// The highest line that is neither the one at `frequency_hz` nor the mean.
@@ -216,7 +216,10 @@ mod tests {
             let due = 5.0 * sinc(std::f64::consts::PI * frequency_hz / 2_000.0);
             assert!((line.frequency_hz - frequency_hz).abs() < 0.01, "{line:?}");
             // A parabola through the logarithm of this window's lobe is right to a hundredth of a dB.
-            assert!((line.amplitude_v / due - 1.0).abs() < 2e-3, "{line:?} {due}");
+            assert!(
+                (line.amplitude_v / due - 1.0).abs() < 2e-3,
+                "{line:?} {due}"
+            );
             // What is left is the rounding of the sums.
             let spur = spectrum.worst_spur(frequency_hz).unwrap();
             assert!(spur.amplitude_v < 5e-8, "{spur:?}");
@@ -235,7 +238,10 @@ mod tests {
             .unwrap();
         let due = 5e-5 * sinc(std::f64::consts::PI * 612.0 / 2_000.0);
         assert!((spur.frequency_hz - 612.0).abs() < 0.05, "{spur:?}");
-        assert!((spur.amplitude_v / due - 1.0).abs() < 2e-3, "{spur:?} {due}");
+        assert!(
+            (spur.amplitude_v / due - 1.0).abs() < 2e-3,
+            "{spur:?} {due}"
+        );
     }
 
     #[test]
@@ -254,7 +260,10 @@ mod tests {
         let height = 10.0 * (std::f64::consts::PI * frequency_hz / 2_000.0).sin();
         let due = late_s * 1_000.0 * height;
         assert!((spur.frequency_hz - 960.0).abs() < 0.05, "{spur:?}");
-        assert!((spur.amplitude_v / due - 1.0).abs() < 0.01, "{spur:?} {due}");
+        assert!(
+            (spur.amplitude_v / due - 1.0).abs() < 0.01,
+            "{spur:?} {due}"
+        );
     }
 
     #[test]

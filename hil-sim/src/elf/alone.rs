@@ -371,6 +371,7 @@ impl FarEnd {
                     self.weather.push(self.free_ns, byte);
                 } else {
                     board.wire(PEER_UART).hear(self.free_ns, byte);
+                    self.heard.hear(&[(self.free_ns, byte)]);
                 }
             }
         }
