@@ -8,6 +8,7 @@ use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
+mod budget;
 mod chart;
 mod cost;
 mod demo;
@@ -38,6 +39,9 @@ enum Command {
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
     Cost(Cost),
+    /// Counts what the display's ELF spends its instructions on, update by update and part by part, on an
+    /// emulated board: exit status 1 if it is more than 15 % of them at 2 kHz
+    Budget(budget::Budget),
     /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
     /// heat maps. Run again, it goes on where it was stopped
     Map(map::Maps),
@@ -137,6 +141,7 @@ impl Arguments {
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
+            Command::Budget(budget) => budget.execute(),
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
             Command::Chart(chart) => chart.execute(),

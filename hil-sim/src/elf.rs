@@ -5,6 +5,7 @@ pub mod alone;
 pub mod cost;
 mod display;
 mod firmware;
+pub mod instructions;
 mod lockstep;
 mod nucleo;
 mod rtt;

@@ -26,7 +26,7 @@ pub(super) struct Measured {
     out: PathBuf,
     /// A little of it only, to see that it works
     #[arg(long)]
-    quick: bool,
+    pub(super) quick: bool,
 }
 
 impl Measured {
@@ -36,7 +36,7 @@ impl Measured {
         Ok(self.firmware()?)
     }
 
-    fn firmware(&self) -> Result<Firmware, FirmwareError> {
+    pub(super) fn firmware(&self) -> Result<Firmware, FirmwareError> {
         Firmware::read(&self.display_elf, Role::Display)
     }
 

@@ -122,11 +122,31 @@ pub struct AloneRun {
     pub dac_frame_errors: u64,
 }
 
+/// Somebody who looks on while the board runs.
+pub(super) trait Witness: Send + 'static {
+    /// The run has come to an instant at which the far end is served, each millisecond.
+    fn on_look(&mut self, _at_ns: u64, _host: &mut dyn Host) {}
+
+    /// Every access, stop and hit, once the models have settled.
+    fn on_settled(&mut self, _settled: &Settled) {}
+}
+
+impl Witness for () {}
+
 /// Runs `firmware` as `alone` says.
 ///
 /// # Errors
 /// If the board can't be emulated, stops before the end, or refuses the configuration.
 pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
+    run_before(alone, firmware, ()).map(|(run, ())| run)
+}
+
+/// The same, before a witness, who is given back.
+pub(super) fn run_before<W: Witness>(
+    alone: Alone,
+    firmware: &Firmware,
+    witness: W,
+) -> Result<(AloneRun, W), ElfError> {
     const BOARD: &str = "display";
     let board_error = |reason: String| ElfError::Board {
         board: BOARD,
@@ -150,6 +170,7 @@ pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
         next_log_ns: LOG_NS,
         end_ns,
         warm: None,
+        witness,
     };
     let started = Instant::now();
     let images = [firmware.image.clone()];
@@ -174,7 +195,13 @@ pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
     let resets = finished.session.resets().len();
     let (pins, part) = finished.session.board_mut().pins();
     let left = pins.leave(part);
-    let Solo { far, log, warm, .. } = finished.driver;
+    let Solo {
+        far,
+        log,
+        warm,
+        witness,
+        ..
+    } = finished.driver;
     let Some(configured_ns) = far.configured_ns else {
         return Err(ElfError::Configuration {
             board: BOARD,
@@ -190,7 +217,7 @@ pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
         None => (started, 0.0),
     };
     let log = log.map(|log| log.lines()).unwrap_or_default();
-    Ok(AloneRun {
+    let run = AloneRun {
         configured_ns,
         motions: far.motions,
         instructions: finished.stop.map_or(0, |stop| stop.instruction_count),
@@ -216,7 +243,8 @@ pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
         },
         statuses: far.statuses,
         safety: far.safety,
-    })
+    };
+    Ok((run, witness))
 }
 
 /// The scripted sensor, and the way from it to the board.
@@ -391,7 +419,7 @@ impl FarEnd {
     }
 }
 
-struct Solo {
+struct Solo<W> {
     far: FarEnd,
     log: Option<Log>,
     next_look_ns: u64,
@@ -399,15 +427,17 @@ struct Solo {
     end_ns: u64,
     /// When the emulator had run for [`WARM_UP_NS`].
     warm: Option<Instant>,
+    witness: W,
 }
 
-impl Driver<Nucleo<DisplayPins>> for Solo {
+impl<W: Witness> Driver<Nucleo<DisplayPins>> for Solo<W> {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<DisplayPins>>,
         _host: &mut dyn Host,
         settled: Settled,
     ) {
+        self.witness.on_settled(&settled);
         if let Settled::Access {
             access:
                 Access {
@@ -439,6 +469,7 @@ impl Driver<Nucleo<DisplayPins>> for Solo {
         }
         if now_ns >= self.next_look_ns {
             self.far.look(session.board_mut(), now_ns);
+            self.witness.on_look(now_ns, host);
             if now_ns >= self.end_ns || self.far.refused.is_some() {
                 return None;
             }
