@@ -1,52 +1,38 @@
-//! Output ticks of a moving hand: 500 µs each on the board.
+//! Output ticks of a moving hand, the stimulus alone: 500 or 250 µs each on the board.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use firmware_display::Display;
-use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
+use firmware_display::Stimulus;
+use firmware_display::phase::Wavelength;
+use protocol::actuators::DEFAULT_ACTUATORS;
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-const TICKS: u64 = 2_000;
+/// The whole gain.
+const FULL: u32 = 1 << 31;
 
-fn estimate(sequence: u32, wavelength_mm: f32) -> Estimate {
-    Estimate {
-        sequence,
-        instant_us: 0,
-        wavelength_mm: Some(wavelength_mm),
-        valid: true,
-        confidence: 1.0,
-        amplitude_lsb: 100.0,
-        counted_mm: None,
-        range: Range::T1,
-        contact: Contact::Unknown,
-        velocity_um_s: 70_000,
-        lag_um: None,
-        gauges_used: 0b1_1111,
-        health: [GaugeHealth::Good; GAUGES],
-    }
-}
-
-/// One second: 70 mm/s, an estimate every 20 ticks.
-fn second(criterion: &mut Criterion, name: &str, mode: Mode) {
+/// One second: 7 counts a tick, an estimate every 10 ms.
+fn second(criterion: &mut Criterion, name: &str, mode: Mode, update_rate: UpdateRate) {
     let mut group = criterion.benchmark_group("tick");
-    group.throughput(Throughput::Elements(TICKS));
+    group.throughput(Throughput::Elements(update_rate.hz().into()));
     let configuration = DisplayConfiguration {
         mode,
-        ..DisplayConfiguration::default()
+        update_rate,
+        ..DisplayConfiguration::DEFAULT
     };
-    let mut display = Display::new(configuration);
-    let (mut sequence, mut encoder) = (0_u32, 0_u16);
+    let mut stimulus = Stimulus::new(&configuration, &DEFAULT_ACTUATORS);
+    let mut sequence = 0_u32;
     group.bench_function(name, |bencher| {
         bencher.iter(|| {
-            for tick in 0..TICKS {
-                if tick % 20 == 0 {
+            for tick in 0..update_rate.hz() {
+                if tick.is_multiple_of(update_rate.hz() / 100) {
                     sequence = sequence.wrapping_add(1);
-                    display.on_estimate(&estimate(sequence, 2.0 + (sequence % 7) as f32 * 0.01));
+                    if let Some(wavelength) = Wavelength::new(2.0 + (sequence % 7) as f32 * 0.01) {
+                        stimulus.follow(wavelength, 100.0);
+                    }
                 }
-                encoder = encoder.wrapping_add(7);
-                black_box(display.tick(encoder));
-                black_box(display.words());
-                black_box(display.motion(tick));
+                black_box(stimulus.tick(black_box(7), FULL));
+                black_box(stimulus.words());
             }
         });
     });
@@ -54,8 +40,14 @@ fn second(criterion: &mut Criterion, name: &str, mode: Mode) {
 }
 
 fn ticks(criterion: &mut Criterion) {
-    second(criterion, "one second, uniform", Mode::Uniform);
-    second(criterion, "one second, travelling", Mode::Travelling);
+    for (name, mode, update_rate) in [
+        ("2 kHz, uniform", Mode::Uniform, UpdateRate::Hz2000),
+        ("2 kHz, travelling", Mode::Travelling, UpdateRate::Hz2000),
+        ("4 kHz, uniform", Mode::Uniform, UpdateRate::Hz4000),
+        ("4 kHz, travelling", Mode::Travelling, UpdateRate::Hz4000),
+    ] {
+        second(criterion, name, mode, update_rate);
+    }
 }
 
 criterion_group!(benches, ticks);

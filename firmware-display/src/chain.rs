@@ -1,12 +1,14 @@
 //! The way to the four converters: a frame for each on SPI1, by DMA, and one edge of LDAC for all.
 //!
 //! ```text
-//! tick ─> select 1, stream on ─interrupt─> deselect 1, select 2, stream on ─ … ─interrupt─> deselect 4, LDAC
+//! tick ─> select 1, stream on ─interrupt─> deselect 1, select 2, stream on ─ … ─interrupt─> deselect 4, arm LDAC
+//!                                                                    then, if it is time: a look into one chip
 //! ```
 //!
-//! SPI1 and its DMA stream are set up once and stay on, so that a frame costs eight accesses to
-//! registers; embassy's `Spi::write` sets both up for each transfer and polls for its end. The task
-//! sleeps meanwhile, and learns at the next tick how it went.
+//! SPI1 and its DMA stream are set up once and stay on, so that a frame costs few accesses to registers;
+//! embassy's `Spi::write` sets both up for each transfer and polls for its end. The task sleeps
+//! meanwhile, and learns at the next tick how it went. A frame is an odd number of bytes: its first goes
+//! by itself, and the words by the stream, half as many transfers as if they went byte by byte.
 
 use core::cell::RefCell;
 use core::sync::atomic::{Ordering, fence};
@@ -16,40 +18,26 @@ use embassy_stm32::gpio::Output;
 use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::dma::regs::{Cr, Fcr, Ixr, Ndtr};
-use embassy_stm32::pac::dma::vals::{Dir, Dmdis, Pl};
+use embassy_stm32::pac::dma::vals::{Dir, Dmdis, Pl, Size};
 use embassy_stm32::pac::{DMA2, SPI1};
 use embassy_stm32::peripherals::{self, DMA2_CH3};
-use embassy_stm32::spi::{self, Spi, TxDma, mode::Master};
+use embassy_stm32::spi::{Spi, TxDma, mode::Master};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use firmware_display::ACTUATORS;
 use firmware_display::dac81416::{self, CHIPS, Frame};
+use firmware_display::look::{self, Look};
+use firmware_display::{ACTUATORS, Readback, Transfer};
 use static_cell::StaticCell;
 
-const STREAM: usize = 3;
-const CYCLES_PER_US: u32 = 168;
-const CYCLES_PER_BIT: u32 = CYCLES_PER_US * 1_000_000 / dac81416::MAX_CLOCK_HZ;
-/// The stream is done as soon as the last byte is in SPI1's buffer, when up to two bytes are still to
-/// be shifted out. One bit more, because the STM32F4's BSY is said to fall before the last edge does.
-const LAST_BYTES_CYCLES: u32 = (2 * 8 + 1) * CYCLES_PER_BIT;
-/// From a broadcast to LDAC, 4 µs: the family's t_BCASTWAIT (DAC81408, SLASER3A), read on the safe side
-/// as the time that the buffers take.
-const BROADCAST_CYCLES: u32 = 4 * CYCLES_PER_US;
-/// From a word to LDAC, and from LDAC's fall to its rise, 0.1 µs; the family asks for 80 and 20 ns
-/// (DAC81404, SLASEH2A).
-const LOAD_CYCLES: u32 = CYCLES_PER_US / 10 + 1;
-/// Looks at a flag that is due, before it is given up: a microsecond and more.
-const LOOKS: usize = 32;
+use crate::bus::{self, Bus, Width};
+use crate::{load, ticks};
 
-/// Why an update did not reach the converters: their outputs are those of the last that did, their
-/// buffers may hold anything.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// The stream could not read the frames, or SPI1 did not send what it was given.
-    Transfer,
-    /// It was still going on when the next tick came.
-    Stall,
-}
+const STREAM: usize = 3;
+/// From a broadcast to LDAC, 4 µs: the family's t_BCASTWAIT (DAC81408, SLASER3A), read on the safe side
+/// as the time that the buffers take. From any other word 0.1 µs; the family asks for 80 ns (DAC81404,
+/// SLASEH2A).
+const BROADCAST_CYCLES: u32 = 4 * bus::CYCLES_PER_US;
+const LOAD_CYCLES: u32 = bus::CYCLES_PER_US / 10 + 1;
 
 /// The task's end: fills the frames, starts them, and asks how they went.
 pub struct Chain {
@@ -57,23 +45,22 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// The way by SPI1, `spi` in 8-bit words and `stream`, to the chips behind `select`, with `load` on
-    /// all their LDACs. To be called once.
+    /// The way by SPI1, `spi` in 8-bit words and `stream`, to the chips behind `select`. To be called
+    /// once.
     pub fn new(
         spi: Spi<'static, Blocking, Master>,
         stream: Peri<'static, DMA2_CH3>,
         select: [Output<'static>; CHIPS],
-        load: Output<'static>,
     ) -> Self {
         static FRAMES: StaticCell<[Frame; CHIPS]> = StaticCell::new();
         let control = control(TxDma::<peripherals::SPI1>::request(&*stream));
         let line = Line {
-            spi,
+            bus: Bus::new(spi, select),
             control,
             _stream: stream,
-            select,
-            load,
-            transfers: [Transfer::default(); CHIPS],
+            shipments: [Shipment::default(); CHIPS],
+            look: None,
+            readback: Readback::None,
             state: State::Idle,
         };
         LINE.lock(|place| place.replace(Some(line)));
@@ -82,10 +69,10 @@ impl Chain {
         }
     }
 
-    /// Writes `bytes` to each chip and waits, with interrupts held off while a chip is selected: for
-    /// start-up, three bytes at a time, before [`Chain::open`].
-    pub fn write(&mut self, bytes: &[u8]) -> Result<(), spi::Error> {
-        (0..CHIPS).try_for_each(|chip| with_line(|line| line.write(chip, bytes)).unwrap_or(Ok(())))
+    /// Writes `bytes` to `chip`, waits, and returns what came back meanwhile; None if SPI1 does not send.
+    /// For start-up, before [`Chain::open`].
+    pub fn exchange(&mut self, chip: usize, bytes: look::Bytes) -> Option<look::Bytes> {
+        with_line(|line| line.bus.exchange(chip, bytes)).flatten()
     }
 
     /// Makes ready for [`Chain::send`].
@@ -93,21 +80,31 @@ impl Chain {
         with_line(|line| line.open());
     }
 
-    /// Starts an update of all channels to `words`; they change together, some 50 µs later.
-    /// [`Chain::finish`] comes between two of these.
-    pub fn send(&mut self, words: &[u16; ACTUATORS]) {
+    /// Starts an update of all channels to `words`; they change together with LDAC's next edge. Once
+    /// they are out, looks into a chip, if asked to. [`Chain::finish`] comes between two of these.
+    pub fn send(&mut self, words: &[u16; ACTUATORS], look: Option<Look>) {
         dac81416::stream(words, self.frames);
-        let transfers = self.frames.each_ref().map(Transfer::of);
+        let shipments = self.frames.each_ref().map(Shipment::of);
         with_line(|line| {
-            line.transfers = transfers;
+            line.shipments = shipments;
+            line.look = look;
             line.send(0);
         });
     }
 
-    /// How the last update went, if it has not been told yet. One that is still going on is aborted,
-    /// and the way is made ready for the next.
-    pub fn finish(&mut self) -> Result<(), Fault> {
-        with_line(Line::finish).unwrap_or(Ok(()))
+    /// Looks into a chip while nothing is sent, and waits for it.
+    pub fn look(&mut self, look: Look) {
+        with_line(|line| line.readback = line.bus.look(&look));
+    }
+
+    /// How the last update went, if it has not been told yet, and the last look. An update that is still
+    /// going on is aborted, and the way is made ready for the next.
+    pub fn finish(&mut self) -> (Transfer, Readback) {
+        with_line(|line| {
+            let readback = core::mem::take(&mut line.readback);
+            (line.finish(), readback)
+        })
+        .unwrap_or_default()
     }
 }
 
@@ -119,8 +116,8 @@ fn with_line<R>(act: impl FnOnce(&mut Line) -> R) -> Option<R> {
     LINE.lock(|line| line.try_borrow_mut().ok()?.as_mut().map(act))
 }
 
-/// Answers DMA2 stream 3: a frame is in SPI1, or something is wrong. Deadline: 450 µs for the four, the
-/// rest of the tick; missed, the next tick aborts them.
+/// Answers DMA2 stream 3: a frame is in SPI1, or something is wrong. Deadline: LDAC's edge, for the four;
+/// missed, they are sent again.
 pub struct FrameHandler;
 
 impl Handler<typelevel::DMA2_STREAM3> for FrameHandler {
@@ -130,20 +127,22 @@ impl Handler<typelevel::DMA2_STREAM3> for FrameHandler {
     }
 }
 
-/// Where a frame is, as the stream's registers take it.
+/// A frame as SPI1 and the stream's registers take it.
 #[derive(Clone, Copy, Default)]
-struct Transfer {
+struct Shipment {
+    register: u8,
     address: u32,
-    length: u16,
+    words: u16,
     is_broadcast: bool,
 }
 
-impl Transfer {
+impl Shipment {
     fn of(frame: &Frame) -> Self {
-        let bytes = frame.bytes();
+        let words = frame.words();
         Self {
-            address: bytes.as_ptr() as u32,
-            length: bytes.len() as u16,
+            register: frame.register(),
+            address: words.as_ptr() as u32,
+            words: words.len() as u16,
             is_broadcast: frame.is_broadcast(),
         }
     }
@@ -154,29 +153,24 @@ enum State {
     Idle,
     /// This chip's frame is on its way.
     Sending(usize),
+    /// All are in the chips, and LDAC is to fall.
+    Armed,
     Failed,
 }
 
 struct Line {
-    spi: Spi<'static, Blocking, Master>,
+    bus: Bus,
     /// The stream's control register, enabled.
     control: Cr,
     _stream: Peri<'static, DMA2_CH3>,
-    select: [Output<'static>; CHIPS],
-    load: Output<'static>,
-    transfers: [Transfer; CHIPS],
+    shipments: [Shipment; CHIPS],
+    look: Option<Look>,
+    readback: Readback,
     state: State,
 }
 
 impl Line {
-    fn write(&mut self, chip: usize, bytes: &[u8]) -> Result<(), spi::Error> {
-        self.select[chip].set_low();
-        let written = self.spi.blocking_write(bytes);
-        self.select[chip].set_high();
-        written
-    }
-
-    /// Sets the stream up, off, and SPI1 to ask it for bytes.
+    /// Sets the stream up, off, and SPI1 to ask it for words.
     fn open(&mut self) {
         let stream = DMA2.st(STREAM);
         let mut off = self.control;
@@ -188,18 +182,27 @@ impl Line {
         stream.fcr().write_value(direct);
         DMA2.ifcr(0).write_value(FLAGS);
         SPI1.cr2().modify(|w| w.set_txdmaen(true));
-        SPI1.cr1().modify(|w| w.set_spe(true));
     }
 
     fn send(&mut self, chip: usize) {
-        let Transfer {
-            address, length, ..
-        } = self.transfers[chip];
-        let stream = DMA2.st(STREAM);
+        let Shipment {
+            register,
+            address,
+            words,
+            ..
+        } = self.shipments[chip];
         self.state = State::Sending(chip);
-        self.select[chip].set_low();
+        self.bus.set_width(Width::Byte);
+        self.bus.select(chip);
+        self.bus.put(register);
+        let stream = DMA2.st(STREAM);
         stream.m0ar().write_value(address);
-        stream.ndtr().write_value(Ndtr(length.into()));
+        stream.ndtr().write_value(Ndtr(words.into()));
+        if !bus::is_shifted_out(1) {
+            self.fail(chip);
+            return;
+        }
+        self.bus.set_width(Width::Word);
         // The frame is in RAM before the stream reads it.
         fence(Ordering::SeqCst);
         stream.cr().write_value(self.control);
@@ -219,24 +222,31 @@ impl Line {
     }
 
     fn on_sent(&mut self, chip: usize) {
-        if !is_shifted_out() {
+        // The stream is done as soon as the last word is in SPI1's buffer, with one before it perhaps.
+        if !bus::is_shifted_out(4) {
             self.fail(chip);
             return;
         }
-        self.select[chip].set_high();
+        self.bus.deselect(chip);
         if chip + 1 < CHIPS {
             self.send(chip + 1);
             return;
         }
-        wait(if self.transfers[chip].is_broadcast {
+        bus::wait(if self.shipments[chip].is_broadcast {
             BROADCAST_CYCLES
         } else {
             LOAD_CYCLES
         });
-        self.load.set_low();
-        wait(LOAD_CYCLES);
-        self.load.set_high();
-        self.state = State::Idle;
+        if load::is_high() {
+            load::arm();
+            self.state = State::Armed;
+        } else {
+            // The tick raised it: something holds the wire down.
+            self.state = State::Failed;
+        }
+        if let Some(look) = self.look.take() {
+            self.readback = self.bus.look(&look);
+        }
     }
 
     fn fail(&mut self, chip: usize) {
@@ -244,16 +254,19 @@ impl Line {
         self.state = State::Failed;
     }
 
-    fn finish(&mut self) -> Result<(), Fault> {
+    fn finish(&mut self) -> Transfer {
         let state = core::mem::replace(&mut self.state, State::Idle);
         // The stream has read the frames before they are written again.
         fence(Ordering::SeqCst);
         match state {
-            State::Idle => Ok(()),
-            State::Failed => Err(Fault::Transfer),
+            State::Idle => Transfer::Done,
+            State::Armed if ticks::loaded() => Transfer::Done,
+            // Out too late for the edge, or the wire does not follow.
+            State::Armed => Transfer::Stalled,
+            State::Failed => Transfer::Failed,
             State::Sending(chip) => {
                 self.close(chip);
-                Err(Fault::Stall)
+                Transfer::Stalled
             }
         }
     }
@@ -263,44 +276,31 @@ impl Line {
         let stream = DMA2.st(STREAM);
         stream.cr().modify(|w| w.set_en(false));
         // It ends after the access under way.
-        let _ = (0..LOOKS).any(|_| !stream.cr().read().en());
-        // If bytes are stuck there is no more to be done about them than this.
-        let _ = is_shifted_out();
-        self.select[chip].set_high();
-        SPI1.cr1().modify(|w| w.set_spe(false));
+        let _ = (0..bus::LOOKS).any(|_| !stream.cr().read().en());
+        // If words are stuck there is no more to be done about them than this.
+        let _ = bus::is_shifted_out(4);
+        self.bus.deselect(chip);
+        self.look = None;
         self.open();
     }
 }
 
 /// Stream 3's flags of LISR. FEIF is among them, but is no fault: a stream in direct mode raises it if
-/// SPI1 asks before the first byte has been fetched, as it does here, and loses nothing (RM0090,
+/// SPI1 asks before the first word has been fetched, as it does here, and loses nothing (RM0090,
 /// 10.3.18).
 const FLAGS: Ixr = Ixr(0x3D << 22);
 
-/// Memory to SPI1, byte by byte, enabled, with interrupts at the end and at an error, on `request`.
+/// Memory to SPI1, word by word, enabled, with interrupts at the end and at an error, on `request`.
 fn control(request: u8) -> Cr {
     let mut control = Cr(0);
     control.set_chsel(request);
     control.set_pl(Pl::HIGH);
     control.set_minc(true);
+    control.set_msize(Size::BITS16);
+    control.set_psize(Size::BITS16);
     control.set_dir(Dir::MEMORY_TO_PERIPHERAL);
     control.set_tcie(true);
     control.set_teie(true);
     control.set_en(true);
     control
-}
-
-/// Waits for `cycles` at least. A turn of the loop takes a Cortex-M4 three: one to subtract, two to
-/// branch.
-fn wait(cycles: u32) {
-    cortex_m::asm::delay(cycles.div_ceil(3));
-}
-
-/// Waits for SPI1's last two bytes; false if they do not come.
-fn is_shifted_out() -> bool {
-    wait(LAST_BYTES_CYCLES);
-    (0..LOOKS).any(|_| {
-        let status = SPI1.sr().read();
-        status.txe() && !status.bsy()
-    })
 }

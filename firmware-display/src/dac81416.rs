@@ -3,10 +3,10 @@
 //! Facts are from TI's datasheet SLASEO0 as published drivers for the chip carry them, and from TI's
 //! forum where said; none of it has been tried on silicon here.
 //!
-//! SPI mode 1 (clock idles low, data taken at the falling edge), most significant bit first, at most
-//! 21 MHz (the STM32F429's SPI1 at 84 MHz / 4). A write is three bytes under one chip select: the
+//! SPI mode 1 (clock idles low, data taken at the falling edge), most significant bit first, at 42 MHz
+//! (the STM32F429's SPI1 at 84 MHz / 2; the chip takes 50 MHz), and read at a quarter of that. A write is three bytes under one chip select: the
 //! register's address, then 16 bits of data. Bit 7 of the address byte asks for a read; the answer
-//! comes with the next frame.
+//! comes with the next frame, unless the chip is streaming: see [`crate::look`].
 //!
 //! With streaming enabled the chip select may stay low after the first word: each further word goes
 //! to the next address. So one frame carries all of a chip's channels, and one falling edge of LDAC,
@@ -23,8 +23,6 @@ pub const CHIPS: usize = 4;
 pub const CHANNELS_PER_CHIP: usize = 13;
 /// Bytes of a chip's longest frame: the first channel's address, then its channels' words.
 pub const FRAME_BYTES: usize = 1 + 2 * CHANNELS_PER_CHIP;
-/// Bytes of a broadcast: its address and a word.
-const BROADCAST_BYTES: usize = 3;
 
 const _: () = assert!(CHIPS * CHANNELS_PER_CHIP >= ACTUATORS);
 const _: () = assert!((CHIPS - 1) * CHANNELS_PER_CHIP < ACTUATORS);
@@ -32,7 +30,7 @@ const _: () = assert!((CHIPS - 1) * CHANNELS_PER_CHIP < ACTUATORS);
 /// Channels that the chip has (DAC0 to DAC15).
 pub const CHANNELS: usize = 16;
 /// Fastest SPI clock used, in Hz.
-pub const MAX_CLOCK_HZ: u32 = 21_000_000;
+pub const MAX_CLOCK_HZ: u32 = 42_000_000;
 /// DEVICEID bits 15 to 2 of a DAC81416 (0x29C).
 pub const PRODUCT: u16 = 668;
 
@@ -97,13 +95,13 @@ pub mod spiconfig {
 }
 
 /// [`register::GENCONFIG`]: reference on, no differential pairs, reserved bits as after a reset.
-const REFERENCE_ON: u16 = 0x3F00;
+pub(crate) const REFERENCE_ON: u16 = 0x3F00;
 /// ±5 V for four channels.
 const RANGES_BIPOLAR_5_V: u16 = 0x9999;
-const ALL_CHANNELS: u16 = 0xFFFF;
+pub(crate) const ALL_CHANNELS: u16 = 0xFFFF;
 /// The channels of [`Frame`]; the others stay at 0 V.
-const FRAME_CHANNELS: u16 = (1 << CHANNELS_PER_CHIP) - 1;
-const NO_CHANNEL: u16 = 0x0000;
+pub(crate) const FRAME_CHANNELS: u16 = (1 << CHANNELS_PER_CHIP) - 1;
+pub(crate) const NO_CHANNEL: u16 = 0x0000;
 /// Bit 4 of [`register::TRIGGER`].
 const TRIGGER_LDAC: u16 = 1 << 4;
 
@@ -119,17 +117,19 @@ pub const fn read(register: u8) -> [u8; 3] {
 }
 
 const WRITES_BEFORE_CODES: usize = 11;
-const WRITES_AFTER_CODES: usize = 3;
+const WRITES_AFTER_CODES: usize = 2;
 /// Writes in [`START_UP`].
 pub const START_UP_WRITES: usize = WRITES_BEFORE_CODES + CHANNELS + WRITES_AFTER_CODES;
 
 /// The writes that take a chip from any state to fifty synchronous channels at 0 V, for each chip
-/// alike, a chip select each.
+/// alike, a chip select each. It answers then; [`STREAM`] makes it ready for frames.
 ///
 /// In the order that keeps the skin quiet, whatever the chip did before (a watchdog restarts the
 /// board, not the chip): channels off, ranges, 0 V in every channel's code and in force, and only
 /// then channels on. The middle of a bipolar range is 0 V whatever the reference does meanwhile.
 /// No software reset: it would not undo more, and its wait is one more thing to get wrong.
+/// CLR is low throughout, which holds every code at 0 V by itself; they are written all the same, for
+/// a CLR that does not arrive.
 pub const START_UP: [[u8; 3]; START_UP_WRITES] = start_up_writes();
 
 const fn start_up_writes() -> [[u8; 3]; START_UP_WRITES] {
@@ -148,11 +148,8 @@ const fn start_up_writes() -> [[u8; 3]; START_UP_WRITES] {
         write(DACRANGE0 + 2, RANGES_BIPOLAR_5_V),
         write(DACRANGE0 + 3, RANGES_BIPOLAR_5_V),
     ];
-    let after: [[u8; 3]; WRITES_AFTER_CODES] = [
-        write(TRIGGER, TRIGGER_LDAC),
-        write(DACPWDWN, NO_CHANNEL),
-        write(SPICONFIG, spiconfig::STREAMING),
-    ];
+    let after: [[u8; 3]; WRITES_AFTER_CODES] =
+        [write(TRIGGER, TRIGGER_LDAC), write(DACPWDWN, NO_CHANNEL)];
     let mut writes = [[0; 3]; START_UP_WRITES];
     let mut at = 0;
     while at < START_UP_WRITES {
@@ -173,60 +170,62 @@ pub fn start_up() -> impl Iterator<Item = [u8; 3]> {
     START_UP.into_iter()
 }
 
+/// The write after which a chip takes [`Frame`]s, and no longer answers.
+pub const STREAM: [u8; 3] = write(register::SPICONFIG, spiconfig::STREAMING);
+/// The write after which a chip answers, understood by one that is streaming: a stream of one word.
+pub const ANSWER: [u8; 3] = write(register::SPICONFIG, spiconfig::ANSWERING);
+
 /// The chip and channel that drive `actuator`.
 pub const fn place_of(actuator: usize) -> (usize, usize) {
     (actuator / CHANNELS_PER_CHIP, actuator % CHANNELS_PER_CHIP)
 }
 
-/// What goes to a chip under one chip select at an output tick: a word for each of its channels, or
-/// one for all of them.
+/// What goes to a chip under one chip select at an output tick: a register's address, then a word for
+/// each of its channels, or one for all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
-    bytes: [u8; FRAME_BYTES],
-    is_broadcast: bool,
+    register: u8,
+    words: [u16; CHANNELS_PER_CHIP],
 }
 
 impl Frame {
     /// 0 V on each channel.
-    pub const ZERO_VOLT: Self = {
-        let [address, high, low] = write(register::BRDCAST, ZERO_VOLT);
-        let mut bytes = [0; FRAME_BYTES];
-        bytes[0] = address;
-        bytes[1] = high;
-        bytes[2] = low;
-        Self {
-            bytes,
-            is_broadcast: true,
-        }
+    pub const ZERO_VOLT: Self = Self {
+        register: register::BRDCAST,
+        words: [ZERO_VOLT; CHANNELS_PER_CHIP],
     };
 
-    /// The bytes to send, 3 or [`FRAME_BYTES`].
-    pub fn bytes(&self) -> &[u8] {
-        if self.is_broadcast {
-            &self.bytes[..BROADCAST_BYTES]
+    /// The address byte to begin with.
+    pub fn register(&self) -> u8 {
+        self.register
+    }
+
+    /// The words that follow, 1 or [`CHANNELS_PER_CHIP`].
+    pub fn words(&self) -> &[u16] {
+        if self.is_broadcast() {
+            &self.words[..1]
         } else {
-            &self.bytes
+            &self.words
         }
     }
 
     /// Whether it is one word for all channels.
     pub fn is_broadcast(&self) -> bool {
-        self.is_broadcast
+        self.register == register::BRDCAST
     }
 
     /// Takes the words of the first channels. The frame's others get 0 V; or, if `words` are all
     /// equal, that word too: nothing is wired to them.
     fn set(&mut self, words: &[u16]) {
-        self.is_broadcast = words.windows(2).all(|pair| pair[0] == pair[1]);
-        let (address, data) = self.bytes.split_at_mut(1);
-        address[0] = if self.is_broadcast {
+        let is_broadcast = words.windows(2).all(|pair| pair[0] == pair[1]);
+        self.register = if is_broadcast {
             register::BRDCAST
         } else {
             register::DAC0
         };
         let words = words.iter().copied().chain(core::iter::repeat(ZERO_VOLT));
-        for (bytes, word) in data.chunks_exact_mut(2).zip(words) {
-            bytes.copy_from_slice(&word.to_be_bytes());
+        for (place, word) in self.words.iter_mut().zip(words) {
+            *place = word;
         }
     }
 }
@@ -274,13 +273,14 @@ mod tests {
             [0x1F, 0x80, 0x00],
             [0x0E, 0x00, 0x10],
             [0x09, 0x00, 0x00],
-            [0x03, 0x0A, 0x8C],
         ];
         assert_eq!(start_up().collect::<std::vec::Vec<_>>(), literal);
+        assert_eq!(ANSWER, [0x03, 0x0A, 0x84]);
+        assert_eq!(STREAM, [0x03, 0x0A, 0x8C]);
     }
 
     #[test]
-    fn every_code_is_zero_volt_and_loaded_before_a_channel_is_powered_and_streaming_is_last() {
+    fn every_code_is_zero_volt_and_loaded_before_a_channel_is_powered() {
         let at = |write: [u8; 3]| START_UP.iter().position(|&other| other == write).unwrap();
         let power_up = at(write(register::DACPWDWN, NO_CHANNEL));
         let load = at(write(register::TRIGGER, TRIGGER_LDAC));
@@ -288,10 +288,13 @@ mod tests {
             assert!(at(write(register::DAC0 + channel, ZERO_VOLT)) < load);
         }
         assert!(load < power_up);
-        assert_eq!(
-            at(write(register::SPICONFIG, spiconfig::STREAMING)),
-            START_UP_WRITES - 1
-        );
+        assert_eq!(power_up, START_UP_WRITES - 1);
+    }
+
+    /// A frame as it goes over the wire.
+    fn bytes(frame: &Frame) -> std::vec::Vec<u8> {
+        let words = frame.words().iter().flat_map(|word| word.to_be_bytes());
+        core::iter::once(frame.register()).chain(words).collect()
     }
 
     fn frames_of(words: &[u16; ACTUATORS]) -> [Frame; CHIPS] {
@@ -304,16 +307,16 @@ mod tests {
     fn streaming_frames_are_these_bytes() {
         let frames = frames_of(&core::array::from_fn(|i| 0x4000 + i as u16));
         assert_eq!(
-            frames[0].bytes(),
+            bytes(&frames[0]),
             [
                 0x10, 0x40, 0x00, 0x40, 0x01, 0x40, 0x02, 0x40, 0x03, 0x40, 0x04, 0x40, 0x05, 0x40,
                 0x06, 0x40, 0x07, 0x40, 0x08, 0x40, 0x09, 0x40, 0x0A, 0x40, 0x0B, 0x40, 0x0C,
             ]
         );
-        assert_eq!(frames[1].bytes()[..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
-        assert_eq!(frames[2].bytes()[..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
+        assert_eq!(bytes(&frames[1])[..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
+        assert_eq!(bytes(&frames[2])[..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
         assert_eq!(
-            frames[3].bytes(),
+            bytes(&frames[3]),
             [
                 0x10, 0x40, 0x27, 0x40, 0x28, 0x40, 0x29, 0x40, 0x2A, 0x40, 0x2B, 0x40, 0x2C, 0x40,
                 0x2D, 0x40, 0x2E, 0x40, 0x2F, 0x40, 0x30, 0x40, 0x31, 0x80, 0x00, 0x80, 0x00,
@@ -323,10 +326,10 @@ mod tests {
 
     #[test]
     fn equal_words_are_these_three_bytes_a_chip() {
-        for frame in frames_of(&[0x1234; ACTUATORS]) {
-            assert_eq!(frame.bytes(), [0x0F, 0x12, 0x34]);
+        for frame in &frames_of(&[0x1234; ACTUATORS]) {
+            assert_eq!(bytes(frame), [0x0F, 0x12, 0x34]);
         }
-        assert_eq!(Frame::ZERO_VOLT.bytes(), [0x0F, 0x80, 0x00]);
+        assert_eq!(bytes(&Frame::ZERO_VOLT), [0x0F, 0x80, 0x00]);
     }
 
     #[test]
@@ -337,7 +340,7 @@ mod tests {
             let (chip, _) = place_of(actuator);
             for (c, frame) in frames_of(&words).iter().enumerate() {
                 let length = if c == chip { FRAME_BYTES } else { 3 };
-                assert_eq!(frame.bytes().len(), length, "chip {c}, actuator {actuator}");
+                assert_eq!(bytes(frame).len(), length, "chip {c}, actuator {actuator}");
             }
         }
     }
@@ -350,10 +353,10 @@ mod tests {
             let (chip, channel) = place_of(actuator);
             for (c, frame) in frames_of(&words).iter().enumerate() {
                 if c != chip {
-                    assert_eq!(frame.bytes(), [0x0F, 0x80, 0x00]);
+                    assert_eq!(bytes(frame), [0x0F, 0x80, 0x00]);
                     continue;
                 }
-                for (n, bytes) in frame.bytes()[1..].chunks(2).enumerate() {
+                for (n, bytes) in bytes(frame)[1..].chunks(2).enumerate() {
                     let expected = if n == channel {
                         [0x12, 0x34]
                     } else {

@@ -1,64 +1,48 @@
-//! The display: estimates and encoder readings in, fifty DAC words out.
+//! The display: estimates and encoder readings in, fifty DAC words out, and the supervisor over them.
 
 use protocol::{
-    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Mode, Motion, StopReason, Trip,
+    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason, Trip,
+    actuators,
 };
 
-use crate::array::{Array, FULL_LEVEL, Trim};
+use crate::endurance::Endurance;
 use crate::fade::Fade;
-use crate::hand::Hand;
-use crate::pattern::Pattern;
-use crate::phase::{Phase, Wavelength};
-use crate::{
-    ACTUATORS, ConverterFault, Output, Readback, Senses, Settings, Transfer, ZERO_VOLT, ticks,
-};
+use crate::hand::{Hand, Jump};
+use crate::limits::Limits;
+use crate::memory::Memory;
+use crate::pace::per_tick;
+use crate::plausibility::{Plausibility, Verdict};
+use crate::senses::{ConverterFault, Output, Readback, Senses};
+use crate::settings::Settings;
+use crate::stimulus::Stimulus;
+use crate::supervisor::{self, Event};
+use crate::watch::Watch;
+use crate::{ACTUATORS, ZERO_VOLT};
 
-/// An estimate is late, and refused, if it is behind the last by at most this many: 10 s.
-const LATE_AT_MOST: u32 = 1_000;
-/// A sensor that has just started sends sequences up to this; from it, one that is behind by more
-/// than [`REORDERED_AT_MOST`] is a new beginning and not late.
-const BEGINNING: u32 = 10;
-/// The link puts estimates out of order by no more than this many.
-const REORDERED_AT_MOST: u32 = 32;
-/// A new amplitude is reached at this rate: the whole of 5 V in 20 ms.
-const AMPLITUDE_PER_TICK: u32 = FULL_LEVEL / ticks(20);
-/// The largest amplitude, in mV, and the voltage of [`FULL_LEVEL`].
-const FULL_LEVEL_MV: u16 = 5_000;
-
-/// The display board's state, stepped once per output tick of 500 µs.
+/// The display board's state, stepped once per output tick.
 ///
-/// 0 V at start and until the first valid estimate, then fades in and follows the hand by the last
-/// valid λ, whatever the link does. When that λ is older than
-/// [`max_age_ms`](DisplayConfiguration::max_age_ms) the stimulus fades out; it fades in again at the
-/// next valid one. Time is counted in ticks alone: the same calls give the same words.
+/// 0 V at start and until the converters have started and a trusted estimate has come; then it fades in
+/// and follows the hand by the last trusted λ, whatever the link does. When that λ is older than
+/// [`max_age_ms`](DisplayConfiguration::max_age_ms), or there is another reason not to drive, the
+/// stimulus fades out; it fades in again when the reason is gone. What no link and no hand can make good
+/// stops it until the reset button or power: see [`crate::supervisor`] and `docs/safety.md`. Time is
+/// counted in ticks alone: the same calls give the same words.
 #[derive(Clone, Debug)]
 pub struct Display {
     configuration: DisplayConfiguration,
-    array: Array,
-    hand: Hand,
-    phase: Phase,
-    wavelength: Option<Wavelength>,
-    pattern: Pattern,
-    fade: Fade,
-    /// Amplitude in force, in Q16 DAC steps, on its way to the configuration's.
-    amplitude: u32,
-    /// Ticks since the last valid estimate.
-    age_ticks: u32,
-    following: bool,
-    last_sequence: Option<u32>,
+    memory: Memory,
     state: DisplayState,
+    /// What trips in the next tick.
+    asked: Option<Trip>,
+    watch: Watch,
+    plausibility: Plausibility,
+    endurance: Endurance,
+    hand: Hand,
+    fade: Fade,
+    stimulus: Stimulus,
+    limits: Limits,
     send_anyway: bool,
-    drawn: Drawn,
-    words: [u16; ACTUATORS],
     counters: DisplayCounters,
-}
-
-/// All that the words depend on, apart from the trims. The default is 0 V.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Drawn {
-    level: u32,
-    turns: u32,
-    pattern: Pattern,
 }
 
 impl Display {
@@ -66,43 +50,59 @@ impl Display {
     /// good if a trip was `persisted` from before the reset.
     pub fn new(settings: &Settings, persisted: Option<Trip>) -> Self {
         let configuration = *settings.configuration();
-        Self {
-            array: Array::new(&[Trim::default(); ACTUATORS]),
+        let actuators = settings.actuators();
+        let mut display = Self {
+            memory: Memory::of(&configuration, actuators),
+            state: DisplayState::Boot,
+            asked: None,
+            watch: Watch::default(),
+            plausibility: Plausibility::new(),
+            endurance: Endurance::default(),
             hand: Hand::default(),
-            phase: Phase::default(),
-            wavelength: None,
-            pattern: Pattern::default(),
             fade: Fade::new(configuration.fade_in_ms, configuration.fade_out_ms),
-            amplitude: 0,
-            age_ticks: u32::MAX,
-            following: false,
-            last_sequence: None,
-            state: persisted.map_or(DisplayState::Boot, DisplayState::Stopped),
+            stimulus: Stimulus::new(&configuration, actuators),
+            limits: Limits::new(configuration.update_rate, configuration.amplitude_mv),
             send_anyway: false,
-            drawn: Drawn::default(),
-            words: [ZERO_VOLT; ACTUATORS],
-            counters: DisplayCounters::default(),
+            counters: DisplayCounters::ZERO,
             configuration,
+        };
+        if let Some(trip) = persisted {
+            display.on(Event::Trip(trip));
         }
+        if !is_sound(settings) {
+            display.on(Event::Trip(Trip::Memory));
+        }
+        display
     }
 
-    /// The converters have been started and read back, or failed to: without it nothing is driven.
+    /// The converters have been started and read back, or failed to: before, nothing is driven.
     pub fn started(&mut self, converters: Result<(), ConverterFault>) {
         match converters {
-            Ok(()) if self.state == DisplayState::Boot => self.enter(DisplayState::Ready),
-            Ok(()) => {}
-            Err(_) => self.trip(Trip::Converter),
+            Ok(()) => self.on(Event::Started),
+            Err(_) => {
+                count(&mut self.counters.converter_faults, true);
+                self.on(Event::Trip(Trip::Converter));
+            }
         }
     }
 
-    /// Takes settings, which are checked. Nothing jumps: a new amplitude is reached at 5 V in 20 ms, a
-    /// new mode or place as a new λ is.
+    /// Takes settings as [`Settings`] made them; others are a fault of memory. See
+    /// [`Stimulus::configure`] for how they come into force; the board paces the ticks by
+    /// [`update_rate`](DisplayConfiguration::update_rate) from the next one on.
     pub fn configure(&mut self, settings: &Settings) {
+        if !is_sound(settings) {
+            self.ask(Trip::Memory);
+            return;
+        }
         let configuration = *settings.configuration();
+        let actuators = settings.actuators();
         self.configuration = configuration;
+        self.memory = Memory::of(&configuration, actuators);
         self.fade
             .set_times(configuration.fade_in_ms, configuration.fade_out_ms);
-        self.aim_pattern();
+        self.stimulus.configure(&configuration, actuators);
+        self.limits
+            .set(configuration.update_rate, configuration.amplitude_mv);
     }
 
     /// The configuration in force.
@@ -110,89 +110,66 @@ impl Display {
         self.configuration
     }
 
-    /// Takes each actuator's gain and polarity, at once: for start-up.
-    pub fn trim(&mut self, trims: &[Trim; ACTUATORS]) {
-        self.array = Array::new(trims);
-        self.send_anyway = true;
-    }
-
-    /// Takes what the sensor says.
-    ///
-    /// Refused and counted: an estimate that is not later than the last seen, and a valid one whose
-    /// λ is missing, not finite, or out of the range of [`Wavelength`]. One that the estimator itself
-    /// calls invalid changes nothing and does not make the last valid one younger. A sensor that
-    /// restarts counts from 0 again: an estimate more than 1 000 behind the last one, or among the
-    /// first eleven and more than 32 behind, is a new beginning.
+    /// Takes what the sensor says, if it is to be trusted: see [`crate::plausibility`].
     pub fn on_estimate(&mut self, estimate: &Estimate) {
-        if self.is_late(estimate.sequence) {
-            self.refuse();
-            return;
-        }
-        self.last_sequence = Some(estimate.sequence);
-        if !estimate.valid {
-            return;
-        }
-        let Some(wavelength) = estimate.wavelength_mm.and_then(Wavelength::new) else {
-            self.refuse();
-            return;
+        let counters = &mut self.counters;
+        let counter = match self
+            .plausibility
+            .judge(estimate, self.configuration.max_age_ms)
+        {
+            Verdict::Trusted(wavelength) => {
+                self.stimulus.follow(wavelength, estimate.amplitude_lsb);
+                Some(&mut counters.estimates)
+            }
+            Verdict::Idle => None,
+            Verdict::Late | Verdict::OutOfRange => Some(&mut counters.refused_estimates),
+            Verdict::Implausible => Some(&mut counters.implausible),
+            Verdict::Flooding => Some(&mut counters.flooded),
         };
-        self.counters.estimates = self.counters.estimates.wrapping_add(1);
-        self.age_ticks = 0;
-        self.wavelength = Some(wavelength);
-        self.phase.follow(wavelength);
-        self.aim_pattern();
+        if let Some(counter) = counter {
+            count(counter, true);
+        }
+        counters.implausible = counters
+            .implausible
+            .wrapping_add(self.plausibility.take_unconfirmed());
     }
 
     /// 0 V from the next tick on, and for good.
     pub fn stop(&mut self, reason: StopReason) {
-        self.trip(match reason {
+        self.ask(match reason {
             StopReason::Operator => Trip::Operator,
             StopReason::Host => Trip::Host,
         });
     }
 
-    /// One output tick with the hand encoder's counter and the board as it is.
+    /// One output tick, with the hand encoder's counter and the board as it is.
     pub fn tick(&mut self, encoder: u16, senses: &Senses) -> Output {
-        self.counters.ticks = self.counters.ticks.wrapping_add(1);
-        if senses.stop_input_open {
-            self.trip(Trip::EmergencyStop);
-        }
-        if senses.alarm || senses.readback == Readback::Differs {
-            self.trip(Trip::Converter);
-        }
-        self.send_anyway |= senses.clear_fell || senses.transfer != Transfer::Done;
-        let travel = self.hand.read(encoder);
-        self.phase.advance(travel);
-        let silent = self.fade.gain() == 0;
-        self.supervise();
-        self.approach(silent, travel);
-        let drawn = self.next_drawn();
-        let mut send = core::mem::take(&mut self.send_anyway);
-        if send || drawn != self.drawn {
-            let sines = drawn.pattern.sines(drawn.turns);
-            send |= self.array.draw(drawn.level, &sines, &mut self.words);
-            self.drawn = drawn;
-        }
-        self.counters.updates = self.counters.updates.wrapping_add(u32::from(send));
+        count(&mut self.counters.ticks, true);
+        let quarters = per_tick(self.configuration.update_rate);
+        let elapsed = quarters.saturating_mul(senses.missed_ticks.saturating_add(1));
+        let travel = self.hand.read(encoder, elapsed);
+        self.elapse(elapsed);
+        self.sense(senses, travel, elapsed);
+        self.on(match self.hold() {
+            Some(hold) => Event::Hold(hold),
+            None => Event::Fresh,
+        });
+        let send = self.drive(travel.unwrap_or(0), quarters);
+        count(&mut self.counters.updates, send);
         Output {
             send,
-            release: !matches!(self.state, DisplayState::Boot | DisplayState::Stopped(_)),
+            release: supervisor::releases(self.state),
         }
     }
 
     /// The words of the last tick: [`ZERO_VOLT`] is 0 V, a step 10 V / 65 536.
     pub fn words(&self) -> &[u16; ACTUATORS] {
-        &self.words
+        self.stimulus.words()
     }
 
-    /// The hand's [`Motion`] after every fourth tick; see [`Hand::motion`].
+    /// The hand's [`Motion`] every 2 ms, whatever the state; see [`Hand::motion`].
     pub fn motion(&mut self, instant_us: u64) -> Option<Motion> {
         self.hand.motion(instant_us)
-    }
-
-    /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
-    pub fn counters(&self) -> DisplayCounters {
-        self.counters
     }
 
     /// The supervisor's state.
@@ -200,79 +177,214 @@ impl Display {
         self.state
     }
 
-    fn enter(&mut self, state: DisplayState) {
-        self.counters.changes = self.counters.changes.wrapping_add(1);
-        self.counters.state = state;
-        self.state = state;
-    }
-
-    fn trip(&mut self, trip: Trip) {
-        if !matches!(self.state, DisplayState::Stopped(_)) {
-            self.enter(DisplayState::Stopped(trip));
+    /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
+    pub fn counters(&self) -> DisplayCounters {
+        DisplayCounters {
+            state: self.state,
+            ..self.counters
         }
     }
 
-    /// Whether `sequence` was sent before, or with, the last one seen.
-    fn is_late(&self, sequence: u32) -> bool {
-        let Some(last) = self.last_sequence else {
-            return false;
-        };
-        // A later one is behind by almost 2³².
-        let behind = last.wrapping_sub(sequence);
-        let begins_anew = sequence <= BEGINNING && behind > REORDERED_AT_MOST;
-        behind <= LATE_AT_MOST && !begins_anew
+    fn ask(&mut self, trip: Trip) {
+        self.asked = self.asked.or(Some(trip));
     }
 
-    fn refuse(&mut self) {
-        self.counters.refused_estimates = self.counters.refused_estimates.wrapping_add(1);
-    }
-
-    fn aim_pattern(&mut self) {
-        let half_pitch_um = f64::from(protocol::actuators::DEFAULT_PITCH_UM) / 2.0;
-        self.pattern
-            .aim(match (self.configuration.mode, self.wavelength) {
-                (Mode::Travelling, Some(wavelength)) => wavelength.phase_of(half_pitch_um),
-                _ => 0,
-            });
-    }
-
-    /// Ages the last valid estimate and fades accordingly.
-    fn supervise(&mut self) {
-        self.age_ticks = self.age_ticks.saturating_add(1);
-        let fresh = self.age_ticks <= ticks(self.configuration.max_age_ms);
-        if self.following && !fresh {
-            self.counters.fades = self.counters.fades.wrapping_add(1);
-        }
-        self.following = fresh;
-        self.fade.step(fresh);
-    }
-
-    /// Takes amplitude and pattern on to where they are to be: at once while nobody feels it.
-    fn approach(&mut self, silent: bool, travel: i16) {
-        let amplitude_mv = self.configuration.amplitude_mv.min(FULL_LEVEL_MV);
-        let amplitude =
-            (u64::from(FULL_LEVEL) * u64::from(amplitude_mv) / u64::from(FULL_LEVEL_MV)) as u32;
-        if silent {
-            self.amplitude = amplitude;
-            self.pattern.settle();
+    /// Tells the supervisor, and is at 0 V at once where its state asks for it.
+    fn on(&mut self, event: Event) {
+        let before = self.state;
+        self.state = supervisor::next(before, event);
+        if self.state == before {
             return;
         }
-        let low = self.amplitude.saturating_sub(AMPLITUDE_PER_TICK);
-        let high = self.amplitude.saturating_add(AMPLITUDE_PER_TICK);
-        self.amplitude = amplitude.clamp(low, high);
-        let turned = u32::from(travel.unsigned_abs()).saturating_mul(self.phase.per_count());
-        self.pattern.glide(turned);
+        count(&mut self.counters.changes, true);
+        match self.state {
+            DisplayState::Fading(Hold::Stale) => count(&mut self.counters.fades, true),
+            DisplayState::Stopped(_) => self.hush(),
+            _ => {}
+        }
     }
 
-    fn next_drawn(&self) -> Drawn {
-        let level = ((u64::from(self.amplitude) * u64::from(self.fade.gain())) >> 31) as u32;
-        if matches!(self.state, DisplayState::Boot | DisplayState::Stopped(_)) || level == 0 {
-            return Drawn::default();
+    /// All words at 0 V; they are sent in any case, since the chips may hold others.
+    fn hush(&mut self) {
+        self.stimulus.silence();
+        self.limits.cleared();
+        self.send_anyway = true;
+    }
+
+    fn elapse(&mut self, quarters: u32) {
+        let rests = self.stimulus.is_resting();
+        self.plausibility.elapse(quarters, rests);
+        self.endurance.elapse(
+            quarters,
+            self.state == DisplayState::Driving,
+            rests,
+            self.configuration.full_drive_s,
+        );
+    }
+
+    /// All that trips before a word is computed; the first one counts.
+    fn sense(&mut self, senses: &Senses, travel: Result<i16, Jump>, quarters: u32) {
+        // Where CLR is not held off it falls.
+        if senses.clear_fell && supervisor::releases(self.state) {
+            count(&mut self.counters.clears, true);
+            self.on(Event::Cleared);
+            self.hush();
         }
-        Drawn {
-            level,
-            turns: self.phase.turns(),
-            pattern: self.pattern,
+        let watched = self.watch.look(senses, quarters);
+        self.send_anyway |= self.watch.words_are_missing();
+        let differs = senses.readback == Readback::Differs;
+        let counters = &mut self.counters;
+        count(
+            &mut counters.converter_faults,
+            differs || self.watch.alarm_begins(),
+        );
+        count(&mut counters.unheard, senses.unheard);
+        count(&mut counters.encoder_jumps, travel.is_err());
+        let forgot = !self.memory.agrees(&self.configuration, &self.stimulus);
+        for trip in [
+            watched,
+            self.asked,
+            travel.err().map(|_| Trip::HandEncoder),
+            forgot.then_some(Trip::Memory),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            self.on(Event::Trip(trip));
         }
+    }
+
+    /// Why not to drive: first what has to end it quickly.
+    fn hold(&self) -> Option<Hold> {
+        let estimates = &self.plausibility;
+        if self.watch.is_unheard() {
+            Some(Hold::Unheard)
+        } else if estimates.floods() {
+            Some(Hold::Flood)
+        } else if estimates.distrusts() {
+            Some(Hold::Distrust)
+        } else if estimates.contradicts() {
+            Some(Hold::Contradiction)
+        } else if self.endurance.is_exhausted() {
+            Some(Hold::FullDrive)
+        } else if !estimates.is_fresh(self.configuration.max_age_ms) {
+            Some(Hold::Stale)
+        } else {
+            None
+        }
+    }
+
+    /// The words of this tick. Whether they are to be sent.
+    fn drive(&mut self, travel: i16, quarters: u32) -> bool {
+        let gain = self.fade.step(supervisor::aim(self.state), quarters);
+        let mut changed = false;
+        if !matches!(self.state, DisplayState::Stopped(_)) {
+            changed = self.stimulus.tick(travel, gain);
+            if self.limits.check(self.stimulus.words()).is_err() {
+                self.on(Event::Trip(Trip::Limit));
+            }
+            let fades = matches!(self.state, DisplayState::Fading(_));
+            if fades && gain == 0 && self.words() == &[ZERO_VOLT; ACTUATORS] {
+                self.on(Event::Silent);
+            }
+        }
+        core::mem::take(&mut self.send_anyway) || changed
+    }
+}
+
+/// Whether settings are what [`Settings`] lets through.
+fn is_sound(settings: &Settings) -> bool {
+    let configuration = settings.configuration();
+    let described = actuators::hash(settings.actuators()) == configuration.actuators;
+    described && configuration.check().is_ok()
+}
+
+fn count(counter: &mut u32, happened: bool) {
+    *counter = counter.wrapping_add(u32::from(happened));
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::actuators::{Actuator, DEFAULT_ACTUATORS};
+    use protocol::{Contact, GAUGES, GaugeHealth, Range};
+
+    use super::*;
+
+    /// One that has followed a hand of 70 mm/s for 100 ms.
+    fn driving() -> (Display, u16) {
+        let mut display = Display::new(&Settings::DEFAULT, None);
+        display.started(Ok(()));
+        display.on_estimate(&Estimate {
+            sequence: 1,
+            instant_us: 0,
+            wavelength_mm: Some(2.0),
+            valid: true,
+            confidence: 1.0,
+            amplitude_lsb: 100.0,
+            counted_mm: None,
+            range: Range::T1,
+            contact: Contact::Slip,
+            velocity_um_s: 70_000,
+            lag_um: None,
+            gauges_used: 1,
+            health: [GaugeHealth::Good; GAUGES],
+        });
+        for tick in 1..=200 {
+            display.tick(tick * 7, &Senses::default());
+        }
+        assert_eq!(display.state(), DisplayState::Driving);
+        (display, 200 * 7)
+    }
+
+    /// Ticks until it has stopped, in which it is at 0 V and no word was beyond `most` steps before.
+    fn stopped_after(display: &mut Display, mut encoder: u16, most: u16) -> (u32, Trip) {
+        for tick in 1..1_000 {
+            encoder += 7;
+            let output = display.tick(encoder, &Senses::default());
+            if let DisplayState::Stopped(trip) = display.state() {
+                assert!(output.send && !output.release);
+                assert_eq!(*display.words(), [ZERO_VOLT; ACTUATORS]);
+                return (tick, trip);
+            }
+            assert!(
+                display
+                    .words()
+                    .iter()
+                    .all(|w| w.abs_diff(ZERO_VOLT) <= most)
+            );
+        }
+        panic!("never stopped");
+    }
+
+    #[test]
+    fn a_setting_that_changed_by_itself_stops_in_the_next_tick() {
+        let (mut display, encoder) = driving();
+        display.configuration.amplitude_mv ^= 1 << 9;
+        let stopped = stopped_after(&mut display, encoder, 32_767);
+        assert_eq!(stopped, (1, Trip::Memory));
+    }
+
+    #[test]
+    fn an_actuator_that_changed_by_itself_stops_within_nine_milliseconds() {
+        let change: fn(&mut Actuator) = |actuator| actuator.gain_q15 ^= 1 << 14;
+        for index in 0..ACTUATORS {
+            let (mut display, encoder) = driving();
+            let mut changed = DEFAULT_ACTUATORS;
+            change(&mut changed[index]);
+            display.stimulus = Stimulus::new(&display.configuration, &changed);
+            let (ticks, trip) = stopped_after(&mut display, encoder, 32_767);
+            assert_eq!(trip, Trip::Memory);
+            assert!(ticks <= 18, "{ticks}");
+        }
+    }
+
+    #[test]
+    fn words_beyond_a_limit_do_not_go_out() {
+        let (mut display, encoder) = driving();
+        display.limits = Limits::new(display.configuration.update_rate, 1_000);
+        // A quarter of 28.6 ms, in which the wave has a crest.
+        let (ticks, trip) = stopped_after(&mut display, encoder, 6_554);
+        assert_eq!(trip, Trip::Limit);
+        assert!(ticks <= 29, "{ticks}");
     }
 }

@@ -14,21 +14,35 @@
 extern crate std;
 
 pub mod array;
+pub mod balance;
 pub mod dac81416;
 pub mod display;
+pub mod endurance;
 pub mod fade;
+pub mod flood;
+pub mod gate;
 pub mod hand;
+pub mod level;
+pub mod limits;
+pub mod look;
+pub mod memory;
+pub mod pace;
 pub mod pattern;
 pub mod phase;
+pub mod plausibility;
+pub mod rest;
 pub mod senses;
 pub mod settings;
 pub mod sine;
+pub mod stimulus;
+pub mod supervisor;
+pub mod watch;
 
-pub use array::{Array, Place, Polarity, Trim};
 pub use display::Display;
 pub use protocol::ACTUATORS;
 pub use senses::{ConverterFault, Output, Readback, Senses, Transfer};
 pub use settings::Settings;
+pub use stimulus::Stimulus;
 
 /// Output ticks per second: ten samples a cycle at 200 Hz.
 pub const TICK_RATE_HZ: u32 = 2_000;
@@ -39,8 +53,9 @@ pub const MICROMETRES_PER_COUNT: i32 = 5;
 /// The DAC word of 0 V.
 pub const ZERO_VOLT: u16 = 0x8000;
 
-/// Ticks in `ms` milliseconds.
-const fn ticks(ms: u16) -> u32 {
-    const { assert!(TICK_RATE_HZ.is_multiple_of(1_000)) };
-    ms as u32 * (TICK_RATE_HZ / 1_000)
+/// Ticks of `rate` in `ms` milliseconds.
+const fn ticks_at(rate: protocol::UpdateRate, ms: u16) -> u32 {
+    const { assert!(protocol::UpdateRate::Hz2000.hz().is_multiple_of(1_000)) };
+    const { assert!(protocol::UpdateRate::Hz4000.hz().is_multiple_of(1_000)) };
+    ms as u32 * (rate.hz() / 1_000)
 }

@@ -1,23 +1,41 @@
 //! The display board: the operator's hand in, fifty actuators out, at 2 kHz and on its own clock.
 //!
 //! ```text
-//! TIM3 ─latch──> TIM4 (hand) ─┐
-//!      └─tick───────────────> output ─SPI1─> 4 × DAC81416, one LDAC edge
-//!            TIM1 holds CLR off ┘ ^ └─ Motion ─> report ─> ports ─> USART2, USART3
-//!                                 └── Estimate, Stop, Configure ─┘
+//! TIM3 ─latch──> TIM4 (hand) ─┐ ┌─ emergency stop, alarm
+//!      ├─tick───────────────> output <─SPI1─> 4 × DAC81416
+//!      └─LDAC───────────────────┼───────────────┘ │
+//!            TIM1 holds CLR off ┘ ───────────────┘
+//!                          ^ └─ Motion, Safety ─> report ─> ports ─> USART2, USART3
+//!                          └── Estimate, Stop, Configure ────┘
 //! ```
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 mod board;
 #[cfg(target_os = "none")]
+mod bus;
+#[cfg(target_os = "none")]
 mod chain;
 #[cfg(target_os = "none")]
-mod tasks;
-
-// The log, and what is logged when all else fails; a panic ends in the watchdog's reset.
+mod clear;
 #[cfg(target_os = "none")]
-use {defmt_rtt as _, panic_probe as _};
+mod converters;
+#[cfg(target_os = "none")]
+mod crash;
+#[cfg(target_os = "none")]
+mod guard;
+#[cfg(target_os = "none")]
+mod inputs;
+#[cfg(target_os = "none")]
+mod load;
+#[cfg(target_os = "none")]
+mod tasks;
+#[cfg(target_os = "none")]
+mod ticks;
+
+// The log.
+#[cfg(target_os = "none")]
+use defmt_rtt as _;
 
 #[cfg(target_os = "none")]
 nucleo::identify!(protocol::Role::Display);

@@ -1,123 +1,205 @@
-//! How the wave lies over the fingertip: the phase by which each column of actuators is ahead.
+//! How the wave lies over the fingertip: the phase by which each actuator is ahead.
 //!
-//! In travelling mode the actuator at xᵢ is 2π xᵢ/λ ahead of the fingertip's middle, so that the
-//! pattern moves across the skin as the surface would. In uniform mode nobody is ahead, which is the
-//! same with a wavenumber of 0, so that one mode turns into the other as one λ into another.
+//! In travelling mode the actuator at xᵢ is 2π xᵢ/λ ahead of the fingertip's middle, so that the pattern
+//! moves across the skin as the surface would; in uniform mode no place is ahead. Each actuator's trim
+//! is added.
 //!
-//! The hand's phase goes on smoothly when λ changes, but 2π xᵢ/λ would jump. So the wavenumber
-//! glides to its new value, and only while the hand moves: in a tick in which the hand turns the
-//! phase by Δφ, no column is turned by more than Δφ/4 in addition, nor by more than 1/64 turn. No
-//! voltage steps further than 5/4 of what the hand's motion makes it step, and a hand at rest feels
-//! nothing. The outermost columns settle within four times as many wavelengths of travel as they
-//! have turns to go.
-//!
-//! Phases are equal modulo a turn, so the wavenumber goes the shorter way round.
+//! The hand's phase goes on smoothly when λ changes, but 2π xᵢ/λ would jump. So each actuator glides to
+//! its new phase by equal steps, the shorter way round: by half a turn at most.
 
-use crate::array::{COLUMNS, half_pitches_from_middle};
-use crate::sine::Sine;
+use protocol::actuators::Actuator;
+use protocol::{ACTUATORS, Mode};
 
-/// Half pitches from the middle to the outermost column.
-const OUTERMOST: u32 = half_pitches_from_middle(COLUMNS - 1, COLUMNS) as u32;
-/// The most that a column may be turned in addition to the hand, as a part of the hand's turn.
-const PART_OF_THE_HANDS: u32 = 4;
-/// The most that a column may be turned in addition to the hand, in turns / 2³²: 1/64 turn.
-const MOST_PER_TICK: u32 = 1 << (32 - 6);
+use crate::sine::sine;
 
-/// The wavenumber along x: phase per half pitch, in turns / 2³².
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Each actuator's phase ahead of the middle, on its way to where it is to be.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
-    per_half_pitch: u32,
-    target: u32,
+    travelling: bool,
+    places_um: [i16; ACTUATORS],
+    /// Turns / 2¹⁶.
+    trims: [u16; ACTUATORS],
+    /// Turns / 2³².
+    ahead: [u32; ACTUATORS],
+    targets: [u32; ACTUATORS],
+    per_tick: [i32; ACTUATORS],
+    ticks_left: u32,
+    /// Whether all targets are one.
+    flat: bool,
 }
 
 impl Pattern {
-    /// Where to glide: phase per half pitch, in turns / 2³²; 0 is uniform.
-    pub const fn aim(&mut self, per_half_pitch: u32) {
-        self.target = per_half_pitch;
+    /// Places and trims of these actuators, with a wavenumber of 0.
+    pub fn new(mode: Mode, actuators: &[Actuator; ACTUATORS]) -> Self {
+        let mut pattern = Self {
+            travelling: mode == Mode::Travelling,
+            places_um: actuators.map(|actuator| actuator.x_um),
+            trims: actuators.map(|actuator| actuator.phase),
+            ahead: [0; ACTUATORS],
+            targets: [0; ACTUATORS],
+            per_tick: [0; ACTUATORS],
+            ticks_left: 0,
+            flat: true,
+        };
+        pattern.set_targets(0);
+        pattern.settle();
+        pattern
     }
 
-    /// Is there at once: for when no voltage shows it.
-    pub const fn settle(&mut self) {
-        self.per_half_pitch = self.target;
+    /// Whether mode, place and trim of one actuator, of those there are, follow from its description.
+    pub fn is_of(&self, index: usize, mode: Mode, actuator: &Actuator) -> bool {
+        self.travelling == (mode == Mode::Travelling)
+            && self.places_um[index] == actuator.x_um
+            && self.trims[index] == actuator.phase
     }
 
-    /// One tick, in which the hand turned the phase by `turned` (unsigned, turns / 2³²).
-    pub fn glide(&mut self, turned: u32) {
-        let bound = ((turned / PART_OF_THE_HANDS).min(MOST_PER_TICK) / OUTERMOST) as i32;
-        let rest = self.target.wrapping_sub(self.per_half_pitch) as i32;
-        self.per_half_pitch = self
-            .per_half_pitch
-            .wrapping_add(rest.clamp(-bound, bound) as u32);
-    }
-
-    /// Phase per half pitch now, in turns / 2³².
-    pub const fn per_half_pitch(self) -> u32 {
-        self.per_half_pitch
-    }
-
-    /// Each column's sine, with `turns` / 2³² in the middle of the fingertip.
-    pub fn sines(self, turns: u32) -> [Sine; COLUMNS] {
-        if self.per_half_pitch == 0 {
-            return [Sine::of(turns); COLUMNS];
+    /// Lies as a wave of `per_micrometre` (turns / 2³²) does after `ticks` ticks, one at least.
+    pub fn aim(&mut self, per_micrometre: u32, ticks: u32) {
+        if !self.travelling || !self.set_targets(per_micrometre) {
+            return;
         }
-        let mut sines = [Sine::default(); COLUMNS];
-        for (column, sine) in sines.iter_mut().enumerate() {
-            let half_pitches = half_pitches_from_middle(column, COLUMNS) as u32;
-            let ahead = self.per_half_pitch.wrapping_mul(half_pitches);
-            *sine = Sine::of(turns.wrapping_add(ahead));
+        self.ticks_left = ticks.max(1);
+        let ticks = self.ticks_left as i32;
+        for ((step, target), ahead) in self.per_tick.iter_mut().zip(&self.targets).zip(&self.ahead)
+        {
+            // As a signed number the difference is the shorter way.
+            *step = target.wrapping_sub(*ahead) as i32 / ticks;
         }
-        sines
+    }
+
+    /// Whether any changed.
+    fn set_targets(&mut self, per_micrometre: u32) -> bool {
+        let mut changed = false;
+        let mut flat = true;
+        let first = self.target(0, per_micrometre);
+        for actuator in 0..ACTUATORS {
+            let target = self.target(actuator, per_micrometre);
+            changed |= target != self.targets[actuator];
+            flat &= target == first;
+            self.targets[actuator] = target;
+        }
+        self.flat = flat;
+        changed
+    }
+
+    fn target(&self, actuator: usize, per_micrometre: u32) -> u32 {
+        let place = if self.travelling {
+            (i32::from(self.places_um[actuator]) as u32).wrapping_mul(per_micrometre)
+        } else {
+            0
+        };
+        place.wrapping_add(u32::from(self.trims[actuator]) << 16)
+    }
+
+    /// Is there at once: for when nobody feels it.
+    pub fn settle(&mut self) {
+        self.ahead = self.targets;
+        self.ticks_left = 0;
+    }
+
+    /// One tick of the glide.
+    pub fn glide(&mut self) {
+        match self.ticks_left {
+            0 => {}
+            1 => self.settle(),
+            _ => {
+                for (ahead, step) in self.ahead.iter_mut().zip(&self.per_tick) {
+                    *ahead = ahead.wrapping_add_signed(*step);
+                }
+                self.ticks_left -= 1;
+            }
+        }
+    }
+
+    /// Whether there is something left to glide.
+    pub const fn is_gliding(&self) -> bool {
+        self.ticks_left > 0
+    }
+
+    /// Whether all actuators are at the same phase.
+    pub const fn is_flat(&self) -> bool {
+        self.flat && self.ticks_left == 0
+    }
+
+    /// The actuators' sines in Q28, from the first one on, with `turns` / 2³² in the fingertip's middle.
+    pub fn sines(&self, turns: u32, lanes: &mut [i32]) {
+        for (lane, ahead) in lanes.iter_mut().zip(&self.ahead) {
+            *lane = sine(turns.wrapping_add(*ahead));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use protocol::actuators::{DEFAULT_ACTUATORS, grid};
+
     use super::*;
+    use crate::phase::Wavelength;
 
-    const TURN_32ND: u32 = 1 << 27;
-
-    #[test]
-    fn no_column_is_turned_by_more_than_a_quarter_of_the_hands_turn() {
-        let mut pattern = Pattern::default();
-        pattern.aim(5 * TURN_32ND);
-        for turned in [0, 1, 35, 36, 1_000, 50_000_000, 1 << 28, u32::MAX] {
-            let before = pattern;
-            pattern.glide(turned);
-            let moved = pattern.per_half_pitch.wrapping_sub(before.per_half_pitch);
-            assert!(moved * OUTERMOST <= turned / 4);
-            assert!(moved * OUTERMOST <= 1 << 26);
-        }
-        assert!(pattern.per_half_pitch > 0);
+    fn per_micrometre(mm: f32) -> u32 {
+        Wavelength::new(mm).unwrap().phase_per_micrometre()
     }
 
     #[test]
-    fn arrives_exactly_by_the_shorter_way() {
-        let mut pattern = Pattern::default();
-        pattern.aim(30 * TURN_32ND);
-        let mut turned = 0_u64;
-        while pattern.per_half_pitch != pattern.target {
-            let before = pattern.per_half_pitch;
-            pattern.glide(1 << 24);
-            turned += 1 << 24;
-            assert!(
-                pattern.per_half_pitch.wrapping_sub(before) as i32 <= 0,
-                "upwards is longer"
-            );
+    fn actuators_are_ahead_by_their_place_over_the_wavelength_and_their_trim() {
+        let mut actuators = grid(1_501);
+        actuators[17].phase = 12_345;
+        actuators[20].x_um = -20_000;
+        for (mode, far) in [(Mode::Travelling, 1.0), (Mode::Uniform, 0.0)] {
+            for mm in [0.1_f32, 2.0, 50.0] {
+                let mut pattern = Pattern::new(mode, &actuators);
+                pattern.aim(per_micrometre(mm), 1);
+                pattern.glide();
+                for (ahead, actuator) in pattern.ahead.iter().zip(&actuators) {
+                    let place = far * f64::from(actuator.x_um) / 1_000.0 / f64::from(mm);
+                    let off = f64::from(*ahead) / 2_f64.powi(32)
+                        - f64::from(actuator.phase) / 65_536.0
+                        - place;
+                    // Half a unit per micrometre.
+                    let bound = 0.5 * f64::from(actuator.x_um.unsigned_abs()) / 2_f64.powi(32);
+                    assert!((off - off.round()).abs() <= bound + 1e-12, "{mm} mm: {off}");
+                }
+                assert!(!pattern.is_flat());
+            }
         }
-        // Two 32nds down for each half pitch, nine of them, at a quarter of the hand's turn.
-        let expected = 4 * 9 * 2 * u64::from(TURN_32ND);
-        assert!(turned.abs_diff(expected) <= 2 << 24, "{turned} {expected}");
     }
 
     #[test]
-    fn columns_are_ahead_by_their_distance_from_the_middle() {
-        let mut pattern = Pattern::default();
-        pattern.aim(1_000);
-        pattern.settle();
-        let turns = 77_777_777;
-        for (column, sine) in pattern.sines(turns).iter().enumerate() {
-            let ahead = (2 * column as i32 - 9) * 1_000;
-            assert_eq!(*sine, Sine::of(turns.wrapping_add_signed(ahead)));
+    fn each_actuator_glides_by_equal_steps_the_shorter_way_and_arrives_exactly() {
+        for ticks in [1, 7, 40, 1_000] {
+            let mut pattern = Pattern::new(Mode::Travelling, &DEFAULT_ACTUATORS);
+            pattern.aim(per_micrometre(2.0), 0);
+            pattern.glide();
+            let before = pattern.clone();
+            pattern.aim(per_micrometre(3.1), ticks);
+            for tick in 1..=ticks {
+                assert!(pattern.is_gliding());
+                pattern.glide();
+                for i in 0..ACTUATORS {
+                    let whole = i64::from(pattern.targets[i].wrapping_sub(before.ahead[i]) as i32);
+                    let gone = i64::from(pattern.ahead[i].wrapping_sub(before.ahead[i]) as i32);
+                    let even = whole * i64::from(tick) / i64::from(ticks);
+                    assert!(
+                        (gone - even).abs() <= i64::from(ticks),
+                        "{i}: {gone} {even}"
+                    );
+                }
+            }
+            assert_eq!(pattern.ahead, pattern.targets);
+            assert!(!pattern.is_gliding());
+        }
+    }
+
+    #[test]
+    fn nothing_glides_in_uniform_mode_or_to_where_it_is() {
+        let mut uniform = Pattern::new(Mode::Uniform, &DEFAULT_ACTUATORS);
+        uniform.aim(per_micrometre(2.0), 40);
+        assert!(uniform.is_flat() && !uniform.is_gliding());
+        let mut pattern = Pattern::new(Mode::Travelling, &DEFAULT_ACTUATORS);
+        for expected in [true, false] {
+            pattern.aim(per_micrometre(2.0), 40);
+            assert_eq!(pattern.is_gliding(), expected);
+            pattern.settle();
         }
     }
 }

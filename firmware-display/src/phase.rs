@@ -45,9 +45,10 @@ impl Wavelength {
         (TURN * MILLIMETRES_PER_COUNT / self.mm as f64 + 0.5) as u32
     }
 
-    /// Phase of a `distance_um` at rest on the surface, in turns / 2³², whole turns dropped.
-    pub const fn phase_of(self, distance_um: f64) -> u32 {
-        (TURN * distance_um / 1_000.0 / self.mm as f64 + 0.5) as u64 as u32
+    /// Phase of one micrometre, in turns / 2³², rounded to the nearest: off by half a unit at most, so
+    /// by 2.4·10⁻⁶ turns at the furthest actuator.
+    pub const fn phase_per_micrometre(self) -> u32 {
+        (TURN / 1_000.0 / self.mm as f64 + 0.5) as u32
     }
 }
 
@@ -55,23 +56,55 @@ impl Wavelength {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Phase {
     turns: u32,
+    /// The wavenumber, on its way to the target.
     per_count: u32,
+    target: u32,
+    per_tick: i32,
+    ticks_left: u32,
 }
 
 impl Phase {
-    /// Follows `wavelength` from here on.
-    pub const fn follow(&mut self, wavelength: Wavelength) {
-        self.per_count = wavelength.phase_per_count();
+    /// Follows `wavelength` from here on: the wavenumber is there after `ticks` ticks, at once if none.
+    pub const fn follow(&mut self, wavelength: Wavelength, ticks: u32) {
+        let target = wavelength.phase_per_count();
+        if target == self.target {
+            return;
+        }
+        self.target = target;
+        self.ticks_left = ticks;
+        if ticks == 0 {
+            self.settle();
+        } else {
+            // A twentieth of a turn at most: no overflow.
+            self.per_tick = (target as i32 - self.per_count as i32) / ticks as i32;
+        }
     }
 
-    /// Moves on by `counts` of the encoder, back if negative. Before the first
-    /// [`Phase::follow`] nothing moves.
-    pub const fn advance(&mut self, counts: i16) {
-        // Two's complement: multiplying modulo 2³² takes a negative count back by as much as the
-        // positive one went forward.
-        self.turns = self
-            .turns
-            .wrapping_add((counts as i32 as u32).wrapping_mul(self.per_count));
+    /// Has the wavenumber of the wavelength followed at once: for when nobody feels it.
+    pub const fn settle(&mut self) {
+        self.per_count = self.target;
+        self.ticks_left = 0;
+    }
+
+    /// One tick in which the hand moves by `counts` of the encoder, back if negative. Before the first
+    /// [`Phase::follow`] nothing moves. Returns by how much the phase turned, in turns / 2³², or almost a
+    /// quarter of a turn if it was more.
+    pub fn advance(&mut self, counts: i16) -> i32 {
+        match self.ticks_left {
+            0 => {}
+            1 => self.settle(),
+            _ => {
+                self.per_count = self.per_count.wrapping_add_signed(self.per_tick);
+                self.ticks_left -= 1;
+            }
+        }
+        // Two of them may be subtracted from each other.
+        const MOST: i64 = (1 << 30) - 1;
+        let turned = i64::from(counts) * i64::from(self.per_count);
+        // Two's complement: modulo 2³² a negative count takes the phase back by as much as the
+        // positive one took it forward.
+        self.turns = self.turns.wrapping_add(turned as u32);
+        turned.clamp(-MOST, MOST) as i32
     }
 
     /// The phase, in turns / 2³².
@@ -79,7 +112,7 @@ impl Phase {
         self.turns
     }
 
-    /// Phase of one count of the wavelength followed, in turns / 2³²; 0 before the first.
+    /// Phase of one count now, in turns / 2³²; 0 before the first wavelength.
     pub const fn per_count(self) -> u32 {
         self.per_count
     }
@@ -93,7 +126,7 @@ mod tests {
     fn phase_after_five_metres_is_travel_over_wavelength() {
         for mm in [0.1_f32, 0.83, 1.0, 2.0, 3.0, 4.0, 7.77, 50.0] {
             let mut phase = Phase::default();
-            phase.follow(Wavelength::new(mm).unwrap());
+            phase.follow(Wavelength::new(mm).unwrap(), 0);
             const COUNTS: u32 = 1_000_000;
             for _ in 0..COUNTS {
                 phase.advance(1);
@@ -113,7 +146,7 @@ mod tests {
     #[test]
     fn travel_taken_back_takes_the_phase_back_to_the_bit() {
         let mut phase = Phase::default();
-        phase.follow(Wavelength::new(1.7).unwrap());
+        phase.follow(Wavelength::new(1.7).unwrap(), 0);
         let there: std::vec::Vec<u32> = (0..5_000_i32)
             .map(|i| {
                 phase.advance((i % 37 - 3) as i16);
@@ -129,21 +162,60 @@ mod tests {
     #[test]
     fn one_large_step_equals_many_small_ones() {
         let mut once = Phase::default();
-        once.follow(Wavelength::new(0.1).unwrap());
+        once.follow(Wavelength::new(0.1).unwrap(), 0);
         let mut often = once;
         once.advance(i16::MIN);
-        (0..32_768).for_each(|_| often.advance(-1));
+        for _ in 0..32_768 {
+            often.advance(-1);
+        }
         assert_eq!(once, often);
     }
 
     #[test]
     fn a_new_wavelength_leaves_the_phase_where_it_is() {
+        for ticks in [0, 40] {
+            let mut phase = Phase::default();
+            phase.follow(Wavelength::new(2.0).unwrap(), 0);
+            phase.advance(123);
+            let before = phase.turns();
+            phase.follow(Wavelength::new(3.0).unwrap(), ticks);
+            phase.advance(0);
+            assert_eq!(phase.turns(), before);
+        }
+    }
+
+    #[test]
+    fn the_wavenumber_glides_by_equal_steps_and_arrives_exactly_in_its_time() {
+        for (before_mm, after_mm) in [(2.0, 3.0), (0.1, 50.0), (50.0, 0.1)] {
+            let [before, after] = [before_mm, after_mm].map(|mm| Wavelength::new(mm).unwrap());
+            let mut phase = Phase::default();
+            phase.follow(before, 0);
+            phase.follow(after, 40);
+            let whole = i64::from(after.phase_per_count()) - i64::from(before.phase_per_count());
+            for tick in 1..=40 {
+                phase.advance(1);
+                let gone = i64::from(phase.per_count()) - i64::from(before.phase_per_count());
+                // A step is short by less than a unit.
+                assert!((gone - whole * tick / 40).abs() <= 40, "tick {tick}");
+            }
+            assert_eq!(phase.per_count(), after.phase_per_count());
+            // The same wavelength told again does not begin anew.
+            phase.follow(after, 40);
+            assert_eq!(phase.ticks_left, 0);
+        }
+    }
+
+    #[test]
+    fn the_turn_told_is_the_phases_up_to_a_quarter() {
         let mut phase = Phase::default();
-        phase.follow(Wavelength::new(2.0).unwrap());
-        phase.advance(123);
-        let before = phase.turns();
-        phase.follow(Wavelength::new(3.0).unwrap());
-        assert_eq!(phase.turns(), before);
+        phase.follow(Wavelength::new(1.0).unwrap(), 0);
+        for counts in [0, 1, -1, 49, -49] {
+            let before = phase.turns();
+            let turned = phase.advance(counts);
+            assert_eq!(phase.turns().wrapping_sub(before) as i32, turned);
+        }
+        assert_eq!(phase.advance(i16::MAX), (1 << 30) - 1);
+        assert_eq!(phase.advance(i16::MIN), 1 - (1 << 30));
     }
 
     #[test]

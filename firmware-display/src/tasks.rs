@@ -5,28 +5,34 @@ use core::cell::{Cell, RefCell};
 use embassy_executor::Spawner;
 use embassy_stm32::usart::RingBufferedUartRx;
 use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::ThreadModeMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
-use firmware_display::{Display, Settings};
+use firmware_display::look::{self, Look, Rounds};
+use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer};
 use nucleo::care::care;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
 use protocol::{
-    DisplayConfiguration, DisplayCounters, Estimate, Hello, Message, RoleCounters, Stop,
+    DisplayCounters, DisplayState, Estimate, Hello, Message, RoleCounters, Safety, Stop, Trip,
 };
 use static_cell::StaticCell;
 
-use crate::board::{Board, Clear, Dacs, Ticks};
-use crate::chain::Fault;
+use crate::board::Board;
+use crate::converters::Converters;
+use crate::inputs::Inputs;
+use crate::ticks::Ticks;
 
-/// From the ports to the output task: the latest counts.
-static ESTIMATE: Signal<CriticalSectionRawMutex, Estimate> = Signal::new();
+/// From the ports to the output task. More estimates than a tick brings at a line's full speed, so that
+/// those of a flood are seen.
+static ESTIMATES: Channel<CriticalSectionRawMutex, Estimate, 8> = Channel::new();
 static STOP: Signal<CriticalSectionRawMutex, Stop> = Signal::new();
-static CONFIGURE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+static CONFIGURE: Signal<CriticalSectionRawMutex, Settings> = Signal::new();
 /// What is in force, whichever port it came from.
-static SETTINGS: Mutex<CriticalSectionRawMutex, RefCell<Settings>> =
-    Mutex::new(RefCell::new(Settings::DEFAULT));
+static SETTINGS: ThreadModeMutex<RefCell<Settings>> =
+    ThreadModeMutex::new(RefCell::new(Settings::DEFAULT));
 /// What the output task has counted so far.
 static COUNTERS: Mutex<CriticalSectionRawMutex, Cell<DisplayCounters>> =
     Mutex::new(Cell::new(DisplayCounters::ZERO));
@@ -38,14 +44,16 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     let Board {
         output,
         ticks,
-        dacs,
+        converters,
+        inputs,
+        trip,
         peer,
         console,
         vitals,
     } = board;
     let [major, minor, patch] = hello.version;
     defmt::info!("display {}.{}.{} started", major, minor, patch);
-    output.spawn(once(drive(ticks, dacs)));
+    output.spawn(once(drive(ticks, converters, inputs, trip)));
     for (side, serial) in [(Side::Peer, peer), (Side::Console, console)] {
         spawner.spawn(once(listen(ports, side, serial.receiver)));
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
@@ -56,61 +64,133 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     })));
 }
 
-/// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: one tick, 500 µs, for
-/// them to arrive. Missed, they are given up, the next output carries the travel of both ticks, and the
-/// miss is counted; missed four times in a row, the hardware lets CLR fall and all outputs go to 0 V.
+/// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: LDAC's edge, 95 µs after
+/// the tick, for them to arrive. Missed, they are sent again with the next tick's travel in them, and the
+/// miss is counted; missed four times in a row, CLR is no longer held off and all outputs go to 0 V, as
+/// they do by hardware if this task does not run any more.
 #[embassy_executor::task]
-async fn drive(mut ticks: Ticks, mut dacs: Dacs) {
-    let mut display = Display::new(DisplayConfiguration::default());
-    let mut deadline_misses = 0u32;
-    let mut spi_errors = u32::from(dacs.start().is_err());
+async fn drive(
+    mut ticks: Ticks,
+    mut converters: Converters,
+    inputs: Inputs,
+    persisted: Option<Trip>,
+) {
+    let settings = Settings::DEFAULT;
+    let mut display = Display::new(&settings, persisted);
+    display.started(converters.start());
+    let mut pace = Pace::new(&settings);
+    let mut announced = Announced::default();
+    let mut unheard = false;
+    let mut released = false;
     ticks.start();
     loop {
-        let (encoder, missed) = ticks.next().await;
-        deadline_misses = deadline_misses.wrapping_add(missed);
-        match dacs.finish() {
-            Ok(Clear::Held) => {}
-            Ok(Clear::Fell) => display.resend(),
-            Err(Fault::Transfer) => {
-                spi_errors = spi_errors.wrapping_add(1);
-                display.resend();
-            }
-            Err(Fault::Stall) => {
-                deadline_misses = deadline_misses.wrapping_add(1);
-                display.resend();
-            }
+        let (encoder, missed_ticks) = ticks.next().await;
+        let (transfer, readback) = converters.finish();
+        let senses = Senses {
+            stop_input_open: inputs.stop_is_open(),
+            alarm: inputs.alarm(),
+            transfer,
+            clear_fell: released && converters.is_clear(),
+            readback,
+            unheard: core::mem::take(&mut unheard),
+            missed_ticks,
+        };
+        if let Some(stop) = STOP.try_take() {
+            display.stop(stop.reason);
         }
-        if STOP.try_take().is_some() {
-            display.stop();
+        if let Some(settings) = CONFIGURE.try_take() {
+            ticks.set_rate(settings.configuration().update_rate);
+            pace = Pace::new(&settings);
+            display.configure(&settings);
         }
-        if CONFIGURE.try_take().is_some() {
-            SETTINGS.lock(|settings| display.configure(*settings.borrow().configuration()));
-        }
-        if let Some(estimate) = ESTIMATE.try_take() {
+        while let Ok(estimate) = ESTIMATES.try_receive() {
             display.on_estimate(&estimate);
         }
-        if display.tick(encoder) {
-            dacs.update(display.words());
+        let output = display.tick(encoder, &senses);
+        // Outputs that can't be changed go to 0 V.
+        if output.release && transfer == Transfer::Done {
+            converters.hold_off();
         }
+        // What CLR took away is not looked for before it is there again.
+        let quiet = transfer == Transfer::Done && !senses.clear_fell;
+        let look = pace.next(display.words()).filter(|_| quiet);
+        match look {
+            look if output.send => converters.update(display.words(), look),
+            Some(look) => converters.look(look),
+            None => {}
+        }
+        released = output.release;
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
-            // A motion that finds no room shows as a gap in its sequence.
-            let _ = OUTBOX.try_send(Message::Motion(motion));
+            unheard = OUTBOX.try_send(Message::Motion(motion)).is_err();
         }
-        let counters = DisplayCounters {
-            deadline_misses,
-            spi_errors,
-            ..display.counters()
-        };
-        COUNTERS.lock(|shared| shared.set(counters));
+        announced.tell(display.state());
+        COUNTERS.lock(|shared| shared.set(display.counters()));
     }
 }
 
+/// When to look into the converters.
+struct Pace {
+    rounds: Rounds,
+    ticks: u32,
+    period_ticks: u32,
+}
+
+impl Pace {
+    fn new(settings: &Settings) -> Self {
+        let ticks_per_ms = settings.configuration().update_rate.hz() / 1_000;
+        Self {
+            rounds: Rounds::default(),
+            ticks: 0,
+            period_ticks: ticks_per_ms * look::PERIOD_MS,
+        }
+    }
+
+    /// One tick, with the chips holding `words`: a look, if it is due.
+    fn next(&mut self, words: &[u16; ACTUATORS]) -> Option<Look> {
+        self.ticks += 1;
+        if self.ticks < self.period_ticks {
+            return None;
+        }
+        self.ticks = 0;
+        Some(self.rounds.next(words))
+    }
+}
+
+/// What was said of the supervisor's state.
+#[derive(Default)]
+struct Announced {
+    kept: DisplayState,
+    told: DisplayState,
+}
+
+impl Announced {
+    /// Keeps why the display was stopped where a reset does not reach, and tells of each change as soon
+    /// as there is room for the message.
+    fn tell(&mut self, state: DisplayState) {
+        if state != self.kept {
+            self.kept = state;
+            if let DisplayState::Stopped(trip) = state {
+                nucleo::trip::latch(trip);
+            }
+        }
+        if state != self.told {
+            let instant_us = Instant::now().as_micros();
+            let safety = Message::Safety(Safety { instant_us, state });
+            if OUTBOX.try_send(safety).is_ok() {
+                self.told = state;
+            }
+        }
+    }
+}
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
 async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
     ports
         .listen(side, uart, |message| match message {
-            Message::Estimate(estimate) => ESTIMATE.signal(estimate),
+            Message::Estimate(estimate) => {
+                // Full only in a flood, of which those that fit tell enough.
+                let _ = ESTIMATES.try_send(estimate);
+            }
             Message::Stop(stop) => STOP.signal(stop),
             Message::Actuators(block) => {
                 let refused = SETTINGS.lock(|settings| settings.borrow_mut().on_actuators(&block));
@@ -119,9 +199,12 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                 }
             }
             Message::Configure(asked) => {
-                let answer = SETTINGS.lock(|settings| settings.borrow_mut().on_configure(&asked));
+                let (answer, settings) = SETTINGS.lock(|settings| {
+                    let mut settings = settings.borrow_mut();
+                    (settings.on_configure(&asked), settings.clone())
+                });
                 if answer.refused.is_none() {
-                    CONFIGURE.signal(());
+                    CONFIGURE.signal(settings);
                 }
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));

@@ -63,6 +63,9 @@ const RING: usize = 2 * BLOCK;
 const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
 const ARM_PWM: Hertz = Hertz(20_000);
 
+/// Bytes of each port's ring: 11 ms of a line without a gap.
+const RING_BYTES: usize = 1_024;
+
 /// Runs the sampling task above everything else, on the vector of a peripheral that is not used.
 static SAMPLING: InterruptExecutor = InterruptExecutor::new();
 
@@ -136,8 +139,11 @@ impl Board {
             forward: Output::new(p.PF13, Level::Low, Speed::Low),
         };
 
-        let peer = serial::peer(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5);
-        let console = serial::console(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1);
+        static PEER: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
+        static CONSOLE: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
+        let (ring, other) = (PEER.init([0; RING_BYTES]), CONSOLE.init([0; RING_BYTES]));
+        let peer = serial::peer(p.USART2, p.PD6, p.PD5, p.DMA1_CH6, p.DMA1_CH5, ring);
+        let console = serial::console(p.USART3, p.PD9, p.PD8, p.DMA1_CH3, p.DMA1_CH1, other);
 
         interrupt::UART5.set_priority(Priority::P6);
         Self {

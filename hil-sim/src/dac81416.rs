@@ -6,12 +6,16 @@
 //! wrong together only where those facts are.
 //!
 //! Left out: the frame CRC (CRC-EN), toggle mode, differential mode, daisy chains, an external
-//! reference, the alarms, and everything analogue: settling, offset, gain, supplies. Whoever
-//! switches one of the digital ones on finds a [`Fault::NotModelled`].
+//! reference, and everything analogue: settling, offset, gain, supplies. Whoever switches one of the
+//! digital ones on finds a [`Fault::NotModelled`].
+//!
+//! A chip can be broken on purpose: see [`defect`].
 
+pub mod defect;
 pub mod fault;
 pub mod register;
 
+pub use defect::Defects;
 pub use fault::Fault;
 
 use register::{
@@ -30,6 +34,8 @@ const READ: u8 = 0x80;
 /// Address bits; the one between them and [`READ`] does not matter.
 const ADDRESS: u8 = 0x3F;
 
+const SPICONFIG_TEMPALM_EN: u16 = 1 << 11;
+const STATUS_TEMP_ALM: u16 = 1 << 0;
 const SPICONFIG_SOFTTOGGLE_EN: u16 = 1 << 6;
 const SPICONFIG_DEV_PWDWN: u16 = 1 << 5;
 const SPICONFIG_CRC_EN: u16 = 1 << 4;
@@ -109,6 +115,8 @@ pub struct Dac81416 {
     answer: Option<[u8; 3]>,
     ldac_high: bool,
     clr_low: bool,
+    /// What is wrong with it.
+    pub defects: Defects,
     counters: Counters,
     faults: Vec<Fault>,
 }
@@ -123,6 +131,7 @@ impl Dac81416 {
             answer: None,
             ldac_high: true,
             clr_low: false,
+            defects: Defects::default(),
             counters: Counters::default(),
             faults: Vec::new(),
         };
@@ -154,6 +163,9 @@ impl Dac81416 {
     /// SDO answers a read in the frame after it: the read's first byte again, then the register.
     /// Else it says 0; and 0xFF, its idle level, if it is off, or silent because of streaming mode.
     pub fn transfer(&mut self, mosi: u8) -> u8 {
+        if self.defects.deaf {
+            return IDLE_HIGH;
+        }
         let Some((bytes, length)) = &mut self.frame else {
             self.fault(Fault::NotSelected);
             return IDLE_HIGH;
@@ -209,12 +221,23 @@ impl Dac81416 {
         }
     }
 
+    /// ALMOUT: whether the chip pulls it low, which it does when it overheats and was asked to tell
+    /// (TEMPALM-EN). In reset it is asked to.
+    pub fn alarm(&self) -> bool {
+        self.defects.overheated && self.is_set(SPICONFIG, SPICONFIG_TEMPALM_EN)
+    }
+
     /// A channel's output in V, as an ideal converter gives it. 0 V while the channel, the device or
     /// the reference is powered down, while CLR is low, and in no valid range.
     ///
     /// # Panics
     /// If there is no such channel.
     pub fn voltage(&self, channel: usize) -> f64 {
+        if let Some((stuck, volts)) = self.defects.stuck_output
+            && stuck == channel
+        {
+            return volts;
+        }
         let down = self.is_set(SPICONFIG, SPICONFIG_DEV_PWDWN)
             || self.is_set(GENCONFIG, GENCONFIG_REF_PWDWN)
             || self.is_set(DACPWDWN, 1 << channel)
@@ -273,7 +296,12 @@ impl Dac81416 {
             self.write(address, data);
         } else if let Some(&value) = self.registers.get(usize::from(address)) {
             let readable = !matches!(address, NOP | DACRANGE0..=DACRANGE3 | TRIGGER);
-            let [high, low] = if readable { value } else { 0 }.to_be_bytes();
+            let value = match address {
+                STATUS if self.defects.overheated => value | STATUS_TEMP_ALM,
+                _ if readable => value,
+                _ => 0,
+            };
+            let [high, low] = value.to_be_bytes();
             self.answer = Some([command, high, low]);
         } else {
             self.fault(Fault::NoRegister { address });
@@ -367,7 +395,10 @@ impl Dac81416 {
     fn write_channel(&mut self, channel: usize, word: u16) {
         let address = DAC0 + channel as u8;
         if self.clr_low {
-            self.fault(Fault::HeldByClear { address });
+            // To say what is so anyway does no harm.
+            if word != self.registers[usize::from(address)] {
+                self.fault(Fault::HeldByClear { address });
+            }
             return;
         }
         self.counters.words += 1;
@@ -378,6 +409,9 @@ impl Dac81416 {
     }
 
     fn load(&mut self) {
+        if self.defects.no_load {
+            return;
+        }
         self.counters.loads += 1;
         for channel in 0..CHANNELS {
             if self.is_set(SYNCCONFIG, 1 << channel) {

@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use firmware_display::array::{COLUMNS, place};
 use hil_sim::recording::{ACTUATORS, OutputRecord, volts};
 use tests::run::{Run, scene};
 
 const SPEED_MM_S: f64 = 50.0;
+/// Of the default grid.
+const COLUMNS: usize = 10;
 /// In this time, in ns, the pattern is measured: ten cycles of the 12.5 Hz of 4 mm.
 const FROM_NS: u64 = 500_000_000;
 const TO_NS: u64 = 1_300_000_000;

@@ -1,24 +1,42 @@
-//! Whatever happens, in whatever order.
+//! Whatever happens, in whatever order: 1 000 lives of up to 200 random events each.
 
-use firmware_display::{Display, ZERO_VOLT};
+use firmware_display::pace::{per_tick, quarters};
+use firmware_display::{Display, Readback, Senses, Transfer, ZERO_VOLT};
 use proptest::prelude::*;
-use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
+use protocol::{
+    Contact, DisplayConfiguration, DisplayState, Estimate, GAUGES, GaugeHealth, Hold, Mode, Range,
+    StopReason, Trip, UpdateRate,
+};
 
-/// Ticks in which a new amplitude is reached: 20 ms.
-const AMPLITUDE_REACHED: u32 = 40;
+use crate::rig::{SILENCE, configured};
+
+const LIVES: u32 = 1_000;
+const EVENTS: std::ops::Range<usize> = 20..200;
+/// In which a lower amplitude is reached whatever estimates come meanwhile.
+const AMPLITUDE_REACHED_MS: u32 = 250;
+/// From a hold to 0 V, in ms, but for an estimate that is too old.
+const QUICK_MS: u32 = 8;
 
 #[derive(Clone, Debug)]
 enum Event {
-    Tick { counter: u16, times: u8 },
+    /// The hand moves by so many counts a tick.
+    Ticks {
+        counts: i16,
+        times: u8,
+    },
+    /// The hand's encoder is somewhere else.
+    Jump(u16),
     Estimate(Estimate),
     Configure(DisplayConfiguration),
-    Stop,
-    Resend,
+    Stop(StopReason),
+    Senses(Senses),
+    Started,
 }
 
 fn wavelength() -> impl Strategy<Value = Option<f32>> {
     prop_oneof![
-        4 => (0.1_f32..50.0).prop_map(Some),
+        6 => Just(Some(2.0)),
+        3 => (0.1_f32..50.0).prop_map(Some),
         1 => any::<f32>().prop_map(Some),
         1 => Just(None),
     ]
@@ -28,14 +46,14 @@ prop_compose! {
     fn estimate()(
         sequence in prop_oneof![0..2_000_u32, any::<u32>()],
         wavelength_mm in wavelength(),
-        valid in any::<bool>(),
+        valid in prop::bool::weighted(0.8),
         instant_us in any::<u64>(),
-        amplitude_lsb in any::<f32>(),
-        confidence in any::<f32>(),
+        amplitude_lsb in prop_oneof![9 => 0.0..2_000.0_f32, 1 => any::<f32>()],
+        confidence in prop_oneof![9 => 0.0..=1.0_f32, 1 => any::<f32>()],
         counted_mm in any::<Option<f32>>(),
-        velocity_um_s in any::<i32>(),
+        velocity_um_s in prop_oneof![9 => -100_000..100_000, 1 => any::<i32>()],
         lag_um in any::<Option<i32>>(),
-        gauges_used in any::<u8>(),
+        gauges_used in prop_oneof![9 => 1..32_u8, 1 => any::<u8>()],
     ) -> Estimate {
         Estimate {
             sequence,
@@ -58,34 +76,61 @@ prop_compose! {
 prop_compose! {
     fn configuration()(
         travelling in any::<bool>(),
+        fast in any::<bool>(),
         max_age_ms in 20..=5_000_u16,
         fade_in_ms in 1..=1_000_u16,
         fade_out_ms in 1..=1_000_u16,
         glide_ms in 0..=500_u16,
         amplitude_mv in 0..=5_000_u16,
         reference_lsb in 0..=2_000_u16,
+        full_drive_s in 10..=3_600_u16,
     ) -> DisplayConfiguration {
-        let mode = if travelling { Mode::Travelling } else { Mode::Uniform };
         DisplayConfiguration {
-            mode,
+            mode: if travelling { Mode::Travelling } else { Mode::Uniform },
+            update_rate: if fast { UpdateRate::Hz4000 } else { UpdateRate::Hz2000 },
             max_age_ms,
             fade_in_ms,
             fade_out_ms,
             glide_ms,
             amplitude_mv,
             reference_lsb,
+            full_drive_s,
             ..DisplayConfiguration::DEFAULT
         }
     }
 }
 
+prop_compose! {
+    /// Rare enough for other things to happen before they stop the display.
+    fn senses()(
+        stop_input_open in prop::bool::weighted(0.1),
+        alarm in prop::bool::weighted(0.1),
+        transfer in prop_oneof![
+            8 => Just(Transfer::Done), 1 => Just(Transfer::Failed), 1 => Just(Transfer::Stalled)
+        ],
+        clear_fell in prop::bool::weighted(0.2),
+        readback in prop_oneof![
+            8 => Just(Readback::None), 8 => Just(Readback::Agrees), 1 => Just(Readback::Differs)
+        ],
+        unheard in prop::bool::weighted(0.1),
+        missed_ticks in prop_oneof![8 => Just(0), 1 => 0..10_u32, 1 => any::<u32>()],
+    ) -> Senses {
+        Senses { stop_input_open, alarm, transfer, clear_fell, readback, unheard, missed_ticks }
+    }
+}
+
 fn event() -> impl Strategy<Value = Event> {
     prop_oneof![
-        40 => (any::<u16>(), 1..60_u8).prop_map(|(counter, times)| Event::Tick { counter, times }),
-        30 => estimate().prop_map(Event::Estimate),
-        5 => configuration().prop_map(Event::Configure),
-        1 => Just(Event::Stop),
-        2 => Just(Event::Resend),
+        // No faster than 2 m/s at 4 kHz.
+        400 => (-100..=100_i16, 1..60_u8).prop_map(|(counts, times)| Event::Ticks { counts, times }),
+        100 => (-8..=8_i16, 1..60_u8).prop_map(|(counts, times)| Event::Ticks { counts, times }),
+        300 => estimate().prop_map(Event::Estimate),
+        50 => configuration().prop_map(Event::Configure),
+        50 => senses().prop_map(Event::Senses),
+        20 => Just(Event::Started),
+        2 => any::<u16>().prop_map(Event::Jump),
+        1 => Just(Event::Stop(StopReason::Operator)),
+        1 => Just(Event::Stop(StopReason::Host)),
     ]
 }
 
@@ -96,71 +141,156 @@ fn allowed(amplitude_mv: u16) -> u16 {
         .min(32_767.0) as u16
 }
 
-proptest! {
-    #[test]
-    fn words_never_leave_the_amplitude(
-        start in configuration(),
-        events in prop::collection::vec(event(), 1..150),
-    ) {
-        let mut display = Display::new(start);
-        let mut stopped = false;
-        let mut before_mv = start.amplitude_mv;
-        let mut ticks_since_change = u32::MAX;
-        let mut last = *display.words();
-        for event in events {
-            match event {
-                Event::Estimate(estimate) => display.on_estimate(&estimate),
-                Event::Resend => display.resend(),
-                Event::Stop => {
-                    display.stop();
-                    stopped = true;
-                }
-                Event::Configure(configuration) => {
-                    // Until a change is through, the largest of those under way counts.
-                    let under_way = ticks_since_change < AMPLITUDE_REACHED;
-                    let now_mv = display.configuration().amplitude_mv;
-                    before_mv = if under_way { before_mv.max(now_mv) } else { now_mv };
-                    ticks_since_change = 0;
-                    display.configure(configuration);
-                }
-                Event::Tick { counter, times } => {
-                    for time in 0..u16::from(times) {
-                        let sent = display.tick(counter.wrapping_add(time.wrapping_mul(counter % 13)));
-                        ticks_since_change = ticks_since_change.saturating_add(1);
-                        let now_mv = display.configuration().amplitude_mv;
-                        let under_way = ticks_since_change < AMPLITUDE_REACHED;
-                        let most = allowed(if under_way { now_mv.max(before_mv) } else { now_mv });
-                        let most = if stopped { 0 } else { most };
-                        for word in display.words() {
-                            prop_assert!(word.abs_diff(ZERO_VOLT) <= most, "{word:#x}, allowed {most}");
-                        }
-                        prop_assert!(sent || *display.words() == last, "changed but not sent");
-                        last = *display.words();
-                    }
-                }
-            }
+/// A display, and what it has promised.
+struct Watched {
+    display: Display,
+    encoder: u16,
+    stop_asked: bool,
+    /// The amplitude before the last change, in force until it is reached.
+    before_mv: u16,
+    since_change: u32,
+    /// The same, and since a quick hold began, in quarters of a millisecond.
+    since_hold: u32,
+    ticks: u32,
+}
+
+impl Watched {
+    fn new(start: &DisplayConfiguration) -> Self {
+        Self {
+            display: Display::new(&configured(start), None),
+            encoder: 0,
+            stop_asked: false,
+            before_mv: start.amplitude_mv,
+            since_change: u32::MAX,
+            since_hold: 0,
+            ticks: 0,
         }
     }
 
+    fn quarters_per_tick(&self) -> u32 {
+        per_tick(self.display.configuration().update_rate)
+    }
+
+    fn undergo(&mut self, event: &Event) -> Result<(), TestCaseError> {
+        match event {
+            Event::Estimate(estimate) => self.display.on_estimate(estimate),
+            Event::Started => self.display.started(Ok(())),
+            Event::Stop(reason) => {
+                self.display.stop(*reason);
+                self.stop_asked = true;
+            }
+            Event::Configure(configuration) => {
+                // Until a change is through, the largest of those under way counts.
+                let now_mv = self.display.configuration().amplitude_mv;
+                let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
+                self.before_mv = if under_way {
+                    self.before_mv.max(now_mv)
+                } else {
+                    now_mv
+                };
+                self.since_change = 0;
+                self.display.configure(&configured(configuration));
+            }
+            Event::Jump(counter) => {
+                self.encoder = *counter;
+                self.tick(&Senses::default())?;
+            }
+            Event::Senses(senses) => self.tick(senses)?,
+            Event::Ticks { counts, times } => {
+                for _ in 0..*times {
+                    self.encoder = self.encoder.wrapping_add_signed(*counts);
+                    self.tick(&Senses::default())?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn tick(&mut self, senses: &Senses) -> Result<(), TestCaseError> {
+        let before = self.display.state();
+        let words_before = *self.display.words();
+        let output = self.display.tick(self.encoder, senses);
+        self.ticks += 1;
+        let state = self.display.state();
+        let words = *self.display.words();
+
+        // Stopped is for good, for the first reason, and means 0 V in this very tick; a Stop is obeyed.
+        let is_stopped = matches!(state, DisplayState::Stopped(_));
+        if matches!(before, DisplayState::Stopped(_)) {
+            prop_assert_eq!(state, before);
+        } else if is_stopped {
+            prop_assert!(output.send, "0 V is sent");
+        }
+        prop_assert!(is_stopped || !self.stop_asked);
+        // The stimulus breaks no limit by itself, whatever it is told.
+        prop_assert_ne!(state, DisplayState::Stopped(Trip::Limit));
+        prop_assert_ne!(state, DisplayState::Stopped(Trip::Memory));
+        // CLR is held off only where something may be driven.
+        prop_assert_eq!(output.release, !is_stopped && state != DisplayState::Boot);
+        if !matches!(state, DisplayState::Driving | DisplayState::Fading(_)) {
+            prop_assert_eq!(words, SILENCE, "{:?}", state);
+        }
+
+        // A quick hold is through in time; it may begin anew only out of Driving.
+        let quick = matches!(state, DisplayState::Fading(hold) if hold != Hold::Stale);
+        self.since_hold = if quick {
+            self.since_hold + self.quarters_per_tick()
+        } else {
+            0
+        };
+        prop_assert!(self.since_hold < quarters(QUICK_MS));
+
+        // No word is beyond the amplitude, and none changes without being sent.
+        self.since_change = self.since_change.saturating_add(self.quarters_per_tick());
+        let now_mv = self.display.configuration().amplitude_mv;
+        let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
+        let most = allowed(if under_way {
+            now_mv.max(self.before_mv)
+        } else {
+            now_mv
+        });
+        for word in words {
+            prop_assert!(
+                word.abs_diff(ZERO_VOLT) <= most,
+                "{word:#x}, allowed {most}"
+            );
+        }
+        prop_assert!(output.send || words == words_before, "changed but not sent");
+        prop_assert_eq!(self.display.counters().ticks, self.ticks);
+        Ok(())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: LIVES, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_promise_is_broken(
+        start in configuration(),
+        events in prop::collection::vec(event(), EVENTS),
+    ) {
+        let mut watched = Watched::new(&start);
+        watched.undergo(&Event::Started)?;
+        for event in &events {
+            watched.undergo(event)?;
+        }
+    }
+}
+
+proptest! {
     #[test]
     fn the_same_calls_give_the_same_words(
         start in configuration(),
-        events in prop::collection::vec(event(), 1..60),
+        events in prop::collection::vec(event(), EVENTS),
     ) {
-        let mut displays = [Display::new(start), Display::new(start)];
-        for event in events {
-            for display in &mut displays {
-                match event.clone() {
-                    Event::Estimate(estimate) => display.on_estimate(&estimate),
-                    Event::Resend => display.resend(),
-                    Event::Stop => display.stop(),
-                    Event::Configure(configuration) => display.configure(configuration),
-                    Event::Tick { counter, .. } => {
-                        display.tick(counter);
-                    }
-                }
+        let mut watched = [Watched::new(&start), Watched::new(&start)];
+        for event in &events {
+            for watched in &mut watched {
+                watched.undergo(event)?;
             }
-            prop_assert_eq!(displays[0].words(), displays[1].words());
+            let [one, other] = &watched;
+            prop_assert_eq!(one.display.words(), other.display.words());
+            prop_assert_eq!(one.display.counters(), other.display.counters());
         }
     }
 }

@@ -1,80 +1,184 @@
 //! A display with a hand and a sensor at its ends.
 
-use firmware_display::{ACTUATORS, Display};
-use protocol::{Contact, DisplayConfiguration, Estimate, GAUGES, GaugeHealth, Mode, Range};
+use firmware_display::{ACTUATORS, Display, Output, Senses, Settings, ZERO_VOLT};
+use protocol::actuators::{ACTUATOR_BLOCK, Actuator};
+use protocol::{
+    Actuators, Configuration, Contact, DisplayConfiguration, DisplayState, Estimate, GAUGES,
+    GaugeHealth, Range, UpdateRate,
+};
 
-/// Volts of one DAC step.
-pub const VOLT_PER_STEP: f64 = 10.0 / 65_536.0;
-/// Ticks that the default fade-in takes, and one.
-pub const FADED_IN: usize = 41;
+pub const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
+pub const SILENCE: [u16; ACTUATORS] = [ZERO_VOLT; ACTUATORS];
+pub const HEALTHY: Senses = Senses {
+    stop_input_open: false,
+    alarm: false,
+    transfer: firmware_display::Transfer::Done,
+    clear_fell: false,
+    readback: firmware_display::Readback::None,
+    unheard: false,
+    missed_ticks: 0,
+};
+
+/// Settings of a board that was asked for these.
+pub fn settings(
+    configuration: &DisplayConfiguration,
+    described: &[Actuator; ACTUATORS],
+) -> Settings {
+    let mut settings = Settings::DEFAULT;
+    for first in (0..ACTUATORS).step_by(ACTUATOR_BLOCK) {
+        let block = Actuators {
+            first: first as u8,
+            actuators: described[first..first + ACTUATOR_BLOCK].try_into().unwrap(),
+        };
+        assert_eq!(settings.on_actuators(&block), None);
+    }
+    let asked = Configuration::Display(DisplayConfiguration {
+        actuators: protocol::actuators::hash(described),
+        ..*configuration
+    });
+    let refused = settings.on_configure(&asked).refused;
+    assert_eq!(refused, None, "{configuration:?}");
+    settings
+}
+
+/// Settings of a board that was asked for this configuration of the default actuators.
+pub fn configured(configuration: &DisplayConfiguration) -> Settings {
+    settings(configuration, &protocol::actuators::DEFAULT_ACTUATORS)
+}
+
+/// A configuration at a rate, all else by default.
+pub fn at(update_rate: UpdateRate) -> DisplayConfiguration {
+    DisplayConfiguration {
+        update_rate,
+        ..DisplayConfiguration::DEFAULT
+    }
+}
 
 pub struct Rig {
     pub display: Display,
+    pub senses: Senses,
+    /// What the last tick asked for.
+    pub output: Output,
+    rate: UpdateRate,
+    ticks: u64,
     encoder: u16,
     sequence: u32,
 }
 
 impl Rig {
-    pub fn new(mode: Mode) -> Self {
-        Self::with(DisplayConfiguration {
-            mode,
-            ..DisplayConfiguration::default()
-        })
+    /// A display that has started.
+    pub fn new(configuration: &DisplayConfiguration) -> Self {
+        let mut rig = Self::of(Display::new(&configured(configuration), None));
+        rig.display.started(Ok(()));
+        rig
     }
 
-    pub fn with(configuration: DisplayConfiguration) -> Self {
+    pub fn of(display: Display) -> Self {
         Self {
-            display: Display::new(configuration),
+            rate: display.configuration().update_rate,
+            display,
+            senses: HEALTHY,
+            output: Output::default(),
+            ticks: 0,
             encoder: 65_000,
             sequence: 0,
         }
     }
 
-    /// The next estimate, valid, of this wavelength.
-    pub fn estimate(&mut self, wavelength_mm: f32) {
-        self.sequence += 1;
-        self.display
-            .on_estimate(&valid(self.sequence, wavelength_mm));
+    /// One that has followed the hand at full drive for 200 ms.
+    pub fn driving(configuration: &DisplayConfiguration) -> Self {
+        let mut rig = Self::new(configuration);
+        rig.rub(200, 2.0);
+        assert_eq!(rig.display.state(), DisplayState::Driving);
+        assert!(!rig.is_silent());
+        rig
     }
 
-    /// The next estimate, which its estimator does not stand by.
-    pub fn doubtful(&mut self, wavelength_mm: Option<f32>) {
+    pub fn state(&self) -> DisplayState {
+        self.display.state()
+    }
+
+    pub fn is_silent(&self) -> bool {
+        *self.display.words() == SILENCE
+    }
+
+    /// Ticks in `ms` milliseconds.
+    pub fn ticks(&self, ms: u32) -> u32 {
+        ms * self.rate.hz() / 1_000
+    }
+
+    /// Takes a configuration; ticks come at its rate from now on.
+    pub fn configure(&mut self, configuration: &DisplayConfiguration) {
+        self.display.configure(&configured(configuration));
+        self.rate = configuration.update_rate;
+    }
+
+    /// The next estimate, which is sound and of this wavelength.
+    pub fn estimate(&mut self, wavelength_mm: f32) {
+        self.tell(sound(0, wavelength_mm));
+    }
+
+    /// The next estimate.
+    pub fn tell(&mut self, estimate: Estimate) {
         self.sequence += 1;
-        let estimate = Estimate {
-            wavelength_mm,
-            valid: false,
-            ..valid(self.sequence, 1.0)
-        };
-        self.display.on_estimate(&estimate);
+        self.display.on_estimate(&Estimate {
+            sequence: self.sequence,
+            ..estimate
+        });
     }
 
     /// One tick in which the hand moves by `counts`.
-    pub fn tick(&mut self, counts: i16) -> bool {
+    pub fn tick(&mut self, counts: i16) -> Output {
         self.encoder = self.encoder.wrapping_add_signed(counts);
-        self.display.tick(self.encoder)
+        self.ticks += 1;
+        self.output = self.display.tick(self.encoder, &self.senses);
+        self.output
     }
 
-    /// `ticks` ticks with an estimate of `wavelength_mm` every twentieth; the volts of each.
-    pub fn rub(&mut self, ticks: usize, counts: i16, wavelength_mm: f32) -> Vec<[f64; ACTUATORS]> {
-        (0..ticks)
-            .map(|tick| {
-                if tick % 20 == 0 {
-                    self.estimate(wavelength_mm);
-                }
-                self.tick(counts);
-                self.volts()
-            })
-            .collect()
+    /// One tick of a hand at 70 mm/s.
+    pub fn move_on(&mut self) -> Output {
+        // 7 counts a tick at 2 kHz, 3 and 4 in turn at 4 kHz.
+        let counts = 14_000 * (self.ticks + 1) / u64::from(self.rate.hz())
+            - 14_000 * self.ticks / u64::from(self.rate.hz());
+        self.tick(counts as i16)
     }
 
-    pub fn volts(&self) -> [f64; ACTUATORS] {
-        self.display
-            .words()
-            .map(|word| (f64::from(word) - 32_768.0) * VOLT_PER_STEP)
+    /// `ms` milliseconds of rubbing at 70 mm/s with an estimate of `wavelength_mm` every 10 ms.
+    pub fn rub(&mut self, ms: u32, wavelength_mm: f32) {
+        self.rub_while(ms, wavelength_mm, |_| true);
+    }
+
+    /// The same for as long as `goes_on`. Returns the ticks.
+    pub fn rub_while(
+        &mut self,
+        most_ms: u32,
+        wavelength_mm: f32,
+        mut goes_on: impl FnMut(&Self) -> bool,
+    ) -> u32 {
+        let ticks = self.ticks(most_ms);
+        for tick in 0..ticks {
+            if self.ticks.is_multiple_of(u64::from(self.ticks(10))) {
+                self.estimate(wavelength_mm);
+            }
+            self.move_on();
+            if !goes_on(self) {
+                return tick + 1;
+            }
+        }
+        ticks
+    }
+
+    /// Ticks, at most those of `most_ms`, until all words are 0 V; the hand goes on and no estimate comes.
+    pub fn silent_after(&mut self, most_ms: u32) -> Option<u32> {
+        (1..=self.ticks(most_ms)).find(|_| {
+            self.move_on();
+            self.is_silent()
+        })
     }
 }
 
-pub fn valid(sequence: u32, wavelength_mm: f32) -> Estimate {
+/// An estimate that nothing is wrong with.
+pub fn sound(sequence: u32, wavelength_mm: f32) -> Estimate {
     Estimate {
         sequence,
         instant_us: u64::from(sequence) * 10_000,

@@ -1,15 +1,16 @@
-//! What is on the display board's pins: the hand's encoder, and four DAC81416 on SPI1 with common
-//! LDAC and CLR.
+//! What is on the display board's pins: the hand's encoder, the emergency-stop button, and four DAC81416
+//! on SPI1 with common LDAC, CLR and ALMOUT. Some of it can be broken on purpose.
 
 use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::device::Level;
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::generated::GPIOE;
+use rigless::soc::stm32f427::generated::TIM3;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::stm32f427::peripherals::tim;
+use rigless::time::VirtualNanos;
 
 use super::nucleo::Pins;
 use crate::dac81416::Dac81416;
@@ -26,10 +27,50 @@ const CHANNELS_PER_CHIP: usize = 16;
 const SELECTS: [(&str, u8); CHIPS] = [("GPIOD", 14), ("GPIOD", 15), ("GPIOF", 12), ("GPIOF", 13)];
 /// Index of SPI1.
 const SPI: usize = 0;
-/// LDAC is D5 (PE11): bits of the port's set and reset register.
-const LDAC_PIN: u32 = 11;
-const BSRR: u64 = 0x18;
+/// LDAC is D16 (PC6), channel 1 of TIM3; ALMOUT is D3 (PE13); the emergency stop is D4 (PF14).
+const LOAD: Line = Line(2, 6);
+const ALARM: Line = Line(4, 13);
+const BUTTON: Line = Line(5, 14);
+/// Index of TIM3, and the bytes of its registers.
+const TIM3_INDEX: usize = 1;
+const TIM3_SIZE: u64 = 0x400;
 const EIGHT_BITS: u8 = 8;
+
+/// A pin with a wire on it: the port's index and the pin's.
+#[derive(Clone, Copy, Debug)]
+struct Line(usize, u8);
+
+impl Line {
+    fn pin(self) -> Pin {
+        Pin::new(self.1).expect("a port has sixteen pins")
+    }
+
+    /// Puts `level` on the wire from outside, or leaves it to the pull-up.
+    fn drive(self, part: &mut Stm32f427, at_ns: u64, level: Option<Level>) {
+        part.drive_port(VirtualNanos(at_ns), self.0, |gpio, registers, context| {
+            gpio.drive(self.pin(), level, registers, context);
+        });
+    }
+
+    /// Puts `level` on the wire from the peripheral behind the pin.
+    fn drive_function(self, part: &mut Stm32f427, at_ns: u64, level: Level) {
+        part.drive_port(VirtualNanos(at_ns), self.0, |gpio, registers, context| {
+            gpio.drive_function(self.pin(), Some(level), registers, context);
+        });
+    }
+}
+
+/// What can be wrong with the hand's encoder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EncoderFault {
+    /// Nothing.
+    #[default]
+    None,
+    /// It counts no longer.
+    Dead,
+    /// It is off by so many counts, from now on.
+    Off(i16),
+}
 
 /// A chip behind the emulator's SPI seam, and when its voltages last changed.
 #[derive(Debug, Default)]
@@ -90,6 +131,13 @@ pub struct DisplayRecords {
 pub struct DisplayPins {
     world: World,
     clear: Option<Level>,
+    /// LDAC's level on the wire.
+    load: Option<Level>,
+    load_stuck: Option<Level>,
+    alarm: bool,
+    encoder_fault: EncoderFault,
+    /// What the encoder counted last.
+    counted: u16,
     records: DisplayRecords,
 }
 
@@ -99,11 +147,16 @@ impl DisplayPins {
         Self {
             world,
             clear: None,
+            load: None,
+            load_stuck: None,
+            alarm: false,
+            encoder_fault: EncoderFault::None,
+            counted: 0,
             records: DisplayRecords::default(),
         }
     }
 
-    /// Wires the converters up.
+    /// Wires the converters up, and the emergency-stop button, closed.
     pub fn fit(part: &mut Stm32f427) {
         for (port, pin) in SELECTS {
             let pin = Pin::new(pin).expect("a port has sixteen pins");
@@ -114,6 +167,7 @@ impl DisplayPins {
             };
             part.spi[SPI].attach_selected(OnBus::default(), select);
         }
+        BUTTON.drive(part, 0, Some(Level::Low));
     }
 
     /// What the run leaves, once it is over.
@@ -123,19 +177,94 @@ impl DisplayPins {
         std::mem::take(&mut self.records)
     }
 
-    /// The firmware wrote `value` to `address`: an edge of LDAC, if that is what it makes.
-    pub fn on_write(&mut self, part: &mut Stm32f427, address: u64, value: u64, at_ns: u64) {
-        if address != GPIOE.base + BSRR {
+    /// What has been kept so far.
+    pub fn records(&self) -> &DisplayRecords {
+        &self.records
+    }
+
+    /// Presses the emergency stop, which opens its contact, or releases it.
+    pub fn set_stop_button(&mut self, part: &mut Stm32f427, at_ns: u64, open: bool) {
+        BUTTON.drive(part, at_ns, (!open).then_some(Level::Low));
+    }
+
+    /// Breaks the hand's encoder, or mends it.
+    pub fn set_encoder_fault(&mut self, fault: EncoderFault) {
+        self.encoder_fault = fault;
+    }
+
+    /// Holds LDAC's wire at a level, whatever the board does, or lets go of it.
+    pub fn set_load_stuck(&mut self, part: &mut Stm32f427, at_ns: u64, level: Option<Level>) {
+        self.load_stuck = level;
+        self.follow_load(part, at_ns);
+    }
+
+    /// Does something to the `nth` chip, and lets its voltages and its alarm be seen.
+    ///
+    /// # Panics
+    /// If there is no such chip.
+    pub fn with_chip<R>(
+        &mut self,
+        part: &mut Stm32f427,
+        at_ns: u64,
+        nth: usize,
+        act: impl FnOnce(&mut Dac81416) -> R,
+    ) -> R {
+        let result = on_bus(part, nth).drive(at_ns, act);
+        self.record(part, at_ns);
+        self.follow_alarm(part, at_ns);
+        result
+    }
+
+    /// The firmware wrote to `address`: it may have raised LDAC.
+    pub fn on_write(&mut self, part: &mut Stm32f427, address: u64, _value: u64, at_ns: u64) {
+        if (TIM3.base..TIM3.base + TIM3_SIZE).contains(&address) {
+            self.follow_load(part, at_ns);
+        }
+    }
+
+    /// Puts what TIM3's channel 1 says on LDAC's wire.
+    fn follow_load(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        let channel = tim::Channel::new(1).expect("a timer has a channel 1");
+        let (timer, registers) = part.timer(TIM3_INDEX);
+        let driven = timer.output(channel, registers).unwrap_or(Level::High);
+        let level = self.load_stuck.unwrap_or(driven);
+        if self.load == Some(level) {
             return;
         }
-        // In this register setting a pin wins over resetting it (RM0090, 8.4.7).
-        let high = value & (1 << LDAC_PIN) != 0;
-        let low = value & (1 << (16 + LDAC_PIN)) != 0;
-        if high || low {
-            for chip in 0..CHIPS {
-                on_bus(part, chip).drive(at_ns, |dac| dac.ldac(high));
-            }
+        self.load = Some(level);
+        LOAD.drive_function(part, at_ns, level);
+        for chip in 0..CHIPS {
+            on_bus(part, chip).drive(at_ns, |dac| dac.ldac(level == Level::High));
+        }
+        if level == Level::Low {
             self.record(part, at_ns);
+        }
+    }
+
+    /// CLR is TIM1's channel 1, pulled low while nothing drives it.
+    fn follow_clear(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        let channel = tim::Channel::new(1).expect("a timer has a channel 1");
+        let (timer, registers) = part.advanced_timer(0);
+        let level = timer.output(channel, registers).unwrap_or(Level::Low);
+        if self.clear == Some(level) {
+            return;
+        }
+        if self.clear == Some(Level::High) {
+            self.records.clears += 1;
+        }
+        self.clear = Some(level);
+        for chip in 0..CHIPS {
+            on_bus(part, chip).drive(at_ns, |dac| dac.clr(level == Level::Low));
+        }
+        self.record(part, at_ns);
+    }
+
+    /// The chips' alarm outputs pull one wire low together.
+    fn follow_alarm(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        let alarm = (0..CHIPS).any(|chip| on_bus(part, chip).chip.alarm());
+        if alarm != self.alarm {
+            self.alarm = alarm;
+            ALARM.drive(part, at_ns, alarm.then_some(Level::Low));
         }
     }
 
@@ -179,30 +308,22 @@ fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
 impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
-        let encoder = encoder(position_mm);
+        let counted = match self.encoder_fault {
+            EncoderFault::None => encoder(position_mm),
+            EncoderFault::Dead => self.counted,
+            EncoderFault::Off(counts) => encoder(position_mm).wrapping_add_signed(counts),
+        };
+        self.counted = counted;
         self.records.ticks.push(TickRecord {
             at_ns,
-            encoder,
+            encoder: counted,
             position_mm,
         });
-        encoder
+        counted
     }
 
-    /// CLR is TIM1's channel 1, pulled low while nothing drives it.
     fn on_stop(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let channel = tim::Channel::new(1).expect("a timer has a channel 1");
-        let (timer, registers) = part.advanced_timer(0);
-        let level = timer.output(channel, registers).unwrap_or(Level::Low);
-        if self.clear == Some(level) {
-            return;
-        }
-        if self.clear == Some(Level::High) {
-            self.records.clears += 1;
-        }
-        self.clear = Some(level);
-        for chip in 0..CHIPS {
-            on_bus(part, chip).drive(at_ns, |dac| dac.clr(level == Level::Low));
-        }
-        self.record(part, at_ns);
+        self.follow_load(part, at_ns);
+        self.follow_clear(part, at_ns);
     }
 }

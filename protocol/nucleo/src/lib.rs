@@ -11,3 +11,4 @@ pub mod ports;
 pub mod reset;
 pub mod serial;
 pub mod spawn;
+pub mod trip;

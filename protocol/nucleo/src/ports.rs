@@ -97,7 +97,7 @@ impl Ports {
 
     /// Receives for ever: hands each message that is not the link's own to `handle`, which runs while
     /// the port is borrowed and so must not post, only pass on. No deadline: the
-    /// DMA ring holds 11 ms, and what is lost when it overruns is counted.
+    /// ring behind the port holds some milliseconds, and what is lost when it overruns is counted.
     pub async fn listen(
         &self,
         side: Side,

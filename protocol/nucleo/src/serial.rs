@@ -11,7 +11,6 @@ use embassy_stm32::peripherals::{
 };
 use embassy_stm32::usart::{self, Config, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma};
-use static_cell::StaticCell;
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<USART2>;
@@ -24,9 +23,6 @@ bind_interrupts!(struct Irqs {
 
 /// Speed of both ports, 8N1.
 pub const BAUD: u32 = 921_600;
-/// Bytes a receiver's ring holds: 11 ms of an uninterrupted line.
-const RING_BYTES: usize = 1_024;
-
 /// One UART: its receiver runs already, so that what the other board says before the tasks run is kept.
 pub struct Serial {
     /// The receiver.
@@ -35,33 +31,34 @@ pub struct Serial {
     pub transmitter: UartTx<'static, Async>,
 }
 
-/// The port to the other board. To be called once.
+/// The port to the other board, which keeps what it hears in `ring`: 92 bytes a millisecond at most, and
+/// half of it before anyone is told, if the line has no gap.
 pub fn peer(
     uart: Peri<'static, USART2>,
     rx: Peri<'static, PD6>,
     tx: Peri<'static, PD5>,
     tx_dma: Peri<'static, DMA1_CH6>,
     rx_dma: Peri<'static, DMA1_CH5>,
+    ring: &'static mut [u8],
 ) -> Serial {
-    static RING: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
-        RING.init([0; RING_BYTES]),
+        ring,
     )
 }
 
-/// The console port. To be called once.
+/// The console port, with its `ring`.
 pub fn console(
     uart: Peri<'static, USART3>,
     rx: Peri<'static, PD9>,
     tx: Peri<'static, PD8>,
     tx_dma: Peri<'static, DMA1_CH3>,
     rx_dma: Peri<'static, DMA1_CH1>,
+    ring: &'static mut [u8],
 ) -> Serial {
-    static RING: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
-        RING.init([0; RING_BYTES]),
+        ring,
     )
 }
 
@@ -73,7 +70,7 @@ fn configuration() -> Config {
 
 fn start(
     uart: Result<Uart<'static, Async>, usart::ConfigError>,
-    ring: &'static mut [u8; RING_BYTES],
+    ring: &'static mut [u8],
 ) -> Serial {
     let Ok(uart) = uart else {
         defmt::panic!("{} baud divides from 42 MHz", BAUD);

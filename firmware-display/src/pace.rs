@@ -1,0 +1,22 @@
+//! How long a tick is. Times are counted in quarters of a millisecond, the shorter of the two ticks, so
+//! that a change of the update rate changes none of them.
+
+use protocol::UpdateRate;
+
+/// The fastest update rate, in Hz.
+const FASTEST_HZ: u32 = UpdateRate::Hz4000.hz();
+/// Quarters of a millisecond in a millisecond.
+const PER_MS: u32 = FASTEST_HZ / 1_000;
+
+const _: () = assert!(FASTEST_HZ.is_multiple_of(1_000));
+const _: () = assert!(FASTEST_HZ.is_multiple_of(UpdateRate::Hz2000.hz()));
+
+/// Quarters of a millisecond in `ms` milliseconds.
+pub const fn quarters(ms: u32) -> u32 {
+    ms * PER_MS
+}
+
+/// Quarters of a millisecond in a tick.
+pub const fn per_tick(rate: UpdateRate) -> u32 {
+    FASTEST_HZ / rate.hz()
+}

@@ -1,0 +1,297 @@
+//! Which estimates are to be trusted.
+//!
+//! | an estimate is | if | then |
+//! | --- | --- | --- |
+//! | flooding | more come than a sensor sends, see [`crate::flood`] | not used, and a hold until the flood is over |
+//! | late | its sequence is not after the last one's, and no new beginning | not used |
+//! | out of range | it is valid, and λ is missing, not finite or not a [`Wavelength`] | not used; counts as distrust |
+//! | implausible | it contradicts itself, see [`contradicts_itself`] | not used; counts as distrust |
+//! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held |
+//! | surprising | λ differs from the one held by more than a factor of 2.1 | kept until the next valid one: if that is within a tenth of it, that one is trusted; if not, the surprise counts as distrust |
+//! | trusted | none of these | λ is followed |
+//!
+//! Five that count as distrust within half a second are a hold, until half a second has passed without.
+
+use protocol::{Estimate, GAUGES};
+
+use crate::flood::Flood;
+use crate::pace::quarters;
+use crate::phase::Wavelength;
+
+/// An estimate is late if it is behind the last by at most this many: 10 s.
+const LATE_AT_MOST: u32 = 1_000;
+/// A sensor that has just started sends sequences up to this; from it, one that is behind by more
+/// than [`REORDERED_AT_MOST`] is a new beginning and not late.
+const BEGINNING: u32 = 10;
+/// The link puts estimates out of order by no more than this many.
+const REORDERED_AT_MOST: u32 = 32;
+/// A λ that differs from the one held by more than this factor is a surprise. The paper's count is a
+/// whole number: from one estimate to the next it may go from 1 to 2 and back.
+const SURPRISE: f32 = 2.1;
+/// One that differs from the surprise before by no more than this factor confirms it.
+const CONFIRMATION: f32 = 1.1;
+/// So many that count as distrust, within [`DISTRUST_QUARTERS`], are too many.
+const DISTRUSTED: usize = 5;
+const DISTRUST_QUARTERS: u32 = quarters(500);
+/// The largest amplitude that a 12-bit converter can show: the fundamental of a square wave from end to
+/// end, 4/π · 2 048 steps.
+const LARGEST_AMPLITUDE_LSB: f32 = 2_608.0;
+/// No arm is faster: ten times the fastest that can be configured, in µm/s.
+const FASTEST_ARM_UM_S: u32 = 20_000_000;
+/// From here on the arm is said to move, in µm/s.
+const MOVING_UM_S: u32 = 10_000;
+/// The arm may go on for so long after the hand: the link there and back, and the arm's own ramps.
+const CONTRADICTION_QUARTERS: u32 = quarters(3_000);
+/// What the sensor said last counts for so long.
+const HEARD_QUARTERS: u32 = quarters(250);
+
+/// What is to be done with an estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// Its λ is to be followed.
+    Trusted(Wavelength),
+    /// It changes nothing: its estimator does not stand by it, or it is a first surprise.
+    Idle,
+    /// It was sent before one that was seen already.
+    Late,
+    /// It is valid, and its λ is missing or none that can be followed.
+    OutOfRange,
+    /// It contradicts itself.
+    Implausible,
+    /// It is one too many.
+    Flooding,
+}
+
+/// The estimates so far.
+#[derive(Clone, Debug)]
+pub struct Plausibility {
+    last_sequence: Option<u32>,
+    held: Option<Wavelength>,
+    surprise: Option<Wavelength>,
+    /// Surprises that were not confirmed, to be counted by the caller.
+    unconfirmed: u32,
+    /// Time since the last trusted estimate, in quarters of a millisecond.
+    age: u32,
+    flood: Flood,
+    distrust: Distrust,
+    contradiction: Contradiction,
+}
+
+impl Plausibility {
+    /// Before the first estimate.
+    pub const fn new() -> Self {
+        Self {
+            last_sequence: None,
+            held: None,
+            surprise: None,
+            unconfirmed: 0,
+            age: u32::MAX,
+            flood: Flood::NONE,
+            distrust: Distrust::NONE,
+            contradiction: Contradiction::NONE,
+        }
+    }
+
+    /// An estimate has come, while the last trusted λ counts for `max_age_ms`.
+    pub fn judge(&mut self, estimate: &Estimate, max_age_ms: u16) -> Verdict {
+        if !self.flood.take() {
+            return Verdict::Flooding;
+        }
+        match self.order(estimate.sequence) {
+            Order::Late => return Verdict::Late,
+            Order::Later => {}
+            // Another surface, for all that is known.
+            Order::Anew => self.forget(),
+        }
+        self.last_sequence = Some(estimate.sequence);
+        if contradicts_itself(estimate) {
+            self.distrust.count();
+            return Verdict::Implausible;
+        }
+        self.contradiction.hear(estimate.velocity_um_s);
+        if !estimate.valid {
+            return Verdict::Idle;
+        }
+        let Some(wavelength) = estimate.wavelength_mm.and_then(Wavelength::new) else {
+            self.distrust.count();
+            return Verdict::OutOfRange;
+        };
+        if !self.is_fresh(max_age_ms) {
+            self.forget();
+        }
+        self.weigh(wavelength)
+    }
+
+    /// A tick of `quarters` of a millisecond has passed, with the hand at rest or not.
+    pub fn elapse(&mut self, quarters: u32, hand_rests: bool) {
+        self.age = self.age.saturating_add(quarters);
+        self.flood.elapse(quarters);
+        self.distrust.elapse(quarters);
+        self.contradiction.elapse(quarters, hand_rests);
+    }
+
+    /// Whether the last trusted λ is no older than this.
+    pub const fn is_fresh(&self, max_age_ms: u16) -> bool {
+        self.age <= quarters(max_age_ms as u32)
+    }
+
+    /// Whether there are more estimates than a sensor sends.
+    pub const fn floods(&self) -> bool {
+        self.flood.floods()
+    }
+
+    /// Whether too many estimates were not to be trusted.
+    pub const fn distrusts(&self) -> bool {
+        self.distrust.too_many
+    }
+
+    /// Whether the arm has been said to move for 3 s in which the hand rested.
+    pub const fn contradicts(&self) -> bool {
+        self.contradiction.lasted >= CONTRADICTION_QUARTERS
+    }
+
+    /// The surprises that were not confirmed since the last call.
+    pub const fn take_unconfirmed(&mut self) -> u32 {
+        core::mem::replace(&mut self.unconfirmed, 0)
+    }
+
+    fn order(&self, sequence: u32) -> Order {
+        let Some(last) = self.last_sequence else {
+            return Order::Later;
+        };
+        // A later one is behind by almost 2³².
+        let behind = last.wrapping_sub(sequence);
+        let begins_anew = sequence <= BEGINNING && behind > REORDERED_AT_MOST;
+        if behind <= LATE_AT_MOST && !begins_anew {
+            Order::Late
+        } else if behind <= i32::MAX as u32 {
+            Order::Anew
+        } else {
+            Order::Later
+        }
+    }
+
+    /// Nothing is known of the surface any more.
+    fn forget(&mut self) {
+        self.held = None;
+        self.dismiss_surprise();
+    }
+
+    fn weigh(&mut self, wavelength: Wavelength) -> Verdict {
+        let surprises = |than: Wavelength| !are_within(wavelength, than, SURPRISE);
+        if self.held.is_some_and(surprises) {
+            let confirmed = self
+                .surprise
+                .is_some_and(|surprise| are_within(wavelength, surprise, CONFIRMATION));
+            if !confirmed {
+                self.dismiss_surprise();
+                self.surprise = Some(wavelength);
+                return Verdict::Idle;
+            }
+            self.surprise = None;
+        }
+        self.dismiss_surprise();
+        self.held = Some(wavelength);
+        self.age = 0;
+        Verdict::Trusted(wavelength)
+    }
+
+    fn dismiss_surprise(&mut self) {
+        if self.surprise.take().is_some() {
+            self.unconfirmed = self.unconfirmed.wrapping_add(1);
+            self.distrust.count();
+        }
+    }
+}
+
+impl Default for Plausibility {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Where an estimate stands to the last one.
+enum Order {
+    Late,
+    Later,
+    /// The sensor has started again.
+    Anew,
+}
+
+/// Whether two wavelengths differ by no more than a factor.
+fn are_within(one: Wavelength, other: Wavelength, factor: f32) -> bool {
+    one.mm() <= other.mm() * factor && other.mm() <= one.mm() * factor
+}
+
+/// Whether no sensor can have said this: a confidence outside of 0 to 1; an amplitude that is negative or
+/// more than the converter shows; an arm faster than 20 m/s; gauges that a fingertip does not have; valid
+/// without a gauge that took part. A number that is none is in no range.
+pub fn contradicts_itself(estimate: &Estimate) -> bool {
+    const ALL_GAUGES: u8 = (1 << GAUGES) - 1;
+    !(0.0..=1.0).contains(&estimate.confidence)
+        || !(0.0..=LARGEST_AMPLITUDE_LSB).contains(&estimate.amplitude_lsb)
+        || estimate.velocity_um_s.unsigned_abs() > FASTEST_ARM_UM_S
+        || estimate.gauges_used & !ALL_GAUGES != 0
+        || (estimate.valid && estimate.gauges_used == 0)
+}
+
+/// The last few estimates that were not to be trusted.
+#[derive(Clone, Copy, Debug)]
+struct Distrust {
+    /// Ages in quarters of a millisecond, the youngest first.
+    ages: [u32; DISTRUSTED],
+    too_many: bool,
+}
+
+impl Distrust {
+    const NONE: Self = Self {
+        ages: [u32::MAX; DISTRUSTED],
+        too_many: false,
+    };
+
+    fn count(&mut self) {
+        self.ages.rotate_right(1);
+        self.ages[0] = 0;
+        self.too_many |= self.ages[DISTRUSTED - 1] <= DISTRUST_QUARTERS;
+    }
+
+    fn elapse(&mut self, quarters: u32) {
+        for age in &mut self.ages {
+            *age = age.saturating_add(quarters);
+        }
+        self.too_many &= self.ages[0] < DISTRUST_QUARTERS;
+    }
+}
+
+/// How long the arm has been said to move while the hand rested.
+#[derive(Clone, Copy, Debug)]
+struct Contradiction {
+    arm_moves: bool,
+    /// Time since the sensor was heard last, and since the contradiction began, in quarters of a
+    /// millisecond.
+    heard: u32,
+    lasted: u32,
+}
+
+impl Contradiction {
+    const NONE: Self = Self {
+        arm_moves: false,
+        heard: u32::MAX,
+        lasted: 0,
+    };
+
+    fn hear(&mut self, velocity_um_s: i32) {
+        self.arm_moves = velocity_um_s.unsigned_abs() > MOVING_UM_S;
+        self.heard = 0;
+    }
+
+    fn elapse(&mut self, quarters: u32, hand_rests: bool) {
+        self.heard = self.heard.saturating_add(quarters);
+        let goes_on = hand_rests && self.arm_moves && self.heard <= HEARD_QUARTERS;
+        self.lasted = if goes_on {
+            self.lasted.saturating_add(quarters)
+        } else {
+            0
+        };
+    }
+}

@@ -1,0 +1,218 @@
+//! The stimulus: the hand's travel and the surface's λ in, fifty DAC words out, each output tick.
+//!
+//! ```text
+//! travel ─┬─> Phase ──> Pattern: sines ──> Balance: − mean ──> Array: · gain, rounded ──> words
+//!         └─> Rest ───> Gate ─┐                                  ▲
+//!             Level: roll-off ┴───────────── gain ───────────────┘
+//! ```
+//!
+//! y = 5 V · sin(2π (x + xᵢ)/λ) while all is well (equation (12) of Okamoto et al. 2009, accumulated), and
+//! exactly 0 V when the hand rests, within 19 ms of its last count.
+//!
+//! The last resort against steps, of a hand that cannot move so: no word changes by more than
+//! [`MOST_V_PER_MS`].
+
+use protocol::actuators::Actuator;
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
+
+use crate::array::Array;
+use crate::balance::Balance;
+use crate::gate::Gate;
+use crate::level::Level;
+use crate::pattern::Pattern;
+use crate::phase::{Phase, Wavelength};
+use crate::rest::Rest;
+use crate::{ACTUATORS, ZERO_VOLT, ticks_at};
+
+/// The steepest that any voltage gets, in V/ms: a little more than 5 V at 250 Hz need.
+pub const MOST_V_PER_MS: i32 = 8;
+/// The least time in which an actuator's phase glides to that of another λ, so that no voltage jumps.
+const LEAST_GLIDE_MS: u16 = 10;
+
+/// The display board's output, stepped once per output tick.
+///
+/// Time is counted in ticks alone: the same calls give the same words.
+#[derive(Clone, Debug)]
+pub struct Stimulus {
+    rate: UpdateRate,
+    glide_ms: u16,
+    description: Description,
+    /// A description that waits until the one in force is silent.
+    waiting: Option<Description>,
+    wavelength: Option<Wavelength>,
+    array: Array,
+    pattern: Pattern,
+    phase: Phase,
+    level: Level,
+    rest: Rest,
+    gate: Gate,
+    balance: Balance,
+    /// What the actuators do, before gains: of a tick, and only the first of it if they all do the same.
+    lanes: [i32; ACTUATORS],
+    /// Whether all words are 0 V and nothing was to be heard in the last tick.
+    silent: bool,
+    words: [u16; ACTUATORS],
+}
+
+/// What the actuators are and how they share the stimulus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Description {
+    mode: Mode,
+    actuators: [Actuator; ACTUATORS],
+}
+
+impl Stimulus {
+    /// 0 V, a hand at rest and no λ yet. Configuration and actuators are checked.
+    pub fn new(configuration: &DisplayConfiguration, actuators: &[Actuator; ACTUATORS]) -> Self {
+        Self {
+            rate: configuration.update_rate,
+            glide_ms: configuration.glide_ms,
+            description: Description {
+                mode: configuration.mode,
+                actuators: *actuators,
+            },
+            waiting: None,
+            wavelength: None,
+            array: Array::new(actuators),
+            pattern: Pattern::new(configuration.mode, actuators),
+            phase: Phase::default(),
+            level: Level::new(configuration),
+            rest: Rest::default(),
+            gate: Gate::default(),
+            balance: Balance::default(),
+            lanes: [0; ACTUATORS],
+            silent: true,
+            words: [ZERO_VOLT; ACTUATORS],
+        }
+    }
+
+    /// Takes a checked configuration. A new amplitude is reached in 20 ms; a new mode, and new actuators,
+    /// come into force when the gate has closed, which takes 6 ms, and it opens again in 6 ms. If nothing
+    /// is to be heard all is in force with the next tick.
+    pub fn configure(
+        &mut self,
+        configuration: &DisplayConfiguration,
+        actuators: &[Actuator; ACTUATORS],
+    ) {
+        self.rate = configuration.update_rate;
+        self.glide_ms = configuration.glide_ms;
+        self.level.configure(configuration);
+        let asked = Description {
+            mode: configuration.mode,
+            actuators: *actuators,
+        };
+        self.waiting = (asked != self.description).then_some(asked);
+    }
+
+    /// Follows a surface of this λ and amplitude (in ADC steps) from here on, gliding.
+    pub fn follow(&mut self, wavelength: Wavelength, amplitude_lsb: f32) {
+        self.level.follow(amplitude_lsb, self.rate);
+        if self.wavelength != Some(wavelength) {
+            self.wavelength = Some(wavelength);
+            let glide = ticks_at(self.rate, self.glide_ms);
+            self.phase.follow(wavelength, glide);
+            let glide = glide.max(ticks_at(self.rate, LEAST_GLIDE_MS));
+            self.pattern.aim(wavelength.phase_per_micrometre(), glide);
+        }
+        if self.silent {
+            self.settle();
+        }
+    }
+
+    /// One tick in which the hand moved by `travel` counts of 5 µm; `gain` is the supervisor's, in Q31,
+    /// 0 to 2³¹. True if any of [`Stimulus::words`] changed.
+    pub fn tick(&mut self, travel: i16, gain: u32) -> bool {
+        let turned = self.phase.advance(travel);
+        let gain = self.gain(travel, turned, gain);
+        if self.silent && gain == 0 {
+            self.settle();
+            return false;
+        }
+        self.pattern.glide();
+        let shared = self.pattern.is_flat() && self.balance.is_shared();
+        let most = self.most_steps();
+        let lanes = &mut self.lanes[..if shared { 1 } else { ACTUATORS }];
+        self.pattern.sines(self.phase.turns(), lanes);
+        self.balance.remove(lanes, gain, self.rate);
+        let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
+        let changed = self.array.draw(level as u32, lanes, most, &mut self.words);
+        self.silent = gain == 0 && are_silent(&self.words);
+        changed
+    }
+
+    /// What all lanes are multiplied with in this tick, in Q30.
+    fn gain(&mut self, travel: i16, turned: i32, supervisors: u32) -> u32 {
+        self.level.tick(turned, self.rate);
+        self.rest.tick(travel, self.rate);
+        let open = !self.rest.is_resting() && self.waiting.is_none() && supervisors > 0;
+        self.gate.tick(open, self.rate);
+        let gain = (u64::from(self.gate.gain()) * u64::from(supervisors)) >> 31;
+        ((gain * u64::from(self.level.roll_off(self.rate))) >> 30) as u32
+    }
+
+    /// The most that a word changes in a tick.
+    const fn most_steps(&self) -> i32 {
+        let ticks_per_ms = (self.rate.hz() / 1_000) as i32;
+        MOST_V_PER_MS * 65_536 / 10 / ticks_per_ms
+    }
+
+    /// Ends what is under way, while nobody feels it.
+    fn settle(&mut self) {
+        if let Some(description) = self.waiting.take() {
+            self.array = Array::new(&description.actuators);
+            self.pattern = Pattern::new(description.mode, &description.actuators);
+            if let Some(wavelength) = self.wavelength {
+                self.pattern.aim(wavelength.phase_per_micrometre(), 1);
+            }
+            self.balance.clear();
+            self.description = description;
+        }
+        self.phase.settle();
+        self.level.settle();
+        if self.pattern.is_gliding() {
+            self.pattern.settle();
+        }
+    }
+
+    /// The words of the last tick: [`ZERO_VOLT`] is 0 V, a step 10 V / 65 536.
+    pub const fn words(&self) -> &[u16; ACTUATORS] {
+        &self.words
+    }
+
+    /// The description of the actuators that was asked for last.
+    pub fn actuators(&self) -> &[Actuator; ACTUATORS] {
+        let asked = self.waiting.as_ref().unwrap_or(&self.description);
+        &asked.actuators
+    }
+
+    /// Whether what the words are made with still follows from the description of `actuator` in force.
+    pub fn follows_from(&self, actuator: usize) -> bool {
+        let description = &self.description;
+        description
+            .actuators
+            .get(actuator)
+            .is_some_and(|described| {
+                self.array.is_of(actuator, described)
+                    && self.pattern.is_of(actuator, description.mode, described)
+            })
+    }
+
+    /// Whether the hand rests, see [`Rest`].
+    pub const fn is_resting(&self) -> bool {
+        self.rest.is_resting()
+    }
+
+    /// 0 V at once; goes on from there as after a rest if ticks have a gain again.
+    pub fn silence(&mut self) {
+        self.words = [ZERO_VOLT; ACTUATORS];
+        self.gate.shut();
+        self.balance.clear();
+        self.silent = true;
+    }
+}
+
+/// Not inlined, since it would be worked out for nothing while there is a gain.
+#[inline(never)]
+fn are_silent(words: &[u16; ACTUATORS]) -> bool {
+    words.iter().all(|word| *word == ZERO_VOLT)
+}

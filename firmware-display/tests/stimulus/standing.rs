@@ -1,0 +1,256 @@
+//! No channel keeps a voltage.
+//!
+//! A sine cut off anywhere has a mean: 5/(π f) V over a second in the worst case, 45 mV at 35 Hz. So
+//! means are taken over whole cycles, or whole strokes, of about a second.
+
+use std::f64::consts::{PI, TAU};
+
+use firmware_display::balance::TIME_CONSTANT_S;
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
+
+use crate::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, corner_hz, largest, means, trimmed};
+
+/// The most that may stand.
+const MOST_V: f64 = 0.005;
+
+#[test]
+fn in_steady_motion_none_over_whole_cycles() {
+    for rate in RATES {
+        for mode in MODES {
+            for (counts, lambda_counts) in [(7, 166_usize), (-7, 400), (1, 800), (23, 210)] {
+                let mut rig = Rig::new(mode, rate);
+                rig.follow(lambda_counts as f64 * 0.005);
+                rig.rub(rig.ticks(3.0), counts);
+                // As many ticks as a wavelength has counts are whole cycles.
+                let window = rig.ticks(1.0).div_ceil(lambda_counts) * lambda_counts;
+                for _ in 0..3 {
+                    let mean = largest(&means(&rig.rub(window, counts)));
+                    // What rounding leaves is less than a step.
+                    assert!(mean <= OFF_V, "{rate:?} {mode:?} {lambda_counts}: {mean} V");
+                    const { assert!(OFF_V < MOST_V) };
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn in_the_papers_strokes_none_over_whole_strokes() {
+    const STROKE_HZ: f64 = 0.83;
+    let mut worst: f64 = 0.0;
+    for rate in RATES {
+        for mode in MODES {
+            for wavelength_mm in [1.0, 2.0, 3.0] {
+                let mut rig = Rig::new(mode, rate);
+                rig.follow(wavelength_mm);
+                let half_mm = 70.0 / (TAU * STROKE_HZ);
+                let position = |t: f64| -half_mm * (TAU * STROKE_HZ * t).cos();
+                let volts = rig.stroke(rig.ticks(8.0), position);
+                let stroke = rig.ticks(1.0 / STROKE_HZ);
+                // Wherever the stroke is taken to begin.
+                for from in (rig.ticks(3.0)..volts.len() - stroke).step_by(97) {
+                    let mean = largest(&means(&volts[from..from + stroke]));
+                    worst = worst.max(mean);
+                    assert!(
+                        mean <= MOST_V,
+                        "{rate:?} {mode:?} {wavelength_mm} mm: {mean} V"
+                    );
+                }
+            }
+        }
+    }
+    println!("strokes: {:.2} mV at most", worst * 1e3);
+}
+
+#[test]
+fn under_a_hand_that_wobbles_about_any_phase_none_over_whole_wobbles() {
+    let mut worst: f64 = 0.0;
+    for rate in RATES {
+        for mode in MODES {
+            for wavelength_mm in [1.0, 2.0, 4.0] {
+                for swing_mm in [0.1, 0.2, 0.3] {
+                    for phase in 0..8 {
+                        let mut rig = Rig::new(mode, rate);
+                        rig.follow(wavelength_mm);
+                        rig.rest_at(f64::from(phase) / 8.0, wavelength_mm);
+                        let start = rig.ticks(5.0);
+                        let volts = rig.stroke(start + rig.ticks(1.0), |t| {
+                            0.0024 + swing_mm * (TAU * 5.0 * t).sin()
+                        });
+                        let mean = largest(&means(&volts[start..]));
+                        worst = worst.max(mean);
+                        assert!(
+                            mean <= MOST_V,
+                            "{rate:?} {mode:?} {wavelength_mm} mm ± {swing_mm} mm {phase}/8: {mean} V"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    println!("wobbles: {:.2} mV at most", worst * 1e3);
+}
+
+/// Estimates scatter by 0.1 to 0.3 % (rms) at 20 dB and by 1.1 % at 0 dB. In uniform mode that moves no
+/// voltage, since the phase is the integral of them all. In travelling mode the outermost actuators follow
+/// each of them, 6.75 mm away, so that a wave of 35 Hz, scattered a hundred times a second, also has slow
+/// parts: 2 to 3 mV at ± 0.5 %, and in proportion more beyond (10 to 12 mV at ± 2 %).
+#[test]
+fn while_estimates_of_the_wavelength_scatter_none() {
+    for rate in RATES {
+        for (mode, most_scatter) in [(Mode::Uniform, 0.02), (Mode::Travelling, 0.005)] {
+            let mut rig = Rig::new(mode, rate);
+            let mut volts = Vec::new();
+            for estimate in 0..600 {
+                // As if at random, and evenly.
+                let scatter = most_scatter * f64::from(estimate * 7_919 % 41 - 20) / 20.0;
+                rig.follow(2.0 * (1.0 + scatter));
+                volts.extend(rig.rub(rig.ticks(0.01), 7));
+            }
+            // Cycles of 28.6 ms on average have no whole number in any window. One that rises and falls as
+            // sin² does holds 35 of them, of which it lets less than 1/35³ pass.
+            let window = rig.ticks(1.0);
+            let weight = |tick: usize| 2.0 * (PI * tick as f64 / window as f64).sin().powi(2);
+            let mean = (rig.ticks(3.0)..volts.len() - window)
+                .step_by(37)
+                .map(|from| {
+                    let weighted: Vec<_> = (0..window)
+                        .map(|tick| volts[from + tick].map(|volt| volt * weight(tick)))
+                        .collect();
+                    largest(&means(&weighted))
+                })
+                .fold(0.0, f64::max);
+            println!("{rate:?} {mode:?}: {:.2} mV", mean * 1e3);
+            assert!(mean <= MOST_V, "{rate:?} {mode:?}: {mean} V");
+        }
+    }
+}
+
+/// What a start, or a change of λ, leaves: the difference between what the balance has and what the new
+/// motion wants of it, f₀/f of the amplitude for either at most; and what the balance learns while the gate
+/// opens, or λ glides, or learnt when the hand came to rest with 5 V for 13 ms and the gate's 6 ms: 5 V for
+/// that time over τ at most. It is forgotten with τ.
+#[test]
+fn what_a_start_and_a_change_of_wavelength_leave_decays_with_the_time_constant() {
+    let mut second_second: f64 = 0.0;
+    for rate in RATES {
+        for mode in MODES {
+            for (before, after) in [(400_usize, 400_usize), (400, 800), (600, 200), (200, 210)] {
+                for phase in 0..8 {
+                    let mut rig = Rig::new(mode, rate);
+                    let asked = |lambda: usize, hz: f64| corner_hz() * lambda as f64 / (7.0 * hz);
+                    let (wants_before, wants_after) =
+                        (asked(before, rig.hz()), asked(after, rig.hz()));
+                    let mut check = |rig: &mut Rig,
+                                     lambda: usize,
+                                     leaves_v: f64,
+                                     lasts_s: f64,
+                                     stopping_s: f64| {
+                        let leaves_v = leaves_v + 5.0 * (lasts_s + stopping_s) / TIME_CONSTANT_S;
+                        let volts = rig.rub(rig.ticks(2.0), 7);
+                        let begins = rig.ticks(lasts_s);
+                        for at in (begins..volts.len() - lambda).step_by(lambda) {
+                            let mean = largest(&means(&volts[at..at + lambda]));
+                            let decayed =
+                                (-((at - begins) as f64) / rig.hz() / TIME_CONSTANT_S).exp();
+                            assert!(
+                                mean <= leaves_v * decayed + OFF_V,
+                                "{rate:?} {mode:?} {before} to {after}, {phase}/8, tick {at}: {mean} V"
+                            );
+                        }
+                        let from = rig.ticks(1.0);
+                        let window = from / lambda * lambda;
+                        let mean = largest(&means(&volts[from..from + window]));
+                        second_second = second_second.max(mean);
+                    };
+                    rig.follow(before as f64 * 0.005);
+                    rig.rest_at(f64::from(phase) / 8.0, before as f64 * 0.005);
+                    // It has come here from 0, at 5 counts a tick and a part of a cycle.
+                    let learnt = 7.0 / 5.0 * 2.0 * wants_before;
+                    check(
+                        &mut rig,
+                        before,
+                        5.0 * (learnt + wants_before),
+                        0.006,
+                        0.019,
+                    );
+                    rig.follow(after as f64 * 0.005);
+                    check(
+                        &mut rig,
+                        after,
+                        5.0 * (wants_before + wants_after),
+                        0.020,
+                        0.0,
+                    );
+                }
+            }
+        }
+    }
+    println!(
+        "in the second second after it: {:.2} mV",
+        second_second * 1e3
+    );
+    assert!(second_second <= MOST_V);
+}
+
+/// However the hand moves, starts and stops: no channel's integral of voltage leaves ± 5 V · τ, so that no
+/// second has a mean of more than 2 · 5 V · τ/1 s, and no minute one of more than 43 mV.
+#[test]
+fn however_the_hand_moves_the_integral_stays_bounded() {
+    for rate in RATES {
+        for mode in MODES {
+            let configuration = DisplayConfiguration {
+                mode,
+                update_rate: rate,
+                ..DisplayConfiguration::DEFAULT
+            };
+            let mut rig = Rig::with(configuration, trimmed());
+            rig.follow(2.0);
+            let mut integrals = [0.0; firmware_display::ACTUATORS];
+            let mut random = 12_345_u32;
+            for tick in 0..rig.ticks(30.0) {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                // Bursts of up to 7 counts a tick, either way, half of them rests.
+                let burst = (random >> 8) % 15;
+                let counts = if tick / 200 % 2 == 0 {
+                    burst as i16 - 7
+                } else {
+                    0
+                };
+                for (integral, volt) in integrals.iter_mut().zip(rig.tick(counts)) {
+                    *integral += volt / rig.hz();
+                    // Rounding a word loses half a step a tick, in either direction.
+                    let rounding = VOLT_PER_STEP / 2.0 * 30.0;
+                    assert!(f64::abs(*integral) <= 5.0 * TIME_CONSTANT_S + rounding);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_stimulus_is_in_step_with_the_motion_but_for_the_balances_phase() {
+    for rate in RATES {
+        for (lambda_counts, most_cycles) in [(400_usize, 0.02), (40, 0.003)] {
+            // A count a tick at 2 kHz is 5 Hz on 2 mm and 50 Hz on 0.2 mm.
+            let lambda_counts = lambda_counts * rate.hz() as usize / 2_000;
+            let mut rig = Rig::new(Mode::Uniform, rate);
+            rig.follow(lambda_counts as f64 * 0.005);
+            rig.rub(rig.ticks(4.0) / lambda_counts * lambda_counts, 1);
+            let (mut sine, mut cosine) = (0.0, 0.0);
+            for _ in 0..10 * lambda_counts {
+                let volt = rig.tick(1)[0];
+                let angle = TAU * rig.position_mm() / (lambda_counts as f64 * 0.005);
+                sine += volt * angle.sin();
+                cosine += volt * angle.cos();
+            }
+            let hz = rig.hz() / lambda_counts as f64;
+            let ahead = cosine.atan2(sine) / TAU;
+            let expected = (corner_hz() / hz).atan() / TAU;
+            println!("{rate:?} {hz} Hz: {ahead:.5} cycles ahead, atan(f₀/f) {expected:.5}");
+            assert!(ahead.abs() <= most_cycles);
+            assert!((ahead - expected).abs() <= 0.02 * expected);
+        }
+    }
+    const { assert!(UpdateRate::Hz2000.hz() == 2_000) };
+}
