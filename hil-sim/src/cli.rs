@@ -17,6 +17,7 @@ mod goals;
 mod map;
 mod run;
 mod size;
+mod soak;
 
 /// Ridgelink's simulator.
 #[derive(Debug, Parser)]
@@ -54,6 +55,9 @@ enum Command {
     /// channels, hand to output at 2 and 4 kHz over links of all sorts. Exit status 1 if p99 is above 0.6 ms
     /// at 2 kHz. Writes timing.csv and timing.svg
     Timing(display::Timing),
+    /// Runs both ELFs for long, with random strokes over several specimens through bad weather, and holds
+    /// every counter against what was seen: exit status 1 if one does not fit
+    Soak(soak::Soak),
 }
 
 #[derive(Debug, clap::Args)]
@@ -146,6 +150,7 @@ impl Arguments {
             Command::Goals(goals) => goals.execute(),
             Command::Chart(chart) => chart.execute(),
             Command::Timing(timing) => timing.execute(),
+            Command::Soak(soak) => soak.execute(),
         }
     }
 }

@@ -10,6 +10,7 @@ mod lockstep;
 mod nucleo;
 mod rtt;
 mod sensor;
+pub mod soak;
 mod wire;
 
 use std::sync::mpsc::sync_channel;

@@ -130,7 +130,7 @@ pub fn runs(extent: Extent) -> u64 {
 fn plans(extent: Extent) -> Vec<Plan> {
     let strokes = [(70.0, 0.83), (30.0, 0.5), (100.0, 1.5)];
     // A hand that trembles about a place: 0.5 mm, 0.3 mm and 0.1 mm either way.
-    let wobbles = [(10.0, 3.2), (15.0, 8.0), (6.0, 9.5)];
+    let wobbles = [(10.0, 3.2), (15.0, 7.7), (6.0, 9.5)];
     let stroke = |(peak_mm_s, frequency_hz): (f64, f64)| Hand::Stroke {
         peak_mm_s,
         frequency_hz,

@@ -114,6 +114,21 @@ fn print(columns: &[(String, Counted)]) {
             .map(|(_, counted)| format!("{:.1}", counted.total as f64 / counted.ticks as f64)),
     );
     println!("| **in all** | {whole} |");
+    let mut peripherals: Vec<&str> = columns
+        .iter()
+        .flat_map(|(_, counted)| counted.accesses.keys().copied())
+        .collect();
+    peripherals.sort_unstable();
+    peripherals.dedup();
+    let accesses = |counted: &Counted, of: Option<&str>| {
+        let count: u64 = counted
+            .accesses
+            .iter()
+            .filter(|(name, _)| of.is_none_or(|of| of == **name))
+            .map(|(_, count)| count)
+            .sum();
+        format!("{:.1}", count as f64 / counted.ticks as f64)
+    };
     let shares = cells(
         &mut columns
             .iter()
@@ -123,6 +138,13 @@ fn print(columns: &[(String, Counted)]) {
         "| **% of {} M instructions a second** | {shares} |",
         BUDGET / 1_000_000
     );
+    for of in peripherals.into_iter().map(Some).chain([None]) {
+        let row = cells(&mut columns.iter().map(|(_, counted)| accesses(counted, of)));
+        println!(
+            "| accesses to registers: {} | {row} |",
+            of.unwrap_or("in all")
+        );
+    }
 }
 
 /// The share of the board's instructions.

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use addr2line::gimli::{self, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
-use rigless::emulator::{Hit, HitKind, Host, Settled, Watch};
+use rigless::emulator::{Access, Hit, HitKind, Host, Settled, Watch};
 
 use super::alone::{self, Alone, Witness};
 use super::{ElfError, Firmware};
@@ -25,6 +25,8 @@ pub struct Counted {
     pub by_place: BTreeMap<String, u64>,
     /// All of them.
     pub total: u64,
+    /// Accesses to the registers of each peripheral.
+    pub accesses: BTreeMap<&'static str, u64>,
     /// Output ticks meanwhile.
     pub ticks: u64,
     /// The time that it was counted for, in s.
@@ -45,6 +47,7 @@ pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counte
         from_ns,
         running: None,
         counts: HashMap::new(),
+        accesses: BTreeMap::new(),
         refused: 0,
     };
     let (run, watched) = alone::run_before(alone, firmware, watched)?;
@@ -59,6 +62,7 @@ pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counte
     Ok(Counted {
         total: watched.counts.values().sum(),
         by_place,
+        accesses: watched.accesses,
         ticks: run
             .recording
             .ticks
@@ -83,6 +87,7 @@ struct Watched {
     /// The instruction come to last, and how many had been retired before it.
     running: Option<(u64, u64)>,
     counts: HashMap<u64, u64>,
+    accesses: BTreeMap<&'static str, u64>,
     refused: usize,
 }
 
@@ -97,6 +102,14 @@ impl Witness for Watched {
     }
 
     fn on_settled(&mut self, settled: &Settled) {
+        if let Settled::Access {
+            access: Access { address, .. },
+            ..
+        } = *settled
+            && self.running.is_some()
+        {
+            *self.accesses.entry(peripheral(address)).or_default() += 1;
+        }
         let Settled::Hit(Hit {
             kind: HitKind::Instruction,
             address,
@@ -144,6 +157,24 @@ fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
         }
     }
     (!addresses.is_empty()).then_some(addresses)
+}
+
+/// The peripheral that has the registers at an address, of those that the display uses (RM0090, table 1).
+fn peripheral(address: u64) -> &'static str {
+    match address & !0x3FF {
+        0x4000_0400 => "TIM3 (tick, LDAC)",
+        0x4000_0800 => "TIM4 (hand)",
+        0x4000_0C00 => "TIM5 (time)",
+        0x4000_3000 => "IWDG",
+        0x4000_4400 => "USART2 (peer)",
+        0x4000_4800 => "USART3 (console)",
+        0x4001_0000 => "TIM1 (CLR)",
+        0x4001_3000 => "SPI1",
+        0x4002_0000..=0x4002_2800 => "GPIO",
+        0x4002_6000 => "DMA1 (ports)",
+        0x4002_6400 => "DMA2 (SPI1)",
+        _ => "others",
+    }
 }
 
 type Reader<'a> = EndianSlice<'a, LittleEndian>;

@@ -181,7 +181,13 @@ impl ConsoleHost {
         }
     }
 
-    fn serve<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) {
+    /// What came of it.
+    pub fn told(&self) -> Option<Told> {
+        self.told
+    }
+
+    /// Hears the board's console and says what is due, with a patience of 50 ms.
+    pub(super) fn serve<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) {
         let wire = board.wire(CONSOLE_UART);
         let bytes: Vec<u8> = wire.take_sent().into_iter().map(|(_, byte)| byte).collect();
         let mut answer = None;
