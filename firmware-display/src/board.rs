@@ -32,7 +32,6 @@ use static_cell::StaticCell;
 use crate::chain::{Chain, FrameHandler};
 use crate::clear::ClearGuard;
 use crate::converters::Converters;
-use crate::guard;
 use crate::inputs::Inputs;
 use crate::load::Load;
 use crate::ticks::{TickHandler, Ticks};
@@ -88,9 +87,6 @@ impl Board {
         let trip = nucleo::trip::after(started.0);
         let p = embassy_stm32::init(nucleo::clock::configuration());
         let vitals = Vitals::new(p.IWDG, p.PB0, started);
-        if let Some(core) = cortex_m::Peripherals::take() {
-            guard::install(&core.MPU);
-        }
 
         let timer = Timer::new(p.TIM3);
         let load = Load::new(p.PC6, timer.get_clock_frequency().0);

@@ -4,6 +4,7 @@
 
 use core::arch::naked_asm;
 use core::panic::PanicInfo;
+use core::ptr::addr_of;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::SCB;
@@ -11,9 +12,8 @@ use protocol::Trip;
 
 use crate::clear;
 
-/// CFSR's flags of an access that the MPU refused: data, and the stacking and unstacking of an exception,
-/// the floating-point unit's included (DDI 0403E, B3.2.15). All it refuses is the stack's end.
-const REFUSED: u32 = 1 << 1 | 1 << 3 | 1 << 4 | 1 << 5;
+/// The last that a push takes of the stack before it faults, and the frame of the fault itself.
+const LAST_BYTES: u32 = 128;
 
 fn end(trip: Trip) {
     clear::pull();
@@ -39,7 +39,7 @@ fn panic(info: &PanicInfo) -> ! {
     wait_for_the_watchdog()
 }
 
-/// Goes on with a stack that is empty, whatever became of the one there was.
+/// Goes on with a stack that is empty, whatever became of the one there was, and tells where it ended.
 #[allow(
     unsafe_code,
     reason = "an exception's entry, which sets the stack pointer"
@@ -48,23 +48,32 @@ fn panic(info: &PanicInfo) -> ! {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn HardFault() -> ! {
     naked_asm!(
-        "ldr r0, =_stack_start",
-        "msr msp, r0",
+        "mrs r0, msp",
+        "ldr r1, =_stack_start",
+        "msr msp, r1",
         "b {fault}",
         fault = sym fault,
     )
 }
 
-/// Every fault comes here: none of the finer handlers is enabled.
-extern "C" fn fault() -> ! {
-    #[allow(unsafe_code, reason = "a register that is only read")]
-    // SAFETY: the pointer is that of the processor's own registers.
-    let flags = unsafe { (*SCB::PTR).cfsr.read() };
-    end(if flags & REFUSED != 0 {
+/// Every fault comes here: none of the finer handlers is enabled. See memory.x for what becomes of a
+/// stack that is full.
+extern "C" fn fault(stack: u32) -> ! {
+    #[allow(unsafe_code, reason = "a symbol of the linker's")]
+    let stack_end = {
+        unsafe extern "C" {
+            static _stack_end: u8;
+        }
+        addr_of!(_stack_end) as u32
+    };
+    end(if stack < stack_end + LAST_BYTES {
         Trip::StackOverflow
     } else {
         Trip::Fault
     });
-    defmt::error!("fault, CFSR {=u32:#010x}", flags);
+    #[allow(unsafe_code, reason = "a register that is only read")]
+    // SAFETY: the pointer is that of the processor's own registers.
+    let flags = unsafe { (*SCB::PTR).cfsr.read() };
+    defmt::error!("fault, CFSR {=u32:#010x}, stack {=u32:#010x}", flags, stack);
     wait_for_the_watchdog()
 }

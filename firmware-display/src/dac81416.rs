@@ -214,18 +214,17 @@ impl Frame {
         self.register == register::BRDCAST
     }
 
-    /// Takes the words of the first channels. The frame's others get 0 V; or, if `words` are all
-    /// equal, that word too: nothing is wired to them.
+    /// Takes the words of the first channels. The others, which nothing is wired to, stay at 0 V; or get
+    /// the one word that goes to all, if `words` are equal.
     fn set(&mut self, words: &[u16]) {
-        let is_broadcast = words.windows(2).all(|pair| pair[0] == pair[1]);
+        let is_broadcast = words.iter().all(|word| *word == words[0]);
         self.register = if is_broadcast {
             register::BRDCAST
         } else {
             register::DAC0
         };
-        let words = words.iter().copied().chain(core::iter::repeat(ZERO_VOLT));
         for (place, word) in self.words.iter_mut().zip(words) {
-            *place = word;
+            *place = *word;
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use protocol::{
     DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason, Trip,
-    actuators,
 };
 
 use crate::endurance::Endurance;
@@ -12,7 +11,7 @@ use crate::limits::Limits;
 use crate::memory::Memory;
 use crate::pace::per_tick;
 use crate::plausibility::{Plausibility, Verdict};
-use crate::senses::{ConverterFault, Output, Readback, Senses};
+use crate::senses::{ConverterFault, Output, Readback, Senses, Transfer};
 use crate::settings::Settings;
 use crate::stimulus::Stimulus;
 use crate::supervisor::{self, Event};
@@ -69,7 +68,7 @@ impl Display {
         if let Some(trip) = persisted {
             display.on(Event::Trip(trip));
         }
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             display.on(Event::Trip(Trip::Memory));
         }
         display
@@ -90,7 +89,7 @@ impl Display {
     /// [`Stimulus::configure`] for how they come into force; the board paces the ticks by
     /// [`update_rate`](DisplayConfiguration::update_rate) from the next one on.
     pub fn configure(&mut self, settings: &Settings) {
-        if !is_sound(settings) {
+        if !settings.are_sound() {
             self.ask(Trip::Memory);
             return;
         }
@@ -177,7 +176,7 @@ impl Display {
         self.state
     }
 
-    /// What was counted since the start; deadline misses and SPI errors are the board's to fill in.
+    /// What was counted since the start.
     pub fn counters(&self) -> DisplayCounters {
         DisplayCounters {
             state: self.state,
@@ -239,6 +238,15 @@ impl Display {
             differs || self.watch.alarm_begins(),
         );
         count(&mut counters.unheard, senses.unheard);
+        count(
+            &mut counters.spi_errors,
+            senses.transfer == Transfer::Failed,
+        );
+        let stalled = u32::from(senses.transfer == Transfer::Stalled);
+        counters.deadline_misses = counters
+            .deadline_misses
+            .wrapping_add(senses.missed_ticks)
+            .wrapping_add(stalled);
         count(&mut counters.encoder_jumps, travel.is_err());
         let forgot = !self.memory.agrees(&self.configuration, &self.stimulus);
         for trip in [
@@ -290,13 +298,6 @@ impl Display {
         }
         core::mem::take(&mut self.send_anyway) || changed
     }
-}
-
-/// Whether settings are what [`Settings`] lets through.
-fn is_sound(settings: &Settings) -> bool {
-    let configuration = settings.configuration();
-    let described = actuators::hash(settings.actuators()) == configuration.actuators;
-    described && configuration.check().is_ok()
 }
 
 fn count(counter: &mut u32, happened: bool) {

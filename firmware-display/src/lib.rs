@@ -1,9 +1,9 @@
 //! The display board's logic: the hand's travel and the surface's λ in, fifty DAC words out.
 //!
 //! ```text
-//! encoder ──> Phase ──> sine ──> Array ──> words ──> dac81416 ──> SPI
-//!               ▲                  ▲
-//!    λ of the last valid estimate  Fade: age of that estimate
+//! encoder ──> Hand ── travel ─────────────────────────┐
+//! Estimate ─> Plausibility ── λ, amplitude ────────────┼─> Stimulus ─> Limits ─> words
+//! Senses ───> Watch, Memory, Endurance ─> supervisor ──┴── gain       CLR
 //! ```
 //!
 //! Pure: no hardware, no clock (time is counted in ticks), no allocation, no panic. What the board

@@ -11,8 +11,8 @@ use embassy_stm32::pac::timer::regs::CcmrOutputGp16;
 use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals::PC6;
 
-/// From the tick to the edge. The slowest tick measured has its words out some microseconds before.
-pub const OFFSET_US: u32 = 150;
+/// From the tick to the edge. The slowest tick measured has its words out 81 µs after its start.
+pub const OFFSET_US: u32 = 95;
 
 const CHANNEL: usize = 0;
 const PIN: usize = 6;

@@ -23,8 +23,6 @@ mod converters;
 #[cfg(target_os = "none")]
 mod crash;
 #[cfg(target_os = "none")]
-mod guard;
-#[cfg(target_os = "none")]
 mod inputs;
 #[cfg(target_os = "none")]
 mod load;

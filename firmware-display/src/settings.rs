@@ -47,6 +47,13 @@ impl Settings {
         &self.actuators
     }
 
+    /// Whether what is in force is what [`Settings::on_configure`] lets through; else memory has changed by
+    /// itself.
+    pub fn are_sound(&self) -> bool {
+        actuators::hash(&self.actuators) == self.configuration.actuators
+            && self.configuration.check().is_ok()
+    }
+
     /// Keeps a block of a description until a configuration asks for it; None if there is nothing to
     /// say, else the answer.
     pub fn on_actuators(&mut self, block: &Actuators) -> Option<ConfigurationReport> {
@@ -109,10 +116,11 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    use protocol::SensorConfiguration;
     use protocol::actuators::grid;
+    use protocol::{DisplayState, SensorConfiguration, Trip};
 
     use super::*;
+    use crate::{Display, Senses};
 
     fn send(settings: &mut Settings, described: &[Actuator; ACTUATORS]) {
         for first in (0..ACTUATORS).step_by(ACTUATOR_BLOCK) {
@@ -218,5 +226,26 @@ mod tests {
             );
         }
         assert_eq!(settings, Settings::DEFAULT);
+    }
+
+    #[test]
+    fn settings_that_changed_by_themselves_are_not_sound_and_stop_the_display() {
+        assert!(Settings::DEFAULT.are_sound());
+        let spoil: [fn(&mut Settings); 3] = [
+            |settings| settings.actuators[41].gain_q15 ^= 1 << 3,
+            |settings| settings.configuration.actuators ^= 1,
+            |settings| settings.configuration.amplitude_mv = 5_001,
+        ];
+        for spoil in spoil {
+            let mut settings = Settings::DEFAULT;
+            spoil(&mut settings);
+            assert!(!settings.are_sound());
+            let stopped = DisplayState::Stopped(Trip::Memory);
+            assert_eq!(Display::new(&settings, None).state(), stopped);
+            let mut display = Display::new(&Settings::DEFAULT, None);
+            display.configure(&settings);
+            assert!(!display.tick(0, &Senses::default()).release);
+            assert_eq!(display.state(), stopped);
+        }
     }
 }

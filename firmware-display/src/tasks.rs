@@ -98,14 +98,6 @@ async fn drive(
         if let Some(stop) = STOP.try_take() {
             display.stop(stop.reason);
         }
-        if let Some(settings) = CONFIGURE.try_take() {
-            ticks.set_rate(settings.configuration().update_rate);
-            pace = Pace::new(&settings);
-            display.configure(&settings);
-        }
-        while let Ok(estimate) = ESTIMATES.try_receive() {
-            display.on_estimate(&estimate);
-        }
         let output = display.tick(encoder, &senses);
         // Outputs that can't be changed go to 0 V.
         if output.release && transfer == Transfer::Done {
@@ -120,6 +112,15 @@ async fn drive(
             None => {}
         }
         released = output.release;
+        // The words are on their way: what else there is to do has the rest of the tick.
+        if let Some(settings) = CONFIGURE.try_take() {
+            ticks.set_rate(settings.configuration().update_rate);
+            pace = Pace::new(&settings);
+            display.configure(&settings);
+        }
+        while let Ok(estimate) = ESTIMATES.try_receive() {
+            display.on_estimate(&estimate);
+        }
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
             unheard = OUTBOX.try_send(Message::Motion(motion)).is_err();
         }

@@ -53,7 +53,6 @@ pub struct Ticks {
 impl Ticks {
     /// The tick, not yet started, with TIM3's trigger for `encoder` to latch.
     pub fn new(timer: Timer<'static, TIM3>, encoder: Encoder) -> Self {
-        timer.set_master_mode(Mms::UPDATE);
         timer.set_autoreload_preload(true);
         let mut ticks = Self {
             timer,
@@ -61,8 +60,9 @@ impl Ticks {
             seen: 0,
         };
         ticks.set_rate(UpdateRate::default());
-        // Loads what was set.
+        // Loads what was set, which is no tick.
         pac::TIM3.egr().write(|w| w.set_ug(true));
+        ticks.timer.set_master_mode(Mms::UPDATE);
         ticks
     }
 

@@ -5,10 +5,14 @@ use hil_sim::recording::{ACTUATORS, EstimateRecord, Recording};
 use hil_sim::weather::BYTE_NS;
 use protocol::MAX_FRAME;
 
-/// From an estimate's last byte at the UART until the output task has it, in ns, if the line is idle
-/// then: a byte's time (11 µs) until it counts as idle, as much of the simulator's own, and the
+/// From an estimate's last byte at the UART until the output task could take it, in ns, if the line is
+/// idle then: a byte's time (11 µs) until it counts as idle, as much of the simulator's own, and the
 /// listening task, which takes some 10 µs and may be held up by an output tick of 60 µs.
 const TAKEN_NS: u64 = 100_000;
+/// The output task takes estimates once its words are on their way: for the tick to come.
+const TICK_NS: u64 = 500_000;
+/// It does so this long after the tick at the latest.
+const SENT_NS: u64 = 100_000;
 /// The same, if other frames follow without a gap: the port is read when the line falls idle. A
 /// status follows an estimate once a second; no two frames are longer than this.
 const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
@@ -30,7 +34,7 @@ pub struct Replay {
 #[derive(Clone)]
 struct History {
     display: Display,
-    /// How many of the estimates that arrived have been taken, or overwritten by a later one.
+    /// How many of the estimates that arrived have been taken.
     taken: usize,
     /// One that arrived is not taken although it could be.
     waiting: bool,
@@ -40,10 +44,9 @@ struct History {
 /// Replays a display board from its encoder readings and the estimates that reached it, and compares
 /// every word of every output.
 ///
-/// An estimate that arrives just before a tick may be taken at this tick or at a later one: all
+/// An estimate that arrives just before one is taken may be taken then or a tick later: all
 /// histories are followed up until the words tell, and of those that do, the one with the fewest
-/// held up counts. Of two that arrive between two ticks the task sees the later one only. Estimates
-/// older than one that has arrived before are never taken.
+/// held up counts. Estimates older than one that has arrived before are never taken.
 ///
 /// # Errors
 /// The first word that no history explains.
@@ -64,18 +67,19 @@ pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, Stri
         let output = outputs.next_if(|output| {
             output.at_ns >= tick.at_ns && end_ns.is_none_or(|end_ns| output.at_ns < end_ns)
         });
-        let may = arrived.partition_point(|&(at_ns, _)| at_ns <= tick.at_ns);
-        let usual = arrived.partition_point(|&(at_ns, _)| at_ns + TAKEN_NS <= tick.at_ns);
-        let must = arrived.partition_point(|&(at_ns, _)| at_ns + HELD_UP_NS <= tick.at_ns);
+        let taken_ns = tick.at_ns.saturating_sub(TICK_NS);
+        let may = arrived.partition_point(|&(at_ns, _)| at_ns <= taken_ns + SENT_NS);
+        let usual = arrived.partition_point(|&(at_ns, _)| at_ns + TAKEN_NS <= taken_ns);
+        let must = arrived.partition_point(|&(at_ns, _)| at_ns + HELD_UP_NS <= taken_ns);
         let mut next = Vec::new();
         let mut differences = Vec::new();
         for history in &histories {
             for taken in must.max(history.taken)..=may {
                 let mut history = history.clone();
-                if taken > history.taken {
-                    history.display.on_estimate(&arrived[taken - 1].1.estimate);
-                    history.taken = taken;
+                for (_, record) in &arrived[history.taken..taken] {
+                    history.display.on_estimate(&record.estimate);
                 }
+                history.taken = taken;
                 if history.waiting != (usual > taken) {
                     history.waiting = usual > taken;
                     history.held_up += usize::from(history.waiting);

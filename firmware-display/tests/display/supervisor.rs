@@ -1,6 +1,6 @@
 //! States and counters while all is well, or is not known yet.
 
-use firmware_display::{ConverterFault, Display, MOTION_RATE_HZ, Transfer};
+use firmware_display::{ConverterFault, Display, MOTION_RATE_HZ, Senses, Transfer};
 use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, Trip};
 
 use crate::rig::{RATES, Rig, at, configured, sound};
@@ -262,4 +262,48 @@ fn every_tick_update_and_change_is_counted() {
     assert_eq!(counters.estimates, 25);
     // Boot, Ready, Driving.
     assert_eq!((counters.changes, counters.state), (2, rig.state()));
+}
+
+#[test]
+fn what_the_board_senses_is_counted() {
+    let mut rig = Rig::driving(&at(RATES[0]));
+    let healthy = rig.senses;
+    for senses in [
+        Senses {
+            transfer: Transfer::Failed,
+            ..healthy
+        },
+        healthy,
+        Senses {
+            transfer: Transfer::Stalled,
+            missed_ticks: 2,
+            ..healthy
+        },
+        Senses {
+            clear_fell: true,
+            missed_ticks: 5,
+            unheard: true,
+            ..healthy
+        },
+        Senses {
+            alarm: true,
+            ..healthy
+        },
+        // An alarm that lasts is one.
+        Senses {
+            alarm: true,
+            ..healthy
+        },
+        Senses {
+            alarm: true,
+            ..healthy
+        },
+    ] {
+        rig.senses = senses;
+        rig.move_on();
+    }
+    let counters = rig.display.counters();
+    assert_eq!((counters.spi_errors, counters.deadline_misses), (1, 8));
+    assert_eq!((counters.clears, counters.unheard), (1, 1));
+    assert_eq!(counters.converter_faults, 1);
 }

@@ -1,14 +1,21 @@
-//! The phase that the stimulus should have: true travel over the wavelength in force.
+//! The phase that the stimulus should have: true travel times the wavenumber in force.
+
+use firmware_display::ZERO_VOLT;
+use firmware_display::pace::per_tick;
+use firmware_display::plausibility::{Plausibility, Verdict};
+use protocol::{DisplayConfiguration, Estimate};
 
 use crate::analysis::seconds;
 use crate::analysis::track::interpolate;
 use crate::recording::Recording;
 use crate::truth::Truth;
 
-/// The phase due at every instant, ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the last valid
-/// estimate received. 0 until there is one.
+/// The phase due at every instant, ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force, in
+/// which each estimate that the display trusts (its own [`Plausibility`] says which) takes
+/// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
+/// heard. 0 until there is one.
 ///
-/// An estimate is in force from the first tick after its arrival on, for the whole travel since the
+/// An estimate is followed from the first tick after its arrival on, for the whole travel since the
 /// tick before: earlier no display that works in ticks could use it.
 #[derive(Clone, Debug, Default)]
 pub struct DuePhase {
@@ -20,30 +27,34 @@ pub struct DuePhase {
 impl DuePhase {
     /// The phase due at the reference actuator.
     pub fn new(truth: &Truth, recording: &Recording) -> Self {
-        let wavelengths = received_wavelengths(recording);
+        let received = received(recording);
         let place_mm = truth.reference_place_mm();
         let mut due = Self::default();
-        let mut next = 0;
-        let mut in_force_mm: Option<f64> = None;
+        let (mut next, mut output) = (0, 0);
+        let mut followed = Followed::new(truth.display);
         let (mut cycles, mut travelled) = (0.0, 0.0);
         let mut before_mm = None;
         for tick in &recording.ticks {
-            while let Some(&(received_ns, wavelength_mm)) = wavelengths.get(next)
-                && received_ns <= tick.at_ns
+            let outputs = &recording.outputs[output..];
+            output += outputs.partition_point(|output| output.at_ns < tick.at_ns);
+            let last = output.checked_sub(1).map(|last| &recording.outputs[last]);
+            let heard = last.is_some_and(|last| last.words.iter().any(|&word| word != ZERO_VOLT));
+            while let Some((received_ns, estimate)) = received.get(next)
+                && *received_ns <= tick.at_ns
             {
-                in_force_mm = Some(wavelength_mm);
+                followed.hear(estimate, heard);
                 next += 1;
             }
             let travel_mm = tick.position_mm - before_mm.unwrap_or(tick.position_mm);
             before_mm = Some(tick.position_mm);
-            let mut ahead = 0.0;
-            if let Some(wavelength_mm) = in_force_mm {
-                cycles += travel_mm / wavelength_mm;
-                travelled += travel_mm.abs() / wavelength_mm;
-                ahead = place_mm / wavelength_mm;
-                let shortest_mm = due.shortest_mm.unwrap_or(wavelength_mm);
-                due.shortest_mm = Some(shortest_mm.min(wavelength_mm));
+            let per_mm = followed.tick();
+            cycles += travel_mm * per_mm;
+            travelled += travel_mm.abs() * per_mm;
+            if per_mm > 0.0 {
+                let shortest_mm = due.shortest_mm.unwrap_or(f64::INFINITY);
+                due.shortest_mm = Some(shortest_mm.min(1.0 / per_mm));
             }
+            let ahead = place_mm * per_mm;
             due.phase.push((seconds(tick.at_ns), cycles + ahead));
             due.travelled.push((seconds(tick.at_ns), travelled));
         }
@@ -66,29 +77,66 @@ impl DuePhase {
     }
 }
 
-/// The valid estimates that reached the display, in ns and mm, by arrival. One that was made before
-/// another that is already there is old news, and left out.
-fn received_wavelengths(recording: &Recording) -> Vec<(u64, f64)> {
+/// The wavenumber that a display follows.
+struct Followed {
+    configuration: DisplayConfiguration,
+    plausibility: Plausibility,
+    /// In cycles per mm.
+    per_mm: f64,
+    target_per_mm: f64,
+    ticks_left: u32,
+}
+
+impl Followed {
+    fn new(configuration: DisplayConfiguration) -> Self {
+        Self {
+            configuration,
+            plausibility: Plausibility::new(),
+            per_mm: 0.0,
+            target_per_mm: 0.0,
+            ticks_left: 0,
+        }
+    }
+
+    /// An estimate has come, while something was `heard` or nothing.
+    fn hear(&mut self, estimate: &Estimate, heard: bool) {
+        let DisplayConfiguration {
+            max_age_ms,
+            glide_ms,
+            update_rate,
+            ..
+        } = self.configuration;
+        if let Verdict::Trusted(wavelength) = self.plausibility.judge(estimate, max_age_ms) {
+            let target_per_mm = 1.0 / f64::from(wavelength.mm());
+            if target_per_mm != self.target_per_mm {
+                self.target_per_mm = target_per_mm;
+                let glide_ms = if heard { u32::from(glide_ms) } else { 0 };
+                self.ticks_left = glide_ms * (update_rate.hz() / 1_000);
+            }
+        }
+    }
+
+    /// The wavenumber of a tick's travel.
+    fn tick(&mut self) -> f64 {
+        // Whether the hand rests matters to what the sensor says of the arm, not to λ.
+        self.plausibility
+            .elapse(per_tick(self.configuration.update_rate), false);
+        let left = f64::from(self.ticks_left.max(1));
+        self.per_mm += (self.target_per_mm - self.per_mm) / left;
+        self.ticks_left = self.ticks_left.saturating_sub(1);
+        self.per_mm
+    }
+}
+
+/// The estimates that reached the display, with their arrival in ns, by arrival.
+fn received(recording: &Recording) -> Vec<(u64, Estimate)> {
     let mut received: Vec<_> = recording
         .estimates
         .iter()
         .filter_map(|record| Some((record.received_ns?, record.estimate)))
         .collect();
     received.sort_by_key(|&(received_ns, _)| received_ns);
-    let mut newest = None;
-    received.retain(|(_, estimate)| {
-        let news = newest.is_none_or(|newest| estimate.sequence > newest);
-        if news {
-            newest = Some(estimate.sequence);
-        }
-        news
-    });
     received
-        .into_iter()
-        .filter(|(_, estimate)| estimate.valid)
-        .filter_map(|(at_ns, estimate)| Some((at_ns, f64::from(estimate.wavelength_mm?))))
-        .filter(|(_, wavelength_mm)| wavelength_mm.is_finite() && *wavelength_mm > 0.0)
-        .collect()
 }
 
 #[cfg(test)]
@@ -97,24 +145,50 @@ mod tests {
     use crate::analysis::synthetic::Run;
 
     #[test]
-    fn the_due_phase_is_travel_over_the_wavelength_in_force() {
-        // 2 mm, then 4 mm from 1 s on, at 50 mm/s: 25 and 12.5 cycles a second.
+    fn the_due_phase_is_travel_over_the_wavelength_in_force_to_which_it_glides() {
+        // 2 mm, then 2.5 mm from 1 s on, at 50 mm/s: 25 and 20 cycles a second.
         let run = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 4.0 }, true)),
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
             ..Run::steady(50.0, 2.0)
         };
         let recording = run.record();
         let surface = |_| 2.0;
         let due = DuePhase::new(&Truth::new("", "", &surface), &recording);
         // The first estimate arrives at 11 ms, that of 1 s at 1.001 s: each is used for the half
-        // millisecond of travel before that tick as well.
-        let expected = (1.0005 - 0.0105) * 25.0 + (1.9 - 1.0005) * 12.5;
+        // millisecond of travel before that tick as well. Half of the change comes on the way, for a
+        // glide of 40 ticks, of which the last has it in whole.
+        let glided_s = 1.0005 + 0.5 * (0.020 - 0.0005);
+        let expected = (glided_s - 0.0105) * 25.0 + (1.9 - glided_s) * 20.0;
         assert!(
             (due.cycles(1.9) - expected).abs() < 1e-6,
             "{} {expected}",
             due.cycles(1.9)
         );
-        assert_eq!(due.shortest_mm(), Some(2.0));
+        assert!((due.shortest_mm().unwrap() - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_jump_is_in_force_once_the_next_estimate_confirms_it() {
+        let jump = |to: f32, for_s: f64| Run {
+            estimate: Box::new(move |t_s| {
+                let jumped = (0.9999..0.9999 + for_s).contains(&t_s);
+                (if jumped { to } else { 2.0 }, true)
+            }),
+            ..Run::steady(50.0, 2.0)
+        };
+        let surface = |_| 2.0;
+        let cycles =
+            |run: Run| DuePhase::new(&Truth::new("", "", &surface), &run.record()).cycles(1.9);
+        let (steady, once, twice) = (
+            cycles(Run::steady(50.0, 2.0)),
+            cycles(jump(5.0, 0.009)),
+            cycles(jump(5.0, 0.95)),
+        );
+        assert_eq!(once, steady);
+        // From 1.011 s on, half of the glide later.
+        let late_s = 1.9 - 1.0105 - 0.5 * (0.020 - 0.0005);
+        let expected = steady - late_s * 15.0;
+        assert!((twice - expected).abs() < 1e-6, "{twice} {expected}");
     }
 
     #[test]
@@ -130,11 +204,13 @@ mod tests {
 
     #[test]
     fn an_estimate_overtaken_by_a_newer_one_is_not_in_force() {
-        let mut recording = Run::steady(50.0, 2.0).record();
-        recording.estimates.truncate(2);
-        recording.estimates[0].received_ns = Some(500_000_000);
-        recording.estimates[1].received_ns = Some(100_000_000);
-        recording.estimates[0].estimate.wavelength_mm = Some(1.0);
-        assert_eq!(received_wavelengths(&recording), [(100_000_000, 2.0)]);
+        let late = |wavelength_mm: f32| {
+            let mut recording = Run::steady(50.0, 2.0).record();
+            recording.estimates[30].received_ns = Some(500_000_000);
+            recording.estimates[30].estimate.wavelength_mm = Some(wavelength_mm);
+            let surface = |_| 2.0;
+            DuePhase::new(&Truth::new("", "", &surface), &recording).cycles(1.9)
+        };
+        assert_eq!(late(2.2), late(2.0));
     }
 }

@@ -8,6 +8,8 @@ use crate::recording::{
 };
 
 pub const TICK_S: f64 = 500e-6;
+/// The default time in which 1/λ̂ glides, in s.
+const GLIDE_S: f64 = 0.02;
 pub const SCAN_S: f64 = 250e-6;
 pub const ESTIMATE_S: f64 = 10e-3;
 /// One gauge is left out.
@@ -144,11 +146,13 @@ impl Run {
             .collect()
     }
 
-    /// A display as it should be: phase from the encoder's counts and the last valid λ̂ received.
+    /// A display as it should be: phase from the encoder's counts and the last valid λ̂ received, to
+    /// which 1/λ̂ glides.
     fn outputs(&self, ticks: &[TickRecord], estimates: &[EstimateRecord]) -> Vec<OutputRecord> {
         let mut outputs = Vec::new();
         let mut held = [0x8000; ACTUATORS];
         let (mut cycles, mut on_since_s) = (0.0, None);
+        let (mut per_mm, mut target_per_mm, mut ticks_left) = (0.0, 0.0, 0.0);
         for pair in ticks.windows(2) {
             let t_s = pair[1].at_ns as f64 / 1e9;
             let in_force = estimates
@@ -157,14 +161,21 @@ impl Run {
             let Some(wavelength_mm) = in_force.and_then(|e| e.estimate.wavelength_mm) else {
                 continue;
             };
-            let wavelength_mm = f64::from(wavelength_mm);
+            if target_per_mm != 1.0 / f64::from(wavelength_mm) {
+                target_per_mm = 1.0 / f64::from(wavelength_mm);
+                ticks_left = if per_mm == 0.0 { 1.0 } else { GLIDE_S / TICK_S };
+            }
+            if ticks_left > 0.0 {
+                per_mm += (target_per_mm - per_mm) / ticks_left;
+                ticks_left -= 1.0;
+            }
             let counts = pair[1].encoder.wrapping_sub(pair[0].encoder) as i16;
-            cycles += f64::from(counts) * COUNT_MM / wavelength_mm;
+            cycles += f64::from(counts) * COUNT_MM * per_mm;
             let on_s = t_s - *on_since_s.get_or_insert(t_s);
             let amplitude_v = 5.0 * (on_s / FADE_IN_S).min(1.0);
             let mut words = [0; ACTUATORS];
             for (actuator, word) in words.iter_mut().enumerate() {
-                let place = actuator as f64 * self.pitch_mm / wavelength_mm;
+                let place = actuator as f64 * self.pitch_mm * per_mm;
                 let phase = std::f64::consts::TAU * (cycles + (self.ahead_cycles)(t_s) + place);
                 let offset_v = if actuator == 7 { self.offset_v } else { 0.0 };
                 *word = word_of(amplitude_v * phase.sin() + offset_v);

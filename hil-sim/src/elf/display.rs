@@ -5,6 +5,8 @@ use rigless::chip::Timeline;
 use rigless::chip::spi::Peer;
 use rigless::device::Level;
 use rigless::snapshot::Store;
+use rigless::mcu::Operate;
+use rigless::soc::Width;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::TIM3;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
@@ -12,7 +14,7 @@ use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::stm32f427::peripherals::tim;
 use rigless::time::VirtualNanos;
 
-use super::nucleo::Pins;
+use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
 use crate::dac81416::Dac81416;
 use crate::motion::encoder;
 use crate::recording::{OutputRecord, TickRecord};
@@ -34,6 +36,7 @@ const BUTTON: Line = Line(5, 14);
 /// Index of TIM3, and the bytes of its registers.
 const TIM3_INDEX: usize = 1;
 const TIM3_SIZE: u64 = 0x400;
+const CCR1: u64 = 0x34;
 const EIGHT_BITS: u8 = 8;
 
 /// A pin with a wire on it: the port's index and the pin's.
@@ -136,8 +139,9 @@ pub struct DisplayPins {
     load_stuck: Option<Level>,
     alarm: bool,
     encoder_fault: EncoderFault,
-    /// What the encoder counted last.
+    /// What the encoder counted last, and when.
     counted: u16,
+    ticked_ns: u64,
     records: DisplayRecords,
 }
 
@@ -152,6 +156,7 @@ impl DisplayPins {
             alarm: false,
             encoder_fault: EncoderFault::None,
             counted: 0,
+            ticked_ns: 0,
             records: DisplayRecords::default(),
         }
     }
@@ -232,12 +237,27 @@ impl DisplayPins {
             return;
         }
         self.load = Some(level);
+        let at_ns = self.exactly(part, at_ns);
         LOAD.drive_function(part, at_ns, level);
         for chip in 0..CHIPS {
             on_bus(part, chip).drive(at_ns, |dac| dac.ldac(level == Level::High));
         }
         if level == Level::Low {
             self.record(part, at_ns);
+        }
+    }
+
+    /// When TIM3's channel changed that is seen to have at `at_ns`: at its match, if that is just over.
+    fn exactly(&self, part: &mut Stm32f427, at_ns: u64) -> u64 {
+        let at = VirtualNanos(at_ns);
+        let Ok(compare) = part.peek(at, TIM3.base + CCR1, Width::W32) else {
+            return at_ns;
+        };
+        let due_ns = self.ticked_ns + (compare * 1_000).div_ceil(TIM3_CLOCK_MHZ);
+        if (due_ns..due_ns + LATE_NS).contains(&at_ns) {
+            due_ns
+        } else {
+            at_ns
         }
     }
 
@@ -319,6 +339,7 @@ impl Pins for DisplayPins {
             EncoderFault::Off(counts) => encoder(position_mm).wrapping_add_signed(counts),
         };
         self.counted = counted;
+        self.ticked_ns = at_ns;
         self.records.ticks.push(TickRecord {
             at_ns,
             encoder: counted,

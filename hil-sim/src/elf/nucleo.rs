@@ -12,7 +12,7 @@ use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::generated::TIM4;
+use rigless::soc::stm32f427::generated::{TIM3 as TIM3_REGISTERS, TIM4};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
@@ -39,6 +39,12 @@ const TIM4_INDEX: usize = 2;
 const ITR_OF_TIM3: u8 = 2;
 const CNT: u64 = 0x24;
 
+/// The emulation stops for an event at the end of the instruction that it falls into, within two of them.
+pub const LATE_NS: u64 = 20;
+/// TIM3's clock: APB1's, doubled.
+pub const TIM3_CLOCK_MHZ: u64 = 84;
+const ARR: u64 = 0x2C;
+
 /// What is wired to a board's pins.
 pub trait Pins: Debug + Send + 'static {
     /// TIM3 triggered at `at_ns`, for the `nth` time: the encoder's counter at this instant.
@@ -63,6 +69,8 @@ pub struct Wired<P> {
     part: Stm32f427,
     pins: P,
     triggers: u64,
+    /// When the last trigger came.
+    triggered_ns: u64,
 }
 
 impl<P: Pins> Nucleo<P> {
@@ -79,6 +87,7 @@ impl<P: Pins> Nucleo<P> {
                 part,
                 pins,
                 triggers: 0,
+                triggered_ns: 0,
             },
         })
     }
@@ -105,7 +114,8 @@ impl<P: Pins> Wired<P> {
         if !came {
             return;
         }
-        let count = self.pins.on_trigger(&mut self.part, at.0);
+        self.triggered_ns = self.exactly(at);
+        let count = self.pins.on_trigger(&mut self.part, self.triggered_ns);
         // While the counter's clock is off, before the firmware enables it, there is nothing to set.
         let _ = self
             .part
@@ -117,6 +127,19 @@ impl<P: Pins> Wired<P> {
                 });
         }
         self.pins.after_trigger(&mut self.part, at.0);
+    }
+
+    /// When the trigger came that is seen at `at`: a period after the last one, if that is just over.
+    fn exactly(&mut self, at: VirtualNanos) -> u64 {
+        let Ok(reload) = self.part.peek(at, TIM3_REGISTERS.base + ARR, Width::W32) else {
+            return at.0;
+        };
+        let due_ns = self.triggered_ns + (reload + 1) * 1_000 / TIM3_CLOCK_MHZ;
+        if (due_ns..due_ns + LATE_NS).contains(&at.0) {
+            due_ns
+        } else {
+            at.0
+        }
     }
 }
 
