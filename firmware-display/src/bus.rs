@@ -17,6 +17,8 @@ pub const LOOKS: usize = 32;
 const CYCLES_PER_BIT: u32 = CYCLES_PER_US * 1_000_000 / MAX_CLOCK_HZ;
 /// Reading is this much slower than writing, as a power of two: 10.5 MHz.
 const SLOWER: u32 = 2;
+/// What a byte takes then, and two bits more.
+const BYTE_CYCLES: u32 = (8 + 2) * (CYCLES_PER_BIT << SLOWER);
 
 /// What SPI1 takes at once.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -78,38 +80,45 @@ impl Bus {
         SPI1.dr().write(|w| w.set_dr(byte.into()));
     }
 
-    /// Sends three bytes under one chip select and returns those that came back; None if they don't.
-    /// At a quarter of the clock, for SDO, which the family reads slower than it writes.
-    pub fn exchange(&mut self, chip: usize, bytes: look::Bytes) -> Option<look::Bytes> {
+    /// Makes ready to read, at a quarter of the clock, for SDO, which the family reads slower than it
+    /// writes.
+    fn listen(&mut self) {
         let mut slow = self.off;
         slow.set_br(Br::from_bits(self.off.br().to_bits() + SLOWER as u8));
         self.turn_on(slow);
-        // What came in while nobody listened.
+        // What came in while nobody listened, and that it was too much.
         let _ = SPI1.dr().read();
         let _ = SPI1.sr().read();
-        self.select(chip);
-        let mut answer = [0; 3];
-        let mut complete = true;
-        for (byte, place) in bytes.into_iter().zip(&mut answer) {
-            self.put(byte);
-            wait(8 * CYCLES_PER_BIT << SLOWER);
-            complete &= (0..LOOKS).any(|_| SPI1.sr().read().rxne());
-            *place = SPI1.dr().read().dr() as u8;
-        }
-        complete &= is_shifted_out(0);
-        self.deselect(chip);
-        complete.then_some(answer)
     }
 
-    /// Looks into a chip, some 12 µs.
+    /// Sends three bytes under one chip select and returns those that came back.
+    ///
+    /// Each has its time and is then taken to be there: had SPI1 not sent it, what is read is an answer
+    /// to nothing.
+    fn exchange_frame(&mut self, chip: usize, bytes: look::Bytes) -> look::Bytes {
+        self.select(chip);
+        let answer = bytes.map(|byte| {
+            self.put(byte);
+            wait(BYTE_CYCLES);
+            SPI1.dr().read().dr() as u8
+        });
+        self.deselect(chip);
+        answer
+    }
+
+    /// Sends three bytes to `chip` and returns those that came back; None if SPI1 does not send.
+    pub fn exchange(&mut self, chip: usize, bytes: look::Bytes) -> Option<look::Bytes> {
+        self.listen();
+        let answer = self.exchange_frame(chip, bytes);
+        is_shifted_out(0).then_some(answer)
+    }
+
+    /// Looks into a chip, some 16 µs.
     pub fn look(&mut self, look: &Look) -> Readback {
-        let mut answers = [look::Bytes::default(); look::FRAMES];
-        for (frame, place) in look.frames().into_iter().zip(&mut answers) {
-            let Some(answer) = self.exchange(look.chip, frame) else {
-                return Readback::Differs;
-            };
-            *place = answer;
-        }
+        self.listen();
+        let answers = look
+            .frames()
+            .map(|frame| self.exchange_frame(look.chip, frame));
         if look.agrees(&answers) {
             Readback::Agrees
         } else {
@@ -128,8 +137,14 @@ pub fn is_shifted_out(bytes: u32) -> bool {
     })
 }
 
+/// Waits for a byte to be out that was put just now, and four bits more.
+pub fn wait_for_byte() {
+    wait((8 + 4) * CYCLES_PER_BIT);
+}
+
 /// Waits for `cycles` at least. A turn of the loop takes a Cortex-M4 three: one to subtract, two to
 /// branch.
+#[inline]
 pub fn wait(cycles: u32) {
     cortex_m::asm::delay(cycles.div_ceil(3));
 }

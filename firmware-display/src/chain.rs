@@ -198,10 +198,8 @@ impl Line {
         let stream = DMA2.st(STREAM);
         stream.m0ar().write_value(address);
         stream.ndtr().write_value(Ndtr(words.into()));
-        if !bus::is_shifted_out(1) {
-            self.fail(chip);
-            return;
-        }
+        // Had the byte not gone, neither would the words that follow it.
+        bus::wait_for_byte();
         self.bus.set_width(Width::Word);
         // The frame is in RAM before the stream reads it.
         fence(Ordering::SeqCst);

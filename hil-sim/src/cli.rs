@@ -9,10 +9,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
 mod budget;
+mod campaign;
 mod chart;
 mod cost;
 mod demo;
 mod display;
+mod faults;
 mod goals;
 mod map;
 mod run;
@@ -49,6 +51,12 @@ enum Command {
     /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
     /// exit status 1 if a scene is not as expected
     Goals(goals::Goals),
+    /// Lists the kinds of faults that a scene may have: what they mean, where they are injected, their
+    /// keys and defaults, and what is expected of the boards
+    Faults,
+    /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
+    /// 1 if a goal is missed
+    Campaign(campaign::Campaign),
     /// Draws what the estimators give against what they cost, and what the display does
     Chart(chart::Chart),
     /// Measures when the display's outputs change, on its ELF: jitter of the LDAC edges, skew of the
@@ -148,6 +156,8 @@ impl Arguments {
             Command::Budget(budget) => budget.execute(),
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
+            Command::Faults => faults::execute(),
+            Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
             Command::Timing(timing) => timing.execute(),
             Command::Soak(soak) => soak.execute(),

@@ -318,8 +318,10 @@ fn clr_holds_every_channel_at_zero_volts_and_leaves_it_there() {
     assert_eq!(voltages(&chip), [0.0; CHANNELS]);
     // Channel 0 is unipolar.
     assert_eq!((chip.word(0), chip.word(1)), (0, ZERO_VOLTS));
-    // Neither a write nor LDAC gets through, and what waited for LDAC is gone.
+    // Neither a write nor LDAC gets through, and what waited for LDAC is gone. To write 0 V changes
+    // nothing and is no fault.
     write(&mut chip, r::DAC0 + 15, 0xFFFF);
+    write(&mut chip, r::DAC0 + 15, ZERO_VOLTS);
     pulse_ldac(&mut chip);
     assert_eq!(voltages(&chip), [0.0; CHANNELS]);
     assert_eq!(

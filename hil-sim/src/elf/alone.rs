@@ -26,6 +26,7 @@ use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
 use super::rtt::Log;
 use super::{ElfError, Firmware};
 use crate::digest::Digest;
+use crate::fault::{HandFault, Signs};
 use crate::listener::Listener;
 use crate::recording::{Engine, EstimateRecord, Recording};
 use crate::scene::{Link, Motion, Scene};
@@ -159,8 +160,11 @@ pub(super) fn run_before<W: Witness>(
         duration_s,
         ..Scene::constant(2.0, 50.0)
     })?;
-    let board = Nucleo::new(DisplayPins::new(world), DisplayPins::fit)
-        .map_err(|error| board_error(error.to_string()))?;
+    let board = Nucleo::new(
+        DisplayPins::new(world, HandFault::new(&[])),
+        DisplayPins::fit,
+    )
+    .map_err(|error| board_error(error.to_string()))?;
     let session = Session::new(Box::new(board), 0, VirtualNanos(LOOK_NS))
         .map_err(|error| board_error(error.to_string()))?;
     let driver = Solo {
@@ -230,6 +234,7 @@ pub(super) fn run_before<W: Witness>(
             warm_up_s,
             wall_s: (ended - begun).as_secs_f64(),
             hash: digest.finish(),
+            signs: Signs::default(),
             scans: Vec::new(),
             ticks: left.ticks,
             estimates: far.estimates,

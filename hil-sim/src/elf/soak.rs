@@ -17,20 +17,25 @@ use rigless::time::VirtualNanos;
 
 pub use tally::Check;
 
+use super::console::ConsoleHost;
 use super::display::DisplayPins;
-use super::lockstep::{ConsoleHost, QUANTUM_NS, Watched};
-use super::nucleo::{Nucleo, PEER_UART, Pins};
+use super::lockstep::{QUANTUM_NS, Watched};
+use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
-use super::{ElfError, Firmware, Firmwares, TO_DISPLAY, TO_SENSOR};
+use super::{ElfError, Firmware, Firmwares};
 use crate::arm::Arm;
+use crate::fault::HandFault;
 use crate::scene::{ArmDrive, Follows, Gauges, Kinematic, Link, Motion, Scene, Specimen};
 use crate::weather::Weather;
 use crate::world::World;
 use strokes::Strokes;
 use tally::{Outputs, Side};
 
+/// The two directions' numbers.
+const TO_DISPLAY: u64 = 0;
+const TO_SENSOR: u64 = 1;
 /// Silence at the end, in s: two of the boards' statuses and more.
 pub const QUIET_S: f64 = 3.0;
 /// The shortest run, in s.
@@ -102,7 +107,7 @@ pub fn run(
         to_peer,
         from_peer,
         weather: Weather::new(&soak.link, soak.seed, direction),
-        console: ConsoleHost::new(wanted, None),
+        console: ConsoleHost::new(Some(wanted), None, &[]),
         log: Log::find(&firmware.elf),
         side: Side::default(),
         outputs: Outputs::default(),
@@ -136,7 +141,7 @@ pub fn run(
     let configuration = scene.sensor_configuration();
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
-            let pins = SensorPins::new(sensor_world, arm, configuration);
+            let pins = SensorPins::new(sensor_world, arm, configuration, &[]);
             drive(
                 "sensor",
                 Nucleo::new(pins, SensorPins::fit),
@@ -146,7 +151,10 @@ pub fn run(
         });
         let display = drive(
             "display",
-            Nucleo::new(DisplayPins::new(display_world), DisplayPins::fit),
+            Nucleo::new(
+                DisplayPins::new(display_world, HandFault::new(&[])),
+                DisplayPins::fit,
+            ),
             &firmwares.display,
             display_half,
         );
@@ -301,16 +309,15 @@ impl<P: Drained> Driver<Nucleo<P>> for Half {
                 }
             }
         }
-        let due_ns = session
-            .board_mut()
-            .wire(PEER_UART)
-            .next_due()
-            .filter(|&due_ns| due_ns > now_ns);
-        Some(VirtualNanos(
-            due_ns.map_or(self.next_exchange_ns, |due_ns| {
-                due_ns.min(self.next_exchange_ns)
-            }),
-        ))
+        let mut next_ns = self.next_exchange_ns;
+        for uart in [PEER_UART, CONSOLE_UART] {
+            if let Some(due_ns) = session.board_mut().wire(uart).next_due()
+                && due_ns > now_ns
+            {
+                next_ns = next_ns.min(due_ns);
+            }
+        }
+        Some(VirtualNanos(next_ns))
     }
 }
 
@@ -375,7 +382,7 @@ fn drive<P: Drained + Pins>(
         name,
         told: half
             .console
-            .told()
+            .told
             .is_some_and(|told| told.report.refused.is_none()),
         side: half.side,
         outputs: half.outputs,
