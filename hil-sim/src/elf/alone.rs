@@ -161,7 +161,7 @@ pub(super) fn run_before<W: Witness>(
         ..Scene::constant(2.0, 50.0)
     })?;
     let board = Nucleo::new(
-        DisplayPins::new(world, HandFault::default()),
+        DisplayPins::new(world, HandFault::new(&[])),
         DisplayPins::fit,
     )
     .map_err(|error| board_error(error.to_string()))?;
@@ -229,12 +229,12 @@ pub(super) fn run_before<W: Witness>(
         clears: left.clears,
         dac_frame_errors: left.dac_frame_errors,
         recording: Recording {
-            signs: Signs::default(),
             engine: Engine::Elf,
             duration_s,
             warm_up_s,
             wall_s: (ended - begun).as_secs_f64(),
             hash: digest.finish(),
+            signs: Signs::default(),
             scans: Vec::new(),
             ticks: left.ticks,
             estimates: far.estimates,
