@@ -1,15 +1,18 @@
 //! The `elf` engine: the two ELFs that a user would flash, on two emulated Nucleo-F429ZI boards joined
 //! by a UART.
 
+pub mod alone;
 mod console;
 pub mod cost;
 mod display;
 mod firmware;
 mod injector;
+pub mod instructions;
 mod lockstep;
 mod nucleo;
 mod rtt;
 mod sensor;
+pub mod soak;
 mod traps;
 mod wire;
 

@@ -34,6 +34,11 @@ impl Listener {
         }
     }
 
+    /// Takes what was said since the last call.
+    pub fn take(&mut self) -> Vec<Said> {
+        std::mem::take(&mut self.said)
+    }
+
     /// What was said so far.
     pub fn messages(&self) -> impl DoubleEndedIterator<Item = &Said> {
         self.said.iter()

@@ -344,6 +344,11 @@ fn word_of(volts: f64) -> u16 {
         .clamp(0.0, 65_535.0) as u16
 }
 
+/// Loads by LDAC that the first chip has seen since power-up.
+pub fn loads(part: &mut Stm32f427) -> u64 {
+    on_bus(part, 0).chip.counters().loads
+}
+
 fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
     part.spi[SPI]
         .chip_mut(chip)

@@ -26,7 +26,7 @@ const SUPPLY_MV: u32 = 3_300;
 const CORE_CLOCK_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 /// A fixed rate, so instructions can be counted but never called cycles. An M4F at 168 MHz behind its
 /// flash accelerator needs some 1.4 cycles an instruction: a guess, on the slow side.
-const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(120_000_000).unwrap();
+pub const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(120_000_000).unwrap();
 /// RM0090 section 2.3: SysTick's reference clock is the core's over eight.
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
 const PRIORITY_BITS: u8 = 4;
