@@ -155,7 +155,12 @@ mod board {
         });
         let mut balance = Balance::default();
         count(Part::Balance, |_| {
-            black_box(&mut balance).remove(black_box(&mut lanes), OPEN, UpdateRate::Hz2000);
+            black_box(&mut balance).remove(
+                black_box(&mut lanes),
+                OPEN,
+                black_box(1 << 26),
+                UpdateRate::Hz2000,
+            );
         });
         let array = Array::new(&DEFAULT_ACTUATORS);
         let mut words = [ZERO_VOLT; ACTUATORS];

@@ -1,15 +1,19 @@
 //! No channel keeps a standing voltage, in which an ionic polymer gel would electrolyse.
 //!
 //! A sine has no mean over its cycles, but a hand that trembles about one place of the surface plays a
-//! part of a cycle to and fro. So each channel's mean m is taken off, and what remains is what m is
-//! learnt from: z = s − m, dm/dt = gain · z/τ. However s and the gain go on, the integral of gain · z
-//! is τ times the change of m, and |m| ≤ 1: no channel's integral ever leaves ± [`TIME_CONSTANT_S`] times
-//! its amplitude, and whatever repeats has none at all (but for 5 µV, a 30th of a step of the DAC, that
-//! learning loses by rounding down).
+//! part of a cycle to and fro. So each channel's charge q = ∫ y dt, of what goes out, is kept, and what is
+//! too much of it is worked off:
 //!
-//! With a gain of 1 it is a first-order high-pass. A sine of f comes out ahead by atan(f₀/f), where
-//! f₀ = 1/(2π τ), in size by cos of that, and with no other frequency. τ is the shortest power of two of
-//! ticks that keeps 5 Hz within 0.02 cycles of the motion; it forgets 5 V to 5 mV in ln(1000) τ = 1.8 s.
+//! y = s − m, m = e/τ, where e is by how much q is beyond the room it is given, and |m| ≤ 1.
+//!
+//! A sine of ω goes through 2/ω of charge, wherever in the wave it begins. So a wave that gets on, by a turn
+//! in the time of one of [`SLOWEST_HZ`] at least, is given a room of ± [`MARGIN`] · 2/ω, and is let alone. Any
+//! other is none that is felt: a hand that trembles, or creeps, or turns back. It is given none, and what
+//! remains of it is a first-order high-pass. The charge of a channel is never beyond ± [`MOST_S`] times its
+//! amplitude, so that whatever repeats has no mean at all; and what is too much is forgotten with
+//! [`TIME_CONSTANT_S`].
+
+use core::f64::consts::PI;
 
 use protocol::UpdateRate;
 
@@ -20,28 +24,57 @@ use crate::sine::ONE;
 const SHIFT: u32 = 9;
 /// τ, at either rate.
 pub const TIME_CONSTANT_S: f64 = (1 << SHIFT) as f64 / UpdateRate::Hz2000.hz() as f64;
+/// How much more room a wave is given than it needs, and how much less it may get on: the encoder's counts
+/// make it uneven.
+pub const MARGIN: f64 = 1.25;
+/// The slowest sine that is let alone, in Hz.
+pub const SLOWEST_HZ: f64 = 5.0;
+/// The most of any channel's charge, in amplitudes times seconds.
+pub const MOST_S: f64 = MARGIN / (PI * SLOWEST_HZ) + TIME_CONSTANT_S;
 
 const _: () = assert!(UpdateRate::Hz4000.hz() == 2 * UpdateRate::Hz2000.hz());
 
-/// Each channel's mean, as a part of its amplitude.
+/// An amplitude for [`TIME_CONSTANT_S`], in a charge's scale.
+const CHARGE: f64 = (1 << 30) as f64;
+/// The room of a wave of [`SLOWEST_HZ`].
+const MOST_ROOM: f32 = (CHARGE * MARGIN / (PI * SLOWEST_HZ) / TIME_CONSTANT_S) as f32;
+/// Room times the wave's turn a tick (turns / 2³²), at 2 kHz: half of it at 4 kHz.
+const ROOM_AND_TURN: f32 = (CHARGE * MARGIN * crate::phase::TURN
+    / (PI * TIME_CONSTANT_S * UpdateRate::Hz2000.hz() as f64)) as f32;
+/// What a wave has to get on by in a period of [`SLOWEST_HZ`], in turns / 2³².
+const ENOUGH: u64 = (crate::phase::TURN / MARGIN) as u64;
+/// The room is taken away with a time constant of τ over 2 to this, 16 ms.
+const SHRINKING: u32 = 4;
+
+/// Each channel's charge, as a part of its amplitude.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Balance {
-    /// m in Q30; of all channels the first one's while they share a lane.
-    means: [i32; ACTUATORS],
+    /// q: 2³⁰ is the amplitude for τ; of all channels the first one's while they share a lane.
+    charges: [i32; ACTUATORS],
+    /// What a charge may be: it grows at once as the wave slows down, and shrinks softly.
+    room: i32,
+    /// How far the wave has got in this period of [`SLOWEST_HZ`], in turns / 2³², and for how long it has.
+    way: i64,
+    ticks: u32,
+    gets_on: bool,
     shared: bool,
 }
 
 impl Default for Balance {
     fn default() -> Self {
         Self {
-            means: [0; ACTUATORS],
+            charges: [0; ACTUATORS],
+            room: MOST_ROOM as i32,
+            way: 0,
+            ticks: 0,
+            gets_on: true,
             shared: true,
         }
     }
 }
 
 impl Balance {
-    /// Forgets what it has learnt.
+    /// Forgets all charge.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -51,28 +84,49 @@ impl Balance {
         self.shared
     }
 
-    /// Takes its mean off each of `lanes` (Q28, within ± [`ONE`]), to within ± [`ONE`] again, and learns.
-    /// `gain` (Q30, 0 to [`OPEN`]) is what they are going to be multiplied with; without it nothing is
-    /// learnt. A single lane stands for all channels, and only may while [`Balance::is_shared`].
-    pub fn remove(&mut self, lanes: &mut [i32], gain: u32, rate: UpdateRate) {
+    /// Takes what works off too much charge off each of `lanes` (Q28, within ± [`ONE`]), to within
+    /// ± [`ONE`] again. `gain` (Q30, 0 to 2³⁰) is what they are going to be multiplied with, `turn` by how
+    /// much the wave turns in a tick, in turns / 2³². A single lane stands for all channels, and only may
+    /// while [`Balance::is_shared`].
+    pub fn remove(&mut self, lanes: &mut [i32], gain: u32, turn: i32, rate: UpdateRate) {
         if self.shared && lanes.len() > 1 {
-            self.means = [self.means[0]; ACTUATORS];
+            self.charges = [self.charges[0]; ACTUATORS];
             self.shared = false;
         }
-        let shift = match rate {
-            UpdateRate::Hz2000 => SHIFT,
-            UpdateRate::Hz4000 => SHIFT + 1,
+        let (shift, room_and_turn) = match rate {
+            UpdateRate::Hz2000 => (SHIFT, ROOM_AND_TURN),
+            UpdateRate::Hz4000 => (SHIFT + 1, ROOM_AND_TURN / 2.0),
         };
+        self.watch(turn, rate);
+        let needed = if self.gets_on {
+            (room_and_turn / turn.unsigned_abs() as f32).min(MOST_ROOM) as i32
+        } else {
+            0
+        };
+        // The one is what shifting leaves for ever.
+        let shrunk = self.room - (self.room >> (shift - SHRINKING)) - 1;
+        self.room = needed.max(shrunk);
+        let room = self.room;
         // gain/τ in Q34.
         let part = i64::from(gain >> (shift - 4));
-        for (lane, mean) in lanes.iter_mut().zip(&mut self.means) {
-            let rest = *lane - (*mean >> 2);
-            // The mean is learnt a tick late, for which fast waves come out larger by 1/2τ.
-            let rest = rest - (rest >> (shift + 1));
-            // One that is still being learnt may ask for more than there is.
-            let rest = rest.clamp(-ONE, ONE - 1);
-            *mean += ((i64::from(rest) * part) >> 32) as i32;
+        for (lane, charge) in lanes.iter_mut().zip(&mut self.charges) {
+            let beyond = *charge - (*charge).clamp(-room, room);
+            // What is beyond may ask for more than there is.
+            let rest = (*lane - (beyond >> 2)).clamp(-ONE, ONE - 1);
+            // Rounded to the nearest, so that no charge comes of rounding.
+            *charge += ((i64::from(rest) * part + (1 << 31)) >> 32) as i32;
             *lane = rest;
+        }
+    }
+
+    /// Whether the wave gets on, looked at once in a period of the slowest.
+    fn watch(&mut self, turn: i32, rate: UpdateRate) {
+        self.way += i64::from(turn);
+        self.ticks += 1;
+        if self.ticks >= rate.hz() / SLOWEST_HZ as u32 {
+            self.gets_on = self.way.unsigned_abs() >= ENOUGH;
+            self.way = 0;
+            self.ticks = 0;
         }
     }
 }
@@ -87,11 +141,12 @@ mod tests {
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
 
-    /// What comes out of the balance for each of the ticks of `seconds`.
+    /// What comes out of the balance for each of the ticks of `seconds`: the sine of `turns(t)`, times
+    /// `gain(t)`.
     fn balanced(
         rate: UpdateRate,
         seconds: f64,
-        signal: impl Fn(f64) -> f64,
+        turns: impl Fn(f64) -> f64,
         gain: impl Fn(f64) -> f64,
     ) -> Vec<f64> {
         let hz = f64::from(rate.hz());
@@ -99,9 +154,15 @@ mod tests {
         (0..(seconds * hz) as u32)
             .map(|tick| {
                 let t = f64::from(tick) / hz;
-                let mut lane = [(signal(t) * f64::from(ONE)) as i32];
+                let mut lane = [((TAU * turns(t)).sin() * f64::from(ONE)) as i32];
+                let turn = (turns(t) - turns(t - 1.0 / hz)) * crate::phase::TURN;
                 let gain = gain(t);
-                balance.remove(&mut lane, (gain * f64::from(OPEN)) as u32, rate);
+                balance.remove(
+                    &mut lane,
+                    (gain * f64::from(OPEN)) as u32,
+                    turn as i32,
+                    rate,
+                );
                 gain * f64::from(lane[0]) / f64::from(ONE)
             })
             .collect()
@@ -112,27 +173,18 @@ mod tests {
     }
 
     #[test]
-    fn a_sine_is_ahead_by_the_arc_tangent_of_the_corner_over_its_frequency() {
-        let corner_hz = 1.0 / (TAU * TIME_CONSTANT_S);
+    fn a_sine_from_five_hertz_on_is_let_alone_wherever_it_begins() {
         for rate in RATES {
-            for (hz, most_cycles) in [(5.0, 0.02), (50.0, 0.003)] {
-                let samples = balanced(rate, 6.0, |t| (TAU * hz * t).sin(), |_| 1.0);
-                let last_second = &samples[5 * rate.hz() as usize..];
-                let (mut sine, mut cosine) = (0.0, 0.0);
-                for (tick, sample) in last_second.iter().enumerate() {
-                    let angle = TAU * hz * tick as f64 / f64::from(rate.hz());
-                    sine += sample * angle.sin();
-                    cosine += sample * angle.cos();
+            for hz in [5.0, 7.5, 35.0, 200.0] {
+                for start in 0..8 {
+                    let turns = |t: f64| f64::from(start) / 8.0 + hz * t;
+                    let samples = balanced(rate, 3.0, turns, |_| 1.0);
+                    for (tick, sample) in samples.iter().enumerate() {
+                        let exact = (TAU * turns(tick as f64 / f64::from(rate.hz()))).sin();
+                        // Cast down, and the highest is not quite one.
+                        assert!((sample - exact).abs() <= 2.0 / f64::from(ONE), "{hz} Hz");
+                    }
                 }
-                let ahead = cosine.atan2(sine) / TAU;
-                let expected = (corner_hz / hz).atan() / TAU;
-                // Each step is learnt from a tick later: half a tick of the mean's, which is small.
-                let late = 0.5 / f64::from(rate.hz()) * corner_hz / hz * TAU * hz / TAU;
-                assert!(
-                    (ahead - expected).abs() <= 2.0 * late + 1e-6,
-                    "{ahead} {expected}"
-                );
-                assert!(ahead <= most_cycles, "{hz} Hz: {ahead} cycles");
             }
         }
     }
@@ -140,55 +192,92 @@ mod tests {
     #[test]
     fn what_repeats_keeps_no_mean_whatever_the_gain_does_meanwhile() {
         // A wobble of 5 Hz about a place, with a gain that goes to 0 at one of its ends.
-        let wobble = |t: f64| (1.0 + 0.5 * (TAU * 5.0 * t).sin()).sin();
         let gain = |t: f64| (0.5 + 0.6 * (TAU * 5.0 * t).sin()).clamp(0.0, 1.0);
         for rate in RATES {
-            let samples = balanced(rate, 10.0, wobble, gain);
-            let last_second = &samples[9 * rate.hz() as usize..];
-            // Learning is rounded down, by less than 2⁻³⁰ a tick.
-            let bound = TIME_CONSTANT_S * f64::from(rate.hz()) / 2_f64.powi(30) + 1e-7;
-            assert!(mean(last_second).abs() <= bound, "{}", mean(last_second));
+            for place in 0..8 {
+                let wobble = |t: f64| f64::from(place) / 8.0 + 0.08 * (TAU * 5.0 * t).sin();
+                let samples = balanced(rate, 10.0, wobble, gain);
+                let last_second = &samples[9 * rate.hz() as usize..];
+                // The rest of 9 s, some ten mean gains of ½ over τ, and rounding.
+                let bound = (-9.0 * 0.4 / TIME_CONSTANT_S).exp() + 1e-7;
+                assert!(mean(last_second).abs() <= bound, "{}", mean(last_second));
+            }
         }
     }
 
     #[test]
-    fn a_standing_signal_is_forgotten_with_the_time_constant() {
+    fn a_standing_signal_is_worked_off_with_the_time_constant_once_there_is_no_room_for_it() {
         for rate in RATES {
-            let samples = balanced(rate, 2.0, |_| 0.7, |_| 1.0);
+            let samples = balanced(rate, 3.0, |_| 0.125, |_| 1.0);
+            let stands = 0.5_f64.sqrt();
+            // The room is full, then gone 0.2 s after the start, and its charge is to be worked off with
+            // the rest's.
             for (tick, sample) in samples.iter().enumerate() {
                 let t = tick as f64 / f64::from(rate.hz());
-                let expected = 0.7 * (-t / TIME_CONSTANT_S).exp();
-                // (1 − 1/n)ⁿ is less than 1/e by 1/2n of it at most, and n times as many ticks as τ.
-                assert!(
-                    (sample - expected).abs() <= 1e-3,
-                    "{t} s: {sample} {expected}"
-                );
+                if t < MARGIN / (PI * SLOWEST_HZ) / stands {
+                    assert!((sample - stands).abs() <= 2.0 / f64::from(ONE));
+                } else if t > 0.4 {
+                    let decayed = (-(t - 0.4) / TIME_CONSTANT_S).exp();
+                    assert!(
+                        *sample <= stands * decayed + 1e-6 && *sample >= -1e-6,
+                        "{t} s"
+                    );
+                }
             }
         }
     }
 
     #[test]
-    fn the_integral_never_leaves_the_time_constant_times_the_amplitude() {
+    fn the_charge_never_leaves_its_bound() {
         for rate in RATES {
-            // The worst there is: full voltage the one way until it is forgotten, then the other.
-            let samples = balanced(rate, 8.0, |t| if t < 4.0 { 1.0 } else { -1.0 }, |_| 1.0);
-            let mut integral_s: f64 = 0.0;
-            for sample in samples {
-                integral_s += sample / f64::from(rate.hz());
-                // Rounding down loses less than 2⁻³⁰ of m a tick.
-                let lost_s = 8.0 * f64::from(rate.hz()) * TIME_CONSTANT_S / 2_f64.powi(30);
-                assert!(integral_s.abs() <= TIME_CONSTANT_S + lost_s);
+            // The worst there is: full voltage the one way until it is worked off, then the other, while
+            // the wave seems to get on slowly.
+            let mut balance = Balance::default();
+            let (mut charge_s, mut most_s) = (0.0_f64, 0.0_f64);
+            let turn = (SLOWEST_HZ / f64::from(rate.hz()) * crate::phase::TURN) as i32;
+            for tick in 0..8 * rate.hz() {
+                let crest = tick / (4 * rate.hz()) == 0;
+                let mut lane = [if crest { ONE - 1 } else { -ONE }];
+                balance.remove(&mut lane, OPEN, turn, rate);
+                charge_s += f64::from(lane[0]) / f64::from(ONE) / f64::from(rate.hz());
+                most_s = most_s.max(charge_s.abs());
             }
+            // A tick may go beyond.
+            assert!(most_s <= MOST_S + 1.0 / f64::from(rate.hz()), "{most_s}");
+            assert!(most_s >= 0.95 * MOST_S, "the bound is not idle: {most_s}");
+        }
+    }
+
+    #[test]
+    fn room_shrinks_softly_and_grows_at_once() {
+        for rate in RATES {
+            let mut balance = Balance::default();
+            let ticks = f64::from(rate.hz()) * TIME_CONSTANT_S / f64::from(1 << SHRINKING);
+            // 250 Hz at 2 kHz.
+            let fast = 1 << 29;
+            for _ in 0..rate.hz() / 4 {
+                let before = balance.room;
+                balance.remove(&mut [0], OPEN, fast, rate);
+                assert!(f64::from(before - balance.room) <= f64::from(before) / ticks + 2.0);
+            }
+            let of_rate = 2_000.0 / f64::from(rate.hz());
+            let needed = f64::from(ROOM_AND_TURN) / f64::from(fast) * of_rate;
+            assert!((f64::from(balance.room) / needed - 1.0).abs() < 1e-3);
+            balance.remove(&mut [0], OPEN, 1, rate);
+            assert_eq!(balance.room, MOST_ROOM as i32);
+            // A hand that stands still has none in the end.
+            (0..rate.hz()).for_each(|_| balance.remove(&mut [0], OPEN, 0, rate));
+            assert!(balance.room <= 0, "{}", balance.room);
         }
     }
 
     #[test]
     fn lanes_that_were_shared_part_from_where_they_were() {
         let mut balance = Balance::default();
-        (0..100).for_each(|_| balance.remove(&mut [ONE / 2], OPEN, UpdateRate::Hz2000));
+        (0..600).for_each(|_| balance.remove(&mut [ONE / 2], OPEN, 0, UpdateRate::Hz2000));
         let mut lanes = [ONE / 2; ACTUATORS];
         assert!(balance.is_shared());
-        balance.remove(&mut lanes, OPEN, UpdateRate::Hz2000);
+        balance.remove(&mut lanes, OPEN, 0, UpdateRate::Hz2000);
         assert!(!balance.is_shared());
         assert!(lanes.iter().all(|&lane| lane == lanes[0] && lane < ONE / 2));
     }

@@ -121,6 +121,11 @@ impl Level {
         self.value
     }
 
+    /// The wave's turn a tick, averaged over 4 ms, in turns / 2³².
+    pub const fn turn(&self) -> i32 {
+        self.turn
+    }
+
     /// The gain at the wave's frequency, in Q30, 0 to [`OPEN`].
     pub const fn roll_off(&self, rate: UpdateRate) -> u32 {
         // 250 Hz is an eighth of a turn a tick at 2 kHz, a sixteenth at 4 kHz.

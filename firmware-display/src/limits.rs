@@ -9,7 +9,7 @@
 //! | voltage: the configured amplitude | each word is within it |
 //! | slew: [`MOST_SLEW_V_PER_MS`] | the stimulus never exceeds [`crate::stimulus::MOST_V_PER_MS`] |
 //! | energy: a mean of V² over about 1 s, [`MOST_ENERGY_V2`] | a full sine has 12.5 V²; a hand that swings to and fro over half a wavelength makes 17.6 V² of it |
-//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away with a time constant τ of a quarter of it, so that ∫V dt is within ±5 V · τ |
+//! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away so that ∫V dt is within ±5 V · [`crate::balance::MOST_S`] |
 
 use protocol::UpdateRate;
 
@@ -21,7 +21,7 @@ pub const MOST_SLEW_V_PER_MS: i32 = 10;
 /// The largest mean of V², in V².
 pub const MOST_ENERGY_V2: i32 = 20;
 /// The largest mean of V, in V.
-pub const MOST_STANDING_V: f32 = 2.5;
+pub const MOST_STANDING_V: f32 = 3.5;
 /// The time constant of both means, in ticks at 4 kHz, as a power of two: 1.024 s.
 const MEAN_SHIFT: u32 = 12;
 /// Channels whose means are looked at in a tick.
@@ -194,7 +194,8 @@ mod tests {
     use core::f64::consts::TAU;
 
     use super::*;
-    use crate::balance::TIME_CONSTANT_S;
+    use crate::balance::{Balance, MOST_S};
+    use crate::sine::ONE;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
     const VOLT: f64 = 6_553.6;
@@ -238,20 +239,18 @@ mod tests {
 
     #[test]
     fn no_standing_voltage_that_is_balanced_away_breaks_the_limit() {
-        // Whatever the sine s is: y = s − m, m' = y/τ, so that ∫y = τ Δm, within 10 V · τ; in a mean of
-        // four times τ it is no more than 2.5 V. The worst is met by a crest that follows a trough.
+        // Whatever the sine is, ∫y stays within ± 5 V · MOST_S: from the one end to the other it adds no
+        // more than that over the time constant to the mean, 3.3 V. The worst is met by a crest that
+        // follows a trough.
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
             let mut worst = 0.0_f64;
-            let (mut mean, dt_s) = (0.0_f64, 1.0 / f64::from(rate.hz()));
+            let mut balance = Balance::default();
             for tick in 0..20 * rate.hz() {
-                let s = if tick / (2 * rate.hz()) % 2 == 0 {
-                    5.0
-                } else {
-                    -5.0
-                };
-                let y = (s - mean).clamp(-5.0, 5.0);
-                mean += y * dt_s / TIME_CONSTANT_S;
+                let crest = tick / (2 * rate.hz()) % 2 == 0;
+                let mut lane = [if crest { ONE - 1 } else { -ONE }];
+                balance.remove(&mut lane, 1 << 30, 0, rate);
+                let y = 5.0 * f64::from(lane[0]) / f64::from(ONE);
                 let words = [word(y); ACTUATORS];
                 // The steps of s are no hand's.
                 limits.before = words;
@@ -259,10 +258,7 @@ mod tests {
                 let standing = f64::from(limits.standing[0]) / f64::from(1 << FRACTION) / VOLT;
                 worst = worst.max(standing.abs());
             }
-            assert!(
-                (1.0..10.0 * TIME_CONSTANT_S / 1.024).contains(&worst),
-                "{worst} V"
-            );
+            assert!((1.0..10.0 * MOST_S / 1.024).contains(&worst), "{worst} V");
         }
     }
 
@@ -322,10 +318,10 @@ mod tests {
 
     #[test]
     fn a_standing_voltage_is_found_before_it_has_done_harm() {
-        // 5 V after ln(1/(1 − 2.5/5)) time constants, 3 V after ln(1/(1 − 2.5/3)).
+        // 5 V after ln(1/(1 − 3.5/5)) time constants, 4 V after ln(1/(1 − 3.5/4)).
         for rate in RATES {
-            for volts in [5.0_f64, -5.0, 3.0, -3.0] {
-                let expected_s = -1.024 * (1.0 - 2.5 / volts.abs()).ln();
+            for volts in [5.0_f64, -5.0, 4.0, -4.0] {
+                let expected_s = -1.024 * (1.0 - 3.5 / volts.abs()).ln();
                 let ramp = |t: f64| volts * (t / 0.001).min(1.0);
                 let (at_s, breach) = play(rate, 3.0, ramp).unwrap();
                 assert_eq!(breach, Breach::Standing);

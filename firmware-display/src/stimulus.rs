@@ -133,7 +133,8 @@ impl Stimulus {
         let most = self.most_steps();
         let lanes = &mut self.lanes[..if shared { 1 } else { ACTUATORS }];
         self.pattern.sines(self.phase.turns(), lanes);
-        self.balance.remove(lanes, gain, self.rate);
+        self.balance
+            .remove(lanes, gain, self.level.turn(), self.rate);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
         let changed = self.array.draw(level as u32, lanes, most, &mut self.words);
         self.silent = gain == 0 && are_silent(&self.words);

@@ -2,10 +2,13 @@
 
 pub mod actuators;
 mod cycles;
+pub mod edges;
 pub mod estimates;
+pub mod mean;
 pub mod phase;
 mod phase_error;
 pub mod reaction;
+pub mod spectrum;
 #[cfg(test)]
 pub(crate) mod synthetic;
 pub mod track;

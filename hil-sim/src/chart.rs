@@ -1,4 +1,4 @@
-//! What every estimator gives and what it costs: `hil-sim chart`.
+//! What every estimator gives and what it costs, and what the display does: `hil-sim chart`.
 //!
 //! | file | what |
 //! | --- | --- |
@@ -10,10 +10,13 @@
 //! | [`bound`] | the Cramér–Rao bound |
 //! | [`efficiency`] | how near the bank comes to it |
 //! | [`result`], [`picture`] | CSV and SVG |
+//! | [`purity`], [`stop`], [`timing`], [`delay`] | the display's ELF, measured |
 
 pub mod bound;
 pub mod contest;
+mod cores;
 pub mod costs;
+pub mod delay;
 pub mod efficiency;
 pub mod family;
 pub mod fourier;
@@ -22,7 +25,26 @@ pub mod parts;
 pub mod picture;
 pub mod pitch;
 pub mod result;
+pub mod purity;
 pub mod rivals;
 pub mod score;
 pub mod settings;
+pub mod stop;
 pub mod tally;
+pub mod timing;
+
+/// The name of a mode in tables and files.
+pub const fn word_of_mode(mode: protocol::Mode) -> &'static str {
+    match mode {
+        protocol::Mode::Uniform => "uniform",
+        protocol::Mode::Travelling => "travelling",
+    }
+}
+
+/// The text of a finished table.
+fn finish_csv(table: csv::Writer<Vec<u8>>) -> Result<String, csv::Error> {
+    let bytes = table
+        .into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}

@@ -8,13 +8,18 @@ use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
+mod budget;
+mod campaign;
 mod chart;
 mod cost;
 mod demo;
+mod display;
+mod faults;
 mod goals;
 mod map;
 mod run;
 mod size;
+mod soak;
 
 /// Ridgelink's simulator.
 #[derive(Debug, Parser)]
@@ -37,14 +42,30 @@ enum Command {
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
     Cost(Cost),
+    /// Counts what the display's ELF spends its instructions on, update by update and part by part, on an
+    /// emulated board: exit status 1 if it is more than 15 % of them at 2 kHz
+    Budget(budget::Budget),
     /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
     /// heat maps. Run again, it goes on where it was stopped
     Map(map::Maps),
     /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
     /// exit status 1 if a scene is not as expected
     Goals(goals::Goals),
-    /// Draws what the estimators give against what they cost
+    /// Lists the kinds of faults that a scene may have: what they mean, where they are injected, their
+    /// keys and defaults, and what is expected of the boards
+    Faults,
+    /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
+    /// 1 if a goal is missed
+    Campaign(campaign::Campaign),
+    /// Draws what the estimators give against what they cost, and what the display does
     Chart(chart::Chart),
+    /// Measures when the display's outputs change, on its ELF: jitter of the LDAC edges, skew of the
+    /// channels, hand to output at 2 and 4 kHz over links of all sorts. Exit status 1 if p99 is above 0.6 ms
+    /// at 2 kHz. Writes timing.csv and timing.svg
+    Timing(display::Timing),
+    /// Runs both ELFs for long, with random strokes over several specimens through bad weather, and holds
+    /// every counter against what was seen: exit status 1 if one does not fit
+    Soak(soak::Soak),
 }
 
 #[derive(Debug, clap::Args)]
@@ -132,9 +153,14 @@ impl Arguments {
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),
+            Command::Budget(budget) => budget.execute(),
             Command::Map(maps) => maps.execute(),
             Command::Goals(goals) => goals.execute(),
+            Command::Faults => faults::execute(),
+            Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
+            Command::Timing(timing) => timing.execute(),
+            Command::Soak(soak) => soak.execute(),
         }
     }
 }
@@ -148,6 +174,14 @@ fn number(number: Option<f64>, decimals: usize) -> String {
 fn progress(scenes: u64) -> ProgressBar {
     ProgressBar::new(scenes).with_style(
         ProgressStyle::with_template("{bar:40} {pos} of {len} scenes, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
+}
+
+/// The same for runs of the emulated boards.
+fn runs(runs: u64) -> ProgressBar {
+    ProgressBar::new(runs).with_style(
+        ProgressStyle::with_template("{bar:40} {pos} of {len} runs, {eta} to go")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
     )
 }

@@ -1,44 +1,47 @@
 //! The `elf` engine: the two ELFs that a user would flash, on two emulated Nucleo-F429ZI boards joined
 //! by a UART.
 
+pub mod alone;
+mod console;
 pub mod cost;
 mod display;
 mod firmware;
+mod injector;
+pub mod instructions;
 mod lockstep;
 mod nucleo;
 mod rtt;
 mod sensor;
+pub mod soak;
+mod traps;
 mod wire;
 
 use std::sync::mpsc::sync_channel;
 use std::thread;
 use std::time::Instant;
 
-use protocol::{Configuration, DisplayConfiguration, Message, Role, SensorConfiguration, Status};
+use protocol::{Message, Role, Status};
 use rigless::emulator::{self, Start};
 use rigless::session::Session;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::time::VirtualNanos;
 
+pub use console::Told;
 pub use firmware::{Firmware, FirmwareError, Firmwares};
-pub use lockstep::{QUANTUM_NS, Told, WARM_UP_NS};
+pub use lockstep::{QUANTUM_NS, WARM_UP_NS};
 
 use crate::arm::Arm;
 use crate::digest::Digest;
+use crate::fault::{HandFault, Reset, Signs};
 use crate::listener::{Listener, Said};
 use crate::recording::{Engine, EstimateRecord, Recording, ScanRecord};
 use crate::scene::{Scene, SceneError};
-use crate::weather::Weather;
 use crate::world::World;
 use display::{DisplayPins, DisplayRecords};
-use lockstep::{Cable, ConsoleHost, Lockstep, Watched};
+use lockstep::{Cable, Lockstep, Watched};
 use nucleo::Nucleo;
-use rtt::Log;
 use sensor::SensorPins;
-
-/// The two directions' numbers, as in the native engine: the same scene has the same weather.
-const TO_DISPLAY: u64 = 0;
-const TO_SENSOR: u64 = 1;
+use traps::Traps;
 
 const SCANS_PER_ESTIMATE: usize =
     (firmware_sensor::SCAN_RATE_HZ / firmware_sensor::ESTIMATE_RATE_HZ) as usize;
@@ -80,6 +83,14 @@ pub enum ElfError {
         /// What it answered.
         reason: String,
     },
+    /// A fault needs to know where something is in the firmware, and it is not to be found.
+    #[error("the {board} board can't be broken by \"{kind}\": its ELF does not show where: build it with symbols, as ./test does")]
+    Fault {
+        /// Which board.
+        board: &'static str,
+        /// The fault's kind.
+        kind: &'static str,
+    },
     /// The firmware touched what the emulator has no model for.
     #[error(
         "the {board} board's firmware reached an address that no model answers for: {address:#010x}"
@@ -97,7 +108,7 @@ struct Outcome<T> {
     left: T,
     driver: Lockstep,
     instructions: u64,
-    resets: usize,
+    resets: Vec<Reset>,
 }
 
 /// What only the `elf` engine knows, beside the [`Recording`].
@@ -129,36 +140,34 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let (to_sensor, from_display) = sync_channel(1);
 
     let sensor_driver = Lockstep::new(
+        scene,
+        Role::Sensor,
+        &firmwares.sensor.elf,
         Cable {
             to_peer: to_display,
             from_peer: from_display,
         },
-        Weather::new(&scene.link, scene.seed, TO_SENSOR),
-        console_for(scene, Role::Sensor),
-        Log::find(&firmwares.sensor.elf),
-        end_ns,
     );
     let display_driver = Lockstep::new(
+        scene,
+        Role::Display,
+        &firmwares.display.elf,
         Cable {
             to_peer: to_sensor,
             from_peer: from_sensor,
         },
-        Weather::new(&scene.link, scene.seed, TO_DISPLAY),
-        console_for(scene, Role::Display),
-        Log::find(&firmwares.display.elf),
-        end_ns,
     );
 
     let started = Instant::now();
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
             let board = Nucleo::new(
-                SensorPins::new(sensor_world, arm, scene.sensor_configuration()),
+                SensorPins::new(sensor_world, arm, scene.sensor_configuration(), &scene.faults),
                 SensorPins::fit,
             );
             let take = |pins: &mut SensorPins, _: &mut Stm32f427| std::mem::take(&mut pins.scans);
             drive(
-                "sensor",
+                Role::Sensor,
                 board,
                 &firmwares.sensor,
                 sensor_driver,
@@ -166,9 +175,12 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
                 take,
             )
         });
-        let board = Nucleo::new(DisplayPins::new(display_world), DisplayPins::fit);
+        let board = Nucleo::new(
+            DisplayPins::new(display_world, HandFault::new(&scene.faults)),
+            DisplayPins::fit,
+        );
         let display = drive(
-            "display",
+            Role::Display,
             board,
             &firmwares.display,
             display_driver,
@@ -194,7 +206,7 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let facts = BoardFacts {
         sensor_instructions: sensor.instructions,
         display_instructions: display.instructions,
-        resets: sensor.resets + display.resets,
+        resets: sensor.resets.len() + display.resets.len(),
         clears: display.left.clears,
         dac_frame_errors: display.left.dac_frame_errors,
         sensor_told: told("sensor", &sensor.driver)?,
@@ -212,25 +224,6 @@ const ABANDONED: &str = "the other board stopped";
 
 fn is_abandoned(error: &ElfError) -> bool {
     matches!(error, ElfError::Stopped { reason, .. } if reason == ABANDONED)
-}
-
-/// A host on the console, if the scene wants of the board what is not its default.
-fn console_for(scene: &Scene, role: Role) -> Option<ConsoleHost> {
-    match role {
-        Role::Display => {
-            let wanted = scene.display_configuration();
-            (wanted != DisplayConfiguration::DEFAULT).then(|| {
-                let described = (wanted.actuators != DisplayConfiguration::DEFAULT.actuators)
-                    .then_some(&*scene.display.actuators);
-                ConsoleHost::new(Configuration::Display(wanted), described)
-            })
-        }
-        _ => {
-            let wanted = scene.sensor_configuration();
-            (wanted != SensorConfiguration::DEFAULT)
-                .then(|| ConsoleHost::new(Configuration::Sensor(wanted), None))
-        }
-    }
 }
 
 /// What the board answered, if it was asked for anything.
@@ -251,13 +244,14 @@ fn told(name: &'static str, driver: &Lockstep) -> Result<Option<Told>, ElfError>
 }
 
 fn drive<P: Watched, T>(
-    name: &'static str,
+    role: Role,
     board: Result<Nucleo<P>, rigless::soc::Error>,
     firmware: &Firmware,
     driver: Lockstep,
     end_ns: u64,
     take: impl FnOnce(&mut P, &mut Stm32f427) -> T,
 ) -> Result<Outcome<T>, ElfError> {
+    let name = role.name();
     let board_error = |reason: String| ElfError::Board {
         board: name,
         reason,
@@ -266,11 +260,12 @@ fn drive<P: Watched, T>(
     let first_stop = VirtualNanos(QUANTUM_NS);
     let session = Session::new(Box::new(board), 0, first_stop)
         .map_err(|error| board_error(error.to_string()))?;
-    let images = [firmware.image.clone()];
+    let mut images = vec![firmware.image.clone()];
+    images.extend(driver.injector().traps().and_then(Traps::image));
     let mut finished = emulator::run(session, &Start::new(&images), driver)
         .map_err(|error| board_error(error.to_string()))?;
     let at_ns = finished.stop.map_or(0, |stop| stop.at.0);
-    if finished.driver.abandoned || at_ns < end_ns {
+    if !finished.driver.is_done {
         let reason = if finished.driver.abandoned {
             ABANDONED.to_owned()
         } else {
@@ -283,13 +278,29 @@ fn drive<P: Watched, T>(
             reason,
         });
     }
-    if let Some(unmapped) = finished.session.unmapped().first() {
+    if let Some(kind) = finished.driver.injector().failed {
+        return Err(ElfError::Fault {
+            board: name,
+            kind: kind.name(),
+        });
+    }
+    // A board that is broken may well reach where nothing answers.
+    if let Some(unmapped) = finished.session.unmapped().first()
+        && !finished.driver.injector().breaks()
+    {
         return Err(ElfError::Unmapped {
             board: name,
             address: unmapped.address,
         });
     }
-    let resets = finished.session.resets().len();
+    let cuts_ns = &finished.driver.injector().cuts_ns;
+    let clock = finished.driver.clock();
+    let resets = finished.session.resets().iter().map(|reset| Reset {
+        role,
+        at_ns: clock.true_ns(reset.at.0),
+        is_injected: cuts_ns.contains(&reset.at.0),
+    });
+    let resets = resets.collect();
     let (pins, part) = finished.session.board_mut().pins();
     Ok(Outcome {
         left: take(pins, part),
@@ -320,22 +331,30 @@ fn record(
 
     let clock_offset_ns = clock_offset_ns(&said, &sensor.left);
     let mut estimates: Vec<EstimateRecord> = Vec::new();
-    for Said { message, .. } in said.messages() {
+    // A sensor that has started again, or goes by a clock of its own, says nothing of the scene's.
+    let keeps_time = sensor.driver.clock().is_true() && sensor.resets.is_empty();
+    for Said { at_ns, message } in said.messages() {
         if let Message::Estimate(estimate) = message {
+            let made_ns = (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns);
             estimates.push(EstimateRecord {
-                made_ns: (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns),
+                made_ns: if keeps_time { made_ns } else { *at_ns },
                 received_ns: None,
                 estimate: *estimate,
             });
         }
     }
+    // Estimates come in their order but for a few.
+    const REORDERED: usize = 256;
+    let mut last: usize = 0;
     for Said { at_ns, message } in heard.messages() {
+        let from = last.saturating_sub(REORDERED);
         if let Message::Estimate(received) = message
-            && let Some(record) = estimates
-                .iter_mut()
-                .find(|record| record.estimate == *received && record.received_ns.is_none())
+            && let Some(found) = estimates[from..].iter().position(|record| {
+                record.estimate == *received && record.received_ns.is_none()
+            })
         {
-            record.received_ns = Some(*at_ns);
+            last = from + found;
+            estimates[last].received_ns = Some(*at_ns);
         }
     }
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
@@ -348,6 +367,11 @@ fn record(
         );
     }
     log.sort_by_key(|&(at_ns, ..)| at_ns);
+    let sensor_status = last_status(&said);
+    let display_status = last_status(&display_said);
+    let mut resets = sensor.resets;
+    resets.extend(display.resets);
+    resets.sort_by_key(|reset| reset.at_ns);
     Recording {
         engine: Engine::Elf,
         duration_s: scene.duration_s,
@@ -358,9 +382,15 @@ fn record(
         ticks: display.left.ticks,
         estimates,
         outputs: display.left.outputs,
-        sensor_status: last_status(&said),
-        display_status: last_status(&display_said),
+        sensor_status,
+        display_status,
         log,
+        signs: Signs {
+            display: display_said.into_messages(),
+            sensor: said.into_messages(),
+            resets,
+            clears_ns: display.left.clears_ns,
+        },
     }
 }
 

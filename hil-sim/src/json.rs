@@ -6,6 +6,7 @@ use protocol::Status;
 use serde::Serialize;
 
 use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
+use crate::fault::judge::Finding;
 use crate::json::lines::Lines;
 use crate::recording::Recording;
 use crate::truth::Truth;
@@ -32,7 +33,7 @@ pub struct SceneResult<'a> {
     /// The counters of both ends.
     pub link: Link,
     /// What faults were injected.
-    pub faults: &'a [Fault],
+    pub faults: Vec<Fault>,
 }
 
 /// The last counters of both ends; null where none arrived.
@@ -48,7 +49,7 @@ pub struct Link {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
     /// Its kind, as the scene writes it.
-    pub kind: String,
+    pub kind: &'static str,
     /// When, in s since the scene's start.
     pub at_s: f64,
     /// Until it was noticed, in ms.
@@ -57,8 +58,19 @@ pub struct Fault {
     pub safe_ms: Option<f64>,
 }
 
+impl From<&Finding> for Fault {
+    fn from(finding: &Finding) -> Self {
+        Self {
+            kind: finding.fault.kind.name(),
+            at_s: finding.fault.at_s,
+            detected_ms: finding.detected_ms(),
+            safe_ms: finding.safe_ms(),
+        }
+    }
+}
+
 impl<'a> SceneResult<'a> {
-    /// The object of one run.
+    /// The object of one run, without faults.
     pub fn new(truth: &Truth<'a>, recording: &Recording, verdict: &'a Verdict) -> Self {
         Self {
             name: truth.name,
@@ -73,7 +85,7 @@ impl<'a> SceneResult<'a> {
                 sensor: recording.sensor_status,
                 display: recording.display_status,
             },
-            faults: &[],
+            faults: Vec::new(),
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod dac81416;
 pub mod digest;
 pub mod elf;
 pub mod expectation;
+pub mod fault;
 pub mod gauges;
 pub mod json;
 pub mod listener;

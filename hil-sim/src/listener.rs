@@ -24,15 +24,28 @@ impl Listener {
     pub fn hear(&mut self, bytes: &[(u64, u8)]) {
         for &(at_ns, byte) in bytes {
             self.receiver.receive(&[byte], |event| {
-                if let Event::Message(message) = event {
-                    self.said.push(Said { at_ns, message });
-                }
+                let message = match event {
+                    Event::Message(message) => message,
+                    Event::Greeted(hello) => Message::Hello(hello),
+                    Event::Foreign(_) | Event::Unheralded => return,
+                };
+                self.said.push(Said { at_ns, message });
             });
         }
+    }
+
+    /// Takes what was said since the last call.
+    pub fn take(&mut self) -> Vec<Said> {
+        std::mem::take(&mut self.said)
     }
 
     /// What was said so far.
     pub fn messages(&self) -> impl DoubleEndedIterator<Item = &Said> {
         self.said.iter()
+    }
+
+    /// The same, for good.
+    pub fn into_messages(self) -> Vec<Said> {
+        self.said
     }
 }

@@ -12,18 +12,21 @@ use std::time::Instant;
 
 use crate::arm::Arm;
 use crate::digest::Digest;
+use crate::fault::catalogue::Needs;
+use crate::fault::{Clock, GaugeFaults, HandFault, Signs, Way};
+use crate::listener::Said;
 use crate::motion::encoder;
 use crate::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
 use crate::scene::{Scene, SceneError};
-use crate::weather::{BYTE_NS, Weather};
+use crate::weather::BYTE_NS;
 use crate::world::World;
 use firmware_display::{Display, Senses};
 use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
 use protocol::{
-    CHANNELS, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
-    RoleCounters, SensorCounters, Status,
+    CHANNELS, DisplayState, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
+    RoleCounters, Safety, SensorCounters, Status,
 };
 
 const STEP_NS: u64 = 1_000_000_000 / firmware_sensor::SCAN_RATE_HZ as u64;
@@ -68,14 +71,32 @@ struct Pair {
     steps_per_tick: u64,
     sensor_end: End,
     display_end: End,
+    /// The sensor board's.
+    clock: Clock,
+    scan_count: u64,
+    gauges: GaugeFaults,
+    hand: HandFault,
     tape: Tape,
 }
 
 impl Pair {
     fn new(scene: &Scene) -> Result<Self, SceneError> {
-        let end = |role, mark, direction| {
-            End::new(role, Weather::new(&scene.link, scene.seed, direction), mark)
-        };
+        if let Some(at) = scene
+            .faults
+            .iter()
+            .position(|fault| fault.kind.row().needs == Needs::Boards)
+        {
+            return Err(SceneError {
+                file: scene.name.clone(),
+                line: None,
+                key: format!("fault[{at}].kind"),
+                message: format!(
+                    "\"{}\" breaks a board, and this engine has none: give --engine elf",
+                    scene.faults[at].kind.name()
+                ),
+            });
+        }
+        let end = |role, mark, to| End::new(role, Way::new(scene, to), mark);
         Ok(Self {
             world: World::new(scene)?,
             arm: Arm::new(&scene.arm, &scene.motion),
@@ -87,8 +108,12 @@ impl Pair {
                 firmware_sensor::SCAN_RATE_HZ / scene.display_configuration().update_rate.hz(),
             ),
             display: display_of(scene)?,
-            sensor_end: end(Role::Sensor, b'S', 0),
-            display_end: end(Role::Display, b'D', 1),
+            sensor_end: end(Role::Sensor, b'S', Role::Display),
+            display_end: end(Role::Display, b'D', Role::Sensor),
+            clock: Clock::new(&scene.faults),
+            scan_count: 0,
+            gauges: GaugeFaults::new(&scene.faults),
+            hand: HandFault::new(&scene.faults),
             tape: Tape::new(scene.duration_s),
         })
     }
@@ -96,15 +121,35 @@ impl Pair {
     fn step(&mut self, step: u64) {
         let now_ns = step * STEP_NS;
         let t_s = step as f64 / f64::from(firmware_sensor::SCAN_RATE_HZ);
-        self.hear(now_ns);
         self.sensor_end.greet(now_ns, &mut self.tape.digest);
         self.display_end.greet(now_ns, &mut self.tape.digest);
-        self.scan(step, now_ns, t_s);
+        if self.clock.is_true() {
+            self.scan(step, now_ns, t_s);
+        }
+        while !self.clock.is_true() {
+            let at_ns = self.clock.true_ns(self.scan_count * STEP_NS);
+            if at_ns > now_ns {
+                break;
+            }
+            self.scan(self.scan_count, at_ns, at_ns as f64 * 1e-9);
+            self.scan_count += 1;
+        }
         if step.is_multiple_of(self.steps_per_tick) {
             self.tick(now_ns, t_s);
         }
+        // As on the board: what has come is heard once the words are on their way.
+        self.hear(now_ns);
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
+            for (said, status) in [
+                (&mut self.tape.signs.sensor, sensor),
+                (&mut self.tape.signs.display, display),
+            ] {
+                said.push(Said {
+                    at_ns: now_ns,
+                    message: Message::Status(status),
+                });
+            }
             self.sensor_end
                 .send(now_ns, &Message::Status(sensor), &mut self.tape.digest);
             self.display_end
@@ -148,6 +193,7 @@ impl Pair {
     fn scan(&mut self, step: u64, now_ns: u64, t_s: f64) {
         let position_mm = self.arm.position_mm(t_s);
         let codes = self.world.codes(t_s, position_mm);
+        let codes = self.gauges.apply(now_ns, codes);
         let encoder = self.world.arm_encoder(t_s, position_mm);
         self.tape.scans.push(ScanRecord {
             at_ns: now_ns,
@@ -160,13 +206,17 @@ impl Pair {
         if place + 1 < SCANS_PER_SAMPLE {
             return;
         }
-        let output = self.sensor.step(now_ns / 1_000, &self.scans, encoder);
+        let output = self.sensor.step(step * STEP_NS / 1_000, &self.scans, encoder);
         self.sensor_counters.samples = self.sensor_counters.samples.wrapping_add(1);
         if output.drive != self.drive {
             self.drive = output.drive;
             self.arm.command(t_s, self.command_mm_s());
         }
         if let Some(estimate) = output.estimate {
+            self.tape.signs.sensor.push(Said {
+                at_ns: now_ns,
+                message: Message::Estimate(estimate),
+            });
             self.tape.estimates.push(EstimateRecord {
                 made_ns: now_ns,
                 received_ns: None,
@@ -187,7 +237,7 @@ impl Pair {
     /// The display's output tick.
     fn tick(&mut self, now_ns: u64, t_s: f64) {
         let position_mm = self.world.hand_position_mm(t_s);
-        let encoder = encoder(position_mm);
+        let encoder = self.hand.counts(now_ns, encoder(position_mm));
         self.tape.ticks.push(TickRecord {
             at_ns: now_ns,
             encoder,
@@ -195,6 +245,14 @@ impl Pair {
         });
         if self.display.tick(encoder, &Senses::default()).send {
             self.tape.output(now_ns, self.display.words());
+        }
+        let state = self.display.state();
+        if self.tape.state.replace(state) != Some(state) {
+            let instant_us = now_ns / 1_000;
+            self.tape.signs.display.push(Said {
+                at_ns: now_ns,
+                message: Message::Safety(Safety { instant_us, state }),
+            });
         }
         if let Some(motion) = self.display.motion(now_ns / 1_000) {
             self.display_end
@@ -246,6 +304,7 @@ impl Pair {
             sensor_status: Some(sensor),
             display_status: Some(display),
             log: Vec::new(),
+            signs: self.tape.signs,
         }
     }
 }
@@ -266,7 +325,7 @@ fn display_of(scene: &Scene) -> Result<Display, SceneError> {
 /// A board's port towards the other board, and the wire that leads away from it.
 struct End {
     port: Port,
-    wire: Weather,
+    wire: Way,
     /// When the wire has carried all that was sent so far.
     free_ns: u64,
     /// The board's mark in the hash.
@@ -274,7 +333,7 @@ struct End {
 }
 
 impl End {
-    fn new(role: Role, wire: Weather, mark: u8) -> Self {
+    fn new(role: Role, wire: Way, mark: u8) -> Self {
         Self {
             port: Port::new(Hello::new(role, CHIP, VERSION)),
             wire,
@@ -316,7 +375,7 @@ impl End {
 
     /// Takes what has arrived over the peer's `wire`, and hands on each message with its last byte's
     /// arrival.
-    fn hear(&mut self, wire: &mut Weather, now_ns: u64, mut handle: impl FnMut(u64, Message)) {
+    fn hear(&mut self, wire: &mut Way, now_ns: u64, mut handle: impl FnMut(u64, Message)) {
         let mut bytes = [0; 64];
         let mut length = 0;
         while let Some((due_ns, byte)) = wire.pop(now_ns) {
@@ -343,6 +402,9 @@ struct Tape {
     ticks: Vec<TickRecord>,
     estimates: Vec<EstimateRecord>,
     outputs: Vec<OutputRecord>,
+    signs: Signs,
+    /// The supervisor's last.
+    state: Option<DisplayState>,
 }
 
 impl Tape {
@@ -355,6 +417,8 @@ impl Tape {
             ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
             outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
+            signs: Signs::default(),
+            state: None,
         }
     }
 

@@ -2,7 +2,8 @@
 
 use crate::analysis::{self, Verdict};
 use crate::expectation;
-use crate::json::SceneResult;
+use crate::fault::judge::{Finding, judge};
+use crate::json::{Fault, SceneResult};
 use crate::recording::Recording;
 use crate::report::Chapter;
 use crate::scene::Scene;
@@ -19,6 +20,8 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// A line for each expectation of the scene that was not met.
     pub unmet: Vec<String>,
+    /// What became of the scene's faults, in their order.
+    pub findings: Vec<Finding>,
     wavelength_mm: Box<dyn Fn(f64) -> f64>,
 }
 
@@ -29,11 +32,13 @@ impl Outcome {
         let wavelength_mm = Box::new(move |x_mm| surface.wavelength_mm(x_mm));
         let verdict = analysis::judge(&truth(&scene, &*wavelength_mm), &recording);
         let unmet = expectation::unmet(&scene.expect, &verdict);
+        let findings = judge(&scene.faults, &recording);
         Self {
             scene,
             recording,
             verdict,
             unmet,
+            findings,
             wavelength_mm,
         }
     }
@@ -45,7 +50,10 @@ impl Outcome {
 
     /// The outcome's object in the JSON.
     pub fn result(&self) -> SceneResult<'_> {
-        SceneResult::new(&self.truth(), &self.recording, &self.verdict)
+        SceneResult {
+            faults: self.findings.iter().map(Fault::from).collect(),
+            ..SceneResult::new(&self.truth(), &self.recording, &self.verdict)
+        }
     }
 
     /// The outcome's part of the report.
@@ -55,6 +63,7 @@ impl Outcome {
             recording: &self.recording,
             verdict: &self.verdict,
             unmet: &self.unmet,
+            findings: &self.findings,
         }
     }
 }

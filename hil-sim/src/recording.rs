@@ -2,6 +2,8 @@
 
 use protocol::{CHANNELS, Estimate, Status};
 
+use crate::fault::Signs;
+
 /// Actuators driven (Okamoto et al. 2009, section IV).
 pub const ACTUATORS: usize = 50;
 
@@ -106,6 +108,8 @@ pub struct Recording {
     pub display_status: Option<Status>,
     /// Log lines of both boards, decoded from defmt: instant in ns, board, text. Empty from `native`.
     pub log: Vec<(u64, &'static str, String)>,
+    /// What the run shows of faults.
+    pub signs: Signs,
 }
 
 impl Recording {

@@ -2,6 +2,7 @@
 
 mod chart;
 mod crossings;
+mod faults;
 pub mod palette;
 mod plots;
 mod senses;
@@ -13,6 +14,7 @@ use std::fmt::Write;
 use thiserror::Error;
 
 use crate::analysis::Verdict;
+use crate::fault::judge::Finding;
 use crate::recording::Recording;
 use crate::report::plots::Figure;
 use crate::truth::Truth;
@@ -28,6 +30,8 @@ pub struct Chapter<'a> {
     pub verdict: &'a Verdict,
     /// A line for each expectation of the scene that was not met.
     pub unmet: &'a [String],
+    /// What became of the scene's faults, in their order.
+    pub findings: &'a [Finding],
 }
 
 /// The report could not be made.
@@ -86,6 +90,7 @@ fn write_chapter(page: &mut String, at: usize, chapter: &Chapter, figures: &[Fig
     for figure in figures {
         write_figure(page, figure);
     }
+    *page += &faults::table(chapter.findings);
     *page += &tables::counters(chapter);
     *page += &tables::log(chapter);
     *page += "</section>\n";
@@ -153,6 +158,7 @@ mod tests {
             recording: &recording,
             verdict: &verdict,
             unmet: &unmet,
+            findings: &[],
         }])
         .unwrap()
     }

@@ -9,9 +9,12 @@ use std::sync::Arc;
 use firmware_display::Settings;
 use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
 
+use crate::fault::Fault;
+
 mod bounds;
 mod display;
 mod error;
+mod fault;
 mod read;
 mod series;
 mod table;
@@ -50,6 +53,8 @@ pub struct Scene {
     pub estimator: Estimator,
     /// How the display board is set.
     pub display: Display,
+    /// What breaks, and when, in the order of the file.
+    pub faults: Vec<Fault>,
     /// What must come out.
     pub expect: Expect,
 }
@@ -328,6 +333,7 @@ impl Scene {
             link: Link::default(),
             estimator: Estimator::default(),
             display: Display::default(),
+            faults: Vec::new(),
             expect: Expect::default(),
         }
     }

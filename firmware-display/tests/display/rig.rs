@@ -175,6 +175,17 @@ impl Rig {
             self.is_silent()
         })
     }
+
+    /// The same, until they stay so up to `most_ms`: a sine crosses 0 V, too.
+    pub fn stays_silent_after(&mut self, most_ms: u32) -> Option<u32> {
+        let ticks = self.ticks(most_ms);
+        let sounding = (1..=ticks).filter(|_| {
+            self.move_on();
+            !self.is_silent()
+        });
+        let last = sounding.last().unwrap_or(0);
+        (last < ticks).then_some(last + 1)
+    }
 }
 
 /// An estimate that nothing is wrong with.

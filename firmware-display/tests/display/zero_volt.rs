@@ -65,8 +65,8 @@ fn each_trip_takes_its_ticks_to_zero_volt_and_is_kept() {
     ];
     for rate in RATES {
         for (trip, expected, fault) in faults {
-            // At different phases of the wave.
-            for further_ms in [0, 3, 8, 13, 21] {
+            // At different phases of the wave, none of which is a crossing.
+            for further_ms in [1, 3, 8, 13, 22] {
                 let mut rig = Rig::driving(&at(rate));
                 rig.rub(further_ms, 2.0);
                 let ticks = ticks_to_zero_volt(&mut rig, fault);
@@ -266,8 +266,10 @@ fn the_stimulus_fades_out_at_the_configured_age_and_in_again_at_the_next_trusted
             ..at(rate)
         };
         let mut rig = Rig::driving(&configuration);
+        // Not at a crossing.
+        rig.rub(1, 2.0);
         rig.estimate(2.0);
-        let ticks = rig.silent_after(1_000).unwrap();
+        let ticks = rig.stays_silent_after(1_000).unwrap();
         assert_eq!(ticks, rig.ticks(100 + 30));
         assert_eq!(rig.state(), DisplayState::Ready);
         assert_eq!(rig.display.counters().fades, 1);

@@ -17,7 +17,9 @@ fn every_word_is_exactly_0_v_within_19_ms_of_the_last_count_whatever_the_phase()
                 // 14 counts more stop two counts further each.
                 rig.rub(300, 7);
                 rig.rub(phase, 2);
-                assert!(!rig.is_silent());
+                // 400 counts are a cycle, which is at 0 V twice by itself.
+                let crosses = (7 * 300 + 2 * phase).is_multiple_of(200);
+                assert_eq!(rig.is_silent(), crosses && mode == Mode::Uniform, "{phase}");
                 let ticks = (GONE_MS * 1e-3 * rig.hz()) as usize;
                 rig.rub(ticks, 0);
                 assert!(rig.is_silent(), "{rate:?} {mode:?} {phase}");

@@ -5,10 +5,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use firmware_display::balance::TIME_CONSTANT_S;
+use firmware_display::balance::MOST_S;
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, corner_hz, largest, means, trimmed};
+use crate::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, largest, means, trimmed};
 
 /// The most that may stand.
 const MOST_V: f64 = 0.005;
@@ -126,75 +126,49 @@ fn while_estimates_of_the_wavelength_scatter_none() {
     }
 }
 
-/// What a start, or a change of λ, leaves: the difference between what the balance has and what the new
-/// motion wants of it, f₀/f of the amplitude for either at most; and what the balance learns while the gate
-/// opens, or λ glides, or learnt when the hand came to rest with 5 V for 13 ms and the gate's 6 ms: 5 V for
-/// that time over τ at most. It is forgotten with τ.
+/// A stimulus from 5 Hz on has no mean from its first whole cycle on, wherever in the wave it begins. But a
+/// charge from before, of a slower wave or of a rest, that is more than the new one has room for is worked
+/// off: 1/2π of the slower one's cycle at 5 V at most, 0.07 Vs of the 11.7 Hz here, most of it in a second.
 #[test]
-fn what_a_start_and_a_change_of_wavelength_leave_decays_with_the_time_constant() {
-    let mut second_second: f64 = 0.0;
+fn a_start_and_a_change_of_wavelength_leave_little() {
+    let mut worst = [0.0_f64; 2];
     for rate in RATES {
         for mode in MODES {
             for (before, after) in [(400_usize, 400_usize), (400, 800), (600, 200), (200, 210)] {
                 for phase in 0..8 {
                     let mut rig = Rig::new(mode, rate);
-                    let asked = |lambda: usize, hz: f64| corner_hz() * lambda as f64 / (7.0 * hz);
-                    let (wants_before, wants_after) =
-                        (asked(before, rig.hz()), asked(after, rig.hz()));
-                    let mut check = |rig: &mut Rig,
-                                     lambda: usize,
-                                     leaves_v: f64,
-                                     lasts_s: f64,
-                                     stopping_s: f64| {
-                        let leaves_v = leaves_v + 5.0 * (lasts_s + stopping_s) / TIME_CONSTANT_S;
-                        let volts = rig.rub(rig.ticks(2.0), 7);
-                        let begins = rig.ticks(lasts_s);
-                        for at in (begins..volts.len() - lambda).step_by(lambda) {
-                            let mean = largest(&means(&volts[at..at + lambda]));
-                            let decayed =
-                                (-((at - begins) as f64) / rig.hz() / TIME_CONSTANT_S).exp();
-                            assert!(
-                                mean <= leaves_v * decayed + OFF_V,
-                                "{rate:?} {mode:?} {before} to {after}, {phase}/8, tick {at}: {mean} V"
-                            );
+                    let mut check = |rig: &mut Rig, lambda: usize| {
+                        let volts = rig.rub(rig.ticks(2.0) + 2 * lambda, 7);
+                        // The gate, or the glide, is through in 20 ms.
+                        let begins = rig.ticks(0.020);
+                        let window = rig.ticks(1.0) / lambda * lambda;
+                        for (second, worst) in worst.iter_mut().enumerate() {
+                            let from = begins + second * window;
+                            let mean = largest(&means(&volts[from..from + window]));
+                            *worst = worst.max(mean);
                         }
-                        let from = rig.ticks(1.0);
-                        let window = from / lambda * lambda;
-                        let mean = largest(&means(&volts[from..from + window]));
-                        second_second = second_second.max(mean);
                     };
                     rig.follow(before as f64 * 0.005);
                     rig.rest_at(f64::from(phase) / 8.0, before as f64 * 0.005);
-                    // It has come here from 0, at 5 counts a tick and a part of a cycle.
-                    let learnt = 7.0 / 5.0 * 2.0 * wants_before;
-                    check(
-                        &mut rig,
-                        before,
-                        5.0 * (learnt + wants_before),
-                        0.006,
-                        0.019,
-                    );
+                    check(&mut rig, before);
                     rig.follow(after as f64 * 0.005);
-                    check(
-                        &mut rig,
-                        after,
-                        5.0 * (wants_before + wants_after),
-                        0.020,
-                        0.0,
-                    );
+                    check(&mut rig, after);
                 }
             }
         }
     }
     println!(
-        "in the second second after it: {:.2} mV",
-        second_second * 1e3
+        "in the first second after it {:.2} mV, in the second {:.2} mV",
+        worst[0] * 1e3,
+        worst[1] * 1e3
     );
-    assert!(second_second <= MOST_V);
+    let slower_hz = 7.0 * 2_000.0 / 600.0 / 2.0;
+    assert!(worst[0] <= 5.0 / (TAU * slower_hz), "{worst:?}");
+    assert!(worst[1] <= worst[0] / 3.0, "{worst:?}");
 }
 
-/// However the hand moves, starts and stops: no channel's integral of voltage leaves ± 5 V · τ, so that no
-/// second has a mean of more than 2 · 5 V · τ/1 s, and no minute one of more than 43 mV.
+/// However the hand moves, starts and stops: no channel's integral of voltage leaves ± 5 V · 0.336 s, so that
+/// no minute has a mean of more than 56 mV.
 #[test]
 fn however_the_hand_moves_the_integral_stays_bounded() {
     for rate in RATES {
@@ -221,7 +195,7 @@ fn however_the_hand_moves_the_integral_stays_bounded() {
                     *integral += volt / rig.hz();
                     // Rounding a word loses half a step a tick, in either direction.
                     let rounding = VOLT_PER_STEP / 2.0 * 30.0;
-                    assert!(f64::abs(*integral) <= 5.0 * TIME_CONSTANT_S + rounding);
+                    assert!(f64::abs(*integral) <= 5.0 * MOST_S + rounding);
                 }
             }
         }
@@ -229,9 +203,9 @@ fn however_the_hand_moves_the_integral_stays_bounded() {
 }
 
 #[test]
-fn the_stimulus_is_in_step_with_the_motion_but_for_the_balances_phase() {
+fn the_stimulus_is_in_step_with_the_motion() {
     for rate in RATES {
-        for (lambda_counts, most_cycles) in [(400_usize, 0.02), (40, 0.003)] {
+        for lambda_counts in [400_usize, 40] {
             // A count a tick at 2 kHz is 5 Hz on 2 mm and 50 Hz on 0.2 mm.
             let lambda_counts = lambda_counts * rate.hz() as usize / 2_000;
             let mut rig = Rig::new(Mode::Uniform, rate);
@@ -244,12 +218,10 @@ fn the_stimulus_is_in_step_with_the_motion_but_for_the_balances_phase() {
                 sine += volt * angle.sin();
                 cosine += volt * angle.cos();
             }
-            let hz = rig.hz() / lambda_counts as f64;
             let ahead = cosine.atan2(sine) / TAU;
-            let expected = (corner_hz() / hz).atan() / TAU;
-            println!("{rate:?} {hz} Hz: {ahead:.5} cycles ahead, atan(f₀/f) {expected:.5}");
-            assert!(ahead.abs() <= most_cycles);
-            assert!((ahead - expected).abs() <= 0.02 * expected);
+            println!("{rate:?}, {lambda_counts} counts: {ahead:.6} cycles ahead");
+            // Words are rounded; counts are off by half of 2⁻³² turns each.
+            assert!(ahead.abs() <= 1e-4, "{ahead}");
         }
     }
     const { assert!(UpdateRate::Hz2000.hz() == 2_000) };

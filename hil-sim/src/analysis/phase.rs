@@ -15,8 +15,8 @@ use crate::truth::Truth;
 /// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
 /// heard. 0 until there is one.
 ///
-/// An estimate is followed from the first tick after its arrival on, for the whole travel since the
-/// tick before: earlier no display that works in ticks could use it.
+/// An estimate is followed from the second tick after its arrival on, for the whole travel since the
+/// first: the board hears what has come once a tick's words are on their way.
 #[derive(Clone, Debug, Default)]
 pub struct DuePhase {
     phase: Vec<(f64, f64)>,
@@ -37,14 +37,10 @@ impl DuePhase {
         for tick in &recording.ticks {
             let outputs = &recording.outputs[output..];
             output += outputs.partition_point(|output| output.at_ns < tick.at_ns);
-            let last = output.checked_sub(1).map(|last| &recording.outputs[last]);
-            let heard = last.is_some_and(|last| last.words.iter().any(|&word| word != ZERO_VOLT));
-            while let Some((received_ns, estimate)) = received.get(next)
-                && *received_ns <= tick.at_ns
-            {
-                followed.hear(estimate, heard);
-                next += 1;
-            }
+            // A wave crosses 0 V; silence stays there.
+            let heard = recording.outputs[output.saturating_sub(2)..output]
+                .iter()
+                .any(|output| output.words.iter().any(|&word| word != ZERO_VOLT));
             let travel_mm = tick.position_mm - before_mm.unwrap_or(tick.position_mm);
             before_mm = Some(tick.position_mm);
             let per_mm = followed.tick();
@@ -57,6 +53,12 @@ impl DuePhase {
             let ahead = place_mm * per_mm;
             due.phase.push((seconds(tick.at_ns), cycles + ahead));
             due.travelled.push((seconds(tick.at_ns), travelled));
+            while let Some((received_ns, estimate)) = received.get(next)
+                && *received_ns <= tick.at_ns
+            {
+                followed.hear(estimate, heard);
+                next += 1;
+            }
         }
         due
     }
@@ -154,11 +156,11 @@ mod tests {
         let recording = run.record();
         let surface = |_| 2.0;
         let due = DuePhase::new(&Truth::new("", "", &surface), &recording);
-        // The first estimate arrives at 11 ms, that of 1 s at 1.001 s: each is used for the half
-        // millisecond of travel before that tick as well. Half of the change comes on the way, for a
+        // The first estimate arrives at 11 ms, that of 1 s at 1.001 s: each is used for the travel after
+        // that tick. Half of the change comes on the way, for a
         // glide of 40 ticks, of which the last has it in whole.
-        let glided_s = 1.0005 + 0.5 * (0.020 - 0.0005);
-        let expected = (glided_s - 0.0105) * 25.0 + (1.9 - glided_s) * 20.0;
+        let glided_s = 1.001 + 0.5 * (0.020 - 0.0005);
+        let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
         assert!(
             (due.cycles(1.9) - expected).abs() < 1e-6,
             "{} {expected}",
@@ -186,7 +188,7 @@ mod tests {
         );
         assert_eq!(once, steady);
         // From 1.011 s on, half of the glide later.
-        let late_s = 1.9 - 1.0105 - 0.5 * (0.020 - 0.0005);
+        let late_s = 1.9 - 1.011 - 0.5 * (0.020 - 0.0005);
         let expected = steady - late_s * 15.0;
         assert!((twice - expected).abs() < 1e-6, "{twice} {expected}");
     }

@@ -185,7 +185,9 @@ mod tests {
     #[test]
     fn a_crest_passed_without_an_edge_is_no_delay() {
         // 80 ticks a cycle, phases at odd 160ths: the two ticks about each crest share their voltage.
+        // In the middle of a count, so that each tick is five of them.
         let run = Run {
+            position_mm: Box::new(|t_s| 50.0 * t_s + 0.0025),
             ahead_cycles: Box::new(|_| 0.5 / 80.0),
             ..Run::steady(50.0, 2.0)
         };

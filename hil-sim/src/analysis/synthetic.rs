@@ -3,6 +3,7 @@
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
 use crate::analysis::track::COUNT_MM;
+use crate::fault::Signs;
 use crate::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
@@ -93,6 +94,7 @@ impl Run {
             sensor_status: None,
             display_status: None,
             log: Vec::new(),
+            signs: Signs::default(),
         }
     }
 
@@ -157,7 +159,7 @@ impl Run {
             let t_s = pair[1].at_ns as f64 / 1e9;
             let in_force = estimates
                 .iter()
-                .rfind(|e| e.estimate.valid && e.received_ns.is_some_and(|at| at <= pair[1].at_ns));
+                .rfind(|e| e.estimate.valid && e.received_ns.is_some_and(|at| at <= pair[0].at_ns));
             let Some(wavelength_mm) = in_force.and_then(|e| e.estimate.wavelength_mm) else {
                 continue;
             };

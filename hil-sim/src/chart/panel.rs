@@ -74,13 +74,14 @@ impl Scale {
     }
 
     pub(super) fn even(low: f64, high: f64, step: f64, label: &str) -> Self {
-        let count = ((high - low) / step).floor() as u32;
+        let count = ((high - low) / step + 1e-9).floor() as u32;
         Self {
             low,
             high,
             logarithmic: false,
             ticks: (0..=count)
-                .map(|index| low + f64::from(index) * step)
+                // To a billionth: a sum of tenths is not to show what binary makes of them.
+                .map(|index| ((low + f64::from(index) * step) * 1e9).round() / 1e9)
                 .map(|tick| (tick, short(tick)))
                 .collect(),
             label: label.to_owned(),
@@ -149,6 +150,18 @@ pub(super) fn line(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &s
         svg,
         "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" fill=\"none\" {style}/>",
         from.0, from.1, to.0, to.1
+    );
+}
+
+/// A line through points on the page.
+pub(super) fn polyline(svg: &mut String, points: &[(f64, f64)], style: &str) {
+    let mut path = String::new();
+    for (index, (x, y)) in points.iter().enumerate() {
+        let _ = write!(path, "{}{x:.1} {y:.1}", if index == 0 { 'M' } else { 'L' });
+    }
+    let _ = writeln!(
+        svg,
+        "<path d=\"{path}\" fill=\"none\" stroke-linejoin=\"round\" {style}/>"
     );
 }
 

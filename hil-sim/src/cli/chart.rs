@@ -14,7 +14,7 @@ use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
 
-use super::{number, progress};
+use super::{display, number, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -31,6 +31,16 @@ enum What {
     /// The bank's error over the Cramér–Rao bound for the travel it used, 5–100 Hz: exit status 1 if one
     /// gauge's is above 1.2 anywhere. Writes bound.csv and bound.svg
     Bound(Bound),
+    /// The display's purity at the converters, from its ELF: spurs from 0 to 1 kHz for stimuli of
+    /// 5–200 Hz, and each channel's mean. Exit status 1 if a goal is missed. Writes purity.csv,
+    /// purity-spectra.csv and purity.svg
+    Purity(display::Purity),
+    /// What the voltage does when the hand stops at a crest and starts again, from the display's ELF: exit
+    /// status 1 if a channel takes longer than 20 ms to 0 V. Writes stop.csv and stop.svg
+    Stop(display::Stop),
+    /// The stimulus' phase error against the motion over the link's delay, from the display's ELF, beside a
+    /// stimulus that is relayed over the network. Writes delay.csv and delay.svg
+    Delay(display::Delay),
 }
 
 #[derive(Debug, clap::Args)]
@@ -66,6 +76,9 @@ impl Chart {
         match self.what {
             What::Estimators(estimators) => estimators.execute(),
             What::Bound(bound) => bound.execute(),
+            What::Purity(purity) => purity.execute(),
+            What::Stop(stop) => stop.execute(),
+            What::Delay(delay) => delay.execute(),
         }
     }
 }
@@ -145,7 +158,7 @@ impl Bound {
     }
 }
 
-fn create_folder(folder: &Path) -> anyhow::Result<()> {
+pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(folder).with_context(|| {
         format!(
             "{}: can't be made: give another with --out",
@@ -154,7 +167,7 @@ fn create_folder(folder: &Path) -> anyhow::Result<()> {
     })
 }
 
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
     println!("{}", path.display());
     Ok(())

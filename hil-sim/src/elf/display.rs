@@ -15,7 +15,8 @@ use rigless::soc::stm32f427::peripherals::tim;
 use rigless::time::VirtualNanos;
 
 use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
-use crate::dac81416::Dac81416;
+use crate::dac81416::{Dac81416, Defects};
+use crate::fault::{Fault, HandFault, Kind};
 use crate::motion::encoder;
 use crate::recording::{OutputRecord, TickRecord};
 use crate::world::World;
@@ -61,18 +62,6 @@ impl Line {
             gpio.drive_function(self.pin(), Some(level), registers, context);
         });
     }
-}
-
-/// What can be wrong with the hand's encoder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EncoderFault {
-    /// Nothing.
-    #[default]
-    None,
-    /// It counts no longer.
-    Dead,
-    /// It is off by so many counts, from now on.
-    Off(i16),
 }
 
 /// A chip behind the emulator's SPI seam, and when its voltages last changed.
@@ -125,6 +114,8 @@ pub struct DisplayRecords {
     pub outputs: Vec<OutputRecord>,
     /// How often CLR fell, after it was released for the first time.
     pub clears: u32,
+    /// When they were, in ns since the scene's start.
+    pub clears_ns: Vec<u64>,
     /// Frames that a converter could not make sense of.
     pub dac_frame_errors: u64,
 }
@@ -133,29 +124,31 @@ pub struct DisplayRecords {
 #[derive(Debug)]
 pub struct DisplayPins {
     world: World,
+    hand: HandFault,
     clear: Option<Level>,
     /// LDAC's level on the wire.
     load: Option<Level>,
     load_stuck: Option<Level>,
+    clear_stuck: bool,
+    button_open: bool,
     alarm: bool,
-    encoder_fault: EncoderFault,
-    /// What the encoder counted last, and when.
-    counted: u16,
+    /// When the encoder was read last.
     ticked_ns: u64,
     records: DisplayRecords,
 }
 
 impl DisplayPins {
     /// The surroundings that `world` describes.
-    pub fn new(world: World) -> Self {
+    pub fn new(world: World, hand: HandFault) -> Self {
         Self {
             world,
+            hand,
             clear: None,
             load: None,
             load_stuck: None,
+            clear_stuck: false,
+            button_open: false,
             alarm: false,
-            encoder_fault: EncoderFault::None,
-            counted: 0,
             ticked_ns: 0,
             records: DisplayRecords::default(),
         }
@@ -182,25 +175,55 @@ impl DisplayPins {
         std::mem::take(&mut self.records)
     }
 
-    /// What has been kept so far.
-    pub fn records(&self) -> &DisplayRecords {
-        &self.records
-    }
-
     /// Presses the emergency stop, which opens its contact, or releases it.
     pub fn set_stop_button(&mut self, part: &mut Stm32f427, at_ns: u64, open: bool) {
+        self.button_open = open;
         BUTTON.drive(part, at_ns, (!open).then_some(Level::Low));
-    }
-
-    /// Breaks the hand's encoder, or mends it.
-    pub fn set_encoder_fault(&mut self, fault: EncoderFault) {
-        self.encoder_fault = fault;
     }
 
     /// Holds LDAC's wire at a level, whatever the board does, or lets go of it.
     pub fn set_load_stuck(&mut self, part: &mut Stm32f427, at_ns: u64, level: Option<Level>) {
         self.load_stuck = level;
         self.follow_load(part, at_ns);
+    }
+
+    /// `fault` of a scene begins, or ends: what of it is at the pins.
+    pub fn break_by(&mut self, part: &mut Stm32f427, fault: &Fault, begins: bool, at_ns: u64) {
+        let chip = fault.values[0] as usize;
+        match fault.kind {
+            Kind::EmergencyStop => self.set_stop_button(part, at_ns, begins),
+            Kind::LdacStuck => {
+                self.set_load_stuck(part, at_ns, begins.then_some(Level::High));
+            }
+            Kind::ClearStuckLow => {
+                self.clear_stuck = begins;
+                self.follow_clear(part, at_ns);
+            }
+            Kind::DacIgnoresWords => {
+                self.with_chip(part, at_ns, chip, |dac| dac.defects.deaf = begins);
+            }
+            Kind::DacAlarm => {
+                self.with_chip(part, at_ns, chip, |dac| dac.defects.overheated = begins);
+            }
+            Kind::DacPowerLost if begins => {
+                self.with_chip(part, at_ns, chip, Dac81416::reset);
+            }
+            // With all power gone nothing that was broken is so any more: the next fault is another
+            // day's.
+            Kind::PowerCycle if begins => {
+                self.clear_stuck = false;
+                self.set_load_stuck(part, at_ns, None);
+                self.set_stop_button(part, at_ns, false);
+                for chip in 0..CHIPS {
+                    self.with_chip(part, at_ns, chip, |dac| {
+                        dac.defects = Defects::default();
+                        dac.reset();
+                    });
+                }
+                self.follow_clear(part, at_ns);
+            }
+            _ => {}
+        }
     }
 
     /// Does something to the `nth` chip, and lets its voltages and its alarm be seen.
@@ -265,12 +288,14 @@ impl DisplayPins {
     fn follow_clear(&mut self, part: &mut Stm32f427, at_ns: u64) {
         let channel = tim::Channel::new(1).expect("a timer has a channel 1");
         let (timer, registers) = part.advanced_timer(0);
-        let level = timer.output(channel, registers).unwrap_or(Level::Low);
+        let driven = timer.output(channel, registers).unwrap_or(Level::Low);
+        let level = if self.clear_stuck { Level::Low } else { driven };
         if self.clear == Some(level) {
             return;
         }
         if self.clear == Some(Level::High) {
             self.records.clears += 1;
+            self.records.clears_ns.push(at_ns);
         }
         self.clear = Some(level);
         for chip in 0..CHIPS {
@@ -319,6 +344,11 @@ fn word_of(volts: f64) -> u16 {
         .clamp(0.0, 65_535.0) as u16
 }
 
+/// Loads by LDAC that the first chip has seen since power-up.
+pub fn loads(part: &mut Stm32f427) -> u64 {
+    on_bus(part, 0).chip.counters().loads
+}
+
 fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
     part.spi[SPI]
         .chip_mut(chip)
@@ -328,12 +358,7 @@ fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
 impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
-        let counted = match self.encoder_fault {
-            EncoderFault::None => encoder(position_mm),
-            EncoderFault::Dead => self.counted,
-            EncoderFault::Off(counts) => encoder(position_mm).wrapping_add_signed(counts),
-        };
-        self.counted = counted;
+        let counted = self.hand.counts(at_ns, encoder(position_mm));
         self.ticked_ns = at_ns;
         self.records.ticks.push(TickRecord {
             at_ns,
@@ -341,6 +366,14 @@ impl Pins for DisplayPins {
             position_mm,
         });
         counted
+    }
+
+    fn on_reset(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        self.load = None;
+        self.alarm = false;
+        self.set_stop_button(part, at_ns, self.button_open);
+        self.on_stop(part, at_ns);
+        self.follow_alarm(part, at_ns);
     }
 
     fn on_stop(&mut self, part: &mut Stm32f427, at_ns: u64) {

@@ -4,20 +4,20 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
 
-use protocol::{
-    ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, Configuration, ConfigurationReport, Hello,
-    MAX_FRAME, Message, Peer, Port, Role,
-};
+use protocol::{Configuration, DisplayConfiguration, Role, SensorConfiguration};
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
+use super::console::{ConsoleHost, Told};
 use super::display::DisplayPins;
+use super::injector::Injector;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
-use crate::weather::Weather;
+use crate::fault::{Clock, Fault, Way};
+use crate::scene::Scene;
 
 /// What a byte takes from board to board at the least, and how often the boards wait for each other.
 /// Smaller is closer to a bare cable and slower; at 500 µs the pair keeps ahead of a wall clock.
@@ -26,9 +26,6 @@ pub const QUANTUM_NS: u64 = 500_000;
 pub const WARM_UP_NS: u64 = 500_000_000;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
-/// How long the host on the console waits for an answer before it asks again: ten times what the two
-/// frames, a board's tasks and the exchange at the end of every quantum take together.
-const PATIENCE_NS: u64 = 50_000_000;
 
 /// What the driver does for one board's pins beyond the seam itself.
 pub trait Watched: Pins {
@@ -36,6 +33,13 @@ pub trait Watched: Pins {
     fn on_write(board: &mut Nucleo<Self>, address: u64, value: u64, at_ns: u64)
     where
         Self: Sized;
+
+    /// `fault` begins, or ends, at the pins.
+    fn break_pins(_board: &mut Nucleo<Self>, _fault: &Fault, _begins: bool, _at_ns: u64)
+    where
+        Self: Sized,
+    {
+    }
 }
 
 impl Watched for SensorPins {
@@ -50,6 +54,11 @@ impl Watched for DisplayPins {
         let (pins, part) = board.pins();
         pins.on_write(part, address, value, at_ns);
     }
+
+    fn break_pins(board: &mut Nucleo<Self>, fault: &Fault, begins: bool, at_ns: u64) {
+        let (pins, part) = board.pins();
+        pins.break_by(part, fault, begins, at_ns);
+    }
 }
 
 /// The ends of the channels to the other board's thread.
@@ -60,37 +69,22 @@ pub struct Cable {
     pub from_peer: Receiver<Vec<TimedByte>>,
 }
 
-/// A host on the console that wants the board configured.
-pub struct ConsoleHost {
-    port: Port,
-    /// What is to be sent before the configuration that names it.
-    described: Vec<Actuators>,
-    wanted: Configuration,
-    /// When it last asked.
-    asked_ns: Option<u64>,
-    told: Option<Told>,
-}
-
-/// What a host on the console asked of a board, and the board's answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Told {
-    /// When the host began to ask, in ns since the scene's start.
-    pub asked_ns: u64,
-    /// When the host had the answer, in ns since the scene's start.
-    pub answered_ns: u64,
-    /// The answer.
-    pub report: ConfigurationReport,
-}
-
 /// Runs one board of a pair.
 pub struct Lockstep {
     cable: Cable,
-    weather: Weather,
+    /// What the peer's bytes go through.
+    way: Way,
     console: Option<ConsoleHost>,
+    injector: Injector,
+    /// The board's.
+    clock: Clock,
     log: Option<Log>,
+    /// By the scene's clock, as all that is written down here.
     next_exchange_ns: u64,
     next_log_ns: u64,
     end_ns: u64,
+    /// Resets seen so far.
+    resets: usize,
     /// What the board sent to its peer, with instants.
     pub sent: Vec<TimedByte>,
     /// What the board heard from its peer, with the instants at which each byte was complete.
@@ -99,35 +93,39 @@ pub struct Lockstep {
     pub warm: Option<Instant>,
     /// Set if the other board's thread is gone before the end.
     pub abandoned: bool,
+    /// Set once the scene is over.
+    pub is_done: bool,
 }
 
 impl Lockstep {
-    /// A driver that stops after `end_ns`; `weather` is what the peer's bytes go through.
-    pub fn new(
-        cable: Cable,
-        weather: Weather,
-        console: Option<ConsoleHost>,
-        log: Option<Log>,
-        end_ns: u64,
-    ) -> Self {
+    /// The driver of the board of `role` in `scene`, which runs `elf`.
+    pub fn new(scene: &Scene, role: Role, elf: &[u8], cable: Cable) -> Self {
+        let clock = match role {
+            Role::Sensor => Clock::new(&scene.faults),
+            _ => Clock::default(),
+        };
         Self {
             cable,
-            weather,
-            console,
-            log,
+            way: Way::new(scene, role),
+            console: console_for(scene, role),
+            injector: Injector::new(scene, role, elf, clock.clone()),
+            clock,
+            log: Log::find(elf),
             next_exchange_ns: QUANTUM_NS,
             next_log_ns: LOG_PERIOD_NS,
-            end_ns,
+            end_ns: (scene.duration_s * 1e9).ceil() as u64,
+            resets: 0,
             sent: Vec::new(),
             heard: Vec::new(),
             warm: None,
             abandoned: false,
+            is_done: false,
         }
     }
 
     /// Whether a host on the console wants the board configured.
     pub fn is_asked(&self) -> bool {
-        self.console.is_some()
+        self.console.as_ref().is_some_and(ConsoleHost::asks)
     }
 
     /// What came of it.
@@ -140,9 +138,22 @@ impl Lockstep {
         self.log.as_ref().map(Log::lines).unwrap_or_default()
     }
 
+    /// The board's clock.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
+    /// What breaks the board.
+    pub fn injector(&self) -> &Injector {
+        &self.injector
+    }
+
     /// Gives the other board what this one sent and takes what it sent; false if it is gone.
     fn exchange<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
-        let sent = board.wire(PEER_UART).take_sent();
+        let mut sent = board.wire(PEER_UART).take_sent();
+        for (at_ns, _) in &mut sent {
+            *at_ns = self.clock.true_ns(*at_ns);
+        }
         self.sent.extend_from_slice(&sent);
         let (Ok(()), Ok(received)) = (self.cable.to_peer.send(sent), self.cable.from_peer.recv())
         else {
@@ -150,10 +161,14 @@ impl Lockstep {
             return false;
         };
         for (at_ns, byte) in received {
-            self.weather.push(at_ns + QUANTUM_NS, byte);
+            self.way.push(at_ns + QUANTUM_NS, byte);
         }
-        while let Some((due_ns, byte)) = self.weather.pop(now_ns + QUANTUM_NS) {
+        while let Some((due_ns, byte)) = self.way.pop(now_ns + QUANTUM_NS) {
+            if self.injector.is_off {
+                continue;
+            }
             self.heard.push((due_ns, byte));
+            let due_ns = self.clock.local_ns(due_ns);
             board.wire(PEER_UART).hear(due_ns, byte);
         }
         if let Some(host) = &mut self.console {
@@ -161,63 +176,42 @@ impl Lockstep {
         }
         true
     }
+
+    /// What comes next, by the board's clock.
+    fn next_stop<P: Watched>(&self, board: &mut Nucleo<P>, local_ns: u64) -> VirtualNanos {
+        let mut next_ns = self.clock.local_ns(self.next_exchange_ns);
+        let due = [PEER_UART, CONSOLE_UART].map(|uart| board.wire(uart).next_due());
+        for due_ns in due.into_iter().chain([self.injector.next_ns()]).flatten() {
+            if due_ns > local_ns {
+                next_ns = next_ns.min(due_ns);
+            }
+        }
+        VirtualNanos(next_ns.max(local_ns + 1))
+    }
 }
 
-impl ConsoleHost {
-    /// A host that asks for `wanted` as soon as the board has introduced itself, and sends the actuators
-    /// `described` before.
-    pub fn new(wanted: Configuration, described: Option<&[Actuator; ACTUATORS]>) -> Self {
-        let (blocks, _) = described.map_or(&[][..], |all| &all[..]).as_chunks();
-        let described = (0_u8..)
-            .step_by(ACTUATOR_BLOCK)
-            .zip(blocks)
-            .map(|(first, &actuators)| Actuators { first, actuators });
-        Self {
-            port: Port::new(Hello::new(Role::Host, "hil-sim", [0, 1, 0])),
-            described: described.collect(),
-            wanted,
-            asked_ns: None,
-            told: None,
-        }
-    }
-
-    fn serve<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) {
-        let wire = board.wire(CONSOLE_UART);
-        let bytes: Vec<u8> = wire.take_sent().into_iter().map(|(_, byte)| byte).collect();
-        let mut answer = None;
-        self.port.receive(now_ns / 1_000, &bytes, |message| {
-            if let Message::Configuration(report) = message {
-                answer = Some(report);
+/// A host on the console, if the scene wants of the board what is not its default, or has a host do
+/// wrong.
+fn console_for(scene: &Scene, role: Role) -> Option<ConsoleHost> {
+    let mut described = None;
+    let (wanted, faults) = match role {
+        Role::Display => {
+            let wanted = scene.display_configuration();
+            if wanted.actuators != DisplayConfiguration::DEFAULT.actuators {
+                described = Some(&*scene.display.actuators);
             }
-        });
-        if let (Some(report), Some(asked_ns), None) = (answer, self.asked_ns, self.told) {
-            self.told = Some(Told {
-                asked_ns,
-                answered_ns: now_ns,
-                report,
-            });
+            let differs = wanted != DisplayConfiguration::DEFAULT;
+            let wanted = differs.then_some(Configuration::Display(wanted));
+            (wanted, &scene.faults[..])
         }
-        let due = self
-            .asked_ns
-            .is_none_or(|asked_ns| now_ns - asked_ns >= PATIENCE_NS);
-        if self.told.is_none() && due && matches!(self.port.peer(), Peer::Known(_)) {
-            for &block in &self.described {
-                self.port.post(&Message::Actuators(block));
-            }
-            self.port.post(&Message::Configure(self.wanted));
-            self.asked_ns = Some(now_ns);
+        _ => {
+            let wanted = scene.sensor_configuration();
+            let differs = wanted != SensorConfiguration::DEFAULT;
+            (differs.then_some(Configuration::Sensor(wanted)), &[][..])
         }
-        let mut out = [0; MAX_FRAME];
-        loop {
-            let count = self.port.take(&mut out);
-            if count == 0 {
-                break;
-            }
-            for &byte in &out[..count] {
-                wire.hear(now_ns, byte);
-            }
-        }
-    }
+    };
+    let is_needed = wanted.is_some() || faults.iter().any(|fault| ConsoleHost::does(fault.kind));
+    is_needed.then(|| ConsoleHost::new(wanted, described, faults))
 }
 
 impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
@@ -249,15 +243,31 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
         stop: Stop,
         host: &mut dyn Host,
     ) -> Option<VirtualNanos> {
-        let now_ns = stop.at.0;
-        if now_ns >= self.next_log_ns {
+        let board_ns = stop.at.0;
+        let now_ns = self.clock.true_ns(board_ns);
+        if now_ns >= self.next_log_ns && !self.injector.is_off {
             self.next_log_ns = now_ns + LOG_PERIOD_NS;
             if let Some(log) = &mut self.log {
                 log.read(now_ns, host);
             }
         }
+        if self.injector.act(session, stop, host)
+            && let Some(console) = &mut self.console
+        {
+            console.restart();
+        }
+        if session.resets().len() != self.resets {
+            self.resets = session.resets().len();
+            // Nobody listens until the firmware does again.
+            session.board_mut().wire(PEER_UART).lose();
+            session.board_mut().wire(CONSOLE_UART).lose();
+        }
         if now_ns >= self.next_exchange_ns {
-            if !self.exchange(session.board_mut(), now_ns) || now_ns >= self.end_ns {
+            if !self.exchange(session.board_mut(), now_ns) {
+                return None;
+            }
+            if now_ns >= self.end_ns {
+                self.is_done = true;
                 return None;
             }
             if self.warm.is_none() && now_ns >= WARM_UP_NS {
@@ -265,13 +275,6 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
             }
             self.next_exchange_ns += QUANTUM_NS;
         }
-        let due_ns = session
-            .board_mut()
-            .wire(PEER_UART)
-            .next_due()
-            .filter(|&due| due > now_ns);
-        Some(VirtualNanos(due_ns.map_or(self.next_exchange_ns, |due| {
-            due.min(self.next_exchange_ns)
-        })))
+        Some(self.next_stop(session.board_mut(), board_ns))
     }
 }

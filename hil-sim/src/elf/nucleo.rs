@@ -7,11 +7,13 @@
 use std::fmt::Debug;
 use std::num::{NonZeroU32, NonZeroU64};
 
+use rigless::chip::uart::Rate;
 use rigless::device::{ErasedDevice, Level, ResetCause};
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::rcc::{Register, csr};
 use rigless::soc::stm32f427::generated::{TIM3 as TIM3_REGISTERS, TIM4};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
@@ -24,7 +26,7 @@ const SUPPLY_MV: u32 = 3_300;
 const CORE_CLOCK_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).unwrap();
 /// A fixed rate, so instructions can be counted but never called cycles. An M4F at 168 MHz behind its
 /// flash accelerator needs some 1.4 cycles an instruction: a guess, on the slow side.
-const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(120_000_000).unwrap();
+pub const INSTRUCTIONS_PER_SECOND: NonZeroU64 = NonZeroU64::new(120_000_000).unwrap();
 /// RM0090 section 2.3: SysTick's reference clock is the core's over eight.
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).unwrap();
 const PRIORITY_BITS: u8 = 4;
@@ -53,6 +55,9 @@ pub trait Pins: Debug + Send + 'static {
     /// After [`Pins::on_trigger`] and the latching of the counter.
     fn after_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
 
+    /// The part has been reset at `at_ns`: what is put on its pins from outside has to be put there anew.
+    fn on_reset(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
+
     /// At every stop of the emulation.
     fn on_stop(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
 }
@@ -69,6 +74,7 @@ pub struct Wired<P> {
     part: Stm32f427,
     pins: P,
     triggers: u64,
+    loses_power: bool,
     /// When the last trigger came.
     triggered_ns: u64,
 }
@@ -87,6 +93,7 @@ impl<P: Pins> Nucleo<P> {
                 part,
                 pins,
                 triggers: 0,
+                loses_power: false,
                 triggered_ns: 0,
             },
         })
@@ -95,6 +102,29 @@ impl<P: Pins> Nucleo<P> {
     /// What is on the pins, and the part.
     pub fn pins(&mut self) -> (&mut P, &mut Stm32f427) {
         (&mut self.mcu.pins, &mut self.mcu.part)
+    }
+
+    /// What the next reset comes from is the supply: to be called before it.
+    pub fn lose_power(&mut self) {
+        self.mcu.loses_power = true;
+    }
+
+    /// Sets or clears bits of a register, whatever the firmware thinks of them; false if there is no
+    /// such register.
+    pub fn set_bits(&mut self, at: VirtualNanos, address: u64, bits: u64, set: bool) -> bool {
+        let part = &mut self.mcu.part;
+        let Ok(value) = part.peek(at, address, Width::W32) else {
+            return false;
+        };
+        let value = if set { value | bits } else { value & !bits };
+        part.write(at, address, Width::W32, value).is_ok()
+    }
+
+    /// Gives every byte that comes from the peer a framing error, or none.
+    pub fn break_line(&mut self, broken: bool) {
+        let framing = &mut self.mcu.part.usart[PEER_UART].errors_mut().framing;
+        framing.name = "wire-stuck-low";
+        framing.per_million = if broken { Rate::EVERY_WORD } else { 0 };
     }
 
     /// The far end of one of the UARTs.
@@ -154,7 +184,15 @@ impl<P: Pins> Mcu for Wired<P> {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.part.reset(at, cause);
+        if std::mem::take(&mut self.loses_power) {
+            // The emulator's part knows no power-on of its own: what tells it from the pin is its flags
+            // (RM0090, 6.3.21).
+            let (_, registers) = self.part.clocks();
+            let flags = csr::PORRSTF.mask() | csr::BORRSTF.mask() | csr::PADRSTF.mask();
+            registers.set(Register::Csr, flags);
+        }
         self.triggers = 0;
+        self.pins.on_reset(&mut self.part, at.0);
     }
 
     fn poll(&mut self, now: VirtualNanos) {

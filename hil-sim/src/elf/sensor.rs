@@ -14,6 +14,7 @@ use rigless::time::VirtualNanos;
 
 use super::nucleo::Pins;
 use crate::arm::Arm;
+use crate::fault::{Clock, Fault, GaugeFaults};
 use crate::recording::ScanRecord;
 use crate::world::World;
 
@@ -41,19 +42,29 @@ pub struct SensorPins {
     arm: Arm,
     arm_full_scale_mm_s: f64,
     position_mm: f64,
+    gauges: GaugeFaults,
+    clock: Clock,
     /// Every scan converted so far.
     pub scans: Vec<ScanRecord>,
 }
 
 impl SensorPins {
     /// The surroundings that `world` and `arm` describe; the servo drive is scaled as the board is told.
-    pub fn new(world: World, arm: Arm, configuration: SensorConfiguration) -> Self {
+    /// `faults` are the scene's.
+    pub fn new(
+        world: World,
+        arm: Arm,
+        configuration: SensorConfiguration,
+        faults: &[Fault],
+    ) -> Self {
         let arm_full_scale_mm_s = f64::from(configuration.arm_full_scale_um_s) * 1e-3;
         Self {
             world,
             arm,
             arm_full_scale_mm_s,
             position_mm: 0.0,
+            gauges: GaugeFaults::new(faults),
+            clock: Clock::new(faults),
             scans: Vec::new(),
         }
     }
@@ -70,11 +81,13 @@ impl SensorPins {
         }
     }
 
-    /// Puts the voltages of `at_ns` on the pins for the scan that begins; returns the arm's encoder.
-    fn present(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
+    /// Puts the voltages of `local_ns`, by the board's clock, on the pins for the scan that begins; returns the arm's encoder.
+    fn present(&mut self, part: &mut Stm32f427, local_ns: u64) -> u16 {
+        let at_ns = self.clock.true_ns(local_ns);
         let t_s = at_ns as f64 * 1e-9;
         self.position_mm = self.arm.position_mm(t_s);
         let codes = self.world.codes(t_s, self.position_mm);
+        let codes = self.gauges.apply(at_ns, codes);
         for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
             if let Some(channel) = Channel::new(channel) {
                 part.adc[ADC].set_input(channel, microvolts(code));
@@ -117,7 +130,8 @@ fn microvolts(code: u16) -> u32 {
 impl Pins for SensorPins {
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
         let command_mm_s = self.command_mm_s(part);
-        self.arm.command(at_ns as f64 * 1e-9, command_mm_s);
+        let t_s = self.clock.true_ns(at_ns) as f64 * 1e-9;
+        self.arm.command(t_s, command_mm_s);
         self.present(part, at_ns)
     }
 

@@ -34,6 +34,11 @@ impl Wire {
         self.due.push_back((at_ns, byte));
     }
 
+    /// Forgets what has not been heard: nobody listened.
+    pub fn lose(&mut self) {
+        self.due.clear();
+    }
+
     /// When the next byte comes that has not been offered yet.
     pub fn next_due(&self) -> Option<u64> {
         self.due.front().map(|&(at, _)| at)

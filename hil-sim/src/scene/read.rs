@@ -10,7 +10,7 @@ use super::bounds::{
     LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
     TRAVEL, WAVELENGTH,
 };
-use super::display;
+use super::{display, fault};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
@@ -41,12 +41,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let link = link(root.table("link")?)?;
     let estimator = estimator(root.table("estimator")?, &force)?;
     let display = display::read(root.table("display")?)?;
-    if let Some(fault) = root.tables("fault")?.first() {
-        return Err(fault.refuse(
-            "kind",
-            "faults are known but not built in this version: take [[fault]] out",
-        ));
-    }
+    let faults = fault::read(root.tables("fault")?, duration_s)?;
     let expect = expect(root.table("expect")?)?;
     if let Profile::Recorded(heights) = &surface.profile {
         covers_travel(&root, heights, &motion, duration_s)?;
@@ -65,6 +60,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         link,
         estimator,
         display,
+        faults,
         expect,
     })
 }

@@ -148,6 +148,30 @@ impl<'t> Table<'t> {
             .ok_or_else(|| self.refuse(key, format!("is missing: give {}", bounds.give)))
     }
 
+    /// A number from `low` to `high`; only a whole one if `whole`.
+    pub fn between(
+        &mut self,
+        key: &'static str,
+        low: f64,
+        high: f64,
+        whole: bool,
+    ) -> Result<Option<f64>, SceneError> {
+        const ANY: Bounds = Bounds {
+            what: "a number",
+            give: "a number",
+            allows: |_| true,
+        };
+        let Some(number) = self.number(key, &ANY)? else {
+            return Ok(None);
+        };
+        if (low..=high).contains(&number) && (!whole || number.fract() == 0.0) {
+            return Ok(Some(number));
+        }
+        let kind = if whole { "whole number" } else { "number" };
+        let message = format!("{number} is out of range: give a {kind} from {low} to {high}");
+        Err(self.refuse(key, message))
+    }
+
     /// A whole number from `low` to `high`.
     pub fn whole(
         &mut self,

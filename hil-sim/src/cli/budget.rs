@@ -1,0 +1,190 @@
+//! `hil-sim budget`.
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+use hil_sim::chart::word_of_mode;
+use hil_sim::elf::alone::Alone;
+use hil_sim::elf::instructions::{self, BUDGET, Counted};
+use hil_sim::scene::Motion;
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
+
+use super::display::Measured;
+
+/// Of all instructions, the display may take this many, in percent.
+const GOAL_PERCENT: f64 = 15.0;
+/// The hand's speed, in mm/s, and λ, in mm: every word changes at every tick.
+const SPEED_MM_S: f64 = 70.0;
+const WAVELENGTH_MM: f64 = 2.0;
+/// Before the count, in s: what fades in, glides and settles has done so.
+const SETTLING_S: f64 = 1.0;
+/// Counted for so long, in s: ten estimates, fifty motions.
+const COUNTED_S: f64 = 0.1;
+/// What a place belongs to, by the beginning of its name; a file of the display's that is not here is a
+/// part of its own.
+const PARTS: [(&str, &str); 17] = [
+    ("firmware-display/hand", "hand and phase"),
+    ("firmware-display/phase", "hand and phase"),
+    ("firmware-display/sine", "sines"),
+    ("firmware-display/display.rs", "supervisor"),
+    ("firmware-display/supervisor", "supervisor"),
+    ("firmware-display/plausibility", "supervisor"),
+    ("firmware-display/fade", "supervisor"),
+    ("firmware-display/dac81416", "frames"),
+    ("firmware-display/chain", "DMA, its interrupts and LDAC"),
+    ("firmware-display/board", "pins and timers"),
+    ("firmware-display/tasks", "tasks"),
+    ("firmware-display/main", "tasks"),
+    ("firmware-display/lib", "tasks"),
+    ("firmware-display/settings", "settings"),
+    ("protocol", "ports: frames of the link"),
+    ("compiler", "memory and arithmetic routines"),
+    ("core", "memory and arithmetic routines"),
+];
+/// Crates by which the ports speak.
+const SPEECH: [&str; 5] = ["serde", "postcard", "cobs", "crc", "heapless"];
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Budget {
+    #[command(flatten)]
+    measured: Measured,
+}
+
+impl Budget {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let firmware = self.measured.firmware()?;
+        let rates: &[UpdateRate] = if self.measured.quick {
+            &[UpdateRate::Hz2000]
+        } else {
+            &[UpdateRate::Hz2000, UpdateRate::Hz4000]
+        };
+        let mut columns: Vec<(String, Counted)> = Vec::new();
+        for &update_rate in rates {
+            for mode in [Mode::Uniform, Mode::Travelling] {
+                let motion = Motion::Constant {
+                    speed_mm_s: SPEED_MM_S,
+                };
+                let alone = Alone {
+                    configuration: DisplayConfiguration {
+                        mode,
+                        update_rate,
+                        ..DisplayConfiguration::DEFAULT
+                    },
+                    ..Alone::new(motion, WAVELENGTH_MM, SETTLING_S + COUNTED_S)
+                };
+                let counted = instructions::count(alone, &firmware, COUNTED_S)?;
+                let head = format!("{} Hz {}", update_rate.hz(), word_of_mode(mode));
+                columns.push((head, counted));
+            }
+        }
+        print(&columns);
+        let met = columns
+            .iter()
+            .all(|(head, counted)| !head.starts_with("2000") || percent(counted) <= GOAL_PERCENT);
+        Ok(ExitCode::from(u8::from(!met)))
+    }
+}
+
+fn print(columns: &[(String, Counted)]) {
+    let mut parts: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for (index, (_, counted)) in columns.iter().enumerate() {
+        for (place, &count) in &counted.by_place {
+            let row = parts
+                .entry(part_of(place))
+                .or_insert_with(|| vec![0.0; columns.len()]);
+            row[index] += count as f64 / counted.ticks as f64;
+        }
+    }
+    let mut parts: Vec<(String, Vec<f64>)> = parts.into_iter().collect();
+    parts.sort_by(|one, other| {
+        let whole = |row: &[f64]| row.iter().sum::<f64>();
+        whole(&other.1).total_cmp(&whole(&one.1))
+    });
+    let cells = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(" | ");
+    let heads = cells(&mut columns.iter().map(|(head, _)| head.clone()));
+    println!("| instructions an update | {heads} |");
+    println!("| --- |{}", " ---: |".repeat(columns.len()));
+    for (part, row) in &parts {
+        let row = cells(&mut row.iter().map(|count| format!("{count:.1}")));
+        println!("| {part} | {row} |");
+    }
+    let whole = cells(
+        &mut columns
+            .iter()
+            .map(|(_, counted)| format!("{:.1}", counted.total as f64 / counted.ticks as f64)),
+    );
+    println!("| **in all** | {whole} |");
+    let mut peripherals: Vec<&str> = columns
+        .iter()
+        .flat_map(|(_, counted)| counted.accesses.keys().copied())
+        .collect();
+    peripherals.sort_unstable();
+    peripherals.dedup();
+    let accesses = |counted: &Counted, of: Option<&str>| {
+        let count: u64 = counted
+            .accesses
+            .iter()
+            .filter(|(name, _)| of.is_none_or(|of| of == **name))
+            .map(|(_, count)| count)
+            .sum();
+        format!("{:.1}", count as f64 / counted.ticks as f64)
+    };
+    let shares = cells(
+        &mut columns
+            .iter()
+            .map(|(_, counted)| format!("{:.2}", percent(counted))),
+    );
+    println!(
+        "| **% of {} M instructions a second** | {shares} |",
+        BUDGET / 1_000_000
+    );
+    for of in peripherals.into_iter().map(Some).chain([None]) {
+        let row = cells(&mut columns.iter().map(|(_, counted)| accesses(counted, of)));
+        println!(
+            "| accesses to registers: {} | {row} |",
+            of.unwrap_or("in all")
+        );
+    }
+}
+
+/// The share of the board's instructions.
+fn percent(counted: &Counted) -> f64 {
+    100.0 * counted.total as f64 / counted.counted_s / BUDGET as f64
+}
+
+fn part_of(place: &str) -> String {
+    if let Some((_, part)) = PARTS.iter().find(|(start, _)| place.starts_with(start)) {
+        return (*part).to_owned();
+    }
+    if let Some(file) = place.strip_prefix("firmware-display/") {
+        return file.trim_end_matches(".rs").to_owned();
+    }
+    if SPEECH.iter().any(|start| place.starts_with(start)) {
+        return "ports: frames of the link".to_owned();
+    }
+    "executor and hardware abstraction".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_new_file_of_the_display_is_a_part_of_its_own() {
+        assert_eq!(part_of("firmware-display/balance.rs"), "balance");
+        assert_eq!(part_of("firmware-display/sine.rs"), "sines");
+        assert_eq!(
+            part_of("protocol/nucleo/ports.rs"),
+            "ports: frames of the link"
+        );
+        assert_eq!(part_of("serde_core"), "ports: frames of the link");
+        assert_eq!(
+            part_of("embassy-executor"),
+            "executor and hardware abstraction"
+        );
+        assert_eq!(
+            part_of("compiler-builtins"),
+            "memory and arithmetic routines"
+        );
+    }
+}

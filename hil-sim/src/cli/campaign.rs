@@ -1,0 +1,235 @@
+//! `hil-sim campaign`.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use hil_sim::elf::ElfError;
+use hil_sim::fault::Kind;
+use hil_sim::fault::campaign::{Plan, Tally, Trial, unmet};
+
+use super::{Elves, number, progress};
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Campaign {
+    /// Kinds to try, as `hil-sim faults` names them [default: all]
+    #[arg(long, value_name = "KIND", value_delimiter = ',', num_args = 1..)]
+    kinds: Vec<String>,
+    /// How many times each
+    #[arg(long, default_value_t = 25)]
+    instants: usize,
+    /// Decides the instants, and what the kinds leave to chance
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Runs at a time; each takes up to two processors
+    #[arg(long, value_name = "RUNS", default_value_t = jobs())]
+    jobs: usize,
+    /// Where to write the table as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Where to write every trial as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    #[command(flatten)]
+    elves: Elves,
+}
+
+/// As many as there are processors: the boards of a run wait for each other half of the time.
+fn jobs() -> usize {
+    thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+impl Campaign {
+    /// Tries everything and prints the table.
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let plan = Plan {
+            kinds: self.kinds()?,
+            instants: self.instants,
+            seed: self.seed,
+        };
+        let firmwares = self.elves.read()?;
+        let json = self.json.as_deref().map(create).transpose()?;
+        let csv = self.csv.as_deref().map(create).transpose()?;
+
+        let shifts = plan.shifts();
+        let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
+        let bar = progress(shifts.len() as u64);
+        let started = Instant::now();
+        let next = AtomicUsize::new(0);
+        let done: Mutex<Vec<(usize, Result<Vec<Trial>, ElfError>)>> = Mutex::new(Vec::new());
+        thread::scope(|scope| {
+            for _ in 0..self.jobs.clamp(1, shifts.len().max(1)) {
+                scope.spawn(|| {
+                    while let Some((number, shift)) = {
+                        let number = next.fetch_add(1, Ordering::Relaxed);
+                        shifts.get(number).map(|shift| (number, shift))
+                    } {
+                        let trials = shift.run(&firmwares);
+                        bar.inc(1);
+                        // A thread that panicked has taken the campaign with it.
+                        if let Ok(mut done) = done.lock() {
+                            done.push((number, trials));
+                        }
+                    }
+                });
+            }
+        });
+        bar.finish_and_clear();
+        let mut done = done.into_inner().unwrap_or_default();
+        done.sort_by_key(|&(number, _)| number);
+        let mut trials = Vec::new();
+        for (_, run) in done {
+            trials.extend(run?);
+        }
+        let tallies: Vec<Tally> = plan
+            .kinds
+            .iter()
+            .map(|&kind| Tally::of(kind, &trials))
+            .collect();
+
+        println!("{HEADER}");
+        for tally in &tallies {
+            println!("{}", line(tally));
+        }
+        let wall_s = started.elapsed().as_secs_f64();
+        println!(
+            "{} faults of {} kinds in {virtual_s:.0} s of virtual time, {} runs; {wall_s:.0} s, {:.2} × real time",
+            trials.len(),
+            tallies.len(),
+            shifts.len(),
+            virtual_s / wall_s
+        );
+        for trial in &trials {
+            let unmet = trial.finding.unmet();
+            if !unmet.is_empty() {
+                let fault = &trial.finding.fault;
+                println!(
+                    "  {} at {:.6} s of {} ({}, {}){}: {}",
+                    fault.kind.name(),
+                    fault.at_s,
+                    trial.scene,
+                    trial.motion,
+                    trial.mode,
+                    keys(trial),
+                    unmet.join("; ")
+                );
+            }
+        }
+        let unmet = unmet(&tallies);
+        for line in &unmet {
+            println!("not met: {line}");
+        }
+        if let Some((mut file, path)) = json {
+            let text = serde_json::to_string_pretty(&tallies)?;
+            writeln!(file, "{text}").with_context(|| format!("{}", path.display()))?;
+        }
+        if let Some((file, path)) = csv {
+            write_trials(file, &trials).with_context(|| format!("{}", path.display()))?;
+        }
+        Ok(if unmet.is_empty() {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(1)
+        })
+    }
+
+    fn kinds(&self) -> anyhow::Result<Vec<Kind>> {
+        if self.kinds.is_empty() {
+            return Ok(Kind::all().collect());
+        }
+        self.kinds
+            .iter()
+            .map(|name| match Kind::from_name(name) {
+                Some(kind) => Ok(kind),
+                None => bail!("{name}: no such kind: give some of those in `hil-sim faults`"),
+            })
+            .collect()
+    }
+}
+
+const HEADER: &str = "\
+kind                    expected  tried   on  seen  first sign ms       0 V in time  0 V after ms     stuck  resets  again  against";
+
+fn line(tally: &Tally) -> String {
+    let times = |times: Option<[f64; 2]>| {
+        format!(
+            "{:>7} {:>8}",
+            number(times.map(|[middle, _]| middle), 2),
+            number(times.map(|[_, worst]| worst), 2)
+        )
+    };
+    format!(
+        "{:<23} {:<8} {:>6} {:>4} {:>5}  {}  {:>12}  {}  {:>5}  {:>6}  {:>5}  {:>7}",
+        tally.kind,
+        tally.expected,
+        tally.injected,
+        tally.driving,
+        tally.seen,
+        times(tally.detected_ms),
+        tally.safe_within_ms.map_or("–".to_owned(), |_| format!(
+            "{}/{}",
+            tally.safe, tally.injected
+        )),
+        times(tally.safe_ms),
+        tally.stuck,
+        tally.resets,
+        tally.drove_again,
+        tally.restarts,
+    )
+}
+
+/// The values of a trial's keys, in words.
+fn keys(trial: &Trial) -> String {
+    let fault = &trial.finding.fault;
+    let keys = fault.kind.row().keys.iter().zip(fault.values);
+    keys.map(|(key, value)| format!(" {} = {value}", key.name))
+        .collect()
+}
+
+fn write_trials(file: File, trials: &[Trial]) -> io::Result<()> {
+    let mut out = io::BufWriter::new(file);
+    writeln!(
+        out,
+        "kind,scene,motion,mode,at_s,keys,was_driving,detected_ms,sign,safe_ms,stuck,resets,drives_again,unmet"
+    )?;
+    let ms = |ms: Option<f64>| ms.map_or(String::new(), |ms| format!("{ms:.4}"));
+    for trial in trials {
+        let finding = &trial.finding;
+        writeln!(
+            out,
+            "{},{},{},{},{:.6},{},{},{},\"{}\",{},{},{},{},\"{}\"",
+            finding.fault.kind.name(),
+            trial.scene,
+            trial.motion,
+            trial.mode,
+            finding.fault.at_s,
+            keys(trial).trim(),
+            finding.was_driving,
+            ms(finding.detected_ms()),
+            finding.sign,
+            ms(finding.safe_ms()),
+            finding.stuck,
+            finding.resets,
+            finding.drives_again,
+            finding.unmet().join("; ")
+        )?;
+    }
+    out.flush()
+}
+
+fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
+    let file = File::create(path).with_context(|| {
+        format!(
+            "{}: cannot be written: give a file in a folder that exists",
+            path.display()
+        )
+    })?;
+    Ok((file, path))
+}

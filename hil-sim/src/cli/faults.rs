@@ -1,0 +1,63 @@
+//! `hil-sim faults`.
+
+use std::fmt::Write;
+use std::process::ExitCode;
+
+use hil_sim::fault::catalogue::{Lasts, Needs, Row, rows};
+
+/// Prints the list.
+pub(super) fn execute() -> anyhow::Result<ExitCode> {
+    let list: Vec<String> = rows().iter().map(entry).collect();
+    println!("{}", list.join("\n"));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn entry(row: &Row) -> String {
+    let lasts = match row.lasts {
+        Lasts::Once => "happens once; no for_s".to_owned(),
+        Lasts::For(s) => format!("for_s = {s} unless given"),
+        Lasts::ForGood => "to the end unless for_s is given".to_owned(),
+    };
+    let mut text = format!("{}: {}\n", row.name, row.meaning);
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "    done      {}", row.injected);
+    let _ = writeln!(text, "    lasts     {lasts}");
+    for key in row.keys {
+        let _ = writeln!(
+            text,
+            "    {:<9} {} (default {})",
+            key.name, key.meaning, key.default
+        );
+    }
+    let engine = match row.needs {
+        Needs::Nothing => "native, elf",
+        Needs::Boards => "elf",
+    };
+    let _ = writeln!(text, "    engine    {engine}");
+    let _ = writeln!(text, "    expected  {}", row.expected);
+    let sign = if row.is_to_be_seen {
+        "to be seen"
+    } else {
+        "no sign of it"
+    };
+    let safe = row
+        .safe_within_ms
+        .map_or("can't put out a wrong voltage".to_owned(), |ms| {
+            format!("all outputs at 0 V within {ms} ms")
+        });
+    let resets = match row.resets {
+        0 => "no reset of the display",
+        _ => "one reset of the display at most",
+    };
+    let again = if row.class.may_drive_again() {
+        "may drive again"
+    } else {
+        "never drives again until its power goes"
+    };
+    let _ = writeln!(
+        text,
+        "    judged    {}: {sign}; {safe}; {again}; {resets}",
+        row.class.name()
+    );
+    text
+}

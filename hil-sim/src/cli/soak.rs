@@ -1,0 +1,78 @@
+//! `hil-sim soak`.
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use hil_sim::elf::soak::{self, SHORTEST_S};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::Elves;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Soak {
+    /// Virtual time
+    #[arg(long, value_name = "HOURS", default_value_t = 1.0)]
+    hours: f64,
+    /// The same in minutes
+    #[arg(long, value_name = "MINUTES", conflicts_with = "hours")]
+    minutes: Option<f64>,
+    /// All randomness comes from it
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    elves: Elves,
+}
+
+impl Soak {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        let minutes = self.minutes.unwrap_or(60.0 * self.hours);
+        let duration_s = 60.0 * minutes;
+        anyhow::ensure!(
+            (SHORTEST_S..=86_400.0).contains(&duration_s),
+            "{minutes} minutes can't be run: give {:.2} to 1440",
+            SHORTEST_S / 60.0
+        );
+        let firmwares = self.elves.read()?;
+        let bar = ProgressBar::new(duration_s.ceil() as u64).with_style(
+            ProgressStyle::with_template("{bar:40} {pos} of {len} virtual s, {eta} to go")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        let begun = Instant::now();
+        let told = bar.clone();
+        let soaked = soak::run(
+            &soak::Soak {
+                duration_s,
+                seed: self.seed,
+                link: soak::Soak::WEATHER,
+            },
+            &firmwares,
+            move |t_s| told.set_position(t_s as u64),
+        )?;
+        bar.finish_and_clear();
+        println!("| counted | |");
+        println!("| --- | ---: |");
+        for (what, count) in &soaked.counts {
+            println!("| {what} | {count} |");
+        }
+        println!("\n| checked | seen |");
+        println!("| --- | ---: |");
+        for check in &soaked.checks {
+            let verdict = if check.holds {
+                ""
+            } else {
+                " not as it must be"
+            };
+            println!("| {} | {} |{verdict}", check.what, check.seen);
+        }
+        let wall_s = begun.elapsed().as_secs_f64();
+        println!(
+            "\n{duration_s:.0} virtual s in {wall_s:.0} s: {}",
+            if soaked.holds() {
+                "all as it must be"
+            } else {
+                "not as it must be"
+            }
+        );
+        Ok(ExitCode::from(u8::from(!soaked.holds())))
+    }
+}

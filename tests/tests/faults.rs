@@ -1,0 +1,119 @@
+//! Faults on the ELFs: every kind once, and what they do to the instant.
+
+use std::thread;
+
+use hil_sim::elf;
+use hil_sim::fault::campaign::{Plan, Tally, Trial, unmet};
+use hil_sim::fault::{Fault, Kind};
+use hil_sim::scene::Scene;
+use protocol::Role;
+use tests::elves;
+
+/// An instruction takes 8.3 ns.
+const INSTRUCTION_NS: u64 = 9;
+
+/// One of each sort; `hil-sim campaign` tries them all, and at many instants.
+const KINDS: [Kind; 16] = [
+    Kind::Nothing,
+    Kind::LinkGarbage,
+    Kind::EstimateNan,
+    Kind::HandEncoderJump,
+    Kind::EmergencyStop,
+    Kind::StopFromConsole,
+    Kind::WrongConfiguration,
+    Kind::DacIgnoresWords,
+    Kind::LdacStuck,
+    Kind::SpiStall,
+    Kind::ThreadStall,
+    Kind::Panic,
+    Kind::StackOverflow,
+    Kind::MemoryChanged,
+    Kind::BrownOut,
+    Kind::SensorHang,
+];
+
+#[test]
+fn faults_of_every_sort_come_out_as_the_table_says() {
+    let plan = Plan {
+        kinds: KINDS.to_vec(),
+        instants: 1,
+        seed: 20,
+    };
+    let firmwares = elves::both();
+    let trials: Vec<Trial> = thread::scope(|scope| {
+        let runs: Vec<_> = plan
+            .shifts()
+            .into_iter()
+            .map(|shift| scope.spawn(move || shift.run(firmwares)))
+            .collect();
+        runs.into_iter()
+            .flat_map(|run| {
+                run.join()
+                    .unwrap()
+                    .unwrap_or_else(|error| panic!("{error}"))
+            })
+            .collect()
+    });
+    let tallies: Vec<Tally> = plan
+        .kinds
+        .iter()
+        .map(|&kind| Tally::of(kind, &trials))
+        .collect();
+    let details: Vec<String> = trials
+        .iter()
+        .filter(|trial| !trial.finding.unmet().is_empty())
+        .map(|trial| format!("{:?}: {:?}", trial.finding, trial.finding.unmet()))
+        .collect();
+    assert!(
+        unmet(&tallies).is_empty() && details.is_empty(),
+        "{:#?}\n{details:#?}",
+        unmet(&tallies)
+    );
+}
+
+#[test]
+fn power_goes_at_the_very_instant_and_the_board_comes_back() {
+    // Off the tick, off the quantum.
+    let at_s = 0.612_345_678;
+    let brown_out = Fault::new(Kind::BrownOut, at_s);
+    let scene = Scene {
+        duration_s: 1.0,
+        faults: vec![brown_out],
+        ..Scene::constant(2.0, 50.0)
+    };
+    let (recording, facts) = elf::run(&scene, elves::both()).unwrap();
+    let signs = &recording.signs;
+    assert_eq!(facts.resets, 1);
+    assert_eq!(signs.resets[0].role, Role::Display);
+    assert!(signs.resets[0].is_injected);
+    let begins_ns = brown_out.begins_ns();
+    assert!(signs.resets[0].at_ns - begins_ns <= INSTRUCTION_NS);
+    assert!(signs.clears_ns[0] - begins_ns <= INSTRUCTION_NS);
+    let back_ns = brown_out.ends_ns().unwrap();
+    let is_driven = |at_ns: u64| at_ns > back_ns;
+    let after = recording
+        .outputs
+        .iter()
+        .filter(|output| is_driven(output.at_ns));
+    assert!(after.count() > 100);
+    let off = recording
+        .ticks
+        .iter()
+        .filter(|tick| (begins_ns..back_ns).contains(&tick.at_ns));
+    assert_eq!(off.count(), 0);
+}
+
+#[test]
+fn the_same_faults_give_the_same_run() {
+    let scene = Scene {
+        duration_s: 1.2,
+        faults: vec![
+            Fault::new(Kind::LinkGarbage, 0.3),
+            Fault::new(Kind::PowerCycle, 0.7),
+        ],
+        ..Scene::constant(2.0, 50.0)
+    };
+    let [first, second] = [0, 1].map(|_| elf::run(&scene, elves::both()).unwrap().0);
+    assert_eq!(first.hash, second.hash);
+    assert_eq!(first.signs, second.signs);
+}
