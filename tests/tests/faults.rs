@@ -12,10 +12,30 @@ use tests::elves;
 /// An instruction takes 8.3 ns.
 const INSTRUCTION_NS: u64 = 9;
 
+/// One of each sort; `hil-sim campaign` tries them all, and at many instants.
+const KINDS: [Kind; 16] = [
+    Kind::Nothing,
+    Kind::LinkGarbage,
+    Kind::EstimateNan,
+    Kind::HandEncoderJump,
+    Kind::EmergencyStop,
+    Kind::StopFromConsole,
+    Kind::WrongConfiguration,
+    Kind::DacIgnoresWords,
+    Kind::LdacStuck,
+    Kind::SpiStall,
+    Kind::ThreadStall,
+    Kind::Panic,
+    Kind::StackOverflow,
+    Kind::MemoryChanged,
+    Kind::BrownOut,
+    Kind::SensorHang,
+];
+
 #[test]
-fn every_kind_comes_out_as_the_table_says() {
+fn faults_of_every_sort_come_out_as_the_table_says() {
     let plan = Plan {
-        kinds: Kind::all().collect(),
+        kinds: KINDS.to_vec(),
         instants: 1,
         seed: 20,
     };

@@ -388,3 +388,6 @@ fn role(counters: &RoleCounters) -> Vec<(&'static str, u32)> {
         ],
     }
 }
+
+#[cfg(test)]
+mod tests;

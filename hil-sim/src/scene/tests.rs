@@ -630,17 +630,12 @@ fn broken_toml_is_refused_at_its_line() {
 
 #[test]
 fn what_this_version_does_not_build_is_refused_as_such() {
-    for (section, key) in [(
-        "[contact]
-model = \"rigid\"",
+    let refusal = refusal_of("[contact]\nmodel = \"rigid\"");
+    for part in [
         "x.toml:4: contact.model: \"rigid\"",
-    )] {
-        let refusal = refusal_of(section);
-        assert!(refusal.contains(key), "{refusal}\nwanted {key}");
-        assert!(
-            refusal.contains("known but not built in this version"),
-            "{refusal}"
-        );
+        "known but not built in this version",
+    ] {
+        assert!(refusal.contains(part), "{refusal}\nwanted {part}");
     }
     assert!(refusal_of("[estimator]\nmethod = \"magic\"").contains("\"magic\" is unknown"));
 }
