@@ -179,31 +179,29 @@ impl Injector {
             .is_some_and(|traps| traps.lead(task, trap, host))
     }
 
-    /// Turns a bit of the amplitude in one of the places where the output task holds the settings: their 16-bit numbers lie
-    /// in the order of their declaration.
+    /// Turns a bit of a setting where the output task holds them: their 16-bit numbers lie in the order of
+    /// their declaration. Places behind the first are copies that the task's start has left.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
         let Some(traps) = &self.traps else {
             return false;
         };
         let set = &self.settings;
-        let before = [
+        let numbers = [
             set.max_age_ms,
             set.fade_in_ms,
             set.fade_out_ms,
             set.glide_ms,
+            set.amplitude_mv,
+            set.reference_lsb,
+            set.full_drive_s,
         ];
-        let behind = [set.amplitude_mv, set.reference_lsb, set.full_drive_s];
-        let pattern: Vec<u8> = before
-            .iter()
-            .chain(&behind)
-            .flat_map(|number| number.to_le_bytes())
-            .collect();
+        let pattern: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
         let places = traps.places(&[OUTPUT_TASK], &pattern, host);
-        let [copy, bit] = fault.values.map(|value| value as usize);
-        let Some(place) = places.get(copy % places.len().max(1)) else {
+        let Some(place) = places.first() else {
             return false;
         };
-        let address = place + 2 * before.len() as u64;
+        let [setting, bit] = fault.values.map(|value| value as u64);
+        let address = place + 2 * setting;
         let turned = host
             .read(address, Width::W16)
             .and_then(|word| host.write(address, Width::W16, word ^ 1 << bit));

@@ -84,17 +84,18 @@ pub(super) static ROWS: [Row; 9] = [
         kind: Kind::MemoryChanged,
         name: "memory-changed",
         meaning: "a bit of the settings in RAM turns",
-        injected: "one bit of the amplitude, in one of the places where the output task holds the settings",
+        injected: "one bit of a setting where the output task holds them, at the lowest address if there are \
+                   more places (what follows there are copies that are no longer read)",
         keys: &[
             Key {
-                name: "copy",
-                meaning: "which of the places, from the lowest address on, 0 to 7; beyond the last it \
-                          begins anew",
-                default: 0.0,
+                name: "setting",
+                meaning: "which: 0 max_age_ms, 1 fade_in_ms, 2 fade_out_ms, 3 glide_ms, 4 amplitude_mv, \
+                          5 reference_lsb, 6 full_drive_s",
+                default: 4.0,
                 low: 0.0,
-                high: 7.0,
+                high: 6.0,
                 whole: true,
-                drawn: Some((0.0, 7.0)),
+                drawn: Some((0.0, 6.0)),
             },
             Key {
                 name: "bit",
