@@ -47,11 +47,16 @@ pub fn raise() -> bool {
     was_low
 }
 
-/// LDAC low at the next match.
-pub fn arm() {
-    pac::TIM3
-        .ccmr_output(0)
-        .write_value(mode(Ocm::INACTIVE_ON_MATCH));
+/// LDAC low at the next match, if it is further away than `least_us`; whether it is.
+pub fn arm(least_us: u32) -> bool {
+    let timer = pac::TIM3;
+    let offset = u32::from(timer.ccr(CHANNEL).read().ccr());
+    let least = offset / OFFSET_US * least_us;
+    let is_early = u32::from(timer.cnt().read().cnt()) + least < offset;
+    if is_early {
+        timer.ccmr_output(0).write_value(mode(Ocm::INACTIVE_ON_MATCH));
+    }
+    is_early
 }
 
 /// The level on the wire, whatever the timer wants it to be.
