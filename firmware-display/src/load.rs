@@ -11,7 +11,7 @@ use embassy_stm32::pac::timer::regs::CcmrOutputGp16;
 use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals::PC6;
 
-/// From the tick to the edge. The slowest tick measured has its words out 81 µs after its start.
+/// From the tick to the edge. The slowest tick measured has its words out 87 µs after its start.
 pub const OFFSET_US: u32 = 95;
 
 const CHANNEL: usize = 0;
@@ -54,7 +54,9 @@ pub fn arm(least_us: u32) -> bool {
     let least = offset / OFFSET_US * least_us;
     let is_early = u32::from(timer.cnt().read().cnt()) + least < offset;
     if is_early {
-        timer.ccmr_output(0).write_value(mode(Ocm::INACTIVE_ON_MATCH));
+        timer
+            .ccmr_output(0)
+            .write_value(mode(Ocm::INACTIVE_ON_MATCH));
     }
     is_early
 }
