@@ -428,6 +428,7 @@ fn levels_dbc(row: &Row) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fault::Signs;
     use crate::recording::{Engine, OutputRecord, TickRecord};
 
     const RATE: UpdateRate = UpdateRate::Hz2000;
@@ -479,6 +480,7 @@ mod tests {
             warm_up_s: 0.0,
             wall_s: 1.0,
             hash: 0,
+            signs: Signs::default(),
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),

@@ -262,6 +262,7 @@ pub fn csv(stops: &[Stop]) -> Result<String, csv::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fault::Signs;
     use crate::recording::{Engine, TickRecord};
 
     /// A hand that stops at 1 s and goes on at 1.4 s; channel 24 stands at 0x9000 and channel 3 at
@@ -305,6 +306,7 @@ mod tests {
             warm_up_s: 0.0,
             wall_s: 1.0,
             hash: 0,
+            signs: Signs::default(),
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),

@@ -48,6 +48,9 @@ const SPEECH: [&str; 5] = ["serde", "postcard", "cobs", "crc", "heapless"];
 pub(super) struct Budget {
     #[command(flatten)]
     measured: Measured,
+    /// Functions as well, and files, of the last column
+    #[arg(long)]
+    closer: bool,
 }
 
 impl Budget {
@@ -78,6 +81,20 @@ impl Budget {
             }
         }
         print(&columns);
+        if self.closer
+            && let Some((_, counted)) = columns.last()
+        {
+            println!();
+            let mut places: Vec<(&String, &u64)> = counted
+                .by_place
+                .iter()
+                .chain(&counted.by_function)
+                .collect();
+            places.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+            for (place, count) in places {
+                println!("{:10.1} {place}", *count as f64 / counted.ticks as f64);
+            }
+        }
         let met = columns
             .iter()
             .all(|(head, counted)| !head.starts_with("2000") || percent(counted) <= GOAL_PERCENT);

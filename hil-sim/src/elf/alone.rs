@@ -28,7 +28,7 @@ use super::{ElfError, Firmware};
 use crate::digest::Digest;
 use crate::fault::{HandFault, Signs};
 use crate::listener::Listener;
-use crate::recording::{Engine, EstimateRecord, Recording};
+use crate::recording::{Engine, EstimateRecord, Recording, TickRecord};
 use crate::scene::{Link, Motion, Scene};
 use crate::weather::{BYTE_NS, Weather};
 use crate::world::World;
@@ -161,7 +161,7 @@ pub(super) fn run_before<W: Witness>(
         ..Scene::constant(2.0, 50.0)
     })?;
     let board = Nucleo::new(
-        DisplayPins::new(world, HandFault::default()),
+        DisplayPins::new(world, HandFault::new(&[])),
         DisplayPins::fit,
     )
     .map_err(|error| board_error(error.to_string()))?;
@@ -214,6 +214,12 @@ pub(super) fn run_before<W: Witness>(
                 .unwrap_or_else(|| "it has not answered by the end: run it for longer".to_owned()),
         });
     };
+    if let Some(reason) = wrong_rate(&left.ticks, far.alone.configuration.update_rate.hz()) {
+        return Err(ElfError::Configuration {
+            board: BOARD,
+            reason,
+        });
+    }
     let mut digest = Digest::default();
     digest.outputs(&left.outputs);
     let (begun, warm_up_s) = match warm {
@@ -229,12 +235,12 @@ pub(super) fn run_before<W: Witness>(
         clears: left.clears,
         dac_frame_errors: left.dac_frame_errors,
         recording: Recording {
-            signs: Signs::default(),
             engine: Engine::Elf,
             duration_s,
             warm_up_s,
             wall_s: (ended - begun).as_secs_f64(),
             hash: digest.finish(),
+            signs: Signs::default(),
             scans: Vec::new(),
             ticks: left.ticks,
             estimates: far.estimates,
@@ -250,6 +256,17 @@ pub(super) fn run_before<W: Witness>(
         safety: far.safety,
     };
     Ok((run, witness))
+}
+
+/// What is wrong with the rate of the last two ticks, if it is not the one asked for.
+fn wrong_rate(ticks: &[TickRecord], rate_hz: u32) -> Option<String> {
+    let [.., before, last] = ticks else {
+        return Some("it has no ticks".to_owned());
+    };
+    let seen_hz = 1e9 / (last.at_ns - before.at_ns) as f64;
+    // Instants are whole ns: 4 kHz is off by 4·10⁻⁶ of it at most.
+    let agrees = (seen_hz / f64::from(rate_hz) - 1.0).abs() < 1e-4;
+    (!agrees).then(|| format!("it ticks at {seen_hz:.0} Hz, asked for {rate_hz}"))
 }
 
 /// The scripted sensor, and the way from it to the board.
@@ -491,5 +508,23 @@ impl<W: Witness> Driver<Nucleo<DisplayPins>> for Solo<W> {
         Some(VirtualNanos(due_ns.map_or(self.next_look_ns, |due_ns| {
             due_ns.min(self.next_look_ns)
         })))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_ticks_at_another_rate_than_asked_for_is_told_of() {
+        let ticks = [0, 500_000, 1_000_000].map(|at_ns| TickRecord {
+            at_ns,
+            encoder: 0,
+            position_mm: 0.0,
+        });
+        assert_eq!(wrong_rate(&ticks, 2_000), None);
+        let reason = wrong_rate(&ticks, 4_000).unwrap();
+        assert_eq!(reason, "it ticks at 2000 Hz, asked for 4000");
+        assert!(wrong_rate(&[], 2_000).is_some());
     }
 }

@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use addr2line::gimli::{self, EndianSlice, LittleEndian};
-use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use rigless::emulator::{Access, Hit, HitKind, Host, Settled, Watch};
 
 use super::alone::{self, Alone, Witness};
@@ -23,6 +23,9 @@ pub const BUDGET: u64 = super::nucleo::INSTRUCTIONS_PER_SECOND.get();
 pub struct Counted {
     /// Instructions by file or crate.
     pub by_place: BTreeMap<String, u64>,
+    /// Instructions by function, as the linker's symbols name it, mangled: what is inlined counts as the
+    /// function that it is inlined into.
+    pub by_function: BTreeMap<String, u64>,
     /// All of them.
     pub total: u64,
     /// Accesses to the registers of each peripheral.
@@ -59,7 +62,15 @@ pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counte
     for (address, count) in &watched.counts {
         *by_place.entry(places.of(*address)).or_default() += count;
     }
+    let functions = functions(&firmware.elf);
+    let mut by_function: BTreeMap<String, u64> = BTreeMap::new();
+    for (address, count) in &watched.counts {
+        let name = functions.range(..=address).next_back();
+        let name = name.map_or("unknown", |(_, name)| name);
+        *by_function.entry(name.to_owned()).or_default() += count;
+    }
     Ok(Counted {
+        by_function,
         total: watched.counts.values().sum(),
         by_place,
         accesses: watched.accesses,
@@ -157,6 +168,21 @@ fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
         }
     }
     (!addresses.is_empty()).then_some(addresses)
+}
+
+/// Where each function of an ELF begins.
+fn functions(elf: &[u8]) -> BTreeMap<u64, String> {
+    let Ok(file) = object::File::parse(elf) else {
+        return BTreeMap::new();
+    };
+    file.symbols()
+        .filter(|symbol| symbol.kind() == SymbolKind::Text)
+        .filter_map(|symbol| {
+            let name = symbol.name().ok()?;
+            // Bit 0 says that it is Thumb code; a mapping symbol is no function.
+            (!name.starts_with('$')).then(|| (symbol.address() & !1, name.to_owned()))
+        })
+        .collect()
 }
 
 /// The peripheral that has the registers at an address, of those that the display uses (RM0090, table 1).

@@ -20,7 +20,7 @@ pub use tally::Check;
 use super::console::ConsoleHost;
 use super::display::DisplayPins;
 use super::lockstep::{QUANTUM_NS, Watched};
-use super::nucleo::{Nucleo, PEER_UART, Pins};
+use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
@@ -33,13 +33,13 @@ use crate::world::World;
 use strokes::Strokes;
 use tally::{Outputs, Side};
 
+/// The two directions' numbers.
+const TO_DISPLAY: u64 = 0;
+const TO_SENSOR: u64 = 1;
 /// Silence at the end, in s: two of the boards' statuses and more.
 pub const QUIET_S: f64 = 3.0;
 /// The shortest run, in s.
 pub const SHORTEST_S: f64 = 10.0;
-/// The two directions' numbers, as in the pair's runs: the same seed has the same weather.
-const TO_DISPLAY: u64 = 0;
-const TO_SENSOR: u64 = 1;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_NS: u64 = 10_000_000;
 /// How often progress is told.
@@ -152,7 +152,7 @@ pub fn run(
         let display = drive(
             "display",
             Nucleo::new(
-                DisplayPins::new(display_world, HandFault::default()),
+                DisplayPins::new(display_world, HandFault::new(&[])),
                 DisplayPins::fit,
             ),
             &firmwares.display,
@@ -309,16 +309,15 @@ impl<P: Drained> Driver<Nucleo<P>> for Half {
                 }
             }
         }
-        let due_ns = session
-            .board_mut()
-            .wire(PEER_UART)
-            .next_due()
-            .filter(|&due_ns| due_ns > now_ns);
-        Some(VirtualNanos(
-            due_ns.map_or(self.next_exchange_ns, |due_ns| {
-                due_ns.min(self.next_exchange_ns)
-            }),
-        ))
+        let mut next_ns = self.next_exchange_ns;
+        for uart in [PEER_UART, CONSOLE_UART] {
+            if let Some(due_ns) = session.board_mut().wire(uart).next_due()
+                && due_ns > now_ns
+            {
+                next_ns = next_ns.min(due_ns);
+            }
+        }
+        Some(VirtualNanos(next_ns))
     }
 }
 
