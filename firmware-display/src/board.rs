@@ -16,7 +16,7 @@
 use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::Peri;
 use embassy_stm32::bind_interrupts;
-use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
+use embassy_stm32::gpio::{AnyPin, Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::spi::{self, MODE_1, Spi};
@@ -95,6 +95,8 @@ impl Board {
         let mut configuration = spi::Config::default();
         configuration.mode = MODE_1;
         configuration.frequency = SPI_CLOCK;
+        // What no chip says is all ones, which answers nothing.
+        configuration.miso_pull = Pull::Up;
         let select = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::High, Speed::VeryHigh);
         let converters = Converters::new(
             Chain::new(

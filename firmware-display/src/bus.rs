@@ -113,7 +113,8 @@ impl Bus {
         is_shifted_out(0).then_some(answer)
     }
 
-    /// Looks into a chip, some 16 µs.
+    /// Looks into a chip, some 16 µs. LDAC's edge may come meanwhile: it is no part of the bus, and the
+    /// words have been in the buffers since before.
     pub fn look(&mut self, look: &Look) -> Readback {
         self.listen();
         let answers = look

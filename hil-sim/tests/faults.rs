@@ -2,6 +2,7 @@
 //! could break.
 
 use std::path::Path;
+use std::process::{Command, Output};
 
 use hil_sim::fault::catalogue::{Class, Needs};
 use hil_sim::fault::judge::judge;
@@ -105,4 +106,41 @@ fn the_json_lists_every_fault_in_the_order_of_the_scene() {
         faults[0]
     );
     assert_eq!(faults[1]["kind"], "nothing");
+}
+
+fn hil_sim(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn the_list_tells_of_every_kind_and_every_key() {
+    let output = hil_sim(&["faults"]);
+    assert_eq!(output.status.code(), Some(0));
+    let list = String::from_utf8(output.stdout).unwrap();
+    for kind in Kind::all() {
+        let row = kind.row();
+        let entry = list.split(&format!("\n{}: ", row.name)).nth(1);
+        let entry = entry.or_else(|| list.strip_prefix(&format!("{}: ", row.name)));
+        let entry = entry.unwrap_or_else(|| panic!("{} is not in the list", row.name));
+        let entry = entry.split("\n\n").next().unwrap();
+        assert!(entry.contains(row.meaning) && entry.contains(row.injected));
+        assert!(entry.contains(row.expected));
+        for key in row.keys {
+            assert!(
+                entry.contains(&format!("(default {})", key.default)),
+                "{entry}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_campaign_of_an_unknown_kind_is_refused() {
+    let output = hil_sim(&["campaign", "--kinds", "panic,gremlin"]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(errors.contains("gremlin: no such kind"), "{errors}");
 }

@@ -27,6 +27,8 @@ const TRIPS: [Trip; 12] = [
     Trip::StackOverflow,
 ];
 
+const _: () = assert!(TRIPS[TRIPS.len() - 1] as usize + 1 == TRIPS.len());
+
 #[allow(
     unsafe_code,
     reason = "the section is cortex-m-rt's own, for RAM that is left alone"
