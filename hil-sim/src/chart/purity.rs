@@ -474,7 +474,6 @@ mod tests {
             })
             .collect();
         Recording {
-            signs: Default::default(),
             engine: Engine::Native,
             duration_s: 5.0,
             warm_up_s: 0.0,

@@ -300,7 +300,6 @@ mod tests {
             })
             .collect();
         Recording {
-            signs: Default::default(),
             engine: Engine::Native,
             duration_s: 2.0,
             warm_up_s: 0.0,

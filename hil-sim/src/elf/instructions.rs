@@ -4,7 +4,8 @@
 //! The whole code is watched for that while, instruction by instruction. Each is put down to the
 //! innermost file of ours among the functions inlined at its address, by the ELF's own debug
 //! information, so that a sine drawn inside the array's loop counts as the sine; code that is inlined
-//! into nothing of ours counts as its crate's.
+//! into nothing of ours counts as its crate's. What the compiler's own routines do, such as copying,
+//! counts as the place that called them.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -45,8 +46,12 @@ pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counte
         .ok_or_else(|| unreadable("it has no code with mapping symbols"))?;
     let end_ns = (alone.duration_s * 1e3).ceil() as u64 * 1_000_000;
     let from_ns = end_ns - (counted_s * 1e3).round() as u64 * 1_000_000;
+    let functions = functions(&firmware.elf);
     let watched = Watched {
         code,
+        routines: routines(&functions),
+        caller: None,
+        by_caller: HashMap::new(),
         from_ns,
         running: None,
         counts: HashMap::new(),
@@ -59,10 +64,9 @@ pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counte
     }
     let places = Places::read(&firmware.elf).map_err(|error| unreadable(&error.to_string()))?;
     let mut by_place: BTreeMap<String, u64> = BTreeMap::new();
-    for (address, count) in &watched.counts {
+    for (address, count) in &watched.by_caller {
         *by_place.entry(places.of(*address)).or_default() += count;
     }
-    let functions = functions(&firmware.elf);
     let mut by_function: BTreeMap<String, u64> = BTreeMap::new();
     for (address, count) in &watched.counts {
         let name = functions.range(..=address).next_back();
@@ -94,6 +98,12 @@ fn unreadable(reason: &str) -> ElfError {
 /// Counts how often each instruction is come to.
 struct Watched {
     code: Vec<u64>,
+    /// Where the compiler's routines begin and end.
+    routines: Vec<std::ops::Range<u64>>,
+    /// The last instruction that was in none of them.
+    caller: Option<u64>,
+    /// The counts of routines put down to their callers.
+    by_caller: HashMap<u64, u64>,
     from_ns: u64,
     /// The instruction come to last, and how many had been retired before it.
     running: Option<(u64, u64)>,
@@ -131,7 +141,17 @@ impl Witness for Watched {
             return;
         };
         if let Some((before, count)) = self.running {
-            *self.counts.entry(before).or_default() += instruction_count - count;
+            let retired = instruction_count - count;
+            *self.counts.entry(before).or_default() += retired;
+            let place = self.caller.unwrap_or(before);
+            *self.by_caller.entry(place).or_default() += retired;
+        }
+        if !self
+            .routines
+            .iter()
+            .any(|routine| routine.contains(&address))
+        {
+            self.caller = Some(address);
         }
         self.running = Some((address, instruction_count));
     }
@@ -168,6 +188,21 @@ fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
         }
     }
     (!addresses.is_empty()).then_some(addresses)
+}
+
+/// Where the compiler's own routines begin and end.
+fn routines(functions: &BTreeMap<u64, String>) -> Vec<std::ops::Range<u64>> {
+    let ends = functions.keys().copied().skip(1).chain([u64::MAX]);
+    functions
+        .iter()
+        .zip(ends)
+        .filter(|((_, name), _)| {
+            name.starts_with("__aeabi_")
+                || name.contains("compiler_builtins")
+                || matches!(&***name, "memcpy" | "memmove" | "memset" | "memcmp")
+        })
+        .map(|((&from, _), to)| from..to)
+        .collect()
 }
 
 /// Where each function of an ELF begins.
@@ -273,6 +308,17 @@ fn crate_of(path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_compiler_s_routines_are_known_by_their_names() {
+        let functions = BTreeMap::from([
+            (0x100, "_ZN7display4tick".to_owned()),
+            (0x200, "__aeabi_memcpy4".to_owned()),
+            (0x240, "_RNvNtCs7_17compiler_builtins3mem6memcpy".to_owned()),
+            (0x280, "memcpy_of_our_own".to_owned()),
+        ]);
+        assert_eq!(routines(&functions), [0x200..0x240, 0x240..0x280]);
+    }
 
     #[test]
     fn a_file_is_named_by_its_crate_wherever_it_lies() {

@@ -14,6 +14,8 @@ pub const SPECIMENS: [(f64, f64); 4] =
 const WITHIN_MM: (f64, f64) = (5.0, 155.0);
 /// The hand rests up to here, in s: both boards start, greet and send a status.
 const BEGINS_S: f64 = 2.2;
+/// The longest stroke, in mm: less than half of that.
+const LONGEST_MM: f64 = 70.0;
 /// The slowest and the fastest stroke, in mm/s.
 const SPEEDS_MM_S: (f64, f64) = (8.0, 120.0);
 /// The shortest and the longest, in s.
@@ -47,8 +49,10 @@ impl Strokes {
                 speed_mm_s = 0.0;
                 strokes.go_on(draws.random_range(RESTS_S.0..RESTS_S.1), 0.0);
             }
-            let lasts_s = draws.random_range(LASTS_S.0..LASTS_S.1);
             let mut next_mm_s: f64 = draws.random_range(SPEEDS_MM_S.0..SPEEDS_MM_S.1);
+            // Short enough for one way or the other from wherever the hand is.
+            let longest_s = LONGEST_MM / next_mm_s - RAMPS_S.1;
+            let lasts_s = draws.random_range(LASTS_S.0..LASTS_S.1).min(longest_s);
             // Mostly back, as a rubbing hand does; always away from an end that is near.
             let forwards = if draws.random_bool(0.8) {
                 speed_mm_s < 0.0
@@ -59,10 +63,10 @@ impl Strokes {
             let position_mm = strokes.position_mm();
             let room_above = position_mm + reach_mm < WITHIN_MM.1;
             let room_below = position_mm - reach_mm > WITHIN_MM.0;
-            let forwards = match (room_above, room_below) {
-                (true, true) => forwards,
-                (above, below) if above != below => above,
-                _ => position_mm < (WITHIN_MM.0 + WITHIN_MM.1) / 2.0,
+            let forwards = if room_above && room_below {
+                forwards
+            } else {
+                room_above
             };
             if !forwards {
                 next_mm_s = -next_mm_s;
