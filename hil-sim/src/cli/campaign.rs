@@ -17,6 +17,9 @@ use hil_sim::fault::campaign::{Plan, Tally, Trial, unmet};
 
 use super::{Elves, number, progress};
 
+/// What came of a run.
+type RunResult = Result<Vec<Trial>, ElfError>;
+
 #[derive(Debug, clap::Args)]
 pub(super) struct Campaign {
     /// Kinds to try, as `hil-sim faults` names them [default: all]
@@ -63,7 +66,7 @@ impl Campaign {
         let bar = progress(shifts.len() as u64);
         let started = Instant::now();
         let next = AtomicUsize::new(0);
-        let done: Mutex<Vec<(usize, Result<Vec<Trial>, ElfError>)>> = Mutex::new(Vec::new());
+        let done: Mutex<Vec<(usize, RunResult)>> = Mutex::new(Vec::new());
         thread::scope(|scope| {
             for _ in 0..self.jobs.clamp(1, shifts.len().max(1)) {
                 scope.spawn(|| {
