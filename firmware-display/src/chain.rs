@@ -33,11 +33,10 @@ use crate::bus::{self, Bus, Width};
 use crate::{load, ticks};
 
 const STREAM: usize = 3;
-/// From a broadcast to LDAC, 4 µs: the family's t_BCASTWAIT (DAC81408, SLASER3A), read on the safe side
-/// as the time that the buffers take. From any other word 0.1 µs; the family asks for 80 ns (DAC81404,
-/// SLASEH2A).
-const BROADCAST_CYCLES: u32 = 4 * bus::CYCLES_PER_US;
-const LOAD_CYCLES: u32 = bus::CYCLES_PER_US / 10 + 1;
+/// From the last word to LDAC at least, in µs. A broadcast takes 4 µs: the family's t_BCASTWAIT (DAC81408,
+/// SLASER3A), read on the safe side as the time that the buffers take. For any other word the family asks
+/// for 80 ns (DAC81404, SLASEH2A).
+const LEAST_TO_LOAD_US: u32 = 4;
 
 /// The task's end: fills the frames, starts them, and asks how they went.
 pub struct Chain {
@@ -133,7 +132,6 @@ struct Shipment {
     register: u8,
     address: u32,
     words: u16,
-    is_broadcast: bool,
 }
 
 impl Shipment {
@@ -143,7 +141,6 @@ impl Shipment {
             register: frame.register(),
             address: words.as_ptr() as u32,
             words: words.len() as u16,
-            is_broadcast: frame.is_broadcast(),
         }
     }
 }
@@ -155,6 +152,8 @@ enum State {
     Sending(usize),
     /// All are in the chips, and LDAC is to fall.
     Armed,
+    /// All are in the chips, but too late for this tick's edge.
+    Late,
     Failed,
 }
 
@@ -189,7 +188,6 @@ impl Line {
             register,
             address,
             words,
-            ..
         } = self.shipments[chip];
         self.state = State::Sending(chip);
         self.bus.set_width(Width::Byte);
@@ -220,8 +218,9 @@ impl Line {
     }
 
     fn on_sent(&mut self, chip: usize) {
-        // The stream is done as soon as the last word is in SPI1's buffer, with one before it perhaps.
-        if !bus::is_shifted_out(4) {
+        // The stream is done as soon as the last word is in SPI1's buffer, with one before it perhaps: of
+        // their four bytes two have gone until here.
+        if !bus::is_shifted_out(2) {
             self.fail(chip);
             return;
         }
@@ -230,18 +229,14 @@ impl Line {
             self.send(chip + 1);
             return;
         }
-        bus::wait(if self.shipments[chip].is_broadcast {
-            BROADCAST_CYCLES
-        } else {
-            LOAD_CYCLES
-        });
-        if load::is_high() {
-            load::arm();
-            self.state = State::Armed;
-        } else {
+        self.state = if !load::is_high() {
             // The tick raised it: something holds the wire down.
-            self.state = State::Failed;
-        }
+            State::Failed
+        } else if load::arm(LEAST_TO_LOAD_US) {
+            State::Armed
+        } else {
+            State::Late
+        };
         if let Some(look) = self.look.take() {
             self.readback = self.bus.look(&look);
         }
@@ -259,8 +254,8 @@ impl Line {
         match state {
             State::Idle => Transfer::Done,
             State::Armed if ticks::loaded() => Transfer::Done,
-            // Out too late for the edge, or the wire does not follow.
-            State::Armed => Transfer::Stalled,
+            // The edge did not come: the wire does not follow, or all was too late.
+            State::Armed | State::Late => Transfer::Stalled,
             State::Failed => Transfer::Failed,
             State::Sending(chip) => {
                 self.close(chip);

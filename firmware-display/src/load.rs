@@ -11,7 +11,7 @@ use embassy_stm32::pac::timer::regs::CcmrOutputGp16;
 use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals::PC6;
 
-/// From the tick to the edge. The slowest tick measured has its words out 81 µs after its start.
+/// From the tick to the edge. The slowest tick measured has its words out 87 µs after its start.
 pub const OFFSET_US: u32 = 95;
 
 const CHANNEL: usize = 0;
@@ -47,11 +47,18 @@ pub fn raise() -> bool {
     was_low
 }
 
-/// LDAC low at the next match.
-pub fn arm() {
-    pac::TIM3
-        .ccmr_output(0)
-        .write_value(mode(Ocm::INACTIVE_ON_MATCH));
+/// LDAC low at the next match, if it is further away than `least_us`; whether it is.
+pub fn arm(least_us: u32) -> bool {
+    let timer = pac::TIM3;
+    let offset = u32::from(timer.ccr(CHANNEL).read().ccr());
+    let least = offset / OFFSET_US * least_us;
+    let is_early = u32::from(timer.cnt().read().cnt()) + least < offset;
+    if is_early {
+        timer
+            .ccmr_output(0)
+            .write_value(mode(Ocm::INACTIVE_ON_MATCH));
+    }
+    is_early
 }
 
 /// The level on the wire, whatever the timer wants it to be.

@@ -4,8 +4,9 @@
 //! off, ask, ask again with the first answer coming back, streaming on with the second. Every
 //! [`PERIOD_MS`] one chip is looked into, so each of the four within 8 ms: its last channel in use,
 //! whose word is the last of its frame and the first to be missing when a frame was cut short or not
-//! heard; and one thing more in turn, so that within [`ROUND_MS`] all its channels, and all its settings
-//! that can be read, have been seen.
+//! heard; and one thing more. That is, every other time, whether its channels are powered, which a chip
+//! that has lost its supply has them not be though it may still take broadcasts; else one thing in turn,
+//! so that within [`ROUND_MS`] all its channels, and all its settings that can be read, have been seen.
 //!
 //! What is read is a channel's buffer. That LDAC moved it to the output can't be read; the board looks
 //! at LDAC's own level instead.
@@ -80,13 +81,16 @@ pub const SETTINGS: [Content; 9] = [
     Content::all(register::SYNCCONFIG, ALL_CHANNELS),
     Content::all(register::TOGGCONFIG0, 0),
     Content::all(register::TOGGCONFIG1, 0),
-    Content::all(register::DACPWDWN, NO_CHANNEL),
+    POWERED,
     Content {
         register: register::STATUS,
         mask: STATUS_CRC_ALARM | STATUS_TEMPERATURE_ALARM,
         want: 0,
     },
 ];
+
+/// All channels are powered.
+const POWERED: Content = Content::all(register::DACPWDWN, NO_CHANNEL);
 
 /// Everything that a chip is to hold after start-up, before it is driven for the first time.
 pub fn at_start() -> impl Iterator<Item = Content> {
@@ -150,13 +154,15 @@ const fn used_channels(chip: usize) -> usize {
 /// Channels besides the last, and settings, each in its turn.
 const TURNS: usize = CHANNELS_PER_CHIP - 1 + SETTINGS.len();
 /// Time in ms within which everything that can be read has been.
-pub const ROUND_MS: u32 = (TURNS * CHIPS) as u32 * PERIOD_MS;
+pub const ROUND_MS: u32 = 2 * (TURNS * CHIPS) as u32 * PERIOD_MS;
 
 /// Whose turn it is, and for what.
 #[derive(Clone, Debug, Default)]
 pub struct Rounds {
     chip: usize,
     turn: usize,
+    /// Whether power is looked at, instead of what has its turn.
+    power: bool,
 }
 
 impl Rounds {
@@ -170,6 +176,7 @@ impl Rounds {
         };
         let last = used_channels(chip) - 1;
         let second = match SETTINGS.get(self.turn) {
+            _ if self.power => POWERED,
             Some(setting) => *setting,
             None => channel((self.turn - SETTINGS.len()) % last),
         };
@@ -179,7 +186,10 @@ impl Rounds {
         };
         self.chip = (chip + 1) % CHIPS;
         if self.chip == 0 {
-            self.turn = (self.turn + 1) % TURNS;
+            if self.power {
+                self.turn = (self.turn + 1) % TURNS;
+            }
+            self.power = !self.power;
         }
         look
     }
@@ -250,6 +260,20 @@ mod tests {
                 last - chip * CHANNELS_PER_CHIP
             );
         }
+    }
+
+    #[test]
+    fn every_chips_power_is_looked_at_within_sixteen_milliseconds() {
+        let mut rounds = Rounds::default();
+        let mut last_ms = [0; CHIPS];
+        for at_ms in (0..2 * ROUND_MS).step_by(PERIOD_MS as usize) {
+            let Look { chip, contents } = rounds.next(&WORDS);
+            if contents[1] == POWERED {
+                assert!(at_ms - last_ms[chip] <= 16, "{at_ms}");
+                last_ms[chip] = at_ms;
+            }
+        }
+        assert!(last_ms.iter().all(|&last| 2 * ROUND_MS - last <= 16));
     }
 
     #[test]

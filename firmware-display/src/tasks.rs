@@ -113,7 +113,10 @@ async fn drive(
         }
         released = output.release;
         // The words are on their way: what else there is to do has the rest of the tick.
-        if let Some(settings) = CONFIGURE.try_take() {
+        // Asked first: to take moves a kilobyte, also if there is nothing to be taken.
+        if CONFIGURE.signaled()
+            && let Some(settings) = CONFIGURE.try_take()
+        {
             ticks.set_rate(settings.configuration().update_rate);
             pace = Pace::new(&settings);
             display.configure(&settings);

@@ -6,7 +6,7 @@ use crate::fault::catalogue::{Class, Key, Lasts, Row};
 
 /// Until a watchdog that is no longer fed has bitten (0.5 s at most) and the board has started again
 /// and had the time to drive, which it must not.
-const PAST_WATCHDOG_S: f64 = 1.2;
+const PAST_WATCHDOG_S: f64 = 0.85;
 
 pub(super) static ROWS: [Row; 9] = [
     Row {
