@@ -24,7 +24,7 @@ use embassy_stm32::peripherals::{self, DMA2_CH3};
 use embassy_stm32::spi::{Spi, TxDma, mode::Master};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use firmware_display::dac81416::{self, CHIPS, Frame};
+use firmware_display::dac81416::{CHIPS, Frame, Frames};
 use firmware_display::look::{self, Look};
 use firmware_display::{ACTUATORS, Readback, Transfer};
 use static_cell::StaticCell;
@@ -40,7 +40,7 @@ const LEAST_TO_LOAD_US: u32 = 4;
 
 /// The task's end: fills the frames, starts them, and asks how they went.
 pub struct Chain {
-    frames: &'static mut [Frame; CHIPS],
+    frames: &'static mut Frames,
 }
 
 impl Chain {
@@ -51,7 +51,7 @@ impl Chain {
         stream: Peri<'static, DMA2_CH3>,
         select: [Output<'static>; CHIPS],
     ) -> Self {
-        static FRAMES: StaticCell<[Frame; CHIPS]> = StaticCell::new();
+        static FRAMES: StaticCell<Frames> = StaticCell::new();
         let control = control(TxDma::<peripherals::SPI1>::request(&*stream));
         let line = Line {
             bus: Bus::new(spi, select),
@@ -64,7 +64,7 @@ impl Chain {
         };
         LINE.lock(|place| place.replace(Some(line)));
         Self {
-            frames: FRAMES.init([Frame::ZERO_VOLT; CHIPS]),
+            frames: FRAMES.init(Frames::ZERO_VOLT),
         }
     }
 
@@ -82,8 +82,8 @@ impl Chain {
     /// Starts an update of all channels to `words`; they change together with LDAC's next edge. Once
     /// they are out, looks into a chip, if asked to. [`Chain::finish`] comes between two of these.
     pub fn send(&mut self, words: &[u16; ACTUATORS], look: Option<Look>) {
-        dac81416::stream(words, self.frames);
-        let shipments = self.frames.each_ref().map(Shipment::of);
+        self.frames.set(words);
+        let shipments = self.frames.each().map(Shipment::of);
         with_line(|line| {
             line.shipments = shipments;
             line.look = look;
@@ -135,12 +135,11 @@ struct Shipment {
 }
 
 impl Shipment {
-    fn of(frame: &Frame) -> Self {
-        let words = frame.words();
+    fn of(frame: Frame<'_>) -> Self {
         Self {
-            register: frame.register(),
-            address: words.as_ptr() as u32,
-            words: words.len() as u16,
+            register: frame.register,
+            address: frame.words.as_ptr() as u32,
+            words: frame.words.len() as u16,
         }
     }
 }

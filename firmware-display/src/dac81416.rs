@@ -170,7 +170,7 @@ pub fn start_up() -> impl Iterator<Item = [u8; 3]> {
     START_UP.into_iter()
 }
 
-/// The write after which a chip takes [`Frame`]s, and no longer answers.
+/// The write after which a chip takes [`Frames`], and no longer answers.
 pub const STREAM: [u8; 3] = write(register::SPICONFIG, spiconfig::STREAMING);
 /// The write after which a chip answers, understood by one that is streaming: a stream of one word.
 pub const ANSWER: [u8; 3] = write(register::SPICONFIG, spiconfig::ANSWERING);
@@ -183,56 +183,53 @@ pub const fn place_of(actuator: usize) -> (usize, usize) {
 /// What goes to a chip under one chip select at an output tick: a register's address, then a word for
 /// each of its channels, or one for all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Frame {
-    register: u8,
-    words: [u16; CHANNELS_PER_CHIP],
+pub struct Frame<'a> {
+    /// The address byte to begin with.
+    pub register: u8,
+    /// The words that follow, 1 or [`CHANNELS_PER_CHIP`].
+    pub words: &'a [u16],
 }
 
-impl Frame {
+/// The words of an output tick, as the four chips' frames take them: one copy, in a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(align(4))]
+pub struct Frames {
+    /// Actuator i is channel i % 13 of chip i / 13. The last channels, which nothing is wired to, stay at
+    /// 0 V; or get the one word that goes to all, if a chip's are equal.
+    words: [u16; CHIPS * CHANNELS_PER_CHIP],
+}
+
+impl Frames {
     /// 0 V on each channel.
     pub const ZERO_VOLT: Self = Self {
-        register: register::BRDCAST,
-        words: [ZERO_VOLT; CHANNELS_PER_CHIP],
+        words: [ZERO_VOLT; CHIPS * CHANNELS_PER_CHIP],
     };
 
-    /// The address byte to begin with.
-    pub fn register(&self) -> u8 {
-        self.register
-    }
-
-    /// The words that follow, 1 or [`CHANNELS_PER_CHIP`].
-    pub fn words(&self) -> &[u16] {
-        if self.is_broadcast() {
-            &self.words[..1]
-        } else {
-            &self.words
+    /// Takes the words of a tick.
+    pub fn set(&mut self, words: &[u16; ACTUATORS]) {
+        if let Some(places) = self.words.first_chunk_mut() {
+            *places = *words;
         }
     }
 
-    /// Whether it is one word for all channels.
-    pub fn is_broadcast(&self) -> bool {
-        self.register == register::BRDCAST
-    }
-
-    /// Takes the words of the first channels. The others, which nothing is wired to, stay at 0 V; or get
-    /// the one word that goes to all, if `words` are equal.
-    fn set(&mut self, words: &[u16]) {
-        let is_broadcast = words.iter().all(|word| *word == words[0]);
-        self.register = if is_broadcast {
-            register::BRDCAST
-        } else {
-            register::DAC0
-        };
-        for (place, word) in self.words.iter_mut().zip(words) {
-            *place = *word;
-        }
-    }
-}
-
-/// Writes the four chips' frames for `words`: actuator i is channel i % 13 of chip i / 13.
-pub fn stream(words: &[u16; ACTUATORS], frames: &mut [Frame; CHIPS]) {
-    for (frame, words) in frames.iter_mut().zip(words.chunks(CHANNELS_PER_CHIP)) {
-        frame.set(words);
+    /// What goes to each chip.
+    pub fn each(&self) -> [Frame<'_>; CHIPS] {
+        core::array::from_fn(|chip| {
+            let start = chip * CHANNELS_PER_CHIP;
+            let words = &self.words[start..start + CHANNELS_PER_CHIP];
+            let used = &words[..CHANNELS_PER_CHIP.min(ACTUATORS - start)];
+            if used.iter().all(|word| *word == used[0]) {
+                Frame {
+                    register: register::BRDCAST,
+                    words: &words[..1],
+                }
+            } else {
+                Frame {
+                    register: register::DAC0,
+                    words,
+                }
+            }
+        })
     }
 }
 
@@ -291,14 +288,14 @@ mod tests {
     }
 
     /// A frame as it goes over the wire.
-    fn bytes(frame: &Frame) -> std::vec::Vec<u8> {
-        let words = frame.words().iter().flat_map(|word| word.to_be_bytes());
-        core::iter::once(frame.register()).chain(words).collect()
+    fn bytes(frame: &Frame<'_>) -> std::vec::Vec<u8> {
+        let words = frame.words.iter().flat_map(|word| word.to_be_bytes());
+        core::iter::once(frame.register).chain(words).collect()
     }
 
-    fn frames_of(words: &[u16; ACTUATORS]) -> [Frame; CHIPS] {
-        let mut frames = [Frame::ZERO_VOLT; CHIPS];
-        stream(words, &mut frames);
+    fn frames_of(words: &[u16; ACTUATORS]) -> Frames {
+        let mut frames = Frames::ZERO_VOLT;
+        frames.set(words);
         frames
     }
 
@@ -306,16 +303,16 @@ mod tests {
     fn streaming_frames_are_these_bytes() {
         let frames = frames_of(&core::array::from_fn(|i| 0x4000 + i as u16));
         assert_eq!(
-            bytes(&frames[0]),
+            bytes(&frames.each()[0]),
             [
                 0x10, 0x40, 0x00, 0x40, 0x01, 0x40, 0x02, 0x40, 0x03, 0x40, 0x04, 0x40, 0x05, 0x40,
                 0x06, 0x40, 0x07, 0x40, 0x08, 0x40, 0x09, 0x40, 0x0A, 0x40, 0x0B, 0x40, 0x0C,
             ]
         );
-        assert_eq!(bytes(&frames[1])[..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
-        assert_eq!(bytes(&frames[2])[..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
+        assert_eq!(bytes(&frames.each()[1])[..5], [0x10, 0x40, 0x0D, 0x40, 0x0E]);
+        assert_eq!(bytes(&frames.each()[2])[..5], [0x10, 0x40, 0x1A, 0x40, 0x1B]);
         assert_eq!(
-            bytes(&frames[3]),
+            bytes(&frames.each()[3]),
             [
                 0x10, 0x40, 0x27, 0x40, 0x28, 0x40, 0x29, 0x40, 0x2A, 0x40, 0x2B, 0x40, 0x2C, 0x40,
                 0x2D, 0x40, 0x2E, 0x40, 0x2F, 0x40, 0x30, 0x40, 0x31, 0x80, 0x00, 0x80, 0x00,
@@ -325,10 +322,12 @@ mod tests {
 
     #[test]
     fn equal_words_are_these_three_bytes_a_chip() {
-        for frame in &frames_of(&[0x1234; ACTUATORS]) {
+        for frame in &frames_of(&[0x1234; ACTUATORS]).each() {
             assert_eq!(bytes(frame), [0x0F, 0x12, 0x34]);
         }
-        assert_eq!(bytes(&Frame::ZERO_VOLT), [0x0F, 0x80, 0x00]);
+        for frame in &Frames::ZERO_VOLT.each() {
+            assert_eq!(bytes(frame), [0x0F, 0x80, 0x00]);
+        }
     }
 
     #[test]
@@ -337,7 +336,7 @@ mod tests {
             let mut words = [0x1234; ACTUATORS];
             words[actuator] = 0x1235;
             let (chip, _) = place_of(actuator);
-            for (c, frame) in frames_of(&words).iter().enumerate() {
+            for (c, frame) in frames_of(&words).each().iter().enumerate() {
                 let length = if c == chip { FRAME_BYTES } else { 3 };
                 assert_eq!(bytes(frame).len(), length, "chip {c}, actuator {actuator}");
             }
@@ -350,7 +349,7 @@ mod tests {
             let mut words = [ZERO_VOLT; ACTUATORS];
             words[actuator] = 0x1234;
             let (chip, channel) = place_of(actuator);
-            for (c, frame) in frames_of(&words).iter().enumerate() {
+            for (c, frame) in frames_of(&words).each().iter().enumerate() {
                 if c != chip {
                     assert_eq!(bytes(frame), [0x0F, 0x80, 0x00]);
                     continue;

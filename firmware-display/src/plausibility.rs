@@ -42,6 +42,8 @@ const FASTEST_ARM_UM_S: u32 = 20_000_000;
 const MOVING_UM_S: u32 = 10_000;
 /// The arm may go on for so long after the hand: the link there and back, and the arm's own ramps.
 const CONTRADICTION_QUARTERS: u32 = quarters(3_000);
+/// An arm that stands still for no longer than this only turns back.
+const REVERSAL_QUARTERS: u32 = quarters(500);
 /// What the sensor said last counts for so long.
 const HEARD_QUARTERS: u32 = quarters(250);
 
@@ -267,9 +269,10 @@ impl Distrust {
 #[derive(Clone, Copy, Debug)]
 struct Contradiction {
     arm_moves: bool,
-    /// Time since the sensor was heard last, and since the contradiction began, in quarters of a
-    /// millisecond.
+    /// Time since the sensor was heard last, since it said last that the arm moves, and since the
+    /// contradiction began, in quarters of a millisecond.
     heard: u32,
+    moved: u32,
     lasted: u32,
 }
 
@@ -277,6 +280,7 @@ impl Contradiction {
     const NONE: Self = Self {
         arm_moves: false,
         heard: u32::MAX,
+        moved: u32::MAX,
         lasted: 0,
     };
 
@@ -287,11 +291,16 @@ impl Contradiction {
 
     fn elapse(&mut self, quarters: u32, hand_rests: bool) {
         self.heard = self.heard.saturating_add(quarters);
-        let goes_on = hand_rests && self.arm_moves && self.heard <= HEARD_QUARTERS;
-        self.lasted = if goes_on {
-            self.lasted.saturating_add(quarters)
-        } else {
+        self.moved = if self.arm_moves {
             0
+        } else {
+            self.moved.saturating_add(quarters)
         };
+        let turns_back = self.moved <= REVERSAL_QUARTERS;
+        if !hand_rests || !turns_back || self.heard > HEARD_QUARTERS {
+            self.lasted = 0;
+        } else if self.arm_moves {
+            self.lasted = self.lasted.saturating_add(quarters);
+        }
     }
 }

@@ -223,6 +223,25 @@ fn an_arm_that_is_said_to_move_for_three_seconds_while_the_hand_rests_is_a_contr
 }
 
 #[test]
+fn an_arm_that_strokes_to_and_fro_while_the_hand_rests_is_a_contradiction_too() {
+    let mut rig = Rig::driving(&at(UpdateRate::Hz2000));
+    let contradicted = (1..=rig.ticks(5_000)).any(|tick| {
+        if tick.is_multiple_of(rig.ticks(10)) {
+            // 0.83 Hz, with some 60 ms below 10 mm/s at each end.
+            let turns = f64::from(tick) / f64::from(rig.ticks(1_000)) * 0.83;
+            let velocity_um_s = (70_000.0 * (std::f64::consts::TAU * turns).sin()) as i32;
+            rig.tell(Estimate {
+                velocity_um_s,
+                ..sound(0, 2.0)
+            });
+        }
+        rig.tick(0);
+        rig.state() == DisplayState::Fading(Hold::Contradiction)
+    });
+    assert!(contradicted);
+}
+
+#[test]
 fn an_arm_that_stops_a_second_after_the_hand_is_none() {
     for rate in RATES {
         let mut rig = Rig::driving(&at(rate));
