@@ -2,7 +2,7 @@
 //! docs/safety.md.
 
 use firmware_display::{ConverterFault, Display, Output, Readback, Transfer};
-use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, StopReason, Trip};
+use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, StopReason, Trip, UpdateRate};
 
 use crate::rig::{RATES, Rig, at, configured, sound};
 
