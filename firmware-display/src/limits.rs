@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn no_standing_voltage_that_is_balanced_away_breaks_the_limit() {
         // Whatever the sine is, ∫y stays within ± 5 V · MOST_S: from the one end to the other it adds no
-        // more than that over the time constant to the mean, 3.3 V. The worst is met by a crest that
+        // more than that over the time constant to the mean, 2.8 V. The worst is met by a crest that
         // follows a trough.
         for rate in RATES {
             let mut limits = Limits::new(rate, 5_000);
