@@ -13,8 +13,8 @@ use nucleo::care::care;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
 use protocol::{
-    Configuration, ConfigurationReport, Hello, Message, Motion, RoleCounters, SensorConfiguration,
-    SensorCounters, Refusal, Setting,
+    Configuration, ConfigurationReport, Hello, Message, Motion, Refusal, RoleCounters,
+    SensorConfiguration, SensorCounters, Setting,
 };
 use static_cell::StaticCell;
 

@@ -84,7 +84,9 @@ pub enum ElfError {
         reason: String,
     },
     /// A fault needs to know where something is in the firmware, and it is not to be found.
-    #[error("the {board} board can't be broken by \"{kind}\": its ELF does not show where: build it with symbols, as ./test does")]
+    #[error(
+        "the {board} board can't be broken by \"{kind}\": its ELF does not show where: build it with symbols, as ./test does"
+    )]
     Fault {
         /// Which board.
         board: &'static str,
@@ -162,7 +164,12 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
             let board = Nucleo::new(
-                SensorPins::new(sensor_world, arm, scene.sensor_configuration(), &scene.faults),
+                SensorPins::new(
+                    sensor_world,
+                    arm,
+                    scene.sensor_configuration(),
+                    &scene.faults,
+                ),
                 SensorPins::fit,
             );
             let take = |pins: &mut SensorPins, _: &mut Stm32f427| std::mem::take(&mut pins.scans);
@@ -349,9 +356,9 @@ fn record(
     for Said { at_ns, message } in heard.messages() {
         let from = last.saturating_sub(REORDERED);
         if let Message::Estimate(received) = message
-            && let Some(found) = estimates[from..].iter().position(|record| {
-                record.estimate == *received && record.received_ns.is_none()
-            })
+            && let Some(found) = estimates[from..]
+                .iter()
+                .position(|record| record.estimate == *received && record.received_ns.is_none())
         {
             last = from + found;
             estimates[last].received_ns = Some(*at_ns);

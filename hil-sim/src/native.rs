@@ -25,8 +25,8 @@ use crate::world::World;
 use firmware_display::{Display, Senses};
 use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
 use protocol::{
-    CHANNELS, DisplayState, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
-    RoleCounters, Safety, SensorCounters, Status,
+    CHANNELS, DisplayState, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause,
+    Role, RoleCounters, Safety, SensorCounters, Status,
 };
 
 const STEP_NS: u64 = 1_000_000_000 / firmware_sensor::SCAN_RATE_HZ as u64;
@@ -206,7 +206,9 @@ impl Pair {
         if place + 1 < SCANS_PER_SAMPLE {
             return;
         }
-        let output = self.sensor.step(step * STEP_NS / 1_000, &self.scans, encoder);
+        let output = self
+            .sensor
+            .step(step * STEP_NS / 1_000, &self.scans, encoder);
         self.sensor_counters.samples = self.sensor_counters.samples.wrapping_add(1);
         if output.drive != self.drive {
             self.drive = output.drive;

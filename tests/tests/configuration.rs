@@ -175,17 +175,18 @@ fn every_setting_of_a_scene_becomes_the_display_boards_and_is_acknowledged_with_
 
 #[test]
 fn the_display_board_refuses_what_is_out_of_range_by_name_and_range() {
-    let cases: [(&dyn Fn(&mut hil_sim::scene::Display), &str); 3] = [
+    type Change = fn(&mut hil_sim::scene::Display);
+    let cases: [(Change, &str); 3] = [
         (
-            &|display| display.configuration.amplitude_mv = 5_001,
+            |display| display.configuration.amplitude_mv = 5_001,
             "AmplitudeMv is out of range: give 0 to 5000",
         ),
         (
-            &|display| display.actuators[37].gain_q15 = 32_769,
+            |display| display.actuators[37].gain_q15 = 32_769,
             "ActuatorGain of actuator 37 is out of range: give 0 to 32768",
         ),
         (
-            &|display| display.actuators[3].x_um = -20_001,
+            |display| display.actuators[3].x_um = -20_001,
             "ActuatorX of actuator 3 is out of range: give -20000 to 20000",
         ),
     ];

@@ -10,13 +10,13 @@ use super::bounds::{
     LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
     TRAVEL, WAVELENGTH,
 };
-use super::{display, fault};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
     ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link,
     Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
+use super::{display, fault};
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
