@@ -19,7 +19,7 @@ pub struct Measurement {
     pub estimates: u32,
     /// Those that the estimator stands by.
     pub valid: u32,
-    /// Those of the valid that are more than [`estimates::WRONG`] off.
+    /// Those of the valid that are more than [`estimates::SETTLED`] off.
     pub wrong: u32,
 }
 
