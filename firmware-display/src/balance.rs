@@ -8,12 +8,11 @@
 //!
 //! A sine of ω goes through 2/ω of charge, wherever in the wave it begins. So a wave that gets on, by a turn
 //! in the time of one of [`SLOWEST_HZ`] at least, is given a room of ± [`MARGIN`] · 2/ω, and is let alone. Any
-//! other is none that is felt: a hand that trembles, or creeps, or turns back. It is given none, and what
-//! remains of it is a first-order high-pass. So it is for [`WORKING_S`] when a charge was beyond the room of a
-//! wave that gets on, as after a slower one: that long it takes to bring the charge back to the middle,
-//! from where it does not come near the room again. The charge of a channel is never beyond ± [`MOST_S`] times its
-//! amplitude, so that whatever repeats has no mean at all; and what is too much is forgotten with
-//! [`TIME_CONSTANT_S`].
+//! other is none that is felt: a hand that trembles, or creeps, or turns back. Then, and when a charge is
+//! beyond its room, as after a slower wave, none is given for [`WORKING_S`]. What remains is a first-order
+//! high-pass, which brings the charge back to the middle, from where a wave does not come near its room.
+//! The charge of a channel is never beyond ± [`MOST_S`] times its amplitude, so that whatever repeats has no
+//! mean at all; and what is too much is forgotten with [`TIME_CONSTANT_S`].
 
 use core::f64::consts::PI;
 
@@ -65,7 +64,8 @@ pub struct Balance {
     /// How far the wave has got in this period of [`SLOWEST_HZ`], in turns / 2³², and for how long it has.
     way: i64,
     ticks: u32,
-    gets_on: bool,
+    /// 1 or −1, and 0 at first.
+    direction: i32,
     shared: bool,
 }
 
@@ -77,7 +77,7 @@ impl Default for Balance {
             working: 0,
             way: 0,
             ticks: 0,
-            gets_on: true,
+            direction: 0,
             shared: true,
         }
     }
@@ -109,7 +109,7 @@ impl Balance {
         };
         self.watch(turn, rate);
         self.working = self.working.saturating_sub(1);
-        let needed = if self.gets_on && self.working == 0 {
+        let needed = if self.working == 0 {
             (room_and_turn / turn.unsigned_abs() as f32).min(MOST_ROOM) as i32
         } else {
             0
@@ -127,22 +127,36 @@ impl Balance {
             *lane = rest;
         }
         if self.ticks.is_multiple_of(LOOK_TICKS) && self.working == 0 {
+            // Not beyond the room as it is: that may still be growing.
             let charges = &self.charges[..lanes.len()];
-            if charges.iter().any(|charge| charge.abs() > room) {
-                self.working = (WORKING_S * rate.hz() as f32) as u32;
+            if charges.iter().any(|charge| charge.abs() > needed) {
+                self.work_off(rate);
             }
         }
     }
 
-    /// Whether the wave gets on, looked at once in a period of the slowest.
+    /// Looks whether the wave gets on, once in a period of the slowest, and does not turn back.
     fn watch(&mut self, turn: i32, rate: UpdateRate) {
+        if turn.signum() * self.direction < 0 {
+            self.work_off(rate);
+        }
+        if turn != 0 {
+            self.direction = turn.signum();
+        }
         self.way += i64::from(turn);
         self.ticks += 1;
         if self.ticks >= rate.hz() / SLOWEST_HZ as u32 {
-            self.gets_on = self.way.unsigned_abs() >= ENOUGH;
+            if self.way.unsigned_abs() < ENOUGH {
+                self.work_off(rate);
+            }
             self.way = 0;
             self.ticks = 0;
         }
+    }
+
+    /// No room is given for a while.
+    fn work_off(&mut self, rate: UpdateRate) {
+        self.working = (WORKING_S * rate.hz() as f32) as u32;
     }
 }
 
@@ -270,7 +284,7 @@ mod tests {
             let ticks = f64::from(rate.hz()) * TIME_CONSTANT_S / f64::from(1 << SOFTLY);
             // 250 Hz at 2 kHz, then a hand that stands still, then 250 Hz again.
             for turn in [1 << 29, 0, 1 << 29] {
-                for _ in 0..rate.hz() {
+                for _ in 0..2 * rate.hz() {
                     let before = balance.room;
                     balance.remove(&mut [0], OPEN, turn, rate);
                     let most = f64::from(MOST_ROOM) / ticks + 2.0;
