@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use hil_sim::recording::{ACTUATORS, Recording};
+use firmware_display::balance::TIME_CONSTANT_S;
+use hil_sim::recording::{ACTUATORS, Recording, volts};
 use tests::run::{Run, scene, scene_in};
 
 /// Okamoto et al. 2009, Fig. 7, over the boundary of Fig. 8.
@@ -134,8 +135,10 @@ fn all_channels_change_on_one_edge_to_one_voltage() {
     }
 }
 
+/// The phase comes back to the bit (firmware-display's own tests); what differs is what is taken off against
+/// a standing voltage after a reversal: charge over τ, of which a sine of ω goes through 2/ω on either way.
 #[test]
-fn a_reversed_stroke_plays_the_wave_back_word_for_word() {
+fn a_reversed_stroke_plays_the_wave_back() {
     let run = back_and_slower();
     // λ̂ settles to 2 mm on the way out, and stays in force on the way back until the next valid
     // estimate, which T2 keeps away for the length of a window.
@@ -170,12 +173,21 @@ fn a_reversed_stroke_plays_the_wave_back_word_for_word() {
         .filter(|(at_ns, ..)| (settled_ns..TURN_NS).contains(at_ns))
         .map(|&(_, encoder, words)| (encoder, words))
         .collect();
+    // 25 Hz on the way out, 17.5 Hz back.
+    let swing_s = |hz: f64| 2.0 / (std::f64::consts::TAU * hz);
+    let taken_v = 5.0 * (swing_s(25.0) + swing_s(17.5)) / TIME_CONSTANT_S;
     let mut played_back = 0;
     for (at_ns, encoder, back) in &words {
         if (TURN_NS..end_ns).contains(at_ns)
             && let Some(out) = out.get(encoder)
         {
-            assert_eq!(out, back, "at {at_ns} ns, encoder {encoder}");
+            for (out, back) in out.iter().zip(back) {
+                let apart_v = (volts(*out) - volts(*back)).abs();
+                assert!(
+                    apart_v <= taken_v,
+                    "at {at_ns} ns, encoder {encoder}: {apart_v} V apart, {taken_v} V taken"
+                );
+            }
             played_back += 1;
         }
     }
