@@ -1,1 +1,13 @@
-//! x
+//! Ridgelink at the operator's desk: boards found, watched, recorded, played back and carried over networks.
+//!
+//! ```text
+//! bench file, --sensor, --display ─> place ─> link ─> monitor, record, relay, doctor
+//! ```
+//!
+//! Nothing is estimated here: what the boards say is shown, kept and carried.
+
+pub mod bench;
+pub mod host_clock;
+pub mod link;
+pub mod place;
+pub mod state;

@@ -3,6 +3,7 @@
 //! library as the `hil-sim` command.
 
 pub mod elves;
+pub mod fake_board;
 pub mod history;
 pub mod run;
 pub mod sensing;
