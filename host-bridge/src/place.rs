@@ -107,6 +107,7 @@ mod tests {
                 serial_number: Some("066C".to_owned()),
                 manufacturer: None,
                 product: None,
+                interface: None,
             }),
         }
     }
