@@ -164,18 +164,21 @@ impl Programmer {
     /// # Errors
     /// If the flash could not be written, or does not hold what was written.
     pub fn write(&mut self, plan: &Plan, mut tell: impl FnMut(Progress)) -> Result<(), Trouble> {
-        let loader = plan.loader().map_err(|error| Trouble::flashing(&error))?;
+        let loader = plan
+            .loader()
+            .map_err(|error| Trouble::flashing(&error, false))?;
         let mut all: Vec<Progress> = Vec::new();
+        let mut is_begun = false;
         let mut options = DownloadOptions::default();
         options.verify = true;
         options.progress = FlashProgress::new(|event| {
             if let Some(progress) = advance(&mut all, &event) {
+                is_begun |= progress.done_bytes > 0;
                 tell(progress);
             }
         });
-        loader
-            .commit(&mut self.session, options)
-            .map_err(|error| Trouble::flashing(&error))
+        let result = loader.commit(&mut self.session, options);
+        result.map_err(|error| Trouble::flashing(&error, is_begun))
     }
 
     /// Resets the chip and lets it run.

@@ -163,24 +163,21 @@ impl Trouble {
         }
     }
 
-    /// Why erasing, writing or verifying stopped.
-    pub fn flashing(error: &FlashError) -> Self {
+    /// Why erasing, writing or verifying stopped; `is_begun` if a sector had been erased.
+    pub fn flashing(error: &FlashError, is_begun: bool) -> Self {
         let reason = chain(error);
         match error {
             FlashError::Verify => Self::Unverified,
-            FlashError::EraseFailed { .. } | FlashError::ChipEraseFailed { .. } => Self::Broken {
+            // A sector whose erasing failed may be half erased.
+            FlashError::EraseFailed { .. } => Self::Broken {
                 what: "erasing",
                 reason,
             },
-            FlashError::ResetAndHalt(_)
-            | FlashError::FlashAlgorithmNotLoaded
-            | FlashError::InvalidFlashAlgorithmLoadAddress { .. }
-            | FlashError::InvalidFlashAlgorithmStackSize { .. }
-            | FlashError::NoFlashLoaderAlgorithmAttached { .. } => Self::LostBefore { reason },
-            _ => Self::Broken {
+            _ if is_begun => Self::Broken {
                 what: "writing",
                 reason,
             },
+            _ => Self::LostBefore { reason },
         }
     }
 }
