@@ -8,6 +8,7 @@
 
 pub mod bench;
 mod hearing;
+pub mod flash;
 pub mod host_clock;
 mod line;
 pub mod link;
