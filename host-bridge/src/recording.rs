@@ -227,8 +227,7 @@ impl Desk {
                     ledger.enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
                 }
                 Taken::Refused(role, missing) => {
-                    ledger
-                        .enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
+                    ledger.enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
                 }
                 Taken::Nothing => {}
                 Taken::Closed => return Ok(()),

@@ -116,9 +116,13 @@ impl GaugeStream {
         Some((Role::Sensor, Message::Configure(configure)))
     }
 
-    /// What gives the sensor board its quiet back; none if it streams of its own accord, or not.
-    pub fn restoration(&self) -> Option<Message> {
-        let configuration = self.configuration.filter(|_| self.switched)?;
+    /// What gives the sensor board its quiet back; none if it streams of its own accord, or not. What it
+    /// reports from now on tells whether it has taken it.
+    pub fn restoration(&mut self) -> Option<Message> {
+        if !self.switched {
+            return None;
+        }
+        let configuration = self.configuration.take()?;
         Some(Message::Configure(streaming(configuration, false)))
     }
 

@@ -76,7 +76,11 @@ impl Serialize for Properties {
         let DataModelType::Struct(fields) = self.0.ty else {
             return Err(unreadable(self.0));
         };
-        serializer.collect_map(fields.iter().map(|field| (field.name, JsonSchema(field.ty))))
+        serializer.collect_map(
+            fields
+                .iter()
+                .map(|field| (field.name, JsonSchema(field.ty))),
+        )
     }
 }
 
@@ -125,7 +129,11 @@ pub fn cells(named: &'static NamedType, value: Option<&Value>, cells: &mut Vec<S
         }
         DataModelType::Struct(fields) => {
             for field in *fields {
-                self::cells(field.ty, value.and_then(|value| value.get(field.name)), cells);
+                self::cells(
+                    field.ty,
+                    value.and_then(|value| value.get(field.name)),
+                    cells,
+                );
             }
         }
         DataModelType::Tuple(items) => {

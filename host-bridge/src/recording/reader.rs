@@ -280,7 +280,8 @@ impl Reader {
                 let told = configurations
                     .into_iter()
                     .find(|(role, _)| role.name() == metadata.name);
-                if let (Some((role, kind)), Some(json)) = (told, metadata.metadata.get(CONFIGURATION))
+                if let (Some((role, kind)), Some(json)) =
+                    (told, metadata.metadata.get(CONFIGURATION))
                     && let Ok(row) = kind.read(json.as_bytes())
                 {
                     self.told.push((role, row));

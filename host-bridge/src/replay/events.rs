@@ -57,8 +57,11 @@ impl Events {
             }
             if !std::mem::replace(&mut self.begun, true) {
                 let known = std::mem::take(&mut self.known);
-                self.due
-                    .extend(known.into_iter().map(|(role, _, event)| (at_s, role, event)));
+                self.due.extend(
+                    known
+                        .into_iter()
+                        .map(|(role, _, event)| (at_s, role, event)),
+                );
             }
             let Entry { role, row, .. } = entry;
             if let Some(event) = self.event(role, row) {
@@ -77,7 +80,10 @@ impl Events {
         if !lasting {
             return;
         }
-        if let Some(event) = self.event(role, row).filter(|event| *event != Event::Restarted) {
+        if let Some(event) = self
+            .event(role, row)
+            .filter(|event| *event != Event::Restarted)
+        {
             self.known
                 .retain(|(of, what, _)| (*of, *what) != (role, kind));
             self.known.push((role, kind, event));
@@ -113,7 +119,11 @@ impl Events {
 
     /// Takes a sample; the message that it completes.
     fn gather(&mut self, row: GaugeRow) -> Option<protocol::Gauges> {
-        if self.samples.first().is_some_and(|first| first.block != row.block) {
+        if self
+            .samples
+            .first()
+            .is_some_and(|first| first.block != row.block)
+        {
             self.samples.clear();
         }
         self.samples.push(row);
