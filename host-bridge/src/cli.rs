@@ -100,7 +100,7 @@ fn put(seat: &mut Seat, place: Option<&Place>) {
             seat.port = None;
             seat.usb = Some(serial.clone());
         }
-        Some(Place::Anywhere) | None => {}
+        Some(Place::Among(_) | Place::Anywhere) | None => {}
     }
 }
 
