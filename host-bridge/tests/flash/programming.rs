@@ -165,7 +165,7 @@ fn a_chip_that_does_not_answer_is_tried_under_reset_and_then_refused() {
         reopened = true;
         Some(probe(&chip))
     })
-        .expect_err("nobody answers");
+    .expect_err("nobody answers");
     assert!(reopened);
     assert!(matches!(trouble, Trouble::NoAnswer { .. }), "{trouble:?}");
     assert!(trouble.to_string().contains("CN4"), "{trouble}");
@@ -266,7 +266,6 @@ fn probe_rs_fake_probe_shows_its_chip_and_no_more() {
         FakeProbe::with_mocked_core_and_binary(&memory).into_probe()
     };
     Programmer::attach(fake(0x2003_6419), &plan, || None).expect("our chip");
-    let trouble = Programmer::attach(fake(0x1000_6451), &plan, || None)
-        .expect_err("an F767");
+    let trouble = Programmer::attach(fake(0x1000_6451), &plan, || None).expect_err("an F767");
     assert!(matches!(trouble, Trouble::OtherChip { .. }), "{trouble:?}");
 }
