@@ -15,6 +15,7 @@ mod monitor;
 mod record;
 mod relay;
 mod replay;
+mod stdout;
 
 /// Ridgelink's bridge: flashes, watches, records and replays the boards, and carries their link over
 /// networks.

@@ -329,9 +329,8 @@ impl<F: FnMut(Event)> Reader<F> {
         line.port
             .receive(at_us, bytes, |message| messages.push(message));
         let peer = line.port.peer();
-        let counters = line.counters();
-        hearing.understand(at_us, &counters);
-        let state = self.state(path, hearing.judge(at_us, peer, &counters));
+        hearing.understand(at_us, &line.counters());
+        let state = self.state(path, hearing.judge(at_us, peer));
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
         if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {

@@ -1,10 +1,11 @@
 //! `host-bridge completions`.
 
-use std::io;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
 use clap_complete::Shell;
+
+use super::stdout;
 
 /// Which shell is to complete what is typed.
 #[derive(Debug, clap::Args)]
@@ -19,7 +20,9 @@ impl Completions {
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let mut command = super::Arguments::command();
         let name = command.get_name().to_owned();
-        clap_complete::generate(self.shell, &mut command, name, &mut io::stdout());
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut command, name, &mut script);
+        stdout::print(&script)?;
         Ok(ExitCode::SUCCESS)
     }
 }

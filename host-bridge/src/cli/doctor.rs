@@ -1,12 +1,13 @@
 //! `host-bridge doctor`.
 
-use std::io::{self, ErrorKind, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use anyhow::Context;
 use host_bridge::doctor::report::Style;
 use host_bridge::doctor::{findings, json, look, report};
+
+use super::stdout;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -53,13 +54,8 @@ impl Doctor {
             };
             report::write(&examination, &findings, style)
         };
-        match io::stdout().write_all(text.as_bytes()) {
-            // Whoever has read enough has not found the bench ill by that.
-            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-                return Err(error).context("standard output");
-            }
-            _ => {}
-        }
+        // Whoever has read enough has not found the bench ill by that.
+        stdout::print(text.as_bytes())?;
         Ok(ExitCode::from(u8::from(!findings.is_empty())))
     }
 }

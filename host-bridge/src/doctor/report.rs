@@ -110,7 +110,7 @@ fn of_board(out: &mut String, board: &BoardFacts, style: Style) {
     }
     if let Some(health) = board.health {
         let words = health.map(|health| format!("{health:?}").to_lowercase());
-        fact("gauges 0 to 4", words.join(", "));
+        fact("gauges 0-4", words.join(", "));
     }
     if let Some(clock) = &board.clock {
         fact(
