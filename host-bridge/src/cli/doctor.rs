@@ -7,7 +7,7 @@ use std::time::Duration;
 use host_bridge::doctor::report::Style;
 use host_bridge::doctor::{findings, json, look, report};
 
-use super::stdout;
+use super::output;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -55,7 +55,7 @@ impl Doctor {
             report::write(&examination, &findings, style)
         };
         // Whoever has read enough has not found the bench ill by that.
-        stdout::print(text.as_bytes())?;
+        output::print(&text)?;
         Ok(ExitCode::from(u8::from(!findings.is_empty())))
     }
 }

@@ -1,13 +1,13 @@
 //! `host-bridge flash`.
 
-use std::io::{self, BufRead, IsTerminal, Write};
+use std::io::{self, BufRead, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
-use clap::ValueEnum;
+use clap::{ValueEnum, ValueHint};
 use host_bridge::bench::Seat;
 use host_bridge::flash::console;
 use host_bridge::flash::firmware::{self, Firmware};
@@ -22,20 +22,22 @@ use protocol::{Hello, Role};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// What `flash` is asked for.
-#[derive(Debug, clap::Args)]
-#[command(
-    long_about = "\
+use super::output;
+
+/// What the command does.
+pub const ABOUT: &str = "\
 Writes a firmware to a board, verifies it, starts it and waits for its Hello.
 
 Before anything is erased, the ELF is looked at (whole, of Ridgelink, this board's, this chip's, this \
 protocol's, within the flash, able to start), then the console (not the other board's, not taken by another \
 program), then the chip behind the probe (the right one, not locked). While the flash is being written, \
-Ctrl-C waits for the end; a second one does not.",
-    after_long_help = "\
+Ctrl-C waits for the end; a second one does not.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
 Examples:
-  host-bridge flash sensor --dry-run        what would be done, without a probe
-  host-bridge flash sensor                  the only board that is plugged in
+  host-bridge flash sensor --dry-run     what would be done, without a probe
+  host-bridge flash sensor               the only board that is plugged in
   host-bridge flash display --probe 0483:374b:066CFF555185754867161530
   host-bridge flash display other.elf --bench lab.toml
 
@@ -43,15 +45,17 @@ The quick way, without these checks but with the board's log, is cargo's:
   cargo run --release --target thumbv7em-none-eabihf -p firmware-sensor
 
 Exit status: 0 done; 1 something was begun and failed, or the board does not say Hello; 2 refused, and \
-nothing was changed."
-)]
+nothing was changed.";
+
+/// What `flash` is asked for.
+#[derive(Debug, clap::Args)]
 pub struct Flash {
     /// The board that gets it
     #[arg(value_enum)]
     board: Board,
     /// The firmware; without it, the bench file's `elf`, or what the build left in
     /// target/thumbv7em-none-eabihf/release
-    #[arg(value_name = "ELF")]
+    #[arg(value_name = "ELF", value_hint = ValueHint::FilePath)]
     elf: Option<PathBuf>,
     /// The probe, if several are plugged in and the bench file does not name the board's
     #[arg(long, value_name = "VID:PID[:SERIAL]")]
@@ -213,10 +217,7 @@ impl Flash {
                 ),
             }
         };
-        match writeln!(io::stdout(), "{text}") {
-            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-            written => written.context("can't print the result"),
-        }
+        output::print(&text)
     }
 
     /// The probe that is meant; asks if that is not clear and somebody is there to be asked.
