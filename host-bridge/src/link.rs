@@ -300,7 +300,8 @@ impl<F: FnMut(Event)> Reader<F> {
                 self.pass(&mut hearing, at_us, message);
             }
         }
-        if let Some(line) = locked(&self.shared.line).take() {
+        let line = locked(&self.shared.line).take();
+        if let Some(line) = line {
             *locked(&self.shared.counters) = line.counters();
             ear.close(line.is_stuck());
         }

@@ -18,6 +18,11 @@ use crate::state::State;
 
 /// Longest wait for each board to be named as what it is: three ports without an answer, and a bit.
 const SETTLING: Duration = Duration::from_secs(5);
+/// How long a board that is not known may still be found behind another port: two links that began at each
+/// other's port have exchanged them within a look or two.
+const EXCHANGE: Duration = Duration::from_millis(600);
+/// Between two looks at whether all are settled.
+const TURN: Duration = Duration::from_millis(50);
 /// Between two pings: often enough to see a clock drift within seconds.
 const PING_EVERY: Duration = Duration::from_millis(100);
 
@@ -34,8 +39,8 @@ pub fn look(bench: &Bench, span: Duration) -> Examination {
         .collect();
     let probes = probes::attached().iter().map(ProbeFacts::from).collect();
     let settled = Instant::now() + SETTLING;
-    while watches.iter().any(|watch| !watch.is_settled) && Instant::now() < settled {
-        hear(&mut watches, &told, settled);
+    while watches.iter().any(|watch| !watch.is_settled()) && Instant::now() < settled {
+        hear(&mut watches, &told, Instant::now() + TURN);
     }
     let began = Instant::now();
     watches.iter_mut().for_each(Watch::begin);
@@ -91,8 +96,8 @@ fn hear(watches: &mut [Watch], told: &Receiver<Told>, until: Instant) {
 struct Watch {
     link: Link,
     facts: BoardFacts,
-    /// Whether it has been named as what it is.
-    is_settled: bool,
+    /// When it was last named as something.
+    named: Option<Instant>,
     exchanges: Vec<Exchange>,
     /// What its role says at a rate, and how much of it has been said since the beginning.
     said: u32,
@@ -115,10 +120,15 @@ impl Watch {
         Self {
             link,
             facts,
-            is_settled: false,
+            named: None,
             exchanges: Vec::new(),
             said: 0,
         }
+    }
+
+    /// Whether what it has been named as stands.
+    fn is_settled(&self) -> bool {
+        self.facts.state.is_known() || self.named.is_some_and(|named| named.elapsed() > EXCHANGE)
     }
 
     /// What was said before does not count for rates.
@@ -134,7 +144,7 @@ impl Watch {
     fn note(&mut self, event: Event) {
         match event {
             Event::Turned(state) => {
-                self.is_settled = !matches!(state, State::Opened { .. });
+                self.named = (!matches!(state, State::Opened { .. })).then(Instant::now);
                 if let State::Known { hello, .. }
                 | State::Foreign { hello, .. }
                 | State::Stranger { hello, .. } = &state
