@@ -13,6 +13,7 @@ mod nucleo;
 mod rtt;
 mod sensor;
 pub mod soak;
+mod terminal;
 mod traps;
 mod wire;
 
@@ -29,6 +30,7 @@ use rigless::time::VirtualNanos;
 pub use console::Told;
 pub use firmware::{Firmware, FirmwareError, Firmwares};
 pub use lockstep::{QUANTUM_NS, WARM_UP_NS};
+pub use terminal::{Terminal, Terminals};
 
 use crate::arm::Arm;
 use crate::digest::Digest;
@@ -133,7 +135,22 @@ pub struct BoardFacts {
 }
 
 /// Runs `scene` on the two firmwares.
+///
+/// # Errors
+/// If a board can't be emulated, stops before the scene's end, or does not take its configuration.
 pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFacts), ElfError> {
+    run_at(scene, firmwares, Terminals::default())
+}
+
+/// The same, with somebody at the consoles.
+///
+/// # Errors
+/// The same.
+pub fn run_at(
+    scene: &Scene,
+    firmwares: &Firmwares,
+    terminals: Terminals,
+) -> Result<(Recording, BoardFacts), ElfError> {
     let end_ns = (scene.duration_s * 1e9).ceil() as u64;
     let sensor_world = World::new(scene)?;
     let display_world = World::new(scene)?;
@@ -141,7 +158,7 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     let (to_display, from_sensor) = sync_channel(1);
     let (to_sensor, from_display) = sync_channel(1);
 
-    let sensor_driver = Lockstep::new(
+    let mut sensor_driver = Lockstep::new(
         scene,
         Role::Sensor,
         &firmwares.sensor.elf,
@@ -150,7 +167,7 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
             from_peer: from_display,
         },
     );
-    let display_driver = Lockstep::new(
+    let mut display_driver = Lockstep::new(
         scene,
         Role::Display,
         &firmwares.display.elf,
@@ -159,6 +176,8 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
             from_peer: from_sensor,
         },
     );
+    sensor_driver.terminal = terminals.sensor;
+    display_driver.terminal = terminals.display;
 
     let started = Instant::now();
     let (sensor, display) = thread::scope(|scope| {

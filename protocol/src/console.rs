@@ -19,7 +19,7 @@ pub const SILENCE_US: u64 = 5_000_000;
 /// How long the line must be quiet after a key, in µs: the bytes of a frame follow each other faster.
 const QUIET_US: u64 = 50_000;
 /// Most characters of a line.
-pub const LINE_BYTES: usize = 192;
+pub const LINE_BYTES: usize = 208;
 /// Ends a line on a terminal.
 pub(crate) const LINE_END: &[u8] = b"\r\n";
 /// Ends a line for a decoder.
@@ -92,8 +92,7 @@ impl Console {
 
 /// The meaning of what came before the line was quiet; none if it was not typed.
 fn key(typed: &[u8]) -> Option<Key> {
-    let is_typed = |byte: &u8| matches!(byte, b' '..=b'~' | b'\r' | b'\n');
-    if !typed.iter().all(is_typed) {
+    if !is_typed(typed) {
         return None;
     }
     if typed.iter().any(|byte| matches!(byte, b'?' | b'h')) {
@@ -104,4 +103,11 @@ fn key(typed: &[u8]) -> Option<Key> {
             .iter()
             .all(|byte| matches!(byte, b'!' | b'\r' | b'\n'));
     Some(if is_stop { Key::Stop } else { Key::Other })
+}
+
+/// Whether a person can have typed these.
+pub(crate) fn is_typed(bytes: &[u8]) -> bool {
+    bytes
+        .iter()
+        .all(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\n'))
 }

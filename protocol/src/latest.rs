@@ -2,7 +2,7 @@
 
 use crate::message::{Estimate, Message, Motion};
 
-/// The latest [`Estimate`] and [`Motion`], and when they were said, in µs of the owner's clock.
+/// The latest [`Estimate`] and [`Motion`], and when they were said or heard, in µs of the owner's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Latest {
     estimate: Option<(u64, Estimate)>,
@@ -18,8 +18,17 @@ impl Latest {
         }
     }
 
-    /// Takes note of a message that was said or heard at `now_us`.
-    pub fn note(&mut self, now_us: u64, message: &Message) {
+    /// Takes note of what the owner says itself.
+    pub fn said(&mut self, message: &Message) {
+        match message {
+            Message::Estimate(estimate) => self.estimate = Some((estimate.instant_us, *estimate)),
+            Message::Motion(motion) => self.motion = Some((motion.instant_us, *motion)),
+            _ => {}
+        }
+    }
+
+    /// Takes note of what the owner hears at `now_us`.
+    pub fn heard(&mut self, now_us: u64, message: &Message) {
         match message {
             Message::Estimate(estimate) => self.estimate = Some((now_us, *estimate)),
             Message::Motion(motion) => self.motion = Some((now_us, *motion)),

@@ -5,6 +5,7 @@
 
 use heapless::Deque;
 
+use crate::console::is_typed;
 use crate::frame::MAX_FRAME;
 use crate::message::{Message, Ping, Pong};
 use crate::receiver::{Event, Peer, Receiver};
@@ -91,25 +92,32 @@ impl Port {
             ..
         } = self;
         let mut ping: Option<Ping> = None;
-        receiver.receive(bytes, |event| {
-            match event {
-                Event::Message(message) => {
-                    // Nobody seemed to listen any more: somebody does.
-                    if sender.waits() {
-                        sender.on_unheralded();
-                    }
-                    match message {
-                        Message::Ping(asked) => ping = Some(asked),
-                        message => handle(message),
-                    }
-                }
-                Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
-                Event::Unheralded => sender.on_unheralded(),
-                Event::Foreign(_) => sender.on_foreign(),
-                Event::Text => return sender.on_text(),
+        // One that waits looks at every byte: a person may have typed right before a program came.
+        let portion = if sender.waits() { 1 } else { bytes.len() };
+        for bytes in bytes.chunks(portion.max(1)) {
+            if sender.waits() && begins_hello(bytes) && is_typed(receiver.unended()) {
+                receiver.forget_unended();
             }
-            *heard_us = now_us;
-        });
+            receiver.receive(bytes, |event| {
+                match event {
+                    Event::Message(message) => {
+                        // Nobody seemed to listen any more: somebody does.
+                        if sender.waits() {
+                            sender.on_unheralded();
+                        }
+                        match message {
+                            Message::Ping(asked) => ping = Some(asked),
+                            message => handle(message),
+                        }
+                    }
+                    Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
+                    Event::Unheralded => sender.on_unheralded(),
+                    Event::Foreign(_) => sender.on_foreign(),
+                    Event::Text => return sender.on_text(),
+                }
+                *heard_us = now_us;
+            });
+        }
         self.stirred_us = now_us;
         if let Some(Ping { sent_us }) = ping {
             self.post(&Message::Pong(Pong {
@@ -192,4 +200,10 @@ impl Port {
             ..self.receiver.counters()
         }
     }
+}
+
+/// Whether a [`Hello`]'s frame may begin so: with the code of one of the three bytes before its magic, of
+/// which the last is always 0.
+fn begins_hello(bytes: &[u8]) -> bool {
+    matches!(bytes, [1..=3, ..])
 }

@@ -15,6 +15,7 @@ use super::injector::Injector;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use super::rtt::Log;
 use super::sensor::SensorPins;
+use super::terminal::{self, Terminal};
 use super::wire::TimedByte;
 use crate::fault::{Clock, Fault, Way};
 use crate::scene::Scene;
@@ -75,6 +76,8 @@ pub struct Lockstep {
     /// What the peer's bytes go through.
     way: Way,
     console: Option<ConsoleHost>,
+    /// Who sits at the console if no host does.
+    pub terminal: Option<Box<dyn Terminal>>,
     injector: Injector,
     /// The board's.
     clock: Clock,
@@ -108,6 +111,7 @@ impl Lockstep {
             cable,
             way: Way::new(scene, role),
             console: console_for(scene, role),
+            terminal: None,
             injector: Injector::new(scene, role, elf, clock.clone()),
             clock,
             log: Log::find(elf),
@@ -173,6 +177,8 @@ impl Lockstep {
         }
         if let Some(host) = &mut self.console {
             host.serve(board, now_ns);
+        } else if let Some(terminal) = &mut self.terminal {
+            terminal::carry(&mut **terminal, board, now_ns);
         }
         true
     }

@@ -105,9 +105,8 @@ impl Ports {
 
     /// Says `message` to whoever listens on either port.
     pub fn post(&self, message: &Message) {
-        let now_us = Instant::now().as_micros();
         self.with(Side::Peer, |port, latest| {
-            latest.note(now_us, message);
+            latest.said(message);
             port.post(message);
         });
         self.with(Side::Console, |port, _| port.post(message));
@@ -162,7 +161,7 @@ impl Ports {
                     let now_us = Instant::now().as_micros();
                     self.with(side, |port, latest| {
                         port.receive(now_us, &bytes[..count], |message| {
-                            latest.note(now_us, &message);
+                            latest.heard(now_us, &message);
                             handle(message);
                         })
                     });
