@@ -2,10 +2,10 @@
 
 use protocol::{
     ACTUATOR_BLOCK, Actuator, Actuators, CHANNELS, Configuration, ConfigurationReport, Contact,
-    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth, GaugeSample,
-    Gauges, Hold, Message, Method, Mode, Motion, Pong, PortCounters, Range, Refusal, ResetCause,
-    Role, RoleCounters, Safety, SensorConfiguration, SensorCounters, Setting, Status, Stop,
-    StopReason, Trip, UpdateRate,
+    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth,
+    GaugeSample, Gauges, Hold, Message, Method, Mode, Motion, Pong, PortCounters, Range, Refusal,
+    ResetCause, Role, RoleCounters, Safety, SensorConfiguration, SensorCounters, Setting, Status,
+    Stop, StopReason, Trip, UpdateRate,
 };
 
 /// Says things, each different.

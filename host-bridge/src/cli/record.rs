@@ -247,7 +247,9 @@ impl Session<'_> {
         match self.told.recv_timeout(wait) {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                if let Event::Turned(state) = &event {
+                if let Event::Turned(state) = &event
+                    && !matches!(state, State::Opened { .. })
+                {
                     self.screen
                         .tell(&format!("{}: {}", role.name(), words(state)));
                 }

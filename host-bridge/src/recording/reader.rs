@@ -171,10 +171,10 @@ impl Reader {
         self.ended == Some(Ending::Cut)
     }
 
-    /// A time of an entry in s since the recording's start.
+    /// A time of an entry in s since the recording's first; 0 for samples that were taken some ms before it.
     pub fn since_start_s(&self, log_ns: u64) -> f64 {
         let first_ns = self.first_ns.unwrap_or(log_ns);
-        (i128::from(log_ns) - i128::from(first_ns)) as f64 / NS_PER_S
+        log_ns.saturating_sub(first_ns) as f64 / NS_PER_S
     }
 
     /// The next entry, in the order in which they were heard; none at the end.
