@@ -9,6 +9,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::fake_board;
+
 /// Between two looks at whether a program has ended.
 const LOOK: Duration = Duration::from_millis(2);
 
@@ -106,7 +108,10 @@ impl Running {
     /// # Panics
     /// If it can't be started.
     pub fn start(command: &mut Command) -> Self {
-        let mut child = command.spawn().expect("the program can be started");
+        let mut child = {
+            let _alone = fake_board::start();
+            command.spawn().expect("the program can be started")
+        };
         let stdout = child.stdout.take().map(read);
         let stderr = child.stderr.take().map(read);
         Self {

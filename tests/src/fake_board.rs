@@ -4,7 +4,7 @@
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -52,7 +52,7 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
-        let (mut master, kept) = TTYPort::pair().expect("the system has pseudo-terminals");
+        let (mut master, kept) = pair();
         let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
         master.set_timeout(LOOK).expect("a timeout can be set");
         let (orders, given) = channel();
@@ -107,6 +107,26 @@ impl FakeBoard {
     pub fn take_heard(&self) -> Vec<Message> {
         std::mem::take(&mut self.heard.lock().unwrap_or_else(PoisonError::into_inner))
     }
+}
+
+/// Programs are started while nobody holds this.
+static STARTS: Mutex<()> = Mutex::new(());
+
+/// Held while a program is started, or while there are files that it must not get.
+pub(crate) fn start() -> MutexGuard<'static, ()> {
+    STARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A pseudo-terminal that no program that is started gets an end of: it would keep the cable in when the
+/// board pulls it.
+fn pair() -> (TTYPort, TTYPort) {
+    let _alone = start();
+    let (master, slave) = TTYPort::pair().expect("the system has pseudo-terminals");
+    let own = |port: TTYPort| {
+        port.try_clone_native()
+            .expect("a port has another handle, which is closed where a program starts")
+    };
+    (own(master), own(slave))
 }
 
 impl Drop for FakeBoard {
