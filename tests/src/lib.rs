@@ -2,7 +2,9 @@
 //! folder of this package: they run scenes on the two ELFs that a user would flash, through the same
 //! library as the `hil-sim` command.
 
+pub mod bridge;
 pub mod elves;
+pub mod fake_board;
 pub mod history;
 pub mod run;
 pub mod sensing;
