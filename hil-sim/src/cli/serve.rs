@@ -10,7 +10,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use hil_sim::scene::{Motion, Scene};
-use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError, Standing};
+use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, Standing};
 
 use super::{Elves, number};
 use input::{Input, Keys};
@@ -158,11 +158,10 @@ impl Serve {
         drop(raw);
         match bench.stop() {
             Ok(()) => Ok(ExitCode::SUCCESS),
-            Err(error @ ServeError::Stopped { .. }) => {
+            Err(error) => {
                 eprintln!("{error}");
                 Ok(ExitCode::from(1))
             }
-            Err(error) => Err(error.into()),
         }
     }
 }
