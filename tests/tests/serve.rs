@@ -83,10 +83,7 @@ fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is() {
             "{text}"
         );
     }
-    assert!(
-        text.contains("firmware-sensor\"") && !text.contains("link"),
-        "{text}"
-    );
+    assert!(text.contains("firmware-sensor\""), "{text}");
     let refused = Bench::start(Options::new(folder("file")), elves::both());
     assert!(
         matches!(refused, Err(ServeError::Taken { .. })),
@@ -155,7 +152,7 @@ fn at_a_wrong_baud_rate_neither_side_understands_the_other_and_at_the_right_one_
             client
                 .listen(|message| panic!("{message:?} at {baud} baud"))
                 .unwrap();
-            (client.bytes > 2_000).then_some(())
+            (client.bytes > 20).then_some(())
         });
         assert_eq!(client.counters().received, 0);
     }
@@ -169,11 +166,6 @@ fn boards_apart_hear_each_other_only_through_whoever_carries_their_bytes() {
         options.is_apart = true;
     });
     let bench = &alone.bench;
-    assert!(
-        fs::read_to_string(bench.bench_file())
-            .unwrap()
-            .contains("link = ")
-    );
     let mut console = Client::open(&bench.path(PortName::DisplayConsole), BAUD);
     let followed = |message| match message {
         Message::Status(status) => match status.role {

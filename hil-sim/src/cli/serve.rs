@@ -179,6 +179,13 @@ fn greet(bench: &Bench, scene: &str, has_keys: bool) {
         bench.bench_file().display(),
         bench.path(PortName::SensorConsole).display()
     );
+    if bench.is_plugged(PortName::SensorLink) {
+        text += &format!(
+            "  host-bridge relay sensor --sensor {}\n  host-bridge relay display --display {}\n",
+            bench.path(PortName::SensorLink).display(),
+            bench.path(PortName::DisplayLink).display()
+        );
+    }
     if has_keys {
         text +=
             "keys: ↑ ↓ ← → space hand, 1–6 cables, r d reset, e emergency stop, q quit, ? help\n";

@@ -324,7 +324,7 @@ impl Bench {
                 bench.shared.socket(name).plug()?;
             }
         }
-        bench.folder.describe(firmwares, is_apart)?;
+        bench.folder.describe(firmwares)?;
         Ok(bench)
     }
 
