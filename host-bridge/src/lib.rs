@@ -1,1 +1,19 @@
-//! x
+//! Ridgelink at the operator's desk: boards found, watched, recorded, played back and carried over networks.
+//!
+//! ```text
+//! bench file, --sensor, --display ─> place ─> link ─> monitor, record, relay, doctor
+//! ```
+//!
+//! Nothing is estimated here: what the boards say is shown, kept and carried.
+
+pub mod bench;
+pub mod doctor;
+pub mod flash;
+mod hearing;
+pub mod host_clock;
+mod line;
+pub mod link;
+pub mod place;
+mod restart;
+mod search;
+pub mod state;

@@ -1,11 +1,17 @@
-//! The tool at the operator's desk. It has no commands yet; until it has, boards are flashed by cargo's
-//! runner and watched by probe-rs (README, "On hardware").
+//! The tool at the operator's desk. See the library for what it is made of.
 
-fn main() -> std::process::ExitCode {
-    eprintln!(
-        "host-bridge has no commands in this version: flash a board with \
-         `cargo run --release --target thumbv7em-none-eabihf -p firmware-sensor` (or firmware-display), \
-         run the pair without hardware with ./demo"
-    );
-    std::process::ExitCode::from(2)
+use std::process::ExitCode;
+
+use clap::Parser;
+
+mod cli;
+
+fn main() -> ExitCode {
+    match cli::Arguments::parse().execute() {
+        Ok(status) => status,
+        Err(error) => {
+            eprintln!("host-bridge: {error:#}");
+            ExitCode::from(2)
+        }
+    }
 }

@@ -4,7 +4,9 @@
 
 #[cfg(target_os = "linux")]
 pub mod bench;
+pub mod bridge;
 pub mod elves;
+pub mod fake_board;
 pub mod history;
 pub mod run;
 pub mod sensing;

@@ -1,11 +1,18 @@
-//! Arbitrary messages, and the longest of each kind.
+//! Messages for tests, and what carries them: arbitrary ones, the longest and a sample of each kind.
 #![allow(
     dead_code,
+    unused_imports,
     reason = "each test binary uses its own part of this module"
 )]
 
+mod longest;
+mod samples;
+
 use proptest::prelude::*;
 use protocol::*;
+
+pub use longest::longest_like;
+pub use samples::samples;
 
 /// A compatible Hello that asks for an answer.
 pub fn hello() -> Hello {
@@ -149,30 +156,6 @@ pub const HEALTHS: [GaugeHealth; 6] = [
     GaugeHealth::Hum,
 ];
 
-/// Every [`Hold`], in the wire's order.
-pub const HOLDS: [Hold; 6] = [
-    Hold::Stale,
-    Hold::Distrust,
-    Hold::Flood,
-    Hold::Contradiction,
-    Hold::Unheard,
-    Hold::FullDrive,
-];
-/// Every [`Trip`], in the wire's order.
-pub const TRIPS: [Trip; 12] = [
-    Trip::Operator,
-    Trip::Host,
-    Trip::EmergencyStop,
-    Trip::HandEncoder,
-    Trip::Converter,
-    Trip::Transfer,
-    Trip::Limit,
-    Trip::Memory,
-    Trip::Watchdog,
-    Trip::Panic,
-    Trip::Fault,
-    Trip::StackOverflow,
-];
 /// Every [`Setting`], in the wire's order.
 pub const SETTINGS: [Setting; 21] = [
     Setting::Role,
@@ -439,282 +422,7 @@ fn state() -> impl Strategy<Value = DisplayState> {
         Just(DisplayState::Boot),
         Just(DisplayState::Ready),
         Just(DisplayState::Driving),
-        proptest::sample::select(HOLDS.to_vec()).prop_map(DisplayState::Fading),
-        proptest::sample::select(TRIPS.to_vec()).prop_map(DisplayState::Stopped),
-    ]
-}
-
-/// The longest message of the same kind: every number where its varint is longest. The match names
-/// every variant, so that a new one does not compile until it stands here too.
-pub fn longest_like(message: &Message) -> Message {
-    match message {
-        Message::Hello(hello) => Message::Hello(*hello),
-        Message::Estimate(_) => Message::Estimate(Estimate {
-            sequence: u32::MAX,
-            instant_us: u64::MAX,
-            wavelength_mm: Some(f32::MAX),
-            valid: true,
-            confidence: f32::MAX,
-            amplitude_lsb: f32::MAX,
-            counted_mm: Some(f32::MAX),
-            range: Range::T2,
-            contact: Contact::StickSlip,
-            velocity_um_s: i32::MIN,
-            lag_um: Some(i32::MIN),
-            gauges_used: u8::MAX,
-            health: [GaugeHealth::Hum; GAUGES],
-        }),
-        Message::Motion(_) => Message::Motion(Motion {
-            sequence: u32::MAX,
-            instant_us: u64::MAX,
-            position_um: i64::MIN,
-            velocity_um_s: i32::MIN,
-        }),
-        Message::Gauges(_) => Message::Gauges(Gauges {
-            first_sample: u32::MAX,
-            instant_us: u64::MAX,
-            position_um: i64::MIN,
-            samples: [GaugeSample {
-                codes: [u16::MAX; CHANNELS],
-                travel_um: i16::MIN,
-            }; GAUGE_BLOCK],
-        }),
-        Message::Status(_) => Message::Status(Status {
-            uptime_us: u64::MAX,
-            reset: ResetCause::Software,
-            watchdog_resets: u32::MAX,
-            peer: port([u32::MAX; 13]),
-            console: port([u32::MAX; 13]),
-            role: RoleCounters::Display(display_counters([u32::MAX; 14])),
-        }),
-        Message::Configure(_) => Message::Configure(longest_configuration()),
-        Message::Configuration(_) => Message::Configuration(ConfigurationReport {
-            refused: Some(Refusal {
-                setting: Setting::ActuatorGain,
-                index: u8::MAX,
-                low: i64::MIN,
-                high: i64::MIN,
-            }),
-            hash: u32::MAX,
-            configuration: longest_configuration(),
-        }),
-        Message::Ping(_) => Message::Ping(Ping { sent_us: u64::MAX }),
-        Message::Pong(_) => Message::Pong(Pong {
-            sent_us: u64::MAX,
-            received_us: u64::MAX,
-            answered_us: u64::MAX,
-        }),
-        Message::Stop(_) => Message::Stop(Stop {
-            reason: StopReason::Host,
-        }),
-        Message::Actuators(_) => Message::Actuators(Actuators {
-            first: u8::MAX,
-            actuators: [actuator((i16::MIN, i16::MIN, u16::MAX, u16::MAX, true)); ACTUATOR_BLOCK],
-        }),
-        Message::Safety(_) => Message::Safety(Safety {
-            instant_us: u64::MAX,
-            state: DisplayState::Stopped(Trip::StackOverflow),
-        }),
-    }
-}
-
-fn longest_configuration() -> Configuration {
-    Configuration::Sensor(SensorConfiguration {
-        method: Method::Crossings,
-        window_ms: u16::MAX,
-        counted_gauge: u8::MAX,
-        gauges: u8::MAX,
-        bank_travel_percent: u16::MAX,
-        bank_candidates: u8::MAX,
-        force_channel: true,
-        force_mn_per_v: u16::MAX,
-        stiffness_n_per_m: u16::MAX,
-        stream_gauges: true,
-        arm_full_scale_um_s: u32::MAX,
-    })
-}
-
-/// One message of each kind, with every role and both outcomes of a configuration.
-pub fn samples() -> Vec<(&'static str, Message)> {
-    let sensor = Configuration::Sensor(SensorConfiguration {
-        method: Method::Counting,
-        window_ms: 80,
-        counted_gauge: 2,
-        gauges: 0b1_0111,
-        bank_travel_percent: 150,
-        bank_candidates: 20,
-        force_channel: true,
-        force_mn_per_v: 1_500,
-        stiffness_n_per_m: 400,
-        stream_gauges: true,
-        arm_full_scale_um_s: 200_000,
-    });
-    let display = Configuration::Display(DisplayConfiguration {
-        mode: Mode::Travelling,
-        update_rate: UpdateRate::Hz4000,
-        max_age_ms: 500,
-        fade_in_ms: 20,
-        fade_out_ms: 50,
-        glide_ms: 20,
-        amplitude_mv: 5_000,
-        reference_lsb: 300,
-        full_drive_s: 600,
-        actuators: 0x1234_5678,
-    });
-    let status = |role| {
-        Message::Status(Status {
-            uptime_us: 5_000_000,
-            reset: ResetCause::Watchdog,
-            watchdog_resets: 1,
-            peer: port(core::array::from_fn(|i| 1 + i as u32)),
-            console: port(core::array::from_fn(|i| 1_000 + i as u32)),
-            role,
-        })
-    };
-    vec![
-        ("hello", Message::Hello(hello())),
-        (
-            "estimate",
-            Message::Estimate(Estimate {
-                sequence: 300,
-                instant_us: 3_000_000,
-                wavelength_mm: Some(2.0),
-                valid: true,
-                confidence: 0.75,
-                amplitude_lsb: 512.5,
-                counted_mm: Some(2.5),
-                range: Range::T2,
-                contact: Contact::StickSlip,
-                velocity_um_s: 70_000,
-                lag_um: Some(-150),
-                gauges_used: 0b0_0010,
-                health: [
-                    GaugeHealth::Dead,
-                    GaugeHealth::Good,
-                    GaugeHealth::Stuck,
-                    GaugeHealth::Saturated,
-                    GaugeHealth::Hum,
-                ],
-            }),
-        ),
-        (
-            "estimate without a wavelength",
-            Message::Estimate(Estimate {
-                sequence: 0,
-                instant_us: 10_000,
-                wavelength_mm: None,
-                valid: false,
-                confidence: 0.0,
-                amplitude_lsb: 0.0,
-                counted_mm: None,
-                range: Range::T1,
-                contact: Contact::Unknown,
-                velocity_um_s: 0,
-                lag_um: None,
-                gauges_used: 0b1_1111,
-                health: [GaugeHealth::Good; GAUGES],
-            }),
-        ),
-        (
-            "motion",
-            Message::Motion(Motion {
-                sequence: 1_500,
-                instant_us: 3_000_000,
-                position_um: -12_345,
-                velocity_um_s: 70_000,
-            }),
-        ),
-        (
-            "gauges",
-            Message::Gauges(Gauges {
-                first_sample: 4_000,
-                instant_us: 4_000_000,
-                position_um: 20_000,
-                samples: core::array::from_fn(|i| GaugeSample {
-                    codes: core::array::from_fn(|channel| 32_768 + 100 * i as u16 + channel as u16),
-                    travel_um: i as i16 - 4,
-                }),
-            }),
-        ),
-        (
-            "sensor's status",
-            status(RoleCounters::Sensor(sensor_counters([
-                5_000, 1, 2, 3, 500, 2_500,
-            ]))),
-        ),
-        (
-            "display's status",
-            status(RoleCounters::Display(display_counters([
-                10_000, 9_000, 1, 500, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11,
-            ]))),
-        ),
-        ("configure a sensor", Message::Configure(sensor)),
-        ("configure a display", Message::Configure(display)),
-        (
-            "configuration taken",
-            Message::Configuration(ConfigurationReport {
-                refused: None,
-                hash: sensor.hash(),
-                configuration: sensor,
-            }),
-        ),
-        (
-            "configuration refused",
-            Message::Configuration(ConfigurationReport {
-                refused: Some(Refusal {
-                    setting: Setting::ActuatorX,
-                    index: 37,
-                    low: -20_000,
-                    high: 20_000,
-                }),
-                hash: 0x0102_0304,
-                configuration: display,
-            }),
-        ),
-        ("ping", Message::Ping(Ping { sent_us: 1_000 })),
-        (
-            "pong",
-            Message::Pong(Pong {
-                sent_us: 1_000,
-                received_us: 2_000,
-                answered_us: 2_050,
-            }),
-        ),
-        (
-            "stop by the operator",
-            Message::Stop(Stop {
-                reason: StopReason::Operator,
-            }),
-        ),
-        (
-            "stop by the host",
-            Message::Stop(Stop {
-                reason: StopReason::Host,
-            }),
-        ),
-        (
-            "actuators",
-            Message::Actuators(Actuators {
-                first: 20,
-                actuators: core::array::from_fn(|i| {
-                    let i = i as i16;
-                    actuator((-1_500 * i, 700, 0x8000, 0x4000, i % 2 == 1))
-                }),
-            }),
-        ),
-        (
-            "safety: driving",
-            Message::Safety(Safety {
-                instant_us: 3_000_000,
-                state: DisplayState::Driving,
-            }),
-        ),
-        (
-            "safety: stopped",
-            Message::Safety(Safety {
-                instant_us: 3_000_000,
-                state: DisplayState::Stopped(Trip::Converter),
-            }),
-        ),
+        proptest::sample::select(Hold::ALL.to_vec()).prop_map(DisplayState::Fading),
+        proptest::sample::select(Trip::ALL.to_vec()).prop_map(DisplayState::Stopped),
     ]
 }

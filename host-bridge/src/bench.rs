@@ -1,0 +1,183 @@
+//! The bench: which board is where, from a file and from the command line.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use protocol::Role;
+use serde::Deserialize;
+
+use crate::place::Place;
+
+/// The bench file that is looked for in the current folder.
+pub const FILE_NAME: &str = "ridgelink.toml";
+
+/// Everything known of a bench.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Bench {
+    /// The sensor board.
+    pub sensor: Seat,
+    /// The display board.
+    pub display: Seat,
+}
+
+/// What is known of one board. All of it may be left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Seat {
+    /// Its console's port.
+    pub port: Option<PathBuf>,
+    /// Its ST-LINK's serial number: the port is then found by it, whatever it is called, and so is the
+    /// probe to flash by.
+    pub usb: Option<String>,
+    /// Its firmware: to flash, and to read its log.
+    pub elf: Option<PathBuf>,
+    /// Where the raw bytes of its log's RTT channel can be read, if not by the probe: a file or a
+    /// pseudo-terminal, or `tcp:HOST:PORT`.
+    pub rtt: Option<String>,
+}
+
+impl Seat {
+    /// Where its console is looked for.
+    pub fn place(&self) -> Place {
+        match (&self.port, &self.usb) {
+            (Some(port), _) => Place::Port(port.clone()),
+            (None, Some(serial)) => Place::Usb(serial.clone()),
+            (None, None) => Place::Anywhere,
+        }
+    }
+}
+
+/// Why a bench can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The file can't be read.
+    #[error("{path}: can't be read: {source}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file is no bench.
+    #[error("{path}: {source}")]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and key.
+        source: Box<toml::de::Error>,
+    },
+    /// Both boards are said to be at one place.
+    #[error("{place} can't be both boards: give each its own port or serial number")]
+    Twice {
+        /// The place.
+        place: String,
+    },
+}
+
+impl Bench {
+    /// Reads a bench file.
+    ///
+    /// # Errors
+    /// If it can't be read or is no bench.
+    pub fn read(path: &Path) -> Result<Self, BenchError> {
+        let text = fs::read_to_string(path).map_err(|source| BenchError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        let bench: Self = toml::from_str(&text).map_err(|source| BenchError::Malformed {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })?;
+        bench.checked()
+    }
+
+    /// The bench file to be used: `given`, else [`FILE_NAME`] in the current folder, else
+    /// `ridgelink/bench.toml` in the user's folder of settings; none of them is an empty bench.
+    ///
+    /// # Errors
+    /// If the file can't be read or is no bench.
+    pub fn find(given: Option<&Path>) -> Result<Self, BenchError> {
+        let settings = std::env::var_os("XDG_CONFIG_HOME")
+            .map(PathBuf::from)
+            .or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".config")));
+        let usual = [
+            Some(PathBuf::from(FILE_NAME)),
+            settings.map(|folder| folder.join("ridgelink").join("bench.toml")),
+        ];
+        match given {
+            Some(path) => Self::read(path),
+            None => match usual.into_iter().flatten().find(|path| path.exists()) {
+                Some(path) => Self::read(&path),
+                None => Ok(Self::default()),
+            },
+        }
+    }
+
+    /// The same, unless both boards are at one place.
+    ///
+    /// # Errors
+    /// If they are.
+    pub fn checked(self) -> Result<Self, BenchError> {
+        let place = self.sensor.place();
+        if place != Place::Anywhere && place == self.display.place() {
+            return Err(BenchError::Twice {
+                place: place.to_string(),
+            });
+        }
+        Ok(self)
+    }
+
+    /// What is known of the board of `role`; a host has no seat.
+    pub const fn seat(&self, role: Role) -> Option<&Seat> {
+        match role {
+            Role::Sensor => Some(&self.sensor),
+            Role::Display => Some(&self.display),
+            Role::Host => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bench_names_ports_serial_numbers_and_firmwares() {
+        let text =
+            "[sensor]\nport = \"/dev/ttyACM0\"\nelf = \"sensor.elf\"\n[display]\nusb = \"066C\"\n";
+        let bench: Bench = toml::from_str(text).expect("a bench");
+        assert_eq!(bench.sensor.place(), Place::Port("/dev/ttyACM0".into()));
+        assert_eq!(bench.sensor.elf.as_deref(), Some(Path::new("sensor.elf")));
+        assert_eq!(bench.display.place(), Place::Usb("066C".to_owned()));
+    }
+
+    #[test]
+    fn a_key_that_does_not_exist_is_refused_by_line_and_name() {
+        let error = toml::from_str::<Bench>("[sensor]\nprot = \"x\"\n").expect_err("no such key");
+        let message = error.to_string();
+        assert!(
+            message.contains("line 2") && message.contains("prot"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn the_example_is_a_bench() {
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("doc/bench.toml");
+        let bench = Bench::read(&example).expect("a bench");
+        for seat in [&bench.sensor, &bench.display] {
+            assert!(seat.usb.is_some() && seat.elf.is_some(), "{seat:?}");
+        }
+        assert_eq!(bench.display.place(), Place::Port("/dev/ttyACM1".into()));
+    }
+
+    #[test]
+    fn one_port_for_two_boards_is_refused() {
+        let text = "[sensor]\nport = \"/dev/a\"\n[display]\nport = \"/dev/a\"\n";
+        let bench: Bench = toml::from_str(text).expect("well-formed");
+        let message = bench.checked().expect_err("one port twice").to_string();
+        assert!(message.starts_with("/dev/a can't be both"), "{message}");
+    }
+}

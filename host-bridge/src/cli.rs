@@ -1,0 +1,124 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueHint};
+use host_bridge::bench::{Bench, BenchError, Seat};
+use host_bridge::place::Place;
+
+mod completions;
+mod doctor;
+mod flash;
+mod man;
+mod monitor;
+mod output;
+mod record;
+mod relay;
+mod replay;
+
+/// Ridgelink's bridge: flashes, watches, records and replays the boards, and carries their link over
+/// networks.
+#[derive(Debug, Parser)]
+#[command(
+    name = "host-bridge",
+    version,
+    about,
+    after_long_help = "\
+Boards are found by themselves: every ST-LINK that is plugged in is asked who is behind it. Where there are \
+several benches, or ports that are none of an ST-LINK's, --sensor and --display say where, or a bench file \
+does, which also names firmwares and probes.
+
+A first session:
+  host-bridge doctor                 what is attached, and what is wrong
+  host-bridge flash sensor           the boards' firmwares, one after the other
+  host-bridge flash display
+  host-bridge monitor                what they say, as it comes
+  host-bridge record                 the same, kept
+  host-bridge replay                 and played again
+
+Results go to standard output, progress and complaints to standard error. Exit status 0 means done, 2 that \
+what was asked for can't be done; what 1 means, each command's own --help says."
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Writes a firmware to a board, verifies it and waits for the board's Hello
+    #[command(long_about = flash::ABOUT, after_long_help = flash::EXAMPLES)]
+    Flash(flash::Flash),
+    /// Shows what the boards say, in the terminal or line by line
+    Monitor(monitor::Monitor),
+    /// Writes everything that the boards say to MCAP or CSV
+    Record(record::Record),
+    /// Plays a recording into a monitor, a board or the simulator
+    Replay(replay::Replay),
+    /// Carries the link between two sites over a network
+    Relay(relay::Relay),
+    /// Looks at what is attached, and says what is wrong and what to do
+    Doctor(doctor::Doctor),
+    /// Prints completions for a shell
+    #[command(after_long_help = completions::EXAMPLES)]
+    Completions(completions::Completions),
+    /// Writes the man pages
+    #[command(after_long_help = man::EXAMPLES)]
+    Man(man::Man),
+}
+
+/// Where the boards are.
+#[derive(Clone, Debug, Args)]
+struct Where {
+    /// The bench file; without it, ridgelink.toml in this folder, or ridgelink/bench.toml in the user's
+    /// settings, if there is one
+    #[arg(long, value_name = "FILE", env = "RIDGELINK_BENCH", value_hint = ValueHint::FilePath)]
+    bench: Option<PathBuf>,
+    /// The sensor board's console: a port, or usb:SERIAL of its ST-LINK
+    #[arg(long, value_name = "PORT", value_hint = ValueHint::FilePath)]
+    sensor: Option<Place>,
+    /// The display board's console
+    #[arg(long, value_name = "PORT", value_hint = ValueHint::FilePath)]
+    display: Option<Place>,
+}
+
+impl Where {
+    /// The bench, with what the command line says put over what the file says.
+    fn find(&self) -> Result<Bench, BenchError> {
+        let mut bench = Bench::find(self.bench.as_deref())?;
+        put(&mut bench.sensor, self.sensor.as_ref());
+        put(&mut bench.display, self.display.as_ref());
+        bench.checked()
+    }
+}
+
+fn put(seat: &mut Seat, place: Option<&Place>) {
+    match place {
+        Some(Place::Port(port)) => seat.port = Some(port.clone()),
+        Some(Place::Usb(serial)) => {
+            seat.port = None;
+            seat.usb = Some(serial.clone());
+        }
+        Some(Place::Among(_) | Place::Anywhere) | None => {}
+    }
+}
+
+impl Arguments {
+    /// Does what was asked for.
+    ///
+    /// # Errors
+    /// If it can't be done.
+    pub fn execute(self) -> anyhow::Result<ExitCode> {
+        match self.command {
+            Command::Flash(flash) => flash.execute(),
+            Command::Monitor(monitor) => monitor.execute(),
+            Command::Record(record) => record.execute(),
+            Command::Replay(replay) => replay.execute(),
+            Command::Relay(relay) => relay.execute(),
+            Command::Doctor(doctor) => doctor.execute(),
+            Command::Completions(completions) => completions.execute(),
+            Command::Man(man) => man.execute(),
+        }
+    }
+}

@@ -1,0 +1,405 @@
+//! One board at the end of a serial line: opened, greeted, listened to, and opened again when it is lost.
+//!
+//! A thread of its own reads the line and runs the protocol's own [`protocol::Port`]; who wants to say
+//! something writes it himself, at once. A board that is unplugged is looked for every [`RETRY`].
+
+use std::io::{self, Read};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use protocol::{ClockOffset, Hello, Message, Peer, Ping, PortCounters, Role};
+
+use crate::hearing::{Hearing, Verdict};
+use crate::host_clock::now_us;
+use crate::line::{self, Ear, Line};
+use crate::place::Place;
+use crate::restart::BoardClock;
+use crate::search::{Candidates, Search};
+use crate::state::State;
+
+/// Speed of a console, 8N1.
+pub const BAUD: u32 = 921_600;
+/// How long a lost board is waited for between two looks: a cable that is put back is seen well within
+/// a second.
+pub const RETRY: Duration = Duration::from_millis(100);
+/// Longest read: what comes in some 40 ms at full speed.
+const READ_BYTES: usize = 4_096;
+
+/// What a link tells its owner.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "an event is handed over once, and boxing every message would cost more"
+)]
+pub enum Event {
+    /// The board has said something.
+    Heard {
+        /// When its last byte was read, in µs of [`now_us`].
+        at_us: u64,
+        /// What it said.
+        message: Message,
+    },
+    /// The board has started anew since it was heard last: its clock and counters begin again.
+    Restarted,
+    /// The link stands differently.
+    Turned(State),
+}
+
+/// Why something was not said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotSent {
+    /// Nobody is there who would understand it.
+    #[error("the board is not there")]
+    NotKnown,
+    /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
+    #[error("the line takes no bytes")]
+    Stuck,
+}
+
+/// What the two clocks of a link are to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clocks {
+    /// The board's clock minus [`now_us`], in µs.
+    pub offset_us: i64,
+    /// The shortest round trip of late, in µs: twice the bound of the offset's error.
+    pub round_trip_us: u64,
+}
+
+/// The way to one board. Dropping it closes the line.
+pub struct Link {
+    shared: Arc<Shared>,
+    reader: Option<JoinHandle<()>>,
+}
+
+/// What both sides of a link use.
+struct Shared {
+    role: Role,
+    line: Mutex<Option<Line>>,
+    state: Mutex<State>,
+    clock: Mutex<ClockOffset>,
+    /// Of the line before, while there is none.
+    counters: Mutex<PortCounters>,
+    ended: AtomicBool,
+    /// Wakes a reader that waits to try again.
+    woken: (Mutex<()>, Condvar),
+}
+
+/// A mutex whose data are sound at every moment, whoever died holding it.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// How a host introduces itself.
+pub fn host_hello() -> Hello {
+    let number = |text: &str| text.parse().unwrap_or(0);
+    Hello::new(
+        Role::Host,
+        "host-bridge",
+        [
+            number(env!("CARGO_PKG_VERSION_MAJOR")),
+            number(env!("CARGO_PKG_VERSION_MINOR")),
+            number(env!("CARGO_PKG_VERSION_PATCH")),
+        ],
+    )
+}
+
+impl Link {
+    /// Looks for the board of `role` at `place`, for as long as the link lives. `tell` is called from the
+    /// link's thread with everything that happens; it may [`Link::post`], and it holds up the reading for
+    /// as long as it takes.
+    pub fn open(role: Role, place: Place, tell: impl FnMut(Event) + Send + 'static) -> Self {
+        let wanted = match &place {
+            Place::Anywhere => format!("an ST-LINK with the {} board", role.name()),
+            named => named.to_string(),
+        };
+        let shared = Arc::new(Shared {
+            role,
+            line: Mutex::new(None),
+            state: Mutex::new(State::Absent {
+                place: wanted.clone(),
+            }),
+            clock: Mutex::new(ClockOffset::new()),
+            counters: Mutex::new(PortCounters::new()),
+            ended: AtomicBool::new(false),
+            woken: (Mutex::new(()), Condvar::new()),
+        });
+        let reader = Reader {
+            shared: Arc::clone(&shared),
+            wanted,
+            search: Search::new(place),
+            tell,
+            told: None,
+            clock: BoardClock::default(),
+        };
+        Self {
+            shared,
+            reader: Some(thread::spawn(|| reader.run())),
+        }
+    }
+
+    /// A way to say things that can be handed to other threads; it does not keep the link open.
+    pub fn voice(&self) -> Voice {
+        Voice {
+            shared: Arc::clone(&self.shared),
+        }
+    }
+
+    /// Says `message` now. See [`Voice::post`].
+    ///
+    /// # Errors
+    /// If nobody is there, or the line is stuck.
+    pub fn post(&self, message: &Message) -> Result<(), NotSent> {
+        self.shared.post(message)
+    }
+
+    /// How the link stands.
+    pub fn state(&self) -> State {
+        locked(&self.shared.state).clone()
+    }
+
+    /// What this end of the line has counted since the line was opened last.
+    pub fn counters(&self) -> PortCounters {
+        match &*locked(&self.shared.line) {
+            Some(line) => line.counters(),
+            None => *locked(&self.shared.counters),
+        }
+    }
+
+    /// The board's clock; none before the first exchange since it started.
+    pub fn clocks(&self) -> Option<Clocks> {
+        let clock = locked(&self.shared.clock);
+        Some(Clocks {
+            offset_us: clock.offset_us()?,
+            round_trip_us: clock.round_trip_us()?,
+        })
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.shared.ended.store(true, Ordering::Release);
+        // Under the lock, so that a reader that is about to wait does not miss it.
+        let guard = locked(&self.shared.woken.0);
+        self.shared.woken.1.notify_all();
+        drop(guard);
+        if let Some(reader) = self.reader.take() {
+            // A reader that panicked has said so on standard error.
+            let _ = reader.join();
+        }
+    }
+}
+
+/// Says things to a board, from any thread.
+#[derive(Clone)]
+pub struct Voice {
+    shared: Arc<Shared>,
+}
+
+impl Voice {
+    /// Says `message` now: it is with the system when this returns.
+    ///
+    /// # Errors
+    /// If nobody is there, or the line is stuck.
+    pub fn post(&self, message: &Message) -> Result<(), NotSent> {
+        self.shared.post(message)
+    }
+}
+
+impl Shared {
+    fn post(&self, message: &Message) -> Result<(), NotSent> {
+        locked(&self.line)
+            .as_mut()
+            .ok_or(NotSent::NotKnown)?
+            .say(message)
+    }
+
+    fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Acquire)
+    }
+
+    /// Waits for [`RETRY`], or until the link ends.
+    fn rest(&self) {
+        let (mutex, woken) = &self.woken;
+        let guard = locked(mutex);
+        if !self.is_ended() {
+            let _ = woken.wait_timeout(guard, RETRY);
+        }
+    }
+}
+
+/// The thread that reads.
+struct Reader<F> {
+    shared: Arc<Shared>,
+    search: Search,
+    /// What is looked for, in words.
+    wanted: String,
+    tell: F,
+    told: Option<State>,
+    /// Kept while the board is away: it may have lost its power with its cable.
+    clock: BoardClock,
+}
+
+impl<F: FnMut(Event)> Reader<F> {
+    fn run(mut self) {
+        while !self.shared.is_ended() {
+            let Candidates { ports, choosy } = self.search.candidates(line::is_held);
+            let mut found = self.absent();
+            for port in ports {
+                let state = match line::open(&port) {
+                    Ok((ear, line)) => self.converse(&port, ear, line, choosy),
+                    Err(state) => state,
+                };
+                if self.shared.is_ended() {
+                    return;
+                }
+                if state.weight() > found.weight() {
+                    found = state;
+                }
+            }
+            self.turn(found);
+            self.shared.rest();
+        }
+    }
+
+    /// Talks until the line is lost, or leads nowhere that was wanted although there is a choice; returns
+    /// how it stood then. Where there is a choice, only a board that was found is told of.
+    fn converse(&mut self, path: &Path, mut ear: Ear, line: Line, choosy: bool) -> State {
+        let mut hearing = Hearing::new(now_us(), self.search.patience_us(path));
+        locked(&self.shared.clock).clear();
+        *locked(&self.shared.line) = Some(line);
+        let mut bytes = vec![0; READ_BYTES];
+        let mut messages = Vec::new();
+        let mut end = None;
+        while !self.shared.is_ended() && end.is_none() {
+            let count = match ear.tty.read(&mut bytes) {
+                Ok(0) => break,
+                Ok(count) => count,
+                Err(error) if is_pause(&error) => 0,
+                Err(_) => break,
+            };
+            let at_us = now_us();
+            let state = self.hear(path, &mut hearing, &bytes[..count], at_us, &mut messages);
+            match &state {
+                State::Known { .. } => self.search.remember(path, true),
+                State::Opened { .. } => {}
+                _ if choosy => {
+                    self.search.remember(path, false);
+                    end = Some(state.clone());
+                }
+                _ => {}
+            }
+            let is_known = state.is_known();
+            if !choosy || is_known {
+                self.turn(state);
+            }
+            // What another board says is nobody's business here.
+            for message in messages.drain(..).filter(|_| is_known) {
+                self.pass(&mut hearing, at_us, message);
+            }
+        }
+        let line = locked(&self.shared.line).take();
+        if let Some(line) = line {
+            *locked(&self.shared.counters) = line.counters();
+            ear.close(line.is_stuck());
+        }
+        let end = end.unwrap_or_else(|| self.absent());
+        let told_of = !choosy || self.told.as_ref().is_some_and(State::is_known);
+        if told_of && !self.shared.is_ended() {
+            self.turn(end.clone());
+        }
+        end
+    }
+
+    /// Runs the protocol on what came, says what is due, and judges how the link stands.
+    fn hear(
+        &self,
+        path: &Path,
+        hearing: &mut Hearing,
+        bytes: &[u8],
+        at_us: u64,
+        messages: &mut Vec<Message>,
+    ) -> State {
+        let mut line = locked(&self.shared.line);
+        let Some(line) = line.as_mut() else {
+            return self.absent();
+        };
+        hearing.hear(at_us, bytes);
+        line.port
+            .receive(at_us, bytes, |message| messages.push(message));
+        let peer = line.port.peer();
+        hearing.understand(at_us, &line.counters());
+        let state = self.state(path, hearing.judge(at_us, peer));
+        line.is_known = state.is_known();
+        // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
+        if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {
+            line.port.post(&Message::Ping(Ping { sent_us: at_us }));
+        }
+        // What a stuck line refuses is counted, and said again when it is due again.
+        let _ = line.flush();
+        state
+    }
+
+    /// The verdict on a line in words.
+    fn state(&self, path: &Path, verdict: Verdict) -> State {
+        let port = path.to_owned();
+        match verdict {
+            Verdict::Open => State::Opened { port },
+            // Whether it asks in return does not make another board of it.
+            Verdict::Known(hello) if hello.role == self.shared.role.byte() => State::Known {
+                port,
+                hello: hello.asking(false),
+            },
+            Verdict::Known(hello) => State::Stranger {
+                port,
+                hello: hello.asking(false),
+                wanted: self.shared.role,
+            },
+            Verdict::Foreign(hello) => State::Foreign {
+                port,
+                hello: hello.asking(false),
+            },
+            Verdict::Silent => State::Silent { port },
+            Verdict::Deaf => State::Deaf { port },
+            Verdict::Garbage => State::Garbage { port },
+        }
+    }
+
+    fn absent(&self) -> State {
+        State::Absent {
+            place: self.wanted.clone(),
+        }
+    }
+
+    fn pass(&mut self, hearing: &mut Hearing, at_us: u64, message: Message) {
+        if self.clock.is_restart(&message) {
+            locked(&self.shared.clock).clear();
+            hearing.forget_ping();
+            (self.tell)(Event::Restarted);
+        }
+        if let Message::Pong(pong) = &message {
+            locked(&self.shared.clock).on_pong(pong, at_us);
+        }
+        (self.tell)(Event::Heard { at_us, message });
+    }
+
+    /// Tells of a state that differs from the last one.
+    fn turn(&mut self, state: State) {
+        if self.told.as_ref() == Some(&state) {
+            return;
+        }
+        *locked(&self.shared.state) = state.clone();
+        self.told = Some(state.clone());
+        (self.tell)(Event::Turned(state));
+    }
+}
+
+/// Whether a read only had nothing to give yet.
+fn is_pause(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
+    )
+}

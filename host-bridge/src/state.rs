@@ -1,0 +1,201 @@
+//! How a board's console stands, in words that say what to do.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use protocol::{Hello, PROTOCOL_VERSION, Role};
+
+/// How the way to one board stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// There is no such port: not plugged in, or another name.
+    Absent {
+        /// Where it was looked for.
+        place: String,
+    },
+    /// Another program has the port.
+    Busy {
+        /// The port.
+        port: PathBuf,
+    },
+    /// This user may not open the port.
+    Denied {
+        /// The port.
+        port: PathBuf,
+    },
+    /// The port can't be used, for another reason.
+    Failed {
+        /// The port.
+        port: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The port has just been opened: an answer may still come.
+    Opened {
+        /// The port.
+        port: PathBuf,
+    },
+    /// The port is open, and nothing is heard.
+    Silent {
+        /// The port.
+        port: PathBuf,
+    },
+    /// A board that speaks, text or frames, and does not answer: nothing that is sent reaches it.
+    Deaf {
+        /// The port.
+        port: PathBuf,
+    },
+    /// What is heard is neither frames nor text.
+    Garbage {
+        /// The port.
+        port: PathBuf,
+    },
+    /// A board of another protocol or schema.
+    Foreign {
+        /// The port.
+        port: PathBuf,
+        /// What it said.
+        hello: Hello,
+    },
+    /// A board that is understood, but of another role than wanted.
+    Stranger {
+        /// The port.
+        port: PathBuf,
+        /// What it said.
+        hello: Hello,
+        /// What was wanted.
+        wanted: Role,
+    },
+    /// The board is there and understood.
+    Known {
+        /// The port.
+        port: PathBuf,
+        /// What it said.
+        hello: Hello,
+    },
+}
+
+impl State {
+    /// Whether the board is there and understood.
+    pub const fn is_known(&self) -> bool {
+        matches!(self, Self::Known { .. })
+    }
+
+    /// The port, if one is or was to be opened.
+    pub const fn port(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Absent { .. } => None,
+            Self::Busy { port }
+            | Self::Denied { port }
+            | Self::Failed { port, .. }
+            | Self::Opened { port }
+            | Self::Silent { port }
+            | Self::Deaf { port }
+            | Self::Garbage { port }
+            | Self::Foreign { port, .. }
+            | Self::Stranger { port, .. }
+            | Self::Known { port, .. } => Some(port),
+        }
+    }
+
+    /// How much it tells: of several ports that were tried, the one that stands highest is told of.
+    pub(crate) const fn weight(&self) -> u8 {
+        match self {
+            Self::Absent { .. } => 0,
+            Self::Stranger { .. } => 1,
+            Self::Opened { .. } => 2,
+            Self::Busy { .. } => 3,
+            Self::Silent { .. } => 4,
+            Self::Failed { .. } => 5,
+            Self::Deaf { .. } => 6,
+            Self::Garbage { .. } => 7,
+            Self::Denied { .. } => 8,
+            Self::Foreign { .. } => 9,
+            Self::Known { .. } => 10,
+        }
+    }
+
+    /// One word for it, for scripts; never changes.
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Absent { .. } => "absent",
+            Self::Busy { .. } => "busy",
+            Self::Denied { .. } => "denied",
+            Self::Failed { .. } => "failed",
+            Self::Opened { .. } => "opened",
+            Self::Silent { .. } => "silent",
+            Self::Deaf { .. } => "deaf",
+            Self::Garbage { .. } => "garbage",
+            Self::Foreign { .. } => "foreign",
+            Self::Stranger { .. } => "wrong-role",
+            Self::Known { .. } => "known",
+        }
+    }
+
+    /// What to do about it; none if there is nothing to be done.
+    pub fn advice(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Absent { .. } => {
+                "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display"
+            }
+            Self::Busy { .. } => {
+                "close the other program: monitor, record, relay, tio and screen all take the port for themselves"
+            }
+            Self::Denied { .. } => {
+                "join the group that owns it (often dialout: `sudo usermod -aG dialout $USER`, then log in again)"
+            }
+            Self::Failed { .. } => "see whether it is a serial port",
+            Self::Opened { .. } | Self::Known { .. } => return None,
+            Self::Silent { .. } => {
+                "see whether the board has power and firmware (`host-bridge flash`), and whether the port is its console"
+            }
+            Self::Deaf { .. } => "nothing that is sent reaches the board: see its RX line (PD9)",
+            Self::Garbage { .. } => {
+                "see whether this is a Ridgelink board's console: 921600 baud, 8N1"
+            }
+            Self::Foreign { .. } => "flash the firmware of this build: `host-bridge flash`",
+            Self::Stranger { .. } => "exchange --sensor and --display, or flash the other firmware",
+        })
+    }
+}
+
+/// The state in one line, without the advice.
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(port) = self.port() {
+            write!(f, "{}: ", port.display())?;
+        }
+        match self {
+            Self::Absent { place } => write!(f, "{place}: not there"),
+            Self::Busy { .. } => f.write_str("another program has it"),
+            Self::Denied { .. } => f.write_str("no permission to open it"),
+            Self::Failed { reason, .. } => f.write_str(reason),
+            Self::Opened { .. } => f.write_str("opened"),
+            Self::Silent { .. } => f.write_str("silent"),
+            Self::Deaf { .. } => f.write_str("speaks and does not answer"),
+            Self::Garbage { .. } => f.write_str("sends garbage"),
+            Self::Foreign { hello, .. } => write!(
+                f,
+                "{} of protocol {}, this program speaks {PROTOCOL_VERSION}",
+                Named(hello),
+                hello.protocol_version(),
+            ),
+            Self::Stranger { hello, wanted, .. } => {
+                write!(f, "{}, not the {}", Named(hello), wanted.name())
+            }
+            Self::Known { hello, .. } => write!(f, "{}", Named(hello)),
+        }
+    }
+}
+
+/// A speaker in words: role, version, chip.
+pub struct Named<'a>(pub &'a Hello);
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(hello) = self;
+        let role = Role::from_byte(hello.role).map_or("unknown board", Role::name);
+        let [major, minor, patch] = hello.version;
+        write!(f, "{role} {major}.{minor}.{patch} on {}", hello.chip_name())
+    }
+}
