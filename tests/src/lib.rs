@@ -2,6 +2,8 @@
 //! folder of this package: they run scenes on the two ELFs that a user would flash, through the same
 //! library as the `hil-sim` command.
 
+#[cfg(target_os = "linux")]
+pub mod bench;
 pub mod bridge;
 pub mod elves;
 pub mod fake_board;
