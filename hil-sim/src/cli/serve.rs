@@ -192,9 +192,10 @@ fn status(bench: &Bench, last: (Instant, Standing), now: (Instant, Standing)) ->
     let wall_s = (now.0 - last.0).as_secs_f64();
     let (before, standing) = (last.1, now.1);
     let sensed = &standing.sensed;
-    let wavelength = match sensed.estimate {
-        Some(estimate) if estimate.valid => format!("{:.2}", estimate.wavelength_mm),
-        _ => "–".to_owned(),
+    let valid = sensed.estimate.filter(|estimate| estimate.valid);
+    let wavelength = match valid.and_then(|estimate| estimate.wavelength_mm) {
+        Some(wavelength_mm) => format!("{wavelength_mm:.2}"),
+        None => "–".to_owned(),
     };
     let open: Vec<&str> = PortName::ALL
         .into_iter()
