@@ -72,40 +72,17 @@ mod tests {
 
     use super::*;
 
-    const HOLDS: [Hold; 6] = [
-        Hold::Stale,
-        Hold::Distrust,
-        Hold::Flood,
-        Hold::Contradiction,
-        Hold::Unheard,
-        Hold::FullDrive,
-    ];
-    const TRIPS: [Trip; 12] = [
-        Trip::Operator,
-        Trip::Host,
-        Trip::EmergencyStop,
-        Trip::HandEncoder,
-        Trip::Converter,
-        Trip::Transfer,
-        Trip::Limit,
-        Trip::Memory,
-        Trip::Watchdog,
-        Trip::Panic,
-        Trip::Fault,
-        Trip::StackOverflow,
-    ];
-
     fn states() -> Vec<DisplayState> {
         let mut states = std::vec![Boot, Ready, Driving];
-        states.extend(HOLDS.map(Fading));
-        states.extend(TRIPS.map(Stopped));
+        states.extend(Hold::ALL.map(Fading));
+        states.extend(Trip::ALL.map(Stopped));
         states
     }
 
     fn events() -> Vec<Event> {
         let mut events = std::vec![Event::Started, Event::Cleared, Event::Fresh, Event::Silent];
-        events.extend(HOLDS.map(Event::Hold));
-        events.extend(TRIPS.map(Event::Trip));
+        events.extend(Hold::ALL.map(Event::Hold));
+        events.extend(Trip::ALL.map(Event::Trip));
         events
     }
 

@@ -1,5 +1,7 @@
 //! What the display board's safety supervisor says of itself.
 
+use core::fmt;
+
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +20,30 @@ pub enum Hold {
     Unheard,
     /// Full drive for longer than allowed: the hand has to rest first.
     FullDrive,
+}
+
+impl Hold {
+    /// Every reason, in the wire's order.
+    pub const ALL: [Self; 6] = [
+        Self::Stale,
+        Self::Distrust,
+        Self::Flood,
+        Self::Contradiction,
+        Self::Unheard,
+        Self::FullDrive,
+    ];
+
+    /// The reason in words, as used in messages to people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stale => "no fresh estimate",
+            Self::Distrust => "estimates not to be trusted",
+            Self::Flood => "too many estimates",
+            Self::Contradiction => "the arm moves, the hand does not",
+            Self::Unheard => "ports held up",
+            Self::FullDrive => "full drive for too long",
+        }
+    }
 }
 
 /// Why the stimulus was stopped for good: until the reset button or power.
@@ -49,6 +75,45 @@ pub enum Trip {
     StackOverflow,
 }
 
+impl Trip {
+    /// Every reason, in the wire's order.
+    pub const ALL: [Self; 12] = [
+        Self::Operator,
+        Self::Host,
+        Self::EmergencyStop,
+        Self::HandEncoder,
+        Self::Converter,
+        Self::Transfer,
+        Self::Limit,
+        Self::Memory,
+        Self::Watchdog,
+        Self::Panic,
+        Self::Fault,
+        Self::StackOverflow,
+    ];
+
+    /// The reason in words, as used in messages to people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Operator => "by the operator",
+            Self::Host => "by a host program",
+            Self::EmergencyStop => "emergency stop",
+            Self::HandEncoder => "hand encoder",
+            Self::Converter => "converter",
+            Self::Transfer => "transfer to the converters",
+            Self::Limit => "limit broken",
+            Self::Memory => "memory changed",
+            Self::Watchdog => "watchdog",
+            Self::Panic => "panic",
+            Self::Fault => "processor fault",
+            Self::StackOverflow => "stack full",
+        }
+    }
+}
+
+const _: () = assert!(Hold::ALL[Hold::ALL.len() - 1] as usize + 1 == Hold::ALL.len());
+const _: () = assert!(Trip::ALL[Trip::ALL.len() - 1] as usize + 1 == Trip::ALL.len());
+
 /// The state of the supervisor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum DisplayState {
@@ -65,6 +130,40 @@ pub enum DisplayState {
     Stopped(Trip),
 }
 
+impl DisplayState {
+    /// The state in a word, without the reason for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Boot => "starting",
+            Self::Ready => "ready",
+            Self::Driving => "driving",
+            Self::Fading(_) => "fading",
+            Self::Stopped(_) => "stopped",
+        }
+    }
+
+    /// The reason for the state in words, if it has one.
+    pub const fn reason(self) -> Option<&'static str> {
+        match self {
+            Self::Boot | Self::Ready | Self::Driving => None,
+            Self::Fading(hold) => Some(hold.name()),
+            Self::Stopped(trip) => Some(trip.name()),
+        }
+    }
+}
+
+/// The state in words, with the reason for it: "stopped: emergency stop".
+impl fmt::Display for DisplayState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        if let Some(reason) = self.reason() {
+            f.write_str(": ")?;
+            f.write_str(reason)?;
+        }
+        Ok(())
+    }
+}
+
 /// Tells of each change of the supervisor's state, within some milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Safety {
@@ -72,4 +171,46 @@ pub struct Safety {
     pub instant_us: u64,
     /// The state since then.
     pub state: DisplayState,
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::string::ToString;
+
+    use super::*;
+
+    #[test]
+    fn a_state_says_what_it_is_and_why() {
+        for (state, words) in [
+            (DisplayState::Boot, "starting"),
+            (DisplayState::Ready, "ready"),
+            (DisplayState::Driving, "driving"),
+            (
+                DisplayState::Fading(Hold::Stale),
+                "fading: no fresh estimate",
+            ),
+            (
+                DisplayState::Stopped(Trip::EmergencyStop),
+                "stopped: emergency stop",
+            ),
+            (
+                DisplayState::Stopped(Trip::Operator),
+                "stopped: by the operator",
+            ),
+        ] {
+            assert_eq!(state.to_string(), words);
+        }
+    }
+
+    #[test]
+    fn the_lists_are_in_the_wires_order_and_leave_nothing_out() {
+        for (number, hold) in Hold::ALL.into_iter().enumerate() {
+            assert_eq!(hold as usize, number);
+        }
+        for (number, trip) in Trip::ALL.into_iter().enumerate() {
+            assert_eq!(trip as usize, number);
+        }
+    }
 }

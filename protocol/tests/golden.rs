@@ -5,10 +5,10 @@
 
 mod messages;
 
-use messages::{
-    CONTACTS, HEALTHS, HOLDS, METHODS, SETTINGS, TRIPS, events, greeted_receiver, hello, samples,
+use messages::{CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples};
+use protocol::{
+    Event, HELLO_LENGTH, Hello, Hold, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver, Trip,
 };
-use protocol::{Event, HELLO_LENGTH, Hello, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver};
 use protocol::{SCHEMA_HASH, frame};
 
 /// The number of every frame below.
@@ -137,8 +137,8 @@ fn every_choice_within_a_message_has_its_byte() {
         bytes(&SETTINGS),
         std::array::from_fn::<u8, 21, _>(|n| n as u8)
     );
-    assert_eq!(bytes(&HOLDS), [0, 1, 2, 3, 4, 5]);
-    assert_eq!(bytes(&TRIPS), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    assert_eq!(bytes(&Hold::ALL), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(bytes(&Trip::ALL), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 }
 
 #[test]

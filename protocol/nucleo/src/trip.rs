@@ -11,24 +11,6 @@ use protocol::{ResetCause, Trip};
 const MARK: u32 = 0x5452_4900;
 const NUMBER: u32 = 0xFF;
 
-/// In the order of their numbers.
-const TRIPS: [Trip; 12] = [
-    Trip::Operator,
-    Trip::Host,
-    Trip::EmergencyStop,
-    Trip::HandEncoder,
-    Trip::Converter,
-    Trip::Transfer,
-    Trip::Limit,
-    Trip::Memory,
-    Trip::Watchdog,
-    Trip::Panic,
-    Trip::Fault,
-    Trip::StackOverflow,
-];
-
-const _: () = assert!(TRIPS[TRIPS.len() - 1] as usize + 1 == TRIPS.len());
-
 #[allow(
     unsafe_code,
     reason = "the section is cortex-m-rt's own, for RAM that is left alone"
@@ -61,7 +43,9 @@ fn kept() -> Option<Trip> {
     if word != !complement || word & !NUMBER != MARK {
         return None;
     }
-    TRIPS.into_iter().find(|&trip| trip as u32 == word & NUMBER)
+    Trip::ALL
+        .into_iter()
+        .find(|&trip| trip as u32 == word & NUMBER)
 }
 
 #[allow(

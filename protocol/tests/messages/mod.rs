@@ -149,30 +149,6 @@ pub const HEALTHS: [GaugeHealth; 6] = [
     GaugeHealth::Hum,
 ];
 
-/// Every [`Hold`], in the wire's order.
-pub const HOLDS: [Hold; 6] = [
-    Hold::Stale,
-    Hold::Distrust,
-    Hold::Flood,
-    Hold::Contradiction,
-    Hold::Unheard,
-    Hold::FullDrive,
-];
-/// Every [`Trip`], in the wire's order.
-pub const TRIPS: [Trip; 12] = [
-    Trip::Operator,
-    Trip::Host,
-    Trip::EmergencyStop,
-    Trip::HandEncoder,
-    Trip::Converter,
-    Trip::Transfer,
-    Trip::Limit,
-    Trip::Memory,
-    Trip::Watchdog,
-    Trip::Panic,
-    Trip::Fault,
-    Trip::StackOverflow,
-];
 /// Every [`Setting`], in the wire's order.
 pub const SETTINGS: [Setting; 21] = [
     Setting::Role,
@@ -439,8 +415,8 @@ fn state() -> impl Strategy<Value = DisplayState> {
         Just(DisplayState::Boot),
         Just(DisplayState::Ready),
         Just(DisplayState::Driving),
-        proptest::sample::select(HOLDS.to_vec()).prop_map(DisplayState::Fading),
-        proptest::sample::select(TRIPS.to_vec()).prop_map(DisplayState::Stopped),
+        proptest::sample::select(Hold::ALL.to_vec()).prop_map(DisplayState::Fading),
+        proptest::sample::select(Trip::ALL.to_vec()).prop_map(DisplayState::Stopped),
     ]
 }
 
