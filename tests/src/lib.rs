@@ -2,6 +2,7 @@
 //! folder of this package: they run scenes on the two ELFs that a user would flash, through the same
 //! library as the `hil-sim` command.
 
+pub mod bridge;
 pub mod elves;
 pub mod fake_board;
 pub mod history;

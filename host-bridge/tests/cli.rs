@@ -1,0 +1,115 @@
+//! The command line, where no board is needed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Runs the program without the settings of whoever runs the tests.
+fn host_bridge(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_host-bridge"))
+        .args(arguments)
+        .env_remove("RIDGELINK_BENCH")
+        .env_remove("HOME")
+        .env_remove("XDG_CONFIG_HOME")
+        .output()
+        .expect("the program can be started")
+}
+
+/// An empty folder for one test.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("cli")
+        .join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn shells_get_their_completions() {
+    for (shell, mark) in [
+        ("bash", "complete -F _host-bridge"),
+        ("zsh", "#compdef host-bridge"),
+        ("fish", "complete -c host-bridge"),
+    ] {
+        let output = host_bridge(&["completions", shell]);
+        assert_eq!(output.status.code(), Some(0), "{shell}");
+        let script = text(&output.stdout);
+        assert!(script.contains(mark), "{shell}: {script}");
+        for command in ["flash", "monitor", "record", "replay", "relay", "doctor"] {
+            assert!(script.contains(command), "{shell} has no {command}");
+        }
+    }
+}
+
+#[test]
+fn man_pages_are_written_for_the_program_and_each_command() {
+    let folder = folder("man").join("made");
+    let output = host_bridge(&["man", &folder.to_string_lossy()]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    for page in [
+        "host-bridge",
+        "host-bridge-flash",
+        "host-bridge-monitor",
+        "host-bridge-record",
+        "host-bridge-replay",
+        "host-bridge-relay",
+        "host-bridge-doctor",
+    ] {
+        let path = folder.join(format!("{page}.1"));
+        let page = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path:?}: {error}"));
+        assert!(page.contains(".TH "), "{path:?}: {page}");
+    }
+}
+
+#[test]
+fn a_folder_that_cant_be_written_is_named() {
+    let file = folder("no-folder").join("file");
+    fs::write(&file, "").expect("a file can be written");
+    let output = host_bridge(&["man", &file.to_string_lossy()]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains(&*file.to_string_lossy()), "{said}");
+}
+
+#[test]
+fn an_unknown_command_is_refused() {
+    let output = host_bridge(&["dance"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("'dance'"), "{said}");
+}
+
+#[test]
+fn a_bad_bench_file_is_refused_by_file_line_and_key() {
+    let bench = folder("bench").join("bad.toml");
+    fs::write(&bench, "[sensor]\nprot = \"/dev/ttyACM0\"\n").expect("a file can be written");
+    for command in ["doctor", "monitor"] {
+        let output = host_bridge(&[command, "--bench", &bench.to_string_lossy()]);
+        assert_eq!(output.status.code(), Some(2), "{command}");
+        let said = text(&output.stderr);
+        for fact in [&*bench.to_string_lossy(), "line 2", "prot"] {
+            assert!(said.contains(fact), "{command}: {said}");
+        }
+    }
+}
+
+#[test]
+fn a_bench_file_that_is_not_there_is_refused_by_name() {
+    let output = host_bridge(&["doctor", "--bench", "no-such-bench.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("no-such-bench.toml: can't be read"), "{said}");
+}
+
+#[test]
+fn one_place_for_both_boards_is_refused() {
+    let output = host_bridge(&["doctor", "--sensor", "/dev/a", "--display", "/dev/a"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("/dev/a can't be both boards"), "{said}");
+}
