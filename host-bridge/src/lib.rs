@@ -9,5 +9,6 @@
 pub mod bench;
 pub mod host_clock;
 pub mod link;
+pub mod monitor;
 pub mod place;
 pub mod state;
