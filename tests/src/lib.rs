@@ -4,6 +4,7 @@
 
 pub mod bridge;
 pub mod elves;
+pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
 pub mod run;

@@ -2,7 +2,6 @@
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders};
 
@@ -41,15 +40,6 @@ pub fn put(frame: &mut Frame<'_>, area: Rect, row: u16, line: Line<'_>) {
         };
         frame.render_widget(line, place);
     }
-}
-
-/// A name and its value.
-pub fn pair<'a>(theme: Theme, name: &'a str, value: String, style: Style) -> [Span<'a>; 3] {
-    [
-        Span::styled(name, theme.quiet()),
-        Span::raw(" "),
-        Span::styled(value, style),
-    ]
 }
 
 /// Seconds as a person reads them: `0:12:31`, or `3 d 04:05`.
