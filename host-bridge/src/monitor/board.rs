@@ -82,7 +82,7 @@ impl Rate {
     pub fn elapse(&mut self, now_us: u64) {
         let elapsed_us = now_us.saturating_sub(self.since_us);
         if elapsed_us >= Self::OVER_US {
-            let per_s = u64::from(self.count) * 1_000_000 / elapsed_us;
+            let per_s = (u64::from(self.count) * 1_000_000 + elapsed_us / 2) / elapsed_us;
             self.per_s = u32::try_from(per_s).unwrap_or(u32::MAX);
             self.count = 0;
             self.since_us = now_us;

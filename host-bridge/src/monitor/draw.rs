@@ -8,6 +8,7 @@
 //! keys
 //! ```
 
+mod areas;
 mod big;
 mod fingertip;
 mod gauges;
@@ -23,8 +24,9 @@ mod tiny;
 mod velocity;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Rect;
 
+use self::areas::{cut_left, cut_top};
 use super::dashboard::Dashboard;
 use super::view::{Panel, View};
 
@@ -48,13 +50,8 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
         tiny::draw(frame, area, live, view);
         return;
     }
-    let head = header::height(live, area.width);
-    let [header, body, keys] = Layout::vertical([
-        Constraint::Length(head),
-        Constraint::Fill(1),
-        Constraint::Length(1),
-    ])
-    .areas(area);
+    let [header, rest] = cut_top(area, header::height(live, area.width));
+    let [body, keys] = cut_top(rest, rest.height.saturating_sub(1));
     header::draw(frame, header, live, view);
     header::keys(frame, keys, live, view);
     draw_body(frame, body, shown, view);
@@ -76,24 +73,17 @@ fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) 
     } else {
         upper.min(body.height)
     };
-    let [top, bottom] =
-        Layout::vertical([Constraint::Length(upper), Constraint::Fill(1)]).areas(body);
-    let [left, right] =
-        Layout::horizontal([Constraint::Length(LEFT_WIDTH), Constraint::Fill(1)]).areas(top);
-    let halves = Layout::vertical([Constraint::Fill(1), Constraint::Fill(1)]);
-    let [surface, fingertip] = halves.areas(left);
-    let [wavelength, velocity] = halves.areas(right);
+    let [top, bottom] = cut_top(body, upper);
+    let [left, right] = cut_left(top, LEFT_WIDTH);
+    let [surface, fingertip] = cut_top(left, left.height / 2);
+    let [wavelength, velocity] = cut_top(right, right.height / 2);
     surface::draw(frame, surface, shown, view.theme);
     surface::draw_trace(frame, wavelength, shown, view);
     fingertip::draw(frame, fingertip, shown, view);
     velocity::draw(frame, velocity, shown, view);
     if has_room {
-        let [gauges, ports, log] = Layout::vertical([
-            Constraint::Length(lower[0]),
-            Constraint::Length(lower[1]),
-            Constraint::Fill(1),
-        ])
-        .areas(bottom);
+        let [gauges, rest] = cut_top(bottom, lower[0]);
+        let [ports, log] = cut_top(rest, lower[1]);
         gauges::draw(frame, gauges, shown, view);
         ports::draw(frame, ports, shown, view.theme);
         log::draw(frame, log, shown, view.theme);

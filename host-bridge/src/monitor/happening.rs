@@ -68,7 +68,7 @@ impl fmt::Display for What {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Link(state) => {
-                write!(f, "{}: {state}", state.word())?;
+                write!(f, "{state}")?;
                 match state.advice() {
                     Some(advice) => write!(f, ": {advice}"),
                     None => Ok(()),

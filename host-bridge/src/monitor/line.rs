@@ -64,11 +64,14 @@ pub fn second(dashboard: &Dashboard) -> String {
 
 /// Something that happened, in one line, which scripts that read the columns take for a comment.
 pub fn happening(happening: &Happening) -> String {
+    let word = match &happening.what {
+        What::Link(state) => state.word(),
+        what => what.word(),
+    };
     format!(
-        "# {:8.3} {} {}: {}",
+        "# {:8.3} {} {word}: {}",
         seconds(happening.at_us),
         happening.role.name(),
-        happening.what.word(),
         happening.what
     )
 }

@@ -4,6 +4,8 @@ use std::io;
 use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use ratatui::DefaultTerminal;
@@ -75,6 +77,7 @@ fn show(
     let mut drawn: Option<Instant> = None;
     let mut changed = true;
     let mut next = Instant::now();
+    let typed = listen();
     while !ended.load(Ordering::Acquire) && end.is_none_or(|end| Instant::now() < end) {
         changed |= desk.take();
         // Shown already, in the log.
@@ -94,9 +97,15 @@ fn show(
         }
         next = (next + FRAME).max(Instant::now());
         // Every key is obeyed when it comes, not at the next picture.
-        while event::poll(next.saturating_duration_since(Instant::now()))? {
+        loop {
+            let event = match typed.recv_timeout(next.saturating_duration_since(Instant::now())) {
+                Ok(event) => event,
+                Err(RecvTimeoutError::Timeout) => break,
+                // Nothing will be typed any more: the terminal is gone.
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            };
             changed = true;
-            let Typed::Key(key) = event::read()? else {
+            let Typed::Key(key) = event else {
                 continue;
             };
             if key.kind == KeyEventKind::Release {
@@ -116,6 +125,20 @@ fn show(
         }
     }
     Ok(())
+}
+
+/// What is typed. On a thread of its own, which is left behind at the end: crossterm never comes back from
+/// a terminal that has hung up.
+fn listen() -> Receiver<Typed> {
+    let (events, typed) = channel();
+    thread::spawn(move || {
+        while let Ok(event) = event::read() {
+            if events.send(event).is_err() {
+                return;
+            }
+        }
+    });
+    typed
 }
 
 fn keep(desk: &mut Desk, view: &mut View) {

@@ -2,10 +2,10 @@
 
 use ratatui::style::{Color, Modifier, Style};
 
-/// Voltages from 0 to the largest: from grey over violet to yellow.
-const RISING: [u8; 8] = [238, 54, 91, 127, 162, 203, 215, 228];
+/// Voltages from 0 to the largest: from grey over violet to orange.
+const RISING: [u8; 8] = [240, 54, 90, 126, 161, 203, 209, 214];
 /// From the lowest voltage to the highest: blue, grey at 0 V, red.
-const SIGNED: [u8; 9] = [33, 32, 25, 24, 238, 88, 124, 160, 196];
+const SIGNED: [u8; 9] = [39, 33, 26, 24, 240, 88, 124, 160, 203];
 
 /// The colours of a dashboard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,14 +12,15 @@ const STANDS_US: u64 = 60_000;
 /// The longest that can be looked back on, in s.
 pub const LONGEST_S: f32 = (BINS as u64 * BIN_US / 1_000_000) as f32;
 
-/// The lowest and the highest value of a while, and the last one.
+/// The values of a while.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// The lowest.
     pub low: f32,
     /// The highest.
     pub high: f32,
-    last: f32,
+    /// The last.
+    pub last: f32,
 }
 
 impl Extent {

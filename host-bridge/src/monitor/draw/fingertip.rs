@@ -11,11 +11,12 @@ use super::text;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
+use crate::monitor::words;
 
 /// Places along the scan, and across it.
 const COLUMNS: usize = 10;
 const ROWS: usize = 5;
-/// Characters of a place.
+/// Characters of a place, with the gap to the next one.
 const WIDTH: usize = 3;
 /// The colours' end, in V.
 const FULL_V: f32 = 5.0;
@@ -50,7 +51,11 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     };
     for (row, places) in (0..).zip(by_place(actuators, &volts)) {
         let mut spans = vec![Span::raw(" ")];
-        spans.extend(places.map(|place| cell(place, view.shows_moment, theme)));
+        spans.extend(
+            places
+                .into_iter()
+                .flat_map(|place| cell(place, view.shows_moment, theme)),
+        );
         text::put(frame, area, row, Line::from(spans));
     }
     text::put(frame, area, ROWS as u16, scale(shown, view));
@@ -84,18 +89,19 @@ fn rank(values: [i16; ACTUATORS], count: usize) -> [usize; ACTUATORS] {
     })
 }
 
-fn cell(place: Option<f32>, is_signed: bool, theme: Theme) -> Span<'static> {
+fn cell(place: Option<f32>, is_signed: bool, theme: Theme) -> [Span<'static>; 2] {
     let Some(volt) = place else {
-        return Span::raw(" ".repeat(WIDTH));
+        return [Span::raw(" ".repeat(WIDTH)), Span::raw("")];
     };
-    if theme.has_colour() {
-        let style = colour(volt, is_signed, theme);
-        Span::styled(" ".repeat(WIDTH), style)
-    } else if is_signed {
-        Span::raw(format!("{volt:+WIDTH$.0}"))
-    } else {
-        Span::raw(format!("{volt:WIDTH$.0}"))
-    }
+    let text = match (theme.has_colour(), is_signed) {
+        (true, _) => " ".repeat(WIDTH - 1),
+        (false, true) => format!("{volt:+width$.0}", width = WIDTH - 1),
+        (false, false) => format!("{volt:width$.0}", width = WIDTH - 1),
+    };
+    [
+        Span::styled(text, colour(volt, is_signed, theme)),
+        Span::raw(" "),
+    ]
 }
 
 fn colour(volt: f32, is_signed: bool, theme: Theme) -> Style {
@@ -123,7 +129,7 @@ fn scale(shown: &Dashboard, view: &View) -> Line<'static> {
     }
     spans.push(Span::styled(format!(" {FULL_V:.0} V"), theme.quiet()));
     if let Some(Configuration::Display(display)) = shown.display.configuration {
-        let mode = super::super::words::word(&super::super::words::MODES, display.mode);
+        let mode = words::word(&words::MODES, display.mode);
         spans.push(Span::styled(format!("   {mode}"), theme.quiet()));
     }
     Line::from(spans)

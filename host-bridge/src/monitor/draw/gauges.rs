@@ -2,17 +2,17 @@
 
 use protocol::{GAUGES, GaugeHealth};
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
 use super::plot::{Plot, Range, Series, round_step};
-use super::text;
+use super::{areas, text};
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::view::View;
 use crate::monitor::words;
 
 /// The gauges show a part of the time that the other traces show: their waves are many times as fast.
-const PART: f32 = 0.1;
+const PART: f32 = 0.03;
 /// The least that is drawn as high as the area, in LSB.
 const LEAST_LSB: f32 = 20.0;
 /// Without a block for so long, in µs, nothing is streaming.
@@ -26,9 +26,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
         height: area.height.saturating_sub(1),
         ..area
     };
-    let columns: [Rect; GAUGES] = Layout::horizontal([Constraint::Fill(1); GAUGES])
-        .spacing(1)
-        .areas(inner);
+    let columns: [Rect; GAUGES] = areas::columns(inner);
     let plots = columns.map(|column| {
         let area = Rect {
             y: column.y + 1,
@@ -52,7 +50,10 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let step = round_step(widest);
     let height = (widest / step).ceil() * step;
     let about = if streams {
-        format!("{height:.0} LSB high, {}", text::span(plots[0].span_s()))
+        format!(
+            "from lowest to highest in LSB; {height:.0} LSB high, {}",
+            text::span(plots[0].span_s())
+        )
     } else {
         "not streamed: g streams them".to_owned()
     };
@@ -97,7 +98,7 @@ fn name(shown: &Dashboard, gauge: usize, extent: Option<(f32, f32)>, view: &View
         }
     }
     if let Some((low, high)) = extent {
-        spans.push(Span::styled(format!(" {:.0}", high - low), theme.quiet()));
+        spans.push(Span::styled(format!("  {:.0}", high - low), theme.quiet()));
     }
     Line::from(spans)
 }

@@ -1,6 +1,6 @@
 //! The boards, the supervisor, and the keys.
 
-use protocol::{DisplayState, Role};
+use protocol::{DisplayState, Role, RoleCounters, Status};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -13,24 +13,33 @@ use crate::monitor::dashboard::{Dashboard, Notice};
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
 use crate::monitor::words;
-use crate::state::{Named, State};
+use crate::state::State;
 
 /// Width of a board's name with what stands around it.
 const NAME_WIDTH: u16 = 11;
+/// Most rows of a board, whatever there is to say.
+const MOST_ROWS: u16 = 4;
 
-/// Rows that the header takes: advice may need two for a board.
+/// Rows that the header takes: what is wrong, and the advice, may need some for a board.
 pub fn height(live: &Dashboard, width: u16) -> u16 {
     let rows = |role| board_rows(live, role, width);
     rows(Role::Sensor) + rows(Role::Display) + 1
 }
 
 fn board_rows(live: &Dashboard, role: Role, width: u16) -> u16 {
-    let needed = trouble(live.board(role)).map_or(0, |text| text.chars().count());
-    if needed > usize::from(width.saturating_sub(NAME_WIDTH)) {
-        2
-    } else {
-        1
+    let width = usize::from(width.saturating_sub(NAME_WIDTH)).max(1);
+    let mut rows = 1;
+    let mut used = 0;
+    for word in trouble(live.board(role)).unwrap_or_default().split(' ') {
+        let length = word.chars().count();
+        if used > 0 && used + 1 + length > width {
+            rows += 1;
+            used = length;
+        } else {
+            used += usize::from(used > 0) + length;
+        }
     }
+    rows.min(MOST_ROWS)
 }
 
 /// What is wrong with the way to a board, and what to do about it.
@@ -78,11 +87,11 @@ fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, t
         ..area
     };
     if let Some(State::Known { port, hello }) = &board.state {
-        let mut spans = vec![
-            Span::raw(format!("{} ", port.display())),
-            Span::styled(Named(hello).to_string(), theme.quiet()),
-        ];
+        let [major, minor, patch] = hello.version;
+        let firmware = format!("{major}.{minor}.{patch} {}", hello.chip_name());
+        let mut spans = vec![Span::raw(port.display().to_string())];
         spans.extend(health(board, live.now_us, theme));
+        spans.push(Span::styled(format!("  {firmware}"), theme.quiet()));
         text::put(frame, rest, 0, Line::from(spans));
     } else {
         let words = trouble(board).unwrap_or_else(|| "not looked for yet".to_owned());
@@ -93,7 +102,7 @@ fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, t
     }
 }
 
-/// How long it runs, why it started, and how it is to be reached.
+/// How it is to be reached, how long it runs, and why it started.
 fn health(board: &Board, now_us: u64, theme: Theme) -> Vec<Span<'static>> {
     let mut spans = Vec::new();
     let mut add = |name: &'static str, value: String, style: Style| {
@@ -101,30 +110,33 @@ fn health(board: &Board, now_us: u64, theme: Theme) -> Vec<Span<'static>> {
         spans.push(Span::styled(value, style));
     };
     if let Some(clocks) = board.clocks {
+        let offset_s = clocks.offset_us as f64 / 1e6;
         add("rtt", text::short(clocks.round_trip_us), Style::new());
+        add("clock", format!("{offset_s:+.4} s"), Style::new());
     }
     if let Some(uptime_us) = board.uptime_us(now_us) {
         add("up", text::duration(uptime_us), Style::new());
     }
     if let Some((_, status)) = &board.status {
-        let resets = status.watchdog_resets;
-        let style = if resets > 0 {
-            theme.bad()
-        } else {
-            Style::new()
+        let count = |count: u32, if_any: Style| {
+            let style = if count > 0 { if_any } else { Style::new() };
+            (text::brief(count), style)
         };
-        add("watchdog", resets.to_string(), style);
-        add(
-            "started by",
-            words::reset(status.reset).to_owned(),
-            Style::new(),
-        );
-    }
-    if let Some(clocks) = board.clocks {
-        let offset_s = clocks.offset_us as f64 / 1e6;
-        add("clock", format!("{offset_s:+.4} s"), Style::new());
+        let (misses, style) = count(missed(status), theme.warning());
+        add("misses", misses, style);
+        let (resets, style) = count(status.watchdog_resets, theme.bad());
+        add("watchdog", resets, style);
+        add("by", words::reset(status.reset).to_owned(), Style::new());
     }
     spans
+}
+
+/// What was not done in time: samples, or output ticks.
+const fn missed(status: &Status) -> u32 {
+    match &status.role {
+        RoleCounters::Sensor(counters) => counters.deadline_misses,
+        RoleCounters::Display(counters) => counters.deadline_misses,
+    }
 }
 
 /// The colour of a board's state.
@@ -220,8 +232,13 @@ pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         ("?", "help"),
         ("q", "quit"),
     ];
-    let spans: Vec<Span<'_>> = keys
+    let needed = |(key, meaning): &(&str, &str)| key.len() + meaning.len() + 3;
+    let is_narrow = keys.iter().map(needed).sum::<usize>() > area.width.into();
+    // The keys that matter least are in the help.
+    let keys = keys
         .into_iter()
+        .filter(|(key, _)| !is_narrow || !["+-", "m"].contains(key));
+    let spans: Vec<Span<'_>> = keys
         .flat_map(|(key, meaning)| {
             [
                 Span::styled(format!(" {key}"), theme.strong()),

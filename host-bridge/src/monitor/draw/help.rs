@@ -8,7 +8,7 @@ use ratatui::widgets::{Block, Borders, Clear, Paragraph};
 use crate::monitor::theme::Theme;
 
 /// Each key, or word, and what it means.
-const LINES: [(&str, &str); 19] = [
+const LINES: [(&str, &str); 20] = [
     (
         "s, space",
         "stop: 0 V at once, until the display board's reset button or power",
@@ -57,9 +57,10 @@ const LINES: [(&str, &str); 19] = [
         "round trip to the board; its clock minus this computer's",
     ),
     (
-        "no hello",
-        "frames from before the two ends knew each other",
+        "misses, by",
+        "samples or output ticks not done in time; why the board started",
     ),
+    ("stray", "frames from before the two ends knew each other"),
     ("unread", "good frames that hold no message of this version"),
 ];
 

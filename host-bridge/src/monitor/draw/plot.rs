@@ -22,7 +22,7 @@ pub struct Series<'a> {
     pub trace: &'a Trace,
     /// Its colour.
     pub style: Style,
-    /// Whether only every other column is drawn, to tell it from the others without colours.
+    /// Whether it is drawn as points that nothing joins, to tell it from the others without colours.
     pub is_dotted: bool,
 }
 
@@ -42,10 +42,12 @@ impl Range {
     pub fn around(low: f32, high: f32, least: f32) -> Self {
         let middle = (low + high) / 2.0;
         let half = (high - low).max(least) / 2.0;
-        let step = round_step(half);
+        // Four steps or a few more, so that little of the height is left empty; what is within a hundredth
+        // of a round number is it.
+        let step = round_step(half / 2.0);
         Self {
-            low: ((middle - half) / step).floor() * step,
-            high: ((middle + half) / step).ceil() * step,
+            low: ((middle - half) / step + 0.01).floor() * step,
+            high: ((middle + half) / step - 0.01).ceil() * step,
             digits: digits(step),
         }
     }
@@ -223,14 +225,16 @@ struct Stroke {
 impl Shape for Stroke {
     fn draw(&self, painter: &mut Painter<'_, '_>) {
         for (column, extent) in self.columns.iter().enumerate() {
-            let Some(Extent { low, high, .. }) = extent else {
+            let Some(Extent { low, high, last }) = extent else {
                 continue;
             };
-            if self.skips.is_some_and(|odd| (column + odd) % 2 == 1) {
-                continue;
-            }
-            let top = row(*high, self.range, self.height);
-            for row in top..=row(*low, self.range, self.height) {
+            let (high, low) = match self.skips {
+                Some(odd) if (column + odd) % 2 == 1 => continue,
+                Some(_) => (*last, *last),
+                None => (*high, *low),
+            };
+            let top = row(high, self.range, self.height);
+            for row in top..=row(low, self.range, self.height) {
                 painter.paint(column, row, self.colour);
             }
         }

@@ -40,7 +40,7 @@ const COLUMNS: [Column; 13] = [
     column("noise", true, |port| port.line_errors),
     column("late", true, |port| port.late),
     column("twice", true, |port| port.duplicated),
-    column("no hello", false, |port| port.unheralded),
+    column("stray", false, |port| port.unheralded),
     column("foreign", true, |port| port.foreign),
     column("unread", true, |port| port.malformed),
     column("overlong", true, |port| port.overlong),

@@ -53,10 +53,11 @@ pub fn duration(us: u64) -> String {
     }
 }
 
-/// A time with the unit that fits: `0.4 ms`, `12.3 s`.
+/// A time with the unit that fits: `52 µs`, `1.4 ms`, `12.3 s`.
 pub fn short(us: u64) -> String {
     match us {
-        0..10_000 => format!("{:.1} ms", us as f64 / 1e3),
+        0..1_000 => format!("{us} µs"),
+        1_000..10_000 => format!("{:.1} ms", us as f64 / 1e3),
         10_000..1_000_000 => format!("{} ms", us / 1_000),
         1_000_000..100_000_000 => format!("{:.1} s", us as f64 / 1e6),
         _ => duration(us),
@@ -74,7 +75,9 @@ pub fn brief(count: u32) -> String {
 
 /// A length of time looked back on, in s.
 pub fn span(s: f32) -> String {
-    if s < 10.0 {
+    if s < 1.0 {
+        format!("{:.0} ms", s * 1e3)
+    } else if s < 10.0 {
         format!("{s:.1} s")
     } else {
         format!("{s:.0} s")
