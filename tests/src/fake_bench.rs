@@ -2,6 +2,10 @@
 //! that follows, gauges that stream when they are told to.
 
 use std::f64::consts::TAU;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use protocol::{
     Configuration, ConfigurationReport, Contact, DisplayConfiguration, DisplayCounters,
@@ -18,6 +22,8 @@ pub const WAVELENGTH_MM: f32 = 2.0;
 pub const FASTEST_MM_S: f64 = 70.0;
 /// Strokes to and fro a second.
 pub const STROKES_HZ: f64 = 0.83;
+/// Between two steps.
+const STEP: Duration = Duration::from_millis(2);
 /// A sample is so many sixteenths of an ADC step; mid-rail.
 const MID_RAIL: f64 = 32_768.0;
 
@@ -214,4 +220,51 @@ fn codes(position_mm: f64) -> [u16; protocol::CHANNELS] {
         let lsb = [100.0, 80.0, 120.0, 60.0, 30.0, 0.0][gauge];
         (MID_RAIL + 16.0 * lsb * phase.sin()) as u16
     })
+}
+
+/// A bench that goes on by itself. Dropping it pulls both cables.
+pub struct Running {
+    bench: Arc<Mutex<FakeBench>>,
+    ended: Arc<AtomicBool>,
+    steps: Option<JoinHandle<()>>,
+}
+
+impl Running {
+    /// Has a bench go on in real time.
+    pub fn new(bench: FakeBench) -> Self {
+        let bench = Arc::new(Mutex::new(bench));
+        let ended = Arc::new(AtomicBool::new(false));
+        let (theirs, their_end) = (Arc::clone(&bench), Arc::clone(&ended));
+        let steps = thread::spawn(move || {
+            let mut next = Instant::now();
+            while !their_end.load(Ordering::Acquire) {
+                locked(&theirs).step();
+                next += STEP;
+                thread::park_timeout(next.saturating_duration_since(Instant::now()));
+            }
+        });
+        Self {
+            bench,
+            ended,
+            steps: Some(steps),
+        }
+    }
+
+    /// The bench at this moment.
+    pub fn bench(&self) -> MutexGuard<'_, FakeBench> {
+        locked(&self.bench)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Release);
+        if let Some(steps) = self.steps.take() {
+            let _ = steps.join();
+        }
+    }
+}
+
+fn locked(bench: &Mutex<FakeBench>) -> MutexGuard<'_, FakeBench> {
+    bench.lock().unwrap_or_else(PoisonError::into_inner)
 }

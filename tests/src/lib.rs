@@ -9,3 +9,4 @@ pub mod fake_board;
 pub mod history;
 pub mod run;
 pub mod sensing;
+pub mod terminal;
