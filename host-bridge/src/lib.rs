@@ -13,6 +13,7 @@ mod hearing;
 pub mod host_clock;
 mod line;
 pub mod link;
+pub mod monitor;
 pub mod place;
 mod restart;
 mod search;

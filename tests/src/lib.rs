@@ -6,7 +6,9 @@
 pub mod bench;
 pub mod bridge;
 pub mod elves;
+pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
 pub mod run;
 pub mod sensing;
+pub mod terminal;
