@@ -15,6 +15,8 @@ mod line;
 pub mod link;
 pub mod monitor;
 pub mod place;
+pub mod recording;
+pub mod replay;
 mod restart;
 mod search;
 pub mod state;

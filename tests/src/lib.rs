@@ -12,3 +12,4 @@ pub mod history;
 pub mod run;
 pub mod sensing;
 pub mod terminal;
+pub mod utterance;
