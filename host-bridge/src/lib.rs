@@ -10,4 +10,5 @@ pub mod bench;
 pub mod host_clock;
 pub mod link;
 pub mod place;
+pub mod relay;
 pub mod state;
