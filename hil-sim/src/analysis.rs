@@ -5,6 +5,7 @@ mod cycles;
 pub mod edges;
 pub mod estimates;
 pub mod mean;
+mod middle;
 pub mod phase;
 mod phase_error;
 pub mod reaction;

@@ -18,6 +18,8 @@ mod faults;
 mod goals;
 mod map;
 mod run;
+#[cfg(target_os = "linux")]
+mod serve;
 mod size;
 mod soak;
 
@@ -63,6 +65,10 @@ enum Command {
     /// channels, hand to output at 2 and 4 kHz over links of all sorts. Exit status 1 if p99 is above 0.6 ms
     /// at 2 kHz. Writes timing.csv and timing.svg
     Timing(display::Timing),
+    /// Sets up a bench to try things on: both ELFs on emulated boards, held to real time, each board's
+    /// console as a pseudo-terminal, until it is told to quit
+    #[cfg(target_os = "linux")]
+    Serve(serve::Serve),
     /// Runs both ELFs for long, with random strokes over several specimens through bad weather, and holds
     /// every counter against what was seen: exit status 1 if one does not fit
     Soak(soak::Soak),
@@ -160,6 +166,8 @@ impl Arguments {
             Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
             Command::Timing(timing) => timing.execute(),
+            #[cfg(target_os = "linux")]
+            Command::Serve(serve) => serve.execute(),
             Command::Soak(soak) => soak.execute(),
         }
     }

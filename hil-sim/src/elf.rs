@@ -10,38 +10,33 @@ mod injector;
 pub mod instructions;
 mod lockstep;
 mod nucleo;
+mod pair;
+mod recorder;
 mod rtt;
 mod sensor;
+#[cfg(target_os = "linux")]
+pub mod serve;
 pub mod soak;
 mod traps;
 mod wire;
 
-use std::sync::mpsc::sync_channel;
-use std::thread;
 use std::time::Instant;
 
 use protocol::{Message, Role, Status};
-use rigless::emulator::{self, Start};
-use rigless::session::Session;
-use rigless::soc::stm32f427::Stm32f427;
-use rigless::time::VirtualNanos;
 
 pub use console::Told;
 pub use firmware::{Firmware, FirmwareError, Firmwares};
-pub use lockstep::{QUANTUM_NS, WARM_UP_NS};
+pub use lockstep::QUANTUM_NS;
+pub use recorder::WARM_UP_NS;
 
-use crate::arm::Arm;
 use crate::digest::Digest;
-use crate::fault::{HandFault, Reset, Signs};
+use crate::fault::Signs;
 use crate::listener::{Listener, Said};
 use crate::recording::{Engine, EstimateRecord, Recording, ScanRecord};
 use crate::scene::{Scene, SceneError};
-use crate::world::World;
-use display::{DisplayPins, DisplayRecords};
-use lockstep::{Cable, Lockstep, Watched};
-use nucleo::Nucleo;
-use sensor::SensorPins;
-use traps::Traps;
+use display::DisplayRecords;
+use pair::Finished;
+use recorder::Recorder;
 
 const SCANS_PER_ESTIMATE: usize =
     (firmware_sensor::SCAN_RATE_HZ / firmware_sensor::ESTIMATE_RATE_HZ) as usize;
@@ -105,14 +100,6 @@ pub enum ElfError {
     },
 }
 
-/// What one board leaves behind.
-struct Outcome<T> {
-    left: T,
-    driver: Lockstep,
-    instructions: u64,
-    resets: Vec<Reset>,
-}
-
 /// What only the `elf` engine knows, beside the [`Recording`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BoardFacts {
@@ -133,93 +120,29 @@ pub struct BoardFacts {
 }
 
 /// Runs `scene` on the two firmwares.
+///
+/// # Errors
+/// If a board can't be emulated, stops before the scene's end, or does not take its configuration.
 pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFacts), ElfError> {
-    let end_ns = (scene.duration_s * 1e9).ceil() as u64;
-    let sensor_world = World::new(scene)?;
-    let display_world = World::new(scene)?;
-    let arm = Arm::new(&scene.arm, &scene.motion);
-    let (to_display, from_sensor) = sync_channel(1);
-    let (to_sensor, from_display) = sync_channel(1);
-
-    let sensor_driver = Lockstep::new(
-        scene,
-        Role::Sensor,
-        &firmwares.sensor.elf,
-        Cable {
-            to_peer: to_display,
-            from_peer: from_display,
-        },
-    );
-    let display_driver = Lockstep::new(
-        scene,
-        Role::Display,
-        &firmwares.display.elf,
-        Cable {
-            to_peer: to_sensor,
-            from_peer: from_sensor,
-        },
-    );
-
     let started = Instant::now();
-    let (sensor, display) = thread::scope(|scope| {
-        let sensor = scope.spawn(|| {
-            let board = Nucleo::new(
-                SensorPins::new(
-                    sensor_world,
-                    arm,
-                    scene.sensor_configuration(),
-                    &scene.faults,
-                ),
-                SensorPins::fit,
-            );
-            let take = |pins: &mut SensorPins, _: &mut Stm32f427| std::mem::take(&mut pins.scans);
-            drive(
-                Role::Sensor,
-                board,
-                &firmwares.sensor,
-                sensor_driver,
-                end_ns,
-                take,
-            )
-        });
-        let board = Nucleo::new(
-            DisplayPins::new(display_world, HandFault::new(&scene.faults)),
-            DisplayPins::fit,
-        );
-        let display = drive(
-            Role::Display,
-            board,
-            &firmwares.display,
-            display_driver,
-            end_ns,
-            DisplayPins::leave,
-        );
-        (sensor.join(), display)
-    });
+    let beside = |role, firmware: &Firmware| Recorder::new(scene, role, &firmware.elf);
+    let (sensor, display) = pair::run(
+        scene,
+        firmwares,
+        beside(Role::Sensor, &firmwares.sensor),
+        beside(Role::Display, &firmwares.display),
+    )?;
     let ended = Instant::now();
-    let sensor = sensor.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    // The board that fails abandons the other: its own reason is the one to tell.
-    let (sensor, display) = match (sensor, display) {
-        (Ok(sensor), Ok(display)) => (sensor, display),
-        (Err(error), Ok(_)) | (Ok(_), Err(error)) => return Err(error),
-        (Err(sensor), Err(display)) => {
-            return Err(if is_abandoned(&sensor) {
-                display
-            } else {
-                sensor
-            });
-        }
-    };
     let facts = BoardFacts {
         sensor_instructions: sensor.instructions,
         display_instructions: display.instructions,
         resets: sensor.resets.len() + display.resets.len(),
-        clears: display.left.clears,
-        dac_frame_errors: display.left.dac_frame_errors,
-        sensor_told: told("sensor", &sensor.driver)?,
-        display_told: told("display", &display.driver)?,
+        clears: display.records.clears,
+        dac_frame_errors: display.records.dac_frame_errors,
+        sensor_told: sensor.witness.told("sensor")?,
+        display_told: display.witness.told("display")?,
     };
-    let (begun, warm_up_s) = match sensor.driver.warm {
+    let (begun, warm_up_s) = match sensor.witness.warm {
         Some(warm) => (warm, WARM_UP_NS as f64 * 1e-9),
         None => (started, 0.0),
     };
@@ -227,119 +150,29 @@ pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFact
     Ok((record(scene, sensor, display, pace), facts))
 }
 
-const ABANDONED: &str = "the other board stopped";
-
-fn is_abandoned(error: &ElfError) -> bool {
-    matches!(error, ElfError::Stopped { reason, .. } if reason == ABANDONED)
-}
-
-/// What the board answered, if it was asked for anything.
-fn told(name: &'static str, driver: &Lockstep) -> Result<Option<Told>, ElfError> {
-    let reason = match driver.told() {
-        None if driver.is_asked() => {
-            "it has not answered by the scene's end: give a longer duration_s".to_owned()
-        }
-        told => match told.and_then(|told| told.report.refused) {
-            None => return Ok(told),
-            Some(refusal) => refusal.to_string(),
-        },
-    };
-    Err(ElfError::Configuration {
-        board: name,
-        reason,
-    })
-}
-
-fn drive<P: Watched, T>(
-    role: Role,
-    board: Result<Nucleo<P>, rigless::soc::Error>,
-    firmware: &Firmware,
-    driver: Lockstep,
-    end_ns: u64,
-    take: impl FnOnce(&mut P, &mut Stm32f427) -> T,
-) -> Result<Outcome<T>, ElfError> {
-    let name = role.name();
-    let board_error = |reason: String| ElfError::Board {
-        board: name,
-        reason,
-    };
-    let board = board.map_err(|error| board_error(error.to_string()))?;
-    let first_stop = VirtualNanos(QUANTUM_NS);
-    let session = Session::new(Box::new(board), 0, first_stop)
-        .map_err(|error| board_error(error.to_string()))?;
-    let mut images = vec![firmware.image.clone()];
-    images.extend(driver.injector().traps().and_then(Traps::image));
-    let mut finished = emulator::run(session, &Start::new(&images), driver)
-        .map_err(|error| board_error(error.to_string()))?;
-    let at_ns = finished.stop.map_or(0, |stop| stop.at.0);
-    if !finished.driver.is_done {
-        let reason = if finished.driver.abandoned {
-            ABANDONED.to_owned()
-        } else {
-            format!("{:?}", finished.stop)
-        };
-        return Err(ElfError::Stopped {
-            board: name,
-            at_s: at_ns as f64 * 1e-9,
-            duration_s: end_ns as f64 * 1e-9,
-            reason,
-        });
-    }
-    if let Some(kind) = finished.driver.injector().failed {
-        return Err(ElfError::Fault {
-            board: name,
-            kind: kind.name(),
-        });
-    }
-    // A board that is broken may well reach where nothing answers.
-    if let Some(unmapped) = finished.session.unmapped().first()
-        && !finished.driver.injector().breaks()
-    {
-        return Err(ElfError::Unmapped {
-            board: name,
-            address: unmapped.address,
-        });
-    }
-    let cuts_ns = &finished.driver.injector().cuts_ns;
-    let clock = finished.driver.clock();
-    let resets = finished.session.resets().iter().map(|reset| Reset {
-        role,
-        at_ns: clock.true_ns(reset.at.0),
-        is_injected: cuts_ns.contains(&reset.at.0),
-    });
-    let resets = resets.collect();
-    let (pins, part) = finished.session.board_mut().pins();
-    Ok(Outcome {
-        left: take(pins, part),
-        driver: finished.driver,
-        instructions: finished.stop.map_or(0, |stop| stop.instruction_count),
-        resets,
-    })
-}
-
 fn record(
     scene: &Scene,
-    sensor: Outcome<Vec<ScanRecord>>,
-    display: Outcome<DisplayRecords>,
+    sensor: Finished<Vec<ScanRecord>, Recorder>,
+    display: Finished<DisplayRecords, Recorder>,
     (warm_up_s, wall_s): (f64, f64),
 ) -> Recording {
     let mut digest = Digest::default();
-    digest.link(&sensor.driver.sent);
-    digest.link(&display.driver.sent);
-    digest.outputs(&display.left.outputs);
+    digest.link(&sensor.witness.sent);
+    digest.link(&display.witness.sent);
+    digest.outputs(&display.records.outputs);
 
     // What the sensor said, and what of it reached the display.
     let mut said = Listener::default();
-    said.hear(&sensor.driver.sent);
+    said.hear(&sensor.witness.sent);
     let mut heard = Listener::default();
-    heard.hear(&display.driver.heard);
+    heard.hear(&display.witness.heard);
     let mut display_said = Listener::default();
-    display_said.hear(&display.driver.sent);
+    display_said.hear(&display.witness.sent);
 
-    let clock_offset_ns = clock_offset_ns(&said, &sensor.left);
+    let clock_offset_ns = clock_offset_ns(&said, &sensor.records);
     let mut estimates: Vec<EstimateRecord> = Vec::new();
     // A sensor that has started again, or goes by a clock of its own, says nothing of the scene's.
-    let keeps_time = sensor.driver.clock().is_true() && sensor.resets.is_empty();
+    let keeps_time = sensor.clock.is_true() && sensor.resets.is_empty();
     for Said { at_ns, message } in said.messages() {
         if let Message::Estimate(estimate) = message {
             let made_ns = (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns);
@@ -365,9 +198,9 @@ fn record(
         }
     }
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
-    for (board, driver) in [("sensor", &sensor.driver), ("display", &display.driver)] {
+    for (board, witness) in [("sensor", &sensor.witness), ("display", &display.witness)] {
         log.extend(
-            driver
+            witness
                 .log_lines()
                 .into_iter()
                 .map(|(at_ns, line)| (at_ns, board, line)),
@@ -385,10 +218,10 @@ fn record(
         warm_up_s,
         wall_s,
         hash: digest.finish(),
-        scans: sensor.left,
-        ticks: display.left.ticks,
+        scans: sensor.records,
+        ticks: display.records.ticks,
         estimates,
-        outputs: display.left.outputs,
+        outputs: display.records.outputs,
         sensor_status,
         display_status,
         log,
@@ -396,7 +229,7 @@ fn record(
             display: display_said.into_messages(),
             sensor: said.into_messages(),
             resets,
-            clears_ns: display.left.clears_ns,
+            clears_ns: display.records.clears_ns,
         },
     }
 }

@@ -24,3 +24,6 @@ pub mod surface;
 pub mod truth;
 pub mod weather;
 pub mod world;
+
+#[cfg(target_os = "linux")]
+pub use elf::serve;

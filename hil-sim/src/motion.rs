@@ -1,5 +1,9 @@
 //! Where the hand is, and what its encoder says.
 
+mod live;
+
+pub use live::LiveHand;
+
 use crate::scene::Motion;
 
 /// Travel for one count of either encoder, in mm: 5 µm.
@@ -31,6 +35,7 @@ impl Motion {
                 amplitude_mm_s / omega * (1.0 - (omega * t_s).cos())
             }
             Motion::Recorded(positions) => positions.value(positions.row(t_s, 0), 0, t_s),
+            Motion::Live(hand) => hand.position_mm(t_s),
         }
     }
 
@@ -43,6 +48,15 @@ impl Motion {
                 frequency_hz,
             } => amplitude_mm_s * (std::f64::consts::TAU * frequency_hz * t_s).sin(),
             Motion::Recorded(positions) => positions.slope(positions.row(t_s, 0), 0, t_s),
+            Motion::Live(hand) => hand.velocity_mm_s(t_s),
+        }
+    }
+
+    /// Where a recording that belongs to the motion is at `t_s`: there, unless it is played to and fro.
+    pub fn played_s(&self, t_s: f64) -> f64 {
+        match self {
+            Motion::Live(hand) => hand.played_s(t_s),
+            _ => t_s,
         }
     }
 }

@@ -136,9 +136,9 @@ impl Pair {
         }
         if step.is_multiple_of(self.steps_per_tick) {
             self.tick(now_ns, t_s);
+            self.display_hears(now_ns);
         }
-        // As on the board: what has come is heard once the words are on their way.
-        self.hear(now_ns);
+        self.sensor_hears(now_ns);
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
             for (said, status) in [
@@ -157,15 +157,13 @@ impl Pair {
         }
     }
 
-    /// Hands on all that has arrived at either board.
-    fn hear(&mut self, now_ns: u64) {
+    /// Hands on all that has arrived at the sensor.
+    fn sensor_hears(&mut self, now_ns: u64) {
         let Self {
             sensor,
-            display,
             sensor_end,
             display_end,
             sensor_counters,
-            tape,
             ..
         } = self;
         sensor_end.hear(&mut display_end.wire, now_ns, |_, message| {
@@ -175,6 +173,18 @@ impl Pair {
                 sensor_counters.motions = sensor_counters.motions.wrapping_add(1);
             }
         });
+    }
+
+    /// Hands on all that has arrived at the display. As on the board, it is heard once a tick's words are on
+    /// their way.
+    fn display_hears(&mut self, now_ns: u64) {
+        let Self {
+            display,
+            sensor_end,
+            display_end,
+            tape,
+            ..
+        } = self;
         display_end.hear(
             &mut sensor_end.wire,
             now_ns,

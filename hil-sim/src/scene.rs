@@ -10,6 +10,7 @@ use firmware_display::Settings;
 use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
 
 use crate::fault::Fault;
+use crate::motion::LiveHand;
 
 mod bounds;
 mod display;
@@ -109,6 +110,8 @@ pub enum Motion {
     },
     /// Measured positions, straight lines between them; `file` has the columns `t_s,x_mm`.
     Recorded(Arc<Series>),
+    /// Moved while the scene runs. No file has it.
+    Live(Arc<LiveHand>),
 }
 
 /// `[arm]`: how the remote fingertip follows the hand.

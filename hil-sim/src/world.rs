@@ -88,7 +88,7 @@ impl World {
     pub fn codes(&mut self, t_s: f64, arm_position_mm: f64) -> [u16; CHANNELS] {
         let fingertip = match &mut self.source {
             Source::Computed(fingertip) => fingertip,
-            Source::Recorded(gauges) => return gauges.scan(t_s),
+            Source::Recorded(gauges) => return gauges.scan(self.motion.played_s(t_s)),
         };
         let arm_mm = self.skew.at_gauges_mm(t_s, arm_position_mm);
         let touch = fingertip.contact.follow(t_s, arm_mm);

@@ -164,6 +164,16 @@ mod tests {
     }
 
     #[test]
+    fn the_example_is_a_bench() {
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("doc/bench.toml");
+        let bench = Bench::read(&example).expect("a bench");
+        for seat in [&bench.sensor, &bench.display] {
+            assert!(seat.usb.is_some() && seat.elf.is_some(), "{seat:?}");
+        }
+        assert_eq!(bench.display.place(), Place::Port("/dev/ttyACM1".into()));
+    }
+
+    #[test]
     fn one_port_for_two_boards_is_refused() {
         let text = "[sensor]\nport = \"/dev/a\"\n[display]\nport = \"/dev/a\"\n";
         let bench: Bench = toml::from_str(text).expect("well-formed");

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueHint};
 use host_bridge::bench::{Bench, BenchError, Seat};
 use host_bridge::place::Place;
 
@@ -12,6 +12,7 @@ mod doctor;
 mod flash;
 mod man;
 mod monitor;
+mod output;
 mod record;
 mod relay;
 mod replay;
@@ -19,7 +20,26 @@ mod replay;
 /// Ridgelink's bridge: flashes, watches, records and replays the boards, and carries their link over
 /// networks.
 #[derive(Debug, Parser)]
-#[command(name = "host-bridge", version, about)]
+#[command(
+    name = "host-bridge",
+    version,
+    about,
+    after_long_help = "\
+Boards are found by themselves: every ST-LINK that is plugged in is asked who is behind it. Where there are \
+several benches, or ports that are none of an ST-LINK's, --sensor and --display say where, or a bench file \
+does, which also names firmwares and probes.
+
+A first session:
+  host-bridge doctor                 what is attached, and what is wrong
+  host-bridge flash sensor           the boards' firmwares, one after the other
+  host-bridge flash display
+  host-bridge monitor                what they say, as it comes
+  host-bridge record                 the same, kept
+  host-bridge replay                 and played again
+
+Results go to standard output, progress and complaints to standard error. Exit status 0 means done, 2 that \
+what was asked for can't be done; what 1 means, each command's own --help says."
+)]
 pub struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -28,6 +48,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Writes a firmware to a board, verifies it and waits for the board's Hello
+    #[command(long_about = flash::ABOUT, after_long_help = flash::EXAMPLES)]
     Flash(flash::Flash),
     /// Shows what the boards say, in the terminal or line by line
     Monitor(monitor::Monitor),
@@ -36,12 +57,15 @@ enum Command {
     /// Plays a recording into a monitor, a board or the simulator
     Replay(replay::Replay),
     /// Carries the link between two sites over a network
+    #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
     /// Looks at what is attached, and says what is wrong and what to do
     Doctor(doctor::Doctor),
     /// Prints completions for a shell
+    #[command(after_long_help = completions::EXAMPLES)]
     Completions(completions::Completions),
     /// Writes the man pages
+    #[command(after_long_help = man::EXAMPLES)]
     Man(man::Man),
 }
 
@@ -50,13 +74,13 @@ enum Command {
 struct Where {
     /// The bench file; without it, ridgelink.toml in this folder, or ridgelink/bench.toml in the user's
     /// settings, if there is one
-    #[arg(long, value_name = "FILE", env = "RIDGELINK_BENCH")]
+    #[arg(long, value_name = "FILE", env = "RIDGELINK_BENCH", value_hint = ValueHint::FilePath)]
     bench: Option<PathBuf>,
     /// The sensor board's console: a port, or usb:SERIAL of its ST-LINK
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", value_hint = ValueHint::FilePath)]
     sensor: Option<Place>,
     /// The display board's console
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", value_hint = ValueHint::FilePath)]
     display: Option<Place>,
 }
 
@@ -77,7 +101,7 @@ fn put(seat: &mut Seat, place: Option<&Place>) {
             seat.port = None;
             seat.usb = Some(serial.clone());
         }
-        Some(Place::Anywhere) | None => {}
+        Some(Place::Among(_) | Place::Anywhere) | None => {}
     }
 }
 

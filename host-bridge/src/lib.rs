@@ -7,8 +7,13 @@
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
 pub mod bench;
+mod hearing;
+pub mod flash;
 pub mod host_clock;
+mod line;
 pub mod link;
 pub mod place;
 pub mod relay;
+mod restart;
+mod search;
 pub mod state;

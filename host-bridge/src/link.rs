@@ -1,22 +1,23 @@
 //! One board at the end of a serial line: opened, greeted, listened to, and opened again when it is lost.
 //!
-//! A thread of its own reads the line and runs the protocol's own [`Port`]; who wants to say something
-//! writes it himself, at once. A board that is unplugged is looked for every [`RETRY`].
+//! A thread of its own reads the line and runs the protocol's own [`protocol::Port`]; who wants to say
+//! something writes it himself, at once. A board that is unplugged is looked for every [`RETRY`].
 
-use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Read};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use protocol::{
-    ClockOffset, Hello, MAX_FRAME, Message, Peer, Ping, Port, PortCounters, Role, Status,
-};
-use serialport::{ErrorKind, TTYPort};
+use protocol::{ClockOffset, Hello, Message, Peer, Ping, PortCounters, Role};
 
+use crate::hearing::{Hearing, Verdict};
 use crate::host_clock::now_us;
+use crate::line::{self, Ear, Line};
 use crate::place::Place;
+use crate::restart::BoardClock;
+use crate::search::{Candidates, Search};
 use crate::state::State;
 
 /// Speed of a console, 8N1.
@@ -24,15 +25,7 @@ pub const BAUD: u32 = 921_600;
 /// How long a lost board is waited for between two looks: a cable that is put back is seen well within
 /// a second.
 pub const RETRY: Duration = Duration::from_millis(100);
-/// Longest wait for bytes; also how late a Hello or a ping may be.
-const READ_TIMEOUT: Duration = Duration::from_millis(20);
-/// Between two pings.
-const PING_US: u64 = 1_000_000;
-/// What a board may take for its first answer: two Hellos and a status.
-const PATIENCE_US: u64 = 1_500_000;
-/// How long a board that was known may say nothing: it reports once a second.
-const SILENCE_US: u64 = 2_500_000;
-/// Longest read: what comes in a [`READ_TIMEOUT`] at full speed, twice over.
+/// Longest read: what comes in some 40 ms at full speed.
 const READ_BYTES: usize = 4_096;
 
 /// What a link tells its owner.
@@ -61,7 +54,7 @@ pub enum NotSent {
     /// Nobody is there who would understand it.
     #[error("the board is not there")]
     NotKnown,
-    /// The line does not take bytes.
+    /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
     #[error("the line takes no bytes")]
     Stuck,
 }
@@ -87,34 +80,11 @@ struct Shared {
     line: Mutex<Option<Line>>,
     state: Mutex<State>,
     clock: Mutex<ClockOffset>,
+    /// Of the line before, while there is none.
     counters: Mutex<PortCounters>,
     ended: AtomicBool,
     /// Wakes a reader that waits to try again.
     woken: (Mutex<()>, Condvar),
-}
-
-/// An open line.
-struct Line {
-    port: Box<Port>,
-    tty: TTYPort,
-}
-
-impl Line {
-    /// Writes what is to be said. False if the line does not take it.
-    fn flush(&mut self) -> bool {
-        let mut bytes = [0; MAX_FRAME];
-        loop {
-            let count = self.port.take(&mut bytes);
-            if count == 0 {
-                return true;
-            }
-            if self.tty.write_all(&bytes[..count]).is_err() {
-                // The other end counts what is left of the frame as corrupt.
-                while self.port.take(&mut bytes) != 0 {}
-                return false;
-            }
-        }
-    }
 }
 
 /// A mutex whose data are sound at every moment, whoever died holding it.
@@ -141,11 +111,15 @@ impl Link {
     /// link's thread with everything that happens; it may [`Link::post`], and it holds up the reading for
     /// as long as it takes.
     pub fn open(role: Role, place: Place, tell: impl FnMut(Event) + Send + 'static) -> Self {
+        let wanted = match &place {
+            Place::Anywhere => format!("an ST-LINK with the {} board", role.name()),
+            named => named.to_string(),
+        };
         let shared = Arc::new(Shared {
             role,
             line: Mutex::new(None),
             state: Mutex::new(State::Absent {
-                place: place.to_string(),
+                place: wanted.clone(),
             }),
             clock: Mutex::new(ClockOffset::new()),
             counters: Mutex::new(PortCounters::new()),
@@ -154,9 +128,11 @@ impl Link {
         });
         let reader = Reader {
             shared: Arc::clone(&shared),
-            place,
+            wanted,
+            search: Search::new(place),
             tell,
             told: None,
+            clock: BoardClock::default(),
         };
         Self {
             shared,
@@ -186,7 +162,10 @@ impl Link {
 
     /// What this end of the line has counted since the line was opened last.
     pub fn counters(&self) -> PortCounters {
-        *locked(&self.shared.counters)
+        match &*locked(&self.shared.line) {
+            Some(line) => line.counters(),
+            None => *locked(&self.shared.counters),
+        }
     }
 
     /// The board's clock; none before the first exchange since it started.
@@ -202,7 +181,10 @@ impl Link {
 impl Drop for Link {
     fn drop(&mut self) {
         self.shared.ended.store(true, Ordering::Release);
+        // Under the lock, so that a reader that is about to wait does not miss it.
+        let guard = locked(&self.shared.woken.0);
         self.shared.woken.1.notify_all();
+        drop(guard);
         if let Some(reader) = self.reader.take() {
             // A reader that panicked has said so on standard error.
             let _ = reader.join();
@@ -228,19 +210,10 @@ impl Voice {
 
 impl Shared {
     fn post(&self, message: &Message) -> Result<(), NotSent> {
-        if !locked(&self.state).is_known() {
-            return Err(NotSent::NotKnown);
-        }
-        let mut line = locked(&self.line);
-        let Some(line) = line.as_mut() else {
-            return Err(NotSent::NotKnown);
-        };
-        line.port.post(message);
-        if line.flush() {
-            Ok(())
-        } else {
-            Err(NotSent::Stuck)
-        }
+        locked(&self.line)
+            .as_mut()
+            .ok_or(NotSent::NotKnown)?
+            .say(message)
     }
 
     fn is_ended(&self) -> bool {
@@ -260,172 +233,154 @@ impl Shared {
 /// The thread that reads.
 struct Reader<F> {
     shared: Arc<Shared>,
-    place: Place,
+    search: Search,
+    /// What is looked for, in words.
+    wanted: String,
     tell: F,
     told: Option<State>,
-}
-
-/// What has been heard on a line since it was opened.
-#[derive(Default)]
-struct Hearing {
-    opened_us: u64,
-    bytes: u64,
-    /// Bytes that are neither text nor between lines of text.
-    strange: u64,
-    /// When a frame came last that was understood.
-    understood_us: Option<u64>,
-    pinged_us: Option<u64>,
-    uptime_us: u64,
+    /// Kept while the board is away: it may have lost its power with its cable.
+    clock: BoardClock,
 }
 
 impl<F: FnMut(Event)> Reader<F> {
     fn run(mut self) {
         while !self.shared.is_ended() {
-            let candidates = self.place.candidates();
-            if candidates.is_empty() {
-                self.turn(State::Absent {
-                    place: self.place.to_string(),
-                });
-            }
-            for port in candidates {
-                match open(&port) {
-                    Ok(tty) => self.converse(&port, tty),
-                    Err(error) => self.turn(refused(port, &error)),
-                }
+            let Candidates { ports, choosy } = self.search.candidates(line::is_held);
+            let mut found = self.absent();
+            for port in ports {
+                let state = match line::open(&port) {
+                    Ok((ear, line)) => self.converse(&port, ear, line, choosy),
+                    Err(state) => state,
+                };
                 if self.shared.is_ended() {
                     return;
                 }
+                if state.weight() > found.weight() {
+                    found = state;
+                }
             }
+            self.turn(found);
             self.shared.rest();
         }
     }
 
-    /// Talks until the line is lost, or leads nowhere that was wanted.
-    fn converse(&mut self, path: &Path, mut tty: TTYPort) {
-        let Ok(mut writer) = tty.try_clone_native() else {
-            return;
-        };
-        // What a terminal may have left half said is over with it.
-        if writer.write_all(&[0]).is_err() {
-            return;
-        }
-        *locked(&self.shared.clock) = ClockOffset::new();
-        *locked(&self.shared.line) = Some(Line {
-            port: Box::new(Port::new(host_hello())),
-            tty: writer,
-        });
-        let mut hearing = Hearing {
-            opened_us: now_us(),
-            ..Hearing::default()
-        };
+    /// Talks until the line is lost, or leads nowhere that was wanted although there is a choice; returns
+    /// how it stood then. Where there is a choice, only a board that was found is told of.
+    fn converse(&mut self, path: &Path, mut ear: Ear, line: Line, choosy: bool) -> State {
+        let mut hearing = Hearing::new(now_us(), self.search.patience_us(path));
+        locked(&self.shared.clock).clear();
+        *locked(&self.shared.line) = Some(line);
         let mut bytes = vec![0; READ_BYTES];
         let mut messages = Vec::new();
-        while !self.shared.is_ended() {
-            let count = match tty.read(&mut bytes) {
+        let mut end = None;
+        while !self.shared.is_ended() && end.is_none() {
+            let count = match ear.tty.read(&mut bytes) {
                 Ok(0) => break,
                 Ok(count) => count,
                 Err(error) if is_pause(&error) => 0,
                 Err(_) => break,
             };
             let at_us = now_us();
-            let Some(peer) = self.hear(&mut hearing, &bytes[..count], at_us, &mut messages) else {
-                break;
-            };
-            let state = self.judge(path, peer, &hearing, at_us);
-            let leads_nowhere = self.place == Place::Anywhere
-                && !matches!(state, State::Opened { .. } | State::Known { .. });
-            self.turn(state);
-            for message in messages.drain(..) {
+            let state = self.hear(path, &mut hearing, &bytes[..count], at_us, &mut messages);
+            match &state {
+                State::Known { .. } => self.search.remember(path, true),
+                State::Opened { .. } => {}
+                _ if choosy => {
+                    self.search.remember(path, false);
+                    end = Some(state.clone());
+                }
+                _ => {}
+            }
+            let is_known = state.is_known();
+            if !choosy || is_known {
+                self.turn(state);
+            }
+            // What another board says is nobody's business here.
+            for message in messages.drain(..).filter(|_| is_known) {
                 self.pass(&mut hearing, at_us, message);
             }
-            if leads_nowhere {
-                break;
-            }
         }
-        *locked(&self.shared.line) = None;
-        let lost = self
-            .told
-            .as_ref()
-            .is_some_and(|told| matches!(told, State::Known { .. } | State::Opened { .. }));
-        if lost && !self.shared.is_ended() {
-            self.turn(State::Absent {
-                place: self.place.to_string(),
-            });
+        if let Some(line) = locked(&self.shared.line).take() {
+            *locked(&self.shared.counters) = line.counters();
+            ear.close(line.is_stuck());
         }
+        let end = end.unwrap_or_else(|| self.absent());
+        let told_of = !choosy || self.told.as_ref().is_some_and(State::is_known);
+        if told_of && !self.shared.is_ended() {
+            self.turn(end.clone());
+        }
+        end
     }
 
-    /// Runs the protocol on what came, and says what is due; none if the line is lost.
+    /// Runs the protocol on what came, says what is due, and judges how the link stands.
     fn hear(
         &self,
+        path: &Path,
         hearing: &mut Hearing,
         bytes: &[u8],
         at_us: u64,
         messages: &mut Vec<Message>,
-    ) -> Option<Peer> {
+    ) -> State {
         let mut line = locked(&self.shared.line);
-        let line = line.as_mut()?;
-        hearing.bytes += bytes.len() as u64;
-        if matches!(line.port.peer(), Peer::Silent) {
-            hearing.strange += bytes.iter().filter(|&&byte| !is_text(byte)).count() as u64;
-        }
+        let Some(line) = line.as_mut() else {
+            return self.absent();
+        };
+        hearing.hear(at_us, bytes);
         line.port
             .receive(at_us, bytes, |message| messages.push(message));
         let peer = line.port.peer();
-        let is_known = matches!(peer, Peer::Known(_));
-        if !messages.is_empty() || (is_known && hearing.understood_us.is_none()) {
-            hearing.understood_us = Some(at_us);
-        }
-        let due = hearing
-            .pinged_us
-            .is_none_or(|pinged_us| at_us.saturating_sub(pinged_us) >= PING_US);
-        if is_known && due {
-            hearing.pinged_us = Some(at_us);
+        let counters = line.counters();
+        hearing.understand(at_us, &counters);
+        let state = self.state(path, hearing.judge(at_us, peer, &counters));
+        line.is_known = state.is_known();
+        // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
+        if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {
             line.port.post(&Message::Ping(Ping { sent_us: at_us }));
         }
-        line.flush();
-        *locked(&self.shared.counters) = line.port.counters();
-        Some(peer)
+        // What a stuck line refuses is counted, and said again when it is due again.
+        let _ = line.flush();
+        state
     }
 
-    /// How the link stands, by what has been heard.
-    fn judge(&self, path: &Path, peer: Peer, hearing: &Hearing, at_us: u64) -> State {
+    /// The verdict on a line in words.
+    fn state(&self, path: &Path, verdict: Verdict) -> State {
         let port = path.to_owned();
-        let impatient = at_us.saturating_sub(hearing.opened_us) > PATIENCE_US;
-        match peer {
-            Peer::Known(hello) if hello.role != self.shared.role.byte() => State::Stranger {
+        match verdict {
+            Verdict::Open => State::Opened { port },
+            // Whether it asks in return does not make another board of it.
+            Verdict::Known(hello) if hello.role == self.shared.role.byte() => State::Known {
                 port,
-                hello,
+                hello: hello.asking(false),
+            },
+            Verdict::Known(hello) => State::Stranger {
+                port,
+                hello: hello.asking(false),
                 wanted: self.shared.role,
             },
-            Peer::Known(hello) => {
-                let last_us = hearing.understood_us.unwrap_or(hearing.opened_us);
-                if at_us.saturating_sub(last_us) > SILENCE_US {
-                    State::Silent { port }
-                } else {
-                    State::Known { port, hello }
-                }
-            }
-            Peer::Foreign(hello) => State::Foreign { port, hello },
-            Peer::Silent if !impatient => State::Opened { port },
-            Peer::Silent if hearing.bytes == 0 => State::Silent { port },
-            Peer::Silent if hearing.strange == 0 => State::Deaf { port },
-            Peer::Silent => State::Garbage { port },
+            Verdict::Foreign(hello) => State::Foreign {
+                port,
+                hello: hello.asking(false),
+            },
+            Verdict::Silent => State::Silent { port },
+            Verdict::Deaf => State::Deaf { port },
+            Verdict::Garbage => State::Garbage { port },
+        }
+    }
+
+    fn absent(&self) -> State {
+        State::Absent {
+            place: self.wanted.clone(),
         }
     }
 
     fn pass(&mut self, hearing: &mut Hearing, at_us: u64, message: Message) {
-        match &message {
-            Message::Pong(pong) => {
-                locked(&self.shared.clock).on_pong(pong, at_us);
-            }
-            Message::Status(Status { uptime_us, .. }) => {
-                if *uptime_us < hearing.uptime_us {
-                    locked(&self.shared.clock).clear();
-                    (self.tell)(Event::Restarted);
-                }
-                hearing.uptime_us = *uptime_us;
-            }
-            _ => {}
+        if self.clock.is_restart(&message) {
+            locked(&self.shared.clock).clear();
+            hearing.forget_ping();
+            (self.tell)(Event::Restarted);
+        }
+        if let Message::Pong(pong) = &message {
+            locked(&self.shared.clock).on_pong(pong, at_us);
         }
         (self.tell)(Event::Heard { at_us, message });
     }
@@ -441,36 +396,10 @@ impl<F: FnMut(Event)> Reader<F> {
     }
 }
 
-/// Opens a console for this program alone.
-fn open(port: &Path) -> serialport::Result<TTYPort> {
-    serialport::new(port.to_string_lossy(), BAUD)
-        .timeout(READ_TIMEOUT)
-        .open_native()
-}
-
-fn refused(port: PathBuf, error: &serialport::Error) -> State {
-    match error.kind() {
-        ErrorKind::NoDevice => State::Busy { port },
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => State::Denied { port },
-        ErrorKind::Io(io::ErrorKind::NotFound) => State::Absent {
-            place: port.display().to_string(),
-        },
-        _ => State::Failed {
-            port,
-            reason: error.to_string(),
-        },
-    }
-}
-
 /// Whether a read only had nothing to give yet.
 fn is_pause(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
     )
-}
-
-/// What a board's lines of text, and the ends of frames, are made of.
-const fn is_text(byte: u8) -> bool {
-    matches!(byte, b' '..=b'~' | b'\r' | b'\n' | 0)
 }

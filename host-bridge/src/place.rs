@@ -19,6 +19,8 @@ pub enum Place {
     Port(PathBuf),
     /// The ST-LINK of this serial number, whatever its port is called at the moment.
     Usb(String),
+    /// One of these ports: that behind which a board of the wanted role says Hello.
+    Among(Vec<PathBuf>),
     /// Any ST-LINK behind which a board of the wanted role says Hello.
     #[default]
     Anywhere,
@@ -30,6 +32,7 @@ impl Place {
         match self {
             Self::Port(path) if path.exists() => vec![path.clone()],
             Self::Port(_) => Vec::new(),
+            Self::Among(ports) => ports.iter().filter(|path| path.exists()).cloned().collect(),
             Self::Usb(serial) => st_links()
                 .into_iter()
                 .filter(|found| found.serial.as_deref() == Some(serial.as_str()))
@@ -45,6 +48,13 @@ impl fmt::Display for Place {
         match self {
             Self::Port(path) => write!(f, "{}", path.display()),
             Self::Usb(serial) => write!(f, "the ST-LINK {serial}"),
+            Self::Among(ports) => {
+                let names: Vec<_> = ports
+                    .iter()
+                    .map(|port| port.display().to_string())
+                    .collect();
+                write!(f, "one of {}", names.join(", "))
+            }
             Self::Anywhere => f.write_str("any ST-LINK"),
         }
     }

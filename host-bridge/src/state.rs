@@ -23,11 +23,11 @@ pub enum State {
         /// The port.
         port: PathBuf,
     },
-    /// The port can't be opened, for another reason.
+    /// The port can't be used, for another reason.
     Failed {
         /// The port.
         port: PathBuf,
-        /// The system's reason.
+        /// What is wrong with it.
         reason: String,
     },
     /// The port has just been opened: an answer may still come.
@@ -40,7 +40,7 @@ pub enum State {
         /// The port.
         port: PathBuf,
     },
-    /// A board that speaks text to people and does not answer: nothing that is sent reaches it.
+    /// A board that speaks, text or frames, and does not answer: nothing that is sent reaches it.
     Deaf {
         /// The port.
         port: PathBuf,
@@ -98,6 +98,23 @@ impl State {
         }
     }
 
+    /// How much it tells: of several ports that were tried, the one that stands highest is told of.
+    pub(crate) const fn weight(&self) -> u8 {
+        match self {
+            Self::Absent { .. } => 0,
+            Self::Stranger { .. } => 1,
+            Self::Opened { .. } => 2,
+            Self::Busy { .. } => 3,
+            Self::Silent { .. } => 4,
+            Self::Failed { .. } => 5,
+            Self::Deaf { .. } => 6,
+            Self::Garbage { .. } => 7,
+            Self::Denied { .. } => 8,
+            Self::Foreign { .. } => 9,
+            Self::Known { .. } => 10,
+        }
+    }
+
     /// One word for it, for scripts; never changes.
     pub const fn word(&self) -> &'static str {
         match self {
@@ -152,10 +169,10 @@ impl fmt::Display for State {
             Self::Absent { place } => write!(f, "{place}: not there"),
             Self::Busy { .. } => f.write_str("another program has it"),
             Self::Denied { .. } => f.write_str("no permission to open it"),
-            Self::Failed { reason, .. } => write!(f, "can't be opened: {reason}"),
+            Self::Failed { reason, .. } => f.write_str(reason),
             Self::Opened { .. } => f.write_str("opened"),
             Self::Silent { .. } => f.write_str("silent"),
-            Self::Deaf { .. } => f.write_str("speaks text and does not answer"),
+            Self::Deaf { .. } => f.write_str("speaks and does not answer"),
             Self::Garbage { .. } => f.write_str("sends garbage"),
             Self::Foreign { hello, .. } => write!(
                 f,

@@ -32,7 +32,7 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn shells_get_their_completions() {
     for (shell, mark) in [
-        ("bash", "complete -F _host-bridge"),
+        ("bash", "complete -F _host"),
         ("zsh", "#compdef host-bridge"),
         ("fish", "complete -c host-bridge"),
     ] {

@@ -1,7 +1,7 @@
 //! A board that is not there: the protocol's own port behind a pseudo-terminal, with whatever a test
 //! wants said. For the bridge's tests that need no firmware.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,8 +18,15 @@ const LOOK: Duration = Duration::from_millis(1);
 enum Order {
     Say(Box<Message>),
     Bytes(Vec<u8>),
+    Mute(bool),
+    Deafen(bool),
+    Restart,
     End,
 }
+
+/// What a board does by itself: called about once in a ms with the board's clock in µs, it returns what is
+/// to be said.
+pub type Script = Box<dyn FnMut(u64) -> Vec<Message> + Send>;
 
 /// A board on a pseudo-terminal. Dropping it pulls the cable.
 pub struct FakeBoard {
@@ -28,7 +35,7 @@ pub struct FakeBoard {
     heard: Arc<Mutex<Vec<Message>>>,
     line: Option<JoinHandle<()>>,
     /// Keeps the pseudo-terminal alive while nobody has it open.
-    _kept: TTYPort,
+    kept: Option<TTYPort>,
 }
 
 impl FakeBoard {
@@ -39,19 +46,24 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello`, whatever it says.
     pub fn saying(hello: Hello) -> Self {
+        Self::acting(hello, Box::new(|_| Vec::new()))
+    }
+
+    /// A board that introduces itself with `hello` and says by itself what `script` has it say.
+    pub fn acting(hello: Hello, script: Script) -> Self {
         let (mut master, kept) = TTYPort::pair().expect("the system has pseudo-terminals");
         let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
         master.set_timeout(LOOK).expect("a timeout can be set");
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
         let ears = Arc::clone(&heard);
-        let line = thread::spawn(move || run(master, hello, &given, &ears));
+        let line = thread::spawn(move || run(master, hello, script, &given, &ears));
         Self {
             path,
             orders,
             heard,
             line: Some(line),
-            _kept: kept,
+            kept: Some(kept),
         }
     }
 
@@ -70,6 +82,21 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Bytes(bytes.to_vec()));
     }
 
+    /// Has the board say nothing at all for as long as it is mute; it hears.
+    pub fn mute(&self, is_mute: bool) {
+        let _ = self.orders.send(Order::Mute(is_mute));
+    }
+
+    /// Has the board take no bytes from the line for as long as it is deaf, so that the line fills up.
+    pub fn deafen(&self, is_deaf: bool) {
+        let _ = self.orders.send(Order::Deafen(is_deaf));
+    }
+
+    /// Restarts the board: its clock, its counters and whom it knows.
+    pub fn restart(&self) {
+        let _ = self.orders.send(Order::Restart);
+    }
+
     /// What the board has heard so far; the list is emptied.
     pub fn take_heard(&self) -> Vec<Message> {
         std::mem::take(&mut self.heard.lock().unwrap_or_else(PoisonError::into_inner))
@@ -79,22 +106,36 @@ impl FakeBoard {
 impl Drop for FakeBoard {
     fn drop(&mut self) {
         let _ = self.orders.send(Order::End);
+        // A write that waits for a reader who will not come ends with this.
+        self.kept = None;
         if let Some(line) = self.line.take() {
             let _ = line.join();
         }
     }
 }
 
-fn run(mut master: TTYPort, hello: Hello, given: &Receiver<Order>, heard: &Mutex<Vec<Message>>) {
-    let started = Instant::now();
+fn run(
+    mut master: TTYPort,
+    hello: Hello,
+    mut script: Script,
+    given: &Receiver<Order>,
+    heard: &Mutex<Vec<Message>>,
+) {
+    let mut started = Instant::now();
     let mut port = Port::new(hello);
+    let (mut is_mute, mut is_deaf) = (false, false);
     let mut bytes = [0; 4_096];
     let mut out = [0; MAX_FRAME];
     loop {
-        let count = match master.read(&mut bytes) {
-            Ok(count) => count,
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
-            Err(_) => return,
+        let count = if is_deaf {
+            thread::park_timeout(LOOK);
+            0
+        } else {
+            match master.read(&mut bytes) {
+                Ok(count) => count,
+                Err(error) if is_pause(&error) => 0,
+                Err(_) => return,
+            }
         };
         let now_us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
         port.receive(now_us, &bytes[..count], |message| {
@@ -103,9 +144,12 @@ fn run(mut master: TTYPort, hello: Hello, given: &Receiver<Order>, heard: &Mutex
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(message);
         });
+        for message in script(now_us) {
+            port.post(&message);
+        }
         loop {
             while let count @ 1.. = port.take(&mut out) {
-                if master.write_all(&out[..count]).is_err() {
+                if !is_mute && master.write_all(&out[..count]).is_err() {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
@@ -115,11 +159,21 @@ fn run(mut master: TTYPort, hello: Hello, given: &Receiver<Order>, heard: &Mutex
                 Ok(Order::Bytes(bytes)) => {
                     let _ = master.write_all(&bytes);
                 }
+                Ok(Order::Mute(now)) => is_mute = now,
+                Ok(Order::Deafen(now)) => is_deaf = now,
+                Ok(Order::Restart) => {
+                    port = Port::new(hello);
+                    started = Instant::now();
+                }
                 Ok(Order::End) => return,
                 Err(_) => break,
             }
         }
     }
+}
+
+fn is_pause(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock)
 }
 
 /// Waits until `holds`, for at most `limit`; whether it did.

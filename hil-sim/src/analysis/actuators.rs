@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::analysis::cycles::{self, Cycle};
 use crate::analysis::finite;
+use crate::analysis::middle::about_middle;
 use crate::analysis::phase::DuePhase;
 use crate::analysis::phase_error::phase_error;
 use crate::analysis::reaction::{Reaction, reaction};
@@ -21,7 +22,7 @@ const STILL_V: f64 = 0.05;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Actuators {
     /// Frequency of the reference actuator's voltage in Hz, between the first and the last upward
-    /// zero crossing of the longest stretch at full amplitude in which the hand did not turn.
+    /// crossing of its middle in the longest stretch at full amplitude in which the hand did not turn.
     pub frequency_hz: Option<f64>,
     /// Mean of |v|/λ̂ over the same stretch, in Hz.
     pub truth_hz: Option<f64>,
@@ -68,7 +69,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     if peak_v(&reference) < STILL_V {
         return actuators;
     }
-    let cycles = cycles::cycles(&reference, &hand, &due);
+    let cycles = cycles::cycles(&about_middle(&reference, &hand, &due), &due);
     if let Some((stretch, count)) = cycles::longest_stretch(&cycles) {
         let stretch_s = stretch.to_s - stretch.from_s;
         let travelled = due.travelled_cycles(stretch.to_s) - due.travelled_cycles(stretch.from_s);

@@ -38,6 +38,10 @@ pub struct Run {
     pub edge_s: Box<dyn Fn(f64) -> f64>,
     /// What the stimulus is ahead of its due phase, in cycles.
     pub ahead_cycles: Box<dyn Fn(f64) -> f64>,
+    /// The sines' amplitude, in V.
+    pub amplitude_v: f64,
+    /// Added to every actuator's voltage, in V: what goes beyond ± 5 V with it is cut off.
+    pub standing_v: Box<dyn Fn(f64) -> f64>,
     /// Added to actuator 7's voltage, in V.
     pub offset_v: f64,
     /// Phase from one actuator to the next, in mm of place.
@@ -55,6 +59,8 @@ impl Run {
             transit_s: 1e-3,
             edge_s: Box::new(|_| 0.0),
             ahead_cycles: Box::new(|_| 0.0),
+            amplitude_v: 5.0,
+            standing_v: Box::new(|_| 0.0),
             offset_v: 0.0,
             pitch_mm: 0.0,
         }
@@ -66,6 +72,17 @@ impl Run {
         Self {
             position_mm: Box::new(move |t_s| peak_mm_s / turn * (1.0 - (turn * t_s).cos())),
             ..Self::steady(peak_mm_s, wavelength_mm)
+        }
+    }
+
+    /// A hand that goes to and fro at one speed, `stroke_s` each way, on λ.
+    pub fn to_and_fro(speed_mm_s: f64, stroke_s: f64, wavelength_mm: f64) -> Self {
+        Self {
+            position_mm: Box::new(move |t_s| {
+                let into_s = t_s % (2.0 * stroke_s);
+                speed_mm_s * into_s.min(2.0 * stroke_s - into_s)
+            }),
+            ..Self::steady(speed_mm_s, wavelength_mm)
         }
     }
 
@@ -174,13 +191,14 @@ impl Run {
             let counts = pair[1].encoder.wrapping_sub(pair[0].encoder) as i16;
             cycles += f64::from(counts) * COUNT_MM * per_mm;
             let on_s = t_s - *on_since_s.get_or_insert(t_s);
-            let amplitude_v = 5.0 * (on_s / FADE_IN_S).min(1.0);
+            let amplitude_v = self.amplitude_v * (on_s / FADE_IN_S).min(1.0);
             let mut words = [0; ACTUATORS];
             for (actuator, word) in words.iter_mut().enumerate() {
                 let place = actuator as f64 * self.pitch_mm * per_mm;
                 let phase = std::f64::consts::TAU * (cycles + (self.ahead_cycles)(t_s) + place);
                 let offset_v = if actuator == 7 { self.offset_v } else { 0.0 };
-                *word = word_of(amplitude_v * phase.sin() + offset_v);
+                let standing_v = (self.standing_v)(t_s) + offset_v;
+                *word = word_of(amplitude_v * phase.sin() + standing_v);
             }
             if words != held {
                 held = words;

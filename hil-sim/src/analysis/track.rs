@@ -53,6 +53,27 @@ impl Track {
         interpolate(&self.points, t_s)
     }
 
+    /// When it went one way only, or not at all: the spans from one turning point to the next, in s.
+    pub fn strokes(&self) -> Vec<(f64, f64)> {
+        let (Some(first), Some(last)) = (self.points.first(), self.points.last()) else {
+            return Vec::new();
+        };
+        let mut strokes = Vec::new();
+        let (mut from_s, mut forwards) = (first.0, None);
+        for pair in self.points.windows(2) {
+            let step_mm = pair[1].1 - pair[0].1;
+            if step_mm == 0.0 {
+                continue;
+            }
+            if forwards.replace(step_mm > 0.0) == Some(step_mm < 0.0) {
+                strokes.push((from_s, pair[0].0));
+                from_s = pair[0].0;
+            }
+        }
+        strokes.push((from_s, last.0));
+        strokes
+    }
+
     /// The velocity at an instant, in mm/s. None with fewer than two points.
     pub fn velocity_mm_s(&self, t_s: f64) -> Option<f64> {
         let (start, end) = (self.points.first()?.0, self.points.last()?.0);
@@ -89,6 +110,25 @@ mod tests {
         assert!((track.position_mm(0.05).unwrap() - 1.5).abs() < 1e-12);
         assert_eq!(track.position_mm(1.0), Some(2.0));
         assert!((track.velocity_mm_s(0.05).unwrap() - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn strokes_go_from_one_turning_point_to_the_next() {
+        let track = Track::new([
+            (0.0, 1.0),
+            (1.0, 1.0),
+            (2.0, 2.0),
+            (3.0, 3.0),
+            // A rest on the way, and one at the turning point.
+            (4.0, 3.0),
+            (5.0, 4.0),
+            (6.0, 4.0),
+            (7.0, 3.5),
+            (8.0, 3.6),
+        ]);
+        assert_eq!(track.strokes(), [(0.0, 6.0), (6.0, 7.0), (7.0, 8.0)]);
+        assert_eq!(Track::default().strokes(), []);
+        assert_eq!(Track::new([(2.0, 1.0)]).strokes(), [(2.0, 2.0)]);
     }
 
     #[test]

@@ -21,8 +21,9 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use super::display::DisplayPins;
-use super::lockstep::{WARM_UP_NS, Watched};
+use super::lockstep::Watched;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
+use super::recorder::WARM_UP_NS;
 use super::rtt::Log;
 use super::{ElfError, Firmware};
 use crate::digest::Digest;

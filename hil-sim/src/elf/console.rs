@@ -4,12 +4,13 @@
 use protocol::actuators::ACTUATORS;
 use protocol::{
     ACTUATOR_BLOCK, Actuator, Actuators, Configuration, ConfigurationReport, DisplayConfiguration,
-    Hello, MAX_FRAME, Message, Peer, Ping, Port, Role, Stop, StopReason,
+    Hello, MAX_FRAME, Message, Peer, Ping, Port, Role, SensorConfiguration, Stop, StopReason,
 };
 
 use super::lockstep::QUANTUM_NS;
 use super::nucleo::{CONSOLE_UART, Nucleo, Pins};
 use crate::fault::{Fault, Kind};
+use crate::scene::Scene;
 use crate::weather::BYTE_NS;
 
 /// How long the host waits for an answer before it asks again: ten times what the two frames, a board's
@@ -76,6 +77,29 @@ impl ConsoleHost {
             done: 0,
             free_ns: 0,
         }
+    }
+
+    /// A host if `scene` wants of the board of `role` what is not its default, or has a host do wrong.
+    pub fn of_scene(scene: &Scene, role: Role) -> Option<Self> {
+        let mut described = None;
+        let (wanted, faults) = match role {
+            Role::Display => {
+                let wanted = scene.display_configuration();
+                if wanted.actuators != DisplayConfiguration::DEFAULT.actuators {
+                    described = Some(&*scene.display.actuators);
+                }
+                let differs = wanted != DisplayConfiguration::DEFAULT;
+                let wanted = differs.then_some(Configuration::Display(wanted));
+                (wanted, &scene.faults[..])
+            }
+            _ => {
+                let wanted = scene.sensor_configuration();
+                let differs = wanted != SensorConfiguration::DEFAULT;
+                (differs.then_some(Configuration::Sensor(wanted)), &[][..])
+            }
+        };
+        let is_needed = wanted.is_some() || faults.iter().any(|fault| Self::does(fault.kind));
+        is_needed.then(|| Self::new(wanted, described, faults))
     }
 
     /// Whether a kind of fault is a host's.

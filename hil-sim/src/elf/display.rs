@@ -175,6 +175,11 @@ impl DisplayPins {
         std::mem::take(&mut self.records)
     }
 
+    /// Whether CLR is low.
+    pub fn is_clear(&self) -> bool {
+        self.clear != Some(Level::High)
+    }
+
     /// Presses the emergency stop, which opens its contact, or releases it.
     pub fn set_stop_button(&mut self, part: &mut Stm32f427, at_ns: u64, open: bool) {
         self.button_open = open;

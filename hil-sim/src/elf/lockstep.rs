@@ -2,33 +2,37 @@
 //! the end of every quantum of virtual time. Which thread runs when decides nothing.
 
 use std::sync::mpsc::{Receiver, SyncSender};
-use std::time::Instant;
 
-use protocol::{Configuration, DisplayConfiguration, Role, SensorConfiguration};
+use protocol::Role;
 use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
-use super::console::{ConsoleHost, Told};
-use super::display::DisplayPins;
+use super::display::{DisplayPins, DisplayRecords};
 use super::injector::Injector;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
-use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
 use crate::fault::{Clock, Fault, Way};
+use crate::recording::ScanRecord;
 use crate::scene::Scene;
 
 /// What a byte takes from board to board at the least, and how often the boards wait for each other.
 /// Smaller is closer to a bare cable and slower; at 500 µs the pair keeps ahead of a wall clock.
 pub const QUANTUM_NS: u64 = 500_000;
-/// Virtual time by which the emulator has met, and translated, all of the firmware that a run needs.
-pub const WARM_UP_NS: u64 = 500_000_000;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
 
 /// What the driver does for one board's pins beyond the seam itself.
 pub trait Watched: Pins {
+    /// What is written down at the pins.
+    type Records: Send;
+
+    /// Takes what has been written down since the last call.
+    fn take_records(board: &mut Nucleo<Self>) -> Self::Records
+    where
+        Self: Sized;
+
     /// Sees every write of the firmware to a peripheral.
     fn on_write(board: &mut Nucleo<Self>, address: u64, value: u64, at_ns: u64)
     where
@@ -43,6 +47,12 @@ pub trait Watched: Pins {
 }
 
 impl Watched for SensorPins {
+    type Records = Vec<ScanRecord>;
+
+    fn take_records(board: &mut Nucleo<Self>) -> Vec<ScanRecord> {
+        std::mem::take(&mut board.pins().0.scans)
+    }
+
     fn on_write(board: &mut Nucleo<Self>, address: u64, value: u64, at_ns: u64) {
         let (pins, part) = board.pins();
         pins.on_write(part, address, value, at_ns);
@@ -50,6 +60,13 @@ impl Watched for SensorPins {
 }
 
 impl Watched for DisplayPins {
+    type Records = DisplayRecords;
+
+    fn take_records(board: &mut Nucleo<Self>) -> DisplayRecords {
+        let (pins, part) = board.pins();
+        pins.leave(part)
+    }
+
     fn on_write(board: &mut Nucleo<Self>, address: u64, value: u64, at_ns: u64) {
         let (pins, part) = board.pins();
         pins.on_write(part, address, value, at_ns);
@@ -61,6 +78,51 @@ impl Watched for DisplayPins {
     }
 }
 
+/// A board between two quanta.
+pub struct Between<'a, P: Watched> {
+    /// The board, as it is run.
+    pub session: &'a mut Session<Nucleo<P>>,
+    /// What runs it.
+    pub host: &'a mut dyn Host,
+    /// Where it was stopped.
+    pub stop: Stop,
+    /// When, by the scene's clock.
+    pub now_ns: u64,
+    /// Whether it has power.
+    pub is_on: bool,
+}
+
+/// What stands beside one board of a pair and makes something of what it sees: all instants are the
+/// scene's clock's.
+pub trait Witness<P: Watched>: Send + 'static {
+    /// The quantum that ends at `now_ns` is over; nothing of it has been exchanged yet.
+    fn begin(&mut self, _now_ns: u64) {}
+
+    /// The board put these on its wire to the peer, with the instants at which each was complete.
+    fn sent(&mut self, board: &mut Nucleo<P>, sent: &[TimedByte]);
+
+    /// Whether what the peer says goes on its way to the board.
+    fn is_joined(&self, _now_ns: u64) -> bool {
+        true
+    }
+
+    /// This byte of the peer's reaches the board.
+    fn heard(&mut self, due_ns: u64, byte: u8);
+
+    /// The peers' bytes have been exchanged: the console's turn, and whatever else is to be done to the
+    /// board.
+    fn attend(&mut self, between: Between<'_, P>);
+
+    /// The log is to be read.
+    fn log(&mut self, now_ns: u64, host: &mut dyn Host);
+
+    /// The board has lost its power.
+    fn restart(&mut self) {}
+
+    /// Whether the run is over with the quantum that ended at `now_ns`. Both boards' have to agree.
+    fn is_over(&self, now_ns: u64) -> bool;
+}
+
 /// The ends of the channels to the other board's thread.
 pub struct Cable {
     /// What this board sends.
@@ -70,36 +132,29 @@ pub struct Cable {
 }
 
 /// Runs one board of a pair.
-pub struct Lockstep {
+pub struct Lockstep<W> {
     cable: Cable,
     /// What the peer's bytes go through.
     way: Way,
-    console: Option<ConsoleHost>,
     injector: Injector,
     /// The board's.
     clock: Clock,
-    log: Option<Log>,
-    /// By the scene's clock, as all that is written down here.
+    /// By the scene's clock, as all that follows.
     next_exchange_ns: u64,
     next_log_ns: u64,
-    end_ns: u64,
     /// Resets seen so far.
     resets: usize,
-    /// What the board sent to its peer, with instants.
-    pub sent: Vec<TimedByte>,
-    /// What the board heard from its peer, with the instants at which each byte was complete.
-    pub heard: Vec<TimedByte>,
-    /// When the board had run for [`WARM_UP_NS`].
-    pub warm: Option<Instant>,
+    /// What makes something of it.
+    pub witness: W,
     /// Set if the other board's thread is gone before the end.
     pub abandoned: bool,
-    /// Set once the scene is over.
+    /// Set once the run is over.
     pub is_done: bool,
 }
 
-impl Lockstep {
+impl<W> Lockstep<W> {
     /// The driver of the board of `role` in `scene`, which runs `elf`.
-    pub fn new(scene: &Scene, role: Role, elf: &[u8], cable: Cable) -> Self {
+    pub fn new(scene: &Scene, role: Role, elf: &[u8], cable: Cable, witness: W) -> Self {
         let clock = match role {
             Role::Sensor => Clock::new(&scene.faults),
             _ => Clock::default(),
@@ -107,35 +162,15 @@ impl Lockstep {
         Self {
             cable,
             way: Way::new(scene, role),
-            console: console_for(scene, role),
             injector: Injector::new(scene, role, elf, clock.clone()),
             clock,
-            log: Log::find(elf),
             next_exchange_ns: QUANTUM_NS,
             next_log_ns: LOG_PERIOD_NS,
-            end_ns: (scene.duration_s * 1e9).ceil() as u64,
             resets: 0,
-            sent: Vec::new(),
-            heard: Vec::new(),
-            warm: None,
+            witness,
             abandoned: false,
             is_done: false,
         }
-    }
-
-    /// Whether a host on the console wants the board configured.
-    pub fn is_asked(&self) -> bool {
-        self.console.as_ref().is_some_and(ConsoleHost::asks)
-    }
-
-    /// What came of it.
-    pub fn told(&self) -> Option<Told> {
-        self.console.as_ref().and_then(|host| host.told)
-    }
-
-    /// The board's log.
-    pub fn log_lines(&self) -> Vec<(u64, String)> {
-        self.log.as_ref().map(Log::lines).unwrap_or_default()
     }
 
     /// The board's clock.
@@ -149,30 +184,33 @@ impl Lockstep {
     }
 
     /// Gives the other board what this one sent and takes what it sent; false if it is gone.
-    fn exchange<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
+    fn exchange<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
+    where
+        W: Witness<P>,
+    {
+        self.witness.begin(now_ns);
         let mut sent = board.wire(PEER_UART).take_sent();
         for (at_ns, _) in &mut sent {
             *at_ns = self.clock.true_ns(*at_ns);
         }
-        self.sent.extend_from_slice(&sent);
+        self.witness.sent(board, &sent);
         let (Ok(()), Ok(received)) = (self.cable.to_peer.send(sent), self.cable.from_peer.recv())
         else {
             self.abandoned = true;
             return false;
         };
-        for (at_ns, byte) in received {
-            self.way.push(at_ns + QUANTUM_NS, byte);
+        if self.witness.is_joined(now_ns) {
+            for (at_ns, byte) in received {
+                self.way.push(at_ns + QUANTUM_NS, byte);
+            }
         }
         while let Some((due_ns, byte)) = self.way.pop(now_ns + QUANTUM_NS) {
             if self.injector.is_off {
                 continue;
             }
-            self.heard.push((due_ns, byte));
+            self.witness.heard(due_ns, byte);
             let due_ns = self.clock.local_ns(due_ns);
             board.wire(PEER_UART).hear(due_ns, byte);
-        }
-        if let Some(host) = &mut self.console {
-            host.serve(board, now_ns);
         }
         true
     }
@@ -190,31 +228,7 @@ impl Lockstep {
     }
 }
 
-/// A host on the console, if the scene wants of the board what is not its default, or has a host do
-/// wrong.
-fn console_for(scene: &Scene, role: Role) -> Option<ConsoleHost> {
-    let mut described = None;
-    let (wanted, faults) = match role {
-        Role::Display => {
-            let wanted = scene.display_configuration();
-            if wanted.actuators != DisplayConfiguration::DEFAULT.actuators {
-                described = Some(&*scene.display.actuators);
-            }
-            let differs = wanted != DisplayConfiguration::DEFAULT;
-            let wanted = differs.then_some(Configuration::Display(wanted));
-            (wanted, &scene.faults[..])
-        }
-        _ => {
-            let wanted = scene.sensor_configuration();
-            let differs = wanted != SensorConfiguration::DEFAULT;
-            (differs.then_some(Configuration::Sensor(wanted)), &[][..])
-        }
-    };
-    let is_needed = wanted.is_some() || faults.iter().any(|fault| ConsoleHost::does(fault.kind));
-    is_needed.then(|| ConsoleHost::new(wanted, described, faults))
-}
-
-impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
+impl<P: Watched, W: Witness<P>> Driver<Nucleo<P>> for Lockstep<W> {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<P>>,
@@ -247,14 +261,10 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
         let now_ns = self.clock.true_ns(board_ns);
         if now_ns >= self.next_log_ns && !self.injector.is_off {
             self.next_log_ns = now_ns + LOG_PERIOD_NS;
-            if let Some(log) = &mut self.log {
-                log.read(now_ns, host);
-            }
+            self.witness.log(now_ns, host);
         }
-        if self.injector.act(session, stop, host)
-            && let Some(console) = &mut self.console
-        {
-            console.restart();
+        if self.injector.act(session, stop, host) {
+            self.witness.restart();
         }
         if session.resets().len() != self.resets {
             self.resets = session.resets().len();
@@ -266,12 +276,16 @@ impl<P: Watched> Driver<Nucleo<P>> for Lockstep {
             if !self.exchange(session.board_mut(), now_ns) {
                 return None;
             }
-            if now_ns >= self.end_ns {
+            self.witness.attend(Between {
+                session: &mut *session,
+                host,
+                stop,
+                now_ns,
+                is_on: !self.injector.is_off,
+            });
+            if self.witness.is_over(now_ns) {
                 self.is_done = true;
                 return None;
-            }
-            if self.warm.is_none() && now_ns >= WARM_UP_NS {
-                self.warm = Some(Instant::now());
             }
             self.next_exchange_ns += QUANTUM_NS;
         }

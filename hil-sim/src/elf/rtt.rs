@@ -13,31 +13,25 @@ const SIZE: u64 = 24 + 8;
 const WRITE_OFFSET: u64 = 24 + 12;
 const READ_OFFSET: u64 = 24 + 16;
 
-/// The log of one board.
-pub struct Log {
+/// The channel by which a board logs: the first that goes up.
+#[derive(Clone, Copy, Debug)]
+pub struct Channel {
     block: u64,
-    table: Table,
-    bytes: Vec<(u64, Vec<u8>)>,
 }
 
-impl Log {
-    /// Finds the log's place in an ELF; none if it keeps none.
+impl Channel {
+    /// Finds it in an ELF; none if it has none.
     pub fn find(elf: &[u8]) -> Option<Self> {
         let block = object::File::parse(elf)
             .ok()?
             .symbols()
             .find(|symbol| symbol.name() == Ok("_SEGGER_RTT"))?
             .address();
-        let table = Table::parse(elf).ok()??;
-        Some(Self {
-            block,
-            table,
-            bytes: Vec::new(),
-        })
+        Some(Self { block })
     }
 
-    /// Takes what the board has logged since the last call.
-    pub fn read(&mut self, at_ns: u64, host: &mut dyn Host) {
+    /// Takes what the board has written since the last call.
+    pub fn take(&self, host: &mut dyn Host) -> Vec<u8> {
         let mut word = |offset: u64| {
             host.read(self.block + offset, Width::W32)
                 .ok()
@@ -49,24 +43,48 @@ impl Log {
             word(WRITE_OFFSET),
             word(READ_OFFSET),
         ) else {
-            return;
+            return Vec::new();
         };
         if size == 0 || write >= size || read >= size || write == read {
-            return;
+            return Vec::new();
         }
         let mut taken = Vec::new();
         let mut at = read;
         while at != write {
             let Ok(byte) = host.read(buffer + at, Width::W8) else {
-                return;
+                return Vec::new();
             };
             taken.push(byte.to_le_bytes()[0]);
             at = (at + 1) % size;
         }
-        if host
-            .write(self.block + READ_OFFSET, Width::W32, write)
-            .is_ok()
-        {
+        match host.write(self.block + READ_OFFSET, Width::W32, write) {
+            Ok(()) => taken,
+            Err(_) => Vec::new(),
+        }
+    }
+}
+
+/// The log of one board.
+pub struct Log {
+    channel: Channel,
+    table: Table,
+    bytes: Vec<(u64, Vec<u8>)>,
+}
+
+impl Log {
+    /// Finds the log's place in an ELF; none if it keeps none.
+    pub fn find(elf: &[u8]) -> Option<Self> {
+        Some(Self {
+            channel: Channel::find(elf)?,
+            table: Table::parse(elf).ok()??,
+            bytes: Vec::new(),
+        })
+    }
+
+    /// Takes what the board has logged since the last call.
+    pub fn read(&mut self, at_ns: u64, host: &mut dyn Host) {
+        let taken = self.channel.take(host);
+        if !taken.is_empty() {
             self.bytes.push((at_ns, taken));
         }
     }

@@ -69,6 +69,11 @@ impl SensorPins {
         }
     }
 
+    /// The true wavelength under the fingertip at the last scan, in mm.
+    pub fn wavelength_mm(&self) -> f64 {
+        self.world.wavelength_mm(self.position_mm)
+    }
+
     /// Wires up what the part itself has to know.
     pub fn fit(part: &mut Stm32f427) {
         part.adc[ADC].set_reference(REFERENCE_UV);

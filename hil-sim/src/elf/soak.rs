@@ -7,41 +7,28 @@
 mod strokes;
 mod tally;
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread;
-
 use protocol::{Configuration, DisplayConfiguration, Mode, SensorConfiguration, Status};
-use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
-use rigless::session::Session;
-use rigless::time::VirtualNanos;
+use rigless::emulator::Host;
 
 pub use tally::Check;
 
 use super::console::ConsoleHost;
 use super::display::DisplayPins;
-use super::lockstep::{QUANTUM_NS, Watched};
-use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
+use super::lockstep::{Between, Watched, Witness};
+use super::nucleo::Nucleo;
+use super::pair::{self, Finished};
 use super::rtt::Log;
 use super::sensor::SensorPins;
 use super::wire::TimedByte;
 use super::{ElfError, Firmware, Firmwares};
-use crate::arm::Arm;
-use crate::fault::HandFault;
 use crate::scene::{ArmDrive, Follows, Gauges, Kinematic, Link, Motion, Scene, Specimen};
-use crate::weather::Weather;
-use crate::world::World;
 use strokes::Strokes;
 use tally::{Outputs, Side};
 
-/// The two directions' numbers.
-const TO_DISPLAY: u64 = 0;
-const TO_SENSOR: u64 = 1;
 /// Silence at the end, in s: two of the boards' statuses and more.
 pub const QUIET_S: f64 = 3.0;
 /// The shortest run, in s.
 pub const SHORTEST_S: f64 = 10.0;
-/// How often the log is read: well before the 1 KiB of RTT are full.
-const LOG_NS: u64 = 10_000_000;
 /// How often progress is told.
 const TOLD_NS: u64 = 1_000_000_000;
 
@@ -96,88 +83,42 @@ pub fn run(
     let quiet_ns = end_ns - (QUIET_S * 1e9) as u64;
     let strokes = Strokes::new(soak.seed, quiet_ns as f64 * 1e-9);
     let crossed = strokes.crossed();
-    let scene = scene(soak, strokes.hand());
-    let (to_display, from_sensor) = sync_channel(1);
-    let (to_sensor, from_display) = sync_channel(1);
+    let scene = scene(soak, end_ns, strokes.hand());
     let travelling = Configuration::Display(DisplayConfiguration {
         mode: Mode::Travelling,
         ..DisplayConfiguration::DEFAULT
     });
-    let half = |to_peer, from_peer, direction, wanted, firmware: &Firmware| Half {
-        to_peer,
-        from_peer,
-        weather: Weather::new(&soak.link, soak.seed, direction),
+    let half = |wanted, firmware: &Firmware| Half {
         console: ConsoleHost::new(Some(wanted), None, &[]),
         log: Log::find(&firmware.elf),
         side: Side::default(),
         outputs: Outputs::default(),
-        next_exchange_ns: QUANTUM_NS,
-        next_log_ns: LOG_NS,
         next_told_ns: TOLD_NS,
         quiet_ns,
         end_ns,
-        abandoned: false,
         progress: None,
     };
-    let sensor_half = half(
-        to_display,
-        from_display,
-        TO_SENSOR,
+    let sensor = half(
         Configuration::Sensor(SensorConfiguration::DEFAULT),
         &firmwares.sensor,
     );
-    let display_half = Half {
+    let display = Half {
         progress: Some(Box::new(progress)),
-        ..half(
-            to_sensor,
-            from_sensor,
-            TO_DISPLAY,
-            travelling,
-            &firmwares.display,
-        )
+        ..half(travelling, &firmwares.display)
     };
-    let (sensor_world, display_world) = (World::new(&scene)?, World::new(&scene)?);
-    let arm = Arm::new(&scene.arm, &scene.motion);
-    let configuration = scene.sensor_configuration();
-    let (sensor, display) = thread::scope(|scope| {
-        let sensor = scope.spawn(|| {
-            let pins = SensorPins::new(sensor_world, arm, configuration, &[]);
-            drive(
-                "sensor",
-                Nucleo::new(pins, SensorPins::fit),
-                &firmwares.sensor,
-                sensor_half,
-            )
-        });
-        let display = drive(
-            "display",
-            Nucleo::new(
-                DisplayPins::new(display_world, HandFault::new(&[])),
-                DisplayPins::fit,
-            ),
-            &firmwares.display,
-            display_half,
-        );
-        (sensor.join(), display)
-    });
-    let sensor = sensor.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-    let (sensor, display) = match (sensor, display) {
-        (Ok(sensor), Ok(display)) => (sensor, display),
-        // The board that fails abandons the other: its own reason is the one to tell.
-        (Err(error), Ok(_)) | (Ok(_), Err(error)) => return Err(error),
-        (Err(sensor), Err(display)) => {
-            let abandoned = super::is_abandoned(&sensor);
-            return Err(if abandoned { display } else { sensor });
-        }
-    };
-    Ok(tally::judge(sensor, display, crossed))
+    let (sensor, display) = pair::run(&scene, firmwares, sensor, display)?;
+    Ok(tally::judge(
+        Left::new("sensor", sensor),
+        Left::new("display", display),
+        crossed,
+    ))
 }
 
 /// The world that the strokes go through: four specimens, noise, an arm that follows over the link.
-fn scene(soak: &Soak, hand: Motion) -> Scene {
+fn scene(soak: &Soak, end_ns: u64, hand: Motion) -> Scene {
     let mut scene = Scene::constant(2.0, 50.0);
     scene.seed = soak.seed;
-    scene.duration_s = soak.duration_s;
+    scene.duration_s = end_ns as f64 * 1e-9;
     scene.surface.specimens = strokes::SPECIMENS
         .map(|(wavelength_mm, length_mm)| Specimen {
             wavelength_mm,
@@ -213,111 +154,57 @@ impl Drained for SensorPins {
 
 impl Drained for DisplayPins {
     fn drain(board: &mut Nucleo<Self>, outputs: &mut Outputs) {
-        let (pins, part) = board.pins();
-        let records = pins.leave(part);
-        let loads = super::display::loads(part);
+        let records = Self::take_records(board);
+        let loads = super::display::loads(board.pins().1);
         outputs.take(records, loads);
     }
 }
 
-/// One board of the pair.
+/// Beside one board of the pair.
 struct Half {
-    to_peer: SyncSender<Vec<TimedByte>>,
-    from_peer: Receiver<Vec<TimedByte>>,
-    weather: Weather,
     console: ConsoleHost,
     log: Option<Log>,
     side: Side,
     outputs: Outputs,
-    next_exchange_ns: u64,
-    next_log_ns: u64,
     next_told_ns: u64,
     quiet_ns: u64,
     end_ns: u64,
-    abandoned: bool,
     progress: Option<Box<dyn Fn(f64) + Send>>,
 }
 
-impl Half {
-    fn exchange<P: Drained>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
+impl<P: Drained> Witness<P> for Half {
+    fn sent(&mut self, board: &mut Nucleo<P>, sent: &[TimedByte]) {
         P::drain(board, &mut self.outputs);
-        let sent = board.wire(PEER_UART).take_sent();
-        self.side.sent(&sent, &self.outputs);
-        let (Ok(()), Ok(received)) = (self.to_peer.send(sent), self.from_peer.recv()) else {
-            self.abandoned = true;
-            return false;
-        };
-        if now_ns < self.quiet_ns {
-            for (at_ns, byte) in received {
-                self.weather.push(at_ns + QUANTUM_NS, byte);
-            }
-        }
-        while let Some((due_ns, byte)) = self.weather.pop(now_ns + QUANTUM_NS) {
-            self.side.arrived(due_ns, byte);
-            board.wire(PEER_UART).hear(due_ns, byte);
-        }
-        self.console.serve(board, now_ns);
-        true
+        self.side.sent(sent, &self.outputs);
     }
-}
 
-impl<P: Drained> Driver<Nucleo<P>> for Half {
-    fn on_settled(
-        &mut self,
-        session: &mut Session<Nucleo<P>>,
-        _host: &mut dyn Host,
-        settled: Settled,
-    ) {
-        if let Settled::Access {
-            access:
-                Access {
-                    kind: AccessKind::Write,
-                    address,
-                    value,
-                    virtual_time,
-                    ..
-                },
-            ..
-        } = settled
-        {
-            P::on_write(session.board_mut(), address, value, virtual_time.0);
+    fn is_joined(&self, now_ns: u64) -> bool {
+        now_ns < self.quiet_ns
+    }
+
+    fn heard(&mut self, due_ns: u64, byte: u8) {
+        self.side.arrived(due_ns, byte);
+    }
+
+    fn attend(&mut self, between: Between<'_, P>) {
+        let now_ns = between.now_ns;
+        self.console.serve(between.session.board_mut(), now_ns);
+        if now_ns >= self.next_told_ns {
+            self.next_told_ns += TOLD_NS;
+            if let Some(progress) = &self.progress {
+                progress(now_ns as f64 * 1e-9);
+            }
         }
     }
 
-    fn on_stop(
-        &mut self,
-        session: &mut Session<Nucleo<P>>,
-        stop: Stop,
-        host: &mut dyn Host,
-    ) -> Option<VirtualNanos> {
-        let now_ns = stop.at.0;
-        if now_ns >= self.next_log_ns {
-            self.next_log_ns = now_ns + LOG_NS;
-            if let Some(log) = &mut self.log {
-                log.read(now_ns, host);
-            }
+    fn log(&mut self, now_ns: u64, host: &mut dyn Host) {
+        if let Some(log) = &mut self.log {
+            log.read(now_ns, host);
         }
-        if now_ns >= self.next_exchange_ns {
-            if !self.exchange(session.board_mut(), now_ns) || now_ns >= self.end_ns {
-                return None;
-            }
-            self.next_exchange_ns += QUANTUM_NS;
-            if now_ns >= self.next_told_ns {
-                self.next_told_ns += TOLD_NS;
-                if let Some(progress) = &self.progress {
-                    progress(now_ns as f64 * 1e-9);
-                }
-            }
-        }
-        let mut next_ns = self.next_exchange_ns;
-        for uart in [PEER_UART, CONSOLE_UART] {
-            if let Some(due_ns) = session.board_mut().wire(uart).next_due()
-                && due_ns > now_ns
-            {
-                next_ns = next_ns.min(due_ns);
-            }
-        }
-        Some(VirtualNanos(next_ns))
+    }
+
+    fn is_over(&self, now_ns: u64) -> bool {
+        now_ns >= self.end_ns
     }
 }
 
@@ -333,64 +220,26 @@ struct Left {
 }
 
 impl Left {
+    fn new<R>(name: &'static str, finished: Finished<R, Half>) -> Self {
+        let half = finished.witness;
+        let lines = half.log.as_ref().map(Log::lines).unwrap_or_default();
+        let told = half.console.told;
+        Self {
+            name,
+            told: told.is_some_and(|told| told.report.refused.is_none()),
+            side: half.side,
+            outputs: half.outputs,
+            resets: finished.resets.len(),
+            panics: lines
+                .into_iter()
+                .map(|(_, line)| line)
+                .filter(|line| line.contains("panicked"))
+                .collect(),
+        }
+    }
+
     /// Its last status.
     fn status(&self) -> Option<Status> {
         self.side.last_status()
     }
-}
-
-fn drive<P: Drained + Pins>(
-    name: &'static str,
-    board: Result<Nucleo<P>, rigless::soc::Error>,
-    firmware: &Firmware,
-    half: Half,
-) -> Result<Left, ElfError> {
-    let board_error = |reason: String| ElfError::Board {
-        board: name,
-        reason,
-    };
-    let end_ns = half.end_ns;
-    let board = board.map_err(|error| board_error(error.to_string()))?;
-    let session = Session::new(Box::new(board), 0, VirtualNanos(QUANTUM_NS))
-        .map_err(|error| board_error(error.to_string()))?;
-    let images = [firmware.image.clone()];
-    let finished = emulator::run(session, &Start::new(&images), half)
-        .map_err(|error| board_error(error.to_string()))?;
-    let at_ns = finished.stop.map_or(0, |stop| stop.at.0);
-    let half = finished.driver;
-    if half.abandoned || at_ns < end_ns {
-        let reason = if half.abandoned {
-            super::ABANDONED.to_owned()
-        } else {
-            format!("{:?}", finished.stop)
-        };
-        return Err(ElfError::Stopped {
-            board: name,
-            at_s: at_ns as f64 * 1e-9,
-            duration_s: end_ns as f64 * 1e-9,
-            reason,
-        });
-    }
-    if let Some(unmapped) = finished.session.unmapped().first() {
-        return Err(ElfError::Unmapped {
-            board: name,
-            address: unmapped.address,
-        });
-    }
-    let lines = half.log.as_ref().map(Log::lines).unwrap_or_default();
-    Ok(Left {
-        name,
-        told: half
-            .console
-            .told
-            .is_some_and(|told| told.report.refused.is_none()),
-        side: half.side,
-        outputs: half.outputs,
-        resets: finished.session.resets().len(),
-        panics: lines
-            .into_iter()
-            .map(|(_, line)| line)
-            .filter(|line| line.contains("panicked"))
-            .collect(),
-    })
 }

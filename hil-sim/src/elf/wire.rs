@@ -34,6 +34,11 @@ impl Wire {
         self.due.push_back((at_ns, byte));
     }
 
+    /// Bytes that have not been heard yet.
+    pub fn waiting(&self) -> usize {
+        self.due.len()
+    }
+
     /// Forgets what has not been heard: nobody listened.
     pub fn lose(&mut self) {
         self.due.clear();

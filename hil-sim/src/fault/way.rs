@@ -82,6 +82,11 @@ impl Way {
         }
     }
 
+    /// Whether a fault of the scene's is on this way.
+    pub fn has_faults(&self) -> bool {
+        self.listens
+    }
+
     /// A byte whose last bit has left the sender's UART at `at_ns`. Instants must not decrease.
     #[inline]
     pub fn push(&mut self, at_ns: u64, byte: u8) {

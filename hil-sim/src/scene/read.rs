@@ -135,6 +135,41 @@ fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
     })
 }
 
+/// Columns of a recorded hand.
+const POSITIONS: &[&str] = &["t_s,x_mm"];
+
+/// Whether a hand can have come from one row to the next.
+fn check_position(before: Option<&[f64]>, row: &[f64]) -> Result<(), (usize, String)> {
+    if !(PLACE.allows)(row[1]) {
+        return Err((1, format!("is out of reach: give {}", PLACE.give)));
+    }
+    let Some(before) = before else { return Ok(()) };
+    let speed_mm_s = (row[1] - before[1]) / (row[0] - before[0]);
+    if speed_mm_s.abs() <= MOST_SPEED_MM_S {
+        Ok(())
+    } else {
+        Err((
+            1,
+            format!("is {speed_mm_s:.0} mm/s from the row before: no hand is faster than 1000"),
+        ))
+    }
+}
+
+impl Motion {
+    /// Reads a recorded hand from a CSV file with the columns `t_s,x_mm`.
+    ///
+    /// # Errors
+    /// If it can't be read, or is no hand's.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let bytes = std::fs::read(path).map_err(|error| SceneError {
+            message: format!("cannot be read: {error}: give a CSV file with the columns t_s,x_mm"),
+            ..SceneError::unreadable(path, &error)
+        })?;
+        let positions = Series::read(path, &bytes, POSITIONS, check_position)?;
+        Ok(Self::Recorded(Arc::new(positions)))
+    }
+}
+
 fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
     match table.choice(
         "kind",
@@ -156,23 +191,7 @@ fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
             })
         }
         _ => {
-            let positions = series(&mut table, &["t_s,x_mm"], |before, row| {
-                if !(PLACE.allows)(row[1]) {
-                    return Err((1, format!("is out of reach: give {}", PLACE.give)));
-                }
-                let Some(before) = before else { return Ok(()) };
-                let speed_mm_s = (row[1] - before[1]) / (row[0] - before[0]);
-                if speed_mm_s.abs() <= MOST_SPEED_MM_S {
-                    Ok(())
-                } else {
-                    Err((
-                        1,
-                        format!(
-                            "is {speed_mm_s:.0} mm/s from the row before: no hand is faster than 1000"
-                        ),
-                    ))
-                }
-            })?;
+            let positions = series(&mut table, POSITIONS, check_position)?;
             covers_time(&table, &positions, duration_s)?;
             table.finish(" with kind = \"recorded\"")?;
             Ok(Motion::Recorded(positions))

@@ -1,18 +1,383 @@
 //! `host-bridge flash`.
 
+use std::io::{self, BufRead, IsTerminal};
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use clap::{ValueEnum, ValueHint};
+use host_bridge::bench::Seat;
+use host_bridge::flash::console;
+use host_bridge::flash::firmware::{self, Firmware};
+use host_bridge::flash::plan::{Plan, Summary};
+use host_bridge::flash::probes::{self, Attached, Selector, Undecided, Wish};
+use host_bridge::flash::programmer::{Programmer, Progress};
+use host_bridge::flash::trouble::Trouble;
+use host_bridge::place::{self, Place};
+use host_bridge::state::{Named, State};
+use indicatif::{ProgressBar, ProgressStyle};
+use protocol::{Hello, Role};
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::output;
+
+/// What the command does.
+pub const ABOUT: &str = "\
+Writes a firmware to a board, verifies it, starts it and waits for its Hello.
+
+Before anything is erased, the ELF is looked at (whole, of Ridgelink, this board's, this chip's, this \
+protocol's, within the flash, able to start), then the console (not the other board's, not taken by another \
+program), then the chip behind the probe (the right one, not locked). While the flash is being written, \
+Ctrl-C waits for the end; a second one does not.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge flash sensor --dry-run     what would be done, without a probe
+  host-bridge flash sensor               the only board that is plugged in
+  host-bridge flash display --probe 0483:374b:066CFF555185754867161530
+  host-bridge flash display other.elf --bench lab.toml
+
+The quick way, without these checks but with the board's log, is cargo's:
+  cargo run --release --target thumbv7em-none-eabihf -p firmware-sensor
+
+Exit status: 0 done; 1 something was begun and failed, or the board does not say Hello; 2 refused, and \
+nothing was changed.";
 
 /// What `flash` is asked for.
 #[derive(Debug, clap::Args)]
 pub struct Flash {
+    /// The board that gets it
+    #[arg(value_enum)]
+    board: Board,
+    /// The firmware; without it, the bench file's `elf`, or what the build left in
+    /// target/thumbv7em-none-eabihf/release
+    #[arg(value_name = "ELF", value_hint = ValueHint::FilePath)]
+    elf: Option<PathBuf>,
+    /// The probe, if several are plugged in and the bench file does not name the board's
+    #[arg(long, value_name = "VID:PID[:SERIAL]")]
+    probe: Option<Selector>,
+    /// Only says what would be done; needs no probe
+    #[arg(long)]
+    dry_run: bool,
+    /// Lets a board become the other one: without it, a board that says it is the other is left alone
+    #[arg(long)]
+    change_role: bool,
+    /// Does not look at the board's console, neither before nor after
+    #[arg(long)]
+    no_hello: bool,
+    /// Prints one JSON object for scripts
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     boards: super::Where,
+}
+
+/// The two boards.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Board {
+    /// The one with the gauges
+    Sensor,
+    /// The one with the actuators
+    Display,
+}
+
+impl Board {
+    const fn role(self) -> Role {
+        match self {
+            Self::Sensor => Role::Sensor,
+            Self::Display => Role::Display,
+        }
+    }
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    /// What was planned.
+    plan: Summary,
+    /// Whether it was carried out.
+    flashed: bool,
+    /// By which probe.
+    probe: Option<String>,
+    /// What the board says of itself now; none if it was not waited for, or says nothing.
+    hello: Option<Spoken>,
+}
+
+/// A Hello for scripts.
+#[derive(Serialize)]
+struct Spoken {
+    role: &'static str,
+    chip: String,
+    version: String,
+    protocol: u16,
+    schema: String,
+}
+
+impl From<Hello> for Spoken {
+    fn from(hello: Hello) -> Self {
+        let [major, minor, patch] = hello.version;
+        Self {
+            role: Role::from_byte(hello.role).map_or("?", Role::name),
+            chip: hello.chip_name().to_owned(),
+            version: format!("{major}.{minor}.{patch}"),
+            protocol: hello.protocol_version(),
+            schema: format!("{:016x}", hello.schema_hash()),
+        }
+    }
 }
 
 impl Flash {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        anyhow::bail!("flash is being built: {bench:?}")
+        let role = self.board.role();
+        let (seat, other) = match self.board {
+            Board::Sensor => (&bench.sensor, &bench.display),
+            Board::Display => (&bench.display, &bench.sensor),
+        };
+        let elf = self
+            .elf
+            .clone()
+            .or_else(|| seat.elf.clone())
+            .unwrap_or_else(|| firmware::built(role));
+        let plan = Plan::new(Firmware::read(&elf, role)?)?;
+        if self.dry_run {
+            self.report(&plan, None, None)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        self.carry_out(&plan, seat, other)
+    }
+
+    fn carry_out(&self, plan: &Plan, seat: &Seat, other: &Seat) -> anyhow::Result<ExitCode> {
+        let role = plan.firmware.role;
+        let links = place::st_links();
+        let wish = Wish::new(self.probe.clone(), seat, other, &links);
+        let probe = self.choose(&wish, role)?;
+        let console = console::place(&seat.place(), probe.serial(), &links)?;
+        if !self.no_hello {
+            self.check_console(console::look(role, console.clone()), role)?;
+        }
+        let opened = probe.open()?;
+        let mut programmer = Programmer::attach(opened, plan, || probe.open().ok())?;
+
+        let called_off = hold_signals()?;
+        let bar = Bar::new();
+        let written = programmer.write(plan, |progress| bar.show(progress, &called_off));
+        bar.end();
+        if let Err(trouble) = written.and_then(|()| programmer.start()) {
+            return failed(trouble);
+        }
+        let hello = if self.no_hello {
+            None
+        } else {
+            let wanted = plan.firmware.hello;
+            eprintln!("flashed and verified; waiting for the board's Hello");
+            match console::wait(role, console, wanted, console::PATIENCE, &called_off) {
+                Ok(hello) => Some(hello),
+                Err(error) => {
+                    eprintln!("host-bridge: {error}");
+                    if self.json {
+                        self.report(plan, Some(&probe), None)?;
+                    }
+                    return Ok(ExitCode::FAILURE);
+                }
+            }
+        };
+        self.report(plan, Some(&probe), hello)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Prints what is planned, or what was done by `probe`.
+    fn report(
+        &self,
+        plan: &Plan,
+        probe: Option<&Attached>,
+        hello: Option<Hello>,
+    ) -> anyhow::Result<()> {
+        let text = if self.json {
+            serde_json::to_string(&Report {
+                plan: plan.summary(),
+                flashed: probe.is_some(),
+                probe: probe.map(Attached::selector),
+                hello: hello.map(Spoken::from),
+            })?
+        } else {
+            match (probe, hello) {
+                (None, _) => format!("{plan}\nnothing was changed: this was a dry run"),
+                (Some(_), None) => format!("{plan}\nflashed and verified"),
+                (Some(_), Some(hello)) => format!(
+                    "flashed and verified: {}, protocol {}, schema {:016x}",
+                    Named(&hello),
+                    hello.protocol_version(),
+                    hello.schema_hash()
+                ),
+            }
+        };
+        output::print(&text)
+    }
+
+    /// The probe that is meant; asks if that is not clear and somebody is there to be asked.
+    fn choose(&self, wish: &Wish, role: Role) -> anyhow::Result<Attached> {
+        let found = probes::attached();
+        let several = match probes::choose(&found, wish) {
+            Ok(probe) => return Ok(probe),
+            Err(Undecided::Several { found }) => found,
+            Err(other) => return Err(other.into()),
+        };
+        let behind = if self.no_hello {
+            vec![None; several.len()]
+        } else {
+            who(&several, role)
+        };
+        let lines: Vec<String> = several
+            .iter()
+            .zip(&behind)
+            .map(|(probe, state)| match state {
+                Some(state) => format!("{probe}  {state}"),
+                None => probe.to_string(),
+            })
+            .collect();
+        if !is_attended() {
+            anyhow::bail!(
+                "several probes are plugged in: name the {} board's with --probe, or its serial number as \
+                 `usb` in the bench file:\n  {}",
+                role.name(),
+                lines.join("\n  ")
+            );
+        }
+        for (number, line) in lines.iter().enumerate() {
+            eprintln!("{:>3}  {line}", number + 1);
+        }
+        let number = ask(
+            &format!(
+                "Which is the {} board's? [1-{}] ",
+                role.name(),
+                several.len()
+            ),
+            |answer| {
+                answer
+                    .parse::<usize>()
+                    .ok()
+                    .filter(|number| (1..=several.len()).contains(number))
+            },
+        )?;
+        Ok(several[number - 1].clone())
+    }
+
+    /// Whether the console allows to go on.
+    fn check_console(&self, state: State, role: Role) -> anyhow::Result<()> {
+        match state {
+            State::Stranger { ref hello, .. } if Role::from_byte(hello.role) != Some(role) => {
+                let is = Named(hello).to_string();
+                if self.change_role {
+                    return Ok(());
+                }
+                let question = format!(
+                    "This board says that it is the {is}. Its pins are wired for that. Make it the {} board? \
+                     [y/N] ",
+                    role.name()
+                );
+                if is_attended() && ask(&question, |answer| Some(answer == "y"))? {
+                    return Ok(());
+                }
+                anyhow::bail!(
+                    "this board says that it is the {is}, and its pins are wired for that: name the {} \
+                     board's probe, or let this one change with --change-role; nothing was changed",
+                    role.name()
+                )
+            }
+            State::Busy { .. }
+            | State::Denied { .. }
+            | State::Failed { .. }
+            | State::Absent { .. } => {
+                anyhow::bail!(
+                    "{state}: the board's Hello could not be heard; {}, or flash it with --no-hello; nothing \
+                     was changed",
+                    state.advice().unwrap_or("see `host-bridge doctor`")
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Who says Hello behind each of the probes; none where there is no console.
+fn who(probes: &[Attached], role: Role) -> Vec<Option<State>> {
+    let places = probes
+        .iter()
+        .map(|probe| Place::Usb(probe.serial().unwrap_or_default().to_owned()))
+        .collect();
+    console::look_at_all(role, places)
+        .into_iter()
+        .map(|state| (!matches!(state, State::Absent { .. })).then_some(state))
+        .collect()
+}
+
+/// Whether somebody is there to be asked.
+fn is_attended() -> bool {
+    io::stdin().is_terminal() && io::stderr().is_terminal()
+}
+
+/// Asks until the answer is one; none is one if the input ends.
+fn ask<T>(question: &str, read: impl Fn(&str) -> Option<T>) -> anyhow::Result<T> {
+    let mut lines = io::stdin().lock().lines();
+    loop {
+        eprint!("{question}");
+        let answer = lines.next().context("no answer; nothing was changed")??;
+        if let Some(answer) = read(answer.trim()) {
+            return Ok(answer);
+        }
+    }
+}
+
+/// A flag that the first Ctrl-C sets; the second ends the program, whatever it does.
+fn hold_signals() -> io::Result<Arc<AtomicBool>> {
+    let called_off = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&called_off))?;
+        signal_hook::flag::register(signal, Arc::clone(&called_off))?;
+    }
+    Ok(called_off)
+}
+
+/// What went wrong at the chip: harmless refusals are the caller's, the rest leaves its mark in the status.
+fn failed(trouble: Trouble) -> anyhow::Result<ExitCode> {
+    if trouble.is_harmless() {
+        return Err(trouble.into());
+    }
+    eprintln!("host-bridge: {trouble}");
+    Ok(ExitCode::FAILURE)
+}
+
+/// How far it has come, on standard error.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new() -> Self {
+        let bar = ProgressBar::new(0);
+        if let Ok(style) =
+            ProgressStyle::with_template("{msg:<10} {bar:40} {bytes:>10} of {total_bytes}")
+        {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    fn show(&self, progress: Progress, called_off: &AtomicBool) {
+        self.0.set_length(progress.total_bytes);
+        self.0.set_position(progress.done_bytes);
+        self.0.set_message(if called_off.load(Ordering::Relaxed) {
+            "finishing: half a firmware does not start"
+        } else {
+            progress.stage.name()
+        });
+    }
+
+    fn end(&self) {
+        self.0.finish_and_clear();
     }
 }

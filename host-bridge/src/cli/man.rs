@@ -5,13 +5,19 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
-use clap::CommandFactory;
+use clap::{CommandFactory, ValueHint};
+
+/// How they are read.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge man ~/.local/share/man/man1
+  man host-bridge-flash";
 
 /// Where the man pages go.
 #[derive(Debug, clap::Args)]
 pub struct Man {
     /// The folder, made if it is not there: one page for the program and one for each command
-    #[arg(value_name = "FOLDER")]
+    #[arg(value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     folder: PathBuf,
 }
 

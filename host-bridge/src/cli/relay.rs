@@ -1,6 +1,6 @@
 //! `host-bridge relay`.
 
-use std::io::{self, ErrorKind, Write};
+use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueHint};
 use host_bridge::relay::credentials::Credentials;
 use host_bridge::relay::endpoint::Endpoint;
 use host_bridge::relay::far::site;
@@ -21,14 +21,15 @@ use host_bridge::relay::site::{Settings, Site, opposite};
 use protocol::{Role, Stop, StopReason};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 
+use super::output;
+
 /// Between two looks whether the bridge is to end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Between two lines of statistics.
 const REPORT: Duration = Duration::from_secs(1);
 
-/// What `relay` is asked for.
-#[derive(Debug, Args)]
-#[command(after_long_help = "\
+/// How the parts play together.
+pub const EXAMPLES: &str = "\
 At one site:    host-bridge relay sensor --listen tcp/0.0.0.0:7447
 At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
 
@@ -36,7 +37,13 @@ With a router in between, both connect to it:
                 host-bridge relay router --listen tcp/0.0.0.0:7447
 
 With tls/ in place of tcp/, all of them want --ca, --certificate and --key, and whoever has no certificate \
-of that CA is refused. Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards.")]
+of that CA is refused.
+
+Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards. Once a second a bridge \
+says on standard error how it goes; --json says it on standard output, and leaves nothing out.";
+
+/// What `relay` is asked for.
+#[derive(Debug, Args)]
 pub struct Relay {
     #[command(subcommand)]
     part: Part,
@@ -117,13 +124,13 @@ struct Meeting {
 #[derive(Debug, Args)]
 struct Proofs {
     /// The certificate of the CA whose certificates are believed, in PEM
-    #[arg(long, value_name = "FILE", requires_all = ["certificate", "key"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["certificate", "key"])]
     ca: Option<PathBuf>,
     /// One's own certificate, in PEM
-    #[arg(long, value_name = "FILE", requires_all = ["ca", "key"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["ca", "key"])]
     certificate: Option<PathBuf>,
     /// Its private key, in PEM, without a password
-    #[arg(long, value_name = "FILE", requires_all = ["ca", "certificate"])]
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["ca", "certificate"])]
     key: Option<PathBuf>,
 }
 
@@ -210,9 +217,7 @@ impl Bridge {
             if Instant::now() >= due {
                 due += REPORT;
                 let report = bridge.report(false);
-                if !print(&report, before.as_ref(), self.json)? {
-                    return Ok(ExitCode::SUCCESS);
-                }
+                print(&report, before.as_ref(), self.json)?;
                 before = Some(report);
             }
         }
@@ -273,18 +278,14 @@ fn in_words(ends: &Ends) -> String {
     format!("{what} {}", endpoints.join(", "))
 }
 
-/// Prints a report; false if nobody reads any more.
-fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result<bool> {
-    let printed = if json {
-        writeln!(io::stdout(), "{}", serde_json::to_string(report)?)
+/// Prints a report.
+fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result<()> {
+    if json {
+        output::print(&serde_json::to_string(report)?)
     } else if report.total {
-        writeln!(io::stdout(), "{report}")
+        output::print(&report.to_string())
     } else {
-        writeln!(io::stderr(), "{}", report.line(before))
-    };
-    match printed {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-        Err(error) => Err(error).context("can't print"),
+        eprintln!("{}", report.line(before));
+        Ok(())
     }
 }

@@ -125,6 +125,11 @@ impl Inward {
         self.counts.boardless += 1;
     }
 
+    /// The board's line took no more bytes.
+    pub const fn on_stuck(&mut self) {
+        self.counts.stuck += 1;
+    }
+
     /// Time passes.
     pub fn elapse(&mut self, now_us: u64, mut tell: impl FnMut(Notice)) {
         if self.far.elapse(now_us) {

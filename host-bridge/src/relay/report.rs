@@ -28,6 +28,8 @@ pub struct Incoming {
     pub replaced: u64,
     /// Not passed on: the board was not there.
     pub boardless: u64,
+    /// Not passed on: the board's line took no more bytes.
+    pub stuck: u64,
     /// Neither sound nor of this build.
     pub refused: u64,
 }
@@ -86,10 +88,11 @@ impl Report {
             undated,
             replaced,
             boardless,
+            stuck,
             refused,
             ..
         } = self.incoming;
-        let not_passed = stale + undated + replaced + boardless + refused + arrivals.superseded;
+        let not_passed = stale + undated + replaced + boardless + stuck + refused + arrivals.superseded;
         format!(
             "{:8.1} s  in {:5.1}/s, age {}; lost {}, late {}, twice {}, not passed on {not_passed}; out {:5.1}/s; round trip {}",
             self.uptime_s,
@@ -143,6 +146,7 @@ impl fmt::Display for Report {
             undated,
             replaced,
             boardless,
+            stuck,
             refused,
         } = self.incoming;
         writeln!(
@@ -157,7 +161,7 @@ impl fmt::Display for Report {
         )?;
         writeln!(
             f,
-            "  not passed on: {stale} too old, {undated} of unknown age, {replaced} replaced by a newer one, {} superseded, {boardless} without a board",
+            "  not passed on: {stale} too old, {undated} of unknown age, {replaced} replaced by a newer one, {} superseded, {boardless} without a board, {stuck} to a full line",
             arrivals.superseded
         )?;
         writeln!(

@@ -21,7 +21,7 @@ use std::time::Duration;
 use protocol::{Hello, Message, Ping, Pong, Role, Stop};
 
 use crate::host_clock::now_us;
-use crate::link::{self, Event, Link, Voice};
+use crate::link::{self, Event, Link, NotSent, Voice};
 use crate::place::Place;
 use crate::relay::envelope::{Content, Envelope, is_carried};
 use crate::relay::inward::{Heard, Inward};
@@ -377,7 +377,9 @@ impl Shared {
                 }
                 Due::Message(waiting) => match voice.post(&waiting.message) {
                     Ok(()) => locked(&self.inward).on_passed(&waiting, now_us()),
-                    Err(_) => locked(&self.inward).on_boardless(),
+                    Err(NotSent::NotKnown) => locked(&self.inward).on_boardless(),
+                    // A newer one is on its way, and may find the line free.
+                    Err(NotSent::Stuck) => locked(&self.inward).on_stuck(),
                 },
             }
         }

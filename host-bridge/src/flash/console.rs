@@ -1,0 +1,216 @@
+//! The board's console before and after: who says Hello there, and whether it is the new firmware.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use protocol::{Hello, Role};
+
+use crate::link::{Event, Link};
+use crate::place::{Place, StLink};
+use crate::state::{Named, State};
+
+/// How long a board may take from its reset to its first Hello; it takes a tenth of this.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+/// How long a look may take: what a link needs to be sure of silence, and some.
+const LOOK: Duration = Duration::from_millis(2_500);
+/// How often a wait looks up whether it was called off.
+const TURN: Duration = Duration::from_millis(100);
+
+/// Where the console of the board of `seat` is, behind a probe of serial number `probe`.
+///
+/// A port that was named is taken at its word, unless it is another ST-LINK's: then the Hello that is heard
+/// there would be another board's.
+///
+/// # Errors
+/// If the port is another ST-LINK's.
+pub fn place(seat: &Place, probe: Option<&str>, links: &[StLink]) -> Result<Place, Elsewhere> {
+    let own = probe.filter(|serial| {
+        links
+            .iter()
+            .any(|link| link.serial.as_deref() == Some(serial))
+    });
+    match (seat, own) {
+        (Place::Port(port), Some(own)) => {
+            let real = port.canonicalize().unwrap_or_else(|_| port.clone());
+            match links
+                .iter()
+                .find(|link| link.port == real)
+                .and_then(|link| link.serial.as_deref())
+            {
+                Some(serial) if serial != own => Err(Elsewhere {
+                    console: port.display().to_string(),
+                    serial: serial.to_owned(),
+                    probe: own.to_owned(),
+                }),
+                _ => Ok(seat.clone()),
+            }
+        }
+        (Place::Usb(_) | Place::Anywhere, Some(own)) => Ok(Place::Usb(own.to_owned())),
+        (_, None) => Ok(seat.clone()),
+    }
+}
+
+/// The console that was named is not behind the probe.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{console} is the console of the ST-LINK {serial}, but the probe is {probe}: name one board only"
+)]
+pub struct Elsewhere {
+    /// The port.
+    pub console: String,
+    /// Its ST-LINK.
+    pub serial: String,
+    /// The probe.
+    pub probe: String,
+}
+
+/// How the console at `place` stands, for one who wants the board of `role`: as soon as that is clear.
+pub fn look(role: Role, place: Place) -> State {
+    let (events, told) = channel();
+    let link = Link::open(role, place, move |event| {
+        // Who no longer listens has what he wanted to know.
+        let _ = events.send(event);
+    });
+    let end = Instant::now() + LOOK;
+    loop {
+        match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
+            Ok(Event::Turned(State::Opened { .. }))
+            | Ok(Event::Heard { .. } | Event::Restarted) => {}
+            Ok(Event::Turned(state)) => return state,
+            Err(_) => return link.state(),
+        }
+    }
+}
+
+/// Looks at several consoles at once.
+pub fn look_at_all(role: Role, places: Vec<Place>) -> Vec<State> {
+    let looks: Vec<_> = places
+        .into_iter()
+        .map(|place| {
+            let kept = place.clone();
+            (kept, std::thread::spawn(move || look(role, place)))
+        })
+        .collect();
+    looks
+        .into_iter()
+        .map(|(place, look)| {
+            look.join().unwrap_or(State::Absent {
+                place: place.to_string(),
+            })
+        })
+        .collect()
+}
+
+/// Why the new firmware was not heard.
+#[derive(Debug, thiserror::Error)]
+pub enum NoHello {
+    /// Nothing, or something else, was heard.
+    #[error(
+        "flashed and verified, but no Hello from the board within {} s: {state}; {}",
+        limit.as_secs(),
+        state.advice().unwrap_or("press its reset button and see `host-bridge doctor`")
+    )]
+    Silence {
+        /// How the console stands.
+        state: State,
+        /// How long it was waited for.
+        limit: Duration,
+    },
+    /// A firmware of another version answers.
+    #[error(
+        "flashed and verified, but the board says that it is {}, not {}: see that console and probe are the \
+         same board's, and press its reset button",
+        Named(found),
+        Named(wanted)
+    )]
+    AnotherVersion {
+        /// What it says.
+        found: Hello,
+        /// What was flashed.
+        wanted: Hello,
+    },
+    /// It was called off.
+    #[error("flashed and verified; the board's Hello was not waited for")]
+    CalledOff,
+}
+
+/// Waits at `place` for the Hello of the firmware that says `wanted` of itself, for at most `limit`.
+///
+/// # Errors
+/// If it is not heard, or when `called_off` becomes true.
+pub fn wait(
+    role: Role,
+    place: Place,
+    wanted: Hello,
+    limit: Duration,
+    called_off: &AtomicBool,
+) -> Result<Hello, NoHello> {
+    let (events, told) = channel();
+    let link = Link::open(role, place, move |event| {
+        // Who no longer listens has what he wanted to know.
+        let _ = events.send(event);
+    });
+    let end = Instant::now() + limit;
+    let mut other = None;
+    loop {
+        if called_off.load(Ordering::Relaxed) {
+            return Err(NoHello::CalledOff);
+        }
+        let left = end.saturating_duration_since(Instant::now());
+        match told.recv_timeout(left.min(TURN)) {
+            Ok(Event::Turned(State::Known { hello, .. })) if hello.version == wanted.version => {
+                return Ok(hello);
+            }
+            Ok(Event::Turned(State::Known { hello, .. })) => other = Some(hello),
+            Ok(_) | Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+        if left.is_zero() {
+            break;
+        }
+    }
+    Err(match other {
+        Some(found) => NoHello::AnotherVersion { found, wanted },
+        None => NoHello::Silence {
+            state: link.state(),
+            limit,
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn links() -> [StLink; 2] {
+        [("/dev/null", "A"), ("/dev/zero", "B")].map(|(port, serial)| StLink {
+            port: port.into(),
+            serial: Some(serial.to_owned()),
+        })
+    }
+
+    #[test]
+    fn the_console_is_the_probes_own() {
+        let place = place(&Place::Anywhere, Some("B"), &links());
+        assert_eq!(place, Ok(Place::Usb("B".to_owned())));
+    }
+
+    #[test]
+    fn a_probe_without_a_console_leaves_what_the_bench_says() {
+        for seat in [Place::Anywhere, Place::Port("/dev/ttyS0".into())] {
+            assert_eq!(place(&seat, Some("J"), &links()), Ok(seat.clone()));
+            assert_eq!(place(&seat, None, &links()), Ok(seat));
+        }
+    }
+
+    #[test]
+    fn another_boards_console_is_refused() {
+        let error = place(&Place::Port("/dev/null".into()), Some("B"), &links());
+        let error = error.expect_err("it is the other's").to_string();
+        assert!(
+            error.contains("ST-LINK A") && error.contains("probe is B"),
+            "{error}"
+        );
+    }
+}

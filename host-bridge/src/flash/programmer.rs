@@ -1,0 +1,271 @@
+//! A probe with a chip behind it: asked what it is, erased, written, verified, started.
+
+use probe_rs::flashing::{DownloadOptions, FlashProgress, ProgressEvent, ProgressOperation};
+use probe_rs::probe::Probe;
+use probe_rs::{Core, MemoryInterface, Permissions, Session};
+
+use super::plan::{FLASH_START, Plan};
+use super::trouble::{Trouble, chain};
+
+/// DBGMCU_IDCODE: the device in its low twelve bits (RM0090, 38.6.1).
+const DEVICE_ID: u64 = 0xE004_2000;
+/// The device of our chip: STM32F42x and F43x.
+const OUR_DEVICE: u32 = 0x419;
+/// The size of the flash in KiB, 16 bits (RM0090, 39.2), in a word that begins two bytes before it.
+const FLASH_SIZE: u64 = 0x1FFF_7A20;
+/// FLASH_OPTCR: RDP in bits 15:8, nWRP of sectors 0–11 in 27:16, SPRMOD in 31 (RM0090, 3.9.10).
+const OPTIONS: u64 = 0x4002_3C14;
+/// FLASH_OPTCR1: nWRP of sectors 12–23 in bits 27:16 (RM0090, 3.9.12).
+const OPTIONS_1: u64 = 0x4002_3C18;
+/// Below this a chip has no power: probe-rs warns at the same voltage.
+const LEAST_VOLTS: f32 = 1.4;
+
+/// Devices with an identity at the same place, of which some stand on boards that look just like ours.
+const DEVICES: [(u32, &str); 22] = [
+    (0x410, "an STM32F101/102/103 (medium density)"),
+    (0x411, "an STM32F20x/21x"),
+    (0x413, "an STM32F405/407/415/417"),
+    (0x414, "an STM32F101/103 (high density)"),
+    (0x415, "an STM32L475/476/486"),
+    (0x416, "an STM32L1"),
+    (0x421, "an STM32F446"),
+    (0x422, "an STM32F302/303/358"),
+    (0x423, "an STM32F401xB/C"),
+    (0x431, "an STM32F411"),
+    (0x433, "an STM32F401xD/E"),
+    (0x434, "an STM32F469/479"),
+    (0x435, "an STM32L43x/44x"),
+    (0x438, "an STM32F303x6/8/328/334"),
+    (0x441, "an STM32F412"),
+    (0x446, "an STM32F302/303xD/E/398"),
+    (0x449, "an STM32F745/746/756"),
+    (0x451, "an STM32F765/767/769/777/779"),
+    (0x452, "an STM32F722/723/732/733"),
+    (0x458, "an STM32F410"),
+    (0x463, "an STM32F413/423"),
+    (0x469, "an STM32G47x/48x"),
+];
+
+/// Part of the way through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Sectors are being erased.
+    Erase,
+    /// Pages are being written.
+    Write,
+    /// The flash is being read back.
+    Verify,
+}
+
+impl Stage {
+    /// The stage in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Erase => "erasing",
+            Self::Write => "writing",
+            Self::Verify => "verifying",
+        }
+    }
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// What is being done.
+    pub stage: Stage,
+    /// How many bytes of it are done.
+    pub done_bytes: u64,
+    /// How many there are.
+    pub total_bytes: u64,
+}
+
+/// A chip that is the right one and may be written.
+#[derive(Debug)]
+pub struct Programmer {
+    session: Session,
+}
+
+impl Programmer {
+    /// Asks the chip behind `probe` whether `plan` can be carried out on it. Nothing is changed but that the
+    /// chip may be halted or, if it does not answer otherwise, reset. `reopen` opens the probe a second
+    /// time, for an attempt under reset.
+    ///
+    /// # Errors
+    /// If the chip has no power, does not answer, is another one, too small, locked or protected.
+    pub fn attach(
+        mut probe: Probe,
+        plan: &Plan,
+        reopen: impl FnOnce() -> Option<Probe>,
+    ) -> Result<Self, Trouble> {
+        if let Ok(Some(volts)) = probe.get_target_voltage()
+            && volts < LEAST_VOLTS
+        {
+            return Err(Trouble::NoPower { volts });
+        }
+        let target = || plan.target.clone();
+        let session = probe
+            .attach(target(), Permissions::default())
+            .or_else(|error| match reopen() {
+                // A chip whose program sleeps deeply or has put the debug pins to other uses.
+                Some(probe) => probe
+                    .attach_under_reset(target(), Permissions::default())
+                    .map_err(|_| error),
+                None => Err(error),
+            })
+            .map_err(|error| Trouble::NoAnswer {
+                reason: chain(&error),
+            })?;
+        let mut programmer = Self { session };
+        programmer.check(plan)?;
+        Ok(programmer)
+    }
+
+    fn core(&mut self) -> Result<Core<'_>, Trouble> {
+        self.session.core(0).map_err(|error| Trouble::LostBefore {
+            reason: chain(&error),
+        })
+    }
+
+    fn check(&mut self, plan: &Plan) -> Result<(), Trouble> {
+        let mut core = self.core()?;
+        let mut read = |address| {
+            core.read_word_32(address)
+                .map_err(|error| Trouble::LostBefore {
+                    reason: chain(&error),
+                })
+        };
+        let device = read(DEVICE_ID)? & 0xFFF;
+        if device != OUR_DEVICE {
+            return Err(Trouble::OtherChip {
+                found: named(device),
+            });
+        }
+        check_lock(read(OPTIONS)?, read(OPTIONS_1)?, plan)?;
+        let found_kib = u64::from(read(FLASH_SIZE)? >> 16);
+        let end = plan
+            .firmware
+            .segments
+            .iter()
+            .map(|segment| segment.range().end)
+            .max()
+            .unwrap_or(FLASH_START);
+        let wanted_kib = (end - FLASH_START).div_ceil(1024);
+        if found_kib < wanted_kib {
+            return Err(Trouble::SmallFlash {
+                found_kib,
+                wanted_kib,
+            });
+        }
+        Ok(())
+    }
+
+    /// Erases, writes and verifies. `tell` is called as it comes along.
+    ///
+    /// # Errors
+    /// If the flash could not be written, or does not hold what was written.
+    pub fn write(&mut self, plan: &Plan, mut tell: impl FnMut(Progress)) -> Result<(), Trouble> {
+        let loader = plan
+            .loader()
+            .map_err(|error| Trouble::flashing(&error, false))?;
+        let mut all: Vec<Progress> = Vec::new();
+        let mut is_begun = false;
+        let mut options = DownloadOptions::default();
+        options.verify = true;
+        options.progress = FlashProgress::new(|event| {
+            if let Some(progress) = advance(&mut all, &event) {
+                is_begun |= progress.done_bytes > 0;
+                tell(progress);
+            }
+        });
+        let result = loader.commit(&mut self.session, options);
+        result.map_err(|error| Trouble::flashing(&error, is_begun))
+    }
+
+    /// Resets the chip and lets it run.
+    ///
+    /// # Errors
+    /// If it does not take the reset.
+    pub fn start(mut self) -> Result<(), Trouble> {
+        self.session
+            .core(0)
+            .and_then(|mut core| core.reset())
+            .map_err(|error| Trouble::NotStarted {
+                reason: chain(&error),
+            })
+    }
+}
+
+/// A device by its identity.
+fn named(device: u32) -> String {
+    DEVICES.iter().find(|(id, _)| *id == device).map_or_else(
+        || format!("none that this program knows (device 0x{device:03X})"),
+        |(id, name)| format!("{name} (device 0x{id:03X})"),
+    )
+}
+
+/// Whether the option bytes allow the plan.
+fn check_lock(options: u32, options_1: u32, plan: &Plan) -> Result<(), Trouble> {
+    match (options >> 8) & 0xFF {
+        0xAA => {}
+        0xCC => return Err(Trouble::Locked { level: 2 }),
+        _ => return Err(Trouble::Locked { level: 1 }),
+    }
+    // A bit of nWRP is 0 where the sector is protected. With SPRMOD the bits protect from reading, and the
+    // other way round.
+    let bits = ((options >> 16) & 0xFFF) | ((options_1 >> 16) & 0xFFF) << 12;
+    let is_protected = |sector: usize| (bits >> sector) & 1 == options >> 31;
+    match plan
+        .sectors
+        .iter()
+        .find(|sector| is_protected(sector.number))
+    {
+        Some(sector) => Err(Trouble::Protected {
+            sector: sector.number,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Takes an event into account; what is to be told of it.
+fn advance(all: &mut Vec<Progress>, event: &ProgressEvent) -> Option<Progress> {
+    match event {
+        ProgressEvent::AddProgressBar { operation, total } => {
+            all.push(Progress {
+                stage: stage(*operation)?,
+                done_bytes: 0,
+                total_bytes: total.unwrap_or(0),
+            });
+            None
+        }
+        ProgressEvent::Started(operation) => {
+            let stage = stage(*operation)?;
+            all.iter().find(|known| known.stage == stage).copied()
+        }
+        ProgressEvent::Progress {
+            operation, size, ..
+        } => {
+            let stage = stage(*operation)?;
+            let known = all.iter_mut().find(|known| known.stage == stage)?;
+            known.done_bytes += size;
+            Some(*known)
+        }
+        ProgressEvent::Finished(operation) => {
+            let stage = stage(*operation)?;
+            let known = all.iter_mut().find(|known| known.stage == stage)?;
+            known.done_bytes = known.total_bytes;
+            Some(*known)
+        }
+        ProgressEvent::FlashLayoutReady { .. }
+        | ProgressEvent::Failed(_)
+        | ProgressEvent::DiagnosticMessage { .. } => None,
+    }
+}
+
+const fn stage(operation: ProgressOperation) -> Option<Stage> {
+    match operation {
+        ProgressOperation::Erase => Some(Stage::Erase),
+        ProgressOperation::Program => Some(Stage::Write),
+        ProgressOperation::Verify => Some(Stage::Verify),
+        ProgressOperation::Fill => None,
+    }
+}

@@ -1,0 +1,240 @@
+//! What is heard on a line, and what that tells of who is at its other end.
+
+use protocol::{Hello, Peer, PortCounters};
+
+/// What a board may take for its first answer: two Hellos and a status.
+pub const PATIENCE_US: u64 = 1_500_000;
+/// How long a board that was known may say nothing: it reports once a second.
+const SILENCE_US: u64 = 2_500_000;
+/// Between two pings.
+const PING_US: u64 = 1_000_000;
+/// What is heard is judged by this much time at least, and by twice as much at most: a board that speaks
+/// text has a line a second.
+const SPAN_US: u64 = 1_500_000;
+/// Text that has been disturbed is still text: at most one byte in so many may be strange. Of random bytes
+/// more than half are.
+const TEXT_BYTES_A_STRANGE_ONE: u64 = 8;
+
+/// What has been heard on a line since it was opened.
+pub struct Hearing {
+    opened_us: u64,
+    patience_us: u64,
+    /// When a byte came last.
+    heard_us: Option<u64>,
+    /// When a frame came last that was understood.
+    understood_us: Option<u64>,
+    /// Frames that had been understood by then.
+    understood: u32,
+    pinged_us: Option<u64>,
+    /// When the newer span began.
+    span_us: u64,
+    /// This span, and the one before.
+    spans: [Sound; 2],
+}
+
+/// What bytes of a span of time were like.
+#[derive(Clone, Copy, Default)]
+struct Sound {
+    bytes: u64,
+    /// Bytes that no text is made of.
+    strange: u64,
+}
+
+/// What the other end of a line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// An answer may still come.
+    Open,
+    /// Somebody who is understood.
+    Known(Hello),
+    /// Somebody of another protocol or schema.
+    Foreign(Hello),
+    /// Nothing is heard.
+    Silent,
+    /// Text, or frames, from somebody who does not answer.
+    Deaf,
+    /// Neither frames nor text.
+    Garbage,
+}
+
+impl Hearing {
+    /// Nothing heard yet on a line that was opened at `opened_us`, and that may be silent for
+    /// `patience_us` before it is called so.
+    pub const fn new(opened_us: u64, patience_us: u64) -> Self {
+        Self {
+            opened_us,
+            patience_us,
+            heard_us: None,
+            understood_us: None,
+            understood: 0,
+            pinged_us: None,
+            span_us: opened_us,
+            spans: [Sound {
+                bytes: 0,
+                strange: 0,
+            }; 2],
+        }
+    }
+
+    /// Takes note of what came, maybe nothing, until `at_us`.
+    pub fn hear(&mut self, at_us: u64, bytes: &[u8]) {
+        if at_us.saturating_sub(self.span_us) >= SPAN_US {
+            self.span_us = at_us;
+            self.spans = [Sound::default(), self.spans[0]];
+        }
+        if bytes.is_empty() {
+            return;
+        }
+        self.heard_us = Some(at_us);
+        let strange = bytes.iter().filter(|&&byte| !is_text(byte)).count();
+        self.spans[0].bytes += bytes.len() as u64;
+        self.spans[0].strange += strange as u64;
+    }
+
+    /// Takes note of what the protocol made of it.
+    pub fn understand(&mut self, at_us: u64, counters: &PortCounters) {
+        if counters.received != self.understood {
+            self.understood = counters.received;
+            self.understood_us = Some(at_us);
+        }
+    }
+
+    /// Whether a ping is due; it counts as sent.
+    pub fn ping_due(&mut self, at_us: u64) -> bool {
+        let due = self
+            .pinged_us
+            .is_none_or(|pinged_us| at_us.saturating_sub(pinged_us) >= PING_US);
+        if due {
+            self.pinged_us = Some(at_us);
+        }
+        due
+    }
+
+    /// The board has started anew: its clock is to be asked for.
+    pub const fn forget_ping(&mut self) {
+        self.pinged_us = None;
+    }
+
+    /// What all this tells.
+    pub fn judge(&self, at_us: u64, peer: Peer, counters: &PortCounters) -> Verdict {
+        let recent = |when_us: Option<u64>| {
+            when_us.is_some_and(|when_us| at_us.saturating_sub(when_us) <= SILENCE_US)
+        };
+        match peer {
+            Peer::Known(hello) if recent(self.understood_us) => Verdict::Known(hello),
+            Peer::Foreign(hello) if recent(self.heard_us) => Verdict::Foreign(hello),
+            Peer::Silent if at_us.saturating_sub(self.opened_us) <= self.patience_us => {
+                Verdict::Open
+            }
+            _ => self.judge_sound(counters),
+        }
+    }
+
+    fn judge_sound(&self, counters: &PortCounters) -> Verdict {
+        let [now, before] = self.spans;
+        let bytes = now.bytes + before.bytes;
+        let strange = now.strange + before.strange;
+        if bytes == 0 {
+            Verdict::Silent
+        } else if counters.unheralded > 0 || strange * TEXT_BYTES_A_STRANGE_ONE <= bytes {
+            Verdict::Deaf
+        } else {
+            Verdict::Garbage
+        }
+    }
+}
+
+/// What a board's lines of text, and the ends of frames, are made of.
+const fn is_text(byte: u8) -> bool {
+    matches!(byte, b' '..=b'~' | b'\r' | b'\n' | 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::Role;
+
+    const HELLO: Hello = Hello::new(Role::Sensor, "stm32f429zi", [0, 1, 0]);
+    const S: u64 = 1_000_000;
+
+    fn heard(at_us: u64, bytes: &[u8]) -> Hearing {
+        let mut hearing = Hearing::new(0, PATIENCE_US);
+        hearing.hear(at_us, bytes);
+        hearing
+    }
+
+    fn verdict(hearing: &Hearing, at_us: u64) -> Verdict {
+        hearing.judge(at_us, Peer::Silent, &PortCounters::new())
+    }
+
+    #[test]
+    fn nothing_is_said_of_a_line_before_it_had_time_to_answer() {
+        assert_eq!(verdict(&heard(S, &[0x80; 99]), PATIENCE_US), Verdict::Open);
+        assert_eq!(
+            verdict(&heard(S, &[0x80; 99]), PATIENCE_US + 1),
+            Verdict::Garbage
+        );
+    }
+
+    #[test]
+    fn text_is_told_from_garbage_and_from_silence() {
+        let line = b"lambda 2.03 mm, v 70 mm/s\r\n\0";
+        assert_eq!(verdict(&heard(S, line), 2 * S), Verdict::Deaf);
+        let mut disturbed = *line;
+        disturbed[3] = 0xff;
+        assert_eq!(verdict(&heard(S, &disturbed), 2 * S), Verdict::Deaf);
+        disturbed[..9].fill(0xff);
+        assert_eq!(verdict(&heard(S, &disturbed), 2 * S), Verdict::Garbage);
+        assert_eq!(verdict(&heard(S, b""), 2 * S), Verdict::Silent);
+    }
+
+    #[test]
+    fn frames_of_somebody_who_does_not_answer_are_no_garbage() {
+        let counters = PortCounters {
+            unheralded: 1,
+            ..PortCounters::new()
+        };
+        let verdict = heard(S, &[0x80; 99]).judge(2 * S, Peer::Silent, &counters);
+        assert_eq!(verdict, Verdict::Deaf);
+    }
+
+    #[test]
+    fn a_board_is_known_for_as_long_as_it_is_understood() {
+        let mut hearing = heard(S, &[1; 40]);
+        let counters = PortCounters {
+            received: 1,
+            ..PortCounters::new()
+        };
+        hearing.understand(S, &counters);
+        let mut judge = |at_us: u64, bytes: &[u8]| {
+            hearing.hear(at_us, bytes);
+            hearing.understand(at_us, &counters);
+            hearing.judge(at_us, Peer::Known(HELLO), &counters)
+        };
+        assert_eq!(judge(S + SILENCE_US, b""), Verdict::Known(HELLO));
+        assert_eq!(judge(S + SILENCE_US + 1, b""), Verdict::Garbage);
+        assert_eq!(judge(S + 2 * SILENCE_US, b""), Verdict::Silent);
+        assert_eq!(judge(9 * S, b"a line of text\r\n"), Verdict::Deaf);
+    }
+
+    #[test]
+    fn a_foreign_board_that_is_gone_is_silent() {
+        let mut hearing = heard(S, &[1; 40]);
+        let judge = |hearing: &Hearing, at_us| {
+            hearing.judge(at_us, Peer::Foreign(HELLO), &PortCounters::new())
+        };
+        assert_eq!(judge(&hearing, S + SILENCE_US), Verdict::Foreign(HELLO));
+        hearing.hear(S + SPAN_US, b"");
+        hearing.hear(S + 2 * SPAN_US, b"");
+        assert_eq!(judge(&hearing, S + 2 * SPAN_US), Verdict::Silent);
+    }
+
+    #[test]
+    fn a_ping_is_due_at_once_and_then_once_a_second() {
+        let mut hearing = Hearing::new(0, PATIENCE_US);
+        let due: Vec<bool> = [5, 6, PING_US + 4, PING_US + 5, PING_US + 6]
+            .map(|at_us| hearing.ping_due(at_us))
+            .into();
+        assert_eq!(due, [true, false, false, true, false]);
+    }
+}

@@ -1,0 +1,107 @@
+//! In which order ports are tried for a board, so that links that look among the same ports don't get
+//! into each other's way for ever.
+
+use std::path::{Path, PathBuf};
+
+use crate::hearing::PATIENCE_US;
+use crate::place::Place;
+
+/// How long a port that led nowhere before may take to answer, in µs: a board that runs answers within
+/// milliseconds.
+const SECOND_LOOK_US: u64 = 300_000;
+
+/// Looks for one board again and again, and remembers where it was not.
+pub struct Search {
+    place: Place,
+    /// Ports behind which something else was, for as long as they are there.
+    elsewhere: Vec<PathBuf>,
+}
+
+impl Search {
+    /// A search at `place` that remembers nothing yet.
+    pub const fn new(place: Place) -> Self {
+        Self {
+            place,
+            elsewhere: Vec::new(),
+        }
+    }
+
+    /// The ports to try, in order: those that led nowhere before come last. Of ports to choose from, those
+    /// that `is_held` by another link of this program are left out.
+    pub fn candidates(&mut self, is_held: impl Fn(&Path) -> bool) -> Candidates {
+        let mut ports = self.place.candidates();
+        self.elsewhere.retain(|port| ports.contains(port));
+        let choosy = self.is_choosy() || ports.len() > 1;
+        if choosy {
+            ports.retain(|port| !is_held(port));
+            ports.sort_by_key(|port| self.elsewhere.contains(port));
+        }
+        Candidates { ports, choosy }
+    }
+
+    /// How long `port` may be silent before it is called so, in µs.
+    pub fn patience_us(&self, port: &Path) -> u64 {
+        if self.elsewhere.iter().any(|known| known == port) {
+            SECOND_LOOK_US
+        } else {
+            PATIENCE_US
+        }
+    }
+
+    /// Remembers whether the board was behind `port`.
+    pub fn remember(&mut self, port: &Path, found: bool) {
+        self.elsewhere.retain(|known| known != port);
+        if !found {
+            self.elsewhere.push(port.to_owned());
+        }
+    }
+
+    const fn is_choosy(&self) -> bool {
+        matches!(self.place, Place::Anywhere | Place::Among(_))
+    }
+}
+
+/// Ports to try.
+pub struct Candidates {
+    /// The ports, in order.
+    pub ports: Vec<PathBuf>,
+    /// Whether a port behind which something else is, is to be left for the next one.
+    pub choosy: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ports that exist wherever tests run, and are no terminals.
+    fn ports() -> Vec<PathBuf> {
+        ["/dev/null", "/dev/zero", "/dev/full"]
+            .map(PathBuf::from)
+            .into()
+    }
+
+    #[test]
+    fn a_port_that_led_nowhere_is_tried_last_and_shortly() {
+        let mut search = Search::new(Place::Among(ports()));
+        let [null, zero, full] = ["/dev/null", "/dev/zero", "/dev/full"].map(Path::new);
+        search.remember(null, false);
+        assert_eq!(search.candidates(|_| false).ports, [zero, full, null]);
+        assert_eq!(search.patience_us(null), SECOND_LOOK_US);
+        assert_eq!(search.patience_us(zero), PATIENCE_US);
+        search.remember(null, true);
+        assert_eq!(search.candidates(|_| false).ports, ports());
+    }
+
+    #[test]
+    fn a_port_of_another_link_is_left_out_where_there_is_a_choice() {
+        let mut search = Search::new(Place::Among(ports()));
+        let held = |port: &Path| port == Path::new("/dev/null");
+        let Candidates { ports, choosy } = search.candidates(held);
+        assert!(choosy);
+        assert_eq!(ports, [Path::new("/dev/zero"), Path::new("/dev/full")]);
+        let Candidates { ports, choosy } =
+            Search::new(Place::Port("/dev/null".into())).candidates(held);
+        assert!(!choosy);
+        assert_eq!(ports, [Path::new("/dev/null")]);
+    }
+}
