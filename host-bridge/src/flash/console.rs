@@ -46,7 +46,9 @@ pub fn place(seat: &Place, probe: Option<&str>, links: &[StLink]) -> Result<Plac
                 _ => Ok(seat.clone()),
             }
         }
-        (Place::Usb(_) | Place::Anywhere, Some(own)) => Ok(Place::Usb(own.to_owned())),
+        (Place::Usb(_) | Place::Among(_) | Place::Anywhere, Some(own)) => {
+            Ok(Place::Usb(own.to_owned()))
+        }
         (_, None) => Ok(seat.clone()),
     }
 }
