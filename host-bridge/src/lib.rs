@@ -7,8 +7,8 @@
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
 pub mod bench;
-mod hearing;
 pub mod flash;
+mod hearing;
 pub mod host_clock;
 mod line;
 pub mod link;

@@ -6,5 +6,7 @@ pub mod bridge;
 pub mod elves;
 pub mod fake_board;
 pub mod history;
+pub mod relay;
 pub mod run;
 pub mod sensing;
+pub mod weather;

@@ -92,7 +92,8 @@ impl Report {
             refused,
             ..
         } = self.incoming;
-        let not_passed = stale + undated + replaced + boardless + stuck + refused + arrivals.superseded;
+        let not_passed =
+            stale + undated + replaced + boardless + stuck + refused + arrivals.superseded;
         format!(
             "{:8.1} s  in {:5.1}/s, age {}; lost {}, late {}, twice {}, not passed on {not_passed}; out {:5.1}/s; round trip {}",
             self.uptime_s,
