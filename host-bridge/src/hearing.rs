@@ -25,6 +25,8 @@ pub struct Hearing {
     understood_us: Option<u64>,
     /// Frames that had been understood by then.
     understood: u32,
+    /// Frames of somebody who has not said Hello, so far.
+    unheralded: u32,
     pinged_us: Option<u64>,
     /// When the newer span began.
     span_us: u64,
@@ -38,6 +40,8 @@ struct Sound {
     bytes: u64,
     /// Bytes that no text is made of.
     strange: u64,
+    /// Frames of somebody who has not said Hello.
+    unheralded: u32,
 }
 
 /// What the other end of a line is.
@@ -67,11 +71,13 @@ impl Hearing {
             heard_us: None,
             understood_us: None,
             understood: 0,
+            unheralded: 0,
             pinged_us: None,
             span_us: opened_us,
             spans: [Sound {
                 bytes: 0,
                 strange: 0,
+                unheralded: 0,
             }; 2],
         }
     }
@@ -97,6 +103,8 @@ impl Hearing {
             self.understood = counters.received;
             self.understood_us = Some(at_us);
         }
+        self.spans[0].unheralded += counters.unheralded.wrapping_sub(self.unheralded);
+        self.unheralded = counters.unheralded;
     }
 
     /// Whether a ping is due; it counts as sent.
@@ -116,7 +124,7 @@ impl Hearing {
     }
 
     /// What all this tells.
-    pub fn judge(&self, at_us: u64, peer: Peer, counters: &PortCounters) -> Verdict {
+    pub fn judge(&self, at_us: u64, peer: Peer) -> Verdict {
         let recent = |when_us: Option<u64>| {
             when_us.is_some_and(|when_us| at_us.saturating_sub(when_us) <= SILENCE_US)
         };
@@ -126,17 +134,19 @@ impl Hearing {
             Peer::Silent if at_us.saturating_sub(self.opened_us) <= self.patience_us => {
                 Verdict::Open
             }
-            _ => self.judge_sound(counters),
+            _ => self.judge_sound(),
         }
     }
 
-    fn judge_sound(&self, counters: &PortCounters) -> Verdict {
+    fn judge_sound(&self) -> Verdict {
         let [now, before] = self.spans;
         let bytes = now.bytes + before.bytes;
         let strange = now.strange + before.strange;
         if bytes == 0 {
             Verdict::Silent
-        } else if counters.unheralded > 0 || strange * TEXT_BYTES_A_STRANGE_ONE <= bytes {
+        } else if now.unheralded + before.unheralded > 0
+            || strange * TEXT_BYTES_A_STRANGE_ONE <= bytes
+        {
             Verdict::Deaf
         } else {
             Verdict::Garbage
@@ -164,7 +174,7 @@ mod tests {
     }
 
     fn verdict(hearing: &Hearing, at_us: u64) -> Verdict {
-        hearing.judge(at_us, Peer::Silent, &PortCounters::new())
+        hearing.judge(at_us, Peer::Silent)
     }
 
     #[test]
@@ -194,8 +204,15 @@ mod tests {
             unheralded: 1,
             ..PortCounters::new()
         };
-        let verdict = heard(S, &[0x80; 99]).judge(2 * S, Peer::Silent, &counters);
-        assert_eq!(verdict, Verdict::Deaf);
+        let mut hearing = heard(S, &[0x80; 99]);
+        hearing.understand(S, &counters);
+        assert_eq!(verdict(&hearing, 2 * S), Verdict::Deaf);
+        // Later it may be something else.
+        for at_us in [3 * S, 5 * S] {
+            hearing.hear(at_us, &[0x80; 99]);
+            hearing.understand(at_us, &counters);
+        }
+        assert_eq!(verdict(&hearing, 5 * S), Verdict::Garbage);
     }
 
     #[test]
@@ -209,7 +226,7 @@ mod tests {
         let mut judge = |at_us: u64, bytes: &[u8]| {
             hearing.hear(at_us, bytes);
             hearing.understand(at_us, &counters);
-            hearing.judge(at_us, Peer::Known(HELLO), &counters)
+            hearing.judge(at_us, Peer::Known(HELLO))
         };
         assert_eq!(judge(S + SILENCE_US, b""), Verdict::Known(HELLO));
         assert_eq!(judge(S + SILENCE_US + 1, b""), Verdict::Garbage);
@@ -220,9 +237,7 @@ mod tests {
     #[test]
     fn a_foreign_board_that_is_gone_is_silent() {
         let mut hearing = heard(S, &[1; 40]);
-        let judge = |hearing: &Hearing, at_us| {
-            hearing.judge(at_us, Peer::Foreign(HELLO), &PortCounters::new())
-        };
+        let judge = |hearing: &Hearing, at_us| hearing.judge(at_us, Peer::Foreign(HELLO));
         assert_eq!(judge(&hearing, S + SILENCE_US), Verdict::Foreign(HELLO));
         hearing.hear(S + SPAN_US, b"");
         hearing.hear(S + 2 * SPAN_US, b"");

@@ -7,6 +7,7 @@
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
 pub mod bench;
+pub mod doctor;
 pub mod flash;
 mod hearing;
 pub mod host_clock;

@@ -6,7 +6,8 @@ use std::io::{self, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use protocol::{MAX_FRAME, Message, Port, PortCounters};
 use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
@@ -16,6 +17,9 @@ use crate::state::State;
 
 /// Longest wait for bytes; also how late a Hello or a ping may be.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
+
+/// How long what was said last may take to leave a line that is closed.
+const DRAIN: Duration = Duration::from_millis(40);
 
 /// The ports that lines of this program have open.
 static HELD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -157,10 +161,15 @@ impl Drop for Line {
 }
 
 impl Ear {
-    /// Closes the line. The system would wait up to half a minute for a stuck one to take its bytes:
-    /// those are thrown away.
+    /// Closes the line. What was said last, maybe a Stop, has [`DRAIN`] to leave; for a stuck line the
+    /// system would wait up to half a minute, so its bytes are thrown away.
     pub fn close(self, stuck: bool) {
-        if stuck {
+        let end = Instant::now() + DRAIN;
+        let waits = || self.tty.bytes_to_write().is_ok_and(|count| count > 0);
+        while !stuck && waits() && Instant::now() < end {
+            thread::park_timeout(DRAIN / 20);
+        }
+        if stuck || waits() {
             // Nothing can be done for a line that does not even allow this.
             let _ = self.tty.clear(ClearBuffer::Output);
         }

@@ -300,7 +300,8 @@ impl<F: FnMut(Event)> Reader<F> {
                 self.pass(&mut hearing, at_us, message);
             }
         }
-        if let Some(line) = locked(&self.shared.line).take() {
+        let line = locked(&self.shared.line).take();
+        if let Some(line) = line {
             *locked(&self.shared.counters) = line.counters();
             ear.close(line.is_stuck());
         }
@@ -329,9 +330,8 @@ impl<F: FnMut(Event)> Reader<F> {
         line.port
             .receive(at_us, bytes, |message| messages.push(message));
         let peer = line.port.peer();
-        let counters = line.counters();
-        hearing.understand(at_us, &counters);
-        let state = self.state(path, hearing.judge(at_us, peer, &counters));
+        hearing.understand(at_us, &line.counters());
+        let state = self.state(path, hearing.judge(at_us, peer));
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
         if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {

@@ -1,16 +1,23 @@
 //! The command line, where no board is needed.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Runs the program without the settings of whoever runs the tests.
-fn host_bridge(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_host-bridge"))
+/// The program, without the settings of whoever runs the tests.
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_host-bridge"));
+    command
         .args(arguments)
         .env_remove("RIDGELINK_BENCH")
         .env_remove("HOME")
-        .env_remove("XDG_CONFIG_HOME")
+        .env_remove("XDG_CONFIG_HOME");
+    command
+}
+
+fn host_bridge(arguments: &[&str]) -> Output {
+    command(arguments)
         .output()
         .expect("the program can be started")
 }
@@ -44,6 +51,18 @@ fn shells_get_their_completions() {
             assert!(script.contains(command), "{shell} has no {command}");
         }
     }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let (reader, writer) = io::pipe().expect("the system has pipes");
+    drop(reader);
+    let output = command(&["completions", "fish"])
+        .stdout(writer)
+        .output()
+        .expect("the program can be started");
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(text(&output.stderr), "");
 }
 
 #[test]

@@ -1,18 +1,61 @@
 //! `host-bridge doctor`.
 
+use std::io::{self, IsTerminal};
 use std::process::ExitCode;
+use std::time::Duration;
+
+use host_bridge::doctor::report::Style;
+use host_bridge::doctor::{findings, json, look, report};
+
+use super::output;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Exit status: 0 if all is well, 1 if something is wrong, 2 if it can't be looked at.
+A bench that names one board only has only that one, as at one end of a relay.
+The ports have to be free: close monitor, record and relay first.")]
 pub struct Doctor {
     #[command(flatten)]
     boards: super::Where,
+    /// How long to listen to the boards, 0.5 to 3600
+    #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = seconds)]
+    span: Duration,
+    /// Prints everything as JSON, for scripts
+    #[arg(long)]
+    json: bool,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .filter(|seconds| (0.5..=3_600.0).contains(seconds))
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| "give 0.5 to 3600".to_owned())
 }
 
 impl Doctor {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        anyhow::bail!("doctor is being built: {bench:?}")
+        if io::stderr().is_terminal() {
+            eprintln!("looking for {:.1} s …", self.span.as_secs_f64());
+        }
+        let examination = look::look(&bench, self.span);
+        let findings = findings::of(&examination);
+        let text = if self.json {
+            json::write(&examination, &findings) + "\n"
+        } else {
+            let coloured = io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            let style = if coloured {
+                Style::Terminal
+            } else {
+                Style::Plain
+            };
+            report::write(&examination, &findings, style)
+        };
+        // Whoever has read enough has not found the bench ill by that.
+        output::print(&text)?;
+        Ok(ExitCode::from(u8::from(!findings.is_empty())))
     }
 }

@@ -34,6 +34,11 @@ impl Attached {
         self.info.serial_number.as_deref()
     }
 
+    /// What probe-rs knows of it.
+    pub const fn info(&self) -> &DebugProbeInfo {
+        &self.info
+    }
+
     /// What `--probe` takes for it.
     pub fn selector(&self) -> String {
         let (vendor, product) = (self.info.vendor_id, self.info.product_id);

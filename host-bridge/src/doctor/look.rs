@@ -1,0 +1,249 @@
+//! Looking at a bench: what is plugged in, and what its boards say for some seconds.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use protocol::{Message, Ping, Role, Status};
+
+use super::clock::{ClockFacts, Exchange};
+use super::examination::{BoardFacts, ElfFacts, Examination, ProbeFacts};
+use super::permission::{Permission, has_plugdev};
+use crate::bench::{Bench, Seat};
+use crate::flash::firmware::Firmware;
+use crate::flash::probes;
+use crate::host_clock::now_us;
+use crate::link::{Event, Link};
+use crate::place::{self, Place};
+use crate::state::State;
+
+/// Longest wait for each board to be named as what it is: three ports without an answer, and a bit.
+const SETTLING: Duration = Duration::from_secs(5);
+/// How long a board that is not known may still be found behind another port: two links that began at each
+/// other's port have exchanged them within a look or two.
+const EXCHANGE: Duration = Duration::from_millis(600);
+/// Between two looks at whether all are settled.
+const TURN: Duration = Duration::from_millis(50);
+/// Between two pings: often enough to see a clock drift within seconds.
+const PING_EVERY: Duration = Duration::from_millis(100);
+
+/// What a link tells.
+type Told = (Role, Event);
+
+/// Looks at everything, and listens for `span` to the boards that are there. If the bench names the place
+/// of one board only, it has only that one, as at one end of a relay.
+pub fn look(bench: &Bench, span: Duration) -> Examination {
+    let (tell, told) = channel();
+    let mut watches: Vec<Watch> = roles(bench)
+        .into_iter()
+        .filter_map(|role| Some(Watch::open(role, bench.seat(role)?, &tell)))
+        .collect();
+    let probes = probes::attached().iter().map(ProbeFacts::from).collect();
+    let settled = Instant::now() + SETTLING;
+    while watches.iter().any(|watch| !watch.is_settled()) && Instant::now() < settled {
+        hear(&mut watches, &told, Instant::now() + TURN);
+    }
+    let began = Instant::now();
+    watches.iter_mut().for_each(Watch::begin);
+    // A bench without a board needs no patience.
+    if watches.iter().any(|watch| watch.facts.state.is_known()) {
+        let mut next_ping = began;
+        while began.elapsed() < span {
+            if Instant::now() >= next_ping {
+                next_ping += PING_EVERY;
+                watches.iter().for_each(Watch::ping);
+            }
+            hear(&mut watches, &told, next_ping.min(began + span));
+        }
+    }
+    let looked = began.elapsed();
+    Examination {
+        looked_s: looked.as_secs_f64(),
+        st_links: place::st_links(),
+        probes,
+        has_plugdev: has_plugdev(),
+        boards: watches.into_iter().map(|watch| watch.end(looked)).collect(),
+    }
+}
+
+/// The boards that the bench has.
+fn roles(bench: &Bench) -> Vec<Role> {
+    let is_named = |role: &Role| {
+        bench
+            .seat(*role)
+            .is_some_and(|seat| seat.place() != Place::Anywhere)
+    };
+    let both = [Role::Sensor, Role::Display];
+    match both.iter().filter(|role| is_named(role)).count() {
+        1 => both.into_iter().filter(is_named).collect(),
+        _ => both.into(),
+    }
+}
+
+/// Takes what is told until `until`, at least one thing or none.
+fn hear(watches: &mut [Watch], told: &Receiver<Told>, until: Instant) {
+    let wait = until.saturating_duration_since(Instant::now());
+    let Ok(first) = told.recv_timeout(wait) else {
+        return;
+    };
+    for (role, event) in std::iter::once(first).chain(told.try_iter()) {
+        if let Some(watch) = watches.iter_mut().find(|watch| watch.facts.role == role) {
+            watch.note(event);
+        }
+    }
+}
+
+/// A board that is being looked at.
+struct Watch {
+    link: Link,
+    facts: BoardFacts,
+    /// When it was last named as something.
+    named: Option<Instant>,
+    exchanges: Vec<Exchange>,
+    /// What its role says at a rate, and how much of it has been said since the beginning.
+    said: u32,
+}
+
+impl Watch {
+    fn open(role: Role, seat: &Seat, tell: &Sender<Told>) -> Self {
+        let tell = tell.clone();
+        let link = Link::open(role, seat.place(), move |event| {
+            // Nobody listens any more when the look is over.
+            let _ = tell.send((role, event));
+        });
+        let mut facts = BoardFacts::new(role, link.state());
+        facts.elf = seat.elf.as_ref().map(|path| ElfFacts {
+            path: path.clone(),
+            hello: Firmware::read(path, role)
+                .map(|firmware| firmware.hello)
+                .map_err(|error| error.to_string()),
+        });
+        Self {
+            link,
+            facts,
+            named: None,
+            exchanges: Vec::new(),
+            said: 0,
+        }
+    }
+
+    /// Whether what it has been named as stands.
+    fn is_settled(&self) -> bool {
+        self.facts.state.is_known() || self.named.is_some_and(|named| named.elapsed() > EXCHANGE)
+    }
+
+    /// What was said before does not count for rates.
+    fn begin(&mut self) {
+        self.said = 0;
+    }
+
+    fn ping(&self) {
+        // A board that is not there answers nothing.
+        let _ = self.link.post(&Message::Ping(Ping { sent_us: now_us() }));
+    }
+
+    fn note(&mut self, event: Event) {
+        match event {
+            Event::Turned(state) => {
+                self.named = (!matches!(state, State::Opened { .. })).then(Instant::now);
+                if let State::Known { hello, .. }
+                | State::Foreign { hello, .. }
+                | State::Stranger { hello, .. } = &state
+                {
+                    self.facts.hello = Some(*hello);
+                }
+                if self.facts.state.is_known() && !state.is_known() {
+                    self.facts.losses += 1;
+                }
+                self.facts.state = state;
+            }
+            Event::Restarted => {
+                self.facts.restarts += 1;
+                self.facts.first = None;
+                self.facts.last = None;
+                self.exchanges.clear();
+            }
+            Event::Heard { at_us, message } => self.hear(at_us, message),
+        }
+    }
+
+    fn hear(&mut self, at_us: u64, message: Message) {
+        match message {
+            Message::Status(status) => self.status(status),
+            Message::Pong(pong) => self.exchanges.extend(Exchange::new(&pong, at_us)),
+            Message::Estimate(estimate) => {
+                self.said += 1;
+                self.facts.health = Some(estimate.health);
+            }
+            Message::Motion(_) => self.said += 1,
+            _ => {}
+        }
+    }
+
+    fn status(&mut self, status: Status) {
+        let place = if self.facts.first.is_none() {
+            &mut self.facts.first
+        } else {
+            &mut self.facts.last
+        };
+        *place = Some(status);
+    }
+
+    /// What has been seen in the end, after it was listened to for `looked`.
+    fn end(self, looked: Duration) -> BoardFacts {
+        let Self {
+            link,
+            mut facts,
+            exchanges,
+            said,
+            ..
+        } = self;
+        facts.counters = link.counters();
+        facts.clock = ClockFacts::new(&exchanges);
+        facts.rate_hz = (facts.state.is_known() && looked >= Duration::from_secs(1))
+            .then(|| f64::from(said) / looked.as_secs_f64());
+        facts.permission = match &facts.state {
+            State::Denied { port } => Permission::of(port),
+            _ => None,
+        };
+        facts
+    }
+}
+
+impl From<&probes::Attached> for ProbeFacts {
+    fn from(probe: &probes::Attached) -> Self {
+        let info = probe.info();
+        Self {
+            name: info.identifier.clone(),
+            vendor: info.vendor_id,
+            product: info.product_id,
+            serial: info.serial_number.clone(),
+            is_allowed: probe.is_allowed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seat(port: Option<&str>) -> Seat {
+        Seat {
+            port: port.map(Into::into),
+            ..Seat::default()
+        }
+    }
+
+    #[test]
+    fn a_bench_that_names_one_board_has_one() {
+        let of = |sensor, display| {
+            roles(&Bench {
+                sensor: seat(sensor),
+                display: seat(display),
+            })
+        };
+        assert_eq!(of(None, None), [Role::Sensor, Role::Display]);
+        assert_eq!(of(Some("/a"), Some("/b")), [Role::Sensor, Role::Display]);
+        assert_eq!(of(Some("/a"), None), [Role::Sensor]);
+        assert_eq!(of(None, Some("/b")), [Role::Display]);
+    }
+}

@@ -1,0 +1,217 @@
+//! `host-bridge doctor` before the two boards' own firmware, on an emulated bench at real time.
+
+use std::fs::OpenOptions;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use hil_sim::serve::{self, Bench, Options, PortName};
+use protocol::Role;
+use serde_json::Value;
+use tests::bridge::{self, Ended, Running};
+use tests::elves;
+use tests::fake_board::wait_until;
+
+/// Far more than a look takes on a busy machine.
+const LIMIT: Duration = Duration::from_secs(60);
+/// What an emulator that does not keep pace with the wall clock is found by.
+const OF_A_SLOW_MACHINE: [&str; 3] = ["drift", "rate", "round-trip"];
+
+/// One bench at a time: two of them would take each other's time.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn options(test: &str) -> Options {
+    let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("bridge_doctor_boards")
+        .join(test);
+    Options::new(folder)
+}
+
+fn bench(options: Options) -> Bench {
+    Bench::start(options, elves::both()).expect("the bench can be set up")
+}
+
+fn start(bench: &Bench, seconds: &str) -> Running {
+    Running::start(
+        bridge::command()
+            .args(["doctor", "--json", "--for", seconds, "--bench"])
+            .arg(bench.bench_file()),
+    )
+}
+
+fn document(ended: &Ended) -> Value {
+    serde_json::from_str(&ended.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}{}", ended.stdout, ended.stderr))
+}
+
+/// The findings but for those of a slow machine, and whether there were such.
+fn findings(document: &Value) -> (Vec<(String, String)>, bool) {
+    let text = |value: &Value| value.as_str().unwrap_or("bench").to_owned();
+    let all: Vec<(String, String)> = document["findings"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|finding| (text(&finding["board"]), text(&finding["kind"])))
+        .collect();
+    let is_of_boards = |found: &&(String, String)| !OF_A_SLOW_MACHINE.contains(&found.1.as_str());
+    let of_boards: Vec<(String, String)> = all.iter().filter(is_of_boards).cloned().collect();
+    let is_slow = of_boards.len() < all.len();
+    (of_boards, is_slow)
+}
+
+fn found(board: &str, kind: &str) -> (String, String) {
+    (board.to_owned(), kind.to_owned())
+}
+
+#[test]
+fn boards_that_are_well_are_told_so() {
+    let _alone = alone();
+    let bench = bench(options("well"));
+    let ended = start(&bench, "3").wait(LIMIT);
+    let document = document(&ended);
+    let (findings, is_slow) = findings(&document);
+    assert_eq!(findings, [], "{document:#}");
+    assert_eq!(ended.status.code(), Some(i32::from(is_slow)));
+    assert_eq!(document["well"], !is_slow);
+    for board in [0, 1].map(|at| &document["boards"][at]) {
+        assert_eq!(board["state"], "known");
+        assert_eq!(board["hello"]["chip"], "stm32f429zi");
+        assert_eq!(board["reset"], "power");
+        assert_eq!(board["elf"]["error"], Value::Null);
+        assert!(board["peer_frames"].as_u64() > Some(0), "{board:#}");
+        assert!(board["clock"]["drift_ppm"].is_number(), "{board:#}");
+    }
+    assert_eq!(document["boards"][0]["gauges"][0], "good");
+    println!("{}", ended.stdout);
+}
+
+#[test]
+fn an_emergency_stop_is_named() {
+    let _alone = alone();
+    let bench = bench(options("stop"));
+    bench
+        .command(serve::Command::Stop)
+        .expect("the bench stands");
+    let document = document(&start(&bench, "2").wait(LIMIT));
+    let (findings, _) = findings(&document);
+    assert_eq!(findings, [found("display", "stopped")], "{document:#}");
+    assert_eq!(
+        document["boards"][1]["supervisor"],
+        "stopped: emergency stop"
+    );
+}
+
+#[test]
+fn a_cable_pulled_and_put_back_is_noticed() {
+    let _alone = alone();
+    let bench = bench(options("cable"));
+    let doctor = start(&bench, "4");
+    let port = PortName::SensorConsole;
+    assert!(wait_until(LIMIT, || bench.has_client(port)));
+    // The board is heard first.
+    let heard_s = bench.now_s() + 0.5;
+    assert!(wait_until(LIMIT, || bench.now_s() > heard_s));
+    bench.pull(port).expect("the port is there");
+    let pulled_s = bench.now_s() + 0.3;
+    assert!(wait_until(LIMIT, || bench.now_s() > pulled_s));
+    bench.plug(port).expect("the port can be made");
+    let ended = doctor.wait(LIMIT);
+    let document = document(&ended);
+    let (findings, _) = findings(&document);
+    assert_eq!(findings, [found("sensor", "lost")], "{document:#}");
+    assert_eq!(ended.status.code(), Some(1));
+    assert_eq!(document["boards"][0]["state"], "known");
+    assert_eq!(document["boards"][0]["losses"], 1);
+}
+
+#[test]
+fn a_board_that_restarts_is_noticed() {
+    let _alone = alone();
+    let bench = bench(options("reset"));
+    let doctor = start(&bench, "4");
+    assert!(wait_until(LIMIT, || bench.has_client(PortName::SensorConsole)));
+    let heard_s = bench.now_s() + 0.7;
+    assert!(wait_until(LIMIT, || bench.now_s() > heard_s));
+    bench
+        .command(serve::Command::Reset(Role::Sensor))
+        .expect("the bench stands");
+    let document = document(&doctor.wait(LIMIT));
+    let (findings, _) = findings(&document);
+    assert!(
+        findings.contains(&found("sensor", "restarted")),
+        "{document:#}"
+    );
+    assert_eq!(document["boards"][0]["restarts"], 1);
+    assert_eq!(document["boards"][0]["reset"], "pin");
+}
+
+#[test]
+fn boards_that_are_not_joined_hear_nothing_of_each_other() {
+    let _alone = alone();
+    let bench = bench(Options {
+        is_apart: true,
+        ..options("apart")
+    });
+    let document = document(&start(&bench, "3").wait(LIMIT));
+    let (findings, _) = findings(&document);
+    assert!(
+        findings.contains(&found("bench", "peer-link")),
+        "{document:#}"
+    );
+}
+
+#[test]
+fn a_wrong_baud_rate_is_garbage_and_named() {
+    let _alone = alone();
+    let bench = bench(options("baud"));
+    let path = bench.path(PortName::DisplayConsole);
+    // Opened before the doctor has it for itself.
+    let port = OpenOptions::new()
+        .read(true)
+        .open(path)
+        .expect("the port is there");
+    let mut doctor = start(&bench, "4");
+    assert!(wait_until(LIMIT, || {
+        let set = Command::new("stty")
+            .arg("115200")
+            .stdin(Stdio::from(port.try_clone().expect("one more")))
+            .status();
+        assert!(set.is_ok_and(|status| status.success()), "no stty");
+        doctor
+            .child
+            .try_wait()
+            .expect("a child can be waited for")
+            .is_some()
+    }));
+    let document = document(&doctor.wait(LIMIT));
+    let (findings, _) = findings(&document);
+    assert!(
+        findings.contains(&found("display", "garbage")),
+        "{document:#}"
+    );
+    let advice = document["findings"].to_string();
+    assert!(advice.contains("921600 baud, 8N1"), "{advice}");
+    assert_eq!(document["boards"][0]["state"], "known");
+}
+
+#[test]
+fn a_second_doctor_is_told_that_the_ports_are_busy() {
+    let _alone = alone();
+    let bench = bench(options("busy"));
+    let first = start(&bench, "3");
+    let both =
+        || bench.has_client(PortName::SensorConsole) && bench.has_client(PortName::DisplayConsole);
+    assert!(wait_until(LIMIT, both));
+    let second = document(&start(&bench, "1").wait(LIMIT));
+    assert_eq!(
+        findings(&second).0,
+        [found("sensor", "busy"), found("display", "busy")]
+    );
+    // The first one is not disturbed.
+    let first = document(&first.wait(LIMIT));
+    assert_eq!(findings(&first).0, [], "{first:#}");
+}
