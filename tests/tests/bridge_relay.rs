@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use protocol::{Message, Role, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
-use tests::fake_board::FakeBoard;
+use tests::fake_board::{FakeBoard, wait_until};
 use tests::relay::{Relay, free_port, listen, motion, sequences, talking_board};
 use tests::weather::Weather;
 
@@ -164,7 +164,7 @@ fn what_was_held_up_too_long_is_never_played() {
             motions.extend(sensor.take_heard());
             still.elapsed() >= Duration::from_millis(1_000)
         };
-        tests::fake_board::wait_until(LIMIT, silent);
+        wait_until(LIMIT, silent);
         let newest_held = sequences(&motions).last().copied().unwrap_or(0);
         pair.weather.hold_still(false);
         let after = listen(&sensor, LIMIT, at_least(100));
@@ -284,11 +284,7 @@ fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     sensor.deafen(true);
     let waits = || last_report(&pair.sensor.lines())["incoming"]["stuck"].as_u64() > Some(300);
-    assert!(tests::fake_board::wait_until(LIMIT, || !pair
-        .sensor
-        .lines()
-        .is_empty()
-        && waits()));
+    assert!(wait_until(LIMIT, || !pair.sensor.lines().is_empty() && waits()));
     sensor.deafen(false);
     motions.extend(listen(&sensor, LIMIT, at_least(300)));
     assert_rising(&motions);
