@@ -278,13 +278,15 @@ fn a_board_whose_cable_is_pulled_and_put_back_goes_on_also_if_it_starts_anew() {
 
 #[test]
 fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
-    let sensor = FakeBoard::new(Role::Sensor);
-    let display = talking_board(Role::Display);
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
     let pair = Pair::new(&sensor, &display, &[]);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     sensor.deafen(true);
-    let waits = || last_report(&pair.sensor.lines())["incoming"]["stuck"].as_u64() > Some(300);
-    assert!(wait_until(LIMIT, || !pair.sensor.lines().is_empty() && waits()));
+    let is_stuck = || {
+        let lines = pair.sensor.lines();
+        !lines.is_empty() && last_report(&lines)["incoming"]["stuck"].as_u64() > Some(300)
+    };
+    assert!(wait_until(LIMIT, is_stuck), "{:?}", pair.sensor.lines());
     sensor.deafen(false);
     motions.extend(listen(&sensor, LIMIT, at_least(300)));
     assert_rising(&motions);
