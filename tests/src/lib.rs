@@ -6,7 +6,7 @@ pub mod bridge;
 pub mod elves;
 pub mod fake_board;
 pub mod history;
-mod pty;
+pub mod pty;
 pub mod relay;
 pub mod run;
 pub mod sensing;

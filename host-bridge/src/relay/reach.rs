@@ -81,11 +81,8 @@ impl Reach {
 
     fn from_tls(error: &io::Error) -> Self {
         let Some(error) = error.get_ref().and_then(|inner| inner.downcast_ref()) else {
-            return match error.kind() {
-                io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => Self::Silent,
-                // What does not speak TLS hangs up when it is greeted.
-                _ => Self::NotTls,
-            };
+            // What does not speak TLS hangs up when it is greeted, or waits for something else.
+            return Self::NotTls;
         };
         match error {
             Error::InvalidCertificate(CertificateError::UnknownIssuer) => Self::Distrusted {

@@ -31,6 +31,7 @@ use crate::relay::outbox::{Due, Outbox};
 use crate::relay::outward::Outward;
 use crate::relay::report::{Notice, Report};
 use crate::relay::wire::{Ear, Wire};
+use crate::state::State;
 use keeper::Keeper;
 
 /// Between two tries to connect for the first time.
@@ -163,6 +164,8 @@ impl Site {
         let carrier = Arc::clone(&shared);
         let link = Link::open(role, place, move |event| match event {
             Event::Heard { at_us, message } => carrier.carry(at_us, message),
+            // What comes of it is told within two seconds.
+            Event::Turned(State::Opened { .. }) => {}
             Event::Turned(state) => carrier.tell(Notice::Board(state)),
             // Its numbers tell as much, and sooner.
             Event::Restarted => {}
