@@ -17,6 +17,7 @@ pub mod monitor;
 pub mod place;
 pub mod recording;
 pub mod replay;
+pub mod relay;
 mod restart;
 mod search;
 pub mod state;

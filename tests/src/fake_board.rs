@@ -2,6 +2,7 @@
 //! wants said. For the bridge's tests that need no firmware.
 
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,7 +10,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{Hello, MAX_FRAME, Message, Port, Role};
-use serialport::{SerialPort, TTYPort};
+
+use crate::pty::Near;
 
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
@@ -36,7 +38,7 @@ pub struct FakeBoard {
     heard: Arc<Mutex<Vec<Message>>>,
     line: Option<JoinHandle<()>>,
     /// Keeps the pseudo-terminal alive while nobody has it open.
-    kept: Option<TTYPort>,
+    kept: Option<OwnedFd>,
 }
 
 impl FakeBoard {
@@ -52,9 +54,7 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
-        let (mut master, kept) = TTYPort::pair().expect("the system has pseudo-terminals");
-        let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
-        master.set_timeout(LOOK).expect("a timeout can be set");
+        let (master, kept, path) = Near::pair(LOOK).expect("the system has pseudo-terminals");
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
         let ears = Arc::clone(&heard);
@@ -121,7 +121,7 @@ impl Drop for FakeBoard {
 }
 
 fn run(
-    mut master: TTYPort,
+    mut master: Near,
     hello: Hello,
     mut script: Script,
     given: &Receiver<Order>,
