@@ -24,6 +24,7 @@ pub mod gate;
 pub mod hand;
 pub mod level;
 pub mod limits;
+pub mod line;
 pub mod look;
 pub mod memory;
 pub mod pace;

@@ -11,12 +11,14 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use firmware_display::look::{self, Look, Rounds};
-use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer};
+use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
 use nucleo::care::care;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
+use nucleo::voice::Voice;
 use protocol::{
-    DisplayCounters, DisplayState, Estimate, Hello, Message, RoleCounters, Safety, Stop, Trip,
+    DisplayCounters, DisplayState, Estimate, Hello, Message, RoleCounters, Safety, Stop,
+    StopReason, Trip,
 };
 use static_cell::StaticCell;
 
@@ -59,9 +61,19 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
     }
     spawner.spawn(once(report(ports)));
-    spawner.spawn(once(care(ports, vitals, || {
-        RoleCounters::Display(COUNTERS.lock(Cell::get))
-    })));
+    let counters = || RoleCounters::Display(COUNTERS.lock(Cell::get));
+    let voice = Voice {
+        hello,
+        line: line::line,
+        help: &line::HELP,
+        stop: || {
+            STOP.signal(Stop {
+                reason: StopReason::Operator,
+            });
+            line::STOPPING
+        },
+    };
+    spawner.spawn(once(care(ports, vitals, counters, voice)));
 }
 
 /// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: LDAC's edge, 95 µs after

@@ -25,6 +25,7 @@ pub mod estimator;
 pub mod health;
 pub mod hum;
 pub mod landmarks;
+pub mod line;
 pub mod method;
 pub mod noise;
 pub mod phasor;

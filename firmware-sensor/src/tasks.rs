@@ -8,10 +8,11 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
-use firmware_sensor::Sensor;
+use firmware_sensor::{Sensor, line};
 use nucleo::care::care;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
+use nucleo::voice::Voice;
 use protocol::{
     Configuration, ConfigurationReport, Hello, Message, Motion, Refusal, RoleCounters,
     SensorConfiguration, SensorCounters, Setting,
@@ -53,9 +54,14 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
     }
     spawner.spawn(once(report(ports)));
-    spawner.spawn(once(care(ports, vitals, || {
-        RoleCounters::Sensor(COUNTERS.lock(Cell::get))
-    })));
+    let counters = || RoleCounters::Sensor(COUNTERS.lock(Cell::get));
+    let voice = Voice {
+        hello,
+        line: line::line,
+        help: &line::HELP,
+        stop: || line::NOT_STOPPING,
+    };
+    spawner.spawn(once(care(ports, vitals, counters, voice)));
 }
 
 /// Samples, estimates, drives the arm. Deadline: one sample period, 1 ms. Missed, DMA goes on for

@@ -17,6 +17,7 @@ mod sensor;
 #[cfg(target_os = "linux")]
 pub mod serve;
 pub mod soak;
+mod terminal;
 mod traps;
 mod wire;
 
@@ -28,6 +29,7 @@ pub use console::Told;
 pub use firmware::{Firmware, FirmwareError, Firmwares};
 pub use lockstep::QUANTUM_NS;
 pub use recorder::WARM_UP_NS;
+pub use terminal::{Terminal, Terminals};
 
 use crate::digest::Digest;
 use crate::fault::Signs;
@@ -124,13 +126,27 @@ pub struct BoardFacts {
 /// # Errors
 /// If a board can't be emulated, stops before the scene's end, or does not take its configuration.
 pub fn run(scene: &Scene, firmwares: &Firmwares) -> Result<(Recording, BoardFacts), ElfError> {
+    run_at(scene, firmwares, Terminals::default())
+}
+
+/// The same, with somebody at the consoles.
+///
+/// # Errors
+/// The same.
+pub fn run_at(
+    scene: &Scene,
+    firmwares: &Firmwares,
+    terminals: Terminals,
+) -> Result<(Recording, BoardFacts), ElfError> {
     let started = Instant::now();
-    let beside = |role, firmware: &Firmware| Recorder::new(scene, role, &firmware.elf);
+    let Terminals { sensor, display } = terminals;
+    let beside =
+        |role, firmware: &Firmware, terminal| Recorder::new(scene, role, &firmware.elf, terminal);
     let (sensor, display) = pair::run(
         scene,
         firmwares,
-        beside(Role::Sensor, &firmwares.sensor),
-        beside(Role::Display, &firmwares.display),
+        beside(Role::Sensor, &firmwares.sensor, sensor),
+        beside(Role::Display, &firmwares.display, display),
     )?;
     let ended = Instant::now();
     let facts = BoardFacts {

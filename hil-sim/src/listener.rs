@@ -27,7 +27,7 @@ impl Listener {
                 let message = match event {
                     Event::Message(message) => message,
                     Event::Greeted(hello) => Message::Hello(hello),
-                    Event::Foreign(_) | Event::Unheralded => return,
+                    Event::Foreign(_) | Event::Unheralded | Event::Text => return,
                 };
                 self.said.push(Said { at_ns, message });
             });

@@ -132,6 +132,18 @@ mod tests {
     }
 
     #[test]
+    fn the_rules_for_udev_name_every_st_link() {
+        let rules = include_str!("../doc/70-ridgelink.rules");
+        let products: Vec<String> = ST_LINK_PRODUCTS
+            .iter()
+            .map(|product| format!("{product:04x}"))
+            .collect();
+        let named = format!("{{idProduct}}==\"{}\"", products.join("|"));
+        assert_eq!(rules.matches(&named).count(), 2, "{named}");
+        assert!(rules.contains(&format!("{{idVendor}}==\"{ST_VENDOR:04x}\"")));
+    }
+
+    #[test]
     fn places_are_read_from_words() {
         assert_eq!("usb:066C".parse(), Ok(Place::Usb("066C".to_owned())));
         assert_eq!(

@@ -7,8 +7,11 @@
 pub mod actuators;
 pub mod clock;
 pub mod configuration;
+pub mod console;
 pub mod frame;
 pub mod hello;
+pub mod latest;
+pub mod line;
 pub mod message;
 pub mod port;
 pub mod receiver;
@@ -25,8 +28,10 @@ pub use configuration::{
     Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, Refusal,
     SensorConfiguration, Setting, UpdateRate,
 };
+pub use console::{Console, Key, Line};
 pub use frame::MAX_FRAME;
 pub use hello::{HELLO_LENGTH, Hello, Role};
+pub use latest::Latest;
 pub use message::{
     CHANNELS, Contact, Estimate, GAUGE_BLOCK, GAUGES, GaugeHealth, GaugeSample, Gauges, Message,
     Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,

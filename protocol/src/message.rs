@@ -2,7 +2,7 @@
 //!
 //! | message | from | rate | what for |
 //! | --- | --- | --- | --- |
-//! | [`Hello`] | all | at start, on request, once a second until answered | who is there, and do we understand each other |
+//! | [`Hello`] | all | at start, on request, once a second until answered; from a [`console`](crate::console) only when spoken to | who is there, and do we understand each other |
 //! | [`Estimate`] | sensor | 100 Hz | the surface, the contact with it, the gauges' health |
 //! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
 //! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
@@ -113,6 +113,20 @@ pub enum GaugeHealth {
     Noisy,
     /// Carries more mains hum than signal.
     Hum,
+}
+
+impl GaugeHealth {
+    /// The state in a word, as used in messages to people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Dead => "dead",
+            Self::Stuck => "stuck",
+            Self::Saturated => "saturated",
+            Self::Noisy => "noisy",
+            Self::Hum => "hum",
+        }
+    }
 }
 
 /// One estimate of the surface under the sensor, at 100 Hz.

@@ -5,6 +5,7 @@
 
 use heapless::Deque;
 
+use crate::console::is_typed;
 use crate::frame::MAX_FRAME;
 use crate::message::{Message, Ping, Pong};
 use crate::receiver::{Event, Peer, Receiver};
@@ -19,6 +20,10 @@ pub struct Port {
     sender: Sender,
     receiver: Receiver,
     queue: Deque<u8, QUEUE_BYTES>,
+    /// When bytes came last, whatever they were.
+    stirred_us: u64,
+    /// When a good frame came last.
+    heard_us: u64,
     dropped: u32,
     overruns: u32,
     line_errors: u32,
@@ -27,10 +32,21 @@ pub struct Port {
 impl Port {
     /// A port that introduces itself with `hello`.
     pub fn new(hello: Hello) -> Self {
+        Self::with(Sender::new(hello))
+    }
+
+    /// A port that waits to be spoken to, and introduces itself with `hello` then.
+    pub(crate) fn waiting(hello: Hello) -> Self {
+        Self::with(Sender::waiting(hello))
+    }
+
+    fn with(sender: Sender) -> Self {
         Self {
-            sender: Sender::new(hello),
+            sender,
             receiver: Receiver::new(),
             queue: Deque::new(),
+            stirred_us: 0,
+            heard_us: 0,
             dropped: 0,
             overruns: 0,
             line_errors: 0,
@@ -51,6 +67,14 @@ impl Port {
         }
     }
 
+    /// Queues bytes that are no frame, if there is room for all of them.
+    pub(crate) fn queue_raw(&mut self, parts: [&[u8]; 3]) {
+        let length: usize = parts.iter().map(|part| part.len()).sum();
+        if self.queue.capacity() - self.queue.len() >= length {
+            self.queue.extend(parts.into_iter().flatten().copied());
+        }
+    }
+
     /// Queues a [`Hello`] when one is due. To be called at least every 100 ms and after each
     /// [`Port::receive`].
     pub fn poll(&mut self, now_us: u64) {
@@ -62,16 +86,39 @@ impl Port {
     /// Takes received bytes, in any portions, answers greetings and pings, and hands on the rest.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8], mut handle: impl FnMut(Message)) {
         let Self {
-            sender, receiver, ..
+            sender,
+            receiver,
+            heard_us,
+            ..
         } = self;
         let mut ping: Option<Ping> = None;
-        receiver.receive(bytes, |event| match event {
-            Event::Message(Message::Ping(asked)) => ping = Some(asked),
-            Event::Message(message) => handle(message),
-            Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
-            Event::Unheralded => sender.on_unheralded(),
-            Event::Foreign(_) => sender.on_foreign(),
-        });
+        // One that waits looks at every byte: a person may have typed right before a program came.
+        let portion = if sender.waits() { 1 } else { bytes.len() };
+        for bytes in bytes.chunks(portion.max(1)) {
+            if sender.waits() && begins_hello(bytes) && is_typed(receiver.unended()) {
+                receiver.forget_unended();
+            }
+            receiver.receive(bytes, |event| {
+                match event {
+                    Event::Message(message) => {
+                        // Nobody seemed to listen any more: somebody does.
+                        if sender.waits() {
+                            sender.on_unheralded();
+                        }
+                        match message {
+                            Message::Ping(asked) => ping = Some(asked),
+                            message => handle(message),
+                        }
+                    }
+                    Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
+                    Event::Unheralded => sender.on_unheralded(),
+                    Event::Foreign(_) => sender.on_foreign(),
+                    Event::Text => return sender.on_text(),
+                }
+                *heard_us = now_us;
+            });
+        }
+        self.stirred_us = now_us;
         if let Some(Ping { sent_us }) = ping {
             self.post(&Message::Pong(Pong {
                 sent_us,
@@ -100,6 +147,34 @@ impl Port {
         !self.queue.is_empty()
     }
 
+    /// Whether it waits to be spoken to.
+    pub(crate) const fn waits(&self) -> bool {
+        self.sender.waits()
+    }
+
+    /// Waits to be spoken to, if no good frame has come for `silence_us`. Who spoke last is still heard.
+    pub(crate) fn wait_after(&mut self, silence_us: u64, now_us: u64) {
+        if now_us.saturating_sub(self.heard_us) >= silence_us {
+            self.sender.wait();
+        }
+    }
+
+    /// Forgets what has not ended yet, after `act` had it, if nothing has come for `quiet_us`.
+    pub(crate) fn take_unended<R>(
+        &mut self,
+        quiet_us: u64,
+        now_us: u64,
+        act: impl FnOnce(&[u8]) -> R,
+    ) -> Option<R> {
+        let unended = self.receiver.unended();
+        if unended.is_empty() || now_us.saturating_sub(self.stirred_us) < quiet_us {
+            return None;
+        }
+        let result = act(unended);
+        self.receiver.forget_unended();
+        Some(result)
+    }
+
     /// Whom this port talks to.
     pub fn peer(&self) -> Peer {
         self.receiver.peer()
@@ -125,4 +200,10 @@ impl Port {
             ..self.receiver.counters()
         }
     }
+}
+
+/// Whether a [`Hello`]'s frame may begin so: with the code of one of the three bytes before its magic, of
+/// which the last is always 0.
+fn begins_hello(bytes: &[u8]) -> bool {
+    matches!(bytes, [1..=3, ..])
 }

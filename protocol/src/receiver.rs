@@ -1,5 +1,6 @@
 //! Bytes in, messages out: nothing on the line can put it out of step, and everything is counted.
 
+use crate::console::LINE_END;
 use crate::frame::{self, MAX_FRAME};
 use crate::hello::Hello;
 use crate::message::Message;
@@ -21,6 +22,9 @@ pub enum Event {
     Foreign(Hello),
     /// A frame came from a peer that has not said Hello to this receiver: ask for one.
     Unheralded,
+    /// A line of text came: the peer is a board's console that has not heard a Hello since its start, or
+    /// for long. Say one.
+    Text,
 }
 
 /// Who is at the other end.
@@ -29,6 +33,8 @@ pub enum Peer {
     /// Nobody has said Hello yet.
     #[default]
     Silent,
+    /// Somebody speaks text and has not said Hello since: see [`crate::console`].
+    Text,
     /// The last Hello was of this protocol and schema.
     Known(Hello),
     /// The last Hello was of another protocol or schema.
@@ -37,10 +43,11 @@ pub enum Peer {
 
 /// The receiving direction of a port.
 ///
-/// Every frame that ends, except an empty one, raises exactly one of the counters `received`,
-/// `corrupt`, `overlong`, `late`, `duplicated`, `malformed`, `foreign` and `unheralded`; `lost`
-/// counts the gaps between them. A Hello is handed on even if it is late or came before: what it
-/// says does not grow old.
+/// Every frame that ends, except an empty one and a line of text, raises exactly one of the counters
+/// `received`, `corrupt`, `overlong`, `late`, `duplicated`, `malformed`, `foreign` and `unheralded`;
+/// `lost` counts the gaps between them. A Hello is handed on even if it is late or came before: what it
+/// says does not grow old. A line of text says that the peer has started over, or has taken its leave:
+/// what it said before is forgotten, and nothing else is read before its Hello.
 pub struct Receiver {
     /// The frame so far, still in COBS.
     buffer: [u8; MAX_FRAME - 1],
@@ -89,6 +96,18 @@ impl Receiver {
         }
     }
 
+    /// What has come of a frame, or of whatever it is, that has not ended yet: still in COBS, and cut
+    /// where it is longer than a frame.
+    pub fn unended(&self) -> &[u8] {
+        &self.buffer[..self.length]
+    }
+
+    /// Forgets what has not ended yet: what comes next begins a frame.
+    pub fn forget_unended(&mut self) {
+        self.length = 0;
+        self.overlong = false;
+    }
+
     /// Who is at the other end, by the last Hello.
     pub const fn peer(&self) -> Peer {
         self.reader.peer
@@ -117,6 +136,11 @@ struct Reader {
 impl Reader {
     /// Reads one frame, without its closing 0x00.
     fn read(&mut self, frame: &mut [u8]) -> Option<Event> {
+        if is_line(frame) {
+            self.sequences = Sequences::new();
+            self.peer = Peer::Text;
+            return Some(Event::Text);
+        }
         let Ok((sequence, payload)) = frame::decode(frame) else {
             count(&mut self.counters.corrupt);
             return None;
@@ -131,7 +155,7 @@ impl Reader {
             return None;
         }
         match self.peer {
-            Peer::Silent => {
+            Peer::Silent | Peer::Text => {
                 count(&mut self.counters.unheralded);
                 Some(Event::Unheralded)
             }
@@ -187,6 +211,15 @@ impl Reader {
         }
         false
     }
+}
+
+/// Whether this is a line of text, as [`crate::Console::say`] ends it. No frame of this version is one:
+/// its fourth byte is the message's variant, a control character, or else one of the four is a code of
+/// COBS below 4.
+fn is_line(frame: &[u8]) -> bool {
+    frame
+        .strip_suffix(LINE_END)
+        .is_some_and(|text| text.iter().all(|byte| matches!(byte, b' '..=b'~')))
 }
 
 /// One more; wraps at 2³².

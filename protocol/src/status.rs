@@ -18,6 +18,18 @@ pub enum ResetCause {
     Software,
 }
 
+impl ResetCause {
+    /// The cause in words, as used in messages to people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Power => "power",
+            Self::Pin => "reset pin",
+            Self::Watchdog => "watchdog",
+            Self::Software => "software",
+        }
+    }
+}
+
 /// What one port has seen since the board's start. All counts wrap at 2³².
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct PortCounters {

@@ -15,7 +15,7 @@ fn expected(message: &Message) -> Event {
     }
 }
 
-/// Every frame that ended is counted exactly once.
+/// Every frame that ended is counted exactly once; lines of text are not.
 fn frames_counted(c: &PortCounters) -> u32 {
     c.received
         + c.corrupt
@@ -27,7 +27,7 @@ fn frames_counted(c: &PortCounters) -> u32 {
         + c.unheralded
 }
 
-/// A stream of frames and garbage, as it may come from a line: garbage never holds a 0x00.
+/// A stream of frames, lines of text and garbage, as it may come from a port: garbage never holds a 0x00.
 fn stream() -> impl Strategy<Value = Vec<u8>> {
     let garbage = proptest::collection::vec(1_u8.., 1..2 * MAX_FRAME).prop_map(|mut bytes| {
         bytes.push(0);
@@ -35,8 +35,9 @@ fn stream() -> impl Strategy<Value = Vec<u8>> {
     });
     let frame =
         (any::<u16>(), message()).prop_map(|(sequence, message)| numbered(sequence, &message));
+    let line = "[ -~]{0,40}\r\n\0".prop_map(String::into_bytes);
     proptest::collection::vec(
-        prop_oneof![3 => frame, 1 => garbage, 1 => Just(vec![0])],
+        prop_oneof![3 => frame, 1 => garbage, 1 => line, 1 => Just(vec![0])],
         0..20,
     )
     .prop_map(|pieces| pieces.concat())
@@ -158,9 +159,10 @@ proptest! {
     #[test]
     fn every_frame_that_ends_is_counted_once(bytes in stream()) {
         let mut receiver = Receiver::new();
-        events(&mut receiver, &bytes);
+        let lines = events(&mut receiver, &bytes).into_iter().filter(|event| *event == Event::Text);
+        let lines = lines.count() as u32;
         let ended = bytes.split_inclusive(|&byte| byte == 0).filter(|frame| frame.len() > 1).count();
-        prop_assert_eq!(frames_counted(&receiver.counters()), ended as u32);
+        prop_assert_eq!(lines + frames_counted(&receiver.counters()), ended as u32);
     }
 
     #[test]

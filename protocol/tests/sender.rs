@@ -132,6 +132,7 @@ impl End {
                 Event::Greeted(hello) => self.sender.on_greeting(hello.asks != 0),
                 Event::Foreign(_) => self.sender.on_foreign(),
                 Event::Unheralded => self.sender.on_unheralded(),
+                Event::Text => self.sender.on_text(),
             }
         }
     }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use hil_sim::scene::{Motion, Scene};
 use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError, Standing};
 
-use super::Elves;
+use super::{Elves, number};
 use input::{Input, Keys};
 use screen::Screen;
 
@@ -172,7 +172,7 @@ fn greet(bench: &Bench, scene: &str, has_keys: bool) {
     let mut text = format!("bench of scene {scene}, ports:\n");
     for name in PortName::ALL {
         if bench.is_plugged(name) {
-            text += &format!("  {name:<16} {}\n", bench.path(name).display());
+            text += &format!("  {:<16} {}\n", name.name(), bench.path(name).display());
         }
     }
     text += &format!(
@@ -193,19 +193,19 @@ fn status(bench: &Bench, last: (Instant, Standing), now: (Instant, Standing)) ->
     let (before, standing) = (last.1, now.1);
     let sensed = &standing.sensed;
     let valid = sensed.estimate.filter(|estimate| estimate.valid);
-    let wavelength = match valid.and_then(|estimate| estimate.wavelength_mm) {
-        Some(wavelength_mm) => format!("{wavelength_mm:.2}"),
-        None => "–".to_owned(),
-    };
+    let wavelength_mm = valid
+        .and_then(|estimate| estimate.wavelength_mm)
+        .map(f64::from);
     let open: Vec<&str> = PortName::ALL
         .into_iter()
         .filter(|&name| bench.has_client(name))
         .map(PortName::name)
         .collect();
     format!(
-        "{:.1} s  {:.2} ×  λ̂ {wavelength} of {:.2} mm  v {:+.1} mm/s  dropped {} B  behind {:.0} ms  open: {}",
+        "{:.1} s  {:.2} ×  λ̂ {} of {:.2} mm  v {:+.1} mm/s  dropped {} B  behind {:.0} ms  open: {}",
         standing.now_s,
         (standing.now_s - before.now_s) / wall_s,
+        number(wavelength_mm, 2),
         sensed.wavelength_mm,
         standing.hand_mm_s,
         standing.dropped,

@@ -16,6 +16,8 @@ use crate::weather::BYTE_NS;
 /// How long the host waits for an answer before it asks again: ten times what the two frames, a board's
 /// tasks and the exchange at the end of every quantum take together.
 const PATIENCE_NS: u64 = 50_000_000;
+/// How often the host says that it is there: the board speaks text to who says nothing for long.
+const PING_NS: u64 = 1_000_000_000;
 /// An amplitude that no board takes.
 const IMPOSSIBLE_MV: u16 = 60_000;
 
@@ -29,6 +31,7 @@ pub struct ConsoleHost {
     asked_ns: Option<u64>,
     /// Whether the board, as it stands since its power came on, has answered.
     is_answered: bool,
+    next_ping_ns: u64,
     pub(super) told: Option<Told>,
     faults: Vec<Fault>,
     /// Faults that have been done.
@@ -72,6 +75,7 @@ impl ConsoleHost {
             wanted,
             asked_ns: None,
             is_answered: false,
+            next_ping_ns: PING_NS,
             told: None,
             faults,
             done: 0,
@@ -140,6 +144,11 @@ impl ConsoleHost {
             });
         }
         self.ask(now_ns);
+        if now_ns >= self.next_ping_ns {
+            self.next_ping_ns += PING_NS;
+            let sent_us = now_ns / 1_000;
+            self.port.post(&Message::Ping(Ping { sent_us }));
+        }
         let mut said = self.take();
         for byte in said.drain(..) {
             wire.hear(now_ns, byte);

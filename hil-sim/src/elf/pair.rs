@@ -37,6 +37,8 @@ pub struct Finished<R, W> {
 }
 
 type Left<P, W> = Finished<<P as Watched>::Records, W>;
+/// What the sensor board leaves behind, and the display board.
+pub type Both<S, D> = (Left<SensorPins, S>, Left<DisplayPins, D>);
 
 /// Runs both boards in `scene`, a witness beside each, until the witnesses say that it is over.
 ///
@@ -47,7 +49,7 @@ pub fn run<S, D>(
     firmwares: &Firmwares,
     sensor: S,
     display: D,
-) -> Result<(Left<SensorPins, S>, Left<DisplayPins, D>), ElfError>
+) -> Result<Both<S, D>, ElfError>
 where
     S: Witness<SensorPins>,
     D: Witness<DisplayPins>,

@@ -10,6 +10,7 @@ use super::console::{ConsoleHost, Told};
 use super::lockstep::{Between, Watched, Witness};
 use super::nucleo::Nucleo;
 use super::rtt::Log;
+use super::terminal::{self, Terminal};
 use super::wire::TimedByte;
 use crate::scene::Scene;
 
@@ -19,6 +20,8 @@ pub const WARM_UP_NS: u64 = 500_000_000;
 /// Stands beside a board for as long as its scene lasts.
 pub struct Recorder {
     console: Option<ConsoleHost>,
+    /// Who sits at the console if no host does.
+    terminal: Option<Box<dyn Terminal>>,
     log: Option<Log>,
     end_ns: u64,
     /// What the board sent to its peer, with instants.
@@ -30,10 +33,11 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Beside the board of `role` in `scene`, which runs `elf`.
-    pub fn new(scene: &Scene, role: Role, elf: &[u8]) -> Self {
+    /// Beside the board of `role` in `scene`, which runs `elf`, with `terminal` at its console.
+    pub fn new(scene: &Scene, role: Role, elf: &[u8], terminal: Option<Box<dyn Terminal>>) -> Self {
         Self {
             console: ConsoleHost::of_scene(scene, role),
+            terminal,
             log: Log::find(elf),
             end_ns: (scene.duration_s * 1e9).ceil() as u64,
             sent: Vec::new(),
@@ -81,6 +85,9 @@ impl<P: Watched> Witness<P> for Recorder {
     fn attend(&mut self, between: Between<'_, P>) {
         if let Some(host) = &mut self.console {
             host.serve(between.session.board_mut(), between.now_ns);
+        } else if let Some(terminal) = &mut self.terminal {
+            let board = between.session.board_mut();
+            terminal::carry(&mut **terminal, board, between.now_ns);
         }
         if self.warm.is_none() && between.now_ns >= WARM_UP_NS {
             self.warm = Some(Instant::now());

@@ -8,10 +8,9 @@ use probe_rs::probe::{DebugProbeError, ProbeCreationError};
 
 use super::plan::CHIP;
 
-/// Where the rules for probes come from.
-pub const UDEV_HINT: &str = "let its users at it with probe-rs's udev rules \
-    (https://probe.rs/docs/getting-started/probe-setup/: copy 69-probe-rs.rules to /etc/udev/rules.d, \
-    `sudo udevadm control --reload && sudo udevadm trigger`, plug the board in again)";
+/// What lets people at their probes.
+pub const UDEV_HINT: &str = "let its users at it by the udev rules in host-bridge/doc/70-ridgelink.rules \
+    (what to do stands in the file), then plug the board in again";
 
 /// Why a board was not flashed.
 #[derive(Debug, thiserror::Error)]
@@ -49,8 +48,8 @@ pub enum Trouble {
     },
     /// The chip has no power.
     #[error(
-        "the probe sees {volts:.1} V on the board, not 3.3 V: see the board's supply (jumper JP1, JP3) and \
-         the probe's cable"
+        "the probe sees {volts:.1} V on the board, not 3.3 V: see the board's supply \
+         (jumper JP3 at U5V, JP5 on) and the probe's cable"
     )]
     NoPower {
         /// What it measures.

@@ -33,8 +33,7 @@ fn seen(chip: &Arc<Mutex<Chip>>) -> MutexGuard<'_, Chip> {
 /// What is said of the chip, to which nothing may have been done.
 fn refusal(plan: &Plan, chip: &Arc<Mutex<Chip>>) -> Trouble {
     let trouble = Programmer::attach(probe(chip), plan, || Some(probe(chip)))
-        .err()
-        .expect("the chip is refused");
+        .expect_err("the chip is refused");
     assert!(trouble.is_harmless(), "{trouble}");
     let flash = |deed: &Deed| matches!(deed, Deed::Erased(_) | Deed::Written(_));
     assert!(!seen(chip).deeds.iter().any(flash), "{trouble}");
@@ -166,8 +165,7 @@ fn a_chip_that_does_not_answer_is_tried_under_reset_and_then_refused() {
         reopened = true;
         Some(probe(&chip))
     })
-    .err()
-    .expect("nobody answers");
+    .expect_err("nobody answers");
     assert!(reopened);
     assert!(matches!(trouble, Trouble::NoAnswer { .. }), "{trouble:?}");
     assert!(trouble.to_string().contains("CN4"), "{trouble}");
@@ -268,8 +266,6 @@ fn probe_rs_fake_probe_shows_its_chip_and_no_more() {
         FakeProbe::with_mocked_core_and_binary(&memory).into_probe()
     };
     Programmer::attach(fake(0x2003_6419), &plan, || None).expect("our chip");
-    let trouble = Programmer::attach(fake(0x1000_6451), &plan, || None)
-        .err()
-        .expect("an F767");
+    let trouble = Programmer::attach(fake(0x1000_6451), &plan, || None).expect_err("an F767");
     assert!(matches!(trouble, Trouble::OtherChip { .. }), "{trouble:?}");
 }

@@ -8,6 +8,7 @@ use embassy_time::{Duration, Instant, Ticker};
 use protocol::{Message, ResetCause, RoleCounters, Status};
 
 use crate::ports::{Ports, Side};
+use crate::voice::Voice;
 
 /// Between two looks: eight in a watchdog's time.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -40,12 +41,29 @@ impl Vitals {
             watchdog_resets,
         }
     }
+
+    fn status(&self, ports: &Ports, role: RoleCounters) -> Status {
+        Status {
+            uptime_us: Instant::now().as_micros(),
+            reset: self.reset,
+            watchdog_resets: self.watchdog_resets,
+            peer: ports.counters(Side::Peer),
+            console: ports.counters(Side::Console),
+            role,
+        }
+    }
 }
 
-/// Greets, sends the counters, and feeds the watchdog as long as they show that the board does its work.
-/// Deadline: 400 ms, the watchdog's; missed, the board restarts.
+/// Greets, sends the counters, speaks to who reads the console, and feeds the watchdog as long as the
+/// counters show that the board does its work. Deadline: 400 ms, the watchdog's; missed, the board
+/// restarts.
 #[embassy_executor::task]
-pub async fn care(ports: &'static Ports, mut vitals: Vitals, counters: fn() -> RoleCounters) {
+pub async fn care(
+    ports: &'static Ports,
+    mut vitals: Vitals,
+    counters: fn() -> RoleCounters,
+    voice: Voice,
+) {
     let mut ticker = Ticker::every(PERIOD);
     let mut next_status = Instant::now() + STATUS_PERIOD;
     let mut work_before = None;
@@ -54,6 +72,7 @@ pub async fn care(ports: &'static Ports, mut vitals: Vitals, counters: fn() -> R
         defmt::Debug2Format(&vitals.reset),
         vitals.watchdog_resets
     );
+    voice.greet(ports, &vitals.status(ports, counters()));
     loop {
         let role = counters();
         let work = match role {
@@ -63,21 +82,22 @@ pub async fn care(ports: &'static Ports, mut vitals: Vitals, counters: fn() -> R
         if work_before.replace(work) != Some(work) {
             vitals.watchdog.pet();
         }
-        ports.poll();
+        let typed = ports.poll();
         let known = ports.is_known(Side::Peer);
         vitals
             .link_led
             .set_level(if known { Level::High } else { Level::Low });
-        if Instant::now() >= next_status {
-            next_status += STATUS_PERIOD;
-            ports.post(&Message::Status(Status {
-                uptime_us: Instant::now().as_micros(),
-                reset: vitals.reset,
-                watchdog_resets: vitals.watchdog_resets,
-                peer: ports.counters(Side::Peer),
-                console: ports.counters(Side::Console),
-                role,
-            }));
+        let is_due = Instant::now() >= next_status;
+        if is_due || typed.is_some() {
+            let status = vitals.status(ports, role);
+            if let Some(key) = typed {
+                voice.obey(ports, key, &status);
+            }
+            if is_due {
+                next_status += STATUS_PERIOD;
+                ports.post(&Message::Status(status));
+                voice.tell(ports, &status);
+            }
         }
         ticker.next().await;
     }

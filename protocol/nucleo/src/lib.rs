@@ -12,3 +12,4 @@ pub mod reset;
 pub mod serial;
 pub mod spawn;
 pub mod trip;
+pub mod voice;

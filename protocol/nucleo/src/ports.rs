@@ -11,7 +11,7 @@ use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use protocol::port::Port;
 use protocol::receiver::Peer;
-use protocol::{Hello, Message, PortCounters};
+use protocol::{Console, Hello, Key, Latest, Message, PortCounters};
 
 /// Most bytes handed to a transmitter's DMA at once.
 const BURST_BYTES: usize = 256;
@@ -43,25 +43,46 @@ pub async fn speak(ports: &'static Ports, side: Side, uart: UartTx<'static, Asyn
     ports.speak(side, uart).await
 }
 
-/// Both ports, shared by the tasks of the thread-mode executor.
+/// Both ports, shared by the tasks of the thread-mode executor, and what went through them last.
 pub struct Ports {
-    ports: ThreadModeMutex<RefCell<[Port; 2]>>,
+    ends: ThreadModeMutex<RefCell<Ends>>,
     filled: [Signal<ThreadModeRawMutex, ()>; 2],
+}
+
+struct Ends {
+    peer: Port,
+    console: Console,
+    latest: Latest,
+}
+
+impl Ends {
+    fn port(&mut self, side: Side) -> (&mut Port, &mut Latest) {
+        let port = match side {
+            Side::Peer => &mut self.peer,
+            Side::Console => self.console.port(),
+        };
+        (port, &mut self.latest)
+    }
 }
 
 impl Ports {
     /// Two ports that introduce themselves with `hello`.
     pub fn new(hello: Hello) -> Self {
         Self {
-            ports: ThreadModeMutex::new(RefCell::new([Port::new(hello), Port::new(hello)])),
+            ends: ThreadModeMutex::new(RefCell::new(Ends {
+                peer: Port::new(hello),
+                console: Console::new(hello),
+                latest: Latest::new(),
+            })),
             filled: [Signal::new(), Signal::new()],
         }
     }
 
-    fn with<R>(&self, side: Side, act: impl FnOnce(&mut Port) -> R) -> R {
-        let (result, filled) = self.ports.lock(|ports| {
-            let port = &mut ports.borrow_mut()[side as usize];
-            let result = act(port);
+    fn with<R>(&self, side: Side, act: impl FnOnce(&mut Port, &mut Latest) -> R) -> R {
+        let (result, filled) = self.ends.lock(|ends| {
+            let ends = &mut *ends.borrow_mut();
+            let (port, latest) = ends.port(side);
+            let result = act(port, latest);
             (result, port.has_bytes())
         });
         if filled {
@@ -70,29 +91,58 @@ impl Ports {
         result
     }
 
-    /// Says `message` to whoever listens on either port.
-    pub fn post(&self, message: &Message) {
-        for side in [Side::Peer, Side::Console] {
-            self.with(side, |port| port.post(message));
+    fn with_console<R>(&self, act: impl FnOnce(&mut Console) -> R) -> R {
+        let (result, filled) = self.ends.lock(|ends| {
+            let console = &mut ends.borrow_mut().console;
+            let result = act(console);
+            (result, console.port().has_bytes())
+        });
+        if filled {
+            self.filled[Side::Console as usize].signal(());
         }
+        result
     }
 
-    /// Sends a Hello on each port where one is due; to be called at least every 100 ms.
-    pub fn poll(&self) {
+    /// Says `message` to whoever listens on either port.
+    pub fn post(&self, message: &Message) {
+        self.with(Side::Peer, |port, latest| {
+            latest.said(message);
+            port.post(message);
+        });
+        self.with(Side::Console, |port, _| port.post(message));
+    }
+
+    /// Says a line to whoever reads the console, if it is a person.
+    pub fn say(&self, line: &str) {
+        self.with_console(|console| console.say(line));
+    }
+
+    /// Whether the console speaks text.
+    pub fn speaks_text(&self) -> bool {
+        self.with_console(|console| console.is_text())
+    }
+
+    /// Sends a Hello on each port where one is due; to be called at least every 100 ms. Returns what a
+    /// person typed on the console.
+    pub fn poll(&self) -> Option<Key> {
         let now_us = Instant::now().as_micros();
-        for side in [Side::Peer, Side::Console] {
-            self.with(side, |port| port.poll(now_us));
-        }
+        self.with(Side::Peer, |port, _| port.poll(now_us));
+        self.with_console(|console| console.poll(now_us))
+    }
+
+    /// The latest that was said or heard of surface and hand.
+    pub fn latest(&self) -> Latest {
+        self.ends.lock(|ends| ends.borrow().latest)
     }
 
     /// Whether the other end of a port has introduced itself and is understood.
     pub fn is_known(&self, side: Side) -> bool {
-        self.with(side, |port| matches!(port.peer(), Peer::Known(_)))
+        self.with(side, |port, _| matches!(port.peer(), Peer::Known(_)))
     }
 
     /// What a port has counted.
     pub fn counters(&self, side: Side) -> PortCounters {
-        self.with(side, |port| port.counters())
+        self.with(side, |port, _| port.counters())
     }
 
     /// Receives for ever: hands each message that is not the link's own to `handle`, which runs while
@@ -109,12 +159,15 @@ impl Ports {
             match uart.read(&mut bytes).await {
                 Ok(count) => {
                     let now_us = Instant::now().as_micros();
-                    self.with(side, |port| {
-                        port.receive(now_us, &bytes[..count], &mut handle)
+                    self.with(side, |port, latest| {
+                        port.receive(now_us, &bytes[..count], |message| {
+                            latest.heard(now_us, &message);
+                            handle(message);
+                        })
                     });
                 }
-                Err(Error::Overrun) => self.with(side, Port::on_overrun),
-                Err(_) => self.with(side, Port::on_line_error),
+                Err(Error::Overrun) => self.with(side, |port, _| port.on_overrun()),
+                Err(_) => self.with(side, |port, _| port.on_line_error()),
             }
         }
     }
@@ -123,11 +176,11 @@ impl Ports {
     pub async fn speak(&self, side: Side, mut uart: UartTx<'static, Async>) -> ! {
         let mut bytes = [0; BURST_BYTES];
         loop {
-            let count = self.with(side, |port| port.take(&mut bytes));
+            let count = self.with(side, |port, _| port.take(&mut bytes));
             if count == 0 {
                 self.filled[side as usize].wait().await;
             } else if uart.write(&bytes[..count]).await.is_err() {
-                self.with(side, Port::on_line_error);
+                self.with(side, |port, _| port.on_line_error());
             }
         }
     }

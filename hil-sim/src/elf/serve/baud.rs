@@ -112,10 +112,10 @@ mod tests {
     }
 
     #[test]
-    fn at_half_the_rate_every_other_bit_is_seen() {
-        // 0x66 is 0 0110 0110 1 on the line. From the middle of the receiver's first bit on it samples the
-        // sender's bits 3, 5, 7 and 9, then rest.
-        assert_eq!(heard(115_200, 57_600, &[0x66]), [0b1111_1001]);
+    fn at_a_third_of_the_rate_every_third_bit_is_seen() {
+        // 0x66 is 0 0110 0110 1 on the line, from the start bit on. The receiver samples it 4.5 and 7.5 bits
+        // after the edge, then rest.
+        assert_eq!(heard(115_200, 38_400, &[0x66]), [0b1111_1110]);
     }
 
     #[test]
@@ -126,11 +126,11 @@ mod tests {
 
     #[test]
     fn what_is_not_known_yet_is_not_heard() {
-        let mut line = Mismatch::new(115_200, 57_600);
+        let mut line = Mismatch::new(115_200, 38_400);
         line.send(0.0, 0x66);
-        let heard_ns = 9.5e9 / 57_600.0;
+        let heard_ns = 9.5e9 / 38_400.0;
         assert_eq!(line.hear(heard_ns - 1.0), None);
-        assert_eq!(line.hear(heard_ns + 1.0), Some(0b1111_1001));
+        assert_eq!(line.hear(heard_ns + 1.0), Some(0b1111_1110));
         assert_eq!(line.hear(1e12), None);
     }
 }

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use crate::elf::WARM_UP_NS;
+
 /// How far virtual time runs after the wall clock that it has fallen behind; what is more is given up.
 const CATCHES_UP: Duration = Duration::from_millis(50);
 
@@ -42,10 +44,12 @@ impl Pacer {
     }
 
     /// Returns when the wall clock has come to the virtual instant `now_ns`. Instants must not decrease.
-    /// Tells how far the wall clock is ahead, time given up included.
+    /// Tells how far the wall clock is ahead, time given up included, since the emulator has warmed up.
     pub fn wait(&mut self, now_ns: u64) -> Duration {
-        let behind = self.lag(now_ns, Instant::now());
-        match behind {
+        if now_ns <= WARM_UP_NS {
+            self.slipped = Duration::ZERO;
+        }
+        match self.lag(now_ns, Instant::now()) {
             Ok(behind) => behind,
             Err(early) => {
                 std::thread::sleep(early);

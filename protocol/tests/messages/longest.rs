@@ -1,0 +1,95 @@
+//! The longest message of each kind.
+
+use protocol::*;
+
+use super::{actuator, display_counters, port};
+
+/// The longest message of the same kind: every number where its varint is longest. The match names
+/// every variant, so that a new one does not compile until it stands here too.
+pub fn longest_like(message: &Message) -> Message {
+    match message {
+        Message::Hello(hello) => Message::Hello(*hello),
+        Message::Estimate(_) => Message::Estimate(Estimate {
+            sequence: u32::MAX,
+            instant_us: u64::MAX,
+            wavelength_mm: Some(f32::MAX),
+            valid: true,
+            confidence: f32::MAX,
+            amplitude_lsb: f32::MAX,
+            counted_mm: Some(f32::MAX),
+            range: Range::T2,
+            contact: Contact::StickSlip,
+            velocity_um_s: i32::MIN,
+            lag_um: Some(i32::MIN),
+            gauges_used: u8::MAX,
+            health: [GaugeHealth::Hum; GAUGES],
+        }),
+        Message::Motion(_) => Message::Motion(Motion {
+            sequence: u32::MAX,
+            instant_us: u64::MAX,
+            position_um: i64::MIN,
+            velocity_um_s: i32::MIN,
+        }),
+        Message::Gauges(_) => Message::Gauges(Gauges {
+            first_sample: u32::MAX,
+            instant_us: u64::MAX,
+            position_um: i64::MIN,
+            samples: [GaugeSample {
+                codes: [u16::MAX; CHANNELS],
+                travel_um: i16::MIN,
+            }; GAUGE_BLOCK],
+        }),
+        Message::Status(_) => Message::Status(Status {
+            uptime_us: u64::MAX,
+            reset: ResetCause::Software,
+            watchdog_resets: u32::MAX,
+            peer: port([u32::MAX; 13]),
+            console: port([u32::MAX; 13]),
+            role: RoleCounters::Display(display_counters([u32::MAX; 14])),
+        }),
+        Message::Configure(_) => Message::Configure(longest_configuration()),
+        Message::Configuration(_) => Message::Configuration(ConfigurationReport {
+            refused: Some(Refusal {
+                setting: Setting::ActuatorGain,
+                index: u8::MAX,
+                low: i64::MIN,
+                high: i64::MIN,
+            }),
+            hash: u32::MAX,
+            configuration: longest_configuration(),
+        }),
+        Message::Ping(_) => Message::Ping(Ping { sent_us: u64::MAX }),
+        Message::Pong(_) => Message::Pong(Pong {
+            sent_us: u64::MAX,
+            received_us: u64::MAX,
+            answered_us: u64::MAX,
+        }),
+        Message::Stop(_) => Message::Stop(Stop {
+            reason: StopReason::Host,
+        }),
+        Message::Actuators(_) => Message::Actuators(Actuators {
+            first: u8::MAX,
+            actuators: [actuator((i16::MIN, i16::MIN, u16::MAX, u16::MAX, true)); ACTUATOR_BLOCK],
+        }),
+        Message::Safety(_) => Message::Safety(Safety {
+            instant_us: u64::MAX,
+            state: DisplayState::Stopped(Trip::StackOverflow),
+        }),
+    }
+}
+
+fn longest_configuration() -> Configuration {
+    Configuration::Sensor(SensorConfiguration {
+        method: Method::Crossings,
+        window_ms: u16::MAX,
+        counted_gauge: u8::MAX,
+        gauges: u8::MAX,
+        bank_travel_percent: u16::MAX,
+        bank_candidates: u8::MAX,
+        force_channel: true,
+        force_mn_per_v: u16::MAX,
+        stiffness_n_per_m: u16::MAX,
+        stream_gauges: true,
+        arm_full_scale_um_s: u32::MAX,
+    })
+}
