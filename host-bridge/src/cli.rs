@@ -59,6 +59,7 @@ enum Command {
     #[command(long_about = replay::ABOUT, after_long_help = replay::EXAMPLES)]
     Replay(replay::Replay),
     /// Carries the link between two sites over a network
+    #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
     /// Looks at what is attached, and says what is wrong and what to do
     Doctor(doctor::Doctor),

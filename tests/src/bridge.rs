@@ -9,8 +9,6 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
-use crate::fake_board;
-
 /// Between two looks at whether a program has ended.
 const LOOK: Duration = Duration::from_millis(2);
 
@@ -108,10 +106,7 @@ impl Running {
     /// # Panics
     /// If it can't be started.
     pub fn start(command: &mut Command) -> Self {
-        let mut child = {
-            let _alone = fake_board::start();
-            command.spawn().expect("the program can be started")
-        };
+        let mut child = command.spawn().expect("the program can be started");
         let stdout = child.stdout.take().map(read);
         let stderr = child.stderr.take().map(read);
         Self {
@@ -119,6 +114,25 @@ impl Running {
             stdout,
             stderr,
         }
+    }
+
+    /// Whether it has ended by itself.
+    pub fn has_ended(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(Some(_)))
+    }
+
+    /// Sends it a signal by name, such as INT: what Ctrl-C does.
+    ///
+    /// # Panics
+    /// If there is no `kill`, or no such program any more.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill")
+            .args(["-s", name, &self.child.id().to_string()])
+            .status();
+        assert!(
+            sent.is_ok_and(|status| status.success()),
+            "no signal {name}"
+        );
     }
 
     /// Waits for its end.

@@ -2,14 +2,16 @@
 //! wants said. For the bridge's tests that need no firmware.
 
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{Hello, MAX_FRAME, Message, Port, Role};
-use serialport::{SerialPort, TTYPort};
+
+use crate::pty::Near;
 
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
@@ -36,7 +38,7 @@ pub struct FakeBoard {
     heard: Arc<Mutex<Vec<Message>>>,
     line: Option<JoinHandle<()>>,
     /// Keeps the pseudo-terminal alive while nobody has it open.
-    kept: Option<TTYPort>,
+    kept: Option<OwnedFd>,
 }
 
 impl FakeBoard {
@@ -52,9 +54,7 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
-        let (mut master, kept) = pair();
-        let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
-        master.set_timeout(LOOK).expect("a timeout can be set");
+        let (master, kept, path) = Near::pair(LOOK).expect("the system has pseudo-terminals");
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
         let ears = Arc::clone(&heard);
@@ -109,26 +109,6 @@ impl FakeBoard {
     }
 }
 
-/// Programs are started while nobody holds this.
-static STARTS: Mutex<()> = Mutex::new(());
-
-/// Held while a program is started, or while there are files that it must not get.
-pub(crate) fn start() -> MutexGuard<'static, ()> {
-    STARTS.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// A pseudo-terminal that no program that is started gets an end of: it would keep the cable in when the
-/// board pulls it.
-fn pair() -> (TTYPort, TTYPort) {
-    let _alone = start();
-    let (master, slave) = TTYPort::pair().expect("the system has pseudo-terminals");
-    let own = |port: TTYPort| {
-        port.try_clone_native()
-            .expect("a port has another handle, which is closed where a program starts")
-    };
-    (own(master), own(slave))
-}
-
 impl Drop for FakeBoard {
     fn drop(&mut self) {
         let _ = self.orders.send(Order::End);
@@ -141,7 +121,7 @@ impl Drop for FakeBoard {
 }
 
 fn run(
-    mut master: TTYPort,
+    mut master: Near,
     hello: Hello,
     mut script: Script,
     given: &Receiver<Order>,
@@ -170,15 +150,17 @@ fn run(
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(message);
         });
-        for message in script(now_us) {
-            port.post(&message);
-        }
+        let mut said = script(now_us).into_iter();
         loop {
             while let count @ 1.. = port.take(&mut out) {
                 if !is_mute && !write(&mut master, &out[..count], is_patient) {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
+            }
+            if let Some(message) = said.next() {
+                port.post(&message);
+                continue;
             }
             match given.try_recv() {
                 Ok(Order::Say(message)) => port.post(&message),
@@ -200,7 +182,7 @@ fn run(
 }
 
 /// Writes all of it; false if it found no room, in spite of all patience.
-fn write(master: &mut TTYPort, mut bytes: &[u8], is_patient: bool) -> bool {
+fn write(master: &mut Near, mut bytes: &[u8], is_patient: bool) -> bool {
     if !is_patient {
         return master.write_all(bytes).is_ok();
     }
