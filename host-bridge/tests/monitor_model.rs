@@ -260,7 +260,7 @@ fn a_trace_loses_no_spike_whatever_the_columns() {
         trace.put(ms * 1_000, value);
     }
     for count in [10, 77, 300] {
-        let column_us = column_us(10.0, count);
+        let column_us = column_us(9.0, count);
         let columns: Vec<_> = trace.columns(9_999_000, column_us, count).collect();
         let highest = columns.iter().flatten().map(|extent| extent.high);
         assert_eq!(highest.fold(0.0, f32::max), 9.0, "{count} columns");

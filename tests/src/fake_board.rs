@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 use protocol::{Hello, MAX_FRAME, Message, Port, Role};
 use serialport::{SerialPort, TTYPort};
 
+use crate::pseudo_terminal;
+
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -51,7 +53,7 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
-        let (mut master, kept) = TTYPort::pair().expect("the system has pseudo-terminals");
+        let (mut master, kept) = pseudo_terminal::pair();
         let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
         master.set_timeout(LOOK).expect("a timeout can be set");
         let (orders, given) = channel();

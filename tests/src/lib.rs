@@ -7,6 +7,7 @@ pub mod elves;
 pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
+pub mod pseudo_terminal;
 pub mod run;
 pub mod sensing;
 pub mod terminal;

@@ -12,6 +12,7 @@ use std::time::Duration;
 use serialport::{SerialPort, TTYPort};
 
 use crate::fake_board::wait_until;
+use crate::pseudo_terminal;
 
 /// A terminal of 120 × 40 characters.
 pub struct Terminal {
@@ -30,7 +31,7 @@ impl Terminal {
     /// # Panics
     /// If the system has none.
     pub fn new() -> Self {
-        let (mut master, mut kept) = TTYPort::pair().expect("the system has pseudo-terminals");
+        let (mut master, mut kept) = pseudo_terminal::pair();
         // The program is to open it, too.
         kept.set_exclusive(false).expect("it can be shared");
         let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));

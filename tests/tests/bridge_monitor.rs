@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
 use tests::bridge;
@@ -64,14 +64,28 @@ impl Lines {
 
     /// The next line with these words.
     fn with(&self, words: &str) -> String {
+        let [line] = self.with_each([words]);
+        line
+    }
+
+    /// For each of these words the first line from now on that has them, in whatever order.
+    fn with_each<const COUNT: usize>(&self, words: [&str; COUNT]) -> [String; COUNT] {
+        let mut found: [Option<String>; COUNT] = std::array::from_fn(|_| None);
         let mut seen = String::new();
-        loop {
-            match self.lines.recv_timeout(LIMIT) {
-                Ok(line) if line.contains(words) => return line,
-                Ok(line) => seen += &format!("{line}\n"),
-                Err(_) => panic!("no line with {words:?} after\n{seen}"),
+        let end = Instant::now() + LIMIT;
+        while found.iter().any(Option::is_none) {
+            let left = end.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                panic!("no line with each of {words:?} after\n{seen}");
+            };
+            for (found, words) in found.iter_mut().zip(words) {
+                if found.is_none() && line.contains(words) {
+                    *found = Some(line.clone());
+                }
             }
+            seen += &format!("{line}\n");
         }
+        found.map(Option::unwrap_or_default)
     }
 
     fn signal(&self, name: &str) {
@@ -125,7 +139,7 @@ fn a_line_a_second_tells_what_both_boards_say_in_columns() {
     assert!((number("lambda_mm") - 2.0).abs() < 0.01, "{line}");
     assert_eq!(cell("conf"), "0.97");
     assert_eq!((cell("range"), cell("contact")), ("T1", "slip"));
-    let hand_mm_s = number("v_hand_mm_s").abs();
+    let hand_mm_s = number("hand_mm_s").abs();
     assert!((14.0..70.1).contains(&hand_mm_s), "{line}");
     assert_eq!((cell("lost"), cell("bad")), ("0", "0"));
     assert!(
@@ -174,9 +188,8 @@ fn what_is_wrong_with_a_port_is_named_with_advice() {
         ..Hello::new(Role::Display, "stm32f429zi", [9, 9, 9])
     });
     let lines = Lines::of(monitor_at(&absent, foreign.path()).arg("--plain"));
-    let line = lines.with("sensor absent: ");
-    assert!(line.contains("not there: plug the board in"), "{line}");
-    let line = lines.with("display foreign: ");
+    let [line, other] = lines.with_each(["display foreign: ", "sensor absent: "]);
+    assert!(other.contains("not there: plug the board in"), "{other}");
     assert!(
         line.contains("of protocol 99") && line.contains("host-bridge flash"),
         "{line}"
@@ -201,12 +214,11 @@ fn the_second_monitor_says_that_the_ports_are_busy() {
     let first = Lines::of(monitor(&running).arg("--plain"));
     first.with("display safety: driving");
     let second = Lines::of(monitor(&running).arg("--plain"));
-    let line = second.with("sensor busy: ");
+    let [line, _] = second.with_each(["sensor busy: ", "display busy: "]);
     assert!(
         line.contains("another program has it: close the other program"),
         "{line}"
     );
-    second.with("display busy: ");
     // The first one is not disturbed, and its ports are free when it ends.
     first.with(" known      known ");
     drop(first);
@@ -230,7 +242,7 @@ fn a_cable_that_is_put_back_is_seen_within_a_second() {
     lines.with("display absent: ");
     let board = FakeBoard::new(Role::Display);
     symlink(board.path(), &name).expect("a link can be made");
-    let back = std::time::Instant::now();
+    let back = Instant::now();
     lines.with("display known: ");
     assert!(
         back.elapsed() < Duration::from_secs(1),
