@@ -116,6 +116,20 @@ impl Running {
         }
     }
 
+    /// Sends it a signal by name, such as INT: what Ctrl-C does.
+    ///
+    /// # Panics
+    /// If there is no `kill`, or no such program any more.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill")
+            .args(["-s", name, &self.child.id().to_string()])
+            .status();
+        assert!(
+            sent.is_ok_and(|status| status.success()),
+            "no signal {name}"
+        );
+    }
+
     /// Waits for its end.
     ///
     /// # Panics

@@ -300,16 +300,16 @@ fn nobody_who_reads_any_more_is_no_error() {
 }
 
 /// Runs a dashboard, lets `end` end it, and checks status and terminal.
-fn assert_restores(end: impl FnOnce(&mut Terminal, &Child)) {
+fn assert_restores(end: impl FnOnce(&Terminal, &Child)) {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let before = terminal.settings();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
     assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
     assert_ne!(terminal.settings(), before);
-    end(&mut terminal, &child);
+    end(&terminal, &child);
     let status = ended(&mut child);
     assert_eq!((status.code(), status.signal()), (Some(0), None));
     assert_eq!(terminal.settings(), before);
@@ -355,7 +355,7 @@ fn a_terminal_that_goes_away_takes_the_monitor_with_it() {
 #[test]
 fn a_key_stops_the_display_and_its_answer_is_shown() {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
@@ -381,7 +381,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
     bench.sensing.window_ms = 123;
     let before = bench.sensing;
     let running = Running::new(bench);
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
@@ -403,7 +403,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
 #[test]
 fn the_form_changes_a_setting_and_shows_a_refusal() {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");

@@ -80,7 +80,7 @@ struct Desk {
 }
 
 impl Desk {
-    fn new(script: &[(u64, Act)]) -> (Box<dyn Terminal>, Arc<Mutex<Seen>>) {
+    fn following(script: &[(u64, Act)]) -> (Box<dyn Terminal>, Arc<Mutex<Seen>>) {
         let seen = Arc::new(Mutex::new(Seen::default()));
         let desk = Self {
             script: script.to_vec(),
@@ -151,8 +151,8 @@ fn watch(toml: &str, at_sensor: &[(u64, Act)], at_display: &[(u64, Act)]) -> Wat
     let scene = scene(&format!(
         "{toml}\n[surface]\nspecimens = [{{ wavelength_mm = 2.0 }}]\n"
     ));
-    let (sensor, sensor_seen) = Desk::new(at_sensor);
-    let (display, display_seen) = Desk::new(at_display);
+    let (sensor, sensor_seen) = Desk::following(at_sensor);
+    let (display, display_seen) = Desk::following(at_display);
     let terminals = Terminals {
         sensor: Some(sensor),
         display: Some(display),

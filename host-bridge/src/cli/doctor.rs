@@ -2,10 +2,13 @@
 
 use std::io::{self, IsTerminal};
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use host_bridge::doctor::report::Style;
 use host_bridge::doctor::{findings, json, look, report};
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output;
 
@@ -18,7 +21,7 @@ The ports have to be free: close monitor, record and relay first.")]
 pub struct Doctor {
     #[command(flatten)]
     boards: super::Where,
-    /// How long to listen to the boards, 0.5 to 3600
+    /// How long to listen to the boards, 0.5 to 3600; Ctrl-C ends it early, with what has been seen by then
     #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = seconds)]
     span: Duration,
     /// Prints everything as JSON, for scripts
@@ -34,6 +37,16 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "give 0.5 to 3600".to_owned())
 }
 
+/// Set by the first SIGINT or SIGTERM; a second one ends the program.
+fn end_by_signal() -> io::Result<Arc<AtomicBool>> {
+    let ended = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&ended))?;
+        signal_hook::flag::register(signal, Arc::clone(&ended))?;
+    }
+    Ok(ended)
+}
+
 impl Doctor {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -41,7 +54,8 @@ impl Doctor {
         if io::stderr().is_terminal() {
             eprintln!("looking for {:.1} s …", self.span.as_secs_f64());
         }
-        let examination = look::look(&bench, self.span);
+        let ended = end_by_signal()?;
+        let examination = look::look(&bench, self.span, &ended);
         let findings = findings::of(&examination);
         let text = if self.json {
             json::write(&examination, &findings) + "\n"

@@ -1,6 +1,5 @@
 //! `host-bridge monitor`.
 
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,12 +8,12 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use anyhow::Context;
+use clap::ValueHint;
 use host_bridge::bench::Bench;
 use host_bridge::link::Link;
-use host_bridge::monitor::desk::Desk;
 use host_bridge::monitor::firmware_log::{Logs, Origin};
-use host_bridge::monitor::plain::{self, Format};
-use host_bridge::monitor::{Source, screen};
+use host_bridge::monitor::plain::Format;
+use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -36,14 +35,17 @@ pub struct Monitor {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     limit: Option<Duration>,
     /// The sensor board's firmware, to read its log
-    #[arg(long, value_name = "ELF")]
+    #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     sensor_elf: Option<PathBuf>,
     /// The display board's firmware, to read its log
-    #[arg(long, value_name = "ELF")]
+    #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     display_elf: Option<PathBuf>,
     /// Reads the logs by the boards' probes, where the bench names no other way (`rtt`)
     #[arg(long)]
     probe_log: bool,
+    /// The folder for recordings that the key r begins
+    #[arg(long, value_name = "FOLDER", default_value = ".", value_hint = ValueHint::DirPath)]
+    record_to: PathBuf,
 }
 
 /// A time above 0.
@@ -67,24 +69,25 @@ impl Monitor {
         }
         let ended = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))
+            // The second one ends the program even where a reader of its lines stands still.
+            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&ended))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&ended)))
                 .context("can't listen to signals")?;
         }
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
         let mut source = open(&bench);
         source.logs = Some(lines);
-        let desk = Desk::new(source, None);
-        if self.plain || self.json || !io::stdout().is_terminal() {
-            let format = Format {
-                is_json: self.json,
-                every: self.every,
-                limit: self.limit,
-            };
-            plain::run(desk, &format, &ended, &mut io::stdout().lock()).context("can't write")?;
-        } else {
-            screen::run(desk, self.limit, &ended).context("can't use the terminal")?;
-        }
+        let format = Format {
+            is_json: self.json,
+            every: self.every,
+        };
+        let options = Options {
+            plain: (self.plain || self.json).then_some(format),
+            limit: self.limit,
+            folder: self.record_to,
+        };
+        monitor::run(source, &options, &ended)?;
         Ok(ExitCode::SUCCESS)
     }
 

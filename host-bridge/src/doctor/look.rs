@@ -1,5 +1,6 @@
 //! Looking at a bench: what is plugged in, and what its boards say for some seconds.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
@@ -30,8 +31,9 @@ const PING_EVERY: Duration = Duration::from_millis(100);
 type Told = (Role, Event);
 
 /// Looks at everything, and listens for `span` to the boards that are there. If the bench names the place
-/// of one board only, it has only that one, as at one end of a relay.
-pub fn look(bench: &Bench, span: Duration) -> Examination {
+/// of one board only, it has only that one, as at one end of a relay. It ends early once `ended` is set.
+pub fn look(bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
+    let goes_on = || !ended.load(Ordering::Acquire);
     let (tell, told) = channel();
     let mut watches: Vec<Watch> = roles(bench)
         .into_iter()
@@ -39,7 +41,7 @@ pub fn look(bench: &Bench, span: Duration) -> Examination {
         .collect();
     let probes = probes::attached().iter().map(ProbeFacts::from).collect();
     let settled = Instant::now() + SETTLING;
-    while watches.iter().any(|watch| !watch.is_settled()) && Instant::now() < settled {
+    while watches.iter().any(|watch| !watch.is_settled()) && Instant::now() < settled && goes_on() {
         hear(&mut watches, &told, Instant::now() + TURN);
     }
     let began = Instant::now();
@@ -47,7 +49,7 @@ pub fn look(bench: &Bench, span: Duration) -> Examination {
     // A bench without a board needs no patience.
     if watches.iter().any(|watch| watch.facts.state.is_known()) {
         let mut next_ping = began;
-        while began.elapsed() < span {
+        while began.elapsed() < span && goes_on() {
             if Instant::now() >= next_ping {
                 next_ping += PING_EVERY;
                 watches.iter().for_each(Watch::ping);

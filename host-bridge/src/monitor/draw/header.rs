@@ -193,13 +193,14 @@ fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
         spans.push(Span::raw("  "));
         spans.push(Span::styled(" FROZEN ", view.theme.chosen()));
     }
-    if let Some(keeping) = &view.keeping {
-        let for_us = live.now_us.saturating_sub(keeping.since_us);
+    if let Some(kept) = &view.kept {
+        let for_us = live.now_us.saturating_sub(kept.since_us);
         spans.push(Span::styled("  ● recording ", view.theme.bad()));
         spans.push(Span::raw(format!(
-            "{}, {}",
-            keeping.path.display(),
-            text::duration(for_us)
+            "{}, {}, {:.1} MB safe",
+            kept.name,
+            text::duration(for_us),
+            kept.safe_bytes as f64 / 1e6
         )));
     }
     spans
@@ -218,7 +219,7 @@ pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         ("c", "configure"),
         (
             "r",
-            if view.keeping.is_some() {
+            if view.kept.is_some() {
                 "end recording"
             } else {
                 "record"
