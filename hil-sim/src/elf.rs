@@ -139,14 +139,13 @@ pub fn run_at(
     terminals: Terminals,
 ) -> Result<(Recording, BoardFacts), ElfError> {
     let started = Instant::now();
-    let Terminals { sensor, display } = terminals;
     let beside =
         |role, firmware: &Firmware, terminal| Recorder::new(scene, role, &firmware.elf, terminal);
     let (sensor, display) = pair::run(
         scene,
         firmwares,
-        beside(Role::Sensor, &firmwares.sensor, sensor),
-        beside(Role::Display, &firmwares.display, display),
+        beside(Role::Sensor, &firmwares.sensor, terminals.sensor),
+        beside(Role::Display, &firmwares.display, terminals.display),
     )?;
     let ended = Instant::now();
     let facts = BoardFacts {

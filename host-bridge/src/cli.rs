@@ -53,10 +53,13 @@ enum Command {
     /// Shows what the boards say, in the terminal or line by line
     Monitor(monitor::Monitor),
     /// Writes everything that the boards say to MCAP or CSV
+    #[command(long_about = record::ABOUT, after_long_help = record::EXAMPLES)]
     Record(record::Record),
     /// Plays a recording into a monitor, a board or the simulator
+    #[command(long_about = replay::ABOUT, after_long_help = replay::EXAMPLES)]
     Replay(replay::Replay),
     /// Carries the link between two sites over a network
+    #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
     /// Looks at what is attached, and says what is wrong and what to do
     Doctor(doctor::Doctor),

@@ -131,7 +131,9 @@ impl Hearing {
         match peer {
             Peer::Known(hello) if recent(self.understood_us) => Verdict::Known(hello),
             Peer::Foreign(hello) if recent(self.heard_us) => Verdict::Foreign(hello),
-            Peer::Silent if at_us.saturating_sub(self.opened_us) <= self.patience_us => {
+            Peer::Silent | Peer::Text
+                if at_us.saturating_sub(self.opened_us) <= self.patience_us =>
+            {
                 Verdict::Open
             }
             _ => self.judge_sound(),

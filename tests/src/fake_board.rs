@@ -2,6 +2,7 @@
 //! wants said. For the bridge's tests that need no firmware.
 
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,7 +10,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{Hello, MAX_FRAME, Message, Port, Role};
-use serialport::{SerialPort, TTYPort};
+
+use crate::pty::Near;
 
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
@@ -21,6 +23,7 @@ enum Order {
     Mute(bool),
     Deafen(bool),
     Restart,
+    Patience,
     End,
 }
 
@@ -35,7 +38,7 @@ pub struct FakeBoard {
     heard: Arc<Mutex<Vec<Message>>>,
     line: Option<JoinHandle<()>>,
     /// Keeps the pseudo-terminal alive while nobody has it open.
-    kept: Option<TTYPort>,
+    kept: Option<OwnedFd>,
 }
 
 impl FakeBoard {
@@ -51,9 +54,7 @@ impl FakeBoard {
 
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
-        let (mut master, kept) = TTYPort::pair().expect("the system has pseudo-terminals");
-        let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
-        master.set_timeout(LOOK).expect("a timeout can be set");
+        let (master, kept, path) = Near::pair(LOOK).expect("the system has pseudo-terminals");
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
         let ears = Arc::clone(&heard);
@@ -97,6 +98,11 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Restart);
     }
 
+    /// Has the board wait from now on for whoever reads its line slowly, instead of losing what finds no room.
+    pub fn lose_nothing(&self) {
+        let _ = self.orders.send(Order::Patience);
+    }
+
     /// What the board has heard so far; the list is emptied.
     pub fn take_heard(&self) -> Vec<Message> {
         std::mem::take(&mut self.heard.lock().unwrap_or_else(PoisonError::into_inner))
@@ -115,7 +121,7 @@ impl Drop for FakeBoard {
 }
 
 fn run(
-    mut master: TTYPort,
+    mut master: Near,
     hello: Hello,
     mut script: Script,
     given: &Receiver<Order>,
@@ -123,7 +129,7 @@ fn run(
 ) {
     let mut started = Instant::now();
     let mut port = Port::new(hello);
-    let (mut is_mute, mut is_deaf) = (false, false);
+    let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
     let mut bytes = [0; 4_096];
     let mut out = [0; MAX_FRAME];
     loop {
@@ -149,7 +155,7 @@ fn run(
         }
         loop {
             while let count @ 1.. = port.take(&mut out) {
-                if !is_mute && master.write_all(&out[..count]).is_err() {
+                if !is_mute && !write(&mut master, &out[..count], is_patient) {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
@@ -161,6 +167,7 @@ fn run(
                 }
                 Ok(Order::Mute(now)) => is_mute = now,
                 Ok(Order::Deafen(now)) => is_deaf = now,
+                Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {
                     port = Port::new(hello);
                     started = Instant::now();
@@ -170,6 +177,21 @@ fn run(
             }
         }
     }
+}
+
+/// Writes all of it; false if it found no room, in spite of all patience.
+fn write(master: &mut TTYPort, mut bytes: &[u8], is_patient: bool) -> bool {
+    if !is_patient {
+        return master.write_all(bytes).is_ok();
+    }
+    while !bytes.is_empty() {
+        match master.write(bytes) {
+            Ok(count) => bytes = &bytes[count..],
+            Err(error) if is_pause(&error) => {}
+            Err(_) => return false,
+        }
+    }
+    true
 }
 
 fn is_pause(error: &io::Error) -> bool {

@@ -2,9 +2,17 @@
 //! folder of this package: they run scenes on the two ELFs that a user would flash, through the same
 //! library as the `hil-sim` command.
 
+#[cfg(target_os = "linux")]
+pub mod bench;
 pub mod bridge;
 pub mod elves;
+pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
+pub mod pty;
+pub mod relay;
 pub mod run;
 pub mod sensing;
+pub mod terminal;
+pub mod utterance;
+pub mod weather;

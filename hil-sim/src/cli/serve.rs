@@ -10,7 +10,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use hil_sim::scene::{Motion, Scene};
-use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError, Standing};
+use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, Standing};
 
 use super::{Elves, number};
 use input::{Input, Keys};
@@ -134,7 +134,15 @@ impl Serve {
             let asked = match input {
                 Some(Input::Quit) => Ok(Some(Command::Quit)),
                 Some(Input::Line(line)) => line.parse().map(Some).map_err(anyhow::Error::from),
-                Some(Input::Key(key)) => Ok(keys.command(key, &bench)),
+                Some(Input::Key(key)) => {
+                    let command = keys.command(key, &bench);
+                    // The hand's shows in the status.
+                    let told = command.filter(|command| !matches!(command, Command::Hand { .. }));
+                    if let Some(command) = told {
+                        screen.tell(&command.to_string());
+                    }
+                    Ok(command)
+                }
                 Some(Input::Help) => {
                     screen.tell(COMMANDS);
                     Ok(None)
@@ -158,11 +166,10 @@ impl Serve {
         drop(raw);
         match bench.stop() {
             Ok(()) => Ok(ExitCode::SUCCESS),
-            Err(error @ ServeError::Stopped { .. }) => {
+            Err(error) => {
                 eprintln!("{error}");
                 Ok(ExitCode::from(1))
             }
-            Err(error) => Err(error.into()),
         }
     }
 }
@@ -180,6 +187,13 @@ fn greet(bench: &Bench, scene: &str, has_keys: bool) {
         bench.bench_file().display(),
         bench.path(PortName::SensorConsole).display()
     );
+    if bench.is_plugged(PortName::SensorLink) {
+        text += &format!(
+            "  host-bridge relay sensor --sensor {}\n  host-bridge relay display --display {}\n",
+            bench.path(PortName::SensorLink).display(),
+            bench.path(PortName::DisplayLink).display()
+        );
+    }
     if has_keys {
         text +=
             "keys: ↑ ↓ ← → space hand, 1–6 cables, r d reset, e emergency stop, q quit, ? help\n";

@@ -33,7 +33,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Beside the board of `role` in `scene`, which runs `elf`, with `terminal` at its console.
+    /// Beside the board of `role` in `scene`, which runs `elf`.
     pub fn new(scene: &Scene, role: Role, elf: &[u8], terminal: Option<Box<dyn Terminal>>) -> Self {
         Self {
             console: ConsoleHost::of_scene(scene, role),
@@ -86,8 +86,7 @@ impl<P: Watched> Witness<P> for Recorder {
         if let Some(host) = &mut self.console {
             host.serve(between.session.board_mut(), between.now_ns);
         } else if let Some(terminal) = &mut self.terminal {
-            let board = between.session.board_mut();
-            terminal::carry(&mut **terminal, board, between.now_ns);
+            terminal::carry(&mut **terminal, between.session.board_mut(), between.now_ns);
         }
         if self.warm.is_none() && between.now_ns >= WARM_UP_NS {
             self.warm = Some(Instant::now());

@@ -291,8 +291,7 @@ impl Bench {
         });
         let (ready, is_ready) = channel();
         let beside = |role, elf: &[u8], pacer| {
-            let setup = ConsoleHost::of_scene(&scene, role);
-            Beside::new(role, elf, shared.clone(), setup, ready.clone(), pacer)
+            Beside::new(&scene, role, elf, shared.clone(), ready.clone(), pacer)
         };
         let sensor = beside(Role::Sensor, &firmwares.sensor.elf, None);
         let display = beside(
@@ -325,7 +324,7 @@ impl Bench {
                 bench.shared.socket(name).plug()?;
             }
         }
-        bench.folder.describe(firmwares, is_apart)?;
+        bench.folder.describe(firmwares)?;
         Ok(bench)
     }
 

@@ -4,7 +4,7 @@ use super::nucleo::{CONSOLE_UART, Nucleo, Pins};
 use super::wire::TimedByte;
 
 /// Somebody at the far end of a board's console, in virtual time.
-pub trait Terminal: Send {
+pub trait Terminal: Send + 'static {
     /// Takes what the board has sent by `now_ns`, each byte with its instant, and returns what is said to
     /// it from then on. Called every [`QUANTUM_NS`](super::QUANTUM_NS).
     fn serve(&mut self, now_ns: u64, sent: &[TimedByte]) -> Vec<u8>;

@@ -1,18 +1,370 @@
 //! `host-bridge record`.
 
+use std::io::{self, IsTerminal, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use clap::ValueHint;
+use host_bridge::host_clock::now_us;
+use host_bridge::link::{Event, Link};
+use host_bridge::recording::gauge_stream::GaugeStream;
+use host_bridge::recording::{PART, Progress, Recorder, Settings};
+use host_bridge::state::State;
+use protocol::{Message, PortCounters, Role};
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::output;
+
+/// What the command does.
+pub const ABOUT: &str = "\
+Writes everything that both boards say, and what their links do, to MCAP, to CSV or to both.
+
+Once a second what has been heard is made safe on the disk: that much is kept whatever happens, and only that \
+is counted as safe. The MCAP file reads as it is in Foxglove, PlotJuggler and whatever else knows MCAP with \
+JSON: a channel for each board and kind of message. The sensor board is told to stream its gauges meanwhile, \
+for which its estimators begin anew, and to stop when the recording ends. A board that goes and returns is \
+recorded on.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge record rubbing.mcap                    until Ctrl-C
+  host-bridge record rubbing.mcap --for 60 --json
+  host-bridge record --csv rubbing --no-gauges       a folder of CSV files
+
+Exit status: 0 recorded, to the end that was asked for; 2 nothing could be recorded, or not to the end: what \
+was said to be safe is.";
+
+/// How often is looked whether there is something to do.
+const LOOK: Duration = Duration::from_millis(50);
+/// How often the progress is told.
+const TOLD: Duration = Duration::from_secs(1);
+/// How long the sensor board may take to confirm that it is as it was.
+const RESTORED: Duration = Duration::from_secs(1);
+const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
 #[derive(Debug, clap::Args)]
 pub struct Record {
+    /// The MCAP file
+    #[arg(value_name = "FILE.mcap", value_hint = ValueHint::FilePath, required_unless_present = "csv")]
+    file: Option<PathBuf>,
+    /// A folder for CSV files, one for each board and kind of message
+    #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
+    csv: Option<PathBuf>,
+    /// Leaves the sensor board as it is: no samples, unless it streams them already
+    #[arg(long)]
+    no_gauges: bool,
+    /// Ends after so many seconds
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    until: Option<Duration>,
+    /// Begins another MCAP file, FILE-2.mcap and so on, after so many minutes; 0 for never: the file's
+    /// index takes 1.8 MB of memory for each hour of it
+    #[arg(long, value_name = "MINUTES", default_value_t = PART.as_secs() as f64 / 60.0)]
+    split: f64,
+    /// Writes over files that are there already
+    #[arg(long)]
+    force: bool,
+    /// Tells no progress
+    #[arg(long)]
+    quiet: bool,
+    /// Prints one JSON object for scripts at the end
+    #[arg(long)]
+    json: bool,
     #[command(flatten)]
     boards: super::Where,
 }
 
+fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse()
+        .ok()
+        .filter(|&seconds| seconds > 0.0)
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .ok_or_else(|| "give a time above 0 s".to_owned())
+}
+
+/// What a script is told.
+#[derive(Serialize)]
+struct Summary {
+    seconds: f64,
+    messages: u64,
+    samples: u64,
+    bytes: u64,
+    lost: u64,
+    gaps: u64,
+    unwritten: u64,
+}
+
 impl Record {
-    /// Does it.
+    /// Records.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        anyhow::bail!("record is being built: {bench:?}")
+        let part = Duration::try_from_secs_f64(self.split * 60.0);
+        let part = part.map_err(|_| anyhow::anyhow!("--split: give minutes, 0 or more"))?;
+        let ended = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&ended))?;
+        }
+        let recorder = Arc::new(Recorder::start(Settings {
+            mcap: self.file.clone(),
+            csv: self.csv.clone(),
+            force: self.force,
+            part: Some(part).filter(|part| !part.is_zero()),
+        })?);
+        let started = Instant::now();
+        let (events, told) = channel();
+        let links = [
+            (Role::Sensor, bench.sensor.place()),
+            (Role::Display, bench.display.place()),
+        ]
+        .map(|(role, place)| {
+            let recorder = Arc::clone(&recorder);
+            let events = events.clone();
+            Link::open(role, place, move |event| {
+                recorder.on_event(role, &event);
+                if concerns(&event) {
+                    // Nobody listens any more when the recording ends.
+                    let _ = events.send((role, event));
+                }
+            })
+        });
+        drop(events);
+        Session {
+            recorder: &recorder,
+            links: &links,
+            told,
+            stream: GaugeStream::new(!self.no_gauges),
+            screen: Screen::new(self.quiet),
+            started,
+        }
+        .run(&ended, self.until);
+        let seconds = started.elapsed().as_secs_f64();
+        // Nothing is told any more once the links are gone.
+        drop(links);
+        let progress = recorder.stop()?;
+        self.report(seconds, &progress)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn report(&self, seconds: f64, progress: &Progress) -> anyhow::Result<()> {
+        let tally = progress.tally;
+        if self.json {
+            let summary = Summary {
+                seconds,
+                messages: tally.messages,
+                samples: tally.samples,
+                bytes: progress.safe_bytes,
+                lost: tally.lost,
+                gaps: tally.gaps,
+                unwritten: tally.unwritten,
+            };
+            return output::print(&serde_json::to_string(&summary)?);
+        }
+        output::print(&format!(
+            "{seconds:.1} s: {} messages, {} samples of each gauge, {}{}",
+            tally.messages,
+            tally.samples,
+            bytes(progress.safe_bytes),
+            missing(progress),
+        ))
+    }
+}
+
+/// Whether an event changes what is to be said to a board.
+fn concerns(event: &Event) -> bool {
+    !matches!(
+        event,
+        Event::Heard { message, .. } if !matches!(message, Message::Configuration(_))
+    )
+}
+
+/// A number of bytes in words.
+fn bytes(count: u64) -> String {
+    match count {
+        0..1_000 => format!("{count} B"),
+        1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", count as f64 / 1e6),
+        _ => format!("{:.2} GB", count as f64 / 1e9),
+    }
+}
+
+/// What is missing, in words; empty if nothing is.
+fn missing(progress: &Progress) -> String {
+    let tally = progress.tally;
+    let mut text = String::new();
+    if tally.gaps > 0 {
+        text += &format!("; {} not heard, in {} gaps", tally.lost, tally.gaps);
+    }
+    if tally.unwritten > 0 {
+        text += &format!(
+            "; {} heard but not written: the disk is too slow",
+            tally.unwritten
+        );
+    }
+    text
+}
+
+/// A recording while it goes on.
+struct Session<'a> {
+    recorder: &'a Recorder,
+    links: &'a [Link; 2],
+    told: Receiver<(Role, Event)>,
+    stream: GaugeStream,
+    screen: Screen,
+    started: Instant,
+}
+
+impl Session<'_> {
+    /// Records until it is asked to end, or can't go on; then the sensor board is as it was.
+    fn run(mut self, ended: &AtomicBool, until: Option<Duration>) {
+        self.record(ended, until);
+        self.restore();
+    }
+
+    fn record(&mut self, ended: &AtomicBool, until: Option<Duration>) {
+        let mut due = self.started + TOLD;
+        loop {
+            let past = until.is_some_and(|until| self.started.elapsed() >= until);
+            if ended.load(Ordering::Relaxed) || past || self.recorder.progress().failed {
+                return;
+            }
+            let left = until.map_or(LOOK, |until| until.saturating_sub(self.started.elapsed()));
+            self.listen(LOOK.min(left));
+            if Instant::now() >= due {
+                due += TOLD;
+                self.count();
+            }
+        }
+    }
+
+    /// Hears what the links tell for as long as `wait`, and says what is due.
+    fn listen(&mut self, wait: Duration) {
+        match self.told.recv_timeout(wait) {
+            Ok((role, event)) => {
+                self.stream.on_event(role, &event);
+                if let Event::Turned(state) = &event
+                    && !matches!(state, State::Opened { .. })
+                {
+                    self.screen
+                        .tell(&format!("{}: {}", role.name(), words(state)));
+                }
+            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+        }
+        while let Some((role, message)) = self.stream.due(now_us()) {
+            // Asked again if it is not answered.
+            let _ = self.link(role).post(&message);
+        }
+    }
+
+    fn link(&self, role: Role) -> &Link {
+        &self.links[usize::from(role == Role::Display)]
+    }
+
+    /// Records the links' counters and tells the progress.
+    fn count(&mut self) {
+        let mut frames = PortCounters::new();
+        for role in BOARDS {
+            let counters = self.link(role).counters();
+            self.recorder.on_counters(role, counters);
+            frames.lost = frames.lost.wrapping_add(counters.lost);
+        }
+        let progress = self.recorder.progress();
+        let frames = match frames.lost {
+            0 => String::new(),
+            lost => format!("; {lost} frames lost on the lines"),
+        };
+        self.screen.progress(&format!(
+            "{:.0} s: {} messages, {} samples, {} safe{frames}{}",
+            self.started.elapsed().as_secs_f64(),
+            progress.safe_messages,
+            progress.safe_samples,
+            bytes(progress.safe_bytes),
+            missing(&progress),
+        ));
+    }
+
+    /// Gives the sensor board its quiet back, and waits until it says so.
+    fn restore(&mut self) {
+        let Some(message) = self.stream.restoration() else {
+            return;
+        };
+        let end = Instant::now() + RESTORED;
+        let mut said = self.link(Role::Sensor).post(&message).is_ok();
+        while said && !self.stream.is_quiet() && Instant::now() < end {
+            match self.told.recv_timeout(LOOK) {
+                Ok((role, event)) => self.stream.on_event(role, &event),
+                Err(RecvTimeoutError::Timeout) => {
+                    said = self.link(Role::Sensor).post(&message).is_ok();
+                }
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        if !self.stream.is_quiet() {
+            self.screen.tell(
+                "sensor: could not be told to stop streaming its gauges: it does until it is configured or restarted",
+            );
+        }
+    }
+}
+
+/// How a link stands, and what to do about it.
+fn words(state: &State) -> String {
+    match state.advice() {
+        Some(advice) => format!("{state}: {advice}"),
+        None => state.to_string(),
+    }
+}
+
+/// Standard error: a progress line that is written over in a terminal, and lines of their own.
+struct Screen {
+    quiet: bool,
+    terminal: bool,
+    /// Whether a progress line stands there.
+    dirty: bool,
+}
+
+impl Screen {
+    fn new(quiet: bool) -> Self {
+        Self {
+            quiet,
+            terminal: io::stderr().is_terminal(),
+            dirty: false,
+        }
+    }
+
+    /// A line of its own.
+    fn tell(&mut self, line: &str) {
+        let clear = if self.dirty { "\r\x1b[K" } else { "" };
+        self.dirty = false;
+        // Nobody may be there to read it.
+        let _ = writeln!(io::stderr(), "{clear}{line}");
+    }
+
+    /// How far it has come.
+    fn progress(&mut self, line: &str) {
+        if self.quiet {
+            return;
+        }
+        let mut out = io::stderr();
+        let _ = if self.terminal {
+            self.dirty = true;
+            write!(out, "\r\x1b[K{line}").and_then(|()| out.flush())
+        } else {
+            writeln!(out, "{line}")
+        };
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        if self.dirty {
+            let _ = writeln!(io::stderr());
+        }
     }
 }

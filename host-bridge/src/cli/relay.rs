@@ -1,18 +1,291 @@
 //! `host-bridge relay`.
 
+use std::io;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand, ValueHint};
+use host_bridge::relay::credentials::Credentials;
+use host_bridge::relay::endpoint::Endpoint;
+use host_bridge::relay::far::site;
+use host_bridge::relay::name::Name;
+use host_bridge::relay::network::{Ends, Network};
+use host_bridge::relay::operator;
+use host_bridge::relay::report::Report;
+use host_bridge::relay::site::{Settings, Site, opposite};
+use protocol::{Role, Stop, StopReason};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+
+use super::output;
+
+/// Between two looks whether the bridge is to end.
+const LOOK: Duration = Duration::from_millis(50);
+/// Between two lines of statistics.
+const REPORT: Duration = Duration::from_secs(1);
+
+/// How the parts play together.
+pub const EXAMPLES: &str = "\
+At one site:    host-bridge relay sensor --listen tcp/0.0.0.0:7447
+At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
+
+With a router in between, both connect to it:
+                host-bridge relay router --listen tcp/0.0.0.0:7447
+
+With tls/ in place of tcp/, all of them want --ca, --certificate and --key, and whoever has no certificate \
+of that CA is refused.
+
+Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards. Once a second a bridge \
+says on standard error how it goes; --json says it on standard output, and leaves nothing out.";
 
 /// What `relay` is asked for.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Args)]
 pub struct Relay {
+    #[command(subcommand)]
+    part: Part,
+}
+
+#[derive(Debug, Subcommand)]
+enum Part {
+    /// The bridge at the sensor's site
+    Sensor(Bridge),
+    /// The bridge at the display's site
+    Display(Bridge),
+    /// Carries on what bridges say, where neither site can be reached from the other
+    Router(Router),
+    /// Says Stop to the boards; exit status 0 as soon as the display has it, 1 if nobody says so
+    Stop(Stopping),
+}
+
+#[derive(Debug, Args)]
+struct Bridge {
     #[command(flatten)]
     boards: super::Where,
+    #[command(flatten)]
+    meeting: Meeting,
+    #[command(flatten)]
+    ends: EitherEnd,
+    /// What comes from the other site older than this is not played; at most as long as the display holds
+    /// an estimate, 500 ms unless configured
+    #[arg(long, value_name = "MS", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..=60_000))]
+    max_age: u32,
+    /// Prints the statistics as lines of JSON on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct EitherEnd {
+    /// Where to wait for the other site to connect, e.g. tcp/0.0.0.0:7447; several may be given
+    #[arg(long, value_name = "ENDPOINT")]
+    listen: Vec<Endpoint>,
+    /// Where the other site or a router listens, e.g. tcp/192.168.1.20:7447; of several, the first that
+    /// answers is taken, and another one when it is lost
+    #[arg(long, value_name = "ENDPOINT")]
+    connect: Vec<Endpoint>,
+}
+
+#[derive(Debug, Args)]
+struct Router {
+    #[command(flatten)]
+    proofs: Proofs,
+    /// Where to wait for bridges, e.g. tcp/0.0.0.0:7447; several may be given
+    #[arg(long, value_name = "ENDPOINT", required = true)]
+    listen: Vec<Endpoint>,
+}
+
+#[derive(Debug, Args)]
+struct Stopping {
+    #[command(flatten)]
+    meeting: Meeting,
+    /// Where a bridge or a router listens
+    #[arg(long, value_name = "ENDPOINT", required = true)]
+    connect: Vec<Endpoint>,
+    /// How long to try
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3_600))]
+    within: u32,
+}
+
+/// Who meets whom, and how they know each other.
+#[derive(Debug, Args)]
+struct Meeting {
+    /// What both sites call the bench: several benches may share a router
+    #[arg(long, default_value = "bench")]
+    name: Name,
+    #[command(flatten)]
+    proofs: Proofs,
+}
+
+#[derive(Debug, Args)]
+struct Proofs {
+    /// The certificate of the CA whose certificates are believed, in PEM
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["certificate", "key"])]
+    ca: Option<PathBuf>,
+    /// One's own certificate, in PEM
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["ca", "key"])]
+    certificate: Option<PathBuf>,
+    /// Its private key, in PEM, without a password
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires_all = ["ca", "certificate"])]
+    key: Option<PathBuf>,
+}
+
+impl Proofs {
+    fn credentials(self) -> Option<Credentials> {
+        Some(Credentials {
+            ca: self.ca?,
+            certificate: self.certificate?,
+            key: self.key?,
+        })
+    }
+}
+
+/// The flags that signals set.
+struct Signals {
+    ended: Arc<AtomicBool>,
+    stopped: Arc<AtomicBool>,
+}
+
+impl Signals {
+    fn new() -> io::Result<Self> {
+        let signals = Self {
+            ended: Arc::default(),
+            stopped: Arc::default(),
+        };
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&signals.ended))?;
+        }
+        signal_hook::flag::register(SIGUSR1, Arc::clone(&signals.stopped))?;
+        Ok(signals)
+    }
+
+    fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
+    }
 }
 
 impl Relay {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
+        match self.part {
+            Part::Sensor(bridge) => bridge.execute(Role::Sensor),
+            Part::Display(bridge) => bridge.execute(Role::Display),
+            Part::Router(router) => router.execute(),
+            Part::Stop(stopping) => stopping.execute(),
+        }
+    }
+}
+
+impl Bridge {
+    fn execute(self, role: Role) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        anyhow::bail!("relay is being built: {bench:?}")
+        let seat = bench.seat(role).context("a host has no seat")?;
+        let ends = if self.ends.listen.is_empty() {
+            Ends::Connecting(self.ends.connect)
+        } else {
+            Ends::Listening(self.ends.listen)
+        };
+        let words = in_words(&ends);
+        let network = Network::new(ends, self.meeting.proofs.credentials())?;
+        let signals = Signals::new()?;
+        let (bridge, notices) = Site::open(Settings {
+            role,
+            place: seat.place(),
+            name: self.meeting.name,
+            network,
+            max_age: Duration::from_millis(self.max_age.into()),
+        })?;
+        let far = opposite(role).map_or("the other site", site);
+        eprintln!("host-bridge: {words}, waiting for {far}");
+        let mut before = None;
+        let mut due = Instant::now() + REPORT;
+        while !signals.is_ended() {
+            if signals.stopped.swap(false, Ordering::Relaxed) {
+                bridge.stop(Stop {
+                    reason: StopReason::Operator,
+                });
+            }
+            match notices.recv_timeout(LOOK.min(due.saturating_duration_since(Instant::now()))) {
+                Ok(notice) => eprintln!("host-bridge: {notice}"),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => bail!("the bridge has ended by itself"),
+            }
+            if Instant::now() >= due {
+                due += REPORT;
+                let report = bridge.report(false);
+                print(&report, before.as_ref(), self.json)?;
+                before = Some(report);
+            }
+        }
+        print(&bridge.report(true), None, self.json)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Router {
+    fn execute(self) -> anyhow::Result<ExitCode> {
+        let ends = Ends::Listening(self.listen);
+        let words = in_words(&ends);
+        let network = Network::new(ends, self.proofs.credentials())?;
+        let signals = Signals::new()?;
+        let session = network.open_router()?;
+        eprintln!("host-bridge: router, {words}");
+        while !signals.is_ended() {
+            std::thread::sleep(LOOK);
+        }
+        // Dropped, it leaves the network; whoever is connected sees it at once.
+        drop(session);
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Stopping {
+    fn execute(self) -> anyhow::Result<ExitCode> {
+        let network = Network::new(
+            Ends::Connecting(self.connect),
+            self.meeting.proofs.credentials(),
+        )?;
+        let within = Duration::from_secs(self.within.into());
+        let stop = Stop {
+            reason: StopReason::Operator,
+        };
+        let is_heard = operator::stop(&network, &self.meeting.name, stop, within);
+        if let Ok(true) = is_heard {
+            eprintln!("host-bridge: Stop: with the display");
+            return Ok(ExitCode::SUCCESS);
+        }
+        eprintln!(
+            "host-bridge: Stop: no word from the display's bridge in {} s: press the emergency stop",
+            self.within
+        );
+        if let Err(error) = is_heard {
+            eprintln!("host-bridge: {error}");
+        }
+        Ok(ExitCode::from(1))
+    }
+}
+
+fn in_words(ends: &Ends) -> String {
+    let (what, endpoints) = match ends {
+        Ends::Listening(endpoints) => ("listening on", endpoints),
+        Ends::Connecting(endpoints) => ("connecting to", endpoints),
+    };
+    let endpoints: Vec<String> = endpoints.iter().map(Endpoint::to_string).collect();
+    format!("{what} {}", endpoints.join(", "))
+}
+
+/// Prints a report.
+fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result<()> {
+    if json {
+        output::print(&serde_json::to_string(report)?)
+    } else if report.total {
+        output::print(&report.to_string())
+    } else {
+        eprintln!("{}", report.line(before));
+        Ok(())
     }
 }

@@ -1,18 +1,236 @@
 //! `host-bridge replay`.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use clap::ValueHint;
+use host_bridge::host_clock::now_us;
+use host_bridge::link::{Event, Link};
+use host_bridge::recording::reader::Reader;
+use host_bridge::replay::scene;
+use host_bridge::replay::stand_in::StandIn;
+use host_bridge::replay::{Pace, Played, SPEEDS, play};
+use protocol::Role;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::output;
+
+/// What the command does.
+pub const ABOUT: &str = "\
+Plays a recording back: into a board in place of its peer, or into a scene for the simulator.
+
+A display board is told the recorded estimates, a sensor board the recorded motions, each at its time: take \
+the board's peer off, or it will hear two of them. Numbers and instants are made fresh, as of a peer that has \
+just started; a hand or an arm that is played faster moves faster. A scene holds the recorded voltages, as \
+they were at the ADC's pins, and the recorded motion of the arm, which stands for the hand's, too: \
+`hil-sim run` of it makes the estimates that were recorded. A recording that was cut off is played as far as \
+it goes.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge replay rubbing.mcap --to display-board --speed 0.5
+  host-bridge replay rubbing.mcap --to sensor-board --sensor /dev/ttyACM0
+  host-bridge replay rubbing.mcap --to rubbing.toml --expect && hil-sim run rubbing.toml
+
+Exit status: 0 played or made; 1 some of it could not be said to the board; 2 not played, or not to the end.";
+
+/// How long a board is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// How often is looked whether the wait is to end.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// What `replay` is asked for.
 #[derive(Debug, clap::Args)]
 pub struct Replay {
+    /// The recording
+    #[arg(value_name = "FILE.mcap", value_hint = ValueHint::FilePath)]
+    file: PathBuf,
+    /// Where it goes: sensor-board, display-board, or a scene to be made, SCENE.toml
+    #[arg(long, value_name = "TARGET", value_hint = ValueHint::FilePath)]
+    to: Target,
+    /// How fast, 0.1 to 100 times its own time; not for a scene
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// From so many seconds after its start on
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    from: f64,
+    /// To so many seconds after its start
+    #[arg(long, value_name = "SECONDS")]
+    to_time: Option<f64>,
+    /// For a scene: the wavelength that was rubbed, in mm; without it, the median of the valid estimates
+    #[arg(long, value_name = "MM")]
+    wavelength: Option<f64>,
+    /// For a scene: it expects the recorded λ and share of valid estimates
+    #[arg(long)]
+    expect: bool,
+    /// For a scene: writes over files that are there already
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     boards: super::Where,
 }
 
-impl Replay {
-    /// Does it.
-    pub fn execute(self) -> anyhow::Result<ExitCode> {
-        let bench = self.boards.find()?;
-        anyhow::bail!("replay is being built: {bench:?}")
+/// Where a recording goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Target {
+    Board(Role),
+    Scene(PathBuf),
+}
+
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "sensor-board" => Ok(Self::Board(Role::Sensor)),
+            "display-board" => Ok(Self::Board(Role::Display)),
+            scene if scene.ends_with(".toml") => Ok(Self::Scene(scene.into())),
+            _ => Err(
+                "give sensor-board, display-board, or a scene's name ending in .toml".to_owned(),
+            ),
+        }
     }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|speed| SPEEDS.contains(speed))
+        .ok_or_else(|| format!("give {} to {}", SPEEDS.start(), SPEEDS.end()))
+}
+
+impl Replay {
+    /// Plays it.
+    pub fn execute(self) -> anyhow::Result<ExitCode> {
+        if self.to_time.is_some_and(|to_s| to_s <= self.from) {
+            bail!(
+                "--to-time {}: give a time after --from",
+                self.to_time.unwrap_or(0.0)
+            );
+        }
+        if let Some(wavelength_mm) = self.wavelength
+            && !(0.01..=100.0).contains(&wavelength_mm)
+        {
+            bail!("--wavelength {wavelength_mm}: give 0.01 to 100 mm");
+        }
+        let recording = Reader::open(&self.file)?;
+        match &self.to {
+            Target::Board(role) => self.play_to(recording, *role),
+            Target::Scene(path) => self.make(recording, path.clone()),
+        }
+    }
+
+    fn make(&self, recording: Reader, path: PathBuf) -> anyhow::Result<ExitCode> {
+        let settings = scene::Settings {
+            path,
+            from_s: self.from,
+            to_s: self.to_time,
+            wavelength_mm: self.wavelength,
+            expect: self.expect,
+            force: self.force,
+        };
+        let made = scene::write(recording, &settings)
+            .with_context(|| format!("{}: no scene", self.file.display()))?;
+        let [scene, gauges, motion] = made.files.each_ref().map(|file| file.display());
+        let (valid, all) = made.estimates;
+        output::print(&format!(
+            "{scene}, {gauges}, {motion}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
+             run it: hil-sim run {scene}",
+            made.duration_s,
+            made.wavelength_mm,
+            cut(made.cut),
+        ))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
+        let bench = self.boards.find()?;
+        let ended = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&ended))?;
+        }
+        let place = bench.seat(role).map(host_bridge::bench::Seat::place);
+        let (states, turned) = channel();
+        let link = Link::open(role, place.unwrap_or_default(), move |event| {
+            if let Event::Turned(state) = event {
+                // Nobody waits for it once the board is there.
+                let _ = states.send(state);
+            }
+        });
+        let end = Instant::now() + PATIENCE;
+        while !link.state().is_known() {
+            if ended.load(Ordering::Relaxed) {
+                return Ok(ExitCode::SUCCESS);
+            }
+            if Instant::now() >= end {
+                let state = link.state();
+                let advice = state.advice().unwrap_or("try again");
+                bail!("{state}: {advice}");
+            }
+            match turned.recv_timeout(LOOK) {
+                Ok(_) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+            }
+        }
+        if self.speed > 4.0 && role == Role::Display {
+            eprintln!(
+                "a display board takes no more than four times a sensor's estimates: at {} times it will fade \
+                 out, and say why",
+                self.speed
+            );
+        }
+        let pace = Pace {
+            speed: self.speed,
+            from_s: self.from,
+            to_s: self.to_time,
+        };
+        let mut peer = StandIn::new(role, self.speed);
+        let (mut said, mut unsaid) = (0_u64, 0_u64);
+        let played = play(recording, &pace, &ended, |from, event| {
+            if let Some(message) = peer.say(from, &event, now_us()) {
+                match link.post(&message) {
+                    Ok(()) => said += 1,
+                    Err(_) => unsaid += 1,
+                }
+            }
+        })?;
+        report(role, &played, said, unsaid)
+    }
+}
+
+fn cut(is_cut: bool) -> &'static str {
+    if is_cut {
+        "; the recording was cut off there"
+    } else {
+        ""
+    }
+}
+
+fn report(role: Role, played: &Played, said: u64, unsaid: u64) -> anyhow::Result<ExitCode> {
+    let what = match role {
+        Role::Display => "estimates",
+        Role::Sensor | Role::Host => "motions",
+    };
+    let missed = match unsaid {
+        0 => String::new(),
+        unsaid => format!(", {unsaid} could not be said"),
+    };
+    output::print(&format!(
+        "{said} {what} said to the {} board{missed}; {:.1} s of the recording, the latest {:.1} ms late{}",
+        role.name(),
+        played.recorded_s,
+        played.latest.as_secs_f64() * 1e3,
+        cut(played.cut),
+    ))?;
+    Ok(if unsaid == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }

@@ -22,6 +22,7 @@ use crate::elf::rtt::Channel;
 use crate::elf::sensor::SensorPins;
 use crate::elf::wire::TimedByte;
 use crate::recording::{ACTUATORS, volts};
+use crate::scene::Scene;
 
 /// When a board has to have answered that it is set up.
 const ANSWERS_NS: u64 = 5_000_000_000;
@@ -174,29 +175,32 @@ pub struct Beside {
     said: Receiver,
     /// Said since the last exchange.
     sent: Vec<TimedByte>,
+    /// Whether the scene breaks the boards.
+    is_broken: bool,
     /// The wall clock, beside the one board that the other waits for.
     pacer: Option<Pacer>,
 }
 
 impl Beside {
-    /// Beside the board of `role`, which runs `elf` and is set up by `setup`.
+    /// Beside the board of `role` in `scene`, which runs `elf`.
     pub fn new(
+        scene: &Scene,
         role: Role,
         elf: &[u8],
         shared: Arc<Shared>,
-        setup: Option<ConsoleHost>,
         ready: Sender<Result<(), ElfError>>,
         pacer: Option<Pacer>,
     ) -> Self {
         Self {
             role,
             shared,
-            setup,
+            setup: ConsoleHost::of_scene(scene, role),
             ready: Some(ready),
             rtt: Channel::find(elf),
             logged: Vec::new(),
             said: Receiver::new(),
             sent: Vec::new(),
+            is_broken: !scene.faults.is_empty(),
             pacer,
         }
     }
@@ -314,6 +318,10 @@ impl<P: Shown> Witness<P> for Beside {
             }
             let logged = std::mem::take(&mut self.logged);
             self.shared.carry(rtt, now_ns, &logged, 0);
+        }
+        // A firmware that has gone astray is not kept running; one that is broken on purpose is.
+        if !self.is_broken && !session.unmapped().is_empty() {
+            self.shared.stops.store(true, Ordering::Relaxed);
         }
         while let Some(order) = self.shared.next_order(self.role) {
             match order {

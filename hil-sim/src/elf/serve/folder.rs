@@ -33,8 +33,6 @@ struct BenchFile<'a> {
 struct BoardEntry<'a> {
     port: PathBuf,
     rtt: PathBuf,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    link: Option<PathBuf>,
     elf: &'a Path,
 }
 
@@ -77,7 +75,7 @@ impl Folder {
     ///
     /// # Errors
     /// If it can't be written.
-    pub fn describe(&self, firmwares: &Firmwares, is_apart: bool) -> Result<(), ServeError> {
+    pub fn describe(&self, firmwares: &Firmwares) -> Result<(), ServeError> {
         let path = self.bench_file();
         let refuse = |source| ServeError::Folder {
             path: path.clone(),
@@ -88,18 +86,15 @@ impl Folder {
             absolute(&firmwares.sensor.path)?,
             absolute(&firmwares.display.path)?,
         );
-        let link = |name| is_apart.then(|| self.port(name));
         let file = BenchFile {
             sensor: BoardEntry {
                 port: self.port(PortName::SensorConsole),
                 rtt: self.port(PortName::SensorRtt),
-                link: link(PortName::SensorLink),
                 elf: &sensor_elf,
             },
             display: BoardEntry {
                 port: self.port(PortName::DisplayConsole),
                 rtt: self.port(PortName::DisplayRtt),
-                link: link(PortName::DisplayLink),
                 elf: &display_elf,
             },
         };

@@ -1,0 +1,253 @@
+//! `hil-sim serve` as a program: lines, signals, its end, and what it refuses. Needs the two ELFs, as
+//! ./test builds them.
+#![cfg(target_os = "linux")]
+
+use std::env;
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use object::{Object, ObjectSection};
+use protocol::Role;
+use rustix::process::{Pid, Signal, kill_process};
+
+/// What is waited for comes long before.
+const PATIENCE: Duration = Duration::from_secs(60);
+const LINKS: [&str; 4] = [
+    "sensor-console",
+    "display-console",
+    "sensor-rtt",
+    "display-rtt",
+];
+
+/// Two boards keep two cores busy: one bench at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+fn turn() -> MutexGuard<'static, ()> {
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where cargo, or the folder named in RIDGELINK_ELVES, has the ELF of a board.
+fn built(role: Role) -> PathBuf {
+    let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/thumbv7em-none-eabihf/release"),
+        PathBuf::from,
+    );
+    folder.join(format!("firmware-{}", role.name()))
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("serve-cli")
+        .join(name);
+    fs::remove_dir_all(&folder).ok();
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn serve(folder: &Path) -> Command {
+    serve_with(folder, &built(Role::Sensor), &built(Role::Display))
+}
+
+fn serve_with(folder: &Path, sensor: &Path, display: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
+    command
+        .arg("serve")
+        .arg("--dir")
+        .arg(folder)
+        .arg("--sensor-elf")
+        .arg(sensor)
+        .arg("--display-elf")
+        .arg(display)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// A bench that stands: its ports are there.
+struct Standing {
+    child: Child,
+    greeting: String,
+}
+
+impl Standing {
+    fn new(command: &mut Command) -> Self {
+        let mut child = command.spawn().unwrap();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut greeting = String::new();
+        while !greeting.contains("tio -b") {
+            let read = out.read_line(&mut greeting).unwrap();
+            assert!(read > 0, "{greeting:?} is all it says");
+        }
+        Self { child, greeting }
+    }
+
+    fn say(&mut self, lines: &str) {
+        let stdin = self.child.stdin.as_mut().unwrap();
+        stdin.write_all(lines.as_bytes()).unwrap();
+    }
+
+    /// What it has complained about by its end, and its exit status.
+    fn ended(mut self) -> (Option<i32>, String) {
+        let begun = Instant::now();
+        while self.child.try_wait().unwrap().is_none() {
+            assert!(begun.elapsed() < PATIENCE, "it stands and stands");
+            std::thread::yield_now();
+        }
+        let Output { status, stderr, .. } = self.child.wait_with_output().unwrap();
+        (status.code(), String::from_utf8(stderr).unwrap())
+    }
+}
+
+fn are_there(folder: &Path) -> [bool; LINKS.len()] {
+    LINKS.map(|link| fs::symlink_metadata(folder.join(link)).is_ok())
+}
+
+fn wait_for(what: &str, condition: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !condition() {
+        assert!(begun.elapsed() < PATIENCE, "{what}: not in a minute");
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+fn lines_on_standard_input_move_cables_and_quit_takes_everything_away() {
+    let _turn = turn();
+    let folder = folder("lines");
+    let mut bench = Standing::new(serve(&folder).arg("--quiet"));
+    assert_eq!(are_there(&folder), [true; 4]);
+    assert!(folder.join("bench.toml").exists());
+    for link in LINKS {
+        let path = folder.join(link);
+        assert!(
+            bench.greeting.contains(&*path.to_string_lossy()),
+            "{}",
+            bench.greeting
+        );
+    }
+    bench.say("hand 40\njump\npull sensor-link\nreset display\npull display-console\n");
+    wait_for("a pulled cable", || {
+        are_there(&folder) == [true, false, true, true]
+    });
+    bench.say("plug display-console\n");
+    wait_for("the cable", || are_there(&folder) == [true; 4]);
+    bench.say("quit\n");
+    let (status, complaints) = bench.ended();
+    assert_eq!(status, Some(0), "{complaints}");
+    assert!(
+        complaints.contains("\"jump\": is no command: give pull"),
+        "{complaints}"
+    );
+    assert!(
+        complaints.contains("sensor-link: there is no such port"),
+        "{complaints}"
+    );
+    assert_eq!(are_there(&folder), [false; 4]);
+    assert!(!folder.join("bench.toml").exists());
+}
+
+#[test]
+fn a_signal_takes_everything_away_and_a_second_bench_in_the_folder_is_refused() {
+    let _turn = turn();
+    for signal in [Signal::TERM, Signal::INT] {
+        let folder = folder("signal");
+        let bench = Standing::new(serve(&folder).arg("--apart"));
+        assert!(folder.join("sensor-link").exists());
+        let second = serve(&folder).output().unwrap();
+        let complaint = String::from_utf8(second.stderr).unwrap();
+        assert_eq!(second.status.code(), Some(2), "{complaint}");
+        assert!(
+            complaint.contains("another bench stands here"),
+            "{complaint}"
+        );
+        kill_process(Pid::from_child(&bench.child), signal).unwrap();
+        let (status, complaints) = bench.ended();
+        assert_eq!(status, Some(0), "{complaints}");
+        assert_eq!(are_there(&folder), [false; 4]);
+        assert!(!folder.join("sensor-link").exists());
+    }
+}
+
+#[test]
+fn after_its_time_it_ends_and_tells_its_status_meanwhile() {
+    let _turn = turn();
+    let folder = folder("time");
+    let hand = folder.join("hand.csv");
+    fs::write(&hand, "t_s,x_mm\n0,0\n0.5,20\n").unwrap();
+    let output = serve(&folder)
+        .args(["--for", "1.5", "--hand"])
+        .arg(&hand)
+        .output()
+        .unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    assert!(
+        told.contains("mm/s") && told.contains("dropped 0 B"),
+        "{told}"
+    );
+    assert_eq!(are_there(&folder), [false; 4]);
+}
+
+#[test]
+fn a_board_whose_firmware_goes_astray_ends_it_with_the_reason() {
+    let _turn = turn();
+    let folder = folder("astray");
+    // Without vectors it begins at address 0, and nowhere.
+    let mut elf = fs::read(built(Role::Display)).unwrap();
+    let vectors = object::File::parse(&*elf)
+        .unwrap()
+        .section_by_name(".vector_table")
+        .and_then(|section| section.file_range())
+        .unwrap();
+    let (begins, length) = (vectors.0 as usize, vectors.1 as usize);
+    elf[begins..begins + length].fill(0);
+    let broken = folder.join("broken");
+    fs::write(&broken, elf).unwrap();
+    let output = serve_with(&folder, &built(Role::Sensor), &broken)
+        .output()
+        .unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("the display board's firmware reached"),
+        "{told}"
+    );
+    assert_eq!(are_there(&folder), [false; 4]);
+}
+
+#[test]
+fn what_it_cannot_do_is_refused_with_what_to_do() {
+    let folder = folder("refused");
+    let complaint = |command: &mut Command| {
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{command:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for (arguments, due) in [
+        (&["--pace", "0"][..], "give 0.01 to 100, or max"),
+        (&["--pace", "fast"], "give 0.01 to 100, or max"),
+        (&["--for", "0"], "give a time above 0 s"),
+        (&["--hand", "keyboard"], "needs a terminal"),
+        (
+            &["--hand", "nobody.csv"],
+            "give a CSV file with the columns t_s,x_mm",
+        ),
+        (&["nowhere.toml"], "give the name of a scene"),
+    ] {
+        let told = complaint(serve(&folder).args(arguments));
+        assert!(told.contains(due), "{arguments:?}: {told}");
+    }
+    let mut nowhere = serve_with(&folder, Path::new("nowhere"), &built(Role::Display));
+    let told = complaint(&mut nowhere);
+    assert!(told.contains("nowhere: can't be read"), "{told}");
+    fs::create_dir(folder.join("sensor-console")).unwrap();
+    let told = complaint(&mut serve(&folder));
+    assert!(told.contains("sensor-console: can't be used"), "{told}");
+    assert!(folder.join("sensor-console").is_dir());
+    assert_eq!(are_there(&folder), [true, false, false, false]);
+}

@@ -1,0 +1,420 @@
+//! Everything that a monitor shows, fed by events alone: the same from boards and from a recording.
+
+use std::collections::VecDeque;
+
+use protocol::{
+    ACTUATORS, DisplayState, Estimate, GAUGES, Gauges, Message, Motion, PortCounters, Role,
+    RoleCounters,
+};
+
+use super::board::Board;
+use super::fingertip::Fingertip;
+use super::happening::{Happening, What};
+use super::orders::{Orders, Outcome};
+use super::settings::{self, Setting};
+use super::trace::Trace;
+use super::words;
+use crate::link::{Clocks, Event, NotSent};
+
+/// Happenings kept.
+const HAPPENINGS: usize = 500;
+/// A message to the person at the desk stands for so long, in µs.
+const NOTICE_US: u64 = 6_000_000;
+/// A sample is so many sixteenths of an ADC step.
+const CODES_PER_LSB: f32 = 16.0;
+/// µs between two samples of a gauge.
+const SAMPLE_US: u64 = 1_000;
+
+/// The last seconds of everything that is traced.
+#[derive(Clone, Debug, Default)]
+pub struct Traces {
+    /// λ in mm.
+    pub wavelength_mm: Trace,
+    /// λ in mm by the paper's count.
+    pub counted_mm: Trace,
+    /// The arm's velocity in mm/s.
+    pub arm_mm_s: Trace,
+    /// The hand's velocity in mm/s.
+    pub hand_mm_s: Trace,
+    /// Each gauge in ADC steps.
+    pub gauges_lsb: [Trace; GAUGES],
+}
+
+/// A message to the person at the desk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Notice {
+    /// When it was made, in µs.
+    pub at_us: u64,
+    /// Whether something did not happen that was asked for.
+    pub is_bad: bool,
+    /// What it says.
+    pub text: String,
+}
+
+/// All that a monitor knows.
+#[derive(Clone, Debug)]
+pub struct Dashboard {
+    /// The present, in µs of [`crate::host_clock::now_us`].
+    pub now_us: u64,
+    /// The sensor board.
+    pub sensor: Board,
+    /// The display board.
+    pub display: Board,
+    /// The last estimate, and when it came.
+    pub estimate: Option<(u64, Estimate)>,
+    /// The last motion, and when it came.
+    pub motion: Option<(u64, Motion)>,
+    /// When gauges came last.
+    pub gauges_us: Option<u64>,
+    /// The supervisor's state, and since when; none while the display is not heard.
+    pub safety: Option<(u64, DisplayState)>,
+    /// The traces.
+    pub traces: Traces,
+    /// The actuators.
+    pub fingertip: Fingertip,
+    /// What has happened, the oldest first.
+    pub happenings: VecDeque<Happening>,
+    /// What came of the last change that was asked for.
+    pub outcome: Option<Outcome>,
+    notice: Option<Notice>,
+    orders: [Orders; 2],
+    fresh: Vec<Happening>,
+}
+
+impl Default for Dashboard {
+    fn default() -> Self {
+        Self {
+            now_us: 0,
+            sensor: Board::new(Role::Sensor),
+            display: Board::new(Role::Display),
+            estimate: None,
+            motion: None,
+            gauges_us: None,
+            safety: None,
+            traces: Traces::default(),
+            fingertip: Fingertip::default(),
+            happenings: VecDeque::new(),
+            outcome: None,
+            notice: None,
+            orders: [Orders::new(Role::Sensor), Orders::new(Role::Display)],
+            fresh: Vec::new(),
+        }
+    }
+}
+
+impl Dashboard {
+    /// The board of `role`; a host counts as the display.
+    pub const fn board(&self, role: Role) -> &Board {
+        match role {
+            Role::Sensor => &self.sensor,
+            Role::Display | Role::Host => &self.display,
+        }
+    }
+
+    const fn board_mut(&mut self, role: Role) -> &mut Board {
+        match role {
+            Role::Sensor => &mut self.sensor,
+            Role::Display | Role::Host => &mut self.display,
+        }
+    }
+
+    const fn orders(&mut self, role: Role) -> &mut Orders {
+        let [sensor, display] = &mut self.orders;
+        match role {
+            Role::Sensor => sensor,
+            Role::Display | Role::Host => display,
+        }
+    }
+
+    /// Takes an event of the link to the board of `role`, at `now_us`.
+    pub fn on(&mut self, now_us: u64, role: Role, event: Event) {
+        self.now_us = self.now_us.max(now_us);
+        match event {
+            Event::Heard { at_us, message } => {
+                self.now_us = self.now_us.max(at_us);
+                self.hear(role, at_us, &message);
+            }
+            Event::Restarted => {
+                self.board_mut(role).clocks = None;
+                self.fingertip.restart();
+                self.orders(role).read();
+                self.happen(role, What::Restarted);
+            }
+            Event::Turned(state) => {
+                if state.is_known() {
+                    self.orders(role).read();
+                } else {
+                    self.lose(role);
+                }
+                self.board_mut(role).state = Some(state.clone());
+                self.happen(role, What::Link(state));
+            }
+        }
+    }
+
+    /// Takes note of something that is no event of a link.
+    pub fn happen(&mut self, role: Role, what: What) {
+        let happening = Happening {
+            at_us: self.now_us,
+            role,
+            what,
+        };
+        if self.happenings.len() == HAPPENINGS {
+            self.happenings.pop_front();
+        }
+        self.happenings.push_back(happening.clone());
+        self.fresh.push(happening);
+    }
+
+    /// What has happened since the last call, which is to come now and then.
+    pub fn take_happenings(&mut self) -> Vec<Happening> {
+        std::mem::take(&mut self.fresh)
+    }
+
+    /// What this program's end of a line knows.
+    pub fn on_line(&mut self, role: Role, counters: PortCounters, clocks: Option<Clocks>) {
+        let board = self.board_mut(role);
+        board.counters = Some(counters);
+        board.clocks = clocks;
+    }
+
+    /// It is `now_us`. What is due is put into the outbox.
+    pub fn elapse(&mut self, now_us: u64) {
+        self.now_us = self.now_us.max(now_us);
+        self.sensor.rate.elapse(now_us);
+        self.display.rate.elapse(now_us);
+        for role in [Role::Sensor, Role::Display] {
+            let is_known = self.board(role).is_known();
+            if let Some(outcome) = self.orders(role).elapse(now_us, is_known) {
+                self.conclude(role, outcome);
+            }
+        }
+        let is_over = |notice: &Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;
+        if self.notice.as_ref().is_some_and(is_over) {
+            self.notice = None;
+        }
+    }
+
+    /// What is to be said to the board of `role` now.
+    pub fn take_outbox(&mut self, role: Role) -> Vec<Message> {
+        self.orders(role).take()
+    }
+
+    /// Something could not be said.
+    pub fn on_not_sent(&mut self, role: Role, message: &Message, why: NotSent) {
+        let name = role.name();
+        let text = match message {
+            Message::Stop(_) => format!(
+                "NOT STOPPED: {name}: {why}; will be told again when it is there: use the emergency stop"
+            ),
+            _ => format!("{name}: {why}"),
+        };
+        self.notify(true, text);
+    }
+
+    /// Stops the stimulus until the display board's reset button or power.
+    pub fn stop(&mut self) {
+        let now_us = self.now_us;
+        self.orders(Role::Display).stop(now_us);
+        self.notify(false, "stop: sent, not confirmed yet".to_owned());
+    }
+
+    /// Reads both configurations anew.
+    pub fn read_configurations(&mut self) {
+        for role in [Role::Sensor, Role::Display] {
+            self.orders(role).read();
+        }
+    }
+
+    /// Changes one setting of the board of `role`, and keeps all others.
+    pub fn change(&mut self, role: Role, setting: &'static Setting, text: &str) {
+        if !self.board(role).is_known() {
+            self.notify(true, format!("{}: {}", role.name(), NotSent::NotKnown));
+            return;
+        }
+        let now_us = self.now_us;
+        self.outcome = None;
+        self.orders(role).change(setting, text, now_us);
+    }
+
+    /// Switches the streaming of gauges on, or off.
+    pub fn toggle_gauges(&mut self) {
+        let setting = settings::stream_gauges();
+        let is_on = |value: String| value == words::SWITCH[1].0;
+        let streams = self
+            .sensor
+            .configuration
+            .and_then(|configuration| setting.value(&configuration))
+            .is_some_and(is_on);
+        let (wanted, _) = words::SWITCH[usize::from(!streams)];
+        self.change(Role::Sensor, setting, wanted);
+    }
+
+    /// Says something to the person at the desk.
+    pub fn notify(&mut self, is_bad: bool, text: String) {
+        self.notice = Some(Notice {
+            at_us: self.now_us,
+            is_bad,
+            text,
+        });
+    }
+
+    /// What is to be said to the person at the desk at the moment.
+    pub const fn notice(&self) -> Option<&Notice> {
+        self.notice.as_ref()
+    }
+
+    /// Time since the last estimate, in ms.
+    pub fn estimate_age_ms(&self) -> Option<u64> {
+        let (at_us, _) = self.estimate.as_ref()?;
+        Some(self.now_us.saturating_sub(*at_us) / 1_000)
+    }
+
+    /// Time since the last motion, in ms.
+    pub fn motion_age_ms(&self) -> Option<u64> {
+        let (at_us, _) = self.motion.as_ref()?;
+        Some(self.now_us.saturating_sub(*at_us) / 1_000)
+    }
+
+    /// The largest voltage of each actuator in the last tenth of a second, in V; none if the display is
+    /// not heard, or its array is not known.
+    pub fn peaks_v(&self) -> Option<[f32; ACTUATORS]> {
+        (self.safety.is_some() && self.fingertip.is_known()).then(|| self.fingertip.peaks_v())
+    }
+
+    /// The voltage of each actuator now, in V; none as above.
+    pub fn volts(&self) -> Option<[f32; ACTUATORS]> {
+        (self.safety.is_some() && self.fingertip.is_known()).then(|| self.fingertip.volts())
+    }
+
+    /// The counters of every port, by its name, as far as they are known: both of each board, and this
+    /// program's ends of their consoles.
+    pub fn ports(&self) -> [(&'static str, Option<PortCounters>); 6] {
+        let sensor = self.sensor.status.map(|(_, status)| status);
+        let display = self.display.status.map(|(_, status)| status);
+        [
+            ("sensor peer", sensor.map(|status| status.peer)),
+            ("display peer", display.map(|status| status.peer)),
+            ("sensor console", sensor.map(|status| status.console)),
+            ("display console", display.map(|status| status.console)),
+            ("here, sensor", self.sensor.counters),
+            ("here, display", self.display.counters),
+        ]
+    }
+
+    fn hear(&mut self, role: Role, at_us: u64, message: &Message) {
+        match (role, message) {
+            (Role::Sensor, Message::Estimate(estimate)) => self.on_estimate(at_us, estimate),
+            (Role::Sensor, Message::Gauges(gauges)) => self.on_gauges(at_us, gauges),
+            (Role::Display, Message::Motion(motion)) => self.on_motion(at_us, motion),
+            (Role::Display, Message::Safety(safety)) => self.turn(safety.state),
+            (_, Message::Status(status)) => {
+                self.board_mut(role).status = Some((at_us, *status));
+                if let (Role::Display, RoleCounters::Display(counters)) = (role, &status.role) {
+                    self.turn(counters.state);
+                }
+            }
+            (_, Message::Configuration(report)) => {
+                let configuration = report.configuration;
+                if words::role_of(&configuration) == role {
+                    self.board_mut(role).configuration = Some(configuration);
+                }
+                if let protocol::Configuration::Display(display) = &configuration {
+                    self.fingertip.configure(display);
+                }
+                if let Some(outcome) = self.orders(role).on_report(report) {
+                    self.conclude(role, outcome);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn on_estimate(&mut self, at_us: u64, estimate: &Estimate) {
+        let own_us = self.sensor.own_us(estimate.instant_us, at_us);
+        self.sensor.rate.count();
+        self.estimate = Some((at_us, *estimate));
+        self.fingertip.hear(estimate);
+        let traces = &mut self.traces;
+        if let Some(wavelength_mm) = estimate.wavelength_mm {
+            traces.wavelength_mm.put(own_us, wavelength_mm);
+        }
+        if let Some(counted_mm) = estimate.counted_mm {
+            traces.counted_mm.put(own_us, counted_mm);
+        }
+        traces.arm_mm_s.put(own_us, mm_s(estimate.velocity_um_s));
+    }
+
+    fn on_motion(&mut self, at_us: u64, motion: &Motion) {
+        let own_us = self.display.own_us(motion.instant_us, at_us);
+        self.display.rate.count();
+        self.motion = Some((at_us, *motion));
+        self.fingertip.follow(motion);
+        self.traces
+            .hand_mm_s
+            .put(own_us, mm_s(motion.velocity_um_s));
+    }
+
+    fn on_gauges(&mut self, at_us: u64, block: &Gauges) {
+        self.gauges_us = Some(at_us);
+        // The block is sent when it is full.
+        let begun_us = at_us.saturating_sub(block.samples.len() as u64 * SAMPLE_US);
+        let mut own_us = self.sensor.own_us(block.instant_us, begun_us);
+        for sample in &block.samples {
+            for (trace, code) in self.traces.gauges_lsb.iter_mut().zip(sample.codes) {
+                trace.put(own_us, f32::from(code) / CODES_PER_LSB);
+            }
+            own_us += SAMPLE_US;
+        }
+    }
+
+    /// The supervisor is in a state, be it a new one or not.
+    fn turn(&mut self, state: DisplayState) {
+        if let DisplayState::Stopped(_) = state
+            && self.orders(Role::Display).is_stopping()
+        {
+            self.orders(Role::Display).stopped();
+            self.notify(false, "stop: confirmed by the display".to_owned());
+        }
+        if self.safety.is_some_and(|(_, before)| before == state) {
+            return;
+        }
+        self.safety = Some((self.now_us, state));
+        self.fingertip.turn(Some(state));
+        self.happen(Role::Display, What::Safety(state));
+    }
+
+    /// The board is not there, or not understood.
+    fn lose(&mut self, role: Role) {
+        let board = self.board_mut(role);
+        board.clocks = None;
+        board.configuration = None;
+        self.orders(role).lost();
+        if role == Role::Display {
+            self.safety = None;
+            self.fingertip.turn(None);
+        }
+    }
+
+    fn conclude(&mut self, role: Role, outcome: Outcome) {
+        let name = role.name();
+        let (is_bad, text) = match &outcome {
+            Outcome::Taken {
+                name: setting,
+                value,
+            } => (false, format!("{name}: {setting} is {value} now")),
+            Outcome::Refused(refusal) => (true, format!("{name}: refused: {refusal}")),
+            Outcome::Misread(misread) => (true, misread.to_string()),
+            Outcome::Unanswered => (
+                true,
+                format!("{name}: no answer, nothing is known to have changed"),
+            ),
+        };
+        self.notify(is_bad, text);
+        self.outcome = Some(outcome);
+    }
+}
+
+fn mm_s(um_s: i32) -> f32 {
+    um_s as f32 / 1_000.0
+}

@@ -1,0 +1,50 @@
+//! Areas cut into parts.
+//!
+//! By hand: ratatui's solver takes as long for a picture as all the drawing.
+
+use ratatui::layout::Rect;
+
+/// The uppermost `height` rows, as far as there are so many, and the rest.
+pub const fn cut_top(area: Rect, height: u16) -> [Rect; 2] {
+    let height = if height < area.height {
+        height
+    } else {
+        area.height
+    };
+    let top = Rect { height, ..area };
+    let rest = Rect {
+        y: area.y + height,
+        height: area.height - height,
+        ..area
+    };
+    [top, rest]
+}
+
+/// The leftmost `width` columns, as far as there are so many, and the rest.
+pub const fn cut_left(area: Rect, width: u16) -> [Rect; 2] {
+    let width = if width < area.width {
+        width
+    } else {
+        area.width
+    };
+    let left = Rect { width, ..area };
+    let rest = Rect {
+        x: area.x + width,
+        width: area.width - width,
+        ..area
+    };
+    [left, rest]
+}
+
+/// Columns of one width, a space apart; what is left over stays empty at the right.
+pub fn columns<const COUNT: usize>(area: Rect) -> [Rect; COUNT] {
+    const GAP: u16 = 1;
+    let count = COUNT as u16;
+    let width = area.width.saturating_sub(GAP * (count - 1)) / count;
+    std::array::from_fn(|index| Rect {
+        x: area.x + (width + GAP) * index as u16,
+        width,
+        ..area
+    })
+    .map(|column| column.intersection(area))
+}

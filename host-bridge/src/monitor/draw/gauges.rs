@@ -1,0 +1,104 @@
+//! The five gauges: what they say, and how they are.
+
+use protocol::{GAUGES, GaugeHealth};
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+
+use super::plot::{Plot, Range, Series, round_step};
+use super::{areas, text};
+use crate::monitor::dashboard::Dashboard;
+use crate::monitor::view::View;
+use crate::monitor::words;
+
+/// The gauges show a part of the time that the other traces show: their waves are many times as fast.
+const PART: f32 = 0.03;
+/// The least that is drawn as high as the area, in LSB.
+const LEAST_LSB: f32 = 20.0;
+/// Without a block for so long, in µs, nothing is streaming.
+const SILENT_US: u64 = 500_000;
+
+/// Draws the gauges side by side, all to one scale.
+pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
+    let theme = view.theme;
+    let inner = Rect {
+        y: area.y + 1,
+        height: area.height.saturating_sub(1),
+        ..area
+    };
+    let columns: [Rect; GAUGES] = areas::columns(inner);
+    let plots = columns.map(|column| {
+        let area = Rect {
+            y: column.y + 1,
+            height: column.height.saturating_sub(1),
+            ..column
+        };
+        Plot::bare(area, view.span_s() * PART)
+    });
+    let streams = shown
+        .gauges_us
+        .is_some_and(|at_us| shown.now_us.saturating_sub(at_us) < SILENT_US);
+    let extents: [Option<(f32, f32)>; GAUGES] = std::array::from_fn(|gauge| {
+        plots[gauge].extent(shown.now_us, &[&shown.traces.gauges_lsb[gauge]])
+    });
+    let widest = extents
+        .iter()
+        .flatten()
+        .map(|(low, high)| high - low)
+        .fold(LEAST_LSB, f32::max);
+    // A little more than the widest, in round numbers, so that it does not change all the time.
+    let step = round_step(widest);
+    let height = (widest / step).ceil() * step;
+    let about = if streams {
+        format!(
+            "from lowest to highest in LSB; {height:.0} LSB high, {}",
+            text::span(plots[0].span_s())
+        )
+    } else {
+        "not streamed: g streams them".to_owned()
+    };
+    text::panel(frame, area, theme, text::title(theme, "gauges", &about));
+    for gauge in 0..GAUGES {
+        text::put(
+            frame,
+            columns[gauge],
+            0,
+            name(shown, gauge, extents[gauge], view),
+        );
+        if let (Some((low, high)), true) = (extents[gauge], streams) {
+            let middle = (low + high) / 2.0;
+            let range = Range {
+                low: middle - height / 2.0,
+                high: middle + height / 2.0,
+                digits: 0,
+            };
+            let series = [Series {
+                trace: &shown.traces.gauges_lsb[gauge],
+                style: theme.sensor(),
+                is_dotted: false,
+            }];
+            plots[gauge].draw(frame, shown.now_us, range, &series, None);
+        }
+    }
+}
+
+fn name(shown: &Dashboard, gauge: usize, extent: Option<(f32, f32)>, view: &View) -> Line<'static> {
+    let theme = view.theme;
+    let mut spans = vec![Span::styled(format!("{gauge} "), theme.strong())];
+    if let Some((_, estimate)) = shown.estimate {
+        let health = estimate.health[gauge];
+        let style = if health == GaugeHealth::Good {
+            theme.good()
+        } else {
+            theme.bad()
+        };
+        spans.push(Span::styled(words::health(health), style));
+        if estimate.gauges_used & (1 << gauge) == 0 {
+            spans.push(Span::styled(" unused", theme.quiet()));
+        }
+    }
+    if let Some((low, high)) = extent {
+        spans.push(Span::styled(format!("  {:.0}", high - low), theme.quiet()));
+    }
+    Line::from(spans)
+}

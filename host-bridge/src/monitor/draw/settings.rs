@@ -1,0 +1,74 @@
+//! The form for settings.
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, Borders, Clear, Paragraph};
+
+use super::help::middle;
+use crate::monitor::dashboard::Dashboard;
+use crate::monitor::form::Form;
+use crate::monitor::orders::Outcome;
+use crate::monitor::settings;
+use crate::monitor::view::View;
+
+/// Width with the frame.
+const WIDTH: u16 = 62;
+
+/// Draws the form over the middle of an area.
+pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, form: &Form) {
+    let theme = view.theme;
+    let configuration = live.board(form.role).configuration;
+    let chosen = form.setting();
+    let mut lines: Vec<Line<'_>> = settings::of(form.role)
+        .iter()
+        .map(|setting| {
+            let is_chosen = chosen.is_some_and(|chosen| std::ptr::eq(chosen, setting));
+            let draft = form.draft.as_deref().filter(|_| is_chosen);
+            let value = configuration
+                .as_ref()
+                .and_then(|configuration| setting.value(configuration));
+            let (shown, style) = match draft {
+                Some(draft) => (format!("{draft}_"), theme.warning()),
+                None => (value.unwrap_or_else(|| "?".to_owned()), Style::new()),
+            };
+            let name = if is_chosen {
+                theme.chosen()
+            } else {
+                theme.quiet()
+            };
+            let wanted = configuration
+                .as_ref()
+                .filter(|_| is_chosen)
+                .map(|configuration| setting.wanted(configuration))
+                .unwrap_or_default();
+            Line::from(vec![
+                Span::styled(format!(" {:<20}", setting.name), name),
+                Span::styled(format!(" {shown:>10} "), style),
+                Span::styled(format!("{:<6} ", setting.unit), theme.quiet()),
+                Span::styled(wanted, theme.quiet()),
+            ])
+        })
+        .collect();
+    let (words, style) = match &live.outcome {
+        Some(Outcome::Taken { name, value }) => (format!("{name} is {value} now"), theme.good()),
+        Some(Outcome::Refused(refusal)) => (format!("refused: {refusal}"), theme.bad()),
+        Some(Outcome::Misread(misread)) => (misread.to_string(), theme.bad()),
+        Some(Outcome::Unanswered) => ("no answer".to_owned(), theme.bad()),
+        None if configuration.is_none() => (
+            "its configuration is not known yet".to_owned(),
+            theme.quiet(),
+        ),
+        None => (String::new(), Style::new()),
+    };
+    lines.push(Line::styled(format!(" {words}"), style));
+    let place = middle(area, WIDTH, lines.len() as u16 + 2);
+    frame.render_widget(Clear, place);
+    let block = Block::new()
+        .borders(Borders::ALL)
+        .border_style(theme.quiet())
+        .title(format!(" {} board ", form.role.name()))
+        .title_bottom(" ↑↓ setting  0-9 ←→ value  Enter send  Tab other board  Esc close ");
+    frame.render_widget(Paragraph::new(lines).block(block), place);
+}

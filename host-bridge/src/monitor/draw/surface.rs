@@ -1,0 +1,186 @@
+//! λ: how long, how sure, by which count, over which seconds.
+
+use protocol::Estimate;
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::{Modifier, Style};
+use ratatui::text::{Line, Span};
+
+use super::plot::{Plot, Range, Series};
+use super::{big, text};
+use crate::monitor::dashboard::Dashboard;
+use crate::monitor::theme::Theme;
+use crate::monitor::view::View;
+use crate::monitor::words;
+
+/// An estimate that is older than this, in ms, is no more than a memory.
+const OLD_MS: u64 = 300;
+/// Parts of the bar of confidence.
+const BAR: usize = 14;
+/// The trace shows λ within so much of it at least: noise is not to look like news.
+const LEAST_PART: f32 = 0.1;
+
+/// Draws the numbers.
+pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
+    let age_ms = shown.estimate_age_ms();
+    let is_old = age_ms.is_none_or(|age_ms| age_ms > OLD_MS);
+    let about = match age_ms {
+        Some(age_ms) if is_old => format!("{} old", text::short(age_ms * 1_000)),
+        Some(_) => format!("{} Hz", shown.sensor.rate.per_s()),
+        None => "nothing heard".to_owned(),
+    };
+    let area = text::panel(frame, area, theme, text::title(theme, "surface", &about));
+    let estimate = shown.estimate.map(|(_, estimate)| estimate);
+    let sure = estimate.is_some_and(|estimate| estimate.valid) && !is_old;
+    let style = if sure { theme.strong() } else { theme.quiet() };
+    let number = estimate
+        .and_then(|estimate| estimate.wavelength_mm)
+        .map_or_else(|| "-.--".to_owned(), millimetres);
+    for (row, mut line) in (0..).zip(big::lines(&number, style)) {
+        line.spans.insert(
+            0,
+            Span::styled(if row == 2 { " λ " } else { "   " }, theme.quiet()),
+        );
+        if row == 2 {
+            line.spans.push(Span::styled("mm", theme.quiet()));
+        }
+        text::put(frame, area, row, line);
+    }
+    let Some(estimate) = estimate else {
+        return;
+    };
+    let lines = [
+        confidence(&estimate, theme, is_old),
+        judgement(&estimate, theme, is_old),
+        count(&estimate, theme, is_old),
+        gauges(&estimate, theme, is_old),
+    ];
+    for (row, line) in (big::ROWS as u16..).zip(lines) {
+        text::put(frame, area, row, line);
+    }
+}
+
+/// λ as it is written: to 10 µm, and to 1 µm below 1 mm.
+pub fn millimetres(mm: f32) -> String {
+    if mm < 0.9995 {
+        format!("{mm:.3}")
+    } else {
+        format!("{mm:.2}")
+    }
+}
+
+fn faded(style: Style, is_old: bool, theme: Theme) -> Style {
+    if is_old { theme.quiet() } else { style }
+}
+
+fn confidence(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
+    let part = estimate.confidence.clamp(0.0, 1.0);
+    let full = (part * BAR as f32).round() as usize;
+    let style = faded(theme.sensor(), is_old, theme);
+    Line::from(vec![
+        Span::styled(" confidence ", theme.quiet()),
+        Span::styled("━".repeat(full), style),
+        Span::styled("─".repeat(BAR - full), theme.quiet()),
+        Span::styled(format!(" {part:.2}"), faded(theme.strong(), is_old, theme)),
+    ])
+}
+
+fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
+    let (word, style) = if estimate.valid {
+        ("valid", theme.good())
+    } else {
+        ("unsure", theme.warning())
+    };
+    Line::from(vec![
+        Span::raw(" "),
+        Span::styled(
+            word,
+            faded(style.add_modifier(Modifier::BOLD), is_old, theme),
+        ),
+        Span::styled("   range ", theme.quiet()),
+        Span::styled(
+            words::range(estimate.range),
+            faded(Style::new(), is_old, theme),
+        ),
+        Span::styled("   contact ", theme.quiet()),
+        Span::styled(
+            words::contact(estimate.contact),
+            faded(Style::new(), is_old, theme),
+        ),
+    ])
+}
+
+fn count(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
+    let counted = estimate
+        .counted_mm
+        .map_or_else(|| "  -  ".to_owned(), |mm| format!("{mm:.2} mm"));
+    let style = faded(Style::new(), is_old, theme);
+    Line::from(vec![
+        Span::styled(" paper's count ", theme.quiet()),
+        Span::styled(counted, style),
+        Span::styled("   ", theme.quiet()),
+        Span::styled(format!("{:.0} LSB", estimate.amplitude_lsb), style),
+    ])
+}
+
+fn gauges(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
+    let used: String = (0..protocol::GAUGES)
+        .filter(|gauge| estimate.gauges_used & (1 << gauge) != 0)
+        .map(|gauge| gauge.to_string())
+        .collect();
+    let used = if used.is_empty() {
+        "none".to_owned()
+    } else {
+        used
+    };
+    let lag = estimate
+        .lag_um
+        .map_or_else(|| "-".to_owned(), |lag_um| format!("{lag_um} µm"));
+    let style = faded(Style::new(), is_old, theme);
+    Line::from(vec![
+        Span::styled(" gauges used ", theme.quiet()),
+        Span::styled(used, style),
+        Span::styled("   lag ", theme.quiet()),
+        Span::styled(lag, style),
+    ])
+}
+
+/// Draws λ and the paper's count over the last seconds.
+pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
+    let theme = view.theme;
+    let inner = Rect {
+        y: area.y + 1,
+        height: area.height.saturating_sub(1),
+        ..area
+    };
+    let plot = Plot::new(inner, view.span_s());
+    let traces = &shown.traces;
+    let series = [
+        Series {
+            trace: &traces.wavelength_mm,
+            style: theme.sensor(),
+            is_dotted: false,
+        },
+        Series {
+            trace: &traces.counted_mm,
+            style: theme.warning(),
+            is_dotted: true,
+        },
+    ];
+    let title = Line::from(vec![
+        Span::styled("λ", theme.strong()),
+        Span::styled("  mm, ", theme.quiet()),
+        Span::styled(text::span(plot.span_s()), theme.quiet()),
+        Span::styled("   ━ ", theme.sensor()),
+        Span::styled("estimate", theme.quiet()),
+        Span::styled("  ┅ ", theme.warning()),
+        Span::styled("paper's count", theme.quiet()),
+    ]);
+    text::panel(frame, area, theme, title);
+    let both = [&traces.wavelength_mm, &traces.counted_mm];
+    if let Some((low, high)) = plot.extent(shown.now_us, &both) {
+        let range = Range::around(low, high, LEAST_PART * high);
+        plot.draw_axis(frame, range, theme);
+        plot.draw(frame, shown.now_us, range, &series, None);
+    }
+}

@@ -1,0 +1,231 @@
+//! The firmwares' logs: the bytes of an RTT channel, from wherever they can be had, decoded by defmt's own
+//! decoder with the strings in the ELF.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, IsTerminal, Read};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+use defmt_decoder::{DecodeError, Table};
+use protocol::Role;
+
+use super::happening::What;
+use crate::link::BAUD;
+
+mod probe;
+
+/// Longest wait for bytes, and between two looks at a file that may grow.
+const LOOK: Duration = Duration::from_millis(100);
+/// Between two attempts to get at the bytes.
+const AGAIN: Duration = Duration::from_secs(1);
+/// Most bytes of a read.
+const READ_BYTES: usize = 4_096;
+
+/// Where the bytes come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// A file that grows, a pipe, or a pseudo-terminal.
+    File(PathBuf),
+    /// A server of the raw channel, as `HOST:PORT`: OpenOCD's `rtt server`, J-Link's, and others.
+    Tcp(String),
+    /// The board's memory, by its probe; that of this serial number if there are several.
+    Probe(Option<String>),
+}
+
+impl Origin {
+    /// `tcp:HOST:PORT`, or the name of a file.
+    pub fn of(text: &str) -> Self {
+        match text.strip_prefix("tcp:") {
+            Some(address) => Self::Tcp(address.to_owned()),
+            None => Self::File(PathBuf::from(text)),
+        }
+    }
+}
+
+/// Why a log can't be read at all.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The ELF can't be read.
+    #[error("{path}: can't be read: {source}")]
+    Unreadable {
+        /// The ELF.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The ELF has no strings of a log.
+    #[error("{path}: holds no defmt log ({reason}): give the firmware's ELF as the build left it")]
+    NoTable {
+        /// The ELF.
+        path: PathBuf,
+        /// What the decoder said.
+        reason: String,
+    },
+}
+
+/// A log to be read.
+struct Log {
+    role: Role,
+    elf: Vec<u8>,
+    table: Table,
+    lines: Sender<(Role, What)>,
+    ended: Arc<AtomicBool>,
+}
+
+/// The logs of all boards whose bytes are read; dropping it ends the reading.
+pub struct Logs {
+    lines: Sender<(Role, What)>,
+    ended: Arc<AtomicBool>,
+}
+
+impl Logs {
+    /// None is read yet; the lines come out of the receiver.
+    pub fn new() -> (Self, Receiver<(Role, What)>) {
+        let (lines, read) = channel();
+        let ended = Arc::new(AtomicBool::new(false));
+        (Self { lines, ended }, read)
+    }
+
+    /// Reads the log of the board of `role`, whose firmware is `elf`, for as long as this lives.
+    ///
+    /// # Errors
+    /// If the ELF can't be read or has no log. That the bytes can't be had is said as it happens.
+    pub fn follow(&self, role: Role, elf: &Path, origin: Origin) -> Result<(), LogError> {
+        let bytes = fs::read(elf).map_err(|source| LogError::Unreadable {
+            path: elf.to_owned(),
+            source,
+        })?;
+        let no_table = |reason: String| LogError::NoTable {
+            path: elf.to_owned(),
+            reason,
+        };
+        let table = Table::parse(&bytes)
+            .map_err(|error| no_table(format!("{error:#}")))?
+            .ok_or_else(|| no_table("no .defmt section".to_owned()))?;
+        let log = Log {
+            role,
+            elf: bytes,
+            table,
+            lines: self.lines.clone(),
+            ended: Arc::clone(&self.ended),
+        };
+        thread::spawn(move || log.read(&origin));
+        Ok(())
+    }
+}
+
+impl Drop for Logs {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Release);
+    }
+}
+
+impl Log {
+    /// Reads until the end of it all; what can't be read is tried again, and told once.
+    fn read(&self, origin: &Origin) {
+        let mut told = None;
+        while !self.is_ended() {
+            let result = match origin {
+                Origin::File(path) => self.read_file(path),
+                Origin::Tcp(address) => self.read_tcp(address),
+                Origin::Probe(serial) => self.read_probe(serial.as_deref()),
+            };
+            let reason = match result {
+                Ok(()) => "its source has ended".to_owned(),
+                Err(reason) => reason,
+            };
+            if told.as_ref() != Some(&reason) && !self.is_ended() {
+                told = Some(reason.clone());
+                let _ = self.lines.send((self.role, What::LogLost { reason }));
+            }
+            thread::park_timeout(AGAIN);
+        }
+    }
+
+    fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Acquire)
+    }
+
+    fn read_file(&self, path: &Path) -> Result<(), String> {
+        let failed = |error: io::Error| format!("{}: {error}", path.display());
+        let file = File::open(path).map_err(failed)?;
+        if file.is_terminal() {
+            // Opened as a line, so that the system does not take the bytes for text.
+            let line = serialport::new(path.to_string_lossy(), BAUD)
+                .timeout(LOOK)
+                .open_native()
+                .map_err(|error| format!("{}: {error}", path.display()))?;
+            return self.pump(line, false).map_err(failed);
+        }
+        let grows = file.metadata().is_ok_and(|metadata| metadata.is_file());
+        self.pump(file, grows).map_err(failed)
+    }
+
+    fn read_tcp(&self, address: &str) -> Result<(), String> {
+        let failed = |error: io::Error| format!("tcp:{address}: {error}");
+        let stream = TcpStream::connect(address).map_err(failed)?;
+        stream.set_read_timeout(Some(LOOK)).map_err(failed)?;
+        self.pump(stream, false).map_err(failed)
+    }
+
+    /// Decodes what a reader gives, until it ends; one that `grows` goes on after its end.
+    fn pump(&self, mut reader: impl Read, grows: bool) -> io::Result<()> {
+        let mut bytes = vec![0; READ_BYTES];
+        self.decode(|| match reader.read(&mut bytes) {
+            Ok(0) if grows => {
+                thread::park_timeout(LOOK);
+                Ok(Some(Vec::new()))
+            }
+            Ok(0) => Ok(None),
+            Ok(count) => Ok(Some(bytes[..count].to_vec())),
+            Err(error) if is_pause(&error) => Ok(Some(Vec::new())),
+            Err(error) => Err(error),
+        })
+    }
+
+    /// Decodes what `more` gives, until it gives none.
+    fn decode<E>(&self, mut more: impl FnMut() -> Result<Option<Vec<u8>>, E>) -> Result<(), E> {
+        let mut decoder = self.table.new_stream_decoder();
+        while !self.is_ended() {
+            let Some(bytes) = more()? else {
+                return Ok(());
+            };
+            decoder.received(&bytes);
+            loop {
+                match decoder.decode() {
+                    Ok(frame) => {
+                        let level = frame.level().map(|level| level.as_str());
+                        let text = frame.display_message().to_string();
+                        if self
+                            .lines
+                            .send((self.role, What::Log { level, text }))
+                            .is_err()
+                        {
+                            return Ok(());
+                        }
+                    }
+                    Err(DecodeError::UnexpectedEof) => break,
+                    Err(DecodeError::Malformed) if self.table.encoding().can_recover() => {}
+                    Err(DecodeError::Malformed) => {
+                        decoder = self.table.new_stream_decoder();
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a read only had nothing to give yet.
+fn is_pause(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+    )
+}

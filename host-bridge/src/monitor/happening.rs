@@ -1,0 +1,86 @@
+//! What is worth a line of its own.
+
+use std::fmt;
+
+use protocol::{DisplayState, Role};
+
+use crate::state::State;
+
+/// Something that happened at one of the boards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Happening {
+    /// When, in µs of [`crate::host_clock::now_us`].
+    pub at_us: u64,
+    /// Where.
+    pub role: Role,
+    /// What.
+    pub what: What,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum What {
+    /// The link stands differently.
+    Link(State),
+    /// The supervisor's state is another.
+    Safety(DisplayState),
+    /// The board has started anew.
+    Restarted,
+    /// The board's firmware has logged a line.
+    Log {
+        /// How grave it is, in defmt's words; none for what was printed without a level.
+        level: Option<&'static str>,
+        /// The line.
+        text: String,
+    },
+    /// Its log can't be read at the moment.
+    LogLost {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl What {
+    /// One word for its kind; never changes.
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Link(_) => "link",
+            Self::Safety(_) => "safety",
+            Self::Restarted => "restarted",
+            Self::Log { .. } => "log",
+            Self::LogLost { .. } => "log-lost",
+        }
+    }
+
+    /// Whether something is wrong.
+    pub fn is_bad(&self) -> bool {
+        match self {
+            Self::Link(state) => state.advice().is_some(),
+            Self::Safety(state) => matches!(state, DisplayState::Stopped(_)),
+            Self::Restarted | Self::LogLost { .. } => true,
+            Self::Log { level, .. } => matches!(level, Some("error" | "warn")),
+        }
+    }
+}
+
+/// The happening in one line, with the advice if there is one.
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(state) => {
+                write!(f, "{state}")?;
+                match state.advice() {
+                    Some(advice) => write!(f, ": {advice}"),
+                    None => Ok(()),
+                }
+            }
+            Self::Safety(state) => write!(f, "{state}"),
+            Self::Restarted => f.write_str("has started anew"),
+            Self::Log { level, text } => match level {
+                Some(level) => write!(f, "{level}: {text}"),
+                None => f.write_str(text),
+            },
+            Self::LogLost { reason } => write!(f, "its log can't be read: {reason}"),
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What is said to the boards: stops, questions for their configurations, and changes of them.
+//!
+//! A configuration is taken as a whole, and another program may have changed it. So it is read right
+//! before it is changed: a board that is given the other one's configuration refuses it, and its answer
+//! carries its own.
+
+use protocol::{
+    Configuration, ConfigurationReport, DisplayConfiguration, Message, Refusal, Role,
+    SensorConfiguration, Stop, StopReason,
+};
+
+use super::settings::{Misread, Setting};
+
+/// A question, or a stop, that was not answered is repeated after so long, in µs.
+const AGAIN_US: u64 = 300_000;
+/// A change that was not answered is given up after so long, in µs.
+const GIVEN_UP_US: u64 = 2_000_000;
+
+/// A setting that is to be changed.
+#[derive(Clone, Debug)]
+struct Change {
+    setting: &'static Setting,
+    text: String,
+    since_us: u64,
+    /// What was sent, once the configuration in force is known.
+    sent: Option<Configuration>,
+}
+
+/// What a change, or a stop, has come to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// The setting is in force.
+    Taken {
+        /// Its name.
+        name: &'static str,
+        /// Its value, with its unit.
+        value: String,
+    },
+    /// The board refused it.
+    Refused(Refusal),
+    /// The text is no value of it.
+    Misread(Misread),
+    /// The board does not answer.
+    Unanswered,
+}
+
+/// The orders to one board.
+#[derive(Clone, Debug)]
+pub struct Orders {
+    role: Role,
+    /// When the configuration was asked for last, while it is wanted.
+    wanted: Option<Option<u64>>,
+    change: Option<Change>,
+    /// Since when the display is to stop, and when it was told so last.
+    stop: Option<(u64, u64)>,
+    outbox: Vec<Message>,
+}
+
+impl Orders {
+    /// Nothing is to be said to the board of `role`.
+    pub const fn new(role: Role) -> Self {
+        Self {
+            role,
+            wanted: None,
+            change: None,
+            stop: None,
+            outbox: Vec::new(),
+        }
+    }
+
+    /// Asks for the configuration.
+    pub fn read(&mut self) {
+        self.wanted.get_or_insert(None);
+    }
+
+    /// Changes one setting and keeps all others.
+    pub fn change(&mut self, setting: &'static Setting, text: &str, now_us: u64) {
+        self.change = Some(Change {
+            setting,
+            text: text.to_owned(),
+            since_us: now_us,
+            sent: None,
+        });
+        // What is known may be old.
+        self.wanted = Some(None);
+    }
+
+    /// Stops the stimulus, and says so again until [`Orders::stopped`].
+    pub fn stop(&mut self, now_us: u64) {
+        self.stop = Some((now_us, now_us));
+        self.outbox.push(STOP);
+    }
+
+    /// The display has stopped.
+    pub fn stopped(&mut self) {
+        self.stop = None;
+    }
+
+    /// Whether a stop is not obeyed yet.
+    pub const fn is_stopping(&self) -> bool {
+        self.stop.is_some()
+    }
+
+    /// The board has gone: what was on the way is void, but for a stop.
+    pub fn lost(&mut self) {
+        self.wanted = None;
+        self.outbox.clear();
+    }
+
+    /// The board has answered. What has come of a change, if it was the answer to one.
+    pub fn on_report(&mut self, report: &ConfigurationReport) -> Option<Outcome> {
+        let is_reading =
+            matches!(report.refused, Some(refusal) if refusal.setting == protocol::Setting::Role);
+        if is_reading {
+            self.wanted = None;
+        }
+        let change = self.change.as_mut()?;
+        match change.sent {
+            None if is_reading => {
+                match change.setting.changed(report.configuration, &change.text) {
+                    Ok(configuration) => {
+                        change.sent = Some(configuration);
+                        self.outbox.push(Message::Configure(configuration));
+                        None
+                    }
+                    Err(misread) => {
+                        self.change = None;
+                        Some(Outcome::Misread(misread))
+                    }
+                }
+            }
+            Some(sent) if !is_reading => {
+                let setting = change.setting;
+                self.change = None;
+                match report.refused {
+                    Some(refusal) => Some(Outcome::Refused(refusal)),
+                    None if report.configuration == sent => Some(Outcome::Taken {
+                        name: setting.name,
+                        value: [
+                            setting.value(&sent).unwrap_or_default().as_str(),
+                            setting.unit,
+                        ]
+                        .join(" ")
+                        .trim_end()
+                        .to_owned(),
+                    }),
+                    // Another program's change came in between.
+                    None => Some(Outcome::Unanswered),
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// Repeats what was not answered; what is given up is returned.
+    pub fn elapse(&mut self, now_us: u64, is_known: bool) -> Option<Outcome> {
+        if is_known {
+            let due = |at_us: u64| now_us.saturating_sub(at_us) >= AGAIN_US;
+            if let Some(asked_us) = &mut self.wanted
+                && asked_us.is_none_or(due)
+            {
+                *asked_us = Some(now_us);
+                self.outbox.push(question(self.role));
+            }
+            if let Some((_, told_us)) = &mut self.stop
+                && due(*told_us)
+            {
+                *told_us = now_us;
+                self.outbox.push(STOP);
+            }
+        }
+        let given_up = |since_us: u64| now_us.saturating_sub(since_us) >= GIVEN_UP_US;
+        if self
+            .change
+            .as_ref()
+            .is_some_and(|change| given_up(change.since_us))
+        {
+            self.change = None;
+            return Some(Outcome::Unanswered);
+        }
+        None
+    }
+
+    /// What is to be said now.
+    pub fn take(&mut self) -> Vec<Message> {
+        std::mem::take(&mut self.outbox)
+    }
+}
+
+const STOP: Message = Message::Stop(Stop {
+    reason: StopReason::Operator,
+});
+
+/// What the board of `role` refuses, and answers with its own.
+const fn question(role: Role) -> Message {
+    Message::Configure(match role {
+        Role::Sensor => Configuration::Display(DisplayConfiguration::DEFAULT),
+        _ => Configuration::Sensor(SensorConfiguration::DEFAULT),
+    })
+}

@@ -1,0 +1,98 @@
+//! The monitor for pipes and logs: a line now and then, and one at each change.
+
+use std::io::{self, ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::desk::Desk;
+use super::line;
+use crate::host_clock::now_us;
+
+/// Longest wait until a signal, or a line of a log, is seen.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What the lines are to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Format {
+    /// JSON instead of columns.
+    pub is_json: bool,
+    /// Time between two lines.
+    pub every: Duration,
+    /// Ends after so long.
+    pub limit: Option<Duration>,
+}
+
+/// Writes lines until `ended`, until the source has ended, or until nobody reads them any more.
+///
+/// # Errors
+/// If they can't be written for another reason.
+pub fn run(
+    mut desk: Desk,
+    format: &Format,
+    ended: &AtomicBool,
+    output: &mut impl Write,
+) -> io::Result<()> {
+    let written = write_lines(&mut desk, format, ended, output);
+    let closed = desk.close();
+    match written {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => closed,
+        Err(error) => Err(error),
+        Ok(()) => closed,
+    }
+}
+
+fn write_lines(
+    desk: &mut Desk,
+    format: &Format,
+    ended: &AtomicBool,
+    output: &mut impl Write,
+) -> io::Result<()> {
+    let begun_us = now_us();
+    let every_us = micros(format.every).max(1);
+    let mut next_us = begun_us + every_us;
+    let end_us = format
+        .limit
+        .map(|limit| begun_us.saturating_add(micros(limit)));
+    if !format.is_json {
+        writeln!(output, "{}", line::HEADING)?;
+        output.flush()?;
+    }
+    loop {
+        let now = now_us();
+        let wait = Duration::from_micros(next_us.saturating_sub(now)).min(LOOK);
+        desk.wait(wait);
+        desk.take();
+        let now = now_us();
+        let happenings = desk.dashboard.take_happenings();
+        let is_due = now >= next_us;
+        let is_over = desk.is_over()
+            || ended.load(Ordering::Acquire)
+            || end_us.is_some_and(|end_us| now >= end_us);
+        for happening in &happenings {
+            if format.is_json {
+                writeln!(output, "{}", line::happening_json(happening))?;
+            } else {
+                writeln!(output, "{}", line::happening(happening))?;
+            }
+        }
+        if is_due {
+            // One line stands for those that would have been due while nobody took them.
+            next_us = (next_us + every_us).max(now);
+            if format.is_json {
+                writeln!(output, "{}", line::second_json(&desk.dashboard))?;
+            } else {
+                writeln!(output, "{}", line::second(&desk.dashboard))?;
+            }
+        }
+        if is_due || !happenings.is_empty() {
+            output.flush()?;
+        }
+        if is_over {
+            return Ok(());
+        }
+    }
+}
+
+fn micros(duration: Duration) -> u64 {
+    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
+}

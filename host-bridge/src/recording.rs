@@ -1,0 +1,252 @@
+//! Recordings: everything that both boards say, and what their links do, in MCAP and CSV.
+//!
+//! ```text
+//! link ─> queue ─> ledger: rows, times, gaps ─> books: MCAP files, CSV folder ─> safe on disk, once a second
+//! MCAP ─> reader: rows ─> replay
+//! ```
+//!
+//! MCAP holds JSON with its JSON Schema, which Foxglove and PlotJuggler read as they come. There is a
+//! channel for each board and kind of message: [`row::CHANNELS`].
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use protocol::{PortCounters, Role};
+
+use crate::host_clock::now_us;
+use crate::link::Event;
+
+mod books;
+mod csv_folder;
+mod error;
+pub mod gauge_stream;
+mod json_schema;
+mod ledger;
+mod mcap_file;
+mod paper;
+mod queue;
+pub mod reader;
+pub mod row;
+
+pub use books::part_path;
+pub use error::RecordingError;
+pub use ledger::{Entry, Tally};
+
+use books::Books;
+use ledger::Ledger;
+use queue::{Queue, Taken};
+
+/// How often what has been heard is made safe: with the time that the disk takes, once a second.
+pub const SYNC: Duration = Duration::from_millis(900);
+/// How long an MCAP file gets before another one follows: its index takes some 7 MB of memory until then.
+pub const PART: Duration = Duration::from_secs(4 * 3_600);
+
+/// Where a recording goes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// The MCAP file, if any.
+    pub mcap: Option<PathBuf>,
+    /// The folder of CSV files, if any.
+    pub csv: Option<PathBuf>,
+    /// Whether to write over what is there already.
+    pub force: bool,
+    /// How long an MCAP file gets before another one follows; none: however long.
+    pub part: Option<Duration>,
+}
+
+/// How a recording stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// What has been written.
+    pub tally: Tally,
+    /// Messages of the boards that are safe on the disk.
+    pub safe_messages: u64,
+    /// Samples of the gauges that are safe on the disk.
+    pub safe_samples: u64,
+    /// Bytes that are safe on the disk.
+    pub safe_bytes: u64,
+    /// Whether it has come to an end before its time: [`Recorder::stop`] says why.
+    pub failed: bool,
+}
+
+/// What waits to be written.
+enum Note {
+    Event {
+        role: Role,
+        at_us: u64,
+        event: Event,
+    },
+    Counters {
+        role: Role,
+        at_us: u64,
+        counters: PortCounters,
+    },
+}
+
+type Writer = JoinHandle<Result<Progress, RecordingError>>;
+
+/// A recording under way. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
+pub struct Recorder {
+    shared: Arc<Shared>,
+    writer: Mutex<Option<Writer>>,
+}
+
+struct Shared {
+    queue: Queue<Note>,
+    progress: Mutex<Progress>,
+}
+
+/// A mutex whose data are sound at every moment, whoever died holding it.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Recorder {
+    /// Makes the files and begins to record.
+    ///
+    /// # Errors
+    /// If there are such files already, or they can't be made.
+    pub fn start(settings: Settings) -> Result<Self, RecordingError> {
+        let books = Books::open(settings)?;
+        let shared = Arc::new(Shared {
+            queue: Queue::default(),
+            progress: Mutex::default(),
+        });
+        let desk = Desk {
+            shared: Arc::clone(&shared),
+            books,
+            ledger: Ledger::default(),
+        };
+        Ok(Self {
+            shared,
+            writer: Mutex::new(Some(thread::spawn(|| desk.run()))),
+        })
+    }
+
+    /// Takes what the link to the board of `role` tells: to be called from the link's thread, which it does
+    /// not hold up for longer than 100 ms, and then only once while the disk stands still.
+    pub fn on_event(&self, role: Role, event: &Event) {
+        let at_us = match event {
+            Event::Heard { at_us, .. } => *at_us,
+            Event::Restarted | Event::Turned(_) => now_us(),
+        };
+        let event = event.clone();
+        self.shared
+            .queue
+            .put(role, Note::Event { role, at_us, event });
+    }
+
+    /// Takes what this end of the line to the board of `role` has counted.
+    pub fn on_counters(&self, role: Role, counters: PortCounters) {
+        let at_us = now_us();
+        let note = Note::Counters {
+            role,
+            at_us,
+            counters,
+        };
+        self.shared.queue.put(role, note);
+    }
+
+    /// How it stands.
+    pub fn progress(&self) -> Progress {
+        *locked(&self.shared.progress)
+    }
+
+    /// Writes what still waits, ends the files as they should end, and says what is in them. The second call
+    /// says nothing.
+    ///
+    /// # Errors
+    /// If they could not be written to the end. What was safe before is.
+    pub fn stop(&self) -> Result<Progress, RecordingError> {
+        self.shared.queue.close();
+        match locked(&self.writer).take() {
+            None => Ok(self.progress()),
+            Some(writer) => writer.join().map_err(|_| RecordingError::Died)?,
+        }
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        let _ = self.stop();
+    }
+}
+
+/// Where the writing is done, on a thread of its own.
+struct Desk {
+    shared: Arc<Shared>,
+    books: Books,
+    ledger: Ledger,
+}
+
+impl Desk {
+    fn run(mut self) -> Result<Progress, RecordingError> {
+        match self.write_all() {
+            Ok(()) => {
+                let Self {
+                    shared,
+                    books,
+                    ledger,
+                } = self;
+                let safe_bytes = books
+                    .finish()
+                    .inspect_err(|_| locked(&shared.progress).failed = true)?;
+                let mut progress = locked(&shared.progress);
+                *progress = all_safe(ledger.tally(), safe_bytes);
+                Ok(*progress)
+            }
+            Err(error) => {
+                self.shared.queue.abandon();
+                self.books.abandon();
+                locked(&self.shared.progress).failed = true;
+                Err(error)
+            }
+        }
+    }
+
+    /// Writes until the queue is closed and empty.
+    fn write_all(&mut self) -> Result<(), RecordingError> {
+        let mut due = Instant::now() + SYNC;
+        loop {
+            let Self {
+                shared,
+                books,
+                ledger,
+            } = self;
+            match shared.queue.take(due) {
+                Taken::Item(Note::Event { role, at_us, event }) => {
+                    ledger.enter(role, &event, at_us, |entry| books.write(&entry))?;
+                }
+                Taken::Item(Note::Counters {
+                    role,
+                    at_us,
+                    counters,
+                }) => {
+                    ledger.enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
+                }
+                Taken::Refused(role, missing) => {
+                    ledger.enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
+                }
+                Taken::Nothing => {}
+                Taken::Closed => return Ok(()),
+            }
+            if Instant::now() >= due {
+                books.sync()?;
+                *locked(&shared.progress) = all_safe(ledger.tally(), books.safe_bytes());
+                due = Instant::now() + SYNC;
+            }
+        }
+    }
+}
+
+fn all_safe(tally: Tally, safe_bytes: u64) -> Progress {
+    Progress {
+        tally,
+        safe_messages: tally.messages,
+        safe_samples: tally.samples,
+        safe_bytes,
+        failed: false,
+    }
+}

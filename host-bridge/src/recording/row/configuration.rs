@@ -1,0 +1,51 @@
+//! Reported configurations as rows.
+
+use postcard_schema::Schema;
+use protocol::{
+    Configuration, ConfigurationReport, DisplayConfiguration, Refusal, SensorConfiguration,
+};
+use serde::{Deserialize, Serialize};
+
+/// A sensor board's [`ConfigurationReport`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SensorConfigurationRow {
+    /// [`ConfigurationReport::refused`]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<Refusal>,
+    /// [`ConfigurationReport::hash`]
+    pub hash: u32,
+    /// [`ConfigurationReport::configuration`]
+    pub in_force: SensorConfiguration,
+}
+
+/// A display board's [`ConfigurationReport`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct DisplayConfigurationRow {
+    /// [`ConfigurationReport::refused`]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<Refusal>,
+    /// [`ConfigurationReport::hash`]
+    pub hash: u32,
+    /// [`ConfigurationReport::configuration`]
+    pub in_force: DisplayConfiguration,
+}
+
+impl From<SensorConfigurationRow> for ConfigurationReport {
+    fn from(row: SensorConfigurationRow) -> Self {
+        Self {
+            refused: row.refused,
+            hash: row.hash,
+            configuration: Configuration::Sensor(row.in_force),
+        }
+    }
+}
+
+impl From<DisplayConfigurationRow> for ConfigurationReport {
+    fn from(row: DisplayConfigurationRow) -> Self {
+        Self {
+            refused: row.refused,
+            hash: row.hash,
+            configuration: Configuration::Display(row.in_force),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Samples of the gauges: a row each, in volts, so that a plot of them is one.
+
+use postcard_schema::Schema;
+use protocol::{CHANNELS, GAUGE_BLOCK, GAUGES, GaugeSample, Gauges};
+use serde::{Deserialize, Serialize};
+
+/// A step of [`GaugeSample::codes`], in V.
+pub const VOLTS_PER_CODE: f64 = 3.3 / 65_536.0;
+/// Volts are written to 10 µV, a fifth of a step, so that the codes can be told from them.
+const PER_VOLT: f64 = 1e5;
+const SAMPLE_US: u64 = 1_000;
+
+/// A sample, at 1 kHz, after the sensor's anti-aliasing filter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct GaugeRow {
+    /// Its index since the sensor's start.
+    pub sample: u32,
+    /// The index of the first sample of the message that it came in.
+    pub block: u32,
+    /// When it was taken, in µs of the sensor's clock.
+    pub instant_us: u64,
+    /// Where the arm was then, in µm since the sensor's start.
+    pub position_um: i64,
+    /// Travel of the arm since the sample before, in µm.
+    pub travel_um: i16,
+    /// Gauge 0 in V, to 10 µV.
+    pub g0_v: f64,
+    /// Gauge 1 in V, to 10 µV.
+    pub g1_v: f64,
+    /// Gauge 2 in V, to 10 µV.
+    pub g2_v: f64,
+    /// Gauge 3 in V, to 10 µV.
+    pub g3_v: f64,
+    /// Gauge 4 in V, to 10 µV.
+    pub g4_v: f64,
+    /// The tangential force channel in V, to 10 µV.
+    pub tangential_v: f64,
+}
+
+impl GaugeRow {
+    /// The samples of a message, in order.
+    pub fn all(gauges: &Gauges) -> [Self; GAUGE_BLOCK] {
+        let mut position_um = gauges.position_um;
+        let mut at = 0;
+        gauges.samples.map(|sample| {
+            let index = at;
+            at += 1;
+            if index > 0 {
+                position_um = position_um.saturating_add(sample.travel_um.into());
+            }
+            let [g0_v, g1_v, g2_v, g3_v, g4_v, tangential_v] = sample.codes.map(volts);
+            Self {
+                sample: gauges.first_sample.wrapping_add(index),
+                block: gauges.first_sample,
+                instant_us: gauges.instant_us + u64::from(index) * SAMPLE_US,
+                position_um,
+                travel_um: sample.travel_um,
+                g0_v,
+                g1_v,
+                g2_v,
+                g3_v,
+                g4_v,
+                tangential_v,
+            }
+        })
+    }
+
+    /// All channels in V, the tangential force last.
+    pub const fn volts(&self) -> [f64; CHANNELS] {
+        [
+            self.g0_v,
+            self.g1_v,
+            self.g2_v,
+            self.g3_v,
+            self.g4_v,
+            self.tangential_v,
+        ]
+    }
+
+    /// All channels as the board sent them.
+    pub fn codes(&self) -> [u16; CHANNELS] {
+        // Saturates where no board could have said it.
+        self.volts()
+            .map(|volts| (volts / VOLTS_PER_CODE).round() as u16)
+    }
+}
+
+const _: () = assert!(CHANNELS == GAUGES + 1);
+
+fn volts(code: u16) -> f64 {
+    (f64::from(code) * VOLTS_PER_CODE * PER_VOLT).round() / PER_VOLT
+}
+
+/// The message that rows came in; none if they are not the whole of one.
+pub fn block(rows: &[GaugeRow]) -> Option<Gauges> {
+    let first = rows.first()?;
+    let whole = rows.len() == GAUGE_BLOCK
+        && rows.iter().zip(0..).all(|(row, index)| {
+            row.block == first.block && row.sample == first.block.wrapping_add(index)
+        });
+    let mut samples = [GaugeSample::default(); GAUGE_BLOCK];
+    for (sample, row) in samples.iter_mut().zip(rows) {
+        *sample = GaugeSample {
+            codes: row.codes(),
+            travel_um: row.travel_um,
+        };
+    }
+    whole.then_some(Gauges {
+        first_sample: first.block,
+        instant_us: first.instant_us,
+        position_um: first.position_um,
+        samples,
+    })
+}

@@ -1,0 +1,265 @@
+//! Counters and the supervisor's state as rows.
+
+use postcard_schema::Schema;
+use protocol::{
+    DisplayCounters, DisplayState, Hold, PortCounters, ResetCause, RoleCounters, Safety,
+    SensorCounters, Status, Trip,
+};
+use serde::{Deserialize, Serialize};
+
+/// A sensor board's [`Status`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SensorStatusRow {
+    /// [`Status::uptime_us`]
+    pub uptime_us: u64,
+    /// [`Status::reset`]
+    pub reset: ResetCause,
+    /// [`Status::watchdog_resets`]
+    pub watchdog_resets: u32,
+    /// [`Status::peer`]
+    pub peer: PortCounters,
+    /// [`Status::console`]
+    pub console: PortCounters,
+    /// [`Status::role`]
+    pub sensor: SensorCounters,
+}
+
+/// A display board's [`Status`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct DisplayStatusRow {
+    /// [`Status::uptime_us`]
+    pub uptime_us: u64,
+    /// [`Status::reset`]
+    pub reset: ResetCause,
+    /// [`Status::watchdog_resets`]
+    pub watchdog_resets: u32,
+    /// [`Status::peer`]
+    pub peer: PortCounters,
+    /// [`Status::console`]
+    pub console: PortCounters,
+    /// [`Status::role`], without the state
+    pub display: DisplayCountersRow,
+    /// [`DisplayCounters::state`]
+    pub supervisor: Stand,
+}
+
+/// [`DisplayCounters`] without the state.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct DisplayCountersRow {
+    /// [`DisplayCounters::ticks`]
+    pub ticks: u32,
+    /// [`DisplayCounters::updates`]
+    pub updates: u32,
+    /// [`DisplayCounters::deadline_misses`]
+    pub deadline_misses: u32,
+    /// [`DisplayCounters::estimates`]
+    pub estimates: u32,
+    /// [`DisplayCounters::refused_estimates`]
+    pub refused_estimates: u32,
+    /// [`DisplayCounters::fades`]
+    pub fades: u32,
+    /// [`DisplayCounters::spi_errors`]
+    pub spi_errors: u32,
+    /// [`DisplayCounters::implausible`]
+    pub implausible: u32,
+    /// [`DisplayCounters::flooded`]
+    pub flooded: u32,
+    /// [`DisplayCounters::encoder_jumps`]
+    pub encoder_jumps: u32,
+    /// [`DisplayCounters::converter_faults`]
+    pub converter_faults: u32,
+    /// [`DisplayCounters::clears`]
+    pub clears: u32,
+    /// [`DisplayCounters::unheard`]
+    pub unheard: u32,
+    /// [`DisplayCounters::changes`]
+    pub changes: u32,
+}
+
+/// A change of the supervisor's state.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SafetyRow {
+    /// [`Safety::instant_us`]
+    pub instant_us: u64,
+    /// [`Safety::state`]
+    pub supervisor: Stand,
+}
+
+/// A [`DisplayState`], its reason beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Stand {
+    /// Its name.
+    pub state: StandName,
+    /// Why it fades.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hold: Option<Hold>,
+    /// Why it has stopped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trip: Option<Trip>,
+}
+
+/// The name of a [`DisplayState`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum StandName {
+    /// [`DisplayState::Boot`]
+    Boot,
+    /// [`DisplayState::Ready`]
+    Ready,
+    /// [`DisplayState::Driving`]
+    Driving,
+    /// [`DisplayState::Fading`]
+    Fading,
+    /// [`DisplayState::Stopped`]
+    Stopped,
+}
+
+impl From<DisplayState> for Stand {
+    fn from(state: DisplayState) -> Self {
+        let stand = |state| Self {
+            state,
+            hold: None,
+            trip: None,
+        };
+        match state {
+            DisplayState::Boot => stand(StandName::Boot),
+            DisplayState::Ready => stand(StandName::Ready),
+            DisplayState::Driving => stand(StandName::Driving),
+            DisplayState::Fading(hold) => Self {
+                hold: Some(hold),
+                ..stand(StandName::Fading)
+            },
+            DisplayState::Stopped(trip) => Self {
+                trip: Some(trip),
+                ..stand(StandName::Stopped)
+            },
+        }
+    }
+}
+
+impl Stand {
+    /// The state; none if its reason is missing.
+    pub fn state(self) -> Option<DisplayState> {
+        Some(match self.state {
+            StandName::Boot => DisplayState::Boot,
+            StandName::Ready => DisplayState::Ready,
+            StandName::Driving => DisplayState::Driving,
+            StandName::Fading => DisplayState::Fading(self.hold?),
+            StandName::Stopped => DisplayState::Stopped(self.trip?),
+        })
+    }
+}
+
+impl SensorStatusRow {
+    /// The row of a sensor board's status.
+    pub fn new(status: &Status, sensor: SensorCounters) -> Self {
+        Self {
+            uptime_us: status.uptime_us,
+            reset: status.reset,
+            watchdog_resets: status.watchdog_resets,
+            peer: status.peer,
+            console: status.console,
+            sensor,
+        }
+    }
+
+    /// The status.
+    pub fn status(self) -> Status {
+        Status {
+            uptime_us: self.uptime_us,
+            reset: self.reset,
+            watchdog_resets: self.watchdog_resets,
+            peer: self.peer,
+            console: self.console,
+            role: RoleCounters::Sensor(self.sensor),
+        }
+    }
+}
+
+impl DisplayStatusRow {
+    /// The row of a display board's status.
+    pub fn new(status: &Status, display: &DisplayCounters) -> Self {
+        Self {
+            uptime_us: status.uptime_us,
+            reset: status.reset,
+            watchdog_resets: status.watchdog_resets,
+            peer: status.peer,
+            console: status.console,
+            display: display.into(),
+            supervisor: display.state.into(),
+        }
+    }
+
+    /// The status; none if the supervisor's reason is missing.
+    pub fn status(self) -> Option<Status> {
+        Some(Status {
+            uptime_us: self.uptime_us,
+            reset: self.reset,
+            watchdog_resets: self.watchdog_resets,
+            peer: self.peer,
+            console: self.console,
+            role: RoleCounters::Display(self.display.with(self.supervisor.state()?)),
+        })
+    }
+}
+
+impl From<&DisplayCounters> for DisplayCountersRow {
+    fn from(counters: &DisplayCounters) -> Self {
+        Self {
+            ticks: counters.ticks,
+            updates: counters.updates,
+            deadline_misses: counters.deadline_misses,
+            estimates: counters.estimates,
+            refused_estimates: counters.refused_estimates,
+            fades: counters.fades,
+            spi_errors: counters.spi_errors,
+            implausible: counters.implausible,
+            flooded: counters.flooded,
+            encoder_jumps: counters.encoder_jumps,
+            converter_faults: counters.converter_faults,
+            clears: counters.clears,
+            unheard: counters.unheard,
+            changes: counters.changes,
+        }
+    }
+}
+
+impl DisplayCountersRow {
+    fn with(self, state: DisplayState) -> DisplayCounters {
+        DisplayCounters {
+            ticks: self.ticks,
+            updates: self.updates,
+            deadline_misses: self.deadline_misses,
+            estimates: self.estimates,
+            refused_estimates: self.refused_estimates,
+            fades: self.fades,
+            spi_errors: self.spi_errors,
+            implausible: self.implausible,
+            flooded: self.flooded,
+            encoder_jumps: self.encoder_jumps,
+            converter_faults: self.converter_faults,
+            clears: self.clears,
+            unheard: self.unheard,
+            changes: self.changes,
+            state,
+        }
+    }
+}
+
+impl From<Safety> for SafetyRow {
+    fn from(safety: Safety) -> Self {
+        Self {
+            instant_us: safety.instant_us,
+            supervisor: safety.state.into(),
+        }
+    }
+}
+
+impl SafetyRow {
+    /// The message; none if the supervisor's reason is missing.
+    pub fn safety(self) -> Option<Safety> {
+        Some(Safety {
+            instant_us: self.instant_us,
+            state: self.supervisor.state()?,
+        })
+    }
+}

@@ -1,0 +1,186 @@
+//! Who may take part: a certificate authority, one's own certificate and its key, looked at before they
+//! are needed.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustls::crypto::{CryptoProvider, ring};
+use rustls::pki_types::pem::PemObject;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
+use rustls::server::WebPkiClientVerifier;
+use rustls::{CertificateError, ClientConfig, Error, RootCertStore, version::TLS13};
+
+/// Three PEM files. With them, both ends of every connection have to prove who they are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Credentials {
+    /// Whose certificates are believed.
+    pub ca: PathBuf,
+    /// One's own certificate, for connecting and for listening, and what leads from it to its CA.
+    pub certificate: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+/// Why credentials can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CredentialsError {
+    /// A file can't be read.
+    #[error("{path}: can't be read: {reason}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's.
+        reason: io::Error,
+    },
+    /// A file has no certificate in it.
+    #[error("{path}: no certificate in it: a PEM file with BEGIN CERTIFICATE is wanted")]
+    NoCertificate {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file has no key in it.
+    #[error(
+        "{path}: no private key in it: a PEM file with BEGIN PRIVATE KEY is wanted, without a password"
+    )]
+    NoKey {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The key is another certificate's.
+    #[error("{key}: not the key of {certificate}: give the two that were made together")]
+    Mismatch {
+        /// The key's file.
+        key: PathBuf,
+        /// The certificate's file.
+        certificate: PathBuf,
+    },
+    /// The certificate is too old.
+    #[error("{path}: the certificate has expired: have a new one made")]
+    Expired {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The certificate's time has not come.
+    #[error("{path}: the certificate is not valid yet: see whether this computer's clock is right")]
+    Early {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The certificate is not meant for this.
+    #[error(
+        "{path}: the certificate is not meant for connecting: it wants extendedKeyUsage = serverAuth, clientAuth"
+    )]
+    Purpose {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Something else is wrong with a file.
+    #[error("{path}: can't be used: {reason}")]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What, in the TLS library's words.
+        reason: Error,
+    },
+}
+
+impl Credentials {
+    /// Reads and checks all three: what a connection will be made with.
+    ///
+    /// # Errors
+    /// If one of them can't be read, is none, doesn't fit, or is not valid today.
+    pub fn load(&self) -> Result<ClientConfig, CredentialsError> {
+        let provider = Arc::new(ring::default_provider());
+        let roots = Arc::new(roots(&self.ca)?);
+        let chain = certificates(&self.certificate)?;
+        self.check_validity(&roots, &chain, &provider)?;
+        let key = PrivateKeyDer::from_pem_slice(&read(&self.key)?).map_err(|_| {
+            CredentialsError::NoKey {
+                path: self.key.clone(),
+            }
+        })?;
+        let unusable = |reason| CredentialsError::Unusable {
+            path: self.key.clone(),
+            reason,
+        };
+        ClientConfig::builder_with_provider(provider)
+            .with_protocol_versions(&[&TLS13])
+            .map_err(unusable)?
+            .with_root_certificates(roots)
+            .with_client_auth_cert(chain, key)
+            .map_err(|error| match error {
+                Error::InconsistentKeys(_) => CredentialsError::Mismatch {
+                    key: self.key.clone(),
+                    certificate: self.certificate.clone(),
+                },
+                reason => unusable(reason),
+            })
+    }
+
+    /// Whether one's own certificate is valid today, whoever made it: the other site may believe in
+    /// another CA than this one.
+    fn check_validity(
+        &self,
+        roots: &Arc<RootCertStore>,
+        chain: &[CertificateDer<'static>],
+        provider: &Arc<CryptoProvider>,
+    ) -> Result<(), CredentialsError> {
+        let Some((own, between)) = chain.split_first() else {
+            return Err(CredentialsError::NoCertificate {
+                path: self.certificate.clone(),
+            });
+        };
+        let verifier =
+            WebPkiClientVerifier::builder_with_provider(Arc::clone(roots), Arc::clone(provider))
+                .build()
+                .map_err(|_| CredentialsError::NoCertificate {
+                    path: self.ca.clone(),
+                })?;
+        let path = self.certificate.clone();
+        match verifier.verify_client_cert(own, between, UnixTime::now()) {
+            Ok(_) | Err(Error::InvalidCertificate(CertificateError::UnknownIssuer)) => Ok(()),
+            Err(Error::InvalidCertificate(
+                CertificateError::Expired | CertificateError::ExpiredContext { .. },
+            )) => Err(CredentialsError::Expired { path }),
+            Err(Error::InvalidCertificate(
+                CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. },
+            )) => Err(CredentialsError::Early { path }),
+            Err(Error::InvalidCertificate(
+                CertificateError::InvalidPurpose | CertificateError::InvalidPurposeContext { .. },
+            )) => Err(CredentialsError::Purpose { path }),
+            Err(reason) => Err(CredentialsError::Unusable { path, reason }),
+        }
+    }
+}
+
+fn roots(path: &Path) -> Result<RootCertStore, CredentialsError> {
+    let mut roots = RootCertStore::empty();
+    for certificate in certificates(path)? {
+        roots
+            .add(certificate)
+            .map_err(|reason| CredentialsError::Unusable {
+                path: path.to_owned(),
+                reason,
+            })?;
+    }
+    Ok(roots)
+}
+
+fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, CredentialsError> {
+    let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&read(path)?).collect();
+    match found {
+        Ok(found) if !found.is_empty() => Ok(found),
+        _ => Err(CredentialsError::NoCertificate {
+            path: path.to_owned(),
+        }),
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, CredentialsError> {
+    fs::read(path).map_err(|reason| CredentialsError::Unreadable {
+        path: path.to_owned(),
+        reason,
+    })
+}

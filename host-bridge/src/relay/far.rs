@@ -1,0 +1,192 @@
+//! Who is at the other site, and since when nothing was heard from there.
+
+use std::fmt;
+use std::time::Duration;
+
+use protocol::{Hello, PROTOCOL_VERSION, Role};
+
+use crate::relay::envelope::ENVELOPE_VERSION;
+use crate::state::Named;
+
+/// After this long without a word the other site counts as silent, and nothing but pings is sent there:
+/// what would wait on the way would be old when it came.
+pub const SILENCE: Duration = Duration::from_secs(2);
+/// [`SILENCE`] in µs.
+pub const SILENCE_US: u64 = 2_000_000;
+
+/// How the other site stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FarState {
+    /// Nothing was ever heard.
+    Unheard,
+    /// A bridge of this build is there.
+    Known {
+        /// What it says of itself.
+        hello: Hello,
+        /// Which start of it.
+        session: u64,
+    },
+    /// A bridge was there, and nothing has been heard for [`SILENCE`].
+    Silent,
+    /// A bridge of another build is there.
+    Foreign {
+        /// What it says of itself.
+        hello: Hello,
+        /// Its envelope's version.
+        version: u8,
+    },
+}
+
+impl FarState {
+    /// One word for it, for scripts; never changes.
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Unheard => "unheard",
+            Self::Known { .. } => "known",
+            Self::Silent => "silent",
+            Self::Foreign { .. } => "foreign",
+        }
+    }
+}
+
+impl fmt::Display for FarState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unheard => f.write_str("not heard yet"),
+            Self::Known { hello, .. } => write!(f, "{}", Named(hello)),
+            Self::Silent => f.write_str("silent"),
+            Self::Foreign { hello, version } => write!(
+                f,
+                "{} of protocol {} (schema {:016x}, envelope {version}); this program speaks {PROTOCOL_VERSION} (schema {:016x}, envelope {ENVELOPE_VERSION}): install the same build at both sites",
+                Named(hello),
+                hello.protocol_version(),
+                hello.schema_hash(),
+                protocol::SCHEMA_HASH,
+            ),
+        }
+    }
+}
+
+/// The other site's bridge.
+#[derive(Clone, Debug)]
+pub struct Far {
+    state: FarState,
+    heard_us: u64,
+    answered_us: Option<u64>,
+}
+
+impl Default for Far {
+    fn default() -> Self {
+        Self {
+            state: FarState::Unheard,
+            heard_us: 0,
+            answered_us: None,
+        }
+    }
+}
+
+impl Far {
+    /// How it stands.
+    pub const fn state(&self) -> &FarState {
+        &self.state
+    }
+
+    /// A sound envelope came. True if it is the first one of another start of the bridge.
+    pub fn hear(&mut self, hello: Hello, session: u64, now_us: u64) -> bool {
+        let is_other = !self.is_session(session);
+        self.heard_us = now_us;
+        if is_other {
+            self.answered_us = None;
+        }
+        self.state = FarState::Known { hello, session };
+        is_other
+    }
+
+    /// An envelope of another build came. It is no more than noted while a bridge of this build is there.
+    pub fn hear_foreign(&mut self, hello: Hello, version: u8) {
+        if !matches!(self.state, FarState::Known { .. }) {
+            self.state = FarState::Foreign { hello, version };
+        }
+    }
+
+    /// A ping of one's own was answered.
+    pub const fn on_answer(&mut self, now_us: u64) {
+        self.answered_us = Some(now_us);
+    }
+
+    /// Whether what is sent now is likely to arrive soon: pings are being answered.
+    pub fn is_answering(&self, now_us: u64) -> bool {
+        self.answered_us
+            .is_some_and(|answered_us| now_us.saturating_sub(answered_us) <= SILENCE_US)
+    }
+
+    /// Time passes. True if the other site has just become silent.
+    pub fn elapse(&mut self, now_us: u64) -> bool {
+        let is_silent = matches!(self.state, FarState::Known { .. })
+            && now_us.saturating_sub(self.heard_us) > SILENCE_US;
+        if is_silent {
+            self.state = FarState::Silent;
+        }
+        is_silent
+    }
+
+    /// Whether it is the one of this session.
+    pub const fn is_session(&self, other: u64) -> bool {
+        matches!(self.state, FarState::Known { session, .. } if session == other)
+    }
+}
+
+/// A site in words.
+pub const fn site(role: Role) -> &'static str {
+    match role {
+        Role::Sensor => "the sensor's site",
+        Role::Display => "the display's site",
+        Role::Host => "an operator",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::host_hello;
+
+    #[test]
+    fn who_is_heard_is_known_until_it_is_silent() {
+        let mut far = Far::default();
+        assert!(far.hear(host_hello(), 1, 0));
+        assert!(!far.hear(host_hello(), 1, 10));
+        assert!(!far.elapse(10 + SILENCE_US));
+        assert!(far.elapse(11 + SILENCE_US));
+        assert!(!far.elapse(12 + SILENCE_US), "said once");
+        assert_eq!(far.state(), &FarState::Silent);
+    }
+
+    #[test]
+    fn only_answers_show_that_what_is_sent_arrives() {
+        let mut far = Far::default();
+        far.hear(host_hello(), 1, 0);
+        assert!(!far.is_answering(0));
+        far.on_answer(5);
+        assert!(far.is_answering(5 + SILENCE_US));
+        assert!(!far.is_answering(6 + SILENCE_US));
+        far.on_answer(7 + SILENCE_US);
+        far.hear(host_hello(), 2, 7 + SILENCE_US);
+        assert!(
+            !far.is_answering(7 + SILENCE_US),
+            "another start has not answered"
+        );
+    }
+
+    #[test]
+    fn another_build_is_named_unless_one_of_this_build_is_there() {
+        let mut other = host_hello();
+        other.protocol = 77_u16.to_le_bytes();
+        let mut far = Far::default();
+        far.hear_foreign(other, 1);
+        let words = far.state().to_string();
+        assert!(words.contains("of protocol 77"), "{words}");
+        far.hear(host_hello(), 1, 0);
+        far.hear_foreign(other, 1);
+        assert_eq!(far.state().word(), "known");
+    }
+}

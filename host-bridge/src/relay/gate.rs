@@ -1,0 +1,270 @@
+//! Nothing old after something newer: which envelopes of a stream may pass, and what became of the rest.
+
+use std::collections::VecDeque;
+
+/// How far back a late envelope is told from one that came twice.
+const WINDOW: u64 = 128;
+/// Earlier sessions that are remembered, so that none of their stragglers is taken for a new one.
+const RETIRED: usize = 16;
+
+/// What an envelope's place says about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Newer than all before.
+    Newer,
+    /// A newer one came before: the network changed their order.
+    Late,
+    /// It came before.
+    Duplicate,
+    /// From a bridge that another has followed.
+    Retired,
+    /// Newer, and yet what the board says in it is not.
+    Repeated,
+}
+
+/// What the gate has counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Arrivals {
+    /// All that came.
+    pub received: u64,
+    /// Never came, of those between the first and the newest.
+    pub lost: u64,
+    /// Came after a newer one.
+    pub late: u64,
+    /// Came again.
+    pub duplicated: u64,
+    /// Came from a bridge that another has followed, or repeated what the board had said before.
+    pub superseded: u64,
+}
+
+/// What a board's message says of its own place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Saying {
+    /// Counts the starts of the board, as its bridge sees them.
+    pub start: u32,
+    /// The board's own count.
+    pub sequence: u32,
+}
+
+/// The order of one stream.
+#[derive(Clone, Debug, Default)]
+pub struct Gate {
+    session: Option<u64>,
+    retired: VecDeque<u64>,
+    /// The newest envelope's number, once there is one.
+    newest: Option<u64>,
+    /// Bit b set: number `newest - b` was skipped and is still missing.
+    missing: u128,
+    /// How many numbers before the newest belong to this session, below [`WINDOW`].
+    depth: u64,
+    last: Option<Saying>,
+    arrivals: Arrivals,
+}
+
+impl Gate {
+    /// Judges the envelope numbered `counter` of `session`, and counts it. Who may pass is [`Order::Newer`]
+    /// and nobody else.
+    pub fn judge(&mut self, session: u64, counter: u64, saying: Saying) -> Order {
+        self.arrivals.received += 1;
+        if self.is_retired(session) {
+            self.arrivals.superseded += 1;
+            return Order::Retired;
+        }
+        self.follow(session);
+        match self.place(counter) {
+            Order::Newer => {}
+            other => return other,
+        }
+        let repeats = self
+            .last
+            .is_some_and(|last| saying.start == last.start && !follows(saying, last));
+        if repeats {
+            self.arrivals.superseded += 1;
+            return Order::Repeated;
+        }
+        self.last = Some(saying);
+        Order::Newer
+    }
+
+    /// Whether another bridge has followed the one of `session`.
+    pub fn is_retired(&self, session: u64) -> bool {
+        self.retired.contains(&session)
+    }
+
+    /// The bridge of `session` is there: what another one still says of its board is not listened to any
+    /// more. True if there was none, or another one.
+    pub fn follow(&mut self, session: u64) -> bool {
+        let is_other = self.session != Some(session);
+        if is_other {
+            self.begin(session);
+        }
+        is_other
+    }
+
+    /// What has been counted so far.
+    pub const fn arrivals(&self) -> Arrivals {
+        self.arrivals
+    }
+
+    /// Another bridge speaks from now on.
+    fn begin(&mut self, session: u64) {
+        if let Some(old) = self.session.replace(session) {
+            self.retired.truncate(RETIRED - 1);
+            self.retired.push_front(old);
+        }
+        self.newest = None;
+        self.missing = 0;
+        self.depth = 0;
+        self.last = None;
+    }
+
+    fn place(&mut self, counter: u64) -> Order {
+        let Some(newest) = self.newest else {
+            self.newest = Some(counter);
+            return Order::Newer;
+        };
+        if let Some(ahead @ 1..) = counter.checked_sub(newest) {
+            self.arrivals.lost += ahead - 1;
+            // The skipped ones are bits 1 to ahead - 1.
+            let moved = u32::try_from(ahead)
+                .ok()
+                .and_then(|ahead| self.missing.checked_shl(ahead))
+                .unwrap_or(0);
+            let skipped = 1_u128
+                .checked_shl(u32::try_from(ahead).unwrap_or(u32::MAX))
+                .map_or(u128::MAX, |bit| bit - 1);
+            self.missing = moved | (skipped & !1);
+            self.newest = Some(counter);
+            self.depth = self.depth.saturating_add(ahead).min(WINDOW - 1);
+            return Order::Newer;
+        }
+        let behind = newest - counter;
+        let bit = 1_u128 << behind.min(WINDOW - 1);
+        if behind < WINDOW && self.missing & bit != 0 {
+            self.missing &= !bit;
+            self.arrivals.lost -= 1;
+            self.arrivals.late += 1;
+            Order::Late
+        } else if behind > self.depth {
+            // Older than can be remembered, or than the first that was heard.
+            self.arrivals.late += 1;
+            Order::Late
+        } else {
+            self.arrivals.duplicated += 1;
+            Order::Duplicate
+        }
+    }
+}
+
+/// Whether a board said `saying` after `last`, in counts that wrap.
+const fn follows(saying: Saying, last: Saying) -> bool {
+    saying.sequence.wrapping_sub(last.sequence).cast_signed() > 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(number: u64) -> Saying {
+        Saying {
+            start: 0,
+            sequence: number as u32,
+        }
+    }
+
+    /// What becomes of the envelopes `counters` of one session.
+    fn judged(counters: &[u64]) -> (Vec<Order>, Arrivals) {
+        let mut gate = Gate::default();
+        let orders = counters
+            .iter()
+            .map(|&counter| gate.judge(7, counter, said(counter)))
+            .collect();
+        (orders, gate.arrivals())
+    }
+
+    #[test]
+    fn a_stream_in_order_passes_whole_wherever_it_begins() {
+        let (orders, arrivals) = judged(&[1_000_000, 1_000_001, 1_000_002]);
+        assert_eq!(orders, [Order::Newer; 3]);
+        assert_eq!((arrivals.received, arrivals.lost), (3, 0));
+    }
+
+    #[test]
+    fn a_gap_is_lost_until_it_is_filled_late_and_never_passes() {
+        let (orders, arrivals) = judged(&[1, 4, 2, 3, 2, 5]);
+        use Order::{Duplicate, Late, Newer};
+        assert_eq!(orders, [Newer, Newer, Late, Late, Duplicate, Newer]);
+        assert_eq!(
+            (arrivals.lost, arrivals.late, arrivals.duplicated),
+            (0, 2, 1)
+        );
+    }
+
+    #[test]
+    fn what_comes_twice_passes_once() {
+        let (orders, arrivals) = judged(&[1, 1, 2, 2, 1]);
+        use Order::{Duplicate, Newer};
+        assert_eq!(orders, [Newer, Duplicate, Newer, Duplicate, Duplicate]);
+        assert_eq!(arrivals.duplicated, 3);
+    }
+
+    #[test]
+    fn a_long_gap_is_counted_whole_and_its_stragglers_are_late() {
+        let (orders, arrivals) = judged(&[0, 1_000, 999, 5, u64::MAX, 1_000]);
+        use Order::{Late, Newer};
+        assert_eq!(orders, [Newer, Newer, Late, Late, Newer, Late]);
+        assert_eq!(arrivals.lost, 999 - 1 + (u64::MAX - 1_001));
+        assert_eq!(arrivals.late, 3);
+    }
+
+    #[test]
+    fn every_number_passes_at_most_once_and_only_upwards_in_any_order() {
+        // A generator of Lehmer's, so that the shuffling is the same each time.
+        let mut state: u64 = 1;
+        let mut gate = Gate::default();
+        let mut newest = None;
+        for step in 0..20_000_u64 {
+            state = state * 48_271 % 0x7fff_ffff;
+            let counter = (step / 2 + 300).saturating_sub(state % 300);
+            let passes = gate.judge(1, counter, said(counter)) == Order::Newer;
+            assert_eq!(passes, newest.is_none_or(|newest| counter > newest));
+            newest = newest.max(Some(counter));
+        }
+        let arrivals = gate.arrivals();
+        assert_eq!(arrivals.received, 20_000);
+        assert!(
+            arrivals.late > 1_000 && arrivals.duplicated > 1_000,
+            "{arrivals:?}"
+        );
+    }
+
+    #[test]
+    fn a_bridge_that_was_started_anew_is_followed_and_its_forerunner_is_not() {
+        let mut gate = Gate::default();
+        assert_eq!(gate.judge(1, 500, said(500)), Order::Newer);
+        assert_eq!(gate.judge(2, 0, said(501)), Order::Newer);
+        assert_eq!(gate.judge(1, 501, said(502)), Order::Retired);
+        assert_eq!(gate.judge(2, 1, said(503)), Order::Newer);
+        assert_eq!(gate.arrivals().superseded, 1);
+    }
+
+    #[test]
+    fn a_board_that_was_started_anew_is_followed_and_one_that_repeats_itself_is_not() {
+        let mut gate = Gate::default();
+        let say = |start, sequence| Saying { start, sequence };
+        assert_eq!(gate.judge(1, 1, say(0, 900)), Order::Newer);
+        assert_eq!(gate.judge(1, 2, say(0, 900)), Order::Repeated);
+        assert_eq!(gate.judge(1, 3, say(0, 899)), Order::Repeated);
+        assert_eq!(gate.judge(1, 4, say(1, 0)), Order::Newer);
+        assert_eq!(gate.judge(1, 5, say(1, 1)), Order::Newer);
+        assert_eq!(gate.arrivals().superseded, 2);
+    }
+
+    #[test]
+    fn a_boards_count_may_wrap() {
+        let mut gate = Gate::default();
+        let say = |sequence| Saying { start: 0, sequence };
+        assert_eq!(gate.judge(1, 1, say(u32::MAX)), Order::Newer);
+        assert_eq!(gate.judge(1, 2, say(0)), Order::Newer);
+    }
+}

@@ -1,0 +1,221 @@
+//! What comes from the other site, on its way to the board: judged by order and age.
+
+use std::time::Duration;
+
+use protocol::{Ping, Pong, Role, Stop};
+
+use crate::relay::age::{Age, Ages};
+use crate::relay::envelope::{Content, Envelope, EnvelopeError, saying};
+use crate::relay::far::Far;
+use crate::relay::gate::{Gate, Order};
+use crate::relay::histogram::{Histogram, Percentiles};
+use crate::relay::outbox::Waiting;
+use crate::relay::report::{Incoming, Notice};
+
+/// What is to be done about an envelope.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "it is done at once, on the stack of one callback"
+)]
+pub enum Heard {
+    /// Nothing.
+    Nothing,
+    /// The board is to be told.
+    Pass(Waiting),
+    /// A ping of this session is to be answered.
+    Asked(u64, Ping),
+    /// The board is to be told, and then the sender.
+    Stop(u64, Stop),
+    /// The Stop of this number is with the other site's board.
+    Stopped(u64),
+}
+
+/// The inward direction of a bridge.
+#[derive(Clone, Debug)]
+pub struct Inward {
+    /// The role of the other site's board.
+    role: Role,
+    session: u64,
+    max_age_us: u64,
+    gate: Gate,
+    ages: Ages,
+    far: Far,
+    counts: Incoming,
+    total: Histogram,
+    recent: Histogram,
+    told_retired: bool,
+    told_slow: bool,
+}
+
+impl Inward {
+    /// Nothing heard yet from the site of the board of `role`, by the bridge of this `session`.
+    pub fn new(role: Role, session: u64, max_age: Duration) -> Self {
+        Self {
+            role,
+            session,
+            max_age_us: u64::try_from(max_age.as_micros()).unwrap_or(u64::MAX),
+            gate: Gate::default(),
+            ages: Ages::new(max_age),
+            far: Far::default(),
+            counts: Incoming::default(),
+            total: Histogram::default(),
+            recent: Histogram::default(),
+            told_retired: false,
+            told_slow: false,
+        }
+    }
+
+    /// Bytes came from the other site at `now_us`. `tell` hears what a person should know.
+    pub fn hear(&mut self, bytes: &[u8], now_us: u64, mut tell: impl FnMut(Notice)) -> Heard {
+        let envelope = match Envelope::from_bytes(bytes) {
+            Ok(envelope) if envelope.role() == Some(self.role) => envelope,
+            Err(EnvelopeError::Foreign { hello, version }) => {
+                self.counts.refused += 1;
+                let before = self.far.state().clone();
+                self.far.hear_foreign(hello, version);
+                if *self.far.state() != before {
+                    tell(Notice::Far(self.role, self.far.state().clone()));
+                }
+                return Heard::Nothing;
+            }
+            _ => {
+                self.counts.refused += 1;
+                return Heard::Nothing;
+            }
+        };
+        // A retired bridge is not listened to, but what it says of a Stop is true.
+        if !self.gate.is_retired(envelope.session) {
+            self.greet(&envelope, now_us, &mut tell);
+        }
+        match envelope.content {
+            Content::Board { .. } => self.weigh(envelope, now_us, tell),
+            Content::Ping(ping) => Heard::Asked(envelope.session, ping),
+            Content::Pong { to, pong } => {
+                if to == self.session && self.far.is_session(envelope.session) {
+                    self.on_pong(&pong, now_us);
+                }
+                Heard::Nothing
+            }
+            Content::Stop { id, stop } => Heard::Stop(id, stop),
+            Content::Stopped { id } => Heard::Stopped(id),
+        }
+    }
+
+    /// A message was given to the board at `now_us`.
+    pub fn on_passed(&mut self, waiting: &Waiting, now_us: u64) {
+        let age_us = waiting.age_us + now_us.saturating_sub(waiting.came_us);
+        self.counts.passed += 1;
+        self.total.add(age_us);
+        self.recent.add(age_us);
+    }
+
+    /// A message had to make room for a newer one.
+    pub const fn on_replaced(&mut self) {
+        self.counts.replaced += 1;
+    }
+
+    /// A message became too old while it waited for the board's line.
+    pub const fn on_stale(&mut self) {
+        self.counts.stale += 1;
+    }
+
+    /// A message found no board.
+    pub const fn on_boardless(&mut self) {
+        self.counts.boardless += 1;
+    }
+
+    /// The board's line took no more bytes.
+    pub const fn on_stuck(&mut self) {
+        self.counts.stuck += 1;
+    }
+
+    /// Time passes.
+    pub fn elapse(&mut self, now_us: u64, mut tell: impl FnMut(Notice)) {
+        if self.far.elapse(now_us) {
+            tell(Notice::Far(self.role, self.far.state().clone()));
+        }
+    }
+
+    /// Who is at the other site.
+    pub const fn far(&self) -> &Far {
+        &self.far
+    }
+
+    /// The shortest round trip of late, in µs.
+    pub fn round_trip_us(&self) -> Option<u64> {
+        self.ages.round_trip_us()
+    }
+
+    /// What has been counted so far.
+    pub const fn counts(&self) -> Incoming {
+        Incoming {
+            arrivals: self.gate.arrivals(),
+            ..self.counts
+        }
+    }
+
+    /// The ages since this was last asked.
+    pub fn take_recent(&mut self) -> Option<Percentiles> {
+        std::mem::take(&mut self.recent).percentiles()
+    }
+
+    /// All ages.
+    pub fn total(&self) -> Option<Percentiles> {
+        self.total.percentiles()
+    }
+
+    fn greet(&mut self, envelope: &Envelope, now_us: u64, tell: &mut impl FnMut(Notice)) {
+        if self.far.hear(envelope.hello, envelope.session, now_us) {
+            if self.gate.follow(envelope.session) {
+                self.ages.forget();
+            }
+            tell(Notice::Far(self.role, self.far.state().clone()));
+        }
+    }
+
+    fn on_pong(&mut self, pong: &Pong, now_us: u64) {
+        if self.ages.on_pong(pong, now_us) {
+            self.far.on_answer(now_us);
+        }
+    }
+
+    fn weigh(&mut self, envelope: Envelope, now_us: u64, mut tell: impl FnMut(Notice)) -> Heard {
+        let Content::Board { start, message } = envelope.content else {
+            return Heard::Nothing;
+        };
+        let Some(saying) = saying(start, &message) else {
+            return Heard::Nothing;
+        };
+        let order = self.gate.judge(envelope.session, envelope.counter, saying);
+        if order == Order::Retired && !self.told_retired {
+            self.told_retired = true;
+            tell(Notice::Retired(self.role));
+        }
+        if order != Order::Newer {
+            return Heard::Nothing;
+        }
+        match self.ages.judge(envelope.sent_us, now_us) {
+            Age::Fresh(age_us) => Heard::Pass(Waiting {
+                message,
+                until_us: now_us.saturating_add(self.max_age_us.saturating_sub(age_us)),
+                age_us,
+                came_us: now_us,
+            }),
+            Age::Stale(age_us) => {
+                self.counts.stale += 1;
+                let one_way_us = self.ages.round_trip_us().unwrap_or(0) / 2;
+                if one_way_us > self.max_age_us && !self.told_slow {
+                    self.told_slow = true;
+                    let max_age_us = self.max_age_us;
+                    tell(Notice::Slow { age_us, max_age_us });
+                }
+                Heard::Nothing
+            }
+            Age::Unknown => {
+                self.counts.undated += 1;
+                Heard::Nothing
+            }
+        }
+    }
+}

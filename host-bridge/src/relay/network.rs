@@ -1,0 +1,265 @@
+//! The network's engine, set up for two bridges: nothing is looked for, lost connections come back soon,
+//! little waits to be sent.
+
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustls::ClientConfig;
+use serde_json::json;
+use zenoh::{Config, Session, Wait};
+
+use crate::relay::credentials::{Credentials, CredentialsError};
+use crate::relay::endpoint::{Endpoint, Transport};
+
+/// First wait before a lost connection is tried again.
+const RETRY_FIRST: Duration = Duration::from_millis(100);
+/// Longest wait between two tries: a router that is back is found well within a second.
+const RETRY_LONGEST: Duration = Duration::from_millis(300);
+/// After this long without a word a connection is given up. What a lossy network holds up for a while
+/// comes well before; a computer whose address changed, or one that was switched off, does not.
+const LEASE: Duration = Duration::from_secs(4);
+/// What may wait to be sent, in bytes, twice for each priority: when a network is stuck, little that is
+/// old comes out of it later.
+const BATCH_BYTES: u16 = 4_096;
+/// Longest message that is taken from the network, in bytes: far more than any of ours.
+const MAX_MESSAGE_BYTES: u32 = 65_536;
+
+/// How a program takes part.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Others connect to it.
+    Listening(Vec<Endpoint>),
+    /// It connects to the first of these that answers, and to another one when it is lost.
+    Connecting(Vec<Endpoint>),
+}
+
+/// What a program needs to take part.
+#[derive(Clone)]
+pub struct Network {
+    ends: Ends,
+    credentials: Option<Credentials>,
+    tls: Option<Arc<ClientConfig>>,
+}
+
+/// Why a program can't take part.
+#[derive(Debug, thiserror::Error)]
+pub enum NetworkError {
+    /// Credentials can't be used.
+    #[error(transparent)]
+    Credentials(#[from] CredentialsError),
+    /// TLS without certificates.
+    #[error("{endpoint} wants certificates on both ends: give --ca, --certificate and --key")]
+    WithoutCertificates {
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
+    /// Certificates, but an open endpoint.
+    #[error("{endpoint} would leave certificates unused and let anybody in: say tls/{}:{}, or leave out --ca, --certificate and --key", .endpoint.host, .endpoint.port)]
+    Open {
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
+    /// The engine can't match an IPv6 address with a certificate.
+    #[error(
+        "{endpoint}: an IPv6 address can't be matched with a certificate: give the host's name"
+    )]
+    Unmatched {
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
+    /// One can't listen there.
+    #[error("{endpoint}: can't listen: {reason}: {}", advice(.reason))]
+    Listening {
+        /// The endpoint.
+        endpoint: Endpoint,
+        /// The system's reason.
+        reason: io::Error,
+    },
+    /// The engine refuses.
+    #[error("the network's engine refuses: {reason}")]
+    Engine {
+        /// In its words.
+        reason: String,
+    },
+}
+
+fn advice(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::AddrInUse => "another program listens there: end it, or take another port",
+        io::ErrorKind::AddrNotAvailable => {
+            "this computer has no such address: take one of its own, or 0.0.0.0 for all of them"
+        }
+        io::ErrorKind::PermissionDenied => "take a port above 1023",
+        _ => "see the host's name and the port",
+    }
+}
+
+fn engine(error: zenoh::Error) -> NetworkError {
+    NetworkError::Engine {
+        reason: error.to_string(),
+    }
+}
+
+impl Network {
+    /// Looks at everything that can be looked at before anybody is talked to.
+    ///
+    /// # Errors
+    /// If endpoints and credentials don't fit, credentials can't be used, or one can't listen.
+    pub fn new(ends: Ends, credentials: Option<Credentials>) -> Result<Self, NetworkError> {
+        let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &ends;
+        for endpoint in endpoints {
+            let endpoint = endpoint.clone();
+            match (endpoint.transport, &credentials) {
+                (Transport::Tls, None) => {
+                    return Err(NetworkError::WithoutCertificates { endpoint });
+                }
+                (Transport::Tcp, Some(_)) => return Err(NetworkError::Open { endpoint }),
+                (Transport::Tls, Some(_))
+                    if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
+                {
+                    return Err(NetworkError::Unmatched { endpoint });
+                }
+                _ => {}
+            }
+        }
+        let tls = match &credentials {
+            Some(credentials) => Some(Arc::new(credentials.load()?)),
+            None => None,
+        };
+        if let Ends::Listening(endpoints) = &ends {
+            for endpoint in endpoints {
+                endpoint
+                    .try_listening()
+                    .map_err(|reason| NetworkError::Listening {
+                        endpoint: endpoint.clone(),
+                        reason,
+                    })?;
+            }
+        }
+        Ok(Self {
+            ends,
+            credentials,
+            tls,
+        })
+    }
+
+    /// Where it connects; empty if it listens.
+    pub fn connects_to(&self) -> &[Endpoint] {
+        match &self.ends {
+            Ends::Listening(_) => &[],
+            Ends::Connecting(endpoints) => endpoints,
+        }
+    }
+
+    /// What a connection is made with, if not in the open.
+    pub const fn tls(&self) -> Option<&Arc<ClientConfig>> {
+        self.tls.as_ref()
+    }
+
+    /// Takes part as a bridge. Where it connects, this returns when somebody has answered or all have been
+    /// tried in vain: to be tried again then. Afterwards the engine keeps up the connection by itself.
+    ///
+    /// # Errors
+    /// If nobody is reached, or one can't listen.
+    pub fn open(&self) -> Result<Session, NetworkError> {
+        let mode = match self.ends {
+            // What connects is a client: a router carries on what clients say, but takes peers for
+            // neighbours who hear each other.
+            Ends::Connecting(_) => "client",
+            Ends::Listening(_) => "peer",
+        };
+        zenoh::open(self.configuration(mode)?)
+            .wait()
+            .map_err(engine)
+    }
+
+    /// Takes part as a router: carries on what bridges say.
+    ///
+    /// # Errors
+    /// If one can't listen.
+    pub fn open_router(&self) -> Result<Session, NetworkError> {
+        zenoh::open(self.configuration("router")?)
+            .wait()
+            .map_err(engine)
+    }
+
+    fn configuration(&self, mode: &str) -> Result<Config, NetworkError> {
+        let words = |endpoints: &[Endpoint]| -> Vec<String> {
+            endpoints.iter().map(Endpoint::to_string).collect()
+        };
+        let (listen, connect) = match &self.ends {
+            Ends::Listening(endpoints) => (words(endpoints), Vec::new()),
+            Ends::Connecting(endpoints) => (Vec::new(), words(endpoints)),
+        };
+        let transport = if self.credentials.is_some() {
+            "tls"
+        } else {
+            "tcp"
+        };
+        let mut settings = vec![
+            ("mode", json!(mode)),
+            ("listen/endpoints", json!(listen)),
+            ("listen/timeout_ms", json!(0)),
+            ("listen/exit_on_failure", json!(true)),
+            ("connect/endpoints", json!(connect)),
+            ("connect/timeout_ms", json!(0)),
+            ("connect/exit_on_failure", json!(true)),
+            (
+                "connect/retry",
+                json!({
+                    "period_init_ms": RETRY_FIRST.as_millis(),
+                    "period_max_ms": RETRY_LONGEST.as_millis(),
+                    "period_increase_factor": 1.5,
+                }),
+            ),
+            ("scouting/multicast/enabled", json!(false)),
+            ("scouting/gossip/enabled", json!(false)),
+            ("scouting/delay", json!(0)),
+            ("timestamping/enabled", json!(false)),
+            ("transport/link/protocols", json!([transport])),
+            ("transport/link/tx/lease", json!(LEASE.as_millis())),
+            ("transport/link/tx/batch_size", json!(BATCH_BYTES)),
+            (
+                "transport/link/rx/max_message_size",
+                json!(MAX_MESSAGE_BYTES),
+            ),
+        ];
+        if let Some(credentials) = &self.credentials {
+            settings.extend([
+                (
+                    "transport/link/tls/root_ca_certificate",
+                    json!(credentials.ca),
+                ),
+                (
+                    "transport/link/tls/listen_certificate",
+                    json!(credentials.certificate),
+                ),
+                (
+                    "transport/link/tls/listen_private_key",
+                    json!(credentials.key),
+                ),
+                (
+                    "transport/link/tls/connect_certificate",
+                    json!(credentials.certificate),
+                ),
+                (
+                    "transport/link/tls/connect_private_key",
+                    json!(credentials.key),
+                ),
+                ("transport/link/tls/enable_mtls", json!(true)),
+                // Never without: the engine also believes the CAs of the web, so that any of their
+                // customers could listen in place of the other site.
+                ("transport/link/tls/verify_name_on_connect", json!(true)),
+                ("transport/link/tls/close_link_on_expiration", json!(true)),
+            ]);
+        }
+        let mut configuration = Config::default();
+        for (key, value) in settings {
+            configuration
+                .insert_json5(key, &value.to_string())
+                .map_err(engine)?;
+        }
+        Ok(configuration)
+    }
+}

@@ -1,0 +1,127 @@
+//! What the board says, on its way to the other site: numbered and dated.
+
+use protocol::{Hello, Message};
+
+use crate::relay::envelope::{Content, Envelope, saying};
+use crate::relay::gate::Saying;
+use crate::relay::report::Outgoing;
+
+/// The outward direction of a bridge.
+#[derive(Clone, Debug)]
+pub struct Outward {
+    hello: Hello,
+    session: u64,
+    counter: u64,
+    start: u32,
+    last: Option<Saying>,
+    counts: Outgoing,
+}
+
+impl Outward {
+    /// Nothing said yet by the bridge that introduces itself with `hello`, in this start of it.
+    pub fn new(hello: Hello, session: u64) -> Self {
+        Self {
+            hello,
+            session,
+            counter: 0,
+            start: 0,
+            last: None,
+            counts: Outgoing::default(),
+        }
+    }
+
+    /// The envelope for what the board said at `at_us`. None if nobody answers at the other site, or if it
+    /// is not carried at all.
+    pub fn carry(&mut self, at_us: u64, message: Message, is_answered: bool) -> Option<Envelope> {
+        let said = saying(self.start, &message)?;
+        // A serial line keeps the order: a board that counts backwards has started anew.
+        let goes_on = self
+            .last
+            .is_none_or(|last| said.sequence.wrapping_sub(last.sequence).cast_signed() > 0);
+        if !goes_on {
+            self.start = self.start.wrapping_add(1);
+        }
+        self.last = Some(said);
+        if !is_answered {
+            self.counts.held += 1;
+            return None;
+        }
+        let counter = self.counter;
+        self.counter += 1;
+        self.counts.sent += 1;
+        Some(Envelope {
+            counter,
+            ..self.other(
+                at_us,
+                Content::Board {
+                    start: self.start,
+                    message,
+                },
+            )
+        })
+    }
+
+    /// An envelope for anything else.
+    pub const fn other(&self, at_us: u64, content: Content) -> Envelope {
+        Envelope {
+            hello: self.hello,
+            session: self.session,
+            counter: 0,
+            sent_us: at_us,
+            content,
+        }
+    }
+
+    /// The network refused what was carried last.
+    pub const fn on_failure(&mut self) {
+        self.counts.failed += 1;
+    }
+
+    /// What has been counted so far.
+    pub const fn counts(&self) -> Outgoing {
+        self.counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::host_hello;
+    use protocol::Motion;
+
+    fn motion(sequence: u32) -> Message {
+        Message::Motion(Motion {
+            sequence,
+            instant_us: 0,
+            position_um: 0,
+            velocity_um_s: 0,
+        })
+    }
+
+    /// Number and board's start of what is carried.
+    fn carried(outward: &mut Outward, sequence: u32) -> (u64, u32) {
+        let envelope = outward.carry(9, motion(sequence), true).expect("carried");
+        match envelope.content {
+            Content::Board { start, .. } => (envelope.counter, start),
+            _ => panic!("not the board's"),
+        }
+    }
+
+    #[test]
+    fn what_a_board_says_is_numbered_and_its_starts_are_counted() {
+        let mut outward = Outward::new(host_hello(), 1);
+        assert_eq!(carried(&mut outward, u32::MAX), (0, 0));
+        assert_eq!(carried(&mut outward, 0), (1, 0));
+        assert_eq!(carried(&mut outward, 700), (2, 0));
+        assert_eq!(carried(&mut outward, 0), (3, 1));
+        assert_eq!(carried(&mut outward, 1), (4, 1));
+    }
+
+    #[test]
+    fn what_nobody_answers_to_is_held_back_and_not_numbered() {
+        let mut outward = Outward::new(host_hello(), 1);
+        assert_eq!(outward.carry(9, motion(5), false), None);
+        assert_eq!(carried(&mut outward, 6), (0, 0));
+        assert_eq!(outward.counts().held, 1);
+    }
+}

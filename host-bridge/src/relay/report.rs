@@ -1,0 +1,249 @@
+//! What a bridge has carried, in numbers and in words.
+
+use std::fmt;
+
+use protocol::Role;
+use serde::Serialize;
+
+use crate::relay::endpoint::Endpoint;
+use crate::relay::far::{FarState, site};
+use crate::relay::gate::Arrivals;
+use crate::relay::histogram::Percentiles;
+use crate::relay::reach::Reach;
+use crate::state::State;
+
+/// What has come from the other site, and what became of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Incoming {
+    /// Order and loss on the network.
+    #[serde(flatten)]
+    pub arrivals: Arrivals,
+    /// With the board's line.
+    pub passed: u64,
+    /// Not passed on: too long on the way.
+    pub stale: u64,
+    /// Not passed on: the clocks had not been compared yet.
+    pub undated: u64,
+    /// Not passed on: a newer one came before the line was free.
+    pub replaced: u64,
+    /// Not passed on: the board was not there.
+    pub boardless: u64,
+    /// Not passed on: the board's line took no more bytes.
+    pub stuck: u64,
+    /// Neither sound nor of this build.
+    pub refused: u64,
+}
+
+/// What has gone to the other site.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Outgoing {
+    /// Given to the network.
+    pub sent: u64,
+    /// Not sent: the other site does not answer, and it would be old when it came.
+    pub held: u64,
+    /// Refused by the network.
+    pub failed: u64,
+}
+
+/// A bridge at one moment. All counts are since its start.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// The site: its board's role.
+    pub site: &'static str,
+    /// Since the bridge was started, in s.
+    pub uptime_s: f64,
+    /// [`State::word`] of the board.
+    pub board: &'static str,
+    /// [`FarState::word`] of the other site.
+    pub far: &'static str,
+    /// To the other bridge and back, in µs.
+    pub round_trip_us: Option<u64>,
+    /// From the other site.
+    pub incoming: Incoming,
+    /// To the other site.
+    pub outgoing: Outgoing,
+    /// From a message's last byte on the other bridge's serial port to its last byte on this one's:
+    /// since the report before, or in the last report since the start.
+    pub age: Option<Percentiles>,
+    /// Whether this is the last report, with `age` of all messages.
+    pub total: bool,
+}
+
+impl Report {
+    /// The report in one line; rates are against `before`, an earlier one.
+    pub fn line(&self, before: Option<&Self>) -> String {
+        let seconds = self.uptime_s - before.map_or(0.0, |before| before.uptime_s);
+        let rate = |count: u64| {
+            if seconds > 0.0 {
+                count as f64 / seconds
+            } else {
+                0.0
+            }
+        };
+        let passed = self.incoming.passed - before.map_or(0, |before| before.incoming.passed);
+        let sent = self.outgoing.sent - before.map_or(0, |before| before.outgoing.sent);
+        let Incoming {
+            arrivals,
+            stale,
+            undated,
+            replaced,
+            boardless,
+            stuck,
+            refused,
+            ..
+        } = self.incoming;
+        let not_passed =
+            stale + undated + replaced + boardless + stuck + refused + arrivals.superseded;
+        format!(
+            "{:8.1} s  in {:5.1}/s, age {}; lost {}, late {}, twice {}, not passed on {not_passed}; out {:5.1}/s; round trip {}",
+            self.uptime_s,
+            rate(passed),
+            Ages(self.age),
+            arrivals.lost,
+            arrivals.late,
+            arrivals.duplicated,
+            rate(sent),
+            self.round_trip_us.map_or_else(
+                || "unknown".to_owned(),
+                |time_us| format!("{} ms", Milliseconds(time_us))
+            ),
+        )
+    }
+}
+
+/// µs as ms.
+struct Milliseconds(u64);
+
+impl fmt::Display for Milliseconds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2}", self.0 as f64 / 1_000.0)
+    }
+}
+
+struct Ages(Option<Percentiles>);
+
+impl fmt::Display for Ages {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.0 {
+            None => f.write_str("unknown"),
+            Some(age) => write!(
+                f,
+                "{} p50, {} p99, {} max ms",
+                Milliseconds(age.p50_us),
+                Milliseconds(age.p99_us),
+                Milliseconds(age.max_us)
+            ),
+        }
+    }
+}
+
+/// All counts, for the end.
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Incoming {
+            arrivals,
+            passed,
+            stale,
+            undated,
+            replaced,
+            boardless,
+            stuck,
+            refused,
+        } = self.incoming;
+        writeln!(
+            f,
+            "{:.1} s at {}: {} came, {passed} passed on",
+            self.uptime_s, self.site, arrivals.received
+        )?;
+        writeln!(
+            f,
+            "  on the network: {} lost, {} late, {} twice, {refused} refused",
+            arrivals.lost, arrivals.late, arrivals.duplicated
+        )?;
+        writeln!(
+            f,
+            "  not passed on: {stale} too old, {undated} of unknown age, {replaced} replaced by a newer one, {} superseded, {boardless} without a board, {stuck} to a full line",
+            arrivals.superseded
+        )?;
+        writeln!(
+            f,
+            "  sent: {}, held back: {}, refused by the network: {}",
+            self.outgoing.sent, self.outgoing.held, self.outgoing.failed
+        )?;
+        write!(f, "  age: {}", Ages(self.age))
+    }
+}
+
+/// What a person should know.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Notice {
+    /// The board's link stands differently.
+    Board(State),
+    /// The other site stands differently.
+    Far(Role, FarState),
+    /// A bridge whose place another has taken is still heard.
+    Retired(Role),
+    /// Another bridge has one's own role and name.
+    Rival(Role),
+    /// This many µs the network takes: longer than anything may be old.
+    Slow {
+        /// One way, in µs.
+        age_us: u64,
+        /// What is allowed, in µs.
+        max_age_us: u64,
+    },
+    /// Nobody is heard, for this reason.
+    Unreached {
+        /// Where.
+        endpoint: Endpoint,
+        /// Why.
+        reach: Reach,
+    },
+    /// Somebody is reached, but not the other site's bridge.
+    Alone(Role),
+    /// Stop, said at this site.
+    StopSaid(Role),
+    /// The Stop is with this site's board.
+    StopPassed,
+    /// The Stop said here is with the board of that site.
+    StopHeard(Role),
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Board(state) => {
+                write!(f, "board: {state}")?;
+                state
+                    .advice()
+                    .map_or(Ok(()), |advice| write!(f, ": {advice}"))
+            }
+            Self::Far(role, state) => write!(f, "{}: {state}", site(*role)),
+            Self::Retired(role) => write!(
+                f,
+                "{}: a bridge that another one has followed still speaks and is not listened to: end one of them, and start the other anew",
+                site(*role)
+            ),
+            Self::Rival(role) => write!(
+                f,
+                "another bridge calls itself {} under this name: end one of them, or give one another --name",
+                site(*role)
+            ),
+            Self::Slow { age_us, max_age_us } => write!(
+                f,
+                "the network takes {} ms, longer than the {} ms of --max-age: nothing is passed on; give a longer one if such a delay is meant",
+                Milliseconds(*age_us),
+                Milliseconds(*max_age_us)
+            ),
+            Self::Unreached { endpoint, reach } => write!(f, "{endpoint}: {reach}"),
+            Self::Alone(role) => write!(
+                f,
+                "the network is there, but {} is not heard: see whether its bridge runs, with the same --name",
+                site(*role)
+            ),
+            Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),
+            Self::StopPassed => f.write_str("Stop: with the board here"),
+            Self::StopHeard(role) => write!(f, "Stop: with the board at {}", site(*role)),
+        }
+    }
+}

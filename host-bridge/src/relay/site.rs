@@ -1,0 +1,399 @@
+//! A bridge at one site: a board's link on one side, the network on the other.
+//!
+//! | thread | does |
+//! | --- | --- |
+//! | the link's | what the board says goes to the network at once |
+//! | the engine's | what the network brings is judged and put into the outbox |
+//! | the writer | what is in the outbox goes to the board as soon as the line takes it |
+//! | the keeper | pings, repeats Stops, looks why nobody is heard |
+//! | the connector | connects; ends when it has |
+
+mod keeper;
+
+use std::collections::VecDeque;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use protocol::{Hello, Message, Ping, Pong, Role, Stop};
+
+use crate::host_clock::now_us;
+use crate::link::{self, Event, Link, NotSent, Voice};
+use crate::place::Place;
+use crate::relay::envelope::{Content, Envelope, is_carried};
+use crate::relay::inward::{Heard, Inward};
+use crate::relay::name::{Channel, Name};
+use crate::relay::network::{Network, NetworkError};
+use crate::relay::outbox::{Due, Outbox};
+use crate::relay::outward::Outward;
+use crate::relay::report::{Notice, Report};
+use crate::relay::wire::{Ear, Wire};
+use crate::state::State;
+use keeper::Keeper;
+
+/// Between two tries to connect for the first time.
+const CONNECT_AGAIN: Duration = Duration::from_millis(250);
+/// Between two tries to give a Stop to a board that does not take it.
+const STOP_AGAIN: Duration = Duration::from_millis(20);
+/// Longest wait of the writer for something to write.
+const IDLE: Duration = Duration::from_secs(1);
+/// Stops that are remembered as done.
+const DONE: usize = 64;
+
+/// What a bridge is told.
+pub struct Settings {
+    /// The role of this site's board.
+    pub role: Role,
+    /// Where its console is.
+    pub place: Place,
+    /// What both bridges call the bench.
+    pub name: Name,
+    /// The way to the other site.
+    pub network: Network,
+    /// How old something from the other site may be and still be passed on.
+    pub max_age: Duration,
+}
+
+/// A bridge that runs. Dropping it ends it.
+pub struct Site {
+    shared: Arc<Shared>,
+    link: Link,
+    writer: Option<JoinHandle<()>>,
+    /// Dropped to end the keeper.
+    ended: Option<Sender<()>>,
+    keeper: Option<JoinHandle<()>>,
+}
+
+/// What the threads share.
+struct Shared {
+    role: Role,
+    far: Role,
+    name: Name,
+    session: u64,
+    network: Network,
+    started_us: u64,
+    wire: OnceLock<Wire>,
+    outward: Mutex<Outward>,
+    inward: Mutex<Inward>,
+    outbox: Outbox,
+    stops: Mutex<Stops>,
+    told_rival: AtomicBool,
+    notices: Sender<Notice>,
+    is_ended: AtomicBool,
+}
+
+/// Stops on their way.
+#[derive(Default)]
+struct Stops {
+    /// Said here and not yet known to be with the other site's board.
+    unheard: Vec<(u64, Stop)>,
+    /// With this site's board.
+    done: VecDeque<u64>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A number that no other start of a bridge has.
+pub fn random_number() -> u64 {
+    RandomState::new().hash_one(now_us())
+}
+
+/// The role of the board at the other site; none for a host, who has no board.
+pub const fn opposite(role: Role) -> Option<Role> {
+    match role {
+        Role::Sensor => Some(Role::Display),
+        Role::Display => Some(Role::Sensor),
+        Role::Host => None,
+    }
+}
+
+/// How the bridge of the board of `role` introduces itself.
+pub fn bridge_hello(role: Role) -> Hello {
+    Hello {
+        role: role.byte(),
+        ..link::host_hello()
+    }
+}
+
+impl Site {
+    /// Starts a bridge. It looks for its board and for the other site for as long as it lives; what a
+    /// person should know comes out of the receiver.
+    ///
+    /// # Errors
+    /// If it can't listen, or if `role` is a host's.
+    pub fn open(settings: Settings) -> Result<(Self, Receiver<Notice>), NetworkError> {
+        let Settings {
+            role,
+            place,
+            name,
+            network,
+            max_age,
+        } = settings;
+        let far = opposite(role).ok_or_else(|| NetworkError::Engine {
+            reason: "a host has no board to be carried".to_owned(),
+        })?;
+        let (notices, told) = mpsc::channel();
+        let session = random_number();
+        let shared = Arc::new(Shared {
+            role,
+            far,
+            name,
+            session,
+            network,
+            started_us: now_us(),
+            wire: OnceLock::new(),
+            outward: Mutex::new(Outward::new(bridge_hello(role), session)),
+            inward: Mutex::new(Inward::new(far, session, max_age)),
+            outbox: Outbox::default(),
+            stops: Mutex::new(Stops::default()),
+            told_rival: AtomicBool::new(false),
+            notices,
+            is_ended: AtomicBool::new(false),
+        });
+        if shared.network.connects_to().is_empty() {
+            shared.connect()?;
+        } else {
+            let shared = Arc::clone(&shared);
+            thread::spawn(move || shared.keep_connecting());
+        }
+        let carrier = Arc::clone(&shared);
+        let link = Link::open(role, place, move |event| match event {
+            Event::Heard { at_us, message } => carrier.carry(at_us, message),
+            // What comes of it is told within two seconds.
+            Event::Turned(State::Opened { .. }) => {}
+            Event::Turned(state) => carrier.tell(Notice::Board(state)),
+            // Its numbers tell as much, and sooner.
+            Event::Restarted => {}
+        });
+        let (voice, writing) = (link.voice(), Arc::clone(&shared));
+        let writer = thread::spawn(move || writing.write(&voice));
+        let (ended, ends) = mpsc::channel();
+        let keeping = Arc::clone(&shared);
+        let keeper = thread::spawn(move || Keeper::new(keeping).run(&ends));
+        let site = Self {
+            shared,
+            link,
+            writer: Some(writer),
+            ended: Some(ended),
+            keeper: Some(keeper),
+        };
+        Ok((site, told))
+    }
+
+    /// Says Stop to both boards: to this one now, to the other one as soon as the network lets it through.
+    pub fn stop(&self, stop: Stop) {
+        let id = random_number();
+        self.shared.outbox.stop(id, stop);
+        locked(&self.shared.stops).unheard.push((id, stop));
+        self.shared.tell(Notice::StopSaid(self.shared.role));
+    }
+
+    /// How the bridge stands. Ages are of the time since this was last asked, or of all of it.
+    pub fn report(&self, total: bool) -> Report {
+        let shared = &self.shared;
+        let outgoing = locked(&shared.outward).counts();
+        let mut inward = locked(&shared.inward);
+        Report {
+            site: shared.role.name(),
+            uptime_s: (now_us() - shared.started_us) as f64 / 1e6,
+            board: self.link.state().word(),
+            far: inward.far().state().word(),
+            round_trip_us: inward.round_trip_us(),
+            incoming: inward.counts(),
+            outgoing,
+            age: if total {
+                inward.total()
+            } else {
+                inward.take_recent()
+            },
+            total,
+        }
+    }
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        self.shared.is_ended.store(true, Ordering::Release);
+        self.shared.outbox.close();
+        drop(self.ended.take());
+        for thread in [self.writer.take(), self.keeper.take()]
+            .into_iter()
+            .flatten()
+        {
+            // One that panicked has said so on standard error.
+            let _ = thread.join();
+        }
+        if let Some(wire) = self.shared.wire.get() {
+            wire.close();
+        }
+    }
+}
+
+impl Shared {
+    fn tell(&self, notice: Notice) {
+        // Who does not listen any more does not want to know.
+        let _ = self.notices.send(notice);
+    }
+
+    fn say(&self, channel: Channel, content: Content) -> bool {
+        let envelope = locked(&self.outward).other(now_us(), content);
+        self.wire
+            .get()
+            .is_some_and(|wire| wire.say(channel, &envelope))
+    }
+
+    fn connect(self: &Arc<Self>) -> Result<(), NetworkError> {
+        let session = self.network.open()?;
+        let ear = |keys, hear: fn(&Self, &[u8])| {
+            // The engine keeps what listens for as long as the wire is there, and the wire is in here.
+            let shared = Arc::downgrade(self);
+            let hear = move |bytes: &[u8]| {
+                if let Some(shared) = shared.upgrade() {
+                    hear(&shared, bytes);
+                }
+            };
+            Ear {
+                keys,
+                hear: Box::new(hear),
+            }
+        };
+        let ears = vec![
+            ear(self.name.keys(self.far), Self::hear),
+            ear(
+                self.name.key(Role::Host, Channel::Stop),
+                Self::hear_operator,
+            ),
+            ear(self.name.key(self.role, Channel::Clock), Self::hear_rival),
+        ];
+        let wire = Wire::new(session, &self.name, self.role, ears)?;
+        // Only one thread connects, once.
+        let _ = self.wire.set(wire);
+        Ok(())
+    }
+
+    fn keep_connecting(self: &Arc<Self>) {
+        while !self.is_ended.load(Ordering::Acquire) && self.connect().is_err() {
+            thread::sleep(CONNECT_AGAIN);
+        }
+    }
+
+    /// The board has said something.
+    fn carry(&self, at_us: u64, message: Message) {
+        if !is_carried(self.role, &message) {
+            return;
+        }
+        let wire = self.wire.get();
+        let is_answered = wire.is_some() && locked(&self.inward).far().is_answering(now_us());
+        let envelope = locked(&self.outward).carry(at_us, message, is_answered);
+        if let (Some(envelope), Some(wire)) = (envelope, wire)
+            && !wire.say(Channel::Board, &envelope)
+        {
+            locked(&self.outward).on_failure();
+        }
+    }
+
+    /// Bytes came from the other site.
+    fn hear(&self, bytes: &[u8]) {
+        let at_us = now_us();
+        let mut inward = locked(&self.inward);
+        match inward.hear(bytes, at_us, |notice| self.tell(notice)) {
+            Heard::Nothing => {}
+            // Under the lock, so that nothing older can slip in behind it.
+            Heard::Pass(waiting) => {
+                if self.outbox.put(waiting) {
+                    inward.on_replaced();
+                }
+            }
+            Heard::Asked(to, Ping { sent_us }) => {
+                drop(inward);
+                let pong = Pong {
+                    sent_us,
+                    received_us: at_us,
+                    answered_us: now_us(),
+                };
+                self.say(Channel::Clock, Content::Pong { to, pong });
+            }
+            Heard::Stop(id, stop) => {
+                drop(inward);
+                self.on_stop(self.far, id, stop);
+            }
+            Heard::Stopped(id) => {
+                drop(inward);
+                let mut stops = locked(&self.stops);
+                let before = stops.unheard.len();
+                stops.unheard.retain(|(unheard, _)| *unheard != id);
+                if stops.unheard.len() < before {
+                    self.tell(Notice::StopHeard(self.far));
+                }
+            }
+        }
+    }
+
+    /// Bytes came from an operator who has no board.
+    fn hear_operator(&self, bytes: &[u8]) {
+        if let Ok(envelope) = Envelope::from_bytes(bytes)
+            && let Content::Stop { id, stop } = envelope.content
+        {
+            self.on_stop(Role::Host, id, stop);
+        }
+    }
+
+    /// Bytes came from a bridge that calls itself like this one.
+    fn hear_rival(&self, bytes: &[u8]) {
+        if let Ok(envelope) = Envelope::from_bytes(bytes)
+            && envelope.session != self.session
+            && !self.told_rival.swap(true, Ordering::Relaxed)
+        {
+            self.tell(Notice::Rival(self.role));
+        }
+    }
+
+    fn on_stop(&self, by: Role, id: u64, stop: Stop) {
+        if locked(&self.stops).done.contains(&id) {
+            self.say(Channel::Stop, Content::Stopped { id });
+        } else if self.outbox.stop(id, stop) {
+            self.tell(Notice::StopSaid(by));
+        }
+    }
+
+    /// Says to the board what is due, until the bridge ends.
+    fn write(&self, voice: &Voice) {
+        loop {
+            match self.outbox.take(IDLE) {
+                Due::Closed => return,
+                Due::Nothing => {}
+                Due::Stop(id, stop) => {
+                    if voice.post(&Message::Stop(stop)).is_ok() {
+                        self.on_stopped(id);
+                    } else {
+                        self.outbox.stop(id, stop);
+                        thread::sleep(STOP_AGAIN);
+                    }
+                }
+                Due::Message(waiting) if now_us() > waiting.until_us => {
+                    locked(&self.inward).on_stale();
+                }
+                Due::Message(waiting) => match voice.post(&waiting.message) {
+                    Ok(()) => locked(&self.inward).on_passed(&waiting, now_us()),
+                    Err(NotSent::NotKnown) => locked(&self.inward).on_boardless(),
+                    // A newer one is on its way, and may find the line free.
+                    Err(NotSent::Stuck) => locked(&self.inward).on_stuck(),
+                },
+            }
+        }
+    }
+
+    fn on_stopped(&self, id: u64) {
+        let mut stops = locked(&self.stops);
+        stops.done.truncate(DONE - 1);
+        stops.done.push_front(id);
+        drop(stops);
+        self.tell(Notice::StopPassed);
+        self.say(Channel::Stop, Content::Stopped { id });
+    }
+}

@@ -1,0 +1,134 @@
+//! The thread of a bridge that does what is due from time to time.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::Duration;
+
+use protocol::Ping;
+
+use super::{Shared, locked};
+use crate::host_clock::now_us;
+use crate::relay::envelope::Content;
+use crate::relay::name::Channel;
+use crate::relay::reach::Reach;
+use crate::relay::report::Notice;
+
+/// How often the keeper looks round.
+const LOOK: Duration = Duration::from_millis(20);
+/// Between two pings while they are answered, in µs: the eight that the clocks are compared by span 2 s.
+const PING_US: u64 = 250_000;
+/// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
+const KNOCK_US: u64 = 100_000;
+/// Between two repetitions of a Stop that nobody has heard, in µs.
+const STOP_US: u64 = 100_000;
+/// How long nobody is heard before it is found out why, in µs.
+const PUZZLED_US: u64 = 3_000_000;
+/// Between two such looks, in µs.
+const LOOK_AGAIN_US: u64 = 10_000_000;
+
+/// The thread that does what is due from time to time.
+pub struct Keeper {
+    shared: Arc<Shared>,
+    pinged_us: Option<u64>,
+    stopped_us: Option<u64>,
+    /// When the other site was last heard, or the bridge started.
+    heard_us: u64,
+    looked_us: Option<u64>,
+    /// What was found last, so that it is said once.
+    found: Arc<Mutex<Option<Notice>>>,
+}
+
+impl Keeper {
+    pub fn new(shared: Arc<Shared>) -> Self {
+        Self {
+            heard_us: shared.started_us,
+            shared,
+            pinged_us: None,
+            stopped_us: None,
+            looked_us: None,
+            found: Arc::default(),
+        }
+    }
+
+    pub fn run(mut self, ends: &Receiver<()>) {
+        while ends.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+            let at_us = now_us();
+            self.ping(at_us);
+            self.repeat_stops(at_us);
+            self.look(at_us);
+        }
+    }
+
+    fn ping(&mut self, at_us: u64) {
+        let is_answering = {
+            let mut inward = locked(&self.shared.inward);
+            inward.elapse(at_us, |notice| self.shared.tell(notice));
+            inward.far().is_answering(at_us)
+        };
+        let period_us = if is_answering { PING_US } else { KNOCK_US };
+        if is_due(self.pinged_us, period_us, at_us) {
+            self.pinged_us = Some(at_us);
+            let ping = Ping { sent_us: now_us() };
+            self.shared.say(Channel::Clock, Content::Ping(ping));
+        }
+    }
+
+    fn repeat_stops(&mut self, at_us: u64) {
+        if !is_due(self.stopped_us, STOP_US, at_us) {
+            return;
+        }
+        let unheard = locked(&self.shared.stops).unheard.clone();
+        if !unheard.is_empty() {
+            self.stopped_us = Some(at_us);
+        }
+        for (id, stop) in unheard {
+            self.shared.say(Channel::Stop, Content::Stop { id, stop });
+        }
+    }
+
+    /// Finds out why nobody is heard, in a thread of its own: it takes a while.
+    fn look(&mut self, at_us: u64) {
+        if matches!(
+            locked(&self.shared.inward).far().state().word(),
+            "known" | "foreign"
+        ) {
+            self.heard_us = at_us;
+            *locked(&self.found) = None;
+        }
+        let is_puzzled = at_us.saturating_sub(self.heard_us) > PUZZLED_US;
+        if !is_puzzled || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
+            return;
+        }
+        self.looked_us = Some(at_us);
+        let (shared, found) = (Arc::clone(&self.shared), Arc::clone(&self.found));
+        thread::spawn(move || {
+            let Some(notice) = shared.puzzle() else {
+                return;
+            };
+            let mut found = locked(&found);
+            if found.as_ref() != Some(&notice) {
+                *found = Some(notice.clone());
+                shared.tell(notice);
+            }
+        });
+    }
+}
+
+fn is_due(last_us: Option<u64>, period_us: u64, at_us: u64) -> bool {
+    last_us.is_none_or(|last_us| at_us.saturating_sub(last_us) >= period_us)
+}
+
+impl Shared {
+    /// Why the other site is not heard.
+    fn puzzle(&self) -> Option<Notice> {
+        let endpoints = self.network.connects_to();
+        let is_connected = self.wire.get().is_some_and(|wire| wire.neighbours() > 0);
+        if is_connected || endpoints.is_empty() {
+            return Some(Notice::Alone(self.far));
+        }
+        let endpoint = endpoints.first()?.clone();
+        let reach = Reach::of(&endpoint, self.network.tls());
+        Some(Notice::Unreached { endpoint, reach })
+    }
+}

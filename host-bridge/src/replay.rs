@@ -1,0 +1,109 @@
+//! Plays a recording back, in its own time or faster or slower.
+//!
+//! ```text
+//! recording ─> events ─> pace ─┬─> a monitor, as from the boards' links
+//!                              └─> stand-in ─> a board, as from its peer
+//! recording ─> scene: TOML and CSV for the simulator
+//! ```
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use protocol::Role;
+
+use crate::link::Event;
+use crate::recording::reader::{ReadError, Reader};
+
+mod events;
+pub mod scene;
+pub mod stand_in;
+mod upsample;
+
+use events::Events;
+
+/// The slowest and the fastest that a recording can be played, relative to its own time.
+pub const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
+/// How soon a player hears that it is to end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Which part of a recording is played, and how fast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Relative to its own time, within [`SPEEDS`].
+    pub speed: f64,
+    /// From where on, in s since its start.
+    pub from_s: f64,
+    /// To where, in s since its start; none to the end.
+    pub to_s: Option<f64>,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            speed: 1.0,
+            from_s: 0.0,
+            to_s: None,
+        }
+    }
+}
+
+/// How a replay went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Played {
+    /// Events that were told.
+    pub events: u64,
+    /// Recorded time that was played, in s.
+    pub recorded_s: f64,
+    /// How late the latest event was told.
+    pub latest: Duration,
+    /// Whether the recording was cut off.
+    pub cut: bool,
+}
+
+/// Tells the events of a recording, each at its time, until its end or until `ended`.
+///
+/// What was known before `pace.from_s` of the links and the configurations is told first.
+///
+/// # Errors
+/// If the recording can't be read to the end; what was read before has been told.
+pub fn play(
+    recording: Reader,
+    pace: &Pace,
+    ended: &AtomicBool,
+    mut tell: impl FnMut(Role, Event),
+) -> Result<Played, ReadError> {
+    let mut events = Events::new(recording);
+    let mut played = Played::default();
+    let mut started: Option<(Instant, f64)> = None;
+    while let Some((at_s, role, event)) = events.next_from(pace.from_s)? {
+        if pace.to_s.is_some_and(|to_s| at_s > to_s) {
+            break;
+        }
+        let (start, start_s) = *started.get_or_insert((Instant::now(), at_s.max(pace.from_s)));
+        let due = start + Duration::from_secs_f64((at_s - start_s).max(0.0) / pace.speed);
+        if !wait_until(due, ended) {
+            break;
+        }
+        played.latest = played.latest.max(due.elapsed());
+        played.recorded_s = (at_s - start_s).max(played.recorded_s);
+        played.events += 1;
+        tell(role, event);
+    }
+    played.cut = events.is_cut();
+    Ok(played)
+}
+
+/// Waits; false if it is to end before.
+fn wait_until(due: Instant, ended: &AtomicBool) -> bool {
+    loop {
+        if ended.load(Ordering::Relaxed) {
+            return false;
+        }
+        let left = due.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return true;
+        }
+        thread::sleep(left.min(LOOK));
+    }
+}

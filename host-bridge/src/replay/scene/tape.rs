@@ -1,0 +1,123 @@
+//! What a scene is made of, taken out of a recording.
+
+use protocol::{DisplayConfiguration, Estimate, Role, SensorConfiguration};
+
+use super::SceneError;
+use crate::recording::reader::Reader;
+use crate::recording::row::{GaugeRow, Row};
+
+/// A piece of a recording.
+#[derive(Default)]
+pub struct Tape {
+    /// Samples without a gap.
+    pub samples: Vec<GaugeRow>,
+    /// The estimates within the piece.
+    pub estimates: Vec<Estimate>,
+    /// The sensor's configuration, if it was reported.
+    pub sensor: Option<SensorConfiguration>,
+    /// The display's.
+    pub display: Option<DisplayConfiguration>,
+    /// Whether the recording was cut off.
+    pub cut: bool,
+}
+
+/// A run of samples without a gap, by time in s.
+#[derive(Clone, Copy)]
+struct Run {
+    from_s: f64,
+    to_s: f64,
+}
+
+impl Run {
+    const fn length_s(&self) -> f64 {
+        self.to_s - self.from_s
+    }
+}
+
+/// The same but for whether samples are sent, which the recording itself changes.
+fn same(one: &SensorConfiguration, other: &SensorConfiguration) -> bool {
+    *one == SensorConfiguration {
+        stream_gauges: one.stream_gauges,
+        ..*other
+    }
+}
+
+impl Tape {
+    /// Takes what lies between two times, in s since the recording's start.
+    ///
+    /// # Errors
+    /// If the recording can't be read, has no samples there or has a gap there, or if the sensor was
+    /// configured otherwise meanwhile.
+    pub fn take(mut recording: Reader, from_s: f64, to_s: f64) -> Result<Self, SceneError> {
+        let mut tape = Self::default();
+        let mut runs: Vec<Run> = Vec::new();
+        let mut gap_s = None;
+        while let Some(entry) = recording.next_entry()? {
+            let at_s = recording.since_start_s(entry.log_ns);
+            if at_s > to_s {
+                break;
+            }
+            for (role, row) in recording.take_told() {
+                tape.configured(role, &row, None)?;
+            }
+            let within = at_s >= from_s;
+            match entry.row {
+                Row::Gauges(row) if within => {
+                    let follows = tape
+                        .samples
+                        .last()
+                        .is_some_and(|last| row.sample == last.sample.wrapping_add(1));
+                    match runs.last_mut() {
+                        Some(run) if follows => run.to_s = at_s,
+                        last => {
+                            if last.is_some() {
+                                gap_s = gap_s.or(Some(at_s));
+                                tape.samples.clear();
+                            }
+                            runs.push(Run {
+                                from_s: at_s,
+                                to_s: at_s,
+                            });
+                        }
+                    }
+                    tape.samples.push(row);
+                }
+                Row::Estimate(row) if within => tape.estimates.push(row.into()),
+                row => {
+                    let changed_s = (within && !tape.samples.is_empty()).then_some(at_s);
+                    tape.configured(entry.role, &row, changed_s)?;
+                }
+            }
+        }
+        tape.cut = recording.is_cut();
+        if let Some(at_s) = gap_s {
+            let longest = runs
+                .into_iter()
+                .max_by(|one, other| one.length_s().total_cmp(&other.length_s()));
+            let (from_s, to_s) = longest.map_or((0.0, 0.0), |run| (run.from_s, run.to_s));
+            return Err(SceneError::Gap { at_s, from_s, to_s });
+        }
+        Ok(tape)
+    }
+
+    /// Takes a reported configuration; one that changes what the samples belong to is refused.
+    fn configured(
+        &mut self,
+        role: Role,
+        row: &Row,
+        changed_s: Option<f64>,
+    ) -> Result<(), SceneError> {
+        match (role, row) {
+            (Role::Sensor, Row::SensorConfiguration(row)) => {
+                let before = self.sensor.replace(row.in_force);
+                let changed = before.is_some_and(|before| !same(&before, &row.in_force));
+                if let Some(at_s) = changed_s.filter(|_| changed) {
+                    return Err(SceneError::Reconfigured { at_s });
+                }
+            }
+            (Role::Display, Row::DisplayConfiguration(row)) => self.display = Some(row.in_force),
+            _ => {}
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,298 @@
+//! What the monitor knows, and what it has said to the boards.
+
+use host_bridge::link::Event;
+use host_bridge::monitor::dashboard::Dashboard;
+use host_bridge::monitor::happening::What;
+use host_bridge::monitor::orders::Outcome;
+use host_bridge::monitor::settings::{self, Kind};
+use host_bridge::monitor::trace::{Trace, column_us};
+use host_bridge::state::State;
+use protocol::{
+    Configuration, ConfigurationReport, DisplayConfiguration, DisplayState, Hello, Message,
+    Refusal, Role, Safety, SensorConfiguration, Setting, Stop, StopReason, Trip,
+};
+
+const STOP: Message = Message::Stop(Stop {
+    reason: StopReason::Operator,
+});
+
+fn connected() -> Dashboard {
+    let mut dashboard = Dashboard::default();
+    for role in [Role::Sensor, Role::Display] {
+        let state = State::Known {
+            port: "/dev/tty".into(),
+            hello: Hello::new(role, "stm32f429zi", [0, 1, 0]),
+        };
+        dashboard.on(0, role, Event::Turned(state));
+    }
+    dashboard
+}
+
+/// What a board says when it is asked for its configuration by being given the other one's.
+fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option<Setting>) {
+    let role = match configuration {
+        Configuration::Sensor(_) => Role::Sensor,
+        Configuration::Display(_) => Role::Display,
+    };
+    let message = Message::Configuration(ConfigurationReport {
+        refused: refused.map(|setting| Refusal {
+            setting,
+            index: 0,
+            low: 1,
+            high: 2,
+        }),
+        hash: configuration.hash(),
+        configuration,
+    });
+    let at_us = dashboard.now_us;
+    dashboard.on(at_us, role, Event::Heard { at_us, message });
+}
+
+#[test]
+fn each_board_is_asked_for_its_configuration_until_it_answers() {
+    let mut dashboard = connected();
+    dashboard.elapse(1);
+    let asks_sensor = vec![Message::Configure(Configuration::Display(
+        DisplayConfiguration::DEFAULT,
+    ))];
+    assert_eq!(dashboard.take_outbox(Role::Sensor), asks_sensor);
+    let asks_display = vec![Message::Configure(Configuration::Sensor(
+        SensorConfiguration::DEFAULT,
+    ))];
+    assert_eq!(dashboard.take_outbox(Role::Display), asks_display);
+    dashboard.elapse(100_000);
+    assert_eq!(dashboard.take_outbox(Role::Sensor), []);
+    dashboard.elapse(400_000);
+    assert_eq!(dashboard.take_outbox(Role::Sensor), asks_sensor);
+    let own = Configuration::Sensor(SensorConfiguration {
+        window_ms: 77,
+        ..SensorConfiguration::DEFAULT
+    });
+    says(&mut dashboard, own, Some(Setting::Role));
+    assert_eq!(dashboard.sensor.configuration, Some(own));
+    dashboard.elapse(9_000_000);
+    assert_eq!(dashboard.take_outbox(Role::Sensor), []);
+}
+
+#[test]
+fn streaming_is_switched_in_the_configuration_that_is_in_force_and_nothing_else_is() {
+    let mut dashboard = connected();
+    dashboard.toggle_gauges();
+    dashboard.elapse(1);
+    assert_eq!(dashboard.take_outbox(Role::Sensor).len(), 1);
+    let before = SensorConfiguration {
+        window_ms: 123,
+        bank_candidates: 13,
+        ..SensorConfiguration::DEFAULT
+    };
+    says(
+        &mut dashboard,
+        Configuration::Sensor(before),
+        Some(Setting::Role),
+    );
+    let wanted = Configuration::Sensor(SensorConfiguration {
+        stream_gauges: true,
+        ..before
+    });
+    assert_eq!(
+        dashboard.take_outbox(Role::Sensor),
+        [Message::Configure(wanted)]
+    );
+    says(&mut dashboard, wanted, None);
+    assert_eq!(
+        dashboard.outcome,
+        Some(Outcome::Taken {
+            name: "stream_gauges",
+            value: "on".to_owned()
+        })
+    );
+    // And off again.
+    dashboard.toggle_gauges();
+    dashboard.elapse(2);
+    dashboard.take_outbox(Role::Sensor);
+    says(&mut dashboard, wanted, Some(Setting::Role));
+    assert_eq!(
+        dashboard.take_outbox(Role::Sensor),
+        [Message::Configure(Configuration::Sensor(before))]
+    );
+}
+
+#[test]
+fn a_refusal_is_shown_by_name_and_range() {
+    let mut dashboard = connected();
+    let setting = &settings::DISPLAY[6];
+    assert_eq!(setting.name, "amplitude_mv");
+    dashboard.change(Role::Display, setting, "6000");
+    dashboard.elapse(1);
+    let own = Configuration::Display(DisplayConfiguration::DEFAULT);
+    says(&mut dashboard, own, Some(Setting::Role));
+    dashboard.take_outbox(Role::Display);
+    says(&mut dashboard, own, Some(Setting::AmplitudeMv));
+    let notice = dashboard.notice().expect("it was refused");
+    assert!(notice.is_bad);
+    assert_eq!(
+        notice.text,
+        "display: refused: AmplitudeMv is out of range: give 1 to 2"
+    );
+}
+
+#[test]
+fn a_change_that_is_not_answered_is_given_up() {
+    let mut dashboard = connected();
+    dashboard.change(Role::Display, &settings::DISPLAY[0], "travelling");
+    dashboard.elapse(1_999_000);
+    assert_eq!(dashboard.outcome, None);
+    dashboard.elapse(2_000_000);
+    assert_eq!(dashboard.outcome, Some(Outcome::Unanswered));
+}
+
+#[test]
+fn a_stop_is_said_at_once_and_again_until_the_display_has_stopped() {
+    let mut dashboard = connected();
+    dashboard.stop();
+    assert_eq!(dashboard.take_outbox(Role::Display), [STOP]);
+    dashboard.elapse(10);
+    dashboard.take_outbox(Role::Display);
+    dashboard.elapse(300_000);
+    assert_eq!(dashboard.take_outbox(Role::Display), [STOP]);
+    let message = Message::Safety(Safety {
+        instant_us: 0,
+        state: DisplayState::Stopped(Trip::Operator),
+    });
+    let at_us = 310_000;
+    dashboard.on(at_us, Role::Display, Event::Heard { at_us, message });
+    let notice = dashboard.notice().expect("it is told");
+    assert_eq!(notice.text, "stop: confirmed by the display");
+    dashboard.elapse(320_000);
+    // Nothing but the question for its configuration.
+    let said = dashboard.take_outbox(Role::Display);
+    assert!(!said.contains(&STOP), "{said:?}");
+}
+
+#[test]
+fn a_stop_waits_for_a_display_that_is_away() {
+    let mut dashboard = connected();
+    let absent = State::Absent {
+        place: "/dev/tty".to_owned(),
+    };
+    dashboard.on(0, Role::Display, Event::Turned(absent));
+    dashboard.stop();
+    dashboard.take_outbox(Role::Display);
+    dashboard.elapse(60_000_000);
+    assert_eq!(dashboard.take_outbox(Role::Display), []);
+    let known = State::Known {
+        port: "/dev/tty".into(),
+        hello: Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
+    };
+    dashboard.on(60_000_001, Role::Display, Event::Turned(known));
+    dashboard.elapse(60_000_002);
+    assert!(dashboard.take_outbox(Role::Display).contains(&STOP));
+}
+
+#[test]
+fn each_change_of_the_supervisor_happens_once() {
+    let mut dashboard = connected();
+    dashboard.take_happenings();
+    for state in [
+        DisplayState::Ready,
+        DisplayState::Driving,
+        DisplayState::Driving,
+        DisplayState::Ready,
+    ] {
+        let message = Message::Safety(Safety {
+            instant_us: 0,
+            state,
+        });
+        dashboard.on(5, Role::Display, Event::Heard { at_us: 5, message });
+    }
+    let told: Vec<What> = dashboard
+        .take_happenings()
+        .into_iter()
+        .map(|happening| happening.what)
+        .collect();
+    assert_eq!(
+        told,
+        [
+            What::Safety(DisplayState::Ready),
+            What::Safety(DisplayState::Driving),
+            What::Safety(DisplayState::Ready),
+        ]
+    );
+}
+
+#[test]
+fn every_setting_takes_its_own_value_back_and_names_its_range() {
+    for (role, configuration) in [
+        (
+            Role::Sensor,
+            Configuration::Sensor(SensorConfiguration::DEFAULT),
+        ),
+        (
+            Role::Display,
+            Configuration::Display(DisplayConfiguration::DEFAULT),
+        ),
+    ] {
+        for setting in settings::of(role) {
+            let value = setting.value(&configuration).expect("it is this board's");
+            assert_eq!(setting.changed(configuration, &value), Ok(configuration));
+            let wanted = setting.wanted(&configuration);
+            match setting.kind {
+                Kind::Number => assert!(wanted.contains(" to "), "{}: {wanted}", setting.name),
+                Kind::Gauges => assert_eq!(wanted, "some of 01234"),
+                Kind::Choice(words) => {
+                    for word in words {
+                        let changed = setting.changed(configuration, word).expect("a word of it");
+                        assert_eq!(setting.value(&changed).as_deref(), Some(*word));
+                    }
+                }
+            }
+            let misread = setting.changed(configuration, "xyz").expect_err("no value");
+            assert!(misread.to_string().contains(setting.name), "{misread}");
+        }
+    }
+}
+
+#[test]
+fn a_trace_loses_no_spike_whatever_the_columns() {
+    let mut trace = Trace::default();
+    for ms in 0..10_000_u64 {
+        let value = if ms == 5_003 { 9.0 } else { 1.0 };
+        trace.put(ms * 1_000, value);
+    }
+    for count in [10, 77, 300] {
+        let column_us = column_us(10.0, count);
+        let columns: Vec<_> = trace.columns(9_999_000, column_us, count).collect();
+        let highest = columns.iter().flatten().map(|extent| extent.high);
+        assert_eq!(highest.fold(0.0, f32::max), 9.0, "{count} columns");
+        assert!(columns.iter().filter(|column| column.is_none()).count() <= 1);
+    }
+}
+
+#[test]
+fn a_trace_shows_a_gap_where_nothing_came_and_forgets_what_is_too_old() {
+    let mut trace = Trace::default();
+    trace.put(1_000_000, 1.0);
+    trace.put(3_000_000, 2.0);
+    let columns: Vec<bool> = trace
+        .columns(3_100_000, 100_000, 22)
+        .map(|column| column.is_some())
+        .collect();
+    let mut expected = vec![false; 22];
+    expected[1] = true;
+    expected[21] = true;
+    // The first value is at 1.0 s, of which the columns begin at 0.9 s.
+    assert_eq!(columns.len(), expected.len());
+    assert_eq!(
+        columns.iter().filter(|column| **column).count(),
+        2,
+        "{columns:?}"
+    );
+    trace.put(60_000_000, 3.0);
+    assert_eq!(trace.extent(0, 50_000_000), None);
+    // What comes late is not put where something newer is.
+    trace.put(1_000_000, 5.0);
+    assert_eq!(
+        trace.extent(0, u64::MAX / 2).map(|extent| extent.high),
+        Some(3.0)
+    );
+}

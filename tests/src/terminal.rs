@@ -1,0 +1,145 @@
+//! A terminal with a program in it: a pseudo-terminal whose other end a test holds.
+
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use serialport::{SerialPort, TTYPort};
+
+use crate::fake_board::wait_until;
+
+/// A terminal of 120 × 40 characters.
+pub struct Terminal {
+    path: PathBuf,
+    keys: TTYPort,
+    shown: Arc<Mutex<String>>,
+    ended: Arc<AtomicBool>,
+    reader: JoinHandle<()>,
+    /// Keeps the terminal alive while no program has it open.
+    _kept: TTYPort,
+}
+
+impl Terminal {
+    /// One in which nothing runs yet.
+    ///
+    /// # Panics
+    /// If the system has none.
+    pub fn new() -> Self {
+        let (mut master, mut kept) = TTYPort::pair().expect("the system has pseudo-terminals");
+        // The program is to open it, too.
+        kept.set_exclusive(false).expect("it can be shared");
+        let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
+        let keys = master.try_clone_native().expect("it can be held twice");
+        master
+            .set_timeout(Duration::from_millis(20))
+            .expect("a timeout can be set");
+        let (shown, ended) = (
+            Arc::<Mutex<String>>::default(),
+            Arc::<AtomicBool>::default(),
+        );
+        let (theirs, their_end) = (Arc::clone(&shown), Arc::clone(&ended));
+        let terminal = Self {
+            path,
+            keys,
+            shown,
+            ended,
+            reader: thread::spawn(move || read(&mut master, &theirs, &their_end)),
+            _kept: kept,
+        };
+        // As a shell leaves it: the pair was made for bytes, not for people.
+        terminal.stty(&["sane", "rows", "40", "cols", "120"]);
+        terminal
+    }
+
+    /// Has `command` run in it. `TERM` and `NO_COLOR` are set, so that what is shown is easy to read.
+    ///
+    /// # Panics
+    /// If it can't be opened.
+    pub fn hold(&self, command: &mut Command) {
+        command
+            .env("TERM", "xterm-256color")
+            .env("NO_COLOR", "1")
+            .stdin(self.end())
+            .stdout(self.end())
+            .stderr(Stdio::piped());
+    }
+
+    fn end(&self) -> File {
+        OpenOptions::new()
+            .read(true)
+            .write(true)
+            .open(&self.path)
+            .expect("the terminal can be opened")
+    }
+
+    /// Types.
+    ///
+    /// # Panics
+    /// If the terminal does not take it.
+    pub fn type_keys(&mut self, keys: &str) {
+        self.keys
+            .write_all(keys.as_bytes())
+            .expect("a terminal takes keys");
+    }
+
+    /// All that was shown so far, with what moves the cursor.
+    pub fn shown(&self) -> String {
+        self.shown
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    /// Waits until `words` were shown; whether they were.
+    pub fn shows(&self, limit: Duration, words: &str) -> bool {
+        wait_until(limit, || self.shown().contains(words))
+    }
+
+    /// How the terminal is set, as `stty` says it.
+    pub fn settings(&self) -> String {
+        self.stty(&["-a"])
+    }
+
+    /// Closes the terminal's window.
+    pub fn hang_up(self) {
+        let Self { ended, reader, .. } = self;
+        ended.store(true, Ordering::Release);
+        // The other hold on the window.
+        let _ = reader.join();
+    }
+
+    fn stty(&self, arguments: &[&str]) -> String {
+        let output = Command::new("stty")
+            .args(arguments)
+            .stdin(self.end())
+            .output()
+            .expect("stty can be run");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+}
+
+impl Default for Terminal {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn read(master: &mut impl Read, shown: &Mutex<String>, ended: &AtomicBool) {
+    let mut bytes = [0; 4_096];
+    while !ended.load(Ordering::Acquire) {
+        match master.read(&mut bytes) {
+            Ok(count) => shown
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push_str(&String::from_utf8_lossy(&bytes[..count])),
+            Err(error) if error.kind() == ErrorKind::TimedOut => {}
+            Err(_) => return,
+        }
+    }
+}

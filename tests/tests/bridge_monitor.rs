@@ -1,0 +1,449 @@
+//! `host-bridge monitor`: lines that are right, states that are named, and a terminal that is left as it
+//! was found.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::os::unix::fs::symlink;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Duration;
+
+use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
+use tests::bridge;
+use tests::fake_bench::{FakeBench, Running};
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::terminal::Terminal;
+
+/// Far more than anything here takes.
+const LIMIT: Duration = Duration::from_secs(30);
+
+fn bench() -> Running {
+    Running::new(FakeBench::new())
+}
+
+/// `host-bridge monitor` at the ports of a bench.
+fn monitor(running: &Running) -> Command {
+    let bench = running.bench();
+    monitor_at(bench.sensor.path(), bench.display.path())
+}
+
+fn monitor_at(sensor: &Path, display: &Path) -> Command {
+    let mut command = bridge::command();
+    command
+        .arg("monitor")
+        .arg("--sensor")
+        .arg(sensor)
+        .arg("--display")
+        .arg(display);
+    command
+}
+
+/// A program that is read line by line.
+struct Lines {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Lines {
+    fn of(command: &mut Command) -> Self {
+        let mut child = command.spawn().expect("the program can be started");
+        let stdout = child.stdout.take().expect("it is piped");
+        let (sender, lines) = channel();
+        thread::spawn(move || {
+            for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { child, lines }
+    }
+
+    /// The next line with these words.
+    fn with(&self, words: &str) -> String {
+        let mut seen = String::new();
+        loop {
+            match self.lines.recv_timeout(LIMIT) {
+                Ok(line) if line.contains(words) => return line,
+                Ok(line) => seen += &format!("{line}\n"),
+                Err(_) => panic!("no line with {words:?} after\n{seen}"),
+            }
+        }
+    }
+
+    fn signal(&self, name: &str) {
+        signal(&self.child, name);
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill")
+        .arg(format!("-{name}"))
+        .arg(child.id().to_string())
+        .status()
+        .expect("kill can be run");
+    assert!(status.success());
+}
+
+/// A name in a folder of its own, free to be linked to a board's port.
+fn name_of_a_port(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("bridge_monitor")
+        .join(test);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder.join("ttyBoard")
+}
+
+#[test]
+fn a_line_a_second_tells_what_both_boards_say_in_columns() {
+    let running = bench();
+    let lines = Lines::of(monitor(&running).arg("--plain").args(["--every", "0.2"]));
+    let heading = lines.with("lambda_mm");
+    let names: Vec<&str> = heading.trim_start_matches('#').split_whitespace().collect();
+    lines.with("display safety: driving");
+    // The surface is told of while the hand is fast enough.
+    let line = lines.with(" valid ");
+    let cells: Vec<&str> = line.split_whitespace().collect();
+    assert_eq!(names.len(), cells.len(), "{heading}\n{line}");
+    let cell = |name: &str| {
+        let column = names.iter().position(|each| *each == name);
+        cells[column.unwrap_or_else(|| panic!("no column {name}"))]
+    };
+    let number = |name: &str| -> f64 { cell(name).parse().expect("a number") };
+    assert_eq!((cell("sensor"), cell("display")), ("known", "known"));
+    assert!((number("lambda_mm") - 2.0).abs() < 0.01, "{line}");
+    assert_eq!(cell("conf"), "0.97");
+    assert_eq!((cell("range"), cell("contact")), ("T1", "slip"));
+    let hand_mm_s = number("v_hand_mm_s").abs();
+    assert!((14.0..70.1).contains(&hand_mm_s), "{line}");
+    assert_eq!((cell("lost"), cell("bad")), ("0", "0"));
+    assert!(
+        number("rtt_s_ms") < 1e3 && number("rtt_d_ms") < 1e3,
+        "{line}"
+    );
+    assert_eq!(cell("supervisor"), "driving");
+}
+
+#[test]
+fn json_lines_hold_the_same_with_every_ports_counters() {
+    let running = bench();
+    let lines = Lines::of(monitor(&running).arg("--json").args(["--every", "0.2"]));
+    let safety = lines.with("\"kind\":\"safety\"");
+    assert!(safety.contains("\"state\":\"driving\""), "{safety}");
+    let line = lines.with("\"kind\":\"second\"");
+    for words in [
+        "\"state\":\"known\"",
+        "\"wavelength_mm\":",
+        "\"round_trip_ms\":",
+        "\"port\":\"sensor peer\"",
+        "\"sent\":4711",
+        "\"gauges\":[\"good\",\"good\",\"good\",\"good\",\"hum\"]",
+    ] {
+        assert!(line.contains(words), "{words} is not in {line}");
+    }
+}
+
+#[test]
+fn a_change_of_the_supervisor_is_a_line_at_once() {
+    let running = bench();
+    // No other line within the test's time.
+    let lines = Lines::of(monitor(&running).arg("--plain").args(["--every", "600"]));
+    lines.with("display safety: driving");
+    running.bench().turn(DisplayState::Fading(Hold::Stale));
+    lines.with("display safety: fading: no fresh estimate");
+    running.bench().turn(DisplayState::Ready);
+    lines.with("display safety: ready");
+}
+
+#[test]
+fn what_is_wrong_with_a_port_is_named_with_advice() {
+    let absent = name_of_a_port("named");
+    let foreign = FakeBoard::saying(Hello {
+        protocol: [99, 0],
+        ..Hello::new(Role::Display, "stm32f429zi", [9, 9, 9])
+    });
+    let lines = Lines::of(monitor_at(&absent, foreign.path()).arg("--plain"));
+    let line = lines.with("sensor absent: ");
+    assert!(line.contains("not there: plug the board in"), "{line}");
+    let line = lines.with("display foreign: ");
+    assert!(
+        line.contains("of protocol 99") && line.contains("host-bridge flash"),
+        "{line}"
+    );
+    drop(lines);
+    let noise = FakeBoard::new(Role::Sensor);
+    noise.mute(true);
+    let lines = Lines::of(monitor_at(noise.path(), &absent).arg("--plain"));
+    let is_named = wait_until(LIMIT, || {
+        noise.send_bytes(&[0x81, 0xfe, 0x93, 0xd0, 0xe5, 0xc7, 0x88, 0x9a]);
+        lines
+            .lines
+            .try_iter()
+            .any(|line| line.contains("sensor garbage: "))
+    });
+    assert!(is_named);
+}
+
+#[test]
+fn the_second_monitor_says_that_the_ports_are_busy() {
+    let running = bench();
+    let first = Lines::of(monitor(&running).arg("--plain"));
+    first.with("display safety: driving");
+    let second = Lines::of(monitor(&running).arg("--plain"));
+    let line = second.with("sensor busy: ");
+    assert!(
+        line.contains("another program has it: close the other program"),
+        "{line}"
+    );
+    second.with("display busy: ");
+    // The first one is not disturbed, and its ports are free when it ends.
+    first.with(" known      known ");
+    drop(first);
+    second.with(" known      known ");
+}
+
+#[test]
+fn a_cable_that_is_put_back_is_seen_within_a_second() {
+    let name = name_of_a_port("cable");
+    let absent = name.with_extension("absent");
+    let board = FakeBoard::new(Role::Display);
+    symlink(board.path(), &name).expect("a link can be made");
+    let lines = Lines::of(
+        monitor_at(&absent, &name)
+            .arg("--plain")
+            .args(["--every", "600"]),
+    );
+    lines.with("display known: ");
+    let _ = fs::remove_file(&name);
+    drop(board);
+    lines.with("display absent: ");
+    let board = FakeBoard::new(Role::Display);
+    symlink(board.path(), &name).expect("a link can be made");
+    let back = std::time::Instant::now();
+    lines.with("display known: ");
+    assert!(
+        back.elapsed() < Duration::from_secs(1),
+        "{:?}",
+        back.elapsed()
+    );
+}
+
+#[test]
+fn signals_and_its_own_end_are_a_success_without_a_word() {
+    let running = bench();
+    for name in ["INT", "TERM", "HUP"] {
+        let mut lines = Lines::of(monitor(&running).arg("--plain"));
+        lines.with("display safety: driving");
+        lines.signal(name);
+        let status = ended(&mut lines.child);
+        assert_eq!((status.code(), status.signal()), (Some(0), None), "{name}");
+    }
+    let ended =
+        bridge::Running::start(monitor(&running).args(["--plain", "--for", "0.3"])).wait(LIMIT);
+    assert!(
+        ended.status.success() && ended.stderr.is_empty(),
+        "{ended:?}"
+    );
+}
+
+fn ended(child: &mut Child) -> std::process::ExitStatus {
+    let mut status = None;
+    let has_ended = wait_until(LIMIT, || {
+        status = child.try_wait().expect("a child can be waited for");
+        status.is_some()
+    });
+    assert!(has_ended, "it goes on");
+    status.expect("it has ended")
+}
+
+#[test]
+fn nobody_who_reads_any_more_is_no_error() {
+    let running = bench();
+    let mut child = monitor(&running)
+        .arg("--plain")
+        .args(["--every", "0.05"])
+        .spawn()
+        .expect("the program can be started");
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().expect("it is piped"))
+        .read_line(&mut first)
+        .expect("it says something");
+    // The pipe is closed here.
+    assert!(ended(&mut child).success());
+    let mut words = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("it is piped"), &mut words)
+        .expect("text");
+    assert_eq!(words, "");
+}
+
+/// Runs a dashboard, lets `end` end it, and checks status and terminal.
+fn assert_restores(end: impl FnOnce(&mut Terminal, &Child)) {
+    let running = bench();
+    let mut terminal = Terminal::new();
+    let before = terminal.settings();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    assert_ne!(terminal.settings(), before);
+    end(&mut terminal, &child);
+    let status = ended(&mut child);
+    assert_eq!((status.code(), status.signal()), (Some(0), None));
+    assert_eq!(terminal.settings(), before);
+    // The usual screen and its cursor are back.
+    let leaves = |shown: String| {
+        let last = |words: &str| shown.rfind(words);
+        last("\x1b[?1049l") > last("\x1b[?1049h") && last("\x1b[?25h") > last("\x1b[?25l")
+    };
+    assert!(wait_until(LIMIT, || leaves(terminal.shown())));
+}
+
+#[test]
+fn the_terminal_is_restored_after_q() {
+    assert_restores(|terminal, _| terminal.type_keys("q"));
+}
+
+#[test]
+fn the_terminal_is_restored_after_control_c() {
+    assert_restores(|terminal, _| terminal.type_keys("\x03"));
+}
+
+#[test]
+fn the_terminal_is_restored_after_any_signal() {
+    for name in ["TERM", "HUP", "INT"] {
+        assert_restores(|_, child| signal(child, name));
+    }
+}
+
+#[test]
+fn a_terminal_that_goes_away_takes_the_monitor_with_it() {
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    // The test's own hold on the terminal.
+    drop(command);
+    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    terminal.hang_up();
+    assert!(ended(&mut child).success());
+}
+
+#[test]
+fn a_key_stops_the_display_and_its_answer_is_shown() {
+    let running = bench();
+    let mut terminal = Terminal::new();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys(" ");
+    assert!(
+        terminal.shows(LIMIT, "STOPPED: BY THE OPERATOR"),
+        "{}",
+        terminal.shown()
+    );
+    let stop = Stop {
+        reason: StopReason::Operator,
+    };
+    assert_eq!(running.bench().stopped, Some(stop));
+    assert!(terminal.shows(LIMIT, "confirmed by the display"));
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+}
+
+#[test]
+fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
+    let mut bench = FakeBench::new();
+    bench.sensing.window_ms = 123;
+    let before = bench.sensing;
+    let running = Running::new(bench);
+    let mut terminal = Terminal::new();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "g streams them"));
+    terminal.type_keys("g");
+    assert!(
+        terminal.shows(LIMIT, "stream_gauges is on now"),
+        "{}",
+        terminal.shown()
+    );
+    let mut wanted = before;
+    wanted.stream_gauges = true;
+    assert_eq!(running.bench().sensing, wanted);
+    assert!(terminal.shows(LIMIT, "LSB high"));
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+}
+
+#[test]
+fn the_form_changes_a_setting_and_shows_a_refusal() {
+    let running = bench();
+    let mut terminal = Terminal::new();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("c");
+    assert!(terminal.shows(LIMIT, "uniform"));
+    // Down to max_age_ms.
+    terminal.type_keys("jj77\r");
+    assert!(
+        terminal.shows(LIMIT, "max_age_ms is 77 ms now"),
+        "{}",
+        terminal.shown()
+    );
+    assert_eq!(running.bench().displaying.max_age_ms, 77);
+    terminal.type_keys("7\r");
+    assert!(
+        terminal.shows(LIMIT, "MaxAgeMs is out of range: give 20 to 5000"),
+        "{}",
+        terminal.shown()
+    );
+    assert_eq!(running.bench().displaying.max_age_ms, 77);
+    terminal.type_keys("qq");
+    assert!(ended(&mut child).success());
+}
+
+#[test]
+fn a_log_without_its_firmware_or_from_none_is_refused() {
+    let folder = name_of_a_port("log").with_file_name("bench.toml");
+    fs::write(
+        &folder,
+        "[sensor]\nport = \"/dev/none\"\nrtt = \"tcp:localhost:1\"\n",
+    )
+    .expect("written");
+    let mut command = bridge::command();
+    command
+        .arg("monitor")
+        .arg("--plain")
+        .arg("--bench")
+        .arg(&folder);
+    let ended = bridge::Running::start(&mut command).wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(2));
+    assert!(
+        ended.stderr.contains("give --sensor-elf"),
+        "{}",
+        ended.stderr
+    );
+    command.arg("--sensor-elf").arg(&folder);
+    let ended = bridge::Running::start(&mut command).wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(2));
+    assert!(
+        ended.stderr.contains("holds no defmt log"),
+        "{}",
+        ended.stderr
+    );
+}

@@ -1,0 +1,357 @@
+//! Whom a relay refuses, and what it says to whoever starts it wrongly.
+
+use std::fs;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use host_bridge::relay::envelope::{Content, Envelope};
+use host_bridge::relay::name::{Channel, Name};
+use host_bridge::relay::network::{Ends, Network};
+use host_bridge::relay::site::bridge_hello;
+use host_bridge::relay::wire::Wire;
+use protocol::{Hello, Ping, Role};
+use rcgen::{
+    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
+    date_time_ymd,
+};
+use tests::bridge;
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::relay::{Relay, free_port, listen, sequences, talking_board};
+
+/// Far more than anything here takes.
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// A certificate authority that lasts for a test.
+struct Authority {
+    folder: PathBuf,
+    issuer: Issuer<'static, KeyPair>,
+}
+
+/// Which certificate is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Good,
+    Expired,
+    OfAnotherHost,
+    ForServersOnly,
+}
+
+impl Authority {
+    fn new(test: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join("bridge_relay_refusals")
+            .join(test);
+        fs::create_dir_all(&folder).expect("a folder can be made");
+        let key = KeyPair::generate().expect("a key can be made");
+        let mut params = CertificateParams::default();
+        params.distinguished_name.push(DnType::CommonName, test);
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        let certificate = params.self_signed(&key).expect("it can be signed");
+        fs::write(folder.join("ca.pem"), certificate.pem()).expect("it can be written");
+        Self {
+            folder,
+            issuer: Issuer::new(params, key),
+        }
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.folder.join(name).display().to_string()
+    }
+
+    /// The three options for a certificate of this authority's, which believes in `ca`.
+    fn proofs(&self, name: &str, kind: Kind, ca: &Self) -> Vec<String> {
+        let host = if kind == Kind::OfAnotherHost {
+            "elsewhere"
+        } else {
+            "localhost"
+        };
+        let mut params = CertificateParams::new([host.to_owned()]).expect("a name");
+        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
+        if kind != Kind::ForServersOnly {
+            params
+                .extended_key_usages
+                .push(ExtendedKeyUsagePurpose::ClientAuth);
+        }
+        if kind == Kind::Expired {
+            params.not_before = date_time_ymd(2001, 1, 1);
+            params.not_after = date_time_ymd(2002, 1, 1);
+        }
+        let key = KeyPair::generate().expect("a key can be made");
+        let certificate = params
+            .signed_by(&key, &self.issuer)
+            .expect("it can be signed");
+        let (pem, key_pem) = (format!("{name}.pem"), format!("{name}.key"));
+        fs::write(self.folder.join(&pem), certificate.pem()).expect("it can be written");
+        fs::write(self.folder.join(&key_pem), key.serialize_pem()).expect("it can be written");
+        [
+            ("--ca", ca.file("ca.pem")),
+            ("--certificate", self.file(&pem)),
+            ("--key", self.file(&key_pem)),
+        ]
+        .into_iter()
+        .flat_map(|(option, file)| [option.to_owned(), file])
+        .collect()
+    }
+}
+
+fn start(role: Role, board: &FakeBoard, end: [&str; 2], proofs: &[String]) -> Relay {
+    let more: Vec<&str> = end
+        .into_iter()
+        .chain(proofs.iter().map(String::as_str))
+        .collect();
+    Relay::bridge(role, board.path(), &more)
+}
+
+#[test]
+fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
+    let (ours, theirs) = (Authority::new("ours"), Authority::new("theirs"));
+    let sensor = talking_board(Role::Sensor);
+    let port = free_port();
+    let (tls, tcp) = (
+        format!("tls/localhost:{port}"),
+        format!("tcp/localhost:{port}"),
+    );
+    let good = ours.proofs("sensor", Kind::Good, &ours);
+    let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &good);
+    listening.says("listening", LIMIT);
+
+    // Strangers: a certificate of another CA, one that believes in another CA, and none at all.
+    let stranger = theirs.proofs("display", Kind::Good, &ours);
+    let distrustful = ours.proofs("distrustful", Kind::Good, &theirs);
+    for (at, proofs, words) in [
+        (&tls, stranger, "our certificate is rejected there"),
+        (&tls, distrustful, "not made by the CA given with --ca"),
+        (&tcp, Vec::new(), "nobody there speaks to us"),
+    ] {
+        let board = talking_board(Role::Display);
+        let bridge = start(Role::Display, &board, ["--connect", at], &proofs);
+        bridge.says(words, LIMIT);
+        assert!(sequences(&board.take_heard()).is_empty());
+    }
+    assert!(
+        sequences(&sensor.take_heard()).is_empty(),
+        "{}",
+        listening.words()
+    );
+
+    // Nor do they keep out who belongs there.
+    let display = talking_board(Role::Display);
+    let good = ours.proofs("display", Kind::Good, &ours);
+    let connecting = start(Role::Display, &display, ["--connect", &tls], &good);
+    connecting.says("the sensor's site: sensor", LIMIT);
+    listen(&display, LIMIT, |heard| sequences(heard).len() >= 20);
+    listen(&sensor, LIMIT, |heard| sequences(heard).len() >= 100);
+
+    let mut stop = vec!["stop", "--connect", &tls];
+    stop.extend(good.iter().map(String::as_str));
+    let (status, _, words) = Relay::start(stop).wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+}
+
+#[test]
+fn a_router_refuses_strangers_as_well() {
+    let (ours, theirs) = (Authority::new("router"), Authority::new("router-theirs"));
+    let tls = format!("tls/localhost:{}", free_port());
+    let proofs = ours.proofs("router", Kind::Good, &ours);
+    let mut arguments = vec!["router", "--listen", &tls];
+    arguments.extend(proofs.iter().map(String::as_str));
+    let _router = Relay::start(arguments);
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let good = ours.proofs("sensor", Kind::Good, &ours);
+    let _inside = start(Role::Sensor, &sensor, ["--connect", &tls], &good);
+    let stranger = theirs.proofs("display", Kind::Good, &ours);
+    let outside = start(Role::Display, &display, ["--connect", &tls], &stranger);
+    outside.says("our certificate is rejected there", LIMIT);
+    assert!(sequences(&sensor.take_heard()).is_empty());
+    let good = ours.proofs("display", Kind::Good, &ours);
+    drop(outside);
+    let _inside = start(Role::Display, &display, ["--connect", &tls], &good);
+    listen(&sensor, LIMIT, |heard| sequences(heard).len() >= 100);
+}
+
+#[test]
+fn a_listener_of_another_name_or_without_tls_is_not_believed() {
+    let ours = Authority::new("names");
+    let board = talking_board(Role::Display);
+    let good = ours.proofs("display", Kind::Good, &ours);
+    let tls = format!("tls/localhost:{}", free_port());
+    let other = ours.proofs("other", Kind::OfAnotherHost, &ours);
+    let sensor = talking_board(Role::Sensor);
+    let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &other);
+    listening.says("listening", LIMIT);
+    let bridge = start(Role::Display, &board, ["--connect", &tls], &good);
+    bridge.says("its certificate is not believed", LIMIT);
+    assert!(sequences(&sensor.take_heard()).is_empty());
+    drop((listening, bridge));
+
+    let tcp = tls.replace("tls", "tcp");
+    let listening = start(Role::Sensor, &sensor, ["--listen", &tcp], &[]);
+    listening.says("listening", LIMIT);
+    let bridge = start(Role::Display, &board, ["--connect", &tls], &good);
+    bridge.says("without TLS", LIMIT);
+    assert!(sequences(&sensor.take_heard()).is_empty());
+}
+
+/// A program that takes part as the display's bridge and says whatever it likes.
+fn impostor(port: u16) -> Wire {
+    let endpoint = format!("tcp/127.0.0.1:{port}")
+        .parse()
+        .expect("an endpoint");
+    let network = Network::new(Ends::Connecting(vec![endpoint]), None).expect("it can connect");
+    let session = network.open().expect("somebody listens");
+    let name: Name = "bench".parse().expect("a name");
+    Wire::new(session, &name, Role::Display, Vec::new()).expect("it can speak")
+}
+
+fn ping(hello: Hello) -> Envelope {
+    Envelope {
+        hello,
+        session: 1,
+        counter: 0,
+        sent_us: 0,
+        content: Content::Ping(Ping { sent_us: 0 }),
+    }
+}
+
+#[test]
+fn a_bridge_of_another_build_is_refused_by_name() {
+    let sensor = talking_board(Role::Sensor);
+    let port = free_port();
+    let at = format!("tcp/127.0.0.1:{port}");
+    let bridge = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &at]);
+    bridge.says("listening", LIMIT);
+    let impostor = impostor(port);
+    let mut hello = bridge_hello(Role::Display);
+    hello.protocol = 77_u16.to_le_bytes();
+    hello.version = [9, 8, 7];
+    let words = "display 9.8.7 on host-bridge of protocol 77";
+    let named = || {
+        impostor.say(Channel::Clock, &ping(hello));
+        bridge.words().contains(words)
+    };
+    assert!(wait_until(LIMIT, named), "{}", bridge.words());
+    assert!(
+        bridge
+            .words()
+            .contains("install the same build at both sites")
+    );
+    let counted = || {
+        bridge
+            .lines()
+            .iter()
+            .any(|line| line.contains("\"far\":\"foreign\""))
+    };
+    assert!(wait_until(LIMIT, counted), "{:?}", bridge.lines());
+}
+
+#[test]
+fn nobody_speaks_for_another_role_than_his_own() {
+    let sensor = talking_board(Role::Sensor);
+    let port = free_port();
+    let at = format!("tcp/127.0.0.1:{port}");
+    let bridge = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &at]);
+    bridge.says("listening", LIMIT);
+    let impostor = impostor(port);
+    let refused = || {
+        impostor.say(Channel::Clock, &ping(bridge_hello(Role::Sensor)));
+        bridge.lines().last().is_some_and(|line| {
+            let report: serde_json::Value = serde_json::from_str(line).expect("JSON");
+            report["incoming"]["refused"].as_u64() > Some(10)
+        })
+    };
+    assert!(wait_until(LIMIT, refused), "{:?}", bridge.lines());
+    assert!(
+        !bridge.words().contains("the display's site: "),
+        "{}",
+        bridge.words()
+    );
+}
+
+/// Runs `host-bridge relay` with arguments that can't be used, and checks what it says.
+fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let arguments = ["relay"].iter().chain(arguments);
+    let ended = bridge::run(arguments, LIMIT);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    for word in words {
+        assert!(
+            ended.stderr.contains(word),
+            "{word:?} is not in: {}",
+            ended.stderr
+        );
+    }
+    assert!(ended.stdout.is_empty(), "{}", ended.stdout);
+}
+
+#[test]
+fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
+    assert_refused(&["sensor"], &["--listen", "--connect"]);
+    assert_refused(&["sensor", "--listen", "7447"], &["tcp/HOST:PORT"]);
+    assert_refused(&["display", "--connect", "udp/x:1"], &["tcp/HOST:PORT"]);
+    assert_refused(&["sensor", "--listen", "tcp/x:y"], &["no port"]);
+    assert_refused(
+        &["sensor", "--listen", "tcp/x:1", "--name", "a/b"],
+        &["\"a/b\" is no name"],
+    );
+    assert_refused(
+        &["sensor", "--listen", "tls/localhost:7447"],
+        &["wants certificates", "--ca"],
+    );
+    assert_refused(
+        &["router", "--listen", "tcp/no-such-host.invalid:7447"],
+        &["no-such-host.invalid", "can't listen"],
+    );
+    assert_refused(
+        &["router", "--listen", "tcp/192.0.2.1:7447"],
+        &["192.0.2.1:7447", "no such address", "0.0.0.0"],
+    );
+    let taken = TcpListener::bind("127.0.0.1:0").expect("the system has ports");
+    let at = format!(
+        "tcp/127.0.0.1:{}",
+        taken.local_addr().expect("an address").port()
+    );
+    for part in ["sensor", "display", "router"] {
+        assert_refused(
+            &[part, "--listen", &at],
+            &[&at, "another program listens there"],
+        );
+    }
+}
+
+#[test]
+fn credentials_that_cannot_be_used_are_named() {
+    let ours = Authority::new("credentials");
+    let tls = format!("tls/localhost:{}", free_port());
+    let refused = |proofs: &[String], words: &[&str]| {
+        let mut arguments = vec!["router", "--listen", &tls];
+        arguments.extend(proofs.iter().map(String::as_str));
+        assert_refused(&arguments, words);
+    };
+    let good = ours.proofs("good", Kind::Good, &ours);
+    let with = |at: usize, file: &str| {
+        let mut proofs = good.clone();
+        proofs[at] = ours.file(file);
+        proofs
+    };
+    ours.proofs("other", Kind::Good, &ours);
+    fs::write(ours.folder.join("text"), "no PEM\n").expect("it can be written");
+
+    refused(&with(1, "no-such-file"), &["no-such-file", "can't be read"]);
+    refused(&with(3, "no-such-file"), &["no-such-file", "can't be read"]);
+    refused(&with(5, "no-such-file"), &["no-such-file", "can't be read"]);
+    refused(&with(1, "text"), &["text", "BEGIN CERTIFICATE"]);
+    refused(&with(3, "good.key"), &["good.key", "BEGIN CERTIFICATE"]);
+    refused(&with(5, "good.pem"), &["good.pem", "BEGIN PRIVATE KEY"]);
+    refused(
+        &with(5, "other.key"),
+        &["other.key", "not the key of", "good.pem"],
+    );
+    let expired = ours.proofs("expired", Kind::Expired, &ours);
+    refused(&expired, &["expired.pem", "has expired"]);
+    let servers = ours.proofs("servers", Kind::ForServersOnly, &ours);
+    refused(&servers, &["servers.pem", "clientAuth"]);
+
+    let mut arguments = vec!["router", "--listen", "tcp/localhost:7447"];
+    arguments.extend(good.iter().map(String::as_str));
+    assert_refused(&arguments, &["let anybody in", "tls/localhost:7447"]);
+}

@@ -1,0 +1,359 @@
+//! `host-bridge replay`: a recording is said to a board in order and in its time, and a scene of it gives
+//! the estimates that were recorded.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
+use hil_sim::native;
+use hil_sim::outcome::Outcome;
+use hil_sim::recording::ScanRecord;
+use hil_sim::scene::Scene;
+use host_bridge::host_clock::now_us;
+use host_bridge::link::Event;
+use host_bridge::recording::reader::Reader;
+use host_bridge::recording::{Recorder, Settings};
+use host_bridge::replay::scene::{self, Made};
+use protocol::{
+    Configuration, ConfigurationReport, Estimate, Message, Motion, Role, SensorConfiguration,
+};
+use tests::bridge::{self, Running};
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::run::scene as scene_of;
+use tests::utterance::Speaker;
+
+/// Far more than anything here takes.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// An empty folder for one test.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("bridge_replay")
+        .join(test);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+/// Records what was heard, each at its time in µs after the first.
+fn record(path: &Path, said: impl IntoIterator<Item = (u64, Role, Message)>) {
+    let recorder = Recorder::start(Settings {
+        mcap: Some(path.to_owned()),
+        ..Settings::default()
+    })
+    .expect("a file can be made");
+    let start_us = now_us();
+    for (after_us, role, message) in said {
+        let at_us = start_us + after_us;
+        recorder.on_event(role, &Event::Heard { at_us, message });
+    }
+    recorder.stop().expect("a whole file");
+}
+
+fn motion(at: u32) -> Motion {
+    Motion {
+        sequence: 1_000 + at,
+        instant_us: 7_000_000 + 2_000 * u64::from(at),
+        position_um: i64::from(at) * 100,
+        velocity_um_s: 50_000,
+    }
+}
+
+/// Motions at 500 Hz and estimates at 100 Hz, for half a second.
+fn half_a_second() -> Vec<(u64, Role, Message)> {
+    let mut speaker = Speaker::new(3);
+    let mut said = Vec::new();
+    for at in 0..250 {
+        let after_us = 2_000 * u64::from(at);
+        said.push((after_us, Role::Display, Message::Motion(motion(at))));
+        if at % 5 == 0 {
+            let Message::Estimate(estimate) = speaker.estimate() else {
+                unreachable!("an estimate was asked for");
+            };
+            let estimate = Estimate {
+                instant_us: 9_000_000 + after_us,
+                velocity_um_s: 1_000,
+                ..estimate
+            };
+            said.push((after_us, Role::Sensor, Message::Estimate(estimate)));
+        }
+    }
+    said
+}
+
+/// Replays into a board; what it hears of the kind it is for, and how long it took from the first to the
+/// last.
+fn replayed(path: &Path, board: Role, speed: &str, count: usize) -> (Vec<Message>, Duration) {
+    let fake = FakeBoard::new(board);
+    let (target, option) = match board {
+        Role::Display => ("display-board", "--display"),
+        Role::Sensor | Role::Host => ("sensor-board", "--sensor"),
+    };
+    let running = Running::start(
+        bridge::command()
+            .arg("replay")
+            .arg(path)
+            .args(["--to", target, "--speed", speed, option])
+            .arg(fake.path()),
+    );
+    let mut heard = Vec::new();
+    let (mut first, mut last) = (None, Instant::now());
+    let complete = wait_until(LIMIT, || {
+        let before = heard.len();
+        heard.extend(
+            fake.take_heard()
+                .into_iter()
+                .filter(|message| matches!(message, Message::Motion(_) | Message::Estimate(_))),
+        );
+        if heard.len() > before {
+            last = Instant::now();
+            first.get_or_insert(last);
+        }
+        heard.len() >= count
+    });
+    let ended = running.wait(LIMIT);
+    assert!(
+        complete,
+        "{} of {count}: {}{}",
+        heard.len(),
+        ended.stdout,
+        ended.stderr
+    );
+    assert_eq!(
+        ended.status.code(),
+        Some(0),
+        "{}{}",
+        ended.stdout,
+        ended.stderr
+    );
+    assert_eq!(fake.take_heard().len(), 0, "nothing else is said");
+    (heard, last - first.unwrap_or(last))
+}
+
+#[test]
+fn a_sensor_board_hears_the_motions_in_order_and_in_their_time() {
+    let path = folder("sensor").join("half.mcap");
+    record(&path, half_a_second());
+    for (speed, factor, least) in [("1", 1, 450), ("10", 10, 40), ("100", 100, 0)] {
+        let (heard, took) = replayed(&path, Role::Sensor, speed, 250);
+        let Some(Message::Motion(first)) = heard.first().cloned() else {
+            panic!("{heard:?}");
+        };
+        for (message, at) in heard.iter().zip(0..) {
+            let want = Motion {
+                sequence: at,
+                instant_us: first.instant_us + 2_000 * u64::from(at) / factor,
+                velocity_um_s: 50_000 * factor as i32,
+                ..motion(at)
+            };
+            assert_eq!(*message, Message::Motion(want), "at {speed} times");
+        }
+        assert!(
+            took >= Duration::from_millis(least),
+            "{took:?} at {speed} times"
+        );
+    }
+}
+
+#[test]
+fn a_display_board_hears_the_estimates_in_order_and_in_their_time() {
+    let path = folder("display").join("half.mcap");
+    let said = half_a_second();
+    record(&path, said.clone());
+    let estimates: Vec<Estimate> = said
+        .into_iter()
+        .filter_map(|(_, _, message)| match message {
+            Message::Estimate(estimate) => Some(estimate),
+            _ => None,
+        })
+        .collect();
+    let (heard, took) = replayed(&path, Role::Display, "1", estimates.len());
+    let Some(Message::Estimate(first)) = heard.first().cloned() else {
+        panic!("{heard:?}");
+    };
+    for ((message, said), at) in heard.iter().zip(estimates).zip(0..) {
+        let want = Estimate {
+            sequence: at,
+            instant_us: first.instant_us + 10_000 * u64::from(at),
+            ..said
+        };
+        assert_eq!(*message, Message::Estimate(want));
+    }
+    assert!(took >= Duration::from_millis(450), "{took:?}");
+}
+
+#[test]
+fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
+    let folder = folder("refusals");
+    let path = folder.join("half.mcap");
+    record(&path, half_a_second());
+    let file = path.to_str().expect("UTF-8");
+    let none = folder.join("none.mcap");
+    fs::write(&none, "no").expect("the file can be written");
+    let none = none.to_str().expect("UTF-8");
+    let toml = folder.join("x.toml");
+    let toml = toml.to_str().expect("UTF-8");
+    for (words, want) in [
+        (
+            vec![file, "--to", "sensor-board", "--sensor", "/dev/null/s"],
+            "/dev/null/s: not there: plug the board in",
+        ),
+        (vec![none, "--to", toml], "none.mcap: is no MCAP file"),
+        (
+            vec![file, "--to", toml],
+            "half.mcap: 0 samples of the gauges there: record without --no-gauges",
+        ),
+        (
+            vec![file, "--to", "nowhere"],
+            "give sensor-board, display-board",
+        ),
+        (
+            vec![file, "--to", toml, "--speed", "1000"],
+            "give 0.1 to 100",
+        ),
+        (
+            vec![file, "--to", toml, "--from", "2", "--to-time", "1"],
+            "give a time after --from",
+        ),
+    ] {
+        let ended = bridge::run(["replay"].into_iter().chain(words.iter().copied()), LIMIT);
+        assert_eq!(ended.status.code(), Some(2), "{words:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains(want), "{words:?}: {}", ended.stderr);
+    }
+}
+
+/// What a sensor board says that reads these scans, its gauges streamed, and how it is set.
+fn said_of(scans: &[ScanRecord], configuration: SensorConfiguration) -> Vec<(u64, Role, Message)> {
+    let streaming = SensorConfiguration {
+        stream_gauges: true,
+        ..configuration
+    };
+    let configuration = Configuration::Sensor(streaming);
+    let report = ConfigurationReport {
+        refused: None,
+        hash: configuration.hash(),
+        configuration,
+    };
+    let mut said = vec![(0, Role::Sensor, Message::Configuration(report))];
+    let mut sensor = Sensor::new(streaming);
+    let (samples, _) = scans.as_chunks::<SCANS_PER_SAMPLE>();
+    for scans in samples {
+        let last = &scans[SCANS_PER_SAMPLE - 1];
+        let at_us = last.at_ns / 1_000;
+        let output = sensor.step(at_us, &scans.map(|scan| scan.codes), last.encoder);
+        let estimate = output.estimate.map(Message::Estimate);
+        let gauges = output.gauges.map(Message::Gauges);
+        said.extend(
+            estimate
+                .into_iter()
+                .chain(gauges)
+                .map(|message| (at_us, Role::Sensor, message)),
+        );
+    }
+    said
+}
+
+/// A scene that was recorded and made a scene of again.
+struct Round {
+    recorded: Vec<Estimate>,
+    made: Made,
+    outcome: Outcome,
+}
+
+/// Runs `toml`, records what the sensor says, makes a scene of what lies between two times and runs that.
+fn round(test: &str, toml: &str, from_s: f64, to_s: Option<f64>) -> Round {
+    let folder = folder(test);
+    let original = scene_of(toml);
+    let configuration = original.sensor_configuration();
+    let scans = native::run(&original)
+        .expect("a scene that loaded runs")
+        .scans;
+    let said = said_of(&scans, configuration);
+    let recorded = said
+        .iter()
+        .filter_map(|(_, _, message)| match message {
+            Message::Estimate(estimate) => Some(*estimate),
+            _ => None,
+        })
+        .collect();
+    let path = folder.join("bench.mcap");
+    record(&path, said);
+    let settings = scene::Settings {
+        path: folder.join("again.toml"),
+        from_s,
+        to_s,
+        wavelength_mm: None,
+        expect: true,
+        force: false,
+    };
+    let recording = Reader::open(&path).expect("a recording");
+    let made = scene::write(recording, &settings).unwrap_or_else(|error| panic!("{error}"));
+    let again = Scene::load(&made.files[0]).unwrap_or_else(|error| panic!("{error}"));
+    let run = native::run(&again).expect("a scene that loaded runs");
+    Round {
+        recorded,
+        made,
+        outcome: Outcome::new(again, run),
+    }
+}
+
+impl Round {
+    /// The recorded estimates and those of the scene at the same samples, from `from_s` of the scene on.
+    fn pairs(&self, from_s: f64) -> Vec<(Estimate, Estimate)> {
+        let at_us = |estimate: &Estimate| estimate.instant_us.cast_signed() - self.made.begin_us;
+        let pairs: Vec<_> = self
+            .outcome
+            .recording
+            .estimates
+            .iter()
+            .map(|record| record.estimate)
+            .filter(|again| again.instant_us as f64 * 1e-6 >= from_s)
+            .map(|again| {
+                let same = self
+                    .recorded
+                    .iter()
+                    .find(|recorded| at_us(recorded) == again.instant_us.cast_signed());
+                (*same.expect("estimates fall on the same samples"), again)
+            })
+            .collect();
+        assert!(!pairs.is_empty());
+        pairs
+    }
+
+    /// The share of pairs that are valid or not alike, and the largest relative difference of λ of those
+    /// that are valid.
+    fn agreement(&self, from_s: f64) -> (f64, f64) {
+        let pairs = self.pairs(from_s);
+        let alike = pairs
+            .iter()
+            .filter(|(one, other)| one.valid == other.valid)
+            .count();
+        let worst = pairs
+            .iter()
+            .filter(|(one, other)| one.valid && other.valid)
+            .filter_map(|(one, other)| Some((one.wavelength_mm?, other.wavelength_mm?)))
+            .map(|(one, other)| f64::from((other / one - 1.0).abs()))
+            .fold(0.0, f64::max);
+        (alike as f64 / pairs.len() as f64, worst)
+    }
+}
+
+#[test]
+fn a_recording_makes_a_scene_that_gives_its_estimates_again() {
+    let round = round(
+        "clean",
+        "duration_s = 4.0\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n\
+         [motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70.0\nfrequency_hz = 0.83\n\
+         [estimator]\ntravel_wavelengths = 0.8\n",
+        0.0,
+        None,
+    );
+    assert!(round.outcome.unmet.is_empty(), "{:?}", round.outcome.unmet);
+    assert_eq!(round.outcome.scene.estimator.travel_percent, 80);
+    let (alike, worst) = round.agreement(0.7);
+    println!("clean: {alike} {worst}");
+    // Each scan is rounded once more: 1/12 of a step² of noise beside a signal of 0.6 · 372/√2 steps and
+    // more, 4 · 10⁻³ in amplitude, and less of it in the ¼ of it below 500 Hz that 0.7 λ average.
+    assert!(alike > 0.98 && worst < 4e-3, "{alike}, {worst}");
+}
