@@ -49,15 +49,19 @@ fn folder(name: &str) -> PathBuf {
 }
 
 fn serve(folder: &Path) -> Command {
+    serve_with(folder, &built(Role::Sensor), &built(Role::Display))
+}
+
+fn serve_with(folder: &Path, sensor: &Path, display: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
     command
         .arg("serve")
         .arg("--dir")
         .arg(folder)
         .arg("--sensor-elf")
-        .arg(built(Role::Sensor))
+        .arg(sensor)
         .arg("--display-elf")
-        .arg(built(Role::Display))
+        .arg(display)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
@@ -204,9 +208,7 @@ fn a_board_whose_firmware_goes_astray_ends_it_with_the_reason() {
     elf[begins..begins + length].fill(0);
     let broken = folder.join("broken");
     fs::write(&broken, elf).unwrap();
-    let output = serve(&folder)
-        .arg("--display-elf")
-        .arg(&broken)
+    let output = serve_with(&folder, &built(Role::Sensor), &broken)
         .output()
         .unwrap();
     let told = String::from_utf8(output.stderr).unwrap();
@@ -221,28 +223,30 @@ fn a_board_whose_firmware_goes_astray_ends_it_with_the_reason() {
 #[test]
 fn what_it_cannot_do_is_refused_with_what_to_do() {
     let folder = folder("refused");
-    let refusal = |arguments: &[&str]| {
-        let output = serve(&folder).args(arguments).output().unwrap();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    let complaint = |command: &mut Command| {
+        let output = command.output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{command:?}");
         String::from_utf8(output.stderr).unwrap()
     };
     for (arguments, due) in [
         (&["--pace", "0"][..], "give 0.01 to 100, or max"),
         (&["--pace", "fast"], "give 0.01 to 100, or max"),
-        (&["--for", "-1"], "give a time above 0 s"),
+        (&["--for", "0"], "give a time above 0 s"),
         (&["--hand", "keyboard"], "needs a terminal"),
         (
             &["--hand", "nobody.csv"],
             "give a CSV file with the columns t_s,x_mm",
         ),
         (&["nowhere.toml"], "give the name of a scene"),
-        (&["--sensor-elf", "nowhere"], "nowhere: can't be read"),
     ] {
-        let told = refusal(arguments);
+        let told = complaint(serve(&folder).args(arguments));
         assert!(told.contains(due), "{arguments:?}: {told}");
     }
+    let mut nowhere = serve_with(&folder, Path::new("nowhere"), &built(Role::Display));
+    let told = complaint(&mut nowhere);
+    assert!(told.contains("nowhere: can't be read"), "{told}");
     fs::create_dir(folder.join("sensor-console")).unwrap();
-    let told = refusal(&[]);
+    let told = complaint(&mut serve(&folder));
     assert!(told.contains("sensor-console: can't be used"), "{told}");
     assert!(folder.join("sensor-console").is_dir());
     assert_eq!(are_there(&folder), [true, false, false, false]);

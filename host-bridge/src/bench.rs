@@ -28,6 +28,9 @@ pub struct Bench {
 pub struct Seat {
     /// Its console's port.
     pub port: Option<PathBuf>,
+    /// The port at its link to the other board, where the two are not wired together: for a bridge that
+    /// stands in the wire.
+    pub link: Option<PathBuf>,
     /// Its ST-LINK's serial number: the port is then found by it, whatever it is called, and so is the
     /// probe to flash by.
     pub usb: Option<String>,

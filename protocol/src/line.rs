@@ -17,19 +17,26 @@ pub const HELP: [&str; 3] = [
     "`host-bridge monitor` is such a program and shows far more.",
 ];
 
-/// The first line after a start: who it is, why it was reset, and how often by the watchdog.
+/// The first line after a start: who it is, why it started, and how often the watchdog had to start it.
 pub fn banner(hello: &Hello, role: &str, status: &Status) -> Line {
     let mut line = Line::new();
     let [major, minor, patch] = hello.version;
+    let protocol = hello.protocol_version();
     put(
         &mut line,
-        format_args!(
-            "ridgelink {role} {major}.{minor}.{patch}, protocol {}, reset by {} (watchdog: {}): ? for help",
-            hello.protocol_version(),
-            status.reset.name(),
-            status.watchdog_resets
-        ),
+        format_args!("ridgelink {role} {major}.{minor}.{patch}, protocol {protocol}"),
     );
+    put(
+        &mut line,
+        format_args!(", started by {}", status.reset.name()),
+    );
+    if status.watchdog_resets > 0 {
+        put(
+            &mut line,
+            format_args!(", watchdog {}", status.watchdog_resets),
+        );
+    }
+    put(&mut line, format_args!(": ? for help"));
     line
 }
 
@@ -210,7 +217,16 @@ mod tests {
         let hello = Hello::new(Role::Display, "test", [0, 1, 0]);
         assert_eq!(
             banner(&hello, "display", &status),
-            "ridgelink display 0.1.0, protocol 3, reset by watchdog (watchdog: 3): ? for help"
+            "ridgelink display 0.1.0, protocol 3, started by watchdog, watchdog 3: ? for help"
+        );
+        let status = Status {
+            reset: ResetCause::Pin,
+            watchdog_resets: 0,
+            ..status
+        };
+        assert_eq!(
+            banner(&hello, "display", &status),
+            "ridgelink display 0.1.0, protocol 3, started by reset pin: ? for help"
         );
     }
 }

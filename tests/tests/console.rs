@@ -197,10 +197,7 @@ fn a_banner_says_who_it_is_as_soon_as_the_board_is_up() {
         let (at_ns, line) = &lines[0];
         let version = format!("ridgelink {role} {major}.{minor}.{patch}, protocol ");
         assert!(line.starts_with(&version), "{line}");
-        assert!(
-            line.ends_with("reset by power (watchdog: 0): ? for help"),
-            "{line}"
-        );
+        assert!(line.ends_with(", started by power: ? for help"), "{line}");
         assert!(*at_ns < START_NS, "{at_ns}");
     }
 }
@@ -385,7 +382,7 @@ fn a_program_is_back_in_frames_at_once_when_the_watchdog_has_restarted_the_board
     let banner = lines.iter().find(|&&(at_ns, _)| at_ns > reset.at_ns);
     let (banner_ns, banner) = banner.expect("the board is up again");
     assert!(
-        banner.ends_with("reset by watchdog (watchdog: 1): ? for help"),
+        banner.ends_with(", started by watchdog, watchdog 1: ? for help"),
         "{banner}"
     );
     // The banner's end, the Hello, the answer.

@@ -134,7 +134,15 @@ impl Serve {
             let asked = match input {
                 Some(Input::Quit) => Ok(Some(Command::Quit)),
                 Some(Input::Line(line)) => line.parse().map(Some).map_err(anyhow::Error::from),
-                Some(Input::Key(key)) => Ok(keys.command(key, &bench)),
+                Some(Input::Key(key)) => {
+                    let command = keys.command(key, &bench);
+                    // The hand's shows in the status.
+                    let told = command.filter(|command| !matches!(command, Command::Hand { .. }));
+                    if let Some(command) = told {
+                        screen.tell(&command.to_string());
+                    }
+                    Ok(command)
+                }
                 Some(Input::Help) => {
                     screen.tell(COMMANDS);
                     Ok(None)

@@ -28,6 +28,21 @@ pub enum Command {
     Quit,
 }
 
+/// As it is read from a line.
+impl std::fmt::Display for Command {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Pull(name) => write!(formatter, "pull {name}"),
+            Self::Plug(name) => write!(formatter, "plug {name}"),
+            Self::Reset(role) => write!(formatter, "reset {}", role.name()),
+            Self::Hand { speed_mm_s } => write!(formatter, "hand {speed_mm_s}"),
+            Self::Stop => formatter.write_str("stop"),
+            Self::Release => formatter.write_str("release"),
+            Self::Quit => formatter.write_str("quit"),
+        }
+    }
+}
+
 /// A line that says nothing to be done.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{line}\": {reason}")]
@@ -96,6 +111,7 @@ mod tests {
             ("quit", Command::Quit),
         ] {
             assert_eq!(line.parse(), Ok(command));
+            assert_eq!(command.to_string().parse(), Ok(command));
         }
     }
 
