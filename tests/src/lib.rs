@@ -10,4 +10,5 @@ pub mod pty;
 pub mod relay;
 pub mod run;
 pub mod sensing;
+pub mod swift_board;
 pub mod weather;
