@@ -180,7 +180,7 @@ fn run(
 }
 
 /// Writes all of it; false if it found no room, in spite of all patience.
-fn write(master: &mut TTYPort, mut bytes: &[u8], is_patient: bool) -> bool {
+fn write(master: &mut Near, mut bytes: &[u8], is_patient: bool) -> bool {
     if !is_patient {
         return master.write_all(bytes).is_ok();
     }
