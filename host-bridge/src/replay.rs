@@ -16,9 +16,9 @@ use crate::link::Event;
 use crate::recording::reader::{ReadError, Reader};
 
 mod events;
+mod pins;
 pub mod scene;
 pub mod stand_in;
-mod upsample;
 
 use events::Events;
 

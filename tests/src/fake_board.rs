@@ -150,15 +150,17 @@ fn run(
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(message);
         });
-        for message in script(now_us) {
-            port.post(&message);
-        }
+        let mut said = script(now_us).into_iter();
         loop {
             while let count @ 1.. = port.take(&mut out) {
                 if !is_mute && !write(&mut master, &out[..count], is_patient) {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
+            }
+            if let Some(message) = said.next() {
+                port.post(&message);
+                continue;
             }
             match given.try_recv() {
                 Ok(Order::Say(message)) => port.post(&message),

@@ -522,8 +522,7 @@ fn a_board_that_goes_and_returns_is_recorded_on_and_the_gap_is_written_down() {
             .args(["record", "--no-gauges"])
             .arg(&path)
             .args(["--display", "/dev/null/d", "--sensor"])
-            .arg(&name)
-            .stderr(std::process::Stdio::inherit()),
+            .arg(&name),
     );
     assert!(asked(&board));
     let mut speaker = Speaker::new(12);

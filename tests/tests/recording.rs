@@ -272,7 +272,7 @@ fn the_reference_library_reads_it_with_a_schema_for_each_channel() {
 fn a_file_cut_off_anywhere_is_read_up_to_its_last_whole_chunk() {
     let folder = folder("cut");
     let path = folder.join("whole.mcap");
-    record_gauges(&path, 30_000);
+    record_gauges(&path, 4_000);
     let bytes = fs::read(&path).expect("the file can be read");
     let summary = Summary::read(&bytes)
         .expect("well-formed")
@@ -291,9 +291,9 @@ fn a_file_cut_off_anywhere_is_read_up_to_its_last_whole_chunk() {
         let end = index.chunk_start_offset + index.chunk_length;
         chunks.push((end as usize, messages));
     }
-    assert!(chunks.len() > 20, "{} chunks", chunks.len());
+    assert!(chunks.len() > 5, "{} chunks", chunks.len());
     let (whole, is_cut) = entries(&path).expect("a whole file");
-    assert_eq!((whole.len(), is_cut), (240_000, false));
+    assert_eq!((whole.len(), is_cut), (32_000, false));
 
     // Behind the record that says whose it is, which is there from the first moment on.
     let start =
@@ -303,14 +303,14 @@ fn a_file_cut_off_anywhere_is_read_up_to_its_last_whole_chunk() {
         .flat_map(|&(end, _)| [end - 1, end, end + 1])
         .collect();
     let mut state = 1_u64;
-    places.extend((0..40).map(|_| {
+    places.extend((0..20).map(|_| {
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1);
         start + (state >> 33) as usize % (bytes.len() - 1 - start)
     }));
     let cut = folder.join("cut.mcap");
-    for place in places {
+    for place in places.into_iter().filter(|&place| place >= start) {
         fs::write(&cut, &bytes[..place]).expect("a file can be written");
         let kept = chunks.iter().rev().find(|&&(end, _)| end <= place);
         let kept = kept.map_or(0, |&(_, messages)| messages);

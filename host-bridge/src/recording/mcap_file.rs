@@ -73,8 +73,9 @@ impl McapFile {
             json: Vec::new(),
             dirty: true,
         };
-        mcap.add_channels()
-            .and_then(|()| mcap.add_metadata(ABOUT, about))
+        // First of all whose it is.
+        mcap.add_metadata(ABOUT, about)
+            .and_then(|()| mcap.add_channels())
             .map_err(|error| mcap.failed(reason(error)))?;
         mcap.sync()?;
         Ok(mcap)

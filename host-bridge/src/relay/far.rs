@@ -3,10 +3,9 @@
 use std::fmt;
 use std::time::Duration;
 
-use protocol::{Hello, PROTOCOL_VERSION, Role};
+use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
 
 use crate::relay::envelope::ENVELOPE_VERSION;
-use crate::state::Named;
 
 /// After this long without a word the other site counts as silent, and nothing but pings is sent there:
 /// what would wait on the way would be old when it came.
@@ -53,17 +52,27 @@ impl fmt::Display for FarState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unheard => f.write_str("not heard yet"),
-            Self::Known { hello, .. } => write!(f, "{}", Named(hello)),
+            Self::Known { hello, .. } => write!(f, "{} is there", Bridge(hello)),
             Self::Silent => f.write_str("silent"),
             Self::Foreign { hello, version } => write!(
                 f,
-                "{} of protocol {} (schema {:016x}, envelope {version}); this program speaks {PROTOCOL_VERSION} (schema {:016x}, envelope {ENVELOPE_VERSION}): install the same build at both sites",
-                Named(hello),
+                "{} speaks protocol {} (schema {:016x}, envelope {version}), this one {PROTOCOL_VERSION} (schema {SCHEMA_HASH:016x}, envelope {ENVELOPE_VERSION}): install the same build at both sites",
+                Bridge(hello),
                 hello.protocol_version(),
                 hello.schema_hash(),
-                protocol::SCHEMA_HASH,
             ),
         }
+    }
+}
+
+/// A bridge in words: program and version.
+struct Bridge<'a>(&'a Hello);
+
+impl fmt::Display for Bridge<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(hello) = self;
+        let [major, minor, patch] = hello.version;
+        write!(f, "{} {major}.{minor}.{patch}", hello.chip_name())
     }
 }
 
@@ -184,7 +193,7 @@ mod tests {
         let mut far = Far::default();
         far.hear_foreign(other, 1);
         let words = far.state().to_string();
-        assert!(words.contains("of protocol 77"), "{words}");
+        assert!(words.contains("speaks protocol 77"), "{words}");
         far.hear(host_hello(), 1, 0);
         far.hear_foreign(other, 1);
         assert_eq!(far.state().word(), "known");

@@ -2,10 +2,9 @@
 //!
 //! The recorded samples come from behind the sensor's anti-aliasing filter, which delays them by 4 ms; the
 //! sensor itself dates them, with the arm's place, 4 ms back, so that the two belong together. In the scene
-//! they are voltages at the ADC's pins at that instant and pass the filter again. Below 400 Hz it changes
-//! nothing; what it took away above, with the noise there, stays away. Each sample is placed so that the
-//! scene's sensor gives it the number it had, up to whole estimates: the scene's estimates come at the same
-//! samples as the recorded ones.
+//! stand voltages at the ADC's pins at that instant, such that the same filter makes the same samples of them
+//! again: see [`super::pins`]. Each sample is placed so that the scene's sensor gives it the number it had,
+//! up to whole estimates: the scene's estimates come at the same samples as the recorded ones.
 //!
 //! The hand and the arm both move as the recorded arm did: it is the arm that the gauges belong to.
 
@@ -15,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use protocol::{Estimate, GAUGES};
 
-use super::upsample::{SCANS, Upsampler};
+use super::pins::Pins;
 use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::GaugeRow;
 
@@ -32,11 +31,14 @@ const LONGEST_S: f64 = 600.0;
 const SAMPLES_PER_ESTIMATE: u32 = 10;
 /// What the sensor's filter delays a sample by, in samples.
 const DELAY_SAMPLES: u32 = 4;
+/// Scans for a sample.
+const SCANS: usize = 4;
 const SCAN_S: f64 = 250e-6;
 const SCAN_US: i64 = 250;
 /// A step of a recorded code is a sixteenth of a step of the ADC.
 const CODES_PER_STEP: f64 = 16.0;
-const VOLTS_PER_STEP: f64 = 3.3 / 4_096.0;
+const STEPS: f64 = 4_096.0;
+const VOLTS_PER_STEP: f64 = 3.3 / STEPS;
 /// Half a count of the encoder: in the middle of a count no rounding takes it to the next.
 const HALF_COUNT_MM: f64 = 0.002_5;
 /// Why no scene can be made of a recording.
@@ -313,20 +315,22 @@ fn write_gauges(
     let force = if has_force { ",tangential" } else { "" };
     writeln!(out, "t_s,g0,g1,g2,g3,g4{force}")?;
     let channels = GAUGES + usize::from(has_force);
-    let codes: Vec<_> = samples
-        .iter()
-        .map(|row| row.codes().map(f64::from))
+    let pins = Pins::default();
+    let scans: Vec<Vec<f64>> = (0..channels)
+        .map(|channel| {
+            let steps = |row: &GaugeRow| f64::from(row.codes()[channel]) / CODES_PER_STEP;
+            let steps: Vec<f64> = samples.iter().map(steps).collect();
+            pins.scans(&steps, channel as u64)
+        })
         .collect();
-    let upsampler = Upsampler::default();
     for index in layout.first..samples.len() {
         let last = index + 1 == samples.len();
         for scan in 0..if last { 1 } else { SCANS } {
             write!(out, "{:.5}", layout.scan_s(index, scan))?;
-            for channel in 0..channels {
-                let code = upsampler.value(|at| codes[at][channel], codes.len(), index, scan);
+            for scans in &scans {
                 // The ADC rounds down: half a step more, so that what comes out is rounded to the nearest.
-                let volts = (code / CODES_PER_STEP + 0.5) * VOLTS_PER_STEP;
-                write!(out, ",{volts:.5}")?;
+                let steps = (scans[index * SCANS + scan] + 0.5).clamp(0.0, STEPS);
+                write!(out, ",{:.5}", steps * VOLTS_PER_STEP)?;
             }
             writeln!(out)?;
         }

@@ -9,6 +9,7 @@ use protocol::Ping;
 
 use super::{Shared, locked};
 use crate::host_clock::now_us;
+use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::Content;
 use crate::relay::name::Channel;
 use crate::relay::reach::Reach;
@@ -36,7 +37,7 @@ pub struct Keeper {
     heard_us: u64,
     looked_us: Option<u64>,
     /// What was found last, so that it is said once.
-    found: Arc<Mutex<Option<Notice>>>,
+    found: Arc<Mutex<Vec<Notice>>>,
 }
 
 impl Keeper {
@@ -94,7 +95,7 @@ impl Keeper {
             "known" | "foreign"
         ) {
             self.heard_us = at_us;
-            *locked(&self.found) = None;
+            locked(&self.found).clear();
         }
         let is_puzzled = at_us.saturating_sub(self.heard_us) > PUZZLED_US;
         if !is_puzzled || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
@@ -103,14 +104,14 @@ impl Keeper {
         self.looked_us = Some(at_us);
         let (shared, found) = (Arc::clone(&self.shared), Arc::clone(&self.found));
         thread::spawn(move || {
-            let Some(notice) = shared.puzzle() else {
-                return;
-            };
+            let notices = shared.puzzle();
             let mut found = locked(&found);
-            if found.as_ref() != Some(&notice) {
-                *found = Some(notice.clone());
-                shared.tell(notice);
+            for notice in &notices {
+                if !found.contains(notice) {
+                    shared.tell(notice.clone());
+                }
             }
+            *found = notices;
         });
     }
 }
@@ -121,14 +122,18 @@ fn is_due(last_us: Option<u64>, period_us: u64, at_us: u64) -> bool {
 
 impl Shared {
     /// Why the other site is not heard.
-    fn puzzle(&self) -> Option<Notice> {
+    fn puzzle(&self) -> Vec<Notice> {
         let endpoints = self.network.connects_to();
-        let is_connected = self.wire.get().is_some_and(|wire| wire.neighbours() > 0);
-        if is_connected || endpoints.is_empty() {
-            return Some(Notice::Alone(self.far));
+        if endpoints.is_empty() {
+            return vec![Notice::Unvisited(self.far)];
         }
-        let endpoint = endpoints.first()?.clone();
-        let reach = Reach::of(&endpoint, self.network.tls());
-        Some(Notice::Unreached { endpoint, reach })
+        if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
+            return vec![Notice::Alone(self.far)];
+        }
+        let reach = |endpoint: &Endpoint| Notice::Unreached {
+            endpoint: endpoint.clone(),
+            reach: Reach::of(endpoint, self.network.tls()),
+        };
+        endpoints.iter().map(reach).collect()
     }
 }
