@@ -91,6 +91,17 @@ impl Terminal {
             .clone()
     }
 
+    /// The last of it, for a message.
+    pub fn last_shown(&self) -> String {
+        const LONGEST: usize = 3_000;
+        let shown = self.shown();
+        let characters = shown.chars().count();
+        shown
+            .chars()
+            .skip(characters.saturating_sub(LONGEST))
+            .collect()
+    }
+
     /// Waits until `words` were shown; whether they were.
     pub fn shows(&self, limit: Duration, words: &str) -> bool {
         wait_until(limit, || self.shown().contains(words))

@@ -307,7 +307,11 @@ fn assert_restores(end: impl FnOnce(&Terminal, &Child)) {
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
-    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    assert!(
+        terminal.shows(LIMIT, "DRIVING"),
+        "{}",
+        terminal.last_shown()
+    );
     assert_ne!(terminal.settings(), before);
     end(&terminal, &child);
     let status = ended(&mut child);
@@ -347,7 +351,11 @@ fn a_terminal_that_goes_away_takes_the_monitor_with_it() {
     let mut child = command.spawn().expect("the program can be started");
     // The test's own hold on the terminal.
     drop(command);
-    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    assert!(
+        terminal.shows(LIMIT, "DRIVING"),
+        "{}",
+        terminal.last_shown()
+    );
     terminal.hang_up();
     assert!(ended(&mut child).success());
 }
@@ -364,7 +372,7 @@ fn a_key_stops_the_display_and_its_answer_is_shown() {
     assert!(
         terminal.shows(LIMIT, "STOPPED: BY THE OPERATOR"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     let stop = Stop {
         reason: StopReason::Operator,
@@ -390,7 +398,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
     assert!(
         terminal.shows(LIMIT, "stream_gauges is on now"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     let mut wanted = before;
     wanted.stream_gauges = true;
@@ -415,14 +423,14 @@ fn the_form_changes_a_setting_and_shows_a_refusal() {
     assert!(
         terminal.shows(LIMIT, "max_age_ms is 77 ms now"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     assert_eq!(running.bench().displaying.max_age_ms, 77);
     terminal.type_keys("7\r");
     assert!(
         terminal.shows(LIMIT, "MaxAgeMs is out of range: give 20 to 5000"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     assert_eq!(running.bench().displaying.max_age_ms, 77);
     terminal.type_keys("qq");
@@ -458,4 +466,68 @@ fn a_log_without_its_firmware_or_from_none_is_refused() {
         "{}",
         ended.stderr
     );
+}
+
+#[test]
+fn a_key_records_what_can_be_watched_again() {
+    let folder = name_of_a_port("recording").with_file_name("kept");
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    command.arg("--record-to").arg(&folder);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "recording"),
+        "{}",
+        terminal.last_shown()
+    );
+    let file = folder.join("monitor-1.mcap");
+    let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > 100_000);
+    assert!(wait_until(LIMIT, is_long));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "recorded: "),
+        "{}",
+        terminal.last_shown()
+    );
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+    drop(running);
+
+    let mut command = bridge::command();
+    command.args(["replay", "--to", "monitor"]).arg(&file);
+    let ended = bridge::Running::start(&mut command).wait(LIMIT);
+    assert!(ended.status.success(), "{ended:?}");
+    for words in [
+        "sensor known: ",
+        "display known: ",
+        "display safety: driving",
+        " T1 ",
+    ] {
+        assert!(ended.stdout.contains(words), "{words} is not in {ended:?}");
+    }
+}
+
+#[test]
+fn a_folder_that_takes_no_recording_is_named() {
+    let folder = name_of_a_port("no-recording").with_file_name("not-there");
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    command.arg("--record-to").arg(&folder);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "NOT RECORDED: "),
+        "{}",
+        terminal.last_shown()
+    );
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
 }

@@ -17,6 +17,29 @@ use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
+/// What the command does.
+pub const ABOUT: &str = "\
+Shows what the boards say: λ and how sure the sensor is of it, the velocities of hand and arm, the gauges, what \
+the actuators do, the supervisor's state, every counter, and the boards' logs.
+
+On a terminal it is a dashboard with keys to stop the stimulus, to change settings, to record and more: ? tells. \
+Where standard output is no terminal, or with --plain or --json, it is a line a second and one at each change. \
+A board that is not there, or not understood, is named with advice, and found as soon as it is back.
+
+A board's log is shown if its ELF is known, by the bench file or by --sensor-elf and --display-elf, and where the \
+bytes of its RTT channel come from: `rtt` in the bench file, a file, a pseudo-terminal or tcp:HOST:PORT; or the \
+board's probe, with --probe-log. NO_COLOR=1 has it draw without colours.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge monitor
+  host-bridge monitor --plain --every 0.1 --for 60 > session.txt
+  host-bridge monitor --json | jq 'select(.kind == \"second\") | .estimate.wavelength_mm'
+
+The columns of --plain are named in its first line; lines that begin with # are changes. Exit status 0 at the end \
+that was asked for, by a key, a signal or --for; 2 if it can't watch at all.";
+
 /// What `monitor` is asked for.
 #[derive(Debug, clap::Args)]
 pub struct Monitor {
@@ -115,10 +138,11 @@ impl Monitor {
     }
 }
 
-/// Both boards' links.
+/// The links to the boards that the bench has.
 fn open(bench: &Bench) -> Source {
     let (events, told) = channel();
-    let links = [Role::Sensor, Role::Display]
+    let links = bench
+        .roles()
         .into_iter()
         .filter_map(|role| {
             let place = bench.seat(role)?.place();

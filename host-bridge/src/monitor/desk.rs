@@ -98,8 +98,7 @@ impl Desk {
             for message in self.dashboard.take_outbox(role) {
                 let link = self.source.links.iter().find(|(of, _)| *of == role);
                 let Some((_, link)) = link else {
-                    let words = "a recording is watched: nothing reaches a board from here";
-                    self.dashboard.notify(true, words.to_owned());
+                    self.dashboard.on_no_way(&message);
                     continue;
                 };
                 if let Err(why) = link.post(&message) {

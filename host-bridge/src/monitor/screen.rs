@@ -90,6 +90,7 @@ fn show(
         // Shown already, in the log.
         desk.dashboard.take_happenings();
         view.kept = desk.keeping().map(kept);
+        view.is_over = desk.is_over();
         let is_idle = drawn.is_none_or(|drawn| drawn.elapsed() >= IDLE);
         if changed || is_idle {
             let live = &desk.dashboard;

@@ -57,6 +57,8 @@ pub struct View {
     pub form: Option<Form>,
     /// Whether what is shown stands still.
     pub is_frozen: bool,
+    /// Whether nothing more will come: a recording that was watched is over.
+    pub is_over: bool,
     /// The recording that is being made.
     pub kept: Option<Kept>,
 }
@@ -72,6 +74,7 @@ impl View {
             shows_help: false,
             form: None,
             is_frozen: false,
+            is_over: false,
             kept: None,
         }
     }
