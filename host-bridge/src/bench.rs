@@ -132,6 +132,20 @@ impl Bench {
         Ok(self)
     }
 
+    /// The boards that the bench has: one that names one board only has only that one, as at one end of a
+    /// relay.
+    pub fn roles(&self) -> Vec<Role> {
+        let is_named = |role: &Role| {
+            self.seat(*role)
+                .is_some_and(|seat| seat.place() != Place::Anywhere)
+        };
+        let both = [Role::Sensor, Role::Display];
+        match both.iter().filter(|role| is_named(role)).count() {
+            1 => both.into_iter().filter(is_named).collect(),
+            _ => both.into(),
+        }
+    }
+
     /// What is known of the board of `role`; a host has no seat.
     pub const fn seat(&self, role: Role) -> Option<&Seat> {
         match role {
@@ -182,5 +196,24 @@ mod tests {
         let bench: Bench = toml::from_str(text).expect("well-formed");
         let message = bench.checked().expect_err("one port twice").to_string();
         assert!(message.starts_with("/dev/a can't be both"), "{message}");
+    }
+
+    #[test]
+    fn a_bench_that_names_one_board_has_one() {
+        let seat = |port: Option<&str>| Seat {
+            port: port.map(Into::into),
+            ..Seat::default()
+        };
+        let of = |sensor, display| {
+            let bench = Bench {
+                sensor: seat(sensor),
+                display: seat(display),
+            };
+            bench.roles()
+        };
+        assert_eq!(of(None, None), [Role::Sensor, Role::Display]);
+        assert_eq!(of(Some("/a"), Some("/b")), [Role::Sensor, Role::Display]);
+        assert_eq!(of(Some("/a"), None), [Role::Sensor]);
+        assert_eq!(of(None, Some("/b")), [Role::Display]);
     }
 }

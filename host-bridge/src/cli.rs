@@ -51,6 +51,7 @@ enum Command {
     #[command(long_about = flash::ABOUT, after_long_help = flash::EXAMPLES)]
     Flash(flash::Flash),
     /// Shows what the boards say, in the terminal or line by line
+    #[command(long_about = monitor::ABOUT, after_long_help = monitor::EXAMPLES)]
     Monitor(monitor::Monitor),
     /// Writes everything that the boards say to MCAP or CSV
     #[command(long_about = record::ABOUT, after_long_help = record::EXAMPLES)]

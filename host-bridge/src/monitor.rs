@@ -16,6 +16,7 @@ pub mod fingertip;
 pub mod firmware_log;
 pub mod form;
 pub mod happening;
+pub mod keeping;
 pub mod keys;
 pub mod line;
 pub mod orders;
@@ -27,4 +28,62 @@ pub mod trace;
 pub mod view;
 pub mod words;
 
-pub use desk::{Keeper, Source};
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+pub use desk::Source;
+
+use crate::recording::RecordingError;
+use desk::Desk;
+use plain::Format;
+
+/// How the boards are watched.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// Lines instead of a dashboard; also where there is no terminal.
+    pub plain: Option<Format>,
+    /// Ends after so long.
+    pub limit: Option<Duration>,
+    /// The folder for recordings that a key begins.
+    pub folder: PathBuf,
+}
+
+/// Why the watching ended before its time.
+#[derive(Debug, thiserror::Error)]
+pub enum MonitorError {
+    /// The terminal, or whatever takes the lines, takes no more.
+    #[error("can't write to standard output: {0}")]
+    Output(#[from] io::Error),
+    /// A recording could not be written to its end.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
+
+/// Watches what `source` tells, until a key or `ended` ends it; lines end with the source, too.
+///
+/// # Errors
+/// If standard output takes no more, unless nobody reads it any more, or if a recording can't be written.
+pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result<(), MonitorError> {
+    let desk = Desk::new(source, options.folder.clone());
+    let format = match options.plain {
+        None if io::stdout().is_terminal() => None,
+        None => Some(Format::default()),
+        plain => plain,
+    };
+    match format {
+        Some(format) => {
+            plain::run(
+                desk,
+                &format,
+                options.limit,
+                ended,
+                &mut io::stdout().lock(),
+            )?;
+            Ok(())
+        }
+        None => screen::run(desk, options.limit, ended),
+    }
+}

@@ -1,15 +1,19 @@
 //! What the monitor knows, and what it has said to the boards.
 
+use firmware_display::{Display, Senses, Settings, ZERO_VOLT};
 use host_bridge::link::Event;
 use host_bridge::monitor::dashboard::Dashboard;
+use host_bridge::monitor::fingertip::Fingertip;
 use host_bridge::monitor::happening::What;
 use host_bridge::monitor::orders::Outcome;
 use host_bridge::monitor::settings::{self, Kind};
 use host_bridge::monitor::trace::{Trace, column_us};
 use host_bridge::state::State;
+use protocol::actuators::{self, grid};
 use protocol::{
-    Configuration, ConfigurationReport, DisplayConfiguration, DisplayState, Hello, Message,
-    Refusal, Role, Safety, SensorConfiguration, Setting, Stop, StopReason, Trip,
+    Configuration, ConfigurationReport, Contact, DisplayConfiguration, DisplayState, Estimate,
+    GAUGES, GaugeHealth, Hello, Message, Mode, Range, Refusal, Role, Safety, SensorConfiguration,
+    Setting, Stop, StopReason, Trip,
 };
 
 const STOP: Message = Message::Stop(Stop {
@@ -260,7 +264,7 @@ fn a_trace_loses_no_spike_whatever_the_columns() {
         trace.put(ms * 1_000, value);
     }
     for count in [10, 77, 300] {
-        let column_us = column_us(10.0, count);
+        let column_us = column_us(9.0, count);
         let columns: Vec<_> = trace.columns(9_999_000, column_us, count).collect();
         let highest = columns.iter().flatten().map(|extent| extent.high);
         assert_eq!(highest.fold(0.0, f32::max), 9.0, "{count} columns");
@@ -295,4 +299,74 @@ fn a_trace_shows_a_gap_where_nothing_came_and_forgets_what_is_too_old() {
         trace.extent(0, u64::MAX / 2).map(|extent| extent.high),
         Some(3.0)
     );
+}
+
+/// The firmware's own display and the monitor's fingertip, fed alike, agree on every actuator's peak.
+#[test]
+fn the_fingertip_is_as_the_firmware_drives_it() {
+    let description = grid(900);
+    for mode in [Mode::Uniform, Mode::Travelling] {
+        let configuration = DisplayConfiguration {
+            mode,
+            amplitude_mv: 4_000,
+            actuators: actuators::hash(&description),
+            ..DisplayConfiguration::DEFAULT
+        };
+        let settings = Settings::new(configuration, &description).expect("in its ranges");
+        let mut display = Display::new(&settings, None);
+        display.started(Ok(()));
+        let mut fingertip = Fingertip::default();
+        fingertip.configure(&configuration);
+        let mut peaks_v = [0.0_f32; 50];
+        let mut told = None;
+        // 2 s at 35 mm/s, of which the last 50 ms are looked at.
+        for tick in 1..=4_000_u32 {
+            if tick % 20 == 1 {
+                let estimate = estimate(tick / 20);
+                display.on_estimate(&estimate);
+                fingertip.hear(&estimate);
+            }
+            display.tick((tick * 7 / 2) as u16, &Senses::default());
+            if told != Some(display.state()) {
+                told = Some(display.state());
+                fingertip.turn(told);
+            }
+            if let Some(motion) = display.motion(u64::from(tick) * 500) {
+                fingertip.follow(&motion);
+            }
+            if tick > 3_900 {
+                for (peak_v, word) in peaks_v.iter_mut().zip(display.words()) {
+                    let volt = f32::from(word.abs_diff(ZERO_VOLT)) * 10.0 / 65_536.0;
+                    *peak_v = peak_v.max(volt);
+                }
+            }
+        }
+        assert_eq!(display.state(), DisplayState::Driving);
+        for (theirs, ours) in peaks_v.iter().zip(fingertip.peaks_v()) {
+            // Peaks of 50 ms at 17.5 Hz hold a crest, of which a tick may miss 1 − cos(π · 17.5/2000).
+            assert!(
+                (theirs - ours).abs() < 0.01,
+                "{mode:?}: {theirs} V, {ours} V"
+            );
+            assert!((3.9..=4.0).contains(theirs), "{theirs} V");
+        }
+    }
+}
+
+fn estimate(sequence: u32) -> Estimate {
+    Estimate {
+        sequence,
+        instant_us: u64::from(sequence) * 10_000,
+        wavelength_mm: Some(2.0),
+        valid: true,
+        confidence: 1.0,
+        amplitude_lsb: 100.0,
+        counted_mm: None,
+        range: Range::T1,
+        contact: Contact::Slip,
+        velocity_um_s: 35_000,
+        lag_um: None,
+        gauges_used: 1,
+        health: [GaugeHealth::Good; GAUGES],
+    }
 }

@@ -7,86 +7,22 @@
 //! two of them.
 
 use std::error::Error;
-use std::io::{ErrorKind, Read, Write};
-use std::os::fd::OwnedFd;
-use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use host_bridge::host_clock::now_us;
 use host_bridge::link::{Event, Link};
 use host_bridge::place::Place;
 use host_bridge::relay::histogram::Histogram;
-use protocol::{Hello, MAX_FRAME, Message, Motion, Port, Role};
+use protocol::{Message, Motion, Role};
 use rustix::process::Signal;
 use tests::bridge;
-use tests::pty::Near;
-use tests::relay::{MOTION_US, Relay, free_port};
+use tests::relay::{Relay, free_port};
+use tests::swift_board::SwiftBoard;
 
-/// Longest wait of a board for bytes.
-const PATIENCE: Duration = Duration::from_millis(2);
-/// Far more than anything else takes.
+/// Far more than anything here takes.
 const LIMIT: Duration = Duration::from_secs(20);
-
-/// A board that reads as soon as bytes come and, if it is a display, says a motion every 2 ms.
-struct Board {
-    path: PathBuf,
-    times_us: Arc<Mutex<Histogram>>,
-    _kept: OwnedFd,
-}
-
-impl Board {
-    fn new(role: Role) -> Result<Self, Box<dyn Error>> {
-        let (near, kept, path) = Near::pair(PATIENCE)?;
-        let times_us = Arc::default();
-        let noted = Arc::clone(&times_us);
-        thread::spawn(move || run(near, role, &noted));
-        Ok(Self {
-            path,
-            times_us,
-            _kept: kept,
-        })
-    }
-}
-
-fn run(mut near: Near, role: Role, times_us: &Mutex<Histogram>) {
-    let mut port = Port::new(Hello::new(role, "stm32f429zi", [0, 1, 0]));
-    let mut bytes = [0; 4_096];
-    let mut frame = [0; MAX_FRAME];
-    let mut sequence = 0;
-    let mut due = Instant::now();
-    loop {
-        let count = match near.read(&mut bytes) {
-            Ok(count) => count,
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
-            Err(_) => return,
-        };
-        let read_us = now_us();
-        port.receive(read_us, &bytes[..count], |message| {
-            if let Message::Motion(Motion { instant_us, .. }) = message {
-                let mut times_us = times_us.lock().unwrap_or_else(PoisonError::into_inner);
-                times_us.add(read_us.saturating_sub(instant_us));
-            }
-        });
-        if role == Role::Display && Instant::now() >= due {
-            due = Instant::now() + Duration::from_micros(MOTION_US);
-            sequence += 1;
-            port.post(&Message::Motion(Motion {
-                sequence,
-                instant_us: now_us(),
-                position_um: 0,
-                velocity_um_s: 0,
-            }));
-        }
-        while let count @ 1.. = port.take(&mut frame) {
-            if near.write_all(&frame[..count]).is_err() {
-                break;
-            }
-        }
-    }
-}
 
 fn print(what: &str, times_us: &Histogram) {
     match times_us.percentiles() {
@@ -104,7 +40,7 @@ fn take(times_us: &Mutex<Histogram>) -> Histogram {
 
 /// The bare line.
 fn bare(seconds: Duration) -> Result<(), Box<dyn Error>> {
-    let display = Board::new(Role::Display)?;
+    let display = SwiftBoard::new(Role::Display, |_, _| {})?;
     let (ends, ended): (_, Receiver<u64>) = channel();
     let link = Link::open(Role::Display, Place::Port(display.path), move |event| {
         if let Event::Heard {
@@ -128,7 +64,15 @@ fn bare(seconds: Duration) -> Result<(), Box<dyn Error>> {
 
 /// The way over two bridges.
 fn relayed(seconds: Duration, by_router: bool) -> Result<(), Box<dyn Error>> {
-    let (sensor, display) = (Board::new(Role::Sensor)?, Board::new(Role::Display)?);
+    let times_us = Arc::<Mutex<Histogram>>::default();
+    let noted = Arc::clone(&times_us);
+    let sensor = SwiftBoard::new(Role::Sensor, move |message, read_us| {
+        if let Message::Motion(Motion { instant_us, .. }) = message {
+            let mut times_us = noted.lock().unwrap_or_else(PoisonError::into_inner);
+            times_us.add(read_us.saturating_sub(instant_us));
+        }
+    })?;
+    let display = SwiftBoard::new(Role::Display, |_, _| {})?;
     let at = format!("tcp/127.0.0.1:{}", free_port());
     let (router, end) = if by_router {
         let router = Relay::start(["router", "--listen", &at]);
@@ -139,17 +83,17 @@ fn relayed(seconds: Duration, by_router: bool) -> Result<(), Box<dyn Error>> {
     };
     let sensors = Relay::bridge(Role::Sensor, &sensor.path, &[end, &at]);
     let displays = Relay::bridge(Role::Display, &display.path, &["--connect", &at]);
-    sensors.says("the display's site: display", LIMIT);
+    sensors.says("the display's site: host-bridge", LIMIT);
     // What the first second takes is not what the others take.
     thread::sleep(Duration::from_secs(2));
-    take(&sensor.times_us);
+    take(&times_us);
     thread::sleep(seconds);
     let what = if by_router {
         "over a router"
     } else {
         "peer to peer"
     };
-    print(&format!("{what}, with two lines"), &take(&sensor.times_us));
+    print(&format!("{what}, with two lines"), &take(&times_us));
     sensors.signal(Signal::INT);
     let (_, lines, _) = sensors.wait(LIMIT);
     let report: serde_json::Value = serde_json::from_str(lines.last().ok_or("no report")?)?;

@@ -15,4 +15,5 @@ pub mod run;
 pub mod sensing;
 pub mod terminal;
 pub mod utterance;
+pub mod swift_board;
 pub mod weather;

@@ -2,26 +2,30 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use serialport::{SerialPort, TTYPort};
-
 use crate::fake_board::wait_until;
+use crate::pty::Near;
+
+/// How long keys may wait.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// A terminal of 120 × 40 characters.
 pub struct Terminal {
     path: PathBuf,
-    keys: TTYPort,
+    keys: Sender<String>,
     shown: Arc<Mutex<String>>,
     ended: Arc<AtomicBool>,
-    reader: JoinHandle<()>,
+    window: JoinHandle<()>,
     /// Keeps the terminal alive while no program has it open.
-    _kept: TTYPort,
+    _kept: OwnedFd,
 }
 
 impl Terminal {
@@ -30,14 +34,8 @@ impl Terminal {
     /// # Panics
     /// If the system has none.
     pub fn new() -> Self {
-        let (mut master, mut kept) = TTYPort::pair().expect("the system has pseudo-terminals");
-        // The program is to open it, too.
-        kept.set_exclusive(false).expect("it can be shared");
-        let path = PathBuf::from(kept.name().expect("a pseudo-terminal has a name"));
-        let keys = master.try_clone_native().expect("it can be held twice");
-        master
-            .set_timeout(Duration::from_millis(20))
-            .expect("a timeout can be set");
+        let (window, kept, path) = Near::pair(LOOK).expect("the system has pseudo-terminals");
+        let (keys, typed) = channel();
         let (shown, ended) = (
             Arc::<Mutex<String>>::default(),
             Arc::<AtomicBool>::default(),
@@ -48,7 +46,7 @@ impl Terminal {
             keys,
             shown,
             ended,
-            reader: thread::spawn(move || read(&mut master, &theirs, &their_end)),
+            window: thread::spawn(move || run(window, &typed, &theirs, &their_end)),
             _kept: kept,
         };
         // As a shell leaves it: the pair was made for bytes, not for people.
@@ -80,11 +78,9 @@ impl Terminal {
     /// Types.
     ///
     /// # Panics
-    /// If the terminal does not take it.
-    pub fn type_keys(&mut self, keys: &str) {
-        self.keys
-            .write_all(keys.as_bytes())
-            .expect("a terminal takes keys");
+    /// If the window is gone.
+    pub fn type_keys(&self, keys: &str) {
+        self.keys.send(keys.to_owned()).expect("there is a window");
     }
 
     /// All that was shown so far, with what moves the cursor.
@@ -93,6 +89,17 @@ impl Terminal {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone()
+    }
+
+    /// The last of it, for a message.
+    pub fn last_shown(&self) -> String {
+        const LONGEST: usize = 3_000;
+        let shown = self.shown();
+        let characters = shown.chars().count();
+        shown
+            .chars()
+            .skip(characters.saturating_sub(LONGEST))
+            .collect()
     }
 
     /// Waits until `words` were shown; whether they were.
@@ -107,10 +114,8 @@ impl Terminal {
 
     /// Closes the terminal's window.
     pub fn hang_up(self) {
-        let Self { ended, reader, .. } = self;
-        ended.store(true, Ordering::Release);
-        // The other hold on the window.
-        let _ = reader.join();
+        self.ended.store(true, Ordering::Release);
+        let _ = self.window.join();
     }
 
     fn stty(&self, arguments: &[&str]) -> String {
@@ -130,16 +135,22 @@ impl Default for Terminal {
     }
 }
 
-fn read(master: &mut impl Read, shown: &Mutex<String>, ended: &AtomicBool) {
+/// The window: shows what comes, and passes on what is typed.
+fn run(mut window: Near, typed: &Receiver<String>, shown: &Mutex<String>, ended: &AtomicBool) {
     let mut bytes = [0; 4_096];
     while !ended.load(Ordering::Acquire) {
-        match master.read(&mut bytes) {
+        match window.read(&mut bytes) {
             Ok(count) => shown
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .push_str(&String::from_utf8_lossy(&bytes[..count])),
             Err(error) if error.kind() == ErrorKind::TimedOut => {}
             Err(_) => return,
+        }
+        for keys in typed.try_iter() {
+            if window.write_all(keys.as_bytes()).is_err() {
+                return;
+            }
         }
     }
 }

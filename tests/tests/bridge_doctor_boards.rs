@@ -100,7 +100,7 @@ fn found(board: &str, kind: &str) -> (String, String) {
 fn boards_that_are_well_are_told_so() {
     let _alone = alone();
     let bench = bench(options("well"));
-    let ended = look(&bench, 3.0);
+    let ended = look(&bench, 2.2);
     let document = document(&ended);
     let (findings, is_slow) = findings(&document);
     assert_eq!(findings, [], "{document:#}");
@@ -124,7 +124,7 @@ fn an_emergency_stop_is_named() {
     bench
         .command(serve::Command::Stop)
         .expect("the bench stands");
-    let document = document(&look(&bench, 2.0));
+    let document = document(&look(&bench, 1.2));
     let (findings, _) = findings(&document);
     assert_eq!(findings, [found("display", "stopped")], "{document:#}");
     assert_eq!(
@@ -145,7 +145,7 @@ fn a_cable_pulled_and_put_back_is_noticed() {
     pass(&bench, 0.3);
     bench.plug(port).expect("the port can be made");
     assert!(wait_until(LIMIT, || bench.has_client(port)));
-    pass(&bench, 2.5);
+    pass(&bench, 1.2);
     let ended = end(doctor);
     let document = document(&ended);
     let (findings, _) = findings(&document);
@@ -164,7 +164,7 @@ fn a_board_that_restarts_is_noticed() {
     bench
         .command(serve::Command::Reset(Role::Sensor))
         .expect("the bench stands");
-    pass(&bench, 2.5);
+    pass(&bench, 1.5);
     let document = document(&end(doctor));
     let (findings, _) = findings(&document);
     assert!(
@@ -182,7 +182,7 @@ fn boards_that_are_not_joined_hear_nothing_of_each_other() {
         is_apart: true,
         ..options("apart")
     });
-    let document = document(&look(&bench, 3.0));
+    let document = document(&look(&bench, 2.2));
     let (findings, _) = findings(&document);
     assert!(
         findings.contains(&found("bench", "peer-link")),
@@ -235,7 +235,7 @@ fn a_second_doctor_is_told_that_the_ports_are_busy() {
         [found("sensor", "busy"), found("display", "busy")]
     );
     // The first one is not disturbed.
-    pass(&bench, 2.5);
+    pass(&bench, 1.2);
     let first = document(&end(first));
     assert_eq!(findings(&first).0, [], "{first:#}");
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
 use tests::bridge;
@@ -64,14 +64,28 @@ impl Lines {
 
     /// The next line with these words.
     fn with(&self, words: &str) -> String {
+        let [line] = self.with_each([words]);
+        line
+    }
+
+    /// For each of these words the first line from now on that has them, in whatever order.
+    fn with_each<const COUNT: usize>(&self, words: [&str; COUNT]) -> [String; COUNT] {
+        let mut found: [Option<String>; COUNT] = std::array::from_fn(|_| None);
         let mut seen = String::new();
-        loop {
-            match self.lines.recv_timeout(LIMIT) {
-                Ok(line) if line.contains(words) => return line,
-                Ok(line) => seen += &format!("{line}\n"),
-                Err(_) => panic!("no line with {words:?} after\n{seen}"),
+        let end = Instant::now() + LIMIT;
+        while found.iter().any(Option::is_none) {
+            let left = end.saturating_duration_since(Instant::now());
+            let Ok(line) = self.lines.recv_timeout(left) else {
+                panic!("no line with each of {words:?} after\n{seen}");
+            };
+            for (found, words) in found.iter_mut().zip(words) {
+                if found.is_none() && line.contains(words) {
+                    *found = Some(line.clone());
+                }
             }
+            seen += &format!("{line}\n");
         }
+        found.map(Option::unwrap_or_default)
     }
 
     fn signal(&self, name: &str) {
@@ -125,7 +139,7 @@ fn a_line_a_second_tells_what_both_boards_say_in_columns() {
     assert!((number("lambda_mm") - 2.0).abs() < 0.01, "{line}");
     assert_eq!(cell("conf"), "0.97");
     assert_eq!((cell("range"), cell("contact")), ("T1", "slip"));
-    let hand_mm_s = number("v_hand_mm_s").abs();
+    let hand_mm_s = number("hand_mm_s").abs();
     assert!((14.0..70.1).contains(&hand_mm_s), "{line}");
     assert_eq!((cell("lost"), cell("bad")), ("0", "0"));
     assert!(
@@ -174,9 +188,8 @@ fn what_is_wrong_with_a_port_is_named_with_advice() {
         ..Hello::new(Role::Display, "stm32f429zi", [9, 9, 9])
     });
     let lines = Lines::of(monitor_at(&absent, foreign.path()).arg("--plain"));
-    let line = lines.with("sensor absent: ");
-    assert!(line.contains("not there: plug the board in"), "{line}");
-    let line = lines.with("display foreign: ");
+    let [line, other] = lines.with_each(["display foreign: ", "sensor absent: "]);
+    assert!(other.contains("not there: plug the board in"), "{other}");
     assert!(
         line.contains("of protocol 99") && line.contains("host-bridge flash"),
         "{line}"
@@ -201,12 +214,11 @@ fn the_second_monitor_says_that_the_ports_are_busy() {
     let first = Lines::of(monitor(&running).arg("--plain"));
     first.with("display safety: driving");
     let second = Lines::of(monitor(&running).arg("--plain"));
-    let line = second.with("sensor busy: ");
+    let [line, _] = second.with_each(["sensor busy: ", "display busy: "]);
     assert!(
         line.contains("another program has it: close the other program"),
         "{line}"
     );
-    second.with("display busy: ");
     // The first one is not disturbed, and its ports are free when it ends.
     first.with(" known      known ");
     drop(first);
@@ -230,7 +242,7 @@ fn a_cable_that_is_put_back_is_seen_within_a_second() {
     lines.with("display absent: ");
     let board = FakeBoard::new(Role::Display);
     symlink(board.path(), &name).expect("a link can be made");
-    let back = std::time::Instant::now();
+    let back = Instant::now();
     lines.with("display known: ");
     assert!(
         back.elapsed() < Duration::from_secs(1),
@@ -288,16 +300,20 @@ fn nobody_who_reads_any_more_is_no_error() {
 }
 
 /// Runs a dashboard, lets `end` end it, and checks status and terminal.
-fn assert_restores(end: impl FnOnce(&mut Terminal, &Child)) {
+fn assert_restores(end: impl FnOnce(&Terminal, &Child)) {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let before = terminal.settings();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
-    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    assert!(
+        terminal.shows(LIMIT, "DRIVING"),
+        "{}",
+        terminal.last_shown()
+    );
     assert_ne!(terminal.settings(), before);
-    end(&mut terminal, &child);
+    end(&terminal, &child);
     let status = ended(&mut child);
     assert_eq!((status.code(), status.signal()), (Some(0), None));
     assert_eq!(terminal.settings(), before);
@@ -335,7 +351,11 @@ fn a_terminal_that_goes_away_takes_the_monitor_with_it() {
     let mut child = command.spawn().expect("the program can be started");
     // The test's own hold on the terminal.
     drop(command);
-    assert!(terminal.shows(LIMIT, "DRIVING"), "{}", terminal.shown());
+    assert!(
+        terminal.shows(LIMIT, "DRIVING"),
+        "{}",
+        terminal.last_shown()
+    );
     terminal.hang_up();
     assert!(ended(&mut child).success());
 }
@@ -343,7 +363,7 @@ fn a_terminal_that_goes_away_takes_the_monitor_with_it() {
 #[test]
 fn a_key_stops_the_display_and_its_answer_is_shown() {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
@@ -352,7 +372,7 @@ fn a_key_stops_the_display_and_its_answer_is_shown() {
     assert!(
         terminal.shows(LIMIT, "STOPPED: BY THE OPERATOR"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     let stop = Stop {
         reason: StopReason::Operator,
@@ -369,7 +389,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
     bench.sensing.window_ms = 123;
     let before = bench.sensing;
     let running = Running::new(bench);
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
@@ -378,7 +398,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
     assert!(
         terminal.shows(LIMIT, "stream_gauges is on now"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     let mut wanted = before;
     wanted.stream_gauges = true;
@@ -391,7 +411,7 @@ fn a_key_streams_the_gauges_and_keeps_every_other_setting() {
 #[test]
 fn the_form_changes_a_setting_and_shows_a_refusal() {
     let running = bench();
-    let mut terminal = Terminal::new();
+    let terminal = Terminal::new();
     let mut command = monitor(&running);
     terminal.hold(&mut command);
     let mut child = command.spawn().expect("the program can be started");
@@ -403,14 +423,14 @@ fn the_form_changes_a_setting_and_shows_a_refusal() {
     assert!(
         terminal.shows(LIMIT, "max_age_ms is 77 ms now"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     assert_eq!(running.bench().displaying.max_age_ms, 77);
     terminal.type_keys("7\r");
     assert!(
         terminal.shows(LIMIT, "MaxAgeMs is out of range: give 20 to 5000"),
         "{}",
-        terminal.shown()
+        terminal.last_shown()
     );
     assert_eq!(running.bench().displaying.max_age_ms, 77);
     terminal.type_keys("qq");
@@ -446,4 +466,68 @@ fn a_log_without_its_firmware_or_from_none_is_refused() {
         "{}",
         ended.stderr
     );
+}
+
+#[test]
+fn a_key_records_what_can_be_watched_again() {
+    let folder = name_of_a_port("recording").with_file_name("kept");
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    command.arg("--record-to").arg(&folder);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "recording"),
+        "{}",
+        terminal.last_shown()
+    );
+    let file = folder.join("monitor-1.mcap");
+    let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > 100_000);
+    assert!(wait_until(LIMIT, is_long));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "recorded: "),
+        "{}",
+        terminal.last_shown()
+    );
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+    drop(running);
+
+    let mut command = bridge::command();
+    command.args(["replay", "--to", "monitor"]).arg(&file);
+    let ended = bridge::Running::start(&mut command).wait(LIMIT);
+    assert!(ended.status.success(), "{ended:?}");
+    for words in [
+        "sensor known: ",
+        "display known: ",
+        "display safety: driving",
+        " T1 ",
+    ] {
+        assert!(ended.stdout.contains(words), "{words} is not in {ended:?}");
+    }
+}
+
+#[test]
+fn a_folder_that_takes_no_recording_is_named() {
+    let folder = name_of_a_port("no-recording").with_file_name("not-there");
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    command.arg("--record-to").arg(&folder);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("r");
+    assert!(
+        terminal.shows(LIMIT, "NOT RECORDED: "),
+        "{}",
+        terminal.last_shown()
+    );
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
 }

@@ -139,7 +139,7 @@ fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
     let display = talking_board(Role::Display);
     let good = ours.proofs("display", Kind::Good, &ours);
     let connecting = start(Role::Display, &display, ["--connect", &tls], &good);
-    connecting.says("the sensor's site: sensor", LIMIT);
+    connecting.says("the sensor's site: host-bridge", LIMIT);
     listen(&display, LIMIT, |heard| sequences(heard).len() >= 20);
     listen(&sensor, LIMIT, |heard| sequences(heard).len() >= 100);
 
@@ -225,7 +225,7 @@ fn a_bridge_of_another_build_is_refused_by_name() {
     let mut hello = bridge_hello(Role::Display);
     hello.protocol = 77_u16.to_le_bytes();
     hello.version = [9, 8, 7];
-    let words = "display 9.8.7 on host-bridge of protocol 77";
+    let words = "the display's site: host-bridge 9.8.7 speaks protocol 77";
     let named = || {
         impostor.say(Channel::Clock, &ping(hello));
         bridge.words().contains(words)

@@ -1,6 +1,5 @@
 //! `host-bridge monitor`.
 
-use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -9,14 +8,37 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use anyhow::Context;
+use clap::ValueHint;
 use host_bridge::bench::Bench;
 use host_bridge::link::Link;
-use host_bridge::monitor::desk::Desk;
 use host_bridge::monitor::firmware_log::{Logs, Origin};
-use host_bridge::monitor::plain::{self, Format};
-use host_bridge::monitor::{Source, screen};
+use host_bridge::monitor::plain::Format;
+use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+/// What the command does.
+pub const ABOUT: &str = "\
+Shows what the boards say: λ and how sure the sensor is of it, the velocities of hand and arm, the gauges, what \
+the actuators do, the supervisor's state, every counter, and the boards' logs.
+
+On a terminal it is a dashboard with keys to stop the stimulus, to change settings, to record and more: ? tells. \
+Where standard output is no terminal, or with --plain or --json, it is a line a second and one at each change. \
+A board that is not there, or not understood, is named with advice, and found as soon as it is back.
+
+A board's log is shown if its ELF is known, by the bench file or by --sensor-elf and --display-elf, and where the \
+bytes of its RTT channel come from: `rtt` in the bench file, a file, a pseudo-terminal or tcp:HOST:PORT; or the \
+board's probe, with --probe-log. NO_COLOR=1 has it draw without colours.";
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+Examples:
+  host-bridge monitor
+  host-bridge monitor --plain --every 0.1 --for 60 > session.txt
+  host-bridge monitor --json | jq 'select(.kind == \"second\") | .estimate.wavelength_mm'
+
+The columns of --plain are named in its first line; lines that begin with # are changes. Exit status 0 at the end \
+that was asked for, by a key, a signal or --for; 2 if it can't watch at all.";
 
 /// What `monitor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -36,14 +58,17 @@ pub struct Monitor {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     limit: Option<Duration>,
     /// The sensor board's firmware, to read its log
-    #[arg(long, value_name = "ELF")]
+    #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     sensor_elf: Option<PathBuf>,
     /// The display board's firmware, to read its log
-    #[arg(long, value_name = "ELF")]
+    #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
     display_elf: Option<PathBuf>,
     /// Reads the logs by the boards' probes, where the bench names no other way (`rtt`)
     #[arg(long)]
     probe_log: bool,
+    /// The folder for recordings that the key r begins
+    #[arg(long, value_name = "FOLDER", default_value = ".", value_hint = ValueHint::DirPath)]
+    record_to: PathBuf,
 }
 
 /// A time above 0.
@@ -67,24 +92,25 @@ impl Monitor {
         }
         let ended = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))
+            // The second one ends the program even where a reader of its lines stands still.
+            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&ended))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&ended)))
                 .context("can't listen to signals")?;
         }
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
         let mut source = open(&bench);
         source.logs = Some(lines);
-        let desk = Desk::new(source, None);
-        if self.plain || self.json || !io::stdout().is_terminal() {
-            let format = Format {
-                is_json: self.json,
-                every: self.every,
-                limit: self.limit,
-            };
-            plain::run(desk, &format, &ended, &mut io::stdout().lock()).context("can't write")?;
-        } else {
-            screen::run(desk, self.limit, &ended).context("can't use the terminal")?;
-        }
+        let format = Format {
+            is_json: self.json,
+            every: self.every,
+        };
+        let options = Options {
+            plain: (self.plain || self.json).then_some(format),
+            limit: self.limit,
+            folder: self.record_to,
+        };
+        monitor::run(source, &options, &ended)?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -112,10 +138,11 @@ impl Monitor {
     }
 }
 
-/// Both boards' links.
+/// The links to the boards that the bench has.
 fn open(bench: &Bench) -> Source {
     let (events, told) = channel();
-    let links = [Role::Sensor, Role::Display]
+    let links = bench
+        .roles()
         .into_iter()
         .filter_map(|role| {
             let place = bench.seat(role)?.place();

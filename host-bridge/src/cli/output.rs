@@ -9,9 +9,18 @@ use anyhow::Context;
 /// # Errors
 /// If it can't be written for another reason.
 pub fn print(text: &str) -> anyhow::Result<()> {
+    print_on(text).map(drop)
+}
+
+/// The same, for who goes on printing: false if the reader has gone away.
+///
+/// # Errors
+/// If it can't be written for another reason.
+pub fn print_on(text: &str) -> anyhow::Result<bool> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.context("standard output can't be written"),
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(error).context("standard output can't be written"),
     }
 }

@@ -1,6 +1,6 @@
 //! `host-bridge relay`.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -157,6 +157,12 @@ impl Signals {
             stopped: Arc::default(),
         };
         for signal in [SIGINT, SIGTERM] {
+            // Said twice, it ends at once: leaving a network that is stuck may take a while.
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                130,
+                Arc::clone(&signals.ended),
+            )?;
             signal_hook::flag::register(signal, Arc::clone(&signals.ended))?;
         }
         signal_hook::flag::register(SIGUSR1, Arc::clone(&signals.stopped))?;
@@ -200,7 +206,7 @@ impl Bridge {
             max_age: Duration::from_millis(self.max_age.into()),
         })?;
         let far = opposite(role).map_or("the other site", site);
-        eprintln!("host-bridge: {words}, waiting for {far}");
+        say(&format!("host-bridge: {words}, waiting for {far}"));
         let mut before = None;
         let mut due = Instant::now() + REPORT;
         while !signals.is_ended() {
@@ -210,14 +216,16 @@ impl Bridge {
                 });
             }
             match notices.recv_timeout(LOOK.min(due.saturating_duration_since(Instant::now()))) {
-                Ok(notice) => eprintln!("host-bridge: {notice}"),
+                Ok(notice) => say(&format!("host-bridge: {notice}")),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => bail!("the bridge has ended by itself"),
             }
             if Instant::now() >= due {
                 due += REPORT;
                 let report = bridge.report(false);
-                print(&report, before.as_ref(), self.json)?;
+                if !print(&report, before.as_ref(), self.json)? {
+                    return Ok(ExitCode::SUCCESS);
+                }
                 before = Some(report);
             }
         }
@@ -233,7 +241,7 @@ impl Router {
         let network = Network::new(ends, self.proofs.credentials())?;
         let signals = Signals::new()?;
         let session = network.open_router()?;
-        eprintln!("host-bridge: router, {words}");
+        say(&format!("host-bridge: router, {words}"));
         while !signals.is_ended() {
             std::thread::sleep(LOOK);
         }
@@ -255,15 +263,15 @@ impl Stopping {
         };
         let is_heard = operator::stop(&network, &self.meeting.name, stop, within);
         if let Ok(true) = is_heard {
-            eprintln!("host-bridge: Stop: with the display");
+            say("host-bridge: Stop: with the display");
             return Ok(ExitCode::SUCCESS);
         }
-        eprintln!(
+        say(&format!(
             "host-bridge: Stop: no word from the display's bridge in {} s: press the emergency stop",
             self.within
-        );
+        ));
         if let Err(error) = is_heard {
-            eprintln!("host-bridge: {error}");
+            say(&format!("host-bridge: {error}"));
         }
         Ok(ExitCode::from(1))
     }
@@ -278,14 +286,19 @@ fn in_words(ends: &Ends) -> String {
     format!("{what} {}", endpoints.join(", "))
 }
 
-/// Prints a report.
-fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result<()> {
+/// Prints a report; false if nobody reads any more.
+fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result<bool> {
     if json {
-        output::print(&serde_json::to_string(report)?)
+        output::print_on(&serde_json::to_string(report)?)
     } else if report.total {
-        output::print(&report.to_string())
+        output::print_on(&report.to_string())
     } else {
-        eprintln!("{}", report.line(before));
-        Ok(())
+        say(&report.line(before));
+        Ok(true)
     }
+}
+
+/// Says something on standard error, whether anybody reads it or not.
+fn say(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }

@@ -6,24 +6,26 @@ use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::ValueHint;
 use host_bridge::host_clock::now_us;
 use host_bridge::link::{Event, Link};
+use host_bridge::monitor::{self, Options, Source};
 use host_bridge::recording::reader::Reader;
 use host_bridge::replay::scene;
 use host_bridge::replay::stand_in::StandIn;
 use host_bridge::replay::{Pace, Played, SPEEDS, play};
 use protocol::Role;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::output;
 
 /// What the command does.
 pub const ABOUT: &str = "\
-Plays a recording back: into a board in place of its peer, or into a scene for the simulator.
+Plays a recording back: into a monitor, into a board in place of its peer, or into a scene for the simulator.
 
 A display board is told the recorded estimates, a sensor board the recorded motions, each at its time: take \
 the board's peer off, or it will hear two of them. Numbers and instants are made fresh, as of a peer that has \
@@ -35,6 +37,7 @@ it goes.";
 /// How it is used.
 pub const EXAMPLES: &str = "\
 Examples:
+  host-bridge replay rubbing.mcap --to monitor
   host-bridge replay rubbing.mcap --to display-board --speed 0.5
   host-bridge replay rubbing.mcap --to sensor-board --sensor /dev/ttyACM0
   host-bridge replay rubbing.mcap --to rubbing.toml --expect && hil-sim run rubbing.toml
@@ -52,7 +55,7 @@ pub struct Replay {
     /// The recording
     #[arg(value_name = "FILE.mcap", value_hint = ValueHint::FilePath)]
     file: PathBuf,
-    /// Where it goes: sensor-board, display-board, or a scene to be made, SCENE.toml
+    /// Where it goes: monitor, sensor-board, display-board, or a scene to be made, SCENE.toml
     #[arg(long, value_name = "TARGET", value_hint = ValueHint::FilePath)]
     to: Target,
     /// How fast, 0.1 to 100 times its own time; not for a scene
@@ -80,6 +83,7 @@ pub struct Replay {
 /// Where a recording goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Target {
+    Monitor,
     Board(Role),
     Scene(PathBuf),
 }
@@ -89,11 +93,13 @@ impl FromStr for Target {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
+            "monitor" => Ok(Self::Monitor),
             "sensor-board" => Ok(Self::Board(Role::Sensor)),
             "display-board" => Ok(Self::Board(Role::Display)),
             scene if scene.ends_with(".toml") => Ok(Self::Scene(scene.into())),
             _ => Err(
-                "give sensor-board, display-board, or a scene's name ending in .toml".to_owned(),
+                "give monitor, sensor-board, display-board, or a scene's name ending in .toml"
+                    .to_owned(),
             ),
         }
     }
@@ -122,6 +128,7 @@ impl Replay {
         }
         let recording = Reader::open(&self.file)?;
         match &self.to {
+            Target::Monitor => self.watch(recording),
             Target::Board(role) => self.play_to(recording, *role),
             Target::Scene(path) => self.make(recording, path.clone()),
         }
@@ -148,6 +155,46 @@ impl Replay {
             cut(made.cut),
         ))?;
         Ok(ExitCode::SUCCESS)
+    }
+
+    /// Plays it into a monitor, which shows its end until a key ends it.
+    fn watch(&self, recording: Reader) -> anyhow::Result<ExitCode> {
+        let ended = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM, SIGHUP] {
+            signal_hook::flag::register(signal, Arc::clone(&ended))?;
+        }
+        let pace = self.pace();
+        let (events, told) = channel();
+        let their_end = Arc::clone(&ended);
+        let player = thread::spawn(move || {
+            play(recording, &pace, &their_end, |role, mut event| {
+                // Read ahead of its time.
+                if let Event::Heard { at_us, .. } = &mut event {
+                    *at_us = now_us();
+                }
+                // A monitor that has ended listens no more.
+                let _ = events.send((role, event));
+            })
+        });
+        let source = Source {
+            events: told,
+            links: Vec::new(),
+            logs: None,
+        };
+        let watched = monitor::run(source, &Options::default(), &ended);
+        ended.store(true, Ordering::Relaxed);
+        let played = player.join();
+        watched?;
+        played.map_err(|_| anyhow::anyhow!("the player died"))??;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    const fn pace(&self) -> Pace {
+        Pace {
+            speed: self.speed,
+            from_s: self.from,
+            to_s: self.to_time,
+        }
     }
 
     fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
@@ -185,11 +232,7 @@ impl Replay {
                 self.speed
             );
         }
-        let pace = Pace {
-            speed: self.speed,
-            from_s: self.from,
-            to_s: self.to_time,
-        };
+        let pace = self.pace();
         let mut peer = StandIn::new(role, self.speed);
         let (mut said, mut unsaid) = (0_u64, 0_u64);
         let played = play(recording, &pace, &ended, |from, event| {

@@ -14,7 +14,7 @@ use crate::flash::firmware::Firmware;
 use crate::flash::probes;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link};
-use crate::place::{self, Place};
+use crate::place;
 use crate::state::State;
 
 /// Longest wait for each board to be named as what it is: three ports without an answer, and a bit.
@@ -35,7 +35,8 @@ type Told = (Role, Event);
 pub fn look(bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
     let goes_on = || !ended.load(Ordering::Acquire);
     let (tell, told) = channel();
-    let mut watches: Vec<Watch> = roles(bench)
+    let mut watches: Vec<Watch> = bench
+        .roles()
         .into_iter()
         .filter_map(|role| Some(Watch::open(role, bench.seat(role)?, &tell)))
         .collect();
@@ -64,20 +65,6 @@ pub fn look(bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
         probes,
         has_plugdev: has_plugdev(),
         boards: watches.into_iter().map(|watch| watch.end(looked)).collect(),
-    }
-}
-
-/// The boards that the bench has.
-fn roles(bench: &Bench) -> Vec<Role> {
-    let is_named = |role: &Role| {
-        bench
-            .seat(*role)
-            .is_some_and(|seat| seat.place() != Place::Anywhere)
-    };
-    let both = [Role::Sensor, Role::Display];
-    match both.iter().filter(|role| is_named(role)).count() {
-        1 => both.into_iter().filter(is_named).collect(),
-        _ => both.into(),
     }
 }
 
@@ -221,31 +208,5 @@ impl From<&probes::Attached> for ProbeFacts {
             serial: info.serial_number.clone(),
             is_allowed: probe.is_allowed,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn seat(port: Option<&str>) -> Seat {
-        Seat {
-            port: port.map(Into::into),
-            ..Seat::default()
-        }
-    }
-
-    #[test]
-    fn a_bench_that_names_one_board_has_one() {
-        let of = |sensor, display| {
-            roles(&Bench {
-                sensor: seat(sensor),
-                display: seat(display),
-            })
-        };
-        assert_eq!(of(None, None), [Role::Sensor, Role::Display]);
-        assert_eq!(of(Some("/a"), Some("/b")), [Role::Sensor, Role::Display]);
-        assert_eq!(of(Some("/a"), None), [Role::Sensor]);
-        assert_eq!(of(None, Some("/b")), [Role::Display]);
     }
 }

@@ -28,8 +28,10 @@ const SAMPLE_US: u64 = 1_000;
 /// The last seconds of everything that is traced.
 #[derive(Clone, Debug, Default)]
 pub struct Traces {
-    /// λ in mm.
+    /// λ in mm while the sensor stands by it.
     pub wavelength_mm: Trace,
+    /// λ in mm while it does not.
+    pub unsure_mm: Trace,
     /// λ in mm by the paper's count.
     pub counted_mm: Trace,
     /// The arm's velocity in mm/s.
@@ -212,6 +214,15 @@ impl Dashboard {
         self.notify(true, text);
     }
 
+    /// There is no way to a board, as where a recording is watched.
+    pub fn on_no_way(&mut self, message: &Message) {
+        if let Message::Stop(_) = message {
+            self.orders(Role::Display).stopped();
+            let words = "NOT STOPPED: there is no way to the display from here";
+            self.notify(true, words.to_owned());
+        }
+    }
+
     /// Stops the stimulus until the display board's reset button or power.
     pub fn stop(&mut self) {
         let now_us = self.now_us;
@@ -337,7 +348,12 @@ impl Dashboard {
         self.fingertip.hear(estimate);
         let traces = &mut self.traces;
         if let Some(wavelength_mm) = estimate.wavelength_mm {
-            traces.wavelength_mm.put(own_us, wavelength_mm);
+            let trace = if estimate.valid {
+                &mut traces.wavelength_mm
+            } else {
+                &mut traces.unsure_mm
+            };
+            trace.put(own_us, wavelength_mm);
         }
         if let Some(counted_mm) = estimate.counted_mm {
             traces.counted_mm.put(own_us, counted_mm);

@@ -1,6 +1,5 @@
 //! The desk at which a dashboard is watched: where events come from, and where orders go to.
 
-use std::io;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
@@ -8,8 +7,10 @@ use protocol::Role;
 
 use super::dashboard::Dashboard;
 use super::happening::What;
+use super::keeping::Keeping;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link};
+use crate::recording::RecordingError;
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
@@ -24,46 +25,26 @@ pub struct Source {
     pub logs: Option<Receiver<(Role, What)>>,
 }
 
-/// Keeps what comes, while it is asked to.
-pub trait Keeper {
-    /// Begins a recording, and says where it is.
-    ///
-    /// # Errors
-    /// If nothing can be written there.
-    fn begin(&mut self) -> io::Result<PathBuf>;
-
-    /// Keeps an event.
-    ///
-    /// # Errors
-    /// If it can't be written: the recording is then over.
-    fn keep(&mut self, role: Role, event: &Event) -> io::Result<()>;
-
-    /// Ends the recording.
-    ///
-    /// # Errors
-    /// If the last of it can't be written.
-    fn end(&mut self) -> io::Result<()>;
-}
-
 /// A dashboard with its source.
 pub struct Desk {
     /// What is known.
     pub dashboard: Dashboard,
     source: Source,
-    keeper: Option<Box<dyn Keeper>>,
-    keeps: bool,
+    /// Where recordings go.
+    folder: PathBuf,
+    keeping: Option<Keeping>,
     lines_us: Option<u64>,
     is_over: bool,
 }
 
 impl Desk {
-    /// Nothing has come yet.
-    pub fn new(source: Source, keeper: Option<Box<dyn Keeper>>) -> Self {
+    /// Nothing has come yet. Recordings will go to `folder`.
+    pub fn new(source: Source, folder: PathBuf) -> Self {
         Self {
             dashboard: Dashboard::default(),
             source,
-            keeper,
-            keeps: false,
+            folder,
+            keeping: None,
             lines_us: None,
             is_over: false,
         }
@@ -97,8 +78,14 @@ impl Desk {
         if self.lines_us.is_none_or(due) {
             self.lines_us = Some(now_us);
             for (role, link) in &self.source.links {
-                self.dashboard
-                    .on_line(*role, link.counters(), link.clocks());
+                let counters = link.counters();
+                self.dashboard.on_line(*role, counters, link.clocks());
+                if let Some(keeping) = &self.keeping {
+                    keeping.keep_counters(*role, counters);
+                }
+            }
+            if self.keeping.as_ref().is_some_and(Keeping::has_failed) {
+                self.end_keeping();
             }
         }
         self.say();
@@ -111,8 +98,7 @@ impl Desk {
             for message in self.dashboard.take_outbox(role) {
                 let link = self.source.links.iter().find(|(of, _)| *of == role);
                 let Some((_, link)) = link else {
-                    let words = "a recording is watched: nothing reaches a board from here";
-                    self.dashboard.notify(true, words.to_owned());
+                    self.dashboard.on_no_way(&message);
                     continue;
                 };
                 if let Err(why) = link.post(&message) {
@@ -136,46 +122,67 @@ impl Desk {
         self.is_over
     }
 
-    /// Begins a recording, and says where it is; or ends it.
-    ///
-    /// # Errors
-    /// If it can't be written.
-    pub fn toggle_keeping(&mut self) -> io::Result<Option<PathBuf>> {
-        let Some(keeper) = &mut self.keeper else {
-            return Err(io::Error::other("nothing can be recorded here"));
-        };
-        if self.keeps {
-            self.keeps = false;
-            return keeper.end().map(|()| None);
+    /// Begins a recording, or ends it; what has come of it is said on the dashboard.
+    pub fn toggle_keeping(&mut self) {
+        if self.keeping.is_some() {
+            self.end_keeping();
+            return;
         }
-        let path = keeper.begin()?;
-        self.keeps = true;
-        Ok(Some(path))
+        match Keeping::begin(&self.folder, self.dashboard.now_us) {
+            Ok(keeping) => {
+                // What came before it began is a part of it, so that it can be played back to a monitor.
+                for role in [Role::Sensor, Role::Display] {
+                    if let Some(state) = &self.dashboard.board(role).state {
+                        keeping.keep(role, &Event::Turned(state.clone()));
+                    }
+                }
+                self.dashboard.read_configurations();
+                self.keeping = Some(keeping);
+            }
+            Err(error) => self
+                .dashboard
+                .notify(true, format!("NOT RECORDED: {error}")),
+        }
     }
 
-    /// Whether a recording is being made.
-    pub const fn keeps(&self) -> bool {
-        self.keeps
+    /// The recording that is being made.
+    pub const fn keeping(&self) -> Option<&Keeping> {
+        self.keeping.as_ref()
     }
 
     /// Ends what is under way.
     ///
     /// # Errors
     /// If the last of a recording can't be written.
-    pub fn close(mut self) -> io::Result<()> {
-        match &mut self.keeper {
-            Some(keeper) if self.keeps => keeper.end(),
-            _ => Ok(()),
+    pub fn close(mut self) -> Result<(), RecordingError> {
+        match self.keeping.take() {
+            Some(keeping) => keeping.end().map(|_| ()),
+            None => Ok(()),
+        }
+    }
+
+    fn end_keeping(&mut self) {
+        let Some(keeping) = self.keeping.take() else {
+            return;
+        };
+        let path = keeping.path.display().to_string();
+        match keeping.end() {
+            Ok(progress) => self.dashboard.notify(
+                false,
+                format!(
+                    "recorded: {path}: {} messages, {} samples",
+                    progress.safe_messages, progress.safe_samples
+                ),
+            ),
+            Err(error) => self
+                .dashboard
+                .notify(true, format!("RECORDING ENDED: {error}")),
         }
     }
 
     fn on(&mut self, role: Role, event: Event) {
-        if let Some(keeper) = self.keeper.as_mut().filter(|_| self.keeps)
-            && let Err(error) = keeper.keep(role, &event)
-        {
-            self.keeps = false;
-            self.dashboard
-                .notify(true, format!("RECORDING ENDED: {error}"));
+        if let Some(keeping) = &self.keeping {
+            keeping.keep(role, &event);
         }
         self.dashboard.on(now_us(), role, event);
     }

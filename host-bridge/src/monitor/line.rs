@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use protocol::{PortCounters, RoleCounters};
+use protocol::{GaugeHealth, PortCounters, RoleCounters};
 use serde_json::{Value, json};
 
 use super::board::Board;
@@ -89,7 +89,7 @@ pub fn second_json(dashboard: &Dashboard) -> Value {
             "amplitude_lsb": estimate.amplitude_lsb,
             "velocity_mm_s": mm_s(estimate.velocity_um_s),
             "lag_um": estimate.lag_um,
-            "gauges": estimate.health.map(words::health),
+            "gauges": estimate.health.map(GaugeHealth::name),
             "age_ms": dashboard.estimate_age_ms(),
             "rate_hz": dashboard.sensor.rate.per_s(),
         })
@@ -161,7 +161,7 @@ fn board_json(board: &Board, now_us: u64) -> Value {
         "text": board.state.as_ref().map(State::to_string),
         "advice": board.state.as_ref().and_then(State::advice),
         "uptime_s": board.uptime_us(now_us).map(seconds),
-        "started_by": status.map(|status| words::reset(status.reset)),
+        "started_by": status.map(|status| status.reset.name()),
         "watchdog_resets": status.map(|status| status.watchdog_resets),
         "round_trip_ms": board.clocks.map(|clocks| clocks.round_trip_us as f64 / 1e3),
         "clock_offset_ms": board.clocks.map(|clocks| clocks.offset_us as f64 / 1e3),

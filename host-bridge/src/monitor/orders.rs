@@ -91,7 +91,7 @@ impl Orders {
         self.outbox.push(STOP);
     }
 
-    /// The display has stopped.
+    /// The display has stopped, or can't be told.
     pub fn stopped(&mut self) {
         self.stop = None;
     }

@@ -12,47 +12,53 @@ use crate::host_clock::now_us;
 const LOOK: Duration = Duration::from_millis(20);
 
 /// What the lines are to be.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// JSON instead of columns.
     pub is_json: bool,
     /// Time between two lines.
     pub every: Duration,
-    /// Ends after so long.
-    pub limit: Option<Duration>,
 }
 
-/// Writes lines until `ended`, until the source has ended, or until nobody reads them any more.
+impl Default for Format {
+    /// Columns, a line a second.
+    fn default() -> Self {
+        Self {
+            is_json: false,
+            every: Duration::from_secs(1),
+        }
+    }
+}
+
+/// Writes lines until `ended`, for `limit` at most, until the source has ended, or until nobody reads them any
+/// more.
 ///
 /// # Errors
 /// If they can't be written for another reason.
 pub fn run(
     mut desk: Desk,
     format: &Format,
+    limit: Option<Duration>,
     ended: &AtomicBool,
     output: &mut impl Write,
 ) -> io::Result<()> {
-    let written = write_lines(&mut desk, format, ended, output);
-    let closed = desk.close();
-    match written {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => closed,
-        Err(error) => Err(error),
-        Ok(()) => closed,
+    match write_lines(&mut desk, format, limit, ended, output) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written,
     }
 }
 
 fn write_lines(
     desk: &mut Desk,
     format: &Format,
+    limit: Option<Duration>,
     ended: &AtomicBool,
     output: &mut impl Write,
 ) -> io::Result<()> {
     let begun_us = now_us();
     let every_us = micros(format.every).max(1);
     let mut next_us = begun_us + every_us;
-    let end_us = format
-        .limit
-        .map(|limit| begun_us.saturating_add(micros(limit)));
+    let end_us = limit.map(|limit| begun_us.saturating_add(micros(limit)));
     if !format.is_json {
         writeln!(output, "{}", line::HEADING)?;
         output.flush()?;

@@ -11,12 +11,14 @@ use std::time::{Duration, Instant};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Typed, KeyEventKind};
 
+use super::MonitorError;
 use super::dashboard::Dashboard;
 use super::desk::Desk;
 use super::draw::draw;
+use super::keeping::Keeping;
 use super::keys::{Asked, press};
 use super::theme::Theme;
-use super::view::{Keeping, View};
+use super::view::{Kept, View};
 
 /// Between two pictures: 30 a second.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 30);
@@ -57,13 +59,18 @@ impl Drop for Screen {
 ///
 /// # Errors
 /// If there is no terminal, or if the last of a recording can't be written.
-pub fn run(mut desk: Desk, limit: Option<Duration>, ended: &Arc<AtomicBool>) -> io::Result<()> {
+pub fn run(
+    mut desk: Desk,
+    limit: Option<Duration>,
+    ended: &Arc<AtomicBool>,
+) -> Result<(), MonitorError> {
     let shown = Screen::open(ended).and_then(|mut screen| {
         let end = limit.map(|limit| Instant::now() + limit);
         show(&mut screen.terminal, &mut desk, end, ended)
     });
     let closed = desk.close();
-    shown.and(closed)
+    shown?;
+    Ok(closed?)
 }
 
 fn show(
@@ -82,9 +89,8 @@ fn show(
         changed |= desk.take();
         // Shown already, in the log.
         desk.dashboard.take_happenings();
-        if view.keeping.is_some() && !desk.keeps() {
-            view.keeping = None;
-        }
+        view.kept = desk.keeping().map(kept);
+        view.is_over = desk.is_over();
         let is_idle = drawn.is_none_or(|drawn| drawn.elapsed() >= IDLE);
         if changed || is_idle {
             let live = &desk.dashboard;
@@ -120,7 +126,7 @@ fn show(
                     view.is_frozen = !view.is_frozen;
                     frozen = view.is_frozen.then(|| Box::new(desk.dashboard.clone()));
                 }
-                Asked::Keep => keep(desk, &mut view),
+                Asked::Keep => desk.toggle_keeping(),
             }
         }
     }
@@ -141,21 +147,11 @@ fn listen() -> Receiver<Typed> {
     typed
 }
 
-fn keep(desk: &mut Desk, view: &mut View) {
-    let since_us = desk.dashboard.now_us;
-    match desk.toggle_keeping() {
-        Ok(Some(path)) => view.keeping = Some(Keeping { path, since_us }),
-        Ok(None) => {
-            if let Some(Keeping { path, .. }) = view.keeping.take() {
-                let words = format!("recorded: {}", path.display());
-                desk.dashboard.notify(false, words);
-            }
-        }
-        Err(error) => {
-            view.keeping = None;
-            desk.dashboard
-                .notify(true, format!("NOT RECORDED: {error}"));
-        }
+fn kept(keeping: &Keeping) -> Kept {
+    Kept {
+        name: keeping.path.display().to_string(),
+        since_us: keeping.since_us,
+        safe_bytes: keeping.progress().safe_bytes,
     }
 }
 

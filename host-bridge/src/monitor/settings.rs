@@ -68,7 +68,7 @@ impl Setting {
         match self.kind {
             Kind::Choice(words) => words.join(" or "),
             Kind::Gauges => "some of 01234".to_owned(),
-            Kind::Number => ["4294967295", "65535"]
+            Kind::Number => ["4294967295", "65535", "255"]
                 .into_iter()
                 .find_map(|most| {
                     let mut beyond = *configuration;

@@ -103,7 +103,7 @@ impl Theme {
         // What is no number is cast to 0.
         let step = (part.clamp(0.0, 1.0) * last as f32).round() as usize;
         if self.has_colour {
-            Style::new().bg(Color::Indexed(steps[step.min(last)]))
+            Style::new().fg(Color::Indexed(steps[step.min(last)]))
         } else {
             Style::new()
         }

@@ -21,14 +21,17 @@ pub struct Extent {
     pub high: f32,
     /// The last.
     pub last: f32,
+    /// When the last one was, in µs, to a bin.
+    at_us: u64,
 }
 
 impl Extent {
-    const fn of(value: f32) -> Self {
+    const fn of(value: f32, at_us: u64) -> Self {
         Self {
             low: value,
             high: value,
             last: value,
+            at_us,
         }
     }
 
@@ -38,6 +41,7 @@ impl Extent {
             low: self.low.min(later.low),
             high: self.high.max(later.high),
             last: later.last,
+            at_us: later.at_us,
         }
     }
 }
@@ -71,7 +75,7 @@ impl Trace {
             return;
         }
         let bin = &mut self.bins[place(index)];
-        let value = Extent::of(value);
+        let value = Extent::of(value, at_us);
         *bin = Some(bin.map_or(value, |bin| bin.then(value)));
     }
 
@@ -102,22 +106,17 @@ impl Trace {
         count: usize,
     ) -> impl Iterator<Item = Option<Extent>> {
         let first = (end_us / column_us).saturating_sub(count as u64);
-        let mut before: Option<(u64, f32)> = None;
-        if first > 0 {
-            let from_us = (first * column_us).saturating_sub(STANDS_US);
-            before = self
-                .extent(from_us, first * column_us)
-                .map(|extent| (first * column_us, extent.last));
-        }
+        let begin_us = first * column_us;
+        let mut before = self.extent(begin_us.saturating_sub(STANDS_US), begin_us);
         (0..count as u64).map(move |column| {
             let from_us = (first + column) * column_us;
             let to_us = from_us + column_us;
             let standing = before
-                .filter(|(at_us, _)| from_us.saturating_sub(*at_us) < STANDS_US)
-                .map(|(_, value)| Extent::of(value));
+                .filter(|before| from_us.saturating_sub(before.at_us) < STANDS_US)
+                .map(|before| Extent::of(before.last, before.at_us));
             match self.extent(from_us, to_us) {
                 Some(new) => {
-                    before = Some((to_us, new.last));
+                    before = Some(new);
                     Some(standing.map_or(new, |standing| standing.then(new)))
                 }
                 // Nothing has come yet where the present is.

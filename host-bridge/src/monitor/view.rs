@@ -1,7 +1,5 @@
 //! How a dashboard is looked at: what the keys change without the boards' knowing.
 
-use std::path::PathBuf;
-
 use super::form::Form;
 use super::theme::Theme;
 
@@ -31,13 +29,15 @@ impl Panel {
     }
 }
 
-/// A recording that is being made.
+/// A recording that is being made, as it is shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Keeping {
-    /// The file.
-    pub path: PathBuf,
+pub struct Kept {
+    /// The file's name.
+    pub name: String,
     /// Since when, in µs of [`crate::host_clock::now_us`].
     pub since_us: u64,
+    /// Bytes that are safe on the disk.
+    pub safe_bytes: u64,
 }
 
 /// How a dashboard is looked at.
@@ -57,8 +57,10 @@ pub struct View {
     pub form: Option<Form>,
     /// Whether what is shown stands still.
     pub is_frozen: bool,
+    /// Whether nothing more will come: a recording that was watched is over.
+    pub is_over: bool,
     /// The recording that is being made.
-    pub keeping: Option<Keeping>,
+    pub kept: Option<Kept>,
 }
 
 impl View {
@@ -72,7 +74,8 @@ impl View {
             shows_help: false,
             form: None,
             is_frozen: false,
-            keeping: None,
+            is_over: false,
+            kept: None,
         }
     }
 

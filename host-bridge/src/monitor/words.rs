@@ -1,6 +1,6 @@
 //! The wire's words in those of the field.
 
-use protocol::{Configuration, Contact, GaugeHealth, Method, Mode, Range, ResetCause, UpdateRate};
+use protocol::{Configuration, Contact, Method, Mode, Range, UpdateRate};
 
 /// The paper's range.
 pub const fn range(range: Range) -> &'static str {
@@ -17,28 +17,6 @@ pub const fn contact(contact: Contact) -> &'static str {
         Contact::Slip => "slip",
         Contact::Stick => "stick",
         Contact::StickSlip => "stick-slip",
-    }
-}
-
-/// What is wrong with a gauge.
-pub const fn health(health: GaugeHealth) -> &'static str {
-    match health {
-        GaugeHealth::Good => "good",
-        GaugeHealth::Dead => "dead",
-        GaugeHealth::Stuck => "stuck",
-        GaugeHealth::Saturated => "saturated",
-        GaugeHealth::Noisy => "noisy",
-        GaugeHealth::Hum => "hum",
-    }
-}
-
-/// Why a board started.
-pub const fn reset(cause: ResetCause) -> &'static str {
-    match cause {
-        ResetCause::Power => "power",
-        ResetCause::Pin => "reset pin",
-        ResetCause::Watchdog => "watchdog",
-        ResetCause::Software => "software",
     }
 }
 

@@ -210,10 +210,10 @@ mod tests {
 
     #[test]
     fn a_long_gap_is_counted_whole_and_its_stragglers_are_late() {
-        let (orders, arrivals) = judged(&[0, 1_000, 999, 5, u64::MAX, 1_000]);
+        let (orders, arrivals) = judged(&[0, 1_000, 999, 5, 1_000_000, 1_000]);
         use Order::{Late, Newer};
         assert_eq!(orders, [Newer, Newer, Late, Late, Newer, Late]);
-        assert_eq!(arrivals.lost, 999 - 1 + (u64::MAX - 1_001));
+        assert_eq!(arrivals.lost, 999 - 1 + 998_999);
         assert_eq!(arrivals.late, 3);
     }
 

@@ -201,6 +201,8 @@ pub enum Notice {
     },
     /// Somebody is reached, but not the other site's bridge.
     Alone(Role),
+    /// Nobody has come from the other site.
+    Unvisited(Role),
     /// Stop, said at this site.
     StopSaid(Role),
     /// The Stop is with this site's board.
@@ -239,6 +241,11 @@ impl fmt::Display for Notice {
             Self::Alone(role) => write!(
                 f,
                 "the network is there, but {} is not heard: see whether its bridge runs, with the same --name",
+                site(*role)
+            ),
+            Self::Unvisited(role) => write!(
+                f,
+                "nobody comes from {}: see whether its bridge runs, connects here, and has the same --name",
                 site(*role)
             ),
             Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),

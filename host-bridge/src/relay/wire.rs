@@ -11,12 +11,15 @@ use crate::relay::envelope::{Envelope, MAX_ENVELOPE};
 use crate::relay::name::{Channel, Name};
 use crate::relay::network::NetworkError;
 
+/// What happens with bytes that come; called from the engine's threads, which it holds up.
+pub type Hear = Box<dyn Fn(&[u8]) + Send + Sync>;
+
 /// Whom a program listens to.
 pub struct Ear {
     /// The keys.
     pub keys: String,
-    /// What happens with the bytes; called from the engine's threads, which it holds up.
-    pub hear: Box<dyn Fn(&[u8]) + Send + Sync>,
+    /// What happens with what they say.
+    pub hear: Hear,
 }
 
 /// A bridge's, or an operator's, place on the network. Dropping it leaves the network.

@@ -18,6 +18,8 @@ const COLUMNS: usize = 10;
 const ROWS: usize = 5;
 /// Characters of a place, with the gap to the next one.
 const WIDTH: usize = 3;
+/// Half of a place: less than a whole block, so that rows stay apart.
+const PLACE: &str = "▇";
 /// The colours' end, in V.
 const FULL_V: f32 = 5.0;
 
@@ -94,7 +96,7 @@ fn cell(place: Option<f32>, is_signed: bool, theme: Theme) -> [Span<'static>; 2]
         return [Span::raw(" ".repeat(WIDTH)), Span::raw("")];
     };
     let text = match (theme.has_colour(), is_signed) {
-        (true, _) => " ".repeat(WIDTH - 1),
+        (true, _) => PLACE.repeat(WIDTH - 1),
         (false, true) => format!("{volt:+width$.0}", width = WIDTH - 1),
         (false, false) => format!("{volt:width$.0}", width = WIDTH - 1),
     };
@@ -122,7 +124,7 @@ fn scale(shown: &Dashboard, view: &View) -> Line<'static> {
         spans.extend((0..STEPS).map(|step| {
             let part = step as f32 / (STEPS - 1) as f32;
             let volt = low_v + part * (FULL_V - low_v);
-            Span::styled(" ", colour(volt, view.shows_moment, theme))
+            Span::styled(PLACE, colour(volt, view.shows_moment, theme))
         }));
     } else {
         spans.push(Span::styled("to", theme.quiet()));

@@ -9,7 +9,6 @@ use super::plot::{Plot, Range, Series, round_step};
 use super::{areas, text};
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::view::View;
-use crate::monitor::words;
 
 /// The gauges show a part of the time that the other traces show: their waves are many times as fast.
 const PART: f32 = 0.03;
@@ -92,7 +91,7 @@ fn name(shown: &Dashboard, gauge: usize, extent: Option<(f32, f32)>, view: &View
         } else {
             theme.bad()
         };
-        spans.push(Span::styled(words::health(health), style));
+        spans.push(Span::styled(health.name(), style));
         if estimate.gauges_used & (1 << gauge) == 0 {
             spans.push(Span::styled(" unused", theme.quiet()));
         }

@@ -12,7 +12,6 @@ use crate::monitor::board::Board;
 use crate::monitor::dashboard::{Dashboard, Notice};
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
-use crate::monitor::words;
 use crate::state::State;
 
 /// Width of a board's name with what stands around it.
@@ -126,7 +125,7 @@ fn health(board: &Board, now_us: u64, theme: Theme) -> Vec<Span<'static>> {
         add("misses", misses, style);
         let (resets, style) = count(status.watchdog_resets, theme.bad());
         add("watchdog", resets, style);
-        add("by", words::reset(status.reset).to_owned(), Style::new());
+        add("by", status.reset.name().to_owned(), Style::new());
     }
     spans
 }
@@ -164,7 +163,7 @@ pub fn supervisor(live: &Dashboard, theme: Theme) -> Line<'static> {
         return Line::styled(" supervisor not heard", theme.quiet());
     };
     let words = state.to_string();
-    let since = text::short(live.now_us.saturating_sub(since_us));
+    let since = text::seconds(live.now_us.saturating_sub(since_us));
     let style = match state {
         DisplayState::Boot | DisplayState::Ready => theme.strong(),
         DisplayState::Driving => theme.good(),
@@ -193,13 +192,18 @@ fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
         spans.push(Span::raw("  "));
         spans.push(Span::styled(" FROZEN ", view.theme.chosen()));
     }
-    if let Some(keeping) = &view.keeping {
-        let for_us = live.now_us.saturating_sub(keeping.since_us);
+    if view.is_over {
+        spans.push(Span::raw("  "));
+        spans.push(Span::styled(" END OF RECORDING ", view.theme.chosen()));
+    }
+    if let Some(kept) = &view.kept {
+        let for_us = live.now_us.saturating_sub(kept.since_us);
         spans.push(Span::styled("  ● recording ", view.theme.bad()));
         spans.push(Span::raw(format!(
-            "{}, {}",
-            keeping.path.display(),
-            text::duration(for_us)
+            "{}, {}, {:.1} MB safe",
+            kept.name,
+            text::duration(for_us),
+            kept.safe_bytes as f64 / 1e6
         )));
     }
     spans
@@ -218,7 +222,7 @@ pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         ("c", "configure"),
         (
             "r",
-            if view.keeping.is_some() {
+            if view.kept.is_some() {
                 "end recording"
             } else {
                 "record"

@@ -42,12 +42,16 @@ impl Range {
     pub fn around(low: f32, high: f32, least: f32) -> Self {
         let middle = (low + high) / 2.0;
         let half = (high - low).max(least) / 2.0;
-        // Four steps or a few more, so that little of the height is left empty; what is within a hundredth
-        // of a round number is it.
+        // Four steps or a few more leave little of the height empty. What is within a hundredth of a step
+        // of a round number is that number.
         let step = round_step(half / 2.0);
+        let low = ((middle - half) / step + 0.01).floor();
+        let mut high = ((middle + half) / step - 0.01).ceil();
+        // The number in the middle is to be round as well.
+        high += (high - low) % 2.0;
         Self {
-            low: ((middle - half) / step + 0.01).floor() * step,
-            high: ((middle + half) / step - 0.01).ceil() * step,
+            low: low * step,
+            high: high * step,
             digits: digits(step),
         }
     }
@@ -225,7 +229,10 @@ struct Stroke {
 impl Shape for Stroke {
     fn draw(&self, painter: &mut Painter<'_, '_>) {
         for (column, extent) in self.columns.iter().enumerate() {
-            let Some(Extent { low, high, last }) = extent else {
+            let Some(Extent {
+                low, high, last, ..
+            }) = extent
+            else {
                 continue;
             };
             let (high, low) = match self.skips {

@@ -162,6 +162,11 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
             is_dotted: false,
         },
         Series {
+            trace: &traces.unsure_mm,
+            style: theme.quiet(),
+            is_dotted: true,
+        },
+        Series {
             trace: &traces.counted_mm,
             style: theme.warning(),
             is_dotted: true,
@@ -172,13 +177,13 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
         Span::styled("  mm, ", theme.quiet()),
         Span::styled(text::span(plot.span_s()), theme.quiet()),
         Span::styled("   ━ ", theme.sensor()),
-        Span::styled("estimate", theme.quiet()),
+        Span::styled("valid  ┅ unsure", theme.quiet()),
         Span::styled("  ┅ ", theme.warning()),
         Span::styled("paper's count", theme.quiet()),
     ]);
     text::panel(frame, area, theme, title);
-    let both = [&traces.wavelength_mm, &traces.counted_mm];
-    if let Some((low, high)) = plot.extent(shown.now_us, &both) {
+    let all = series.each_ref().map(|series| series.trace);
+    if let Some((low, high)) = plot.extent(shown.now_us, &all) {
         let range = Range::around(low, high, LEAST_PART * high);
         plot.draw_axis(frame, range, theme);
         plot.draw(frame, shown.now_us, range, &series, None);

@@ -59,7 +59,14 @@ pub fn short(us: u64) -> String {
         0..1_000 => format!("{us} µs"),
         1_000..10_000 => format!("{:.1} ms", us as f64 / 1e3),
         10_000..1_000_000 => format!("{} ms", us / 1_000),
-        1_000_000..100_000_000 => format!("{:.1} s", us as f64 / 1e6),
+        _ => seconds(us),
+    }
+}
+
+/// A time to a tenth of a second while that is to be seen: `12.3 s`.
+pub fn seconds(us: u64) -> String {
+    match us {
+        0..100_000_000 => format!("{:.1} s", us as f64 / 1e6),
         _ => duration(us),
     }
 }

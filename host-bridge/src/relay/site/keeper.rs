@@ -9,15 +9,14 @@ use protocol::Ping;
 
 use super::{Shared, locked};
 use crate::host_clock::now_us;
+use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::Content;
 use crate::relay::name::Channel;
 use crate::relay::reach::Reach;
 use crate::relay::report::Notice;
 
-/// How often the keeper looks round.
-const LOOK: Duration = Duration::from_millis(20);
-/// Between two pings while they are answered, in µs: the eight that the clocks are compared by span 2 s.
-const PING_US: u64 = 250_000;
+/// How often the keeper looks round; also the time between two pings while they are answered.
+const LOOK: Duration = Duration::from_millis(25);
 /// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
 const KNOCK_US: u64 = 100_000;
 /// Between two repetitions of a Stop that nobody has heard, in µs.
@@ -36,7 +35,7 @@ pub struct Keeper {
     heard_us: u64,
     looked_us: Option<u64>,
     /// What was found last, so that it is said once.
-    found: Arc<Mutex<Option<Notice>>>,
+    found: Arc<Mutex<Vec<Notice>>>,
 }
 
 impl Keeper {
@@ -61,13 +60,9 @@ impl Keeper {
     }
 
     fn ping(&mut self, at_us: u64) {
-        let is_answering = {
-            let mut inward = locked(&self.shared.inward);
-            inward.elapse(at_us, |notice| self.shared.tell(notice));
-            inward.far().is_answering(at_us)
-        };
-        let period_us = if is_answering { PING_US } else { KNOCK_US };
-        if is_due(self.pinged_us, period_us, at_us) {
+        locked(&self.shared.inward).elapse(at_us, |notice| self.shared.tell(notice));
+        let takes_more = locked(&self.shared.outward).flow().takes_more(at_us);
+        if takes_more || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
             let ping = Ping { sent_us: now_us() };
             self.shared.say(Channel::Clock, Content::Ping(ping));
@@ -94,7 +89,7 @@ impl Keeper {
             "known" | "foreign"
         ) {
             self.heard_us = at_us;
-            *locked(&self.found) = None;
+            locked(&self.found).clear();
         }
         let is_puzzled = at_us.saturating_sub(self.heard_us) > PUZZLED_US;
         if !is_puzzled || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
@@ -103,14 +98,14 @@ impl Keeper {
         self.looked_us = Some(at_us);
         let (shared, found) = (Arc::clone(&self.shared), Arc::clone(&self.found));
         thread::spawn(move || {
-            let Some(notice) = shared.puzzle() else {
-                return;
-            };
+            let notices = shared.puzzle();
             let mut found = locked(&found);
-            if found.as_ref() != Some(&notice) {
-                *found = Some(notice.clone());
-                shared.tell(notice);
+            for notice in &notices {
+                if !found.contains(notice) {
+                    shared.tell(notice.clone());
+                }
             }
+            *found = notices;
         });
     }
 }
@@ -121,14 +116,18 @@ fn is_due(last_us: Option<u64>, period_us: u64, at_us: u64) -> bool {
 
 impl Shared {
     /// Why the other site is not heard.
-    fn puzzle(&self) -> Option<Notice> {
+    fn puzzle(&self) -> Vec<Notice> {
         let endpoints = self.network.connects_to();
-        let is_connected = self.wire.get().is_some_and(|wire| wire.neighbours() > 0);
-        if is_connected || endpoints.is_empty() {
-            return Some(Notice::Alone(self.far));
+        if endpoints.is_empty() {
+            return vec![Notice::Unvisited(self.far)];
         }
-        let endpoint = endpoints.first()?.clone();
-        let reach = Reach::of(&endpoint, self.network.tls());
-        Some(Notice::Unreached { endpoint, reach })
+        if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
+            return vec![Notice::Alone(self.far)];
+        }
+        let reach = |endpoint: &Endpoint| Notice::Unreached {
+            endpoint: endpoint.clone(),
+            reach: Reach::of(endpoint, self.network.tls()),
+        };
+        endpoints.iter().map(reach).collect()
     }
 }
