@@ -281,7 +281,7 @@ fn a_trace_shows_a_gap_where_nothing_came_and_forgets_what_is_too_old() {
         .columns(3_100_000, 100_000, 22)
         .map(|column| column.is_some())
         .collect();
-    let mut expected = vec![false; 22];
+    let mut expected = [false; 22];
     expected[1] = true;
     expected[21] = true;
     // The first value is at 1.0 s, of which the columns begin at 0.9 s.
