@@ -206,7 +206,7 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
         ),
         (
             vec![file, "--to", "nowhere"],
-            "give sensor-board, display-board",
+            "give monitor, sensor-board, display-board",
         ),
         (
             vec![file, "--to", toml, "--speed", "1000"],
