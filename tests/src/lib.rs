@@ -13,7 +13,7 @@ pub mod pty;
 pub mod relay;
 pub mod run;
 pub mod sensing;
+pub mod swift_board;
 pub mod terminal;
 pub mod utterance;
-pub mod swift_board;
 pub mod weather;
