@@ -15,6 +15,7 @@ pub mod credentials;
 pub mod endpoint;
 pub mod envelope;
 pub mod far;
+pub mod flow;
 pub mod gate;
 pub mod histogram;
 pub mod inward;

@@ -114,11 +114,13 @@ fn busy(state: DisplayState) -> Dashboard {
         };
         dashboard.on(at_us, Role::Display, heard(at_us, Message::Motion(motion)));
         if ms.is_multiple_of(8) {
-            let mut sample = GaugeSample::default();
-            sample.codes = std::array::from_fn(|gauge| {
-                let lsb = if ms.is_multiple_of(16) { 100.0 } else { -100.0 };
-                (32_768.0 + 16.0 * lsb / (gauge + 1) as f64) as u16
-            });
+            let sample = GaugeSample {
+                codes: std::array::from_fn(|gauge| {
+                    let lsb = if ms.is_multiple_of(16) { 100.0 } else { -100.0 };
+                    (32_768.0 + 16.0 * lsb / (gauge + 1) as f64) as u16
+                }),
+                ..GaugeSample::default()
+            };
             let block = Gauges {
                 first_sample: ms as u32,
                 instant_us: at_us,

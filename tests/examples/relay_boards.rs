@@ -81,7 +81,9 @@ fn board(role: Role) -> std::io::Result<(SwiftBoard, Arc<Mutex<Heard>>)> {
 }
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
-    let seconds = std::env::args().nth(1).map_or(Ok(60), |given| given.parse())?;
+    let seconds = std::env::args()
+        .nth(1)
+        .map_or(Ok(60), |given| given.parse())?;
     let (_sensor, sensor) = board(Role::Sensor)?;
     let (_display, display) = board(Role::Display)?;
     let began = Instant::now();

@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use hil_sim::serve::{Bench, Options};
-use protocol::{Hello, MAX_FRAME, Message, Port, PortCounters, Role};
+use protocol::{Hello, MAX_FRAME, Message, Ping, Port, PortCounters, Role};
 use serialport::SerialPort;
 
 use crate::elves;
@@ -17,6 +17,8 @@ pub const BAUD: u32 = 921_600;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// How long a port is listened to at a time.
 const LISTENS: Duration = Duration::from_millis(20);
+/// How often one stays: well within what a board waits for at the fastest pace here.
+const STAYS: Duration = Duration::from_millis(50);
 
 /// Two boards keep two cores busy: one bench at a time.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -70,6 +72,7 @@ pub struct Client {
     begun: Instant,
     /// Bytes that came.
     pub bytes: u64,
+    stayed: Instant,
 }
 
 impl Client {
@@ -88,6 +91,7 @@ impl Client {
             port: Port::new(Hello::new(Role::Host, "test", [0, 1, 0])),
             begun: Instant::now(),
             bytes: 0,
+            stayed: Instant::now(),
         };
         client.serial.write_all(&[0]).unwrap();
         client.speak().unwrap();
@@ -101,6 +105,18 @@ impl Client {
     pub fn say(&mut self, message: &Message) {
         self.port.post(message);
         self.speak().unwrap();
+    }
+
+    /// Tells the board now and then that somebody is there, without reading what it says: it would speak
+    /// text to who says nothing.
+    ///
+    /// # Panics
+    /// If the port is gone.
+    pub fn stay(&mut self) {
+        if self.stayed.elapsed() >= STAYS {
+            self.stayed = Instant::now();
+            self.say(&Message::Ping(Ping { sent_us: 0 }));
+        }
     }
 
     /// What the port has counted.

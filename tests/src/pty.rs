@@ -7,9 +7,15 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl, open};
+use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+
+/// How long a full line is waited for: a reader on a busy machine takes its time.
+const FULL: Timespec = Timespec {
+    tv_sec: 0,
+    tv_nsec: 50_000_000,
+};
 
 /// The end that a board has.
 pub struct Near {
@@ -18,8 +24,8 @@ pub struct Near {
 }
 
 impl Near {
-    /// A raw pseudo-terminal: the board's end, which waits no longer than `patience`, the other end, to be
-    /// held open, and its name.
+    /// A raw pseudo-terminal: the board's end, the other end, to be held open, and its name. The board
+    /// waits no longer than `patience` for bytes.
     ///
     /// # Errors
     /// The system's.
@@ -27,7 +33,6 @@ impl Near {
         let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&near)?;
         unlockpt(&near)?;
-        fcntl_setfl(&near, fcntl_getfl(&near)? | OFlags::NONBLOCK)?;
         let name = ptsname(&near, Vec::new())?;
         let path = PathBuf::from(name.to_str().map_err(io::Error::other)?);
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
@@ -40,8 +45,8 @@ impl Near {
         Ok((Self { file, patience }, far, path))
     }
 
-    fn wait(&self, flags: PollFlags) -> io::Result<()> {
-        match poll(&mut [PollFd::new(&self.file, flags)], Some(&self.patience))? {
+    fn wait(&self, flags: PollFlags, limit: &Timespec) -> io::Result<()> {
+        match poll(&mut [PollFd::new(&self.file, flags)], Some(limit))? {
             0 => Err(ErrorKind::TimedOut.into()),
             _ => Ok(()),
         }
@@ -50,14 +55,14 @@ impl Near {
 
 impl Read for Near {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.wait(PollFlags::IN)?;
+        self.wait(PollFlags::IN, &self.patience)?;
         self.file.read(bytes)
     }
 }
 
 impl Write for Near {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.wait(PollFlags::OUT)?;
+        self.wait(PollFlags::OUT, &FULL)?;
         self.file.write(bytes)
     }
 

@@ -2,13 +2,14 @@
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use hil_sim::serve::{self, Bench, Options, PortName};
 use protocol::Role;
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
+use tests::bench::BAUD;
 use tests::bridge::{self, Ended, Running};
 use tests::elves;
 use tests::fake_board::wait_until;
@@ -200,17 +201,13 @@ fn a_wrong_baud_rate_is_garbage_and_named() {
         .read(true)
         .open(path)
         .expect("the port is there");
-    let stty = |argument: &str| {
-        let done = Command::new("stty")
-            .arg(argument)
-            .stdin(Stdio::from(port.try_clone().expect("one more")))
-            .output()
-            .expect("there is an stty");
-        String::from_utf8_lossy(&done.stdout).trim().to_owned()
-    };
+    // Not by stty, which does not know a rate without a name of its own.
+    let rate = || tcgetattr(&port).expect("a terminal").output_speed();
     let doctor = start(&bench);
-    assert!(wait_until(LIMIT, || stty("speed") == "921600"));
-    stty("115200");
+    assert!(wait_until(LIMIT, || rate() == BAUD));
+    let mut settings = tcgetattr(&port).expect("a terminal");
+    settings.set_speed(115_200).expect("a rate");
+    tcsetattr(&port, OptionalActions::Now, &settings).expect("a terminal");
     let end_of_garbling = Instant::now() + GARBLED;
     assert!(wait_until(LIMIT, || Instant::now() >= end_of_garbling));
     let document = document(&end(doctor));

@@ -158,7 +158,11 @@ impl Signals {
         };
         for signal in [SIGINT, SIGTERM] {
             // Said twice, it ends at once: leaving a network that is stuck may take a while.
-            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&signals.ended))?;
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                130,
+                Arc::clone(&signals.ended),
+            )?;
             signal_hook::flag::register(signal, Arc::clone(&signals.ended))?;
         }
         signal_hook::flag::register(SIGUSR1, Arc::clone(&signals.stopped))?;

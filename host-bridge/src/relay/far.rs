@@ -1,16 +1,12 @@
 //! Who is at the other site, and since when nothing was heard from there.
 
 use std::fmt;
-use std::time::Duration;
 
 use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
 
 use crate::relay::envelope::ENVELOPE_VERSION;
 
-/// After this long without a word the other site counts as silent, and nothing but pings is sent there:
-/// what would wait on the way would be old when it came.
-pub const SILENCE: Duration = Duration::from_secs(2);
-/// [`SILENCE`] in µs.
+/// After this long without a word the other site counts as silent, in µs.
 pub const SILENCE_US: u64 = 2_000_000;
 
 /// How the other site stands.
@@ -25,7 +21,7 @@ pub enum FarState {
         /// Which start of it.
         session: u64,
     },
-    /// A bridge was there, and nothing has been heard for [`SILENCE`].
+    /// A bridge was there, and nothing has been heard for [`SILENCE_US`].
     Silent,
     /// A bridge of another build is there.
     Foreign {
@@ -81,7 +77,6 @@ impl fmt::Display for Bridge<'_> {
 pub struct Far {
     state: FarState,
     heard_us: u64,
-    answered_us: Option<u64>,
 }
 
 impl Default for Far {
@@ -89,7 +84,6 @@ impl Default for Far {
         Self {
             state: FarState::Unheard,
             heard_us: 0,
-            answered_us: None,
         }
     }
 }
@@ -104,9 +98,6 @@ impl Far {
     pub fn hear(&mut self, hello: Hello, session: u64, now_us: u64) -> bool {
         let is_other = !self.is_session(session);
         self.heard_us = now_us;
-        if is_other {
-            self.answered_us = None;
-        }
         self.state = FarState::Known { hello, session };
         is_other
     }
@@ -116,17 +107,6 @@ impl Far {
         if !matches!(self.state, FarState::Known { .. }) {
             self.state = FarState::Foreign { hello, version };
         }
-    }
-
-    /// A ping of one's own was answered.
-    pub const fn on_answer(&mut self, now_us: u64) {
-        self.answered_us = Some(now_us);
-    }
-
-    /// Whether what is sent now is likely to arrive soon: pings are being answered.
-    pub fn is_answering(&self, now_us: u64) -> bool {
-        self.answered_us
-            .is_some_and(|answered_us| now_us.saturating_sub(answered_us) <= SILENCE_US)
     }
 
     /// Time passes. True if the other site has just become silent.
@@ -168,22 +148,6 @@ mod tests {
         assert!(far.elapse(11 + SILENCE_US));
         assert!(!far.elapse(12 + SILENCE_US), "said once");
         assert_eq!(far.state(), &FarState::Silent);
-    }
-
-    #[test]
-    fn only_answers_show_that_what_is_sent_arrives() {
-        let mut far = Far::default();
-        far.hear(host_hello(), 1, 0);
-        assert!(!far.is_answering(0));
-        far.on_answer(5);
-        assert!(far.is_answering(5 + SILENCE_US));
-        assert!(!far.is_answering(6 + SILENCE_US));
-        far.on_answer(7 + SILENCE_US);
-        far.hear(host_hello(), 2, 7 + SILENCE_US);
-        assert!(
-            !far.is_answering(7 + SILENCE_US),
-            "another start has not answered"
-        );
     }
 
     #[test]

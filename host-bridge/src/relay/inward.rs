@@ -25,6 +25,13 @@ pub enum Heard {
     Pass(Waiting),
     /// A ping of this session is to be answered.
     Asked(u64, Ping),
+    /// A ping of one's own was answered.
+    Answered {
+        /// When it was sent, in µs.
+        sent_us: u64,
+        /// What it took, in µs.
+        round_trip_us: u64,
+    },
     /// The board is to be told, and then the sender.
     Stop(u64, Stop),
     /// The Stop of this number is with the other site's board.
@@ -44,6 +51,8 @@ pub struct Inward {
     counts: Incoming,
     total: Histogram,
     recent: Histogram,
+    /// The last one.
+    round_trip_us: u64,
     told_retired: bool,
     told_slow: bool,
 }
@@ -61,6 +70,7 @@ impl Inward {
             counts: Incoming::default(),
             total: Histogram::default(),
             recent: Histogram::default(),
+            round_trip_us: 0,
             told_retired: false,
             told_slow: false,
         }
@@ -92,10 +102,12 @@ impl Inward {
             Content::Board { .. } => self.weigh(envelope, now_us, tell),
             Content::Ping(ping) => Heard::Asked(envelope.session, ping),
             Content::Pong { to, pong } => {
-                if to == self.session && self.far.is_session(envelope.session) {
-                    self.on_pong(&pong, now_us);
+                let is_ours = to == self.session && self.far.is_session(envelope.session);
+                if is_ours {
+                    self.on_pong(&pong, now_us)
+                } else {
+                    Heard::Nothing
                 }
-                Heard::Nothing
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
             Content::Stopped { id } => Heard::Stopped(id),
@@ -142,11 +154,6 @@ impl Inward {
         &self.far
     }
 
-    /// The shortest round trip of late, in µs.
-    pub fn round_trip_us(&self) -> Option<u64> {
-        self.ages.round_trip_us()
-    }
-
     /// What has been counted so far.
     pub const fn counts(&self) -> Incoming {
         Incoming {
@@ -174,9 +181,14 @@ impl Inward {
         }
     }
 
-    fn on_pong(&mut self, pong: &Pong, now_us: u64) {
-        if self.ages.on_pong(pong, now_us) {
-            self.far.on_answer(now_us);
+    fn on_pong(&mut self, pong: &Pong, now_us: u64) -> Heard {
+        let Some(round_trip_us) = self.ages.on_pong(pong, now_us) else {
+            return Heard::Nothing;
+        };
+        self.round_trip_us = round_trip_us;
+        Heard::Answered {
+            sent_us: pong.sent_us,
+            round_trip_us,
         }
     }
 
@@ -204,8 +216,7 @@ impl Inward {
             }),
             Age::Stale(age_us) => {
                 self.counts.stale += 1;
-                let one_way_us = self.ages.round_trip_us().unwrap_or(0) / 2;
-                if one_way_us > self.max_age_us && !self.told_slow {
+                if self.round_trip_us / 2 > self.max_age_us && !self.told_slow {
                     self.told_slow = true;
                     let max_age_us = self.max_age_us;
                     tell(Notice::Slow { age_us, max_age_us });

@@ -1,8 +1,10 @@
-//! What the board says, on its way to the other site: numbered and dated.
+//! What the board says, on its way to the other site: numbered and dated, and no more of it than the
+//! network carries.
 
 use protocol::{Hello, Message};
 
 use crate::relay::envelope::{Content, Envelope, saying};
+use crate::relay::flow::Flow;
 use crate::relay::gate::Saying;
 use crate::relay::report::Outgoing;
 
@@ -14,6 +16,7 @@ pub struct Outward {
     counter: u64,
     start: u32,
     last: Option<Saying>,
+    flow: Flow,
     counts: Outgoing,
 }
 
@@ -26,13 +29,14 @@ impl Outward {
             counter: 0,
             start: 0,
             last: None,
+            flow: Flow::default(),
             counts: Outgoing::default(),
         }
     }
 
-    /// The envelope for what the board said at `at_us`. None if nobody answers at the other site, or if it
+    /// The envelope for what the board said at `at_us`. None if the network does not take more, or if it
     /// is not carried at all.
-    pub fn carry(&mut self, at_us: u64, message: Message, is_answered: bool) -> Option<Envelope> {
+    pub fn carry(&mut self, at_us: u64, now_us: u64, message: Message) -> Option<Envelope> {
         let said = saying(self.start, &message)?;
         // A serial line keeps the order: a board that counts backwards has started anew.
         let goes_on = self
@@ -42,7 +46,7 @@ impl Outward {
             self.start = self.start.wrapping_add(1);
         }
         self.last = Some(said);
-        if !is_answered {
+        if !self.flow.takes_more(now_us) {
             self.counts.held += 1;
             return None;
         }
@@ -72,6 +76,16 @@ impl Outward {
         }
     }
 
+    /// A ping of `sent_us` was answered after `round_trip_us`.
+    pub fn on_answer(&mut self, sent_us: u64, round_trip_us: u64) {
+        self.flow.on_answer(sent_us, round_trip_us);
+    }
+
+    /// How the network does.
+    pub const fn flow(&self) -> &Flow {
+        &self.flow
+    }
+
     /// The network refused what was carried last.
     pub const fn on_failure(&mut self) {
         self.counts.failed += 1;
@@ -98,9 +112,16 @@ mod tests {
         })
     }
 
+    /// A bridge whose network has just answered.
+    fn answered() -> Outward {
+        let mut outward = Outward::new(host_hello(), 1);
+        outward.on_answer(0, 10_000);
+        outward
+    }
+
     /// Number and board's start of what is carried.
     fn carried(outward: &mut Outward, sequence: u32) -> (u64, u32) {
-        let envelope = outward.carry(9, motion(sequence), true).expect("carried");
+        let envelope = outward.carry(9, 9, motion(sequence)).expect("carried");
         match envelope.content {
             Content::Board { start, .. } => (envelope.counter, start),
             _ => panic!("not the board's"),
@@ -109,7 +130,7 @@ mod tests {
 
     #[test]
     fn what_a_board_says_is_numbered_and_its_starts_are_counted() {
-        let mut outward = Outward::new(host_hello(), 1);
+        let mut outward = answered();
         assert_eq!(carried(&mut outward, u32::MAX), (0, 0));
         assert_eq!(carried(&mut outward, 0), (1, 0));
         assert_eq!(carried(&mut outward, 700), (2, 0));
@@ -118,10 +139,14 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_answers_to_is_held_back_and_not_numbered() {
+    fn what_a_stuck_network_does_not_take_is_held_back_and_not_numbered() {
         let mut outward = Outward::new(host_hello(), 1);
-        assert_eq!(outward.carry(9, motion(5), false), None);
+        assert_eq!(outward.carry(9, 9, motion(5)), None);
+        outward.on_answer(0, 10_000);
         assert_eq!(carried(&mut outward, 6), (0, 0));
-        assert_eq!(outward.counts().held, 1);
+        assert_eq!(outward.carry(9, 1_000_000, motion(7)), None);
+        outward.on_answer(990_000, 10_000);
+        assert_eq!(carried(&mut outward, 8), (1, 0));
+        assert_eq!(outward.counts().held, 2);
     }
 }

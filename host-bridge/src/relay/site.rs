@@ -196,14 +196,16 @@ impl Site {
     /// How the bridge stands. Ages are of the time since this was last asked, or of all of it.
     pub fn report(&self, total: bool) -> Report {
         let shared = &self.shared;
-        let outgoing = locked(&shared.outward).counts();
+        let outward = locked(&shared.outward);
+        let (outgoing, round_trip_us) = (outward.counts(), outward.flow().round_trip_us());
+        drop(outward);
         let mut inward = locked(&shared.inward);
         Report {
             site: shared.role.name(),
             uptime_s: (now_us() - shared.started_us) as f64 / 1e6,
             board: self.link.state().word(),
             far: inward.far().state().word(),
-            round_trip_us: inward.round_trip_us(),
+            round_trip_us,
             incoming: inward.counts(),
             outgoing,
             age: if total {
@@ -287,10 +289,9 @@ impl Shared {
         if !is_carried(self.role, &message) {
             return;
         }
-        let wire = self.wire.get();
-        let is_answered = wire.is_some() && locked(&self.inward).far().is_answering(now_us());
-        let envelope = locked(&self.outward).carry(at_us, message, is_answered);
-        if let (Some(envelope), Some(wire)) = (envelope, wire)
+        let envelope = locked(&self.outward).carry(at_us, now_us(), message);
+        // Nobody has answered before there was a wire.
+        if let (Some(envelope), Some(wire)) = (envelope, self.wire.get())
             && !wire.say(Channel::Board, &envelope)
         {
             locked(&self.outward).on_failure();
@@ -317,6 +318,13 @@ impl Shared {
                     answered_us: now_us(),
                 };
                 self.say(Channel::Clock, Content::Pong { to, pong });
+            }
+            Heard::Answered {
+                sent_us,
+                round_trip_us,
+            } => {
+                drop(inward);
+                locked(&self.outward).on_answer(sent_us, round_trip_us);
             }
             Heard::Stop(id, stop) => {
                 drop(inward);

@@ -110,12 +110,22 @@ impl AsFd for Pty {
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, Instant};
+
     use super::*;
 
     const BAUD: u32 = 921_600;
 
     fn client(pty: &Pty) -> OwnedFd {
         pty.open_far().unwrap()
+    }
+
+    /// The system hands bytes on when it comes to it.
+    fn wait_for(mut condition: impl FnMut() -> bool) {
+        let begun = Instant::now();
+        while !condition() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "not in a minute");
+        }
     }
 
     #[test]
@@ -130,25 +140,25 @@ mod tests {
             assert_eq!(pty.write(&all).unwrap(), 256);
             let mut taken = [0; 256];
             let mut count = 0;
-            while count < 256 {
-                count += rustix::io::read(&far, &mut taken[count..])
-                    .or_else(|error| {
-                        if error == Errno::AGAIN {
-                            Ok(0)
-                        } else {
-                            Err(error)
-                        }
-                    })
-                    .unwrap();
-            }
+            wait_for(|| {
+                match rustix::io::read(&far, &mut taken[count..]) {
+                    Err(Errno::AGAIN) => {}
+                    more => count += more.unwrap(),
+                }
+                count == 256
+            });
             assert_eq!(taken[..], all[..]);
             assert_eq!(rustix::io::write(&far, &all), Ok(256));
             drop(far);
             // What a client wrote before it went is still had.
             let mut count = 0;
-            while let Some(more) = pty.read(&mut bytes[count..]).unwrap() {
-                count += more;
-            }
+            wait_for(|| match pty.read(&mut bytes[count..]).unwrap() {
+                Some(more) => {
+                    count += more;
+                    false
+                }
+                None => true,
+            });
             assert_eq!(bytes[..count], all[..]);
         }
     }
@@ -160,7 +170,7 @@ mod tests {
         rustix::termios::ioctl_tiocexcl(&far).unwrap();
         pty.write(b"stale").unwrap();
         // Seen to have arrived, so that there is something to forget.
-        while rustix::io::ioctl_fionread(&far).unwrap() < 5 {}
+        wait_for(|| rustix::io::ioctl_fionread(&far).unwrap() == 5);
         drop(far);
         assert_eq!(pty.read(&mut [0]).unwrap(), None);
         if pty.forget_client().is_ok() {

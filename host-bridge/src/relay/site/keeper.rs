@@ -15,10 +15,8 @@ use crate::relay::name::Channel;
 use crate::relay::reach::Reach;
 use crate::relay::report::Notice;
 
-/// How often the keeper looks round.
-const LOOK: Duration = Duration::from_millis(20);
-/// Between two pings while they are answered, in µs: the eight that the clocks are compared by span 2 s.
-const PING_US: u64 = 250_000;
+/// How often the keeper looks round; also the time between two pings while they are answered.
+const LOOK: Duration = Duration::from_millis(25);
 /// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
 const KNOCK_US: u64 = 100_000;
 /// Between two repetitions of a Stop that nobody has heard, in µs.
@@ -62,13 +60,9 @@ impl Keeper {
     }
 
     fn ping(&mut self, at_us: u64) {
-        let is_answering = {
-            let mut inward = locked(&self.shared.inward);
-            inward.elapse(at_us, |notice| self.shared.tell(notice));
-            inward.far().is_answering(at_us)
-        };
-        let period_us = if is_answering { PING_US } else { KNOCK_US };
-        if is_due(self.pinged_us, period_us, at_us) {
+        locked(&self.shared.inward).elapse(at_us, |notice| self.shared.tell(notice));
+        let takes_more = locked(&self.shared.outward).flow().takes_more(at_us);
+        if takes_more || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
             let ping = Ping { sent_us: now_us() };
             self.shared.say(Channel::Clock, Content::Ping(ping));
