@@ -189,7 +189,7 @@ fn the_surface_is_told_in_numbers_three_rows_high_and_in_words() {
     let surface: Vec<&str> = picture[4..10]
         .iter()
         .map(|line| {
-            line.get(..line.char_indices().nth(38).map_or(line.len(), |(at, _)| at))
+            line.get(..line.char_indices().nth(35).map_or(line.len(), |(at, _)| at))
                 .unwrap_or_default()
                 .trim_end()
         })
@@ -200,8 +200,8 @@ fn the_surface_is_told_in_numbers_three_rows_high_and_in_words() {
             "   ▀▀█   █▀█ █▀█",
             "   █▀▀   █ █ █ █",
             " λ ▀▀▀ ▀ ▀▀▀ ▀▀▀ mm",
-            " confidence ━━━━━━━━━━━━━━━━━─ 0.93",
-            " valid  range T1  contact slip",
+            " confidence ━━━━━━━━━━━━━─ 0.93",
+            " valid   range T1   contact slip",
             " paper's count 2.40 mm   103 LSB",
         ]
     );
@@ -276,7 +276,7 @@ fn a_constant_is_a_straight_line_between_round_numbers() {
     let picture = picture(&busy(DisplayState::Driving), &view(), 80, 24);
     let velocity: Vec<String> = picture[11..17]
         .iter()
-        .map(|line| line.chars().skip(38).collect())
+        .map(|line| line.chars().skip(35).collect())
         .collect();
     assert_eq!(
         velocity,
@@ -284,7 +284,7 @@ fn a_constant_is_a_straight_line_between_round_numbers() {
             "    85",
             "",
             "",
-            "    70 ⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉",
+            "    70 ⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉",
             "",
             "    55",
         ]

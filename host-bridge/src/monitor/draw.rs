@@ -34,7 +34,7 @@ use super::view::{Panel, View};
 const LEAST_WIDTH: u16 = 60;
 const LEAST_HEIGHT: u16 = 16;
 /// Width of what stands at the left of the traces.
-const LEFT_WIDTH: u16 = 38;
+const LEFT_WIDTH: u16 = 35;
 /// Heights with the line of the title.
 const SURFACE_HEIGHT: u16 = 7;
 const FINGERTIP_HEIGHT: u16 = 7;
@@ -58,7 +58,7 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
     if let Some(form) = &view.form {
         settings::draw(frame, body, live, view, form);
     } else if view.shows_help {
-        help::draw(frame, cut_top(area, area.height - 1)[0], view.theme);
+        help::draw(frame, body, view.theme);
     }
 }
 

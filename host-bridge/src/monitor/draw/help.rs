@@ -11,16 +11,19 @@ use crate::monitor::theme::Theme;
 const LINES: [(&str, &str); 20] = [
     (
         "s, space",
-        "stop: 0 V until the display board's reset button or power",
+        "stop: 0 V at once, until the display board's reset button or power",
     ),
     ("c", "change a setting of a board"),
     ("r", "begin or end a recording"),
     ("g", "stream the gauges, or no longer"),
-    ("f", "freeze what is shown, or go on: nothing is missed"),
+    (
+        "f",
+        "freeze what is shown, or go on; nothing is missed meanwhile",
+    ),
     ("+ -", "a shorter or a longer time"),
     (
         "m",
-        "the fingertip's peaks of the last 0.1 s, or its volts now",
+        "the fingertip's peaks of the last 0.1 s, or its voltages now",
     ),
     (
         "Tab",
@@ -30,11 +33,11 @@ const LINES: [(&str, &str); 20] = [
     ("", ""),
     (
         "λ",
-        "the surface's wavelength, bold where the sensor stands by it",
+        "the surface's wavelength: bold while the sensor stands by it",
     ),
     (
         "range",
-        "T1: v kept its sign over the counting window, T2: it did not",
+        "T1: v kept its sign over the counting window; T2: it did not",
     ),
     (
         "paper's count",
@@ -43,24 +46,21 @@ const LINES: [(&str, &str); 20] = [
     ("LSB", "steps of the 12-bit converter, 3.3 V / 4096"),
     (
         "fingertip",
-        "what the firmware computes from motion and λ: the display",
+        "computed by the firmware's own code from motion and λ;",
     ),
     (
         "",
-        "does not send its voltages, and their phase is not known",
+        "the display does not send its voltages; their phase is not known",
     ),
     (
         "rtt, clock",
-        "round trip; the board's clock minus this computer's",
+        "round trip to the board; its clock minus this computer's",
     ),
     (
         "misses, by",
-        "what was not done in time; why the board started",
+        "samples or output ticks not done in time; why the board started",
     ),
-    (
-        "stray",
-        "frames from before both ends of a port knew each other",
-    ),
+    ("stray", "frames from before the two ends knew each other"),
     ("unread", "good frames that hold no message of this version"),
 ];
 
@@ -70,12 +70,12 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, theme: Theme) {
         .iter()
         .map(|(word, meaning)| {
             Line::from(vec![
-                Span::styled(format!(" {word:<15}"), theme.strong()),
+                Span::styled(format!(" {word:<14}"), theme.strong()),
                 Span::raw(*meaning),
             ])
         })
         .collect();
-    let place = middle(area, 80, lines.len() as u16 + 2);
+    let place = middle(area, 82, lines.len() as u16 + 2);
     frame.render_widget(Clear, place);
     let block = Block::new()
         .borders(Borders::ALL)

@@ -69,6 +69,6 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, fo
         .borders(Borders::ALL)
         .border_style(theme.quiet())
         .title(format!(" {} board ", form.role.name()))
-        .title_bottom(" ↑↓ choose  0-9 ←→ change  Enter send  Tab board  Esc ");
+        .title_bottom(" ↑↓ setting  0-9 ←→ value  Enter send  Tab other board  Esc close ");
     frame.render_widget(Paragraph::new(lines).block(block), place);
 }

@@ -16,7 +16,7 @@ use crate::monitor::words;
 /// An estimate that is older than this, in ms, is no more than a memory.
 const OLD_MS: u64 = 300;
 /// Parts of the bar of confidence.
-const BAR: usize = 18;
+const BAR: usize = 14;
 /// The trace shows λ within so much of it at least: noise is not to look like news.
 const LEAST_PART: f32 = 0.1;
 
@@ -97,12 +97,12 @@ fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
             word,
             faded(style.add_modifier(Modifier::BOLD), is_old, theme),
         ),
-        Span::styled("  range ", theme.quiet()),
+        Span::styled("   range ", theme.quiet()),
         Span::styled(
             words::range(estimate.range),
             faded(Style::new(), is_old, theme),
         ),
-        Span::styled("  contact ", theme.quiet()),
+        Span::styled("   contact ", theme.quiet()),
         Span::styled(
             words::contact(estimate.contact),
             faded(Style::new(), is_old, theme),
