@@ -57,7 +57,8 @@ enum Part {
     Display(Bridge),
     /// Carries on what bridges say, where neither site can be reached from the other
     Router(Router),
-    /// Says Stop to the boards; exit status 0 as soon as the display has it, 1 if nobody says so
+    /// Says Stop to the boards; exit status 0 as soon as the display's bridge has written it to its
+    /// board, 1 if nobody says so: whether the board has stopped is not asked
     Stop(Stopping),
 }
 
