@@ -26,7 +26,7 @@ pub mod stability;
 mod stepped;
 mod stribeck;
 
-pub use bristles::{BRISTLES_N_PER_M, BRISTLES_N_S_PER_M, Bristles};
+pub use bristles::{BRISTLES_DAMPING, BRISTLES_N_PER_M, Bristles};
 pub use integrator::Integrator;
 pub use slider::{DAMPING_N_S_PER_M, MASS_KG, STEP_SHARE, Slider};
 pub use spring::{Hanging, Spring};
@@ -66,10 +66,8 @@ impl Contact {
     /// set down, relaxed, at the first scan.
     pub fn new(contact: scene::Contact, stiffness_n_per_m: f64) -> Self {
         let spring = Spring { stiffness_n_per_m };
-        let bristles = |friction: Friction| Bristles {
-            friction: Stribeck::new(friction),
-            stiffness_n_per_m,
-        };
+        let bristles =
+            |friction: Friction| Bristles::new(Stribeck::new(friction), stiffness_n_per_m);
         let smallest = (Integrator::Radau, f64::INFINITY);
         let (integrator, step_s) = match (contact.rung, contact.solver) {
             (Rung::Reference, _) => smallest,
@@ -121,7 +119,7 @@ impl Contact {
             Self::Clinging(stepped) => {
                 stepped.follow(t_s, arm_m);
                 let stretch_m = stepped.stretch_m();
-                let force_n = stepped.system().stiffness_n_per_m * stretch_m;
+                let force_n = stepped.system().stiffness_n_per_m() * stretch_m;
                 (stretch_m, force_n, stepped.sticks())
             }
         };

@@ -68,10 +68,9 @@ impl Patch {
     /// Prepares a scene's surface. `second_harmonic` is relative to the fundamental. The strongest
     /// specimen's fundamental has amplitude 1.
     pub fn new(surface: &scene::Surface, second_harmonic: f64) -> Self {
-        let longest_mm = surface
-            .specimens
-            .iter()
-            .fold(0.0f64, |longest, specimen| longest.max(specimen.wavelength_mm));
+        let longest_mm = surface.specimens.iter().fold(0.0f64, |longest, specimen| {
+            longest.max(specimen.wavelength_mm)
+        });
         let strongest = felt_share(longest_mm);
         let counts = |wavelength_mm: f64, n: u32| {
             felt_share(wavelength_mm / f64::from(n)) >= NEGLIGIBLE * strongest
@@ -126,14 +125,14 @@ impl Patch {
                             let wavenumber = TAU * f64::from(n) / specimen.wavelength_mm;
                             let weights: &Vec<(f64, f32)> = &gauges[gauge];
                             let (real, imaginary) = gain(
-                                weights.iter().map(|&(s, w)| (s, f64::from(w))).collect::<Vec<_>>().as_slice(),
+                                weights
+                                    .iter()
+                                    .map(|&(s, w)| (s, f64::from(w)))
+                                    .collect::<Vec<_>>()
+                                    .as_slice(),
                                 wavenumber,
                             );
-                            (
-                                n,
-                                amplitude * real.hypot(imaginary),
-                                imaginary.atan2(real),
-                            )
+                            (n, amplitude * real.hypot(imaginary), imaginary.atan2(real))
                         })
                         .collect();
                     period_of(&waves)
@@ -148,7 +147,6 @@ impl Patch {
             is_periodic: !matches!(surface.profile, Profile::Recorded(_)),
         }
     }
-
 }
 
 impl Texture for Patch {

@@ -110,14 +110,18 @@ pub fn longest_slipping_s(
     stiffness_n_per_m: f64,
     arm_m_s: f64,
 ) -> f64 {
-    let bristles = Bristles {
-        friction,
-        stiffness_n_per_m,
-    };
-    let rest = Linear::around(&bristles, [0.0; 3], 0.0);
-    let velocity_m_s = fastest_slip_m_s(friction, stiffness_n_per_m, arm_m_s);
-    let bend_m = friction.sliding_n(velocity_m_s) / super::bristles::BRISTLES_N_PER_M;
-    let slip = Linear::around(&bristles, [0.0, velocity_m_s, bend_m], velocity_m_s);
+    let fastest_m_s = fastest_slip_m_s(friction, stiffness_n_per_m, arm_m_s);
+    longest_clinging_s(
+        integrator,
+        &Bristles::new(friction, stiffness_n_per_m),
+        fastest_m_s,
+    )
+}
+
+/// The same of any bristles, that slip at up to `fastest_m_s`.
+pub fn longest_clinging_s(integrator: Integrator, bristles: &Bristles, fastest_m_s: f64) -> f64 {
+    let rest = Linear::around(bristles, [0.0; 3], 0.0);
+    let slip = Linear::around(bristles, bristles.sliding(fastest_m_s), fastest_m_s);
     longest_of(integrator, &rest).min(longest_of(integrator, &slip))
 }
 
@@ -130,16 +134,17 @@ pub fn fastest_slip_m_s(friction: Stribeck, stiffness_n_per_m: f64, arm_m_s: f64
 
 #[cfg(test)]
 mod tests {
-    use super::super::bristles::{BRISTLES_N_PER_M, BRISTLES_N_S_PER_M};
+    use super::super::bristles::{BRISTLES_DAMPING, BRISTLES_N_PER_M};
     use super::super::slider::DAMPING_N_S_PER_M;
     use super::*;
     use crate::scene::Friction;
 
     /// Frequency and half of the damping rate, in rad/s, of the fingertip that sticks.
     fn stuck(stiffness_n_per_m: f64) -> (f64, f64) {
+        let bristles_n_s_per_m = 2.0 * BRISTLES_DAMPING * (BRISTLES_N_PER_M * MASS_KG).sqrt();
         (
             ((stiffness_n_per_m + BRISTLES_N_PER_M) / MASS_KG).sqrt(),
-            (DAMPING_N_S_PER_M + BRISTLES_N_S_PER_M) / (2.0 * MASS_KG),
+            (DAMPING_N_S_PER_M + bristles_n_s_per_m) / (2.0 * MASS_KG),
         )
     }
 
@@ -215,8 +220,7 @@ mod tests {
             // At rest even by a crawling arm's slip: z decays at σ0 |v| / g.
             let slip_m_s = fastest_slip_m_s(friction, stiffness_n_per_m, 0.0);
             let slip_s = 2.0 * friction.sliding_n(slip_m_s) / (BRISTLES_N_PER_M * slip_m_s);
-            let found_s =
-                longest_slipping_s(Integrator::Euler, friction, stiffness_n_per_m, 0.0);
+            let found_s = longest_slipping_s(Integrator::Euler, friction, stiffness_n_per_m, 0.0);
             let due_s = rest_s.min(slip_s);
             // In a slip the mass takes part a little.
             assert!(

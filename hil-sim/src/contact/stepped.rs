@@ -66,7 +66,9 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
         let step_s = time_s / steps;
         for step in 0..steps as u64 {
             let before_m_s = state[S::VELOCITY].abs();
-            state = self.integrator.advance(&self.system, state, step_s, arm_m_s);
+            state = self
+                .integrator
+                .advance(&self.system, state, step_s, arm_m_s);
             let after_m_s = state[S::VELOCITY].abs();
             let rests = after_m_s < CREEP_M_S;
             if rests != (before_m_s < CREEP_M_S) {

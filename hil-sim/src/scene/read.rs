@@ -14,8 +14,8 @@ use super::contact::{self, Scenery};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link,
-    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link, Motion, Profile,
+    Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use super::{display, fault};
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
@@ -38,7 +38,6 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
             &Scenery {
                 surface: &surface,
                 motion: &motion,
-                gauges: &gauges,
                 stiffness_n_per_m: force.stiffness_n_per_m,
                 duration_s,
             },
