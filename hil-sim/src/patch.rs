@@ -295,6 +295,8 @@ mod tests {
         };
         let sharp = bend(&|x_mm| f64::from(point.feel(x_mm, advance(2))));
         let soft = bend(&|x_mm| f64::from(patch.felt_by(2, x_mm)));
-        assert!(soft < 0.1 * sharp, "{soft}, {sharp}");
+        // A kink of slope is drawn out over the depth, 0.4 mm, where 20 µm were looked at; half of the
+        // kernel's weight lies within a third of it.
+        assert!(soft < 0.15 * sharp, "{soft}, {sharp}");
     }
 }
