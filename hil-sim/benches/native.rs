@@ -4,9 +4,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hil_sim::native;
-use hil_sim::scene::{
-    Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene,
-};
+use hil_sim::scene::{Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene};
 use protocol::Method;
 
 const VIRTUAL_S: u64 = 10;
