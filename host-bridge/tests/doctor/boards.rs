@@ -6,7 +6,7 @@ use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::state::State;
 use protocol::{DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, Trip};
 
-use crate::bench::{display_counters, display_spoiled, one, peer, sensor_spoiled, spoiled};
+use crate::bench::{display_counters, display_spoiled, hello, one, peer, sensor_spoiled, spoiled};
 
 #[test]
 fn boards_of_another_version_are_named_by_what_differs() {

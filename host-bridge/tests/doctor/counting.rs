@@ -1,7 +1,7 @@
 //! Counters that count what should not be.
 
 use host_bridge::doctor::counters;
-use protocol::{DisplayCounters, DisplayState, Hello, PortCounters, RoleCounters, SensorCounters};
+use protocol::{DisplayCounters, DisplayState, PortCounters, RoleCounters, SensorCounters};
 
 use crate::bench::{display_counters, display_spoiled, one, sensor_counters, sensor_spoiled};
 
