@@ -202,14 +202,7 @@ pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
     let keys = [
         ("s", "stop"),
         ("c", "configure"),
-        (
-            "r",
-            if view.kept.is_some() {
-                "end recording"
-            } else {
-                "record"
-            },
-        ),
+        ("r", if view.kept.is_some() { "end" } else { "record" }),
         ("g", "gauges"),
         ("f", if view.is_frozen { "go on" } else { "freeze" }),
         ("+-", "time"),

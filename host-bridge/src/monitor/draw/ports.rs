@@ -43,7 +43,7 @@ const COLUMNS: [Column; 13] = [
     column("stray", false, |port| port.unheralded),
     column("foreign", true, |port| port.foreign),
     column("unread", true, |port| port.malformed),
-    column("overlong", true, |port| port.overlong),
+    column("long", true, |port| port.overlong),
 ];
 
 /// Rows of the table with its heading.

@@ -179,7 +179,7 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
         Span::styled("   ━ ", theme.sensor()),
         Span::styled("valid  ┅ unsure", theme.quiet()),
         Span::styled("  ┅ ", theme.warning()),
-        Span::styled("paper's count", theme.quiet()),
+        Span::styled("paper's", theme.quiet()),
     ]);
     text::panel(frame, area, theme, title);
     let all = series.each_ref().map(|series| series.trace);

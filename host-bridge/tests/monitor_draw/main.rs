@@ -1,5 +1,7 @@
 //! The monitor's dashboard as it is drawn, at fixed inputs.
 
+mod sizes;
+
 use host_bridge::link::{Clocks, Event};
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::draw::draw;
