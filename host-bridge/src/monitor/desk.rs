@@ -169,11 +169,11 @@ impl Desk {
                 self.keeping = Some(keeping);
                 self.ask();
                 let gauges = if self.dashboard.sensor.is_known() {
-                    "the sensor board is told to stream its gauges for as long"
+                    "the sensor board is told to stream its gauges for as long as is recorded"
                 } else {
-                    "no gauges before the sensor board is there"
+                    "no gauges are recorded before the sensor board is there"
                 };
-                self.dashboard.notify(false, format!("recording; {gauges}"));
+                self.dashboard.notify(false, gauges.to_owned());
             }
             Err(error) => self
                 .dashboard
