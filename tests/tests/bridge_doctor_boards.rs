@@ -177,11 +177,16 @@ fn a_wrong_baud_rate_is_garbage_and_named(bench: &Bench) {
         .expect("the port is there");
     // Not by stty, which does not know a rate without a name of its own.
     let rate = || tcgetattr(&port).expect("a terminal").output_speed();
+    let set_rate = |rate| {
+        let mut settings = tcgetattr(&port).expect("a terminal");
+        settings.set_speed(rate).expect("a rate");
+        tcsetattr(&port, OptionalActions::Now, &settings).expect("a terminal");
+    };
+    // The doctor before has left its own.
+    set_rate(38_400);
     let doctor = start(bench);
     assert!(wait_until(LIMIT, || rate() == BAUD));
-    let mut settings = tcgetattr(&port).expect("a terminal");
-    settings.set_speed(115_200).expect("a rate");
-    tcsetattr(&port, OptionalActions::Now, &settings).expect("a terminal");
+    set_rate(115_200);
     let end_of_garbling = Instant::now() + GARBLED;
     assert!(wait_until(LIMIT, || Instant::now() >= end_of_garbling));
     let document = document(&end(doctor));

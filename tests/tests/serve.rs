@@ -237,7 +237,7 @@ fn is_stopped(state: DisplayState) -> bool {
 fn a_scene_s_faults_come_at_their_time() {
     let alone = bench("faults", |options| {
         steady(options);
-        options.scene.faults = vec![Fault::new(Kind::EmergencyStop, 3.0)];
+        options.scene.faults = vec![Fault::new(Kind::EmergencyStop, 1.5)];
     });
     let bench = &alone.bench;
     let mut display = Client::open(&bench.path(PortName::DisplayConsole), BAUD);
@@ -245,7 +245,7 @@ fn a_scene_s_faults_come_at_their_time() {
         Message::Safety(safety) => is_stopped(safety.state).then_some(()),
         _ => None,
     });
-    assert!(bench.now_s() >= 3.0);
+    assert!(bench.now_s() >= 1.5);
 }
 
 fn the_emergency_stop_stops_and_a_reset_brings_the_board_and_its_log_back(bench: &Bench) {
