@@ -319,12 +319,9 @@ impl Shared {
                 };
                 self.say(Channel::Clock, Content::Pong { to, pong });
             }
-            Heard::Answered {
-                sent_us,
-                round_trip_us,
-            } => {
+            Heard::Answered(answer) => {
                 drop(inward);
-                locked(&self.outward).on_answer(sent_us, round_trip_us);
+                locked(&self.outward).on_answer(answer);
             }
             Heard::Stop(id, stop) => {
                 drop(inward);

@@ -61,8 +61,8 @@ impl Keeper {
 
     fn ping(&mut self, at_us: u64) {
         locked(&self.shared.inward).elapse(at_us, |notice| self.shared.tell(notice));
-        let takes_more = locked(&self.shared.outward).flow().takes_more(at_us);
-        if takes_more || is_due(self.pinged_us, KNOCK_US, at_us) {
+        let is_answered = locked(&self.shared.outward).flow().is_answered(at_us);
+        if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
             let ping = Ping { sent_us: now_us() };
             self.shared.say(Channel::Clock, Content::Ping(ping));
