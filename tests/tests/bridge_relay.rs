@@ -6,6 +6,7 @@ use std::os::unix::fs::symlink;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use host_bridge::relay::flow::LATE_SPACING_US;
 use protocol::{Message, Role, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -59,6 +60,10 @@ fn assert_rising(heard: &[Message]) {
     for pair in numbers.windows(2) {
         assert!(pair[0] < pair[1], "{} after {}", pair[1], pair[0]);
     }
+}
+
+fn is_stop(message: &Message) -> bool {
+    matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator)
 }
 
 /// The last report that a bridge printed.
@@ -152,17 +157,20 @@ fn a_network_slower_than_anything_may_be_is_named_and_nothing_is_played() {
 
 #[test]
 fn what_was_held_up_too_long_is_never_played() {
+    const MAX_AGE_MS: u64 = 150;
+    const STILL_MS: u64 = 1_000;
+    const TIMES: u64 = 3;
     let sensor = talking_board(Role::Sensor);
     let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &["--max-age", "150"]);
+    let pair = Pair::new(&sensor, &display, &["--max-age", &MAX_AGE_MS.to_string()]);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
-    for _ in 0..3 {
+    for _ in 0..TIMES {
         pair.weather.hold_still(true);
         // So long that the silence is noticed and what was on its way is old.
         let still = Instant::now();
         let silent = || {
             motions.extend(sensor.take_heard());
-            still.elapsed() >= Duration::from_millis(1_000)
+            still.elapsed() >= Duration::from_millis(STILL_MS)
         };
         wait_until(LIMIT, silent);
         let newest_held = sequences(&motions).last().copied().unwrap_or(0);
@@ -182,7 +190,12 @@ fn what_was_held_up_too_long_is_never_played() {
     println!("ended after {:?}", asked.elapsed());
     assert_eq!(status.code(), Some(0), "{words}");
     let report = last_report(&lines);
-    assert!(report["incoming"]["stale"].as_u64() >= Some(1), "{report}");
+    // While answers are late, a message goes into the network that stands still every so often. All of
+    // them come, but for the last 150 ms too old; a loaded machine says half as many.
+    let said = TIMES * (STILL_MS - MAX_AGE_MS) * 1_000 / LATE_SPACING_US;
+    let stale = report["incoming"]["stale"].as_u64();
+    println!("{stale:?} too old, {said} said");
+    assert!(stale >= Some(said / 2), "{said} said: {report}");
 }
 
 #[test]
@@ -294,8 +307,7 @@ fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
 }
 
 #[test]
-fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_board() {
-    let is_stop = |message: &Message| matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator);
+fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
     let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
     let pair = Pair::new(&sensor, &display, &[]);
     listen(&sensor, LIMIT, at_least(10));
@@ -303,9 +315,17 @@ fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_b
     pair.sensor.signal(Signal::USR1);
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
     listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
-    pair.sensor
-        .says("Stop: with the board at the display's site", LIMIT);
+    pair.sensor.says(
+        "Stop: the board at the display's site has stopped: by the operator",
+        LIMIT,
+    );
     pair.display.says("Stop, said by the sensor's site", LIMIT);
+    pair.display
+        .says("Stop: the board here has stopped: by the operator", LIMIT);
+
+    pair.display.signal(Signal::USR1);
+    pair.display
+        .says("Stop: with the board at the sensor's site", LIMIT);
 
     // Said while the network is away, it comes when it is back.
     pair.weather.cut(true);
@@ -314,17 +334,59 @@ fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_b
     pair.sensor.signal(Signal::USR1);
     pair.weather.cut(false);
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+}
 
+#[test]
+fn relay_stop_ends_well_only_when_the_display_itself_says_that_it_has_stopped() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &[]);
+    listen(&sensor, LIMIT, at_least(10));
     let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
-    display.take_heard();
-    let (status, _, words) = Relay::start(["stop", "--connect", &at]).wait(LIMIT);
-    assert_eq!(status.code(), Some(0), "{words}");
-    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    let stop = |more: &[&str]| {
+        Relay::start(
+            ["stop", "--connect", &at]
+                .into_iter()
+                .chain(more.iter().copied()),
+        )
+    };
+    let fails = |stop: Relay, what: &str| {
+        let (status, _, words) = stop.wait(LIMIT);
+        assert_eq!(status.code(), Some(1), "{words}");
+        for part in [
+            "NOT STOPPED",
+            what,
+            "press the emergency stop, or cut the display's power",
+        ] {
+            assert!(words.contains(part), "{words}");
+        }
+    };
 
-    let other = ["stop", "--connect", &at, "--name", "other", "--within", "1"];
-    let (status, _, words) = Relay::start(other).wait(LIMIT);
-    assert_eq!(status.code(), Some(1), "{words}");
-    assert!(words.contains("press the emergency stop"), "{words}");
+    // Its bridge has written it, and yet the display goes on.
+    display.disobey(true);
+    let short = ["--within", "1"];
+    fails(stop(&short), "does not say that it has stopped");
+    let told = display.take_heard().into_iter().filter(is_stop).count();
+    assert!(
+        told > 1,
+        "a line may garble what is said: told {told} times"
+    );
+
+    // It is told until it obeys.
+    let stopping = stop(&[]);
+    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    display.disobey(false);
+    let (status, _, words) = stopping.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+    assert!(
+        words.contains("the display has stopped: by the operator"),
+        "{words}"
+    );
+
+    let other = ["--name", "other", "--within", "1"];
+    fails(stop(&other), "no word from the display's bridge");
+    drop(display);
+    pair.display.says("not there", LIMIT);
+    fails(stop(&short), "its board is not there");
 }
 
 #[test]

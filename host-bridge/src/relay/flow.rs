@@ -15,7 +15,7 @@ const REPAIR_ROUND_TRIPS: u64 = 2;
 const SLACK_US: u64 = 80_000;
 /// Between two messages at least while answers are late, in µs: little that grows old, and yet more than
 /// enough for TCP to notice a loss by.
-const LATE_SPACING_US: u64 = 10_000;
+pub const LATE_SPACING_US: u64 = 10_000;
 /// How late an answer may be before nothing more is sent, in µs.
 const PATIENCE_US: u64 = 2_000_000;
 /// How long ago the newest ping that was answered may have been sent, in µs: more is no telepresence.

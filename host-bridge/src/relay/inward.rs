@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::{Ping, Pong, Role, Stop};
+use protocol::{Ping, Pong, Role, Stop, Trip};
 
 use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, saying};
@@ -30,8 +30,8 @@ pub enum Heard {
     Answered(Answer),
     /// The board is to be told, and then the sender.
     Stop(u64, Stop),
-    /// The Stop of this number is with the other site's board.
-    Stopped(u64),
+    /// The Stop of this number is done at the other site: see [`Content::Stopped`].
+    Stopped(u64, Option<Trip>),
 }
 
 /// The inward direction of a bridge.
@@ -106,7 +106,9 @@ impl Inward {
                 }
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
-            Content::Stopped { id } => Heard::Stopped(id),
+            Content::Stopped { id, trip } => Heard::Stopped(id, trip),
+            // It is said again, until it is done.
+            Content::Stopping { .. } => Heard::Nothing,
         }
     }
 
