@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use host_bridge::relay::flow::LATE_SPACING_US;
+use host_bridge::relay::network::LEASE;
 use protocol::{Message, Role, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -62,6 +63,10 @@ fn assert_rising(heard: &[Message]) {
     }
 }
 
+fn is_motion(message: &Message) -> bool {
+    matches!(message, Message::Motion(_))
+}
+
 fn is_stop(message: &Message) -> bool {
     matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator)
 }
@@ -81,7 +86,6 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
     let estimates = listen(&display, LIMIT, at_least(200));
     assert_rising(&motions);
     assert_rising(&estimates);
-    let is_motion = |message: &Message| matches!(message, Message::Motion(_));
     let is_estimate = |message: &Message| matches!(message, Message::Estimate(_));
     let is_housekeeping =
         |message: &Message| matches!(message, Message::Ping(_) | Message::Pong(_));
@@ -221,6 +225,40 @@ fn a_router_that_is_killed_and_started_again_brings_the_stream_back() {
         motions.extend(listen(&sensor, LIMIT, at_least(100)));
         listen(&display, LIMIT, at_least(10));
     }
+    assert_rising(&motions);
+}
+
+#[test]
+fn a_site_whose_address_changes_is_back_within_some_seconds() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let pair = Pair::new(&sensor, &display, &[]);
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    listen(&display, LIMIT, at_least(20));
+    let before = pair.weather.connections();
+    pair.weather.strand();
+    let changed = Instant::now();
+    // Nothing tells either end. What is on the way when this is asked has come from before.
+    for bridge in [&pair.sensor, &pair.display] {
+        bridge.says("silent", LIMIT);
+    }
+    motions.extend(sensor.take_heard());
+    display.take_heard();
+    let (mut of_sensor, mut of_display) = (false, false);
+    let both = || {
+        let heard = sensor.take_heard();
+        of_sensor |= heard.iter().any(is_motion);
+        motions.extend(heard);
+        of_display |= !sequences(&display.take_heard()).is_empty();
+        of_sensor && of_display
+    };
+    assert!(wait_until(LIMIT, both));
+    println!("back {:?} after the change", changed.elapsed());
+    // The connection is given up when it was silent for so long; then a new one is made.
+    let most = LEASE + Duration::from_secs(2);
+    assert!(changed.elapsed() < most, "{:?}", changed.elapsed());
+    assert!(pair.weather.connections() > before);
+    motions.extend(listen(&sensor, LIMIT, at_least(100)));
     assert_rising(&motions);
 }
 
