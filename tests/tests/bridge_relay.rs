@@ -95,23 +95,32 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
             .iter()
             .all(|m| is_estimate(m) || is_housekeeping(m))
     );
-    let numbers = sequences(&motions);
-    let missing = (numbers[numbers.len() - 1] - numbers[0]) as usize + 1 - numbers.len();
-    assert!(
-        missing < numbers.len() / 20,
-        "{missing} of {} missing",
-        numbers.len()
-    );
 
     for bridge in [&pair.sensor, &pair.display] {
         bridge.signal(Signal::INT);
     }
+    let (_, lines, _) = pair.sensor.wait(LIMIT);
+    let incoming = last_report(&lines)["incoming"].clone();
     let (status, lines, words) = pair.display.wait(LIMIT);
     assert_eq!(status.code(), Some(0), "{words}");
     let report = last_report(&lines);
     assert_eq!(report["total"], true);
     assert_eq!(report["site"], "display");
     assert_eq!(report["incoming"]["lost"], 0);
+    // A busy machine brings two at once, of which one is replaced, but none goes without being counted.
+    let numbers = sequences(&motions);
+    let missing = u64::from(numbers[numbers.len() - 1] - numbers[0]) + 1 - numbers.len() as u64;
+    let reasons = ["replaced", "stale", "stuck", "undated", "boardless"];
+    let counts = reasons.map(|reason| incoming[reason].as_u64());
+    let counted = counts
+        .into_iter()
+        .chain([report["outgoing"]["held"].as_u64()])
+        .sum::<Option<u64>>();
+    assert!(
+        Some(missing) <= counted,
+        "{missing} missing: {incoming}, {report}"
+    );
+    assert!(missing < numbers.len() as u64 / 2, "{missing} missing");
     assert!(
         report["incoming"]["passed"].as_u64() >= Some(200),
         "{report}"
