@@ -13,10 +13,13 @@ use crate::fault::Fault;
 use crate::motion::LiveHand;
 
 mod bounds;
+mod csv_rows;
 mod display;
 mod error;
 mod fault;
+mod place;
 mod read;
+mod recorded;
 mod series;
 mod table;
 #[cfg(test)]
@@ -24,6 +27,7 @@ mod tests;
 
 pub use display::Display;
 pub use error::SceneError;
+pub use place::line_of;
 pub use series::Series;
 
 /// Everything that decides a run. Two runs of equal scenes are equal, byte for byte.
