@@ -117,10 +117,7 @@ mod tests {
         let report = Report::deserialize_from_str(&text).unwrap();
         let suite = &report.test_suites[0];
         assert_eq!(suite.name.as_str(), "hil-sim native");
-        assert_eq!(
-            (suite.tests, suite.failures, suite.errors),
-            (4, 1, 1)
-        );
+        assert_eq!((suite.tests, suite.failures, suite.errors), (4, 1, 1));
         assert!(text.contains("skipped=\"1\""), "{text}");
         assert!(text.contains("time=\"0.250\""), "{text}");
         assert!(text.contains("0000000000000abc"), "{text}");

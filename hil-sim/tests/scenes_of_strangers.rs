@@ -18,9 +18,11 @@ const RUNS: u64 = 500;
 const RUN_S: f64 = 0.3;
 
 type Draws = Xoshiro256PlusPlus;
+/// The keys of a section, each with what may stand behind it.
+type Keys = &'static [(&'static str, &'static [&'static str])];
 
-/// A section's keys: what may stand behind each, `A..B` being a number from A to B and `A...B` a whole one.
-const GRAMMAR: &[(&str, &[(&str, &[&str])])] = &[
+/// The sections; of what may stand behind a key, `A..B` is a number from A to B and `A...B` a whole one.
+const GRAMMAR: &[(&str, Keys)] = &[
     (
         "",
         &[
@@ -71,16 +73,37 @@ const GRAMMAR: &[(&str, &[(&str, &[&str])])] = &[
     (
         "contact",
         &[
-            ("model", &["\"auto\"", "\"kinematic\"", "\"stick-slip\"", "\"rigid\""]),
-            ("friction", &["\"none\"", "\"mild\"", "\"strong\"", "\"severe\""]),
+            (
+                "model",
+                &["\"auto\"", "\"kinematic\"", "\"stick-slip\"", "\"rigid\""],
+            ),
+            (
+                "friction",
+                &["\"none\"", "\"mild\"", "\"strong\"", "\"severe\""],
+            ),
         ],
     ),
     (
         "gauges",
         &[
             ("kind", &["\"kinematic\"", "\"recorded\""]),
-            ("file", &["\"volts.csv\"", "\"tone.wav\"", "\"broken.wav\"", "\"broken.mcap\""]),
-            ("channels", &["[0, 0, 0, 0, 0]", "[\"g0\", \"g1\", \"g2\", \"g3\", \"g4\"]", "[0]"]),
+            (
+                "file",
+                &[
+                    "\"volts.csv\"",
+                    "\"tone.wav\"",
+                    "\"broken.wav\"",
+                    "\"broken.mcap\"",
+                ],
+            ),
+            (
+                "channels",
+                &[
+                    "[0, 0, 0, 0, 0]",
+                    "[\"g0\", \"g1\", \"g2\", \"g3\", \"g4\"]",
+                    "[0]",
+                ],
+            ),
             ("start_s", &["0..0.1"]),
             ("volts_per_unit", &["0.1..1"]),
             ("offset_v", &["1.65"]),
@@ -118,7 +141,16 @@ const GRAMMAR: &[(&str, &[(&str, &[&str])])] = &[
     (
         "estimator",
         &[
-            ("method", &["\"default\"", "\"counting\"", "\"crossings\"", "\"bank\"", "\"counting-adapted\""]),
+            (
+                "method",
+                &[
+                    "\"default\"",
+                    "\"counting\"",
+                    "\"crossings\"",
+                    "\"bank\"",
+                    "\"counting-adapted\"",
+                ],
+            ),
             ("window_ms", &["10...200"]),
             ("counted_gauge", &["0...4"]),
             ("gauges", &["[0]", "[0, 1, 2, 3, 4]", "[]"]),
@@ -161,9 +193,31 @@ const GRAMMAR: &[(&str, &[(&str, &[&str])])] = &[
 
 /// What stands where something else should.
 const WRONG: &[&str] = &[
-    "-1", "0", "1e999", "-1e308", "nan", "inf", "-inf", "1e-320", "9223372036854775807", "0x7f", "\"\"", "\"x\"",
-    "true", "[]", "[[]]", "{}", "{ a = 1 }", "1979-05-27", "[\"a\", 1]", "\"\\u0000\"", "'λ'", "\"../../\"", "[-1]",
-    "[99999999999]", "",
+    "-1",
+    "0",
+    "1e999",
+    "-1e308",
+    "nan",
+    "inf",
+    "-inf",
+    "1e-320",
+    "9223372036854775807",
+    "0x7f",
+    "\"\"",
+    "\"x\"",
+    "true",
+    "[]",
+    "[[]]",
+    "{}",
+    "{ a = 1 }",
+    "1979-05-27",
+    "[\"a\", 1]",
+    "\"\\u0000\"",
+    "'λ'",
+    "\"../../\"",
+    "[-1]",
+    "[99999999999]",
+    "",
 ];
 
 fn number(draws: &mut Draws, form: &str) -> String {
@@ -206,7 +260,9 @@ fn scene(draws: &mut Draws) -> Vec<String> {
         }
     }
     for _ in 0..draws.random_range(0..3) {
-        let kind = Kind::all().nth(draws.random_range(0..Kind::all().count())).unwrap();
+        let kind = Kind::all()
+            .nth(draws.random_range(0..Kind::all().count()))
+            .unwrap();
         lines.push("[[fault]]".to_owned());
         lines.push(format!("kind = \"{}\"", kind.name()));
         lines.push(format!("at_s = {}", number(draws, "0..0.3")));
@@ -215,7 +271,11 @@ fn scene(draws: &mut Draws) -> Vec<String> {
         }
         for key in kind.row().keys {
             if draws.random_bool(0.5) {
-                lines.push(format!("{} = {}", key.name, number(draws, &format!("{}..{}", key.low, key.high))));
+                lines.push(format!(
+                    "{} = {}",
+                    key.name,
+                    number(draws, &format!("{}..{}", key.low, key.high))
+                ));
             }
         }
     }
@@ -239,7 +299,12 @@ fn spoil(draws: &mut Draws, lines: &mut Vec<String>) {
         6 => {
             let mut letters: Vec<char> = lines[at].chars().collect();
             let place = draws.random_range(0..=letters.len());
-            letters.insert(place, *['"', '[', ']', '=', '#', '\u{0}', 'é', '\\', '9', '\r'].choose(draws).unwrap());
+            letters.insert(
+                place,
+                *['"', '[', ']', '=', '#', '\u{0}', 'é', '\\', '9', '\r']
+                    .choose(draws)
+                    .unwrap(),
+            );
             lines[at] = letters.into_iter().collect();
         }
         _ => {
@@ -257,15 +322,29 @@ fn folder() -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("strangers");
     fs::create_dir_all(&folder).unwrap();
     let rows = |header: &str, row: &dyn Fn(f64) -> String| {
-        (0..=1_200).fold(format!("{header}\n"), |text, ms| text + &row(f64::from(ms) / 1e3))
+        (0..=1_200).fold(format!("{header}\n"), |text, ms| {
+            text + &row(f64::from(ms) / 1e3)
+        })
     };
-    let volts = rows("t_s,g0,g1,g2,g3,g4", &|t_s| format!("{t_s},1,{},1.2,1.65,2\n", 1.0 + t_s));
+    let volts = rows("t_s,g0,g1,g2,g3,g4", &|t_s| {
+        format!("{t_s},1,{},1.2,1.65,2\n", 1.0 + t_s)
+    });
     fs::write(folder.join("volts.csv"), volts).unwrap();
-    fs::write(folder.join("hand.csv"), rows("t_s,x_mm", &|t_s| format!("{t_s},{}\n", 40.0 * t_s))).unwrap();
-    let heights = rows("x_mm,height", &|s| format!("{},{}\n", 200.0 * s - 100.0, (300.0 * s).sin()));
+    fs::write(
+        folder.join("hand.csv"),
+        rows("t_s,x_mm", &|t_s| format!("{t_s},{}\n", 40.0 * t_s)),
+    )
+    .unwrap();
+    let heights = rows("x_mm,height", &|s| {
+        format!("{},{}\n", 200.0 * s - 100.0, (300.0 * s).sin())
+    });
     fs::write(folder.join("heights.csv"), heights).unwrap();
     fs::write(folder.join("broken.wav"), b"RIFF\x24\0\0\0WAVEfmt \x10\0").unwrap();
-    fs::write(folder.join("broken.mcap"), b"\x89MCAP0\r\n\x01\xff\xff\xff\xff\xff\xff\xff\x7f").unwrap();
+    fs::write(
+        folder.join("broken.mcap"),
+        b"\x89MCAP0\r\n\x01\xff\xff\xff\xff\xff\xff\xff\x7f",
+    )
+    .unwrap();
     let spec = hound::WavSpec {
         channels: 1,
         sample_rate: 8_000,
@@ -274,7 +353,8 @@ fn folder() -> PathBuf {
     };
     let mut wav = hound::WavWriter::create(folder.join("tone.wav"), spec).unwrap();
     for sample in 0..9_600 {
-        wav.write_sample((8_000.0 * (f64::from(sample) / 50.0).sin()) as i16).unwrap();
+        wav.write_sample((8_000.0 * (f64::from(sample) / 50.0).sin()) as i16)
+            .unwrap();
     }
     wav.finalize().unwrap();
     folder
@@ -297,7 +377,10 @@ fn check(refusal: &SceneError, path: &Path, text: &str) {
     let with_key = lines.iter().filter(|line| line.contains(last)).count();
     // The key stands in that line; or it is missing, or in several sections, or the text is no TOML.
     assert!(
-        last.is_empty() || lines[line - 1].contains(last) || with_key != 1 || text.contains(&format!("[{last}]")),
+        last.is_empty()
+            || lines[line - 1].contains(last)
+            || with_key != 1
+            || text.contains(&format!("[{last}]")),
         "{told}"
     );
 }
@@ -337,8 +420,14 @@ fn scenes_of_strangers_run_or_are_refused_with_file_line_and_key() {
         let recording = native::run(&scene).unwrap();
         let outcome = Outcome::new(scene, recording);
         let numbers = format!("{:?}", outcome.verdict);
-        assert!(!numbers.contains("NaN") && !numbers.contains("inf"), "{text}\n{numbers}");
+        assert!(
+            !numbers.contains("NaN") && !numbers.contains("inf"),
+            "{text}\n{numbers}"
+        );
     }
     // Both ways are tried, and the sound ones are not all refused.
-    assert!(loaded > SCENES / 20 && run == RUNS && refused > SCENES / 4 && sound > 0, "{loaded} loaded, {run} run, {refused} refused, {sound} not spoiled");
+    assert!(
+        loaded > SCENES / 20 && run == RUNS && refused > SCENES / 4 && sound > 0,
+        "{loaded} loaded, {run} run, {refused} refused, {sound} not spoiled"
+    );
 }

@@ -5,11 +5,11 @@ use super::resampler::{Ratio, resample};
 
 /// Rows may lie so far beside an even raster, in its steps, and be evenly spaced all the same: their times
 /// were rounded when they were written.
-const ROUNDED: f64 = 0.5;
+const ROUNDED: f64 = 0.25;
 /// Rows this close to a wanted point, in steps of the wanted raster, are there: 2.5 µs of the ADC's.
 const THERE: f64 = 0.01;
 /// What a raster that is only nearly the wanted one may be off at the end of a recording, in steps.
-const DRIFT: f64 = 0.01;
+const DRIFT: f64 = 0.001;
 /// If the recording's raster lies beside the wanted one, points are taken on the straight line between two of a
 /// raster that is so much denser: at 500 Hz that is 0.03 % off at most.
 const DENSER: usize = 16;

@@ -27,25 +27,31 @@ pub struct Ratio {
 
 impl Ratio {
     /// The simplest ratio within `tolerance`, relative, of `input_per_output` (above 0), by continued
-    /// fractions; none if there is no such ratio of numbers up to 100 000.
+    /// fractions, or else the best of numbers up to 100 000; none if there is no such ratio at all.
     pub fn near(input_per_output: f64, tolerance: f64) -> Option<Self> {
         let (mut before, mut last) = ((0.0, 1.0), (1.0, 0.0));
         let mut rest = input_per_output;
         loop {
             let whole = rest.floor();
             let next: (f64, f64) = (whole * last.0 + before.0, whole * last.1 + before.1);
-            if next.0.max(next.1) > LARGEST {
-                return None;
+            let within = next.0 <= LARGEST && next.1 <= LARGEST;
+            // Once there is no rest, they are no numbers.
+            if !within {
+                return Self::of(last);
             }
             if (next.0 / next.1 - input_per_output).abs() <= tolerance * input_per_output {
-                return (next.0 >= 1.0).then_some(Self {
-                    input: next.0 as usize,
-                    output: next.1 as usize,
-                });
+                return Self::of(next);
             }
             (before, last) = (last, next);
             rest = (rest - whole).recip();
         }
+    }
+
+    fn of((input, output): (f64, f64)) -> Option<Self> {
+        (input >= 1.0 && output >= 1.0).then_some(Self {
+            input: input as usize,
+            output: output as usize,
+        })
     }
 }
 
@@ -116,20 +122,25 @@ mod tests {
         let root = Ratio::near(2f64.sqrt(), 1e-9).unwrap();
         let off = root.input as f64 / root.output as f64 / 2f64.sqrt() - 1.0;
         assert!(off.abs() <= 1e-9, "{root:?}: {off}");
+        // Beyond the tolerance, the best that there is.
+        let best = Ratio::near(44_117.3 / 4_000.0, 1e-15).unwrap();
+        let off = best.input as f64 / best.output as f64 * 4_000.0 / 44_117.3 - 1.0;
+        assert!(off.abs() < 1e-8, "{best:?}: {off}");
         assert_eq!(Ratio::near(1e7, 1e-9), None);
+        assert_eq!(Ratio::near(1e-7, 1e-9), None);
     }
 
-    /// A tone of 1 at `tone_hz`, recorded for 2 s at `input_hz`, at 4 kHz: what is left of it beside a
-    /// tone of the same phase, and the largest difference from that, in the middle second.
+    /// A tone of 1 at `tone_hz`, recorded for 8 s at `input_hz`, at 4 kHz: its largest value, and its largest
+    /// difference from a tone of the same phase, in a second in the middle.
     fn tone(tone_hz: f64, input_hz: f64) -> (f64, f64) {
         let ratio = Ratio::near(input_hz / 4_000.0, 1e-9).unwrap();
-        let frames = (2.0 * input_hz) as usize;
+        let frames = (8.0 * input_hz) as usize;
         let values: Vec<f64> = (0..frames)
             .map(|frame| (TAU * tone_hz * frame as f64 / input_hz).sin())
             .collect();
         let out = resample(&values, 1, ratio).unwrap();
         let (mut most, mut off) = (0f64, 0f64);
-        for (index, value) in out.iter().enumerate().take(6_000).skip(2_000) {
+        for (index, value) in out.iter().enumerate().take(18_000).skip(14_000) {
             let wanted = (TAU * tone_hz * index as f64 / 4_000.0).sin();
             most = most.max(value.abs());
             off = off.max((value - wanted).abs());
