@@ -20,6 +20,7 @@ pub mod map;
 pub mod motion;
 pub mod native;
 pub mod outcome;
+pub mod patch;
 pub mod recording;
 pub mod report;
 pub mod scene;
