@@ -14,8 +14,8 @@ use super::contact::{self, Scenery};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link,
-    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link, Motion, Profile,
+    Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use super::{display, fault, recorded};
 use crate::gauges::PLACES_MM;

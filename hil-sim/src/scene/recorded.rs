@@ -64,13 +64,12 @@ const LENGTH: Words = Words {
     default: "x_mm",
 };
 
-/// Whether rows lie on straight lines, as between rows of a table, or are samples of something band-limited.
-fn on_lines(table: &mut Table<'_>) -> Result<bool, SceneError> {
-    table.choice(
-        "interpolation",
-        &[("band-limited", false), ("lines", true)],
-        &[],
-    )
+/// Whether rows lie on straight lines, as between rows of a table, or are samples of something band-limited;
+/// none if nothing is said of it.
+fn on_lines(table: &mut Table<'_>) -> Result<Option<bool>, SceneError> {
+    let words = [("band-limited", false), ("lines", true)];
+    let lines = table.choice("interpolation", &words, &[])?;
+    Ok(table.contains("interpolation").then_some(lines))
 }
 
 /// The voltages of `[gauges]`: five columns or six, at the ADC's instants unless they lie on lines.
@@ -86,7 +85,8 @@ pub(super) fn gauges(
     let scale = table.number("volts_per_unit", &SCALE)?;
     let offset_v = table.number("offset_v", &OFFSET_V)?;
     let lines = on_lines(table)?;
-    let is_own = source.is_plain() || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
+    let is_plain = source.is_plain();
+    let is_own = is_plain || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
     let conversion = Conversion {
         shift: -start_s,
         scale: scale.unwrap_or(1.0),
@@ -94,6 +94,7 @@ pub(super) fn gauges(
     };
     let as_it_is = conversion.scale == 1.0 && conversion.offset == 0.0;
     let first_step_s = Cell::new(None);
+    let is_dense = Cell::new(true);
     let check: Check<'_> = &|before, row| {
         let beyond = |&column: &usize| !PIN_VOLTS.contains(&row[column]);
         if let Some(column) = (1..row.len()).find(beyond) {
@@ -114,7 +115,8 @@ pub(super) fn gauges(
         if step_s <= DENSE_S {
             return Ok(());
         }
-        if lines {
+        is_dense.set(false);
+        if lines == Some(true) {
             let message = "comes more than 1 ms after the row before: give 1 kHz or more with interpolation = \"lines\"";
             return Err((0, message.to_owned()));
         }
@@ -173,11 +175,14 @@ pub(super) fn gauges(
     let own_time = (GAUGE_TOPIC, GAUGE_TIME);
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
     covers_time(table, extent, duration_s)?;
-    if lines {
+    let per_unit = f64::from(SCAN_RATE_HZ);
+    // A table of volts, from 1 to 4 kHz, has always been that: old scenes stay as they are.
+    let is_table = is_plain && is_dense.get() && !is_denser(&rows, per_unit);
+    if lines.unwrap_or(is_table) {
         return Ok(Arc::new(rows));
     }
     let adc = Raster {
-        per_unit: f64::from(SCAN_RATE_HZ),
+        per_unit,
         through_zero: true,
     };
     laid(table, rows, adc)
@@ -232,7 +237,7 @@ pub(super) fn profile(table: &mut Table<'_>) -> Result<Arc<Series>, SceneError> 
     let own = ("", ("", 1.0));
     let (rows, _) = source.read(table, columns, own, EVERYWHERE, conversion, nothing_else)?;
     // Coarser heights are points of a surface, not samples of a wave: straight lines make no ripples of an edge.
-    if lines || !is_denser(&rows, GRID_MM.recip()) {
+    if lines == Some(true) || !is_denser(&rows, GRID_MM.recip()) {
         return Ok(Arc::new(rows));
     }
     let grid = Raster {

@@ -12,7 +12,7 @@ use mcap::records::MessageHeader;
 
 use crate::native;
 use crate::outcome::Outcome;
-use crate::scene::{Gauges, Motion, Scene, SceneError};
+use crate::scene::{Motion, Scene, SceneError};
 use crate::surface::Surface;
 use crate::world::World;
 
@@ -374,25 +374,29 @@ fn a_hand_is_read_from_wav_too() {
 }
 
 #[test]
-fn straight_lines_are_still_to_be_had() {
+fn a_table_of_volts_from_1_to_4_khz_lies_on_straight_lines_unless_it_is_told_otherwise() {
     let folder = Folder::new("lines");
-    let rows: String = (0..=2_000)
-        .map(|ms| {
-            format!(
-                "{},{v},{v},{v},{v},{v}\n",
-                f64::from(ms) / 1e3,
-                v = f64::from(ms % 2)
-            )
-        })
-        .collect();
-    let section = "[gauges]\nkind = \"recorded\"\nfile = \"x.csv\"\ninterpolation = \"lines\"\n";
-    let csv = format!("t_s,g0,g1,g2,g3,g4\n{rows}");
-    let scene = folder.load(section, "x.csv", csv.as_bytes()).unwrap();
-    let Gauges::Recorded(volts) = &scene.gauges else {
-        panic!("not recorded")
+    let code = |step_s: f64, keys: &str| {
+        let rows: String = (0..=(2.0 / step_s) as u32)
+            .map(|row| {
+                let volts = f64::from(row % 2);
+                let t_s = f64::from(row) * step_s;
+                format!("{t_s},{volts},{volts},{volts},{volts},{volts}\n")
+            })
+            .collect();
+        let section = format!("[gauges]\nkind = \"recorded\"\nfile = \"x.csv\"\n{keys}");
+        let csv = format!("t_s,g0,g1,g2,g3,g4\n{rows}");
+        let scene = folder.load(&section, "x.csv", csv.as_bytes()).unwrap();
+        World::new(&scene).unwrap().codes(1.00025, 0.0)[0]
     };
-    assert_eq!(volts.at.len(), 2_001);
-    assert_eq!(World::new(&scene).unwrap().codes(0.50025, 0.0)[0], 310);
+    // A quarter of the way from 0 to 1 V; half of a rate is at the end of what is let through.
+    assert_eq!(code(1e-3, ""), 310);
+    assert_eq!(code(1e-3, "interpolation = \"lines\"\n"), 310);
+    assert_eq!(code(1e-3, "interpolation = \"band-limited\"\n"), 620);
+    // Slower than any table was before, and denser than the ADC can follow.
+    assert_eq!(code(2e-3, ""), 620);
+    assert_eq!(code(125e-6, ""), 620);
+    assert_eq!(code(125e-6, "interpolation = \"lines\"\n"), 0);
 }
 
 #[test]
