@@ -85,8 +85,7 @@ pub(super) fn gauges(
     let scale = table.number("volts_per_unit", &SCALE)?;
     let offset_v = table.number("offset_v", &OFFSET_V)?;
     let lines = on_lines(table)?;
-    let is_plain = source.is_plain();
-    let is_own = is_plain || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
+    let is_own = source.is_plain() || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
     let conversion = Conversion {
         shift: -start_s,
         scale: scale.unwrap_or(1.0),
@@ -176,8 +175,9 @@ pub(super) fn gauges(
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
     covers_time(table, extent, duration_s)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
-    // A table of volts, from 1 to 4 kHz, has always been that: old scenes stay as they are.
-    let is_table = is_plain && is_dense.get() && !is_denser(&rows, per_unit);
+    // Volts at 1 to 4 kHz have always been that, and old scenes stay as they are. What the lines leave above half
+    // of such a rate is also where the sensor measures white noise.
+    let is_table = is_own && is_dense.get() && !is_denser(&rows, per_unit);
     if lines.unwrap_or(is_table) {
         return Ok(Arc::new(rows));
     }
