@@ -139,12 +139,7 @@ impl KinematicGauges {
 
     /// One scan at `t_s`, the fingertip's middle at `fingertip_mm` of the surface.
     #[inline]
-    pub fn scan(
-        &mut self,
-        texture: &impl Texture,
-        t_s: f64,
-        fingertip_mm: f64,
-    ) -> [u16; GAUGES] {
+    pub fn scan(&mut self, texture: &impl Texture, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
         let hum_phase = || (TAU * (HUM_HZ * t_s).fract()).sin();
         let hum = if self.hum_codes == 0.0 {
             0.0

@@ -9,6 +9,7 @@ pub mod contact;
 pub mod dac81416;
 pub mod digest;
 pub mod elf;
+pub mod event;
 pub mod expectation;
 pub mod fault;
 pub mod gauges;

@@ -54,8 +54,7 @@ impl Surface {
     /// Prepares a scene's surface. `second_harmonic` is relative to the fundamental.
     pub fn new(surface: &scene::Surface, second_harmonic: f64) -> Self {
         let waves = |wavelength_mm| {
-            let mut waves =
-                harmonics_at(&surface.profile, wavelength_mm, CONTACT_BLUR_MM).to_vec();
+            let mut waves = harmonics_at(&surface.profile, wavelength_mm, CONTACT_BLUR_MM).to_vec();
             waves.push((2, second_harmonic));
             waves
         };
@@ -206,11 +205,7 @@ impl Recorded {
 
 /// The amplitudes of the sines n = 1, 3, 5, 7, the first of them 1, seen through a contact that blurs
 /// with a Gaussian of `blur_mm`.
-pub(crate) fn harmonics_at(
-    profile: &Profile,
-    wavelength_mm: f64,
-    blur_mm: f64,
-) -> [(u32, f64); 4] {
+pub(crate) fn harmonics_at(profile: &Profile, wavelength_mm: f64, blur_mm: f64) -> [(u32, f64); 4] {
     use std::f64::consts::{PI, TAU};
     // A square wave's 1/n, its flanks drawn out over RAMP (a sinc), through the contact (a Gaussian).
     let amplitude = |n: u32| {

@@ -46,9 +46,11 @@ impl World {
             Gauges::Kinematic(kinematic) => {
                 let fingertip = Fingertip {
                     contact: Contact::new(scene.contact, scene.force.stiffness_n_per_m),
-                    patch: scene.contact.rung.has_patch().then(|| {
-                        Box::new(Patch::new(&scene.surface, kinematic.second_harmonic))
-                    }),
+                    patch: scene
+                        .contact
+                        .rung
+                        .has_patch()
+                        .then(|| Box::new(Patch::new(&scene.surface, kinematic.second_harmonic))),
                     gauges: KinematicGauges::new(kinematic, scene.seed),
                     force: ForceChannel::new(&scene.force, kinematic.snr_db.is_some(), scene.seed),
                     touch: None,

@@ -4,15 +4,14 @@
 //! | --- | --- |
 //! | friction | `stick-slip` |
 //! | an arm that speeds up so fast that the spring swings | `viscoelastic` |
-//! | specimens so short that a patch lies on several, or short waves beside long ones in noise | `rigid` |
+//! | more than one specimen | `rigid` |
 //! | none of these | `kinematic` |
 //!
 //! hil-sim/tests/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
 //! by less than [`ENOUGH_PERCENT`] or [`ENOUGH_SHARE`] of itself, whichever is more. And for each rung it
 //! has a scene that the rung below does not do.
 
-use crate::patch::{REACH_MM, felt_share};
-use crate::scene::{Friction, Gauges, Motion, Rung, Surface};
+use crate::scene::{Friction, Motion, Rung, Surface};
 
 use super::spring::Hanging;
 
@@ -20,11 +19,12 @@ use super::spring::Hanging;
 pub const ENOUGH_PERCENT: f64 = 0.25;
 /// The same as a share of the error, where that is more.
 pub const ENOUGH_SHARE: f64 = 0.25;
+/// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
+/// on single hops, and no two models of friction hop alike.
+pub const ENOUGH_BLIND_PERCENT: f64 = 2.0;
 /// RMS of the velocity by which a fingertip on a spring may differ from the arm's, as a share of the arm's
 /// RMS velocity: what goes into λ as it is.
 pub const SWING_SHARE: f64 = 0.005;
-/// Share of the strongest specimen's amplitude below which a patch weakens one so far that noise tells.
-pub const FAINT_SHARE: f64 = 0.3;
 
 /// Between two places of the arm that are looked at, in s: a scan.
 const LOOK_S: f64 = 250e-6;
@@ -45,7 +45,6 @@ pub struct Choice {
 pub fn choose(
     surface: &Surface,
     motion: &Motion,
-    gauges: &Gauges,
     friction: Option<Friction>,
     stiffness_n_per_m: f64,
     duration_s: f64,
@@ -67,12 +66,15 @@ pub fn choose(
             ),
         );
     }
-    if let Some(reason) = needs_patch(surface, gauges) {
-        return choice(Rung::Rigid, reason);
+    if surface.specimens.len() > 1 {
+        return choice(
+            Rung::Rigid,
+            "a border between specimens passes under the fingertip bit by bit".to_owned(),
+        );
     }
     choice(
         Rung::Kinematic,
-        "nothing in the scene lets the fingertip be anywhere but where the arm is, or a point".to_owned(),
+        "one specimen, no friction, and a hand that the fingertip keeps up with".to_owned(),
     )
 }
 
@@ -97,36 +99,4 @@ fn swing_share(motion: &Motion, stiffness_n_per_m: f64, duration_s: f64) -> f64 
         before_m = arm_m;
     }
     if all > 0.0 { (off / all).sqrt() } else { 0.0 }
-}
-
-/// Why a point is too simple, if it is.
-fn needs_patch(surface: &Surface, gauges: &Gauges) -> Option<String> {
-    let Gauges::Kinematic(kinematic) = gauges else {
-        return None;
-    };
-    let inner = &surface.specimens[..surface.specimens.len() - 1];
-    if let Some(short) = inner
-        .iter()
-        .skip(1)
-        .find(|specimen| specimen.length_mm < 2.0 * REACH_MM)
-    {
-        return Some(format!(
-            "a specimen of {} mm is shorter than what a gauge feels, {} mm",
-            short.length_mm,
-            2.0 * REACH_MM
-        ));
-    }
-    let shares = || surface.specimens.iter().map(|specimen| felt_share(specimen.wavelength_mm));
-    let strongest = shares().fold(0.0, f64::max);
-    let faintest = shares().fold(f64::INFINITY, f64::min) / strongest;
-    let disturbed = kinematic.snr_db.is_some()
-        || kinematic.hum_50_hz > 0.0
-        || kinematic.pink > 0.0
-        || kinematic.drift > 0.0;
-    (faintest < FAINT_SHARE && disturbed).then(|| {
-        format!(
-            "of the shortest waves a patch feels {:.0} % of the longest's amplitude, in noise",
-            100.0 * faintest
-        )
-    })
 }

@@ -60,7 +60,10 @@ impl Spring {
             time_s,
             keep: [
                 [decay * (cosine + half * sine), decay * sine],
-                [-decay * omega * omega * sine, decay * (cosine - half * sine)],
+                [
+                    -decay * omega * omega * sine,
+                    decay * (cosine - half * sine),
+                ],
             ],
         }
     }
@@ -72,6 +75,14 @@ pub struct Swing {
     time_s: f64,
     /// Stretch and its rate, from stretch and its rate.
     keep: [[f64; 2]; 2],
+}
+
+impl Swing {
+    /// Stretch in m and its rate in m/s after the time, from those before.
+    pub fn after(&self, [stretch_m, rate_m_s]: [f64; 2]) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.keep;
+        [a * stretch_m + b * rate_m_s, c * stretch_m + d * rate_m_s]
+    }
 }
 
 /// A fingertip on a spring that follows the arm.
@@ -116,12 +127,8 @@ impl Hanging {
             self.swing = self.spring.over(time_s);
         }
         let [stretch_m, velocity_m_s] = self.state.unwrap_or([0.0, arm_m_s]);
-        let rate_m_s = arm_m_s - velocity_m_s;
-        let [[a, b], [c, d]] = self.swing.keep;
-        self.state = Some([
-            a * stretch_m + b * rate_m_s,
-            arm_m_s - (c * stretch_m + d * rate_m_s),
-        ]);
+        let [stretch_m, rate_m_s] = self.swing.after([stretch_m, arm_m_s - velocity_m_s]);
+        self.state = Some([stretch_m, arm_m_s - rate_m_s]);
     }
 
     /// x_arm − x in m.

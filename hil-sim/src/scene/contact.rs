@@ -2,8 +2,8 @@
 
 use super::bounds::STEP;
 use super::table::Table;
-use super::{Contact, Friction, Gauges, Motion, Rung, SceneError, Solver, Surface};
-use crate::contact::{Integrator, Stribeck, ladder, stability};
+use super::{Contact, Friction, Motion, Rung, SceneError, Solver, Surface};
+use crate::contact::{EVENT_STEP_S, Integrator, Stribeck, ladder, stability};
 
 /// Longest step of a method that is not told one, in s.
 const DEFAULT_STEP_S: f64 = 50e-6;
@@ -14,7 +14,6 @@ const DEFAULT_SHARE: f64 = 0.5;
 pub(super) struct Scenery<'a> {
     pub surface: &'a Surface,
     pub motion: &'a Motion,
-    pub gauges: &'a Gauges,
     pub stiffness_n_per_m: f64,
     pub duration_s: f64,
 }
@@ -71,7 +70,6 @@ pub(super) fn read(
             let choice = ladder::choose(
                 scenery.surface,
                 scenery.motion,
-                scenery.gauges,
                 friction,
                 scenery.stiffness_n_per_m,
                 scenery.duration_s,
@@ -122,11 +120,14 @@ fn solver(
         return match step_us {
             None => Ok(Solver::Stepped {
                 integrator,
-                step_s: f64::INFINITY,
+                step_s: EVENT_STEP_S,
             }),
             Some(_) => Err(table.refuse(
                 "step_us",
-                format!("\"{}\" chooses its own steps: take it out", integrator.name()),
+                format!(
+                    "\"{}\" chooses its own steps: take it out",
+                    integrator.name()
+                ),
             )),
         };
     }
