@@ -178,29 +178,37 @@ impl Books<'_> {
                 return Err(error.context(file));
             }
         };
-        println!("{}", judged.row);
-        if !judged.unmet.is_empty() {
-            let text = fs::read_to_string(path).unwrap_or_default();
-            for line in &judged.unmet {
-                println!("  not as expected: {line}");
-                let at = line_of(&text, &["expect", key_of(line)]);
-                self.annotate(&path.display().to_string(), at, &scene.name, line);
-            }
-        }
+        let text = fs::read_to_string(path).unwrap_or_default();
+        // Each line with the file and the line of it that it is about.
+        let mut places: Vec<(&Path, Option<usize>)> = judged
+            .unmet
+            .iter()
+            .map(|line| (path.as_path(), line_of(&text, &["expect", key_of(line)])))
+            .collect();
         if let Some(golden) = &self.golden {
             let name = golden.name(path)?;
             let standing = golden.standing(&name, self.way.engine(), judged.hash);
-            if let Some(line) = complaint(&standing, judged.hash, golden, &name) {
-                println!("  not as expected: {line}");
-                let (file, at) = match standing {
-                    Standing::Other(_, at) => (golden.path(), at),
-                    Standing::Same | Standing::Missing => (path.as_path(), None),
-                };
-                self.annotate(&file.display().to_string(), at, &scene.name, &line);
-                judged.unmet.push(line);
-            }
+            judged
+                .unmet
+                .extend(complaint(&standing, judged.hash, golden, &name));
+            places.push(match standing {
+                Standing::Other(_, at) => (golden.path(), at),
+                Standing::Same | Standing::Missing => (path.as_path(), None),
+            });
         }
-        self.met &= judged.unmet.is_empty();
+        let is_met = judged.unmet.is_empty();
+        judged.row += if is_met { "  ok" } else { "  FAILED" };
+        println!("{}", judged.row);
+        for (line, (file, at)) in judged.unmet.iter().zip(places) {
+            println!("  not as expected: {line}");
+            self.way.annotate(&Annotation {
+                file: &file.display().to_string(),
+                line: at,
+                title: &format!("{} is not as expected", scene.name),
+                message: line,
+            });
+        }
+        self.met &= is_met;
         if let (Some((file, path, list)), Some(alone)) = (&mut self.json, &judged.json) {
             file.write_all(list.next(alone).as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
@@ -214,15 +222,6 @@ impl Books<'_> {
         };
         self.cases.push(case(path, &scene.name, fate));
         Ok(())
-    }
-
-    fn annotate(&self, file: &str, line: Option<usize>, scene: &str, message: &str) {
-        self.way.annotate(&Annotation {
-            file,
-            line,
-            title: &format!("{scene} is not as expected"),
-            message,
-        });
     }
 }
 
@@ -264,11 +263,12 @@ fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
 const HEADER: &str = "\
 scene                       λ mm     rms %  valid  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
+/// A scene's line, up to whether it is as expected.
 fn row(outcome: &Outcome) -> String {
     let summary = &outcome.verdict.summary;
     let actuators = &outcome.verdict.actuators;
     format!(
-        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}  {}",
+        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
         outcome.scene.name,
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
@@ -277,11 +277,6 @@ fn row(outcome: &Outcome) -> String {
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),
         pace(outcome.recording.realtime_factor()),
-        if outcome.unmet.is_empty() {
-            "ok"
-        } else {
-            "FAILED"
-        },
     )
 }
 
