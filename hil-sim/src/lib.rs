@@ -16,6 +16,8 @@ pub mod map;
 pub mod motion;
 pub mod native;
 pub mod outcome;
+pub mod paper;
+pub mod people;
 pub mod recording;
 pub mod report;
 pub mod scene;
