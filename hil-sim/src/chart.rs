@@ -1,4 +1,5 @@
-//! What every estimator gives and what it costs, and what the display does: `hil-sim chart`.
+//! What every estimator gives and what it costs, what the display does, and what the contact models are
+//! worth: `hil-sim chart`.
 //!
 //! | file | what |
 //! | --- | --- |
@@ -10,6 +11,8 @@
 //! | [`bound`] | the Cramér–Rao bound |
 //! | [`efficiency`] | how near the bank comes to it |
 //! | [`result`], [`picture`] | CSV and SVG |
+//! | [`models`] | speed and error of the contact models |
+//! | [`stability`] | where integrators fail |
 //! | [`purity`], [`stop`], [`timing`], [`delay`] | the display's ELF, measured |
 
 pub mod bound;
@@ -20,6 +23,7 @@ pub mod delay;
 pub mod efficiency;
 pub mod family;
 pub mod fourier;
+pub mod models;
 mod panel;
 pub mod parts;
 pub mod picture;
@@ -29,6 +33,7 @@ pub mod result;
 pub mod rivals;
 pub mod score;
 pub mod settings;
+pub mod stability;
 pub mod stop;
 pub mod tally;
 pub mod timing;

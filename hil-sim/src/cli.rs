@@ -17,6 +17,7 @@ mod display;
 mod faults;
 mod goals;
 mod map;
+mod models;
 mod paper;
 mod people;
 mod run;
@@ -61,7 +62,8 @@ enum Command {
     /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
     /// 1 if a goal is missed
     Campaign(campaign::Campaign),
-    /// Draws what the estimators give against what they cost, and what the display does
+    /// Draws what the estimators give against what they cost, what the display does, and what the contact
+    /// models are worth
     Chart(chart::Chart),
     /// Measures when the display's outputs change, on its ELF: jitter of the LDAC edges, skew of the
     /// channels, hand to output at 2 and 4 kHz over links of all sorts. Exit status 1 if p99 is above 0.6 ms

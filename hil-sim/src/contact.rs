@@ -1,14 +1,36 @@
-//! How the fingertip follows the arm over the surface: a ladder of models, from none to friction.
+//! How the fingertip follows the arm over the surface: a ladder of models, from none to bristles.
 //!
 //! A model takes where the arm is, scan by scan, and gives where the skin touches the surface and how
 //! hard the arm drags it ([`Touch`]). The arm moves in a straight line from one scan to the next.
+//!
+//! | rung | touches | a gauge feels |
+//! | --- | --- | --- |
+//! | `kinematic` | where the arm is | the point below it |
+//! | `rigid` | where the arm is | the patch around it ([`crate::patch`]) |
+//! | `viscoelastic` | behind a spring and a damper ([`Hanging`]) | the patch |
+//! | `stick-slip` | behind them, against friction, at rest or sliding ([`Slider`]) | the point |
+//! | `reference` | behind them, clinging by bristles ([`Bristles`]), in the smallest steps | the patch |
+//!
+//! The reference is slow, and there to judge the others by. `stick-slip` leaves the patch out: what it
+//! would change is less than what the guesses at friction are good for. [`ladder`] says which rung a scene
+//! needs.
 
-use crate::scene;
+use crate::scene::{self, Friction, Rung, Solver};
 
+mod bristles;
+pub mod integrator;
+pub mod ladder;
 mod slider;
+mod spring;
+pub mod stability;
+mod stepped;
 mod stribeck;
 
+pub use bristles::{BRISTLES_DAMPING, BRISTLES_N_PER_M, Bristles};
+pub use integrator::Integrator;
 pub use slider::{DAMPING_N_S_PER_M, MASS_KG, STEP_SHARE, Slider};
+pub use spring::{Hanging, Spring};
+pub use stepped::{CREEP_M_S, Stepped};
 pub use stribeck::{KINETIC, NORMAL_N, STRIBECK_M_S, Stribeck};
 
 const MM_PER_M: f64 = 1000.0;
@@ -28,19 +50,42 @@ pub struct Touch {
 #[derive(Clone, Debug)]
 pub enum Contact {
     /// The fingertip is where the arm is: no slip, no stick, no force.
-    Kinematic,
-    /// A slider that the arm pulls by a spring, against friction.
-    StickSlip(Slider),
+    Rigid,
+    /// It hangs on a spring, solved exactly.
+    Hanging(Hanging),
+    /// The same, by steps.
+    Swinging(Stepped<Spring, 2>),
+    /// A slider that the arm pulls by a spring, against friction; rest is a state of its own.
+    Slider(Slider),
+    /// The same with bristles, by steps.
+    Clinging(Stepped<Bristles, 3>),
 }
 
 impl Contact {
     /// The contact of a scene; `stiffness_n_per_m` is the fingertip's, towards shear. The fingertip is
     /// set down, relaxed, at the first scan.
     pub fn new(contact: scene::Contact, stiffness_n_per_m: f64) -> Self {
-        match contact {
-            scene::Contact::Kinematic => Self::Kinematic,
-            scene::Contact::StickSlip(friction) => {
-                Self::StickSlip(Slider::new(Stribeck::new(friction), stiffness_n_per_m))
+        let spring = Spring { stiffness_n_per_m };
+        let bristles =
+            |friction: Friction| Bristles::new(Stribeck::new(friction), stiffness_n_per_m);
+        let smallest = (Integrator::Radau, f64::INFINITY);
+        let (integrator, step_s) = match (contact.rung, contact.solver) {
+            (Rung::Reference, _) => smallest,
+            (_, Solver::Stepped { integrator, step_s }) => (integrator, step_s),
+            (Rung::Kinematic | Rung::Rigid, Solver::Exact) => return Self::Rigid,
+            (Rung::Viscoelastic | Rung::StickSlip, Solver::Exact) => {
+                return match contact.friction {
+                    None => Self::Hanging(Hanging::new(stiffness_n_per_m)),
+                    Some(friction) => {
+                        Self::Slider(Slider::new(Stribeck::new(friction), stiffness_n_per_m))
+                    }
+                };
+            }
+        };
+        match contact.friction {
+            None => Self::Swinging(Stepped::new(spring, integrator, step_s, true)),
+            Some(friction) => {
+                Self::Clinging(Stepped::new(bristles(friction), integrator, step_s, false))
             }
         }
     }
@@ -48,21 +93,51 @@ impl Contact {
     /// The fingertip at `t_s` with the arm at `arm_mm`. Instants must not decrease.
     #[inline]
     pub fn follow(&mut self, t_s: f64, arm_mm: f64) -> Touch {
-        match self {
-            Self::Kinematic => Touch {
-                position_mm: arm_mm,
-                force_n: 0.0,
-                sticks: false,
-            },
-            Self::StickSlip(slider) => {
-                slider.follow(t_s, arm_mm / MM_PER_M);
-                Touch {
-                    // The stretch is what the slider knows: so far from the start nothing is rounded off.
-                    position_mm: arm_mm - slider.stretch_m() * MM_PER_M,
-                    force_n: slider.spring_n(),
-                    sticks: slider.sticks(),
-                }
+        let arm_m = arm_mm / MM_PER_M;
+        let (stretch_m, force_n, sticks) = match self {
+            Self::Rigid => {
+                return Touch {
+                    position_mm: arm_mm,
+                    force_n: 0.0,
+                    sticks: false,
+                };
             }
+            Self::Hanging(hanging) => {
+                hanging.follow(t_s, arm_m);
+                (hanging.stretch_m(), hanging.spring_n(), false)
+            }
+            Self::Swinging(stepped) => {
+                stepped.follow(t_s, arm_m);
+                let stretch_m = stepped.stretch_m();
+                let force_n = stepped.system().stiffness_n_per_m * stretch_m;
+                (stretch_m, force_n, false)
+            }
+            Self::Slider(slider) => {
+                slider.follow(t_s, arm_m);
+                (slider.stretch_m(), slider.spring_n(), slider.sticks())
+            }
+            Self::Clinging(stepped) => {
+                stepped.follow(t_s, arm_m);
+                let stretch_m = stepped.stretch_m();
+                let force_n = stepped.system().stiffness_n_per_m() * stretch_m;
+                (stretch_m, force_n, stepped.sticks())
+            }
+        };
+        Touch {
+            // The stretch is what the models know: so far from the start nothing is rounded off.
+            position_mm: arm_mm - stretch_m * MM_PER_M,
+            force_n,
+            sticks,
+        }
+    }
+
+    /// Passages from rest to slip and back that have not been taken yet: when, in s, and whether it rests
+    /// from then on. None where a model knows no rest.
+    pub fn take_turns(&mut self) -> Vec<(f64, bool)> {
+        match self {
+            Self::Rigid | Self::Hanging(_) | Self::Swinging(_) => Vec::new(),
+            Self::Slider(slider) => slider.take_turns(),
+            Self::Clinging(stepped) => stepped.take_turns(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The voltages of five computed gauges, as ADC codes.
 //!
-//! A gauge feels the texture under its own place on the fingertip, through the sensor's resonance if
-//! there is one; hum, noise, drift and offset come in behind it. Its gain, place and phase are guesses
+//! A gauge feels the texture under its own place on the fingertip ([`Texture`]), through the sensor's
+//! resonance if there is one; hum, noise, drift and offset come in behind it. Its gain, place and phase are guesses
 //! of the numerical study behind this project, not measurements; the phase advances the texture as a
 //! whole, by that angle of its fundamental.
 
@@ -56,6 +56,36 @@ const CODES_PER_UNIT: f64 = VOLTS_PER_UNIT / VOLTS_FULL_SCALE * CODES;
 const MID_RAIL_CODE: f32 = (MID_RAIL_VOLTS / VOLTS_FULL_SCALE * CODES) as f32;
 const HUM_HZ: f64 = 50.0;
 
+/// What gauges feel of a surface.
+pub trait Texture {
+    /// What `gauge`, 0 to 4, feels with the fingertip's middle at `fingertip_mm` of the surface; 1 is the
+    /// fundamental's amplitude.
+    fn felt_by(&self, gauge: usize, fingertip_mm: f64) -> f32;
+}
+
+/// A point at each gauge's place.
+impl Texture for Surface {
+    #[inline]
+    fn felt_by(&self, gauge: usize, fingertip_mm: f64) -> f32 {
+        self.feel(fingertip_mm + PLACES_MM[gauge], advance(gauge))
+    }
+}
+
+/// By how much of its period the texture is ahead under `gauge`, in 2⁻³² cycles.
+#[inline]
+pub(crate) const fn advance(gauge: usize) -> u32 {
+    const ADVANCES: [u32; GAUGES] = {
+        let mut advances = [0; GAUGES];
+        let mut gauge = 0;
+        while gauge < GAUGES {
+            advances[gauge] = (PHASES_RAD[gauge] / TAU * 4_294_967_296.0) as i64 as u32;
+            gauge += 1;
+        }
+        advances
+    };
+    ADVANCES[gauge]
+}
+
 /// Five computed gauges, their noise and their troubles.
 #[derive(Clone, Debug)]
 pub struct KinematicGauges {
@@ -71,8 +101,6 @@ pub struct KinematicGauges {
 
 #[derive(Clone, Copy, Debug)]
 struct Lane {
-    place_mm: f64,
-    advance: u32,
     signal_codes: f32,
     /// Gain of what comes in behind the gauge: hum and noise.
     pickup: f32,
@@ -111,7 +139,7 @@ impl KinematicGauges {
 
     /// One scan at `t_s`, the fingertip's middle at `fingertip_mm` of the surface.
     #[inline]
-    pub fn scan(&mut self, surface: &Surface, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
+    pub fn scan(&mut self, texture: &impl Texture, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
         let hum_phase = || (TAU * (HUM_HZ * t_s).fract()).sin();
         let hum = if self.hum_codes == 0.0 {
             0.0
@@ -131,7 +159,7 @@ impl KinematicGauges {
             if let Some(slow) = &slow {
                 pickup += slow[gauge];
             }
-            let mut signal = surface.feel(fingertip_mm + lane.place_mm, lane.advance);
+            let mut signal = texture.felt_by(gauge, fingertip_mm);
             if let Some((resonance, rings)) = &mut self.resonance {
                 signal = resonance.step(&mut rings[gauge], f64::from(signal)) as f32;
             }
@@ -148,8 +176,6 @@ impl KinematicGauges {
 impl Lane {
     fn new(gauge: usize, gain: f64) -> Self {
         Self {
-            place_mm: PLACES_MM[gauge],
-            advance: (PHASES_RAD[gauge] / TAU * 4_294_967_296.0) as i64 as u32,
             signal_codes: (gain * GAINS[gauge] * CODES_PER_UNIT) as f32,
             pickup: gain as f32,
         }

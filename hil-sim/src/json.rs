@@ -6,9 +6,11 @@ use protocol::Status;
 use serde::Serialize;
 
 use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
+use crate::event::Event;
 use crate::fault::judge::Finding;
 use crate::json::lines::Lines;
 use crate::recording::Recording;
+use crate::scene::{Gauges, Scene};
 use crate::truth::Truth;
 
 /// A scene's object. A number that could not be measured is null.
@@ -34,6 +36,37 @@ pub struct SceneResult<'a> {
     pub link: Link,
     /// What faults were injected.
     pub faults: Vec<Fault>,
+    /// The contact model; null with recorded gauges.
+    pub contact: Option<ContactResult>,
+    /// What happened, and when.
+    pub events: Vec<Event>,
+}
+
+/// The contact model that a scene was run with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ContactResult {
+    /// The rung, as scenes call it.
+    pub model: &'static str,
+    /// Why `"auto"` chose it; null if the scene names it.
+    pub reason: Option<String>,
+}
+
+impl ContactResult {
+    /// The one of a scene; none with recorded gauges.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        matches!(scene.gauges, Gauges::Kinematic(_)).then(|| Self {
+            model: scene.contact.rung.name(),
+            reason: scene.contact_reason.clone(),
+        })
+    }
+
+    /// The rung and why, in words.
+    pub fn sentence(&self) -> String {
+        match &self.reason {
+            None => format!("contact {}, as the scene says", self.model),
+            Some(reason) => format!("contact {}: {reason}", self.model),
+        }
+    }
 }
 
 /// The last counters of both ends; null where none arrived.
@@ -70,7 +103,7 @@ impl From<&Finding> for Fault {
 }
 
 impl<'a> SceneResult<'a> {
-    /// The object of one run, without faults.
+    /// The object of one run, without faults, contact and events.
     pub fn new(truth: &Truth<'a>, recording: &Recording, verdict: &'a Verdict) -> Self {
         Self {
             name: truth.name,
@@ -86,6 +119,8 @@ impl<'a> SceneResult<'a> {
                 display: recording.display_status,
             },
             faults: Vec::new(),
+            contact: None,
+            events: Vec::new(),
         }
     }
 }

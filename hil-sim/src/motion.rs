@@ -6,6 +6,8 @@ pub use live::LiveHand;
 
 use crate::scene::Motion;
 
+/// No hand is faster, in mm/s.
+const FASTEST_MM_S: f64 = 1_000.0;
 /// Travel for one count of either encoder, in mm: 5 µm.
 pub const MM_PER_COUNT: f64 = 0.005;
 
@@ -49,6 +51,18 @@ impl Motion {
             } => amplitude_mm_s * (std::f64::consts::TAU * frequency_hz * t_s).sin(),
             Motion::Recorded(positions) => positions.slope(positions.row(t_s, 0), 0, t_s),
             Motion::Live(hand) => hand.velocity_mm_s(t_s),
+        }
+    }
+
+    /// No velocity is higher, in mm/s.
+    pub fn top_speed_mm_s(&self) -> f64 {
+        match self {
+            Motion::Constant { speed_mm_s } => speed_mm_s.abs(),
+            Motion::Sinusoid { amplitude_mm_s, .. } => amplitude_mm_s.abs(),
+            Motion::Recorded(positions) => (1..positions.at.len())
+                .map(|row| positions.slope(row - 1, 0, positions.at[row - 1]).abs())
+                .fold(0.0, f64::max),
+            Motion::Live(_) => FASTEST_MM_S,
         }
     }
 

@@ -1,9 +1,10 @@
 //! A scene that was run, judged.
 
 use crate::analysis::{self, Verdict};
+use crate::event::events;
 use crate::expectation;
 use crate::fault::judge::{Finding, judge};
-use crate::json::{Fault, SceneResult};
+use crate::json::{ContactResult, Fault, SceneResult};
 use crate::recording::Recording;
 use crate::report::Chapter;
 use crate::scene::Scene;
@@ -51,6 +52,8 @@ impl Outcome {
     /// The outcome's object in the JSON.
     pub fn result(&self) -> SceneResult<'_> {
         SceneResult {
+            contact: ContactResult::of(&self.scene),
+            events: events(&self.scene, &self.recording),
             faults: self.findings.iter().map(Fault::from).collect(),
             ..SceneResult::new(&self.truth(), &self.recording, &self.verdict)
         }
@@ -64,6 +67,7 @@ impl Outcome {
             verdict: &self.verdict,
             unmet: &self.unmet,
             findings: &self.findings,
+            contact: ContactResult::of(&self.scene).map(|contact| contact.sentence()),
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::report::plots::Figure;
 use crate::truth::Truth;
 
 /// One scene's part of the report.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Chapter<'a> {
     /// What the scene knows.
     pub truth: Truth<'a>,
@@ -32,6 +32,8 @@ pub struct Chapter<'a> {
     pub unmet: &'a [String],
     /// What became of the scene's faults, in their order.
     pub findings: &'a [Finding],
+    /// The contact model and why it was taken; none with recorded gauges.
+    pub contact: Option<String>,
 }
 
 /// The report could not be made.
@@ -83,6 +85,9 @@ fn write_chapter(page: &mut String, at: usize, chapter: &Chapter, figures: &[Fig
         recording.duration_s,
         recording.hash,
     );
+    if let Some(contact) = &chapter.contact {
+        let _ = writeln!(page, "<p class=soft>{}</p>", escape(contact));
+    }
     for line in chapter.unmet {
         let _ = writeln!(page, "<p class=unmet>Not as expected: {}</p>", escape(line));
     }
@@ -159,6 +164,7 @@ mod tests {
             verdict: &verdict,
             unmet: &unmet,
             findings: &[],
+            contact: None,
         }])
         .unwrap()
     }

@@ -13,6 +13,7 @@ use crate::fault::Fault;
 use crate::motion::LiveHand;
 
 mod bounds;
+mod contact;
 mod display;
 mod error;
 mod fault;
@@ -44,6 +45,8 @@ pub struct Scene {
     pub arm: ArmDrive,
     /// How the fingertip follows the arm.
     pub contact: Contact,
+    /// Why that rung, if `"auto"` chose it.
+    pub contact_reason: Option<String>,
     /// What the ADC sees.
     pub gauges: Gauges,
     /// The sixth channel, and the shear stiffness that it is read with.
@@ -140,17 +143,99 @@ pub enum Follows {
 
 /// `[contact]`: how the fingertip follows the arm, a rung of [`crate::contact`]'s ladder. Without effect
 /// on recorded gauges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Contact {
-    /// It is where the arm is. The default without friction.
-    #[default]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Which rung: the scene's, or with `"auto"` what [`crate::contact::ladder`] chose.
+    pub rung: Rung,
+    /// How sticky the surface is; none: not at all. Always some with [`Rung::StickSlip`], none below it.
+    pub friction: Option<Friction>,
+    /// How its equations are solved.
+    pub solver: Solver,
+}
+
+/// The rungs of the ladder of contact models, the simplest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Rung {
+    /// The fingertip is where the arm is, a point.
     Kinematic,
-    /// It hangs on a spring, and sticks and slips. The default with friction.
-    StickSlip(Friction),
+    /// The same, a patch.
+    Rigid,
+    /// It hangs on a spring and a damper.
+    Viscoelastic,
+    /// It hangs there, and sticks and slips.
+    StickSlip,
+    /// It does all that, clinging by bristles: slow, to judge the others by.
+    Reference,
+}
+
+/// `[contact] integrator` and `step_us`: how a rung's equations are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// In closed form, or from event to event: the default.
+    Exact,
+    /// By steps. Friction has bristles then ([`crate::contact::Bristles`]).
+    Stepped {
+        /// By which method.
+        integrator: crate::contact::Integrator,
+        /// Longest step in s, above 0; a scan's 250 µs at most, where the method takes what it is told.
+        step_s: f64,
+    },
+}
+
+impl Rung {
+    /// All of them, the simplest first.
+    pub const ALL: [Self; 5] = [
+        Self::Kinematic,
+        Self::Rigid,
+        Self::Viscoelastic,
+        Self::StickSlip,
+        Self::Reference,
+    ];
+
+    /// As scenes call it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Kinematic => "kinematic",
+            Self::Rigid => "rigid",
+            Self::Viscoelastic => "viscoelastic",
+            Self::StickSlip => "stick-slip",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Whether a gauge feels a patch, not a point.
+    pub const fn has_patch(self) -> bool {
+        matches!(self, Self::Rigid | Self::Viscoelastic | Self::Reference)
+    }
+}
+
+impl Contact {
+    /// Where the arm is, a point.
+    pub const KINEMATIC: Self = Self::of(Rung::Kinematic, None);
+
+    /// A rung as it is solved by default.
+    pub const fn of(rung: Rung, friction: Option<Friction>) -> Self {
+        Self {
+            rung,
+            friction,
+            solver: Solver::Exact,
+        }
+    }
+
+    /// A slider that sticks and slips.
+    pub const fn stick_slip(friction: Friction) -> Self {
+        Self::of(Rung::StickSlip, Some(friction))
+    }
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self::KINEMATIC
+    }
 }
 
 /// `[contact] friction`: how sticky the surface is; see [`crate::contact::Stribeck`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Friction {
     /// μs = 0.75.
     Mild,
@@ -330,7 +415,8 @@ impl Scene {
             },
             motion: Motion::Constant { speed_mm_s },
             arm: ArmDrive::default(),
-            contact: Contact::Kinematic,
+            contact: Contact::KINEMATIC,
+            contact_reason: None,
             gauges: Gauges::Kinematic(Kinematic::default()),
             force: Force::default(),
             link: Link::default(),

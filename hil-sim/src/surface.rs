@@ -26,7 +26,7 @@ const FRACTION_BITS: u32 = 32 - POINTS_LOG2;
 const GRID_MM: f64 = 0.02;
 
 /// One period, its first point repeated at the end.
-type Period = [f32; POINTS + 1];
+pub(crate) type Period = [f32; POINTS + 1];
 
 /// The surface, ready to be felt.
 #[derive(Clone, Debug)]
@@ -53,11 +53,37 @@ struct Recorded {
 impl Surface {
     /// Prepares a scene's surface. `second_harmonic` is relative to the fundamental.
     pub fn new(surface: &scene::Surface, second_harmonic: f64) -> Self {
+        let waves = |wavelength_mm| {
+            let mut waves = harmonics_at(&surface.profile, wavelength_mm, CONTACT_BLUR_MM).to_vec();
+            waves.push((2, second_harmonic));
+            waves
+        };
+        Self::with(surface, waves, CONTACT_BLUR_MM)
+    }
+
+    /// As a point feels it, nothing blurred: `waves` are the harmonics of a specimen of a wavelength in
+    /// mm, and their amplitudes.
+    pub(crate) fn of_waves(
+        surface: &scene::Surface,
+        waves: impl Fn(f64) -> Vec<(u32, f64)>,
+    ) -> Self {
+        Self::with(surface, waves, 0.0)
+    }
+
+    fn with(
+        surface: &scene::Surface,
+        waves: impl Fn(f64) -> Vec<(u32, f64)>,
+        blur_mm: f64,
+    ) -> Self {
         let mut start_mm = surface.start_mm;
         let mut patches = Vec::with_capacity(surface.specimens.len());
         for specimen in &surface.specimens {
             let wavelength_mm = specimen.wavelength_mm;
-            let period = period(&harmonics(&surface.profile, wavelength_mm), second_harmonic);
+            let waves: Vec<_> = waves(wavelength_mm)
+                .into_iter()
+                .map(|(n, amplitude)| (n, amplitude, 0.0))
+                .collect();
+            let period = period_of(&waves);
             patches.push(Patch {
                 start_mm,
                 wavelength_mm,
@@ -67,7 +93,7 @@ impl Surface {
             start_mm += specimen.length_mm;
         }
         let recorded = match &surface.profile {
-            Profile::Recorded(heights) => Some(Recorded::new(heights)),
+            Profile::Recorded(heights) => Some(Recorded::new(heights, blur_mm)),
             Profile::Sine | Profile::Trapezoid => None,
         };
         Self { patches, recorded }
@@ -102,17 +128,23 @@ impl Patch {
     #[inline]
     fn feel(&self, x_mm: f64, advance: u32) -> f32 {
         let cycles = (x_mm - self.start_mm) * self.cycles_per_mm;
-        // Whole cycles fall off at the top.
-        let phase = ((cycles * 4_294_967_296.0) as i64 as u32).wrapping_add(advance);
-        let point = (phase >> FRACTION_BITS) as usize;
-        let fraction = (phase & ((1 << FRACTION_BITS) - 1)) as f32 / (1 << FRACTION_BITS) as f32;
-        let (from, to) = (self.period[point], self.period[point + 1]);
-        from + (to - from) * fraction
+        feel(&self.period, cycles, advance)
     }
 }
 
+/// What stands in a period `cycles` after its beginning, and `advance` · 2⁻³² of it further on.
+#[inline]
+pub(crate) fn feel(period: &Period, cycles: f64, advance: u32) -> f32 {
+    // Whole cycles fall off at the top.
+    let phase = ((cycles * 4_294_967_296.0) as i64 as u32).wrapping_add(advance);
+    let point = (phase >> FRACTION_BITS) as usize;
+    let fraction = (phase & ((1 << FRACTION_BITS) - 1)) as f32 / (1 << FRACTION_BITS) as f32;
+    let (from, to) = (period[point], period[point + 1]);
+    from + (to - from) * fraction
+}
+
 impl Recorded {
-    fn new(profile: &Series) -> Self {
+    fn new(profile: &Series, blur_mm: f64) -> Self {
         let (first, last) = profile.extent();
         let points = ((last - first) / GRID_MM).floor() as usize + 1;
         let mut row = 0;
@@ -125,8 +157,11 @@ impl Recorded {
             .collect();
         let mean = raw.iter().sum::<f64>() / points as f64;
 
-        let reach = (4.0 * CONTACT_BLUR_MM / GRID_MM).ceil() as i64;
-        let weight = |step: i64| (-0.5 * (step as f64 * GRID_MM / CONTACT_BLUR_MM).powi(2)).exp();
+        let reach = (4.0 * blur_mm / GRID_MM).ceil() as i64;
+        let weight = |step: i64| match step {
+            0 => 1.0,
+            _ => (-0.5 * (step as f64 * GRID_MM / blur_mm).powi(2)).exp(),
+        };
         let total: f64 = (-reach..=reach).map(weight).sum();
         let blurred: Vec<f64> = (0..points as i64)
             .map(|centre| {
@@ -168,14 +203,15 @@ impl Recorded {
     }
 }
 
-/// The amplitudes of the sines n = 1, 3, 5, 7, the first of them 1.
-fn harmonics(profile: &Profile, wavelength_mm: f64) -> [(u32, f64); 4] {
+/// The amplitudes of the sines n = 1, 3, 5, 7, the first of them 1, seen through a contact that blurs
+/// with a Gaussian of `blur_mm`.
+pub(crate) fn harmonics_at(profile: &Profile, wavelength_mm: f64, blur_mm: f64) -> [(u32, f64); 4] {
     use std::f64::consts::{PI, TAU};
     // A square wave's 1/n, its flanks drawn out over RAMP (a sinc), through the contact (a Gaussian).
     let amplitude = |n: u32| {
         let n = f64::from(n);
         let ramp = (PI * n * RAMP).sin() / (PI * n * RAMP);
-        let blur = (-0.5 * (TAU * n * CONTACT_BLUR_MM / wavelength_mm).powi(2)).exp();
+        let blur = (-0.5 * (TAU * n * blur_mm / wavelength_mm).powi(2)).exp();
         ramp * blur / n
     };
     [1, 3, 5, HIGHEST_HARMONIC].map(|n| match profile {
@@ -186,15 +222,16 @@ fn harmonics(profile: &Profile, wavelength_mm: f64) -> [(u32, f64); 4] {
     })
 }
 
-fn period(harmonics: &[(u32, f64)], second_harmonic: f64) -> Box<Period> {
+/// The period of a sum of sines: number, amplitude, and by how much each is ahead, in rad.
+pub(crate) fn period_of(waves: &[(u32, f64, f64)]) -> Box<Period> {
     let mut period = Box::new([0.0; POINTS + 1]);
     for (point, value) in period.iter_mut().enumerate() {
         let theta = std::f64::consts::TAU * point as f64 / POINTS as f64;
-        let odd: f64 = harmonics
+        let sum: f64 = waves
             .iter()
-            .map(|&(n, a)| a * (f64::from(n) * theta).sin())
+            .map(|&(n, amplitude, ahead)| amplitude * (f64::from(n) * theta + ahead).sin())
             .sum();
-        *value = (odd + second_harmonic * (2.0 * theta).sin()) as f32;
+        *value = sum as f32;
     }
     period
 }

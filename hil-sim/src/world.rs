@@ -6,6 +6,7 @@ use protocol::CHANNELS;
 use crate::contact::{Contact, Touch};
 use crate::gauges::{ForceChannel, KinematicGauges, RecordedGauges};
 use crate::motion::coarse_encoder;
+use crate::patch::Patch;
 use crate::scene::{ENCODER_COUNT_UM, Gauges, Motion, Scene, SceneError};
 use crate::skew::Skew;
 use crate::surface::Surface;
@@ -30,6 +31,8 @@ enum Source {
 #[derive(Clone, Debug)]
 struct Fingertip {
     contact: Contact,
+    /// None where a gauge feels a point.
+    patch: Option<Box<Patch>>,
     gauges: KinematicGauges,
     force: ForceChannel,
     touch: Option<Touch>,
@@ -43,6 +46,11 @@ impl World {
             Gauges::Kinematic(kinematic) => {
                 let fingertip = Fingertip {
                     contact: Contact::new(scene.contact, scene.force.stiffness_n_per_m),
+                    patch: scene
+                        .contact
+                        .rung
+                        .has_patch()
+                        .then(|| Box::new(Patch::new(&scene.surface, kinematic.second_harmonic))),
                     gauges: KinematicGauges::new(kinematic, scene.seed),
                     force: ForceChannel::new(&scene.force, kinematic.snr_db.is_some(), scene.seed),
                     touch: None,
@@ -93,7 +101,11 @@ impl World {
         let arm_mm = self.skew.at_gauges_mm(t_s, arm_position_mm);
         let touch = fingertip.contact.follow(t_s, arm_mm);
         fingertip.touch = Some(touch);
-        let [g0, g1, g2, g3, g4] = fingertip.gauges.scan(&self.surface, t_s, touch.position_mm);
+        let gauges = &mut fingertip.gauges;
+        let [g0, g1, g2, g3, g4] = match &fingertip.patch {
+            None => gauges.scan(&self.surface, t_s, touch.position_mm),
+            Some(patch) => gauges.scan(&**patch, t_s, touch.position_mm),
+        };
         [g0, g1, g2, g3, g4, fingertip.force.scan(touch.force_n)]
     }
 
@@ -123,7 +135,7 @@ mod tests {
 
     fn sliding(friction: Friction) -> Scene {
         Scene {
-            contact: scene::Contact::StickSlip(friction),
+            contact: scene::Contact::stick_slip(friction),
             force: Force {
                 present: true,
                 ..Force::default()

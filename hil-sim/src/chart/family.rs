@@ -150,7 +150,7 @@ fn tone(scene: &Scene) -> Option<Tone<'static>> {
     };
     let sound = kinematic.hum_50_hz == 0.0
         && kinematic.second_harmonic == 0.0
-        && scene.contact == Contact::Kinematic
+        && scene.contact == Contact::KINEMATIC
         && !kinematic
             .dead
             .iter()

@@ -14,7 +14,7 @@ use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
 
-use super::{display, number, progress};
+use super::{display, models, number, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -41,6 +41,12 @@ enum What {
     /// The stimulus' phase error against the motion over the link's delay, from the display's ELF, beside a
     /// stimulus that is relayed over the network. Writes delay.csv and delay.svg
     Delay(display::Delay),
+    /// Speed against accuracy of the contact models: every rung, every integrator, steps of many lengths,
+    /// against the reference. Writes models.csv and models.svg
+    Models(models::Models),
+    /// Where integrators fail: maps over step and stiffness of a fingertip that should rest and of one that
+    /// should swing. Writes stability.csv and stability.svg
+    Stability(models::Stability),
 }
 
 #[derive(Debug, clap::Args)]
@@ -79,6 +85,8 @@ impl Chart {
             What::Purity(purity) => purity.execute(),
             What::Stop(stop) => stop.execute(),
             What::Delay(delay) => delay.execute(),
+            What::Models(models) => models.execute(),
+            What::Stability(stability) => stability.execute(),
         }
     }
 }

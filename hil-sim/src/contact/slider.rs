@@ -42,6 +42,8 @@ pub struct Slider {
     last: Option<(f64, f64)>,
     state: State,
     phase: Phase,
+    /// Passages from rest to slip and back that have not been taken: when, and whether it rests then.
+    turns: Vec<(f64, bool)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +76,7 @@ impl Slider {
                 velocity_m_s: 0.0,
             },
             phase: Phase::Stick,
+            turns: Vec::new(),
         }
     }
 
@@ -89,7 +92,13 @@ impl Slider {
             return;
         }
         self.last = Some((t_s, arm_m));
-        self.advance(time_s, (arm_m - last_m) / time_s);
+        self.advance(t_s, time_s, (arm_m - last_m) / time_s);
+    }
+
+    /// Passages from rest to slip and back since this was last asked: when, in s, and whether it rests
+    /// from then on.
+    pub fn take_turns(&mut self) -> Vec<(f64, bool)> {
+        std::mem::take(&mut self.turns)
     }
 
     /// x_arm − x_s in m.
@@ -107,14 +116,18 @@ impl Slider {
         self.phase == Phase::Stick
     }
 
-    /// Lets `time_s` pass with the arm at a constant velocity.
-    fn advance(&mut self, time_s: f64, arm_m_s: f64) {
+    /// Lets `time_s` pass until `until_s`, with the arm at a constant velocity.
+    fn advance(&mut self, until_s: f64, time_s: f64, arm_m_s: f64) {
         let mut left_s = time_s;
         while left_s > 0.0 {
+            let stuck = self.sticks();
             left_s -= match self.phase {
                 Phase::Stick => self.stick(left_s, arm_m_s),
                 Phase::Slip(sign) => self.slip(left_s, arm_m_s, sign),
             };
+            if self.sticks() != stuck {
+                self.turns.push((until_s - left_s, !stuck));
+            }
         }
     }
 

@@ -98,6 +98,11 @@ pub(super) const STIFFNESS: Bounds = Bounds {
     give: "a stiffness in N/m, 10 to 10 000",
     allows: |n_per_m| (10.0..=10_000.0).contains(&n_per_m),
 };
+pub(super) const STEP: Bounds = Bounds {
+    what: "a step",
+    give: "a time in µs, 0.1 to 250 (a scan)",
+    allows: |us| (0.1..=250.0).contains(&us),
+};
 pub(super) const RESONANCE: Bounds = Bounds {
     what: "a resonance",
     give: "a frequency in Hz, 10 to 2000, or take it out for none",

@@ -10,11 +10,12 @@ use super::bounds::{
     LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
     TRAVEL, WAVELENGTH,
 };
+use super::contact::{self, Scenery};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Friction, Gauges, Kinematic, Link,
-    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link, Motion, Profile,
+    Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use super::{display, fault};
 use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
@@ -30,14 +31,25 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let surface = surface(root.table("surface")?)?;
     let motion = motion(root.table("motion")?, duration_s)?;
     let arm = arm(root.table("arm")?)?;
-    let (contact, contact_given) = contact(root.table("contact")?)?;
     let (gauges, force) = gauges(root.table("gauges")?, duration_s)?;
-    if contact_given && matches!(gauges, Gauges::Recorded(_)) {
-        return Err(root.refuse(
-            "contact",
-            "does not apply to recorded gauges: take [contact] out",
-        ));
-    }
+    let (contact, contact_reason) = match &gauges {
+        Gauges::Kinematic(_) => contact::read(
+            root.table("contact")?,
+            &Scenery {
+                surface: &surface,
+                motion: &motion,
+                stiffness_n_per_m: force.stiffness_n_per_m,
+                duration_s,
+            },
+        )?,
+        Gauges::Recorded(_) if root.contains("contact") => {
+            return Err(root.refuse(
+                "contact",
+                "does not apply to recorded gauges: take [contact] out",
+            ));
+        }
+        Gauges::Recorded(_) => (Contact::KINEMATIC, None),
+    };
     let link = link(root.table("link")?)?;
     let estimator = estimator(root.table("estimator")?, &force)?;
     let display = display::read(root.table("display")?)?;
@@ -55,6 +67,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         motion,
         arm,
         contact,
+        contact_reason,
         gauges,
         force,
         link,
@@ -221,44 +234,6 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
         lag_ms,
         encoder_um,
     })
-}
-
-/// The contact, and whether the section holds anything.
-fn contact(mut table: Table<'_>) -> Result<(Contact, bool), SceneError> {
-    let model = table.choice(
-        "model",
-        &[("auto", 'a'), ("kinematic", 'k'), ("stick-slip", 's')],
-        &["rigid"],
-    )?;
-    let friction = table.choice(
-        "friction",
-        &[
-            ("none", None),
-            ("mild", Some(Friction::Mild)),
-            ("strong", Some(Friction::Strong)),
-            ("severe", Some(Friction::Severe)),
-        ],
-        &[],
-    )?;
-    let contact = match (model, friction) {
-        ('k', Some(_)) => {
-            return Err(table.refuse(
-                "friction",
-                "a \"kinematic\" contact knows no friction: give \"none\", or model = \"stick-slip\"",
-            ));
-        }
-        ('s', None) => {
-            return Err(table.refuse(
-                "friction",
-                "without friction nothing sticks: give \"mild\", \"strong\" or \"severe\", or model = \"kinematic\"",
-            ));
-        }
-        (_, None) => Contact::Kinematic,
-        (_, Some(friction)) => Contact::StickSlip(friction),
-    };
-    let given = table.contains("model") || table.contains("friction");
-    table.finish("")?;
-    Ok((contact, given))
 }
 
 fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), SceneError> {

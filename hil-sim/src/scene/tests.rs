@@ -126,7 +126,7 @@ fn every_key_of_the_contract_parses() {
             stiffness_n_per_m: 800.0
         }
     );
-    assert_eq!(scene.contact, Contact::StickSlip(Friction::Strong));
+    assert_eq!(scene.contact, Contact::stick_slip(Friction::Strong));
     assert_eq!(scene.arm.encoder_um, 50);
     assert_eq!(scene.surface.specimens.len(), 2);
     assert_eq!(scene.surface.specimens[1].length_mm, f64::INFINITY);
@@ -248,7 +248,7 @@ fn all_but_the_specimens_has_a_default() {
             encoder_um: 5,
         }
     );
-    assert_eq!(scene.contact, Contact::Kinematic);
+    assert_eq!(scene.contact, Contact::KINEMATIC);
     assert_eq!(
         scene.force,
         Force {
@@ -276,17 +276,17 @@ fn friction_decides_the_contact_where_it_is_left_open() {
         let text = format!("{SURFACE}[contact]\n{section}");
         Scene::parse(Path::new("x.toml"), &text).unwrap().contact
     };
-    assert_eq!(contact(""), Contact::Kinematic);
-    assert_eq!(contact("model = \"kinematic\""), Contact::Kinematic);
+    assert_eq!(contact(""), Contact::KINEMATIC);
+    assert_eq!(contact("model = \"kinematic\""), Contact::KINEMATIC);
     for (word, friction) in [
         ("mild", Friction::Mild),
         ("strong", Friction::Strong),
         ("severe", Friction::Severe),
     ] {
         let given = format!("friction = \"{word}\"");
-        assert_eq!(contact(&given), Contact::StickSlip(friction));
+        assert_eq!(contact(&given), Contact::stick_slip(friction));
         let both = format!("{given}\nmodel = \"stick-slip\"");
-        assert_eq!(contact(&both), Contact::StickSlip(friction));
+        assert_eq!(contact(&both), Contact::stick_slip(friction));
     }
 }
 

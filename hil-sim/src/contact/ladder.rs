@@ -1,0 +1,102 @@
+//! Which rung a scene needs: the lowest whose next one up would change λ̂'s error by little.
+//!
+//! | what the scene has | rung |
+//! | --- | --- |
+//! | friction | `stick-slip` |
+//! | an arm that speeds up so fast that the spring swings | `viscoelastic` |
+//! | more than one specimen | `rigid` |
+//! | none of these | `kinematic` |
+//!
+//! hil-sim/tests/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
+//! by less than [`ENOUGH_PERCENT`] or [`ENOUGH_SHARE`] of itself, whichever is more. And for each rung it
+//! has a scene that the rung below does not do.
+
+use crate::scene::{Friction, Motion, Rung, Surface};
+
+use super::spring::Hanging;
+
+/// Change of λ̂'s RMS error that is no reason for a higher rung, in percent of λ.
+pub const ENOUGH_PERCENT: f64 = 0.25;
+/// The same as a share of the error, where that is more.
+pub const ENOUGH_SHARE: f64 = 0.25;
+/// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
+/// on single hops, and no two models of friction hop alike.
+pub const ENOUGH_BLIND_PERCENT: f64 = 2.0;
+/// RMS of the velocity by which a fingertip on a spring may differ from the arm's, as a share of the arm's
+/// RMS velocity: what goes into λ as it is.
+pub const SWING_SHARE: f64 = 0.005;
+
+/// Between two places of the arm that are looked at, in s: a scan.
+const LOOK_S: f64 = 250e-6;
+/// The longest that is looked at, in s: of a long scene its beginning.
+const LONGEST_S: f64 = 30.0;
+
+/// A rung, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The rung.
+    pub rung: Rung,
+    /// What of the scene asks for it, in words.
+    pub reason: String,
+}
+
+/// The lowest rung that is good enough for computed gauges on `surface` that are moved as `motion` says
+/// for `duration_s`; `stiffness_n_per_m` is the fingertip's, towards shear.
+pub fn choose(
+    surface: &Surface,
+    motion: &Motion,
+    friction: Option<Friction>,
+    stiffness_n_per_m: f64,
+    duration_s: f64,
+) -> Choice {
+    let choice = |rung, reason| Choice { rung, reason };
+    if friction.is_some() {
+        return choice(
+            Rung::StickSlip,
+            "there is friction: the fingertip sticks and slips".to_owned(),
+        );
+    }
+    let swing = swing_share(motion, stiffness_n_per_m, duration_s);
+    if swing > SWING_SHARE {
+        return choice(
+            Rung::Viscoelastic,
+            format!(
+                "the hand speeds up so fast that the fingertip swings on its spring by {:.1} % of the hand's velocity",
+                100.0 * swing
+            ),
+        );
+    }
+    if surface.specimens.len() > 1 {
+        return choice(
+            Rung::Rigid,
+            "a border between specimens passes under the fingertip bit by bit".to_owned(),
+        );
+    }
+    choice(
+        Rung::Kinematic,
+        "one specimen, no friction, and a hand that the fingertip keeps up with".to_owned(),
+    )
+}
+
+/// RMS of v − v_arm over the RMS of v_arm, of a fingertip on a spring; 0 of an arm at rest.
+fn swing_share(motion: &Motion, stiffness_n_per_m: f64, duration_s: f64) -> f64 {
+    if let Motion::Constant { .. } | Motion::Live(_) = motion {
+        return 0.0;
+    }
+    let mut hanging = Hanging::new(stiffness_n_per_m);
+    let (mut off, mut all) = (0.0, 0.0);
+    let looks = (duration_s.min(LONGEST_S) / LOOK_S).ceil() as u64;
+    let mut before_m = motion.position_mm(0.0) * 1e-3;
+    for look in 0..=looks {
+        let t_s = look as f64 * LOOK_S;
+        let arm_m = motion.position_mm(t_s) * 1e-3;
+        hanging.follow(t_s, arm_m);
+        if look > 0 {
+            let arm_m_s = (arm_m - before_m) / LOOK_S;
+            off += (hanging.velocity_m_s() - arm_m_s).powi(2);
+            all += arm_m_s * arm_m_s;
+        }
+        before_m = arm_m;
+    }
+    if all > 0.0 { (off / all).sqrt() } else { 0.0 }
+}

@@ -1,0 +1,108 @@
+//! A fingertip whose equations are integrated by steps.
+
+use super::integrator::{Integrator, System};
+
+/// Share of a step by which a step may be longer than asked for, so that no splinter is left at a scan's
+/// end.
+const SPLINTER: f64 = 1e-6;
+/// The fingertip rests while it is slower than this, in m/s: in a second it creeps 0.2 mm, a fifth of the
+/// shortest wave. Bristles know no rest that is exact.
+pub const CREEP_M_S: f64 = 2e-4;
+
+/// The equations, how they are integrated, and where the fingertip is.
+#[derive(Clone, Debug)]
+pub struct Stepped<S, const N: usize> {
+    system: S,
+    integrator: Integrator,
+    /// Longest step; infinite to go from scan to scan at once.
+    step_s: f64,
+    /// The last instant and the arm's place then; none before the fingertip is set down.
+    last: Option<(f64, f64)>,
+    /// Stretch in m, velocity in m/s, and what else the system has; none until the arm's first velocity
+    /// is known.
+    state: Option<[f64; N]>,
+    /// Whether it is set down with the arm's velocity, or at rest.
+    moving: bool,
+    /// Passages from rest to slip and back: when, and whether it rests from then on.
+    turns: Vec<(f64, bool)>,
+}
+
+impl<S: System<N>, const N: usize> Stepped<S, N> {
+    /// A fingertip that is set down relaxed at the first scan: with the arm's velocity if `moving`, else
+    /// at rest. Steps are `step_s` at most, and end with each scan.
+    pub fn new(system: S, integrator: Integrator, step_s: f64, moving: bool) -> Self {
+        Self {
+            system,
+            integrator,
+            step_s,
+            last: None,
+            state: None,
+            moving,
+            turns: Vec::new(),
+        }
+    }
+
+    /// Moves on to `t_s`, the arm in a straight line to `arm_m`. Nothing happens if `t_s` is not after
+    /// the last.
+    pub fn follow(&mut self, t_s: f64, arm_m: f64) {
+        let Some((last_s, last_m)) = self.last else {
+            self.last = Some((t_s, arm_m));
+            return;
+        };
+        let time_s = t_s - last_s;
+        if time_s <= 0.0 {
+            return;
+        }
+        self.last = Some((t_s, arm_m));
+        let arm_m_s = (arm_m - last_m) / time_s;
+        let mut state = self.state.unwrap_or_else(|| {
+            let mut state = [0.0; N];
+            if self.moving {
+                state[S::VELOCITY] = arm_m_s;
+            }
+            state
+        });
+        let steps = (time_s / self.step_s - SPLINTER).ceil().max(1.0);
+        let step_s = time_s / steps;
+        for step in 0..steps as u64 {
+            let before_m_s = state[S::VELOCITY].abs();
+            state = self
+                .integrator
+                .advance(&self.system, state, step_s, arm_m_s);
+            let after_m_s = state[S::VELOCITY].abs();
+            let rests = after_m_s < CREEP_M_S;
+            if rests != (before_m_s < CREEP_M_S) {
+                let share = (CREEP_M_S - before_m_s) / (after_m_s - before_m_s);
+                self.turns
+                    .push((last_s + (step as f64 + share) * step_s, rests));
+            }
+        }
+        self.state = Some(state);
+    }
+
+    /// The state: stretch in m first, then velocity in m/s; all zero before the second scan.
+    pub fn state(&self) -> [f64; N] {
+        self.state.unwrap_or([0.0; N])
+    }
+
+    /// x_arm − x in m.
+    pub fn stretch_m(&self) -> f64 {
+        self.state()[0]
+    }
+
+    /// Whether it creeps at most.
+    pub fn sticks(&self) -> bool {
+        self.state()[S::VELOCITY].abs() < CREEP_M_S
+    }
+
+    /// Passages from rest to slip and back since this was last asked: when, in s, and whether it rests
+    /// from then on.
+    pub fn take_turns(&mut self) -> Vec<(f64, bool)> {
+        std::mem::take(&mut self.turns)
+    }
+
+    /// The equations.
+    pub fn system(&self) -> &S {
+        &self.system
+    }
+}
