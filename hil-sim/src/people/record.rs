@@ -21,6 +21,8 @@ pub fn json(study: &Study) -> serde_json::Result<String> {
         half_an_answer,
         left_out,
         as_it_is,
+        simulated,
+        rejected_though_true,
         ..
     } = &study.recount;
     let mut value = serde_json::to_value(study)?;
@@ -31,6 +33,8 @@ pub fn json(study: &Study) -> serde_json::Result<String> {
             "test": half_an_answer,
             "test_without_the_cell": left_out,
             "test_with_the_cell_at_one": as_it_is,
+            "test_by_simulation": simulated,
+            "rejected_though_true": rejected_though_true,
         });
         fields.insert("paper_recounted".into(), recount);
     }
@@ -175,10 +179,12 @@ fn mosteller(study: &Study) -> Result<String, csv::Error> {
         half_an_answer,
         left_out,
         as_it_is,
+        simulated,
         ..
     } = study.recount;
     let mut tests: Vec<(String, Test)> = vec![
         ("paper, cell of 1.00 as 0.95".into(), half_an_answer),
+        ("paper, the same by simulation".into(), simulated),
         ("paper, cell of 1.00 left out".into(), left_out),
         ("paper, cell of 1.00 as it is".into(), as_it_is),
     ];
