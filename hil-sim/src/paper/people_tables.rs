@@ -138,7 +138,8 @@ pub(super) fn table_3(study: &Study) -> Exhibit {
         title: "Table III: shares of correct answers in paired comparison".into(),
         paper: format!(
             "One subject, ten trials a pair. Ours: {} trials, Wilson's 95 % intervals (for the mean: the middle 95 % \
-             of {} such experiments).",
+             of {} such experiments), all with the same rubs of each specimen: another seed, which is another hand, \
+             moves the counts' means by some hundredths.",
             study.trials, study.repetitions
         ),
         seen: format!(

@@ -28,7 +28,8 @@ pub const REPETITIONS: u32 = 2_000;
 pub const SNR_DB: f64 = 20.0;
 /// The bits of a seed that a scene's file may have: its numbers are signed.
 const SCENE_SEED: u64 = u64::MAX >> 1;
-/// How long each specimen is rubbed, in s.
+/// How long each specimen is rubbed, in s. All repetitions are of the same rubs: what another hand would change,
+/// another seed shows.
 const RUB_S: f64 = 4.0;
 /// From when on it is felt, in s: the boards have started.
 const FELT_FROM_S: f64 = 0.5;

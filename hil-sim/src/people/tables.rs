@@ -149,8 +149,9 @@ fn shares(study: &Study) -> String {
     }
     let _ = writeln!(
         text,
-        "\n\nThe mean's interval is the middle 95 % of {} such experiments. Mean share in the long run if a\n\
-         sensation is gathered over one wave, {} s (taken above, a guess), a stroke:",
+        "\n\nThe mean's interval is the middle 95 % of {} such experiments, all with the same rubs of these specimens:\n\
+         another --seed is another hand and other noise, which moves the counts' means by some hundredths.\n\
+         Mean share in the long run if a sensation is gathered over one wave, {} s (taken above, a guess), a stroke:",
         study.repetitions, study.glimpse_s,
     );
     for compared in &study.methods {
