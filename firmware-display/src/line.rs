@@ -1,6 +1,6 @@
 //! What the display board's console says to a person, a line a second.
 
-use protocol::line::{HELP as HEAD, age, counters, put, velocity, wavelength};
+use protocol::line::{HELP as HEAD, age, counters, make_room, put, velocity, wavelength};
 use protocol::{Latest, Line, RoleCounters, Status};
 
 /// What the columns of [`line`] mean, and the keys.
@@ -21,7 +21,8 @@ pub const HELP: [&str; 11] = [
 /// The answer to a key that asks for a stop.
 pub const STOPPING: &str = "stopping: 0 V until the reset button or power";
 
-/// The display in a line.
+/// The display in a line. Where a reason leaves no room for all in a row of a terminal, the counters go first
+/// and then the age.
 pub fn line(latest: &Latest, status: &Status) -> Line {
     let mut line = Line::new();
     wavelength(&mut line, latest);
@@ -29,9 +30,16 @@ pub fn line(latest: &Latest, status: &Status) -> Line {
         &mut line,
         latest.motion().map(|motion| motion.velocity_um_s),
     );
+    let before_age = line.len();
     age(&mut line, latest.estimate_age_ms(status.uptime_us));
     if let RoleCounters::Display(display) = &status.role {
+        let before_counters = line.len();
         counters(&mut line, &status.peer, display.deadline_misses);
+        if let Some(reason) = display.state.reason() {
+            let needed = "  : ".len() + display.state.name().len() + reason.len();
+            make_room(&mut line, before_counters, needed);
+            make_room(&mut line, before_age, needed);
+        }
         put(&mut line, format_args!("  {}", display.state));
     }
     line
@@ -43,6 +51,8 @@ mod tests {
         Contact, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth, Hold, Message,
         Motion, PortCounters, Range, ResetCause, Trip,
     };
+
+    use protocol::line::WIDTH;
 
     use super::*;
 
@@ -103,8 +113,30 @@ mod tests {
         let state = DisplayState::Stopped(Trip::EmergencyStop);
         assert_eq!(
             line(&Latest::new(), &status(1_000_000, state)),
-            "lambda none            v      - mm/s  age   - ms  lost 0 bad 0 miss 0  \
-             stopped: emergency stop"
+            "lambda none            v      - mm/s  age   - ms  stopped: emergency stop"
+        );
+    }
+
+    #[test]
+    fn every_reason_stands_in_a_row_of_a_terminal() {
+        let mut latest = Latest::new();
+        latest.heard(2_992_000, &estimate(2.001));
+        latest.said(&motion(-69_960));
+        for state in Hold::ALL
+            .map(DisplayState::Fading)
+            .into_iter()
+            .chain(Trip::ALL.map(DisplayState::Stopped))
+        {
+            let line = line(&latest, &status(3_000_000, state));
+            assert!(line.len() <= WIDTH, "{line}");
+            assert!(line.ends_with(state.reason().unwrap_or_default()), "{line}");
+        }
+        assert_eq!(
+            line(
+                &latest,
+                &status(3_000_000, DisplayState::Fading(Hold::Contradiction))
+            ),
+            "lambda 2.001 mm valid  v  -70.0 mm/s  fading: the arm moves, the hand does not"
         );
     }
 

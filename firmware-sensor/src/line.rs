@@ -1,7 +1,7 @@
 //! What the sensor board's console says to a person, a line a second.
 
-use protocol::line::{HELP as HEAD, age, counters, put, velocity, wavelength};
-use protocol::{GaugeHealth, Latest, Line, RoleCounters, Status};
+use protocol::line::{HELP as HEAD, age, counters, make_room, put, velocity, wavelength};
+use protocol::{GAUGES, GaugeHealth, Latest, Line, RoleCounters, Status};
 
 /// What the columns of [`line`] mean, and the keys.
 pub const HELP: [&str; 11] = [
@@ -22,42 +22,58 @@ pub const HELP: [&str; 11] = [
 pub const NOT_STOPPING: &str =
     "NOT stopped: type ! on the display board's console, or open its emergency stop";
 
-/// The sensor in a line.
+/// The sensor in a line. Where gauges in trouble leave no room for all in a row of a terminal, the counters go
+/// first and then the age.
 pub fn line(latest: &Latest, status: &Status) -> Line {
     let mut line = Line::new();
     wavelength(&mut line, latest);
     let estimate = latest.estimate();
     velocity(&mut line, estimate.map(|estimate| estimate.velocity_um_s));
+    let before_age = line.len();
     age(&mut line, latest.motion_age_ms(status.uptime_us));
+    let before_counters = line.len();
     if let RoleCounters::Sensor(sensor) = &status.role {
         counters(&mut line, &status.peer, sensor.deadline_misses);
     }
     if let Some(estimate) = estimate {
-        gauges(&mut line, &estimate.health);
+        if estimate.health == [GaugeHealth::Good; GAUGES] {
+            put(&mut line, format_args!("  gauges ok"));
+        } else {
+            let words = trouble(&estimate.health);
+            make_room(&mut line, before_counters, words.len());
+            make_room(&mut line, before_age, words.len());
+            put(&mut line, format_args!("{words}"));
+        }
     }
     line
 }
 
-/// What is wrong with which gauge.
-fn gauges(line: &mut Line, health: &[GaugeHealth]) {
-    put(line, format_args!("  gauges"));
-    let mut before = "";
-    for (gauge, health) in health.iter().enumerate() {
-        if *health != GaugeHealth::Good {
-            put(line, format_args!("{before} {gauge} {}", health.name()));
-            before = ",";
+/// What is wrong with which gauges: those that have the same, and stand next to each other, are told of at once.
+fn trouble(health: &[GaugeHealth; GAUGES]) -> Line {
+    let mut line = Line::new();
+    put(&mut line, format_args!("  gauges"));
+    let mut between = "";
+    for (gauge, own) in health.iter().enumerate() {
+        if *own == GaugeHealth::Good {
+            continue;
+        }
+        put(&mut line, format_args!("{between} {gauge}"));
+        between = "";
+        if health.get(gauge + 1) != Some(own) {
+            put(&mut line, format_args!(" {}", own.name()));
+            between = ",";
         }
     }
-    if before.is_empty() {
-        put(line, format_args!(" ok"));
-    }
+    line
 }
 
 #[cfg(test)]
 mod tests {
     use protocol::{
-        Contact, Estimate, GAUGES, Message, Motion, PortCounters, Range, ResetCause, SensorCounters,
+        Contact, Estimate, Message, Motion, PortCounters, Range, ResetCause, SensorCounters,
     };
+
+    use protocol::line::WIDTH;
 
     use super::*;
 
@@ -115,8 +131,24 @@ mod tests {
         let mut health = [GaugeHealth::Good; GAUGES];
         health[1] = GaugeHealth::Dead;
         health[4] = GaugeHealth::Hum;
-        let line = line(&latest(2.001, 70_000, health), &status(3_000_000));
-        assert!(line.ends_with("  gauges 1 dead, 4 hum"), "{line}");
+        let words = |health| line(&latest(2.001, 70_000, health), &status(3_000_000));
+        assert_eq!(
+            words(health),
+            "lambda 2.001 mm valid  v   70.0 mm/s  age   2 ms  gauges 1 dead, 4 hum"
+        );
+        assert_eq!(
+            words([GaugeHealth::Dead; GAUGES]),
+            "lambda 2.001 mm valid  v   70.0 mm/s  age   2 ms  gauges 0 1 2 3 4 dead"
+        );
+        health[2] = GaugeHealth::Saturated;
+        assert_eq!(
+            words(health),
+            "lambda 2.001 mm valid  v   70.0 mm/s  gauges 1 dead, 2 saturated, 4 hum"
+        );
+        health[0] = GaugeHealth::Dead;
+        let most = words(health);
+        assert!(most.ends_with("  gauges 0 1 dead, 2 saturated, 4 hum"));
+        assert!(most.len() <= WIDTH, "{most}");
     }
 
     #[test]

@@ -4,7 +4,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hil_sim::native;
-use hil_sim::scene::{Gauges, Kinematic, Link, Motion, Scene};
+use hil_sim::scene::{Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene};
+use protocol::Method;
 
 const VIRTUAL_S: u64 = 10;
 
@@ -43,6 +44,30 @@ fn native_engine(criterion: &mut Criterion) {
                     loss: 0.05,
                     reorder: 0.02,
                     corrupt: 0.0002,
+                },
+                ..scene()
+            },
+        ),
+        (
+            "stick-slip",
+            Scene {
+                contact: Contact::stick_slip(Friction::Strong),
+                ..scene()
+            },
+        ),
+        (
+            "viscoelastic",
+            Scene {
+                contact: Contact::of(Rung::Viscoelastic, None),
+                ..scene()
+            },
+        ),
+        (
+            "counting",
+            Scene {
+                estimator: Estimator {
+                    method: Method::Counting,
+                    ..Estimator::default()
                 },
                 ..scene()
             },

@@ -30,10 +30,13 @@ pub use bristles::{BRISTLES_DAMPING, BRISTLES_N_PER_M, Bristles};
 pub use integrator::Integrator;
 pub use slider::{DAMPING_N_S_PER_M, MASS_KG, STEP_SHARE, Slider};
 pub use spring::{Hanging, Spring};
-pub use stepped::{CREEP_M_S, Stepped};
+pub use stepped::{CREEP_M_S, SLIP_M_S, Stepped};
 pub use stribeck::{KINETIC, NORMAL_N, STRIBECK_M_S, Stribeck};
 
 const MM_PER_M: f64 = 1000.0;
+/// After so long, in s, a method that chooses its own steps is asked at least whether the fingertip has come
+/// to rest or broken away: a quarter of a scan.
+pub const EVENT_STEP_S: f64 = 62.5e-6;
 
 /// The fingertip at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +71,7 @@ impl Contact {
         let spring = Spring { stiffness_n_per_m };
         let bristles =
             |friction: Friction| Bristles::new(Stribeck::new(friction), stiffness_n_per_m);
-        let smallest = (Integrator::Radau, f64::INFINITY);
+        let smallest = (Integrator::Radau, EVENT_STEP_S);
         let (integrator, step_s) = match (contact.rung, contact.solver) {
             (Rung::Reference, _) => smallest,
             (_, Solver::Stepped { integrator, step_s }) => (integrator, step_s),

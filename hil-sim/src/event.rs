@@ -282,13 +282,15 @@ mod tests {
                 matches!(kind, Kind::Stick | Kind::Slip)
             })
         };
-        let reference = run(Integrator::Radau, f64::INFINITY);
+        let reference = run(Integrator::Rk4, 1.0);
         assert!(reference.len() >= 6, "{reference:?}");
         for (integrator, step_us) in [
             (Integrator::Rk4, 2.0),
             (Integrator::Rk4, 5.0),
             (Integrator::Implicit, 5.0),
-            (Integrator::Adaptive, f64::INFINITY),
+            (Integrator::SemiImplicit, 2.0),
+            (Integrator::Adaptive, 62.5),
+            (Integrator::Radau, 62.5),
         ] {
             let found = run(integrator, step_us);
             assert_eq!(found.len(), reference.len(), "{integrator:?} {step_us} µs");
@@ -318,7 +320,7 @@ mod tests {
         let hand = of(&events, |kind| kind == Kind::HandReversal);
         let arm = of(&events, |kind| kind == Kind::ArmReversal);
         assert_eq!((hand.len(), arm.len()), (1, 1), "{events:?}");
-        // The drive's lag, and the link's and the follower's few milliseconds.
-        assert!((0.015..0.05).contains(&(arm[0] - hand[0])), "{events:?}");
+        // Behind the hand by the link's milliseconds and what the follower does not make up of the lag.
+        assert!((0.002..0.03).contains(&(arm[0] - hand[0])), "{events:?}");
     }
 }

@@ -111,11 +111,11 @@ fn the_next_rung_up_changes_no_committed_scene_by_more_than_is_stated() {
 #[test]
 fn each_rung_has_a_scene_that_the_rung_below_does_not_do() {
     for (file, below) in [
-        ("short-specimens", Rung::Kinematic),
-        ("shaking", Rung::Rigid),
-        ("sticky", Rung::Viscoelastic),
+        ("estimation/boundary/50mm-s-b", Rung::Kinematic),
+        ("ladder/shaking", Rung::Rigid),
+        ("ladder/sticky", Rung::Viscoelastic),
     ] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/ladder/{file}.toml"));
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{file}.toml"));
         let scene = Scene::load(&path).expect("a committed scene is usable");
         assert!(scene.contact.rung > below, "{file}");
         assert!(scene.contact_reason.is_some(), "{file} is left to \"auto\"");

@@ -40,7 +40,7 @@ use queue::{Queue, Taken};
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);
-/// How long an MCAP file gets before another one follows: its index takes some 7 MB of memory until then.
+/// How long an MCAP file gets before another one follows: its index takes some 10 MB of memory until then.
 pub const PART: Duration = Duration::from_secs(4 * 3_600);
 
 /// Where a recording goes.
@@ -248,5 +248,79 @@ fn all_safe(tally: Tally, safe_bytes: u64) -> Progress {
         safe_samples: tally.samples,
         safe_bytes,
         failed: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use protocol::{Message, Ping};
+
+    use super::*;
+
+    /// Far more than anything here takes.
+    const LIMIT: Duration = Duration::from_secs(30);
+
+    fn heard(at_us: u64) -> Event {
+        Event::Heard {
+            at_us,
+            message: Message::Ping(Ping { sent_us: at_us }),
+        }
+    }
+
+    #[test]
+    fn a_disk_that_is_full_ends_the_recording_and_holds_nobody_up() {
+        let settings = Settings {
+            mcap: Some("/dev/full".into()),
+            force: true,
+            ..Settings::default()
+        };
+        // What is made first may be refused already, or what is synced first.
+        let error = match Recorder::start(settings) {
+            Err(error) => error,
+            Ok(recorder) => {
+                let end = Instant::now() + LIMIT;
+                while !recorder.progress().failed && Instant::now() < end {
+                    recorder.on_event(Role::Sensor, &heard(1));
+                    thread::park_timeout(Duration::from_millis(1));
+                }
+                // Far more than the queue takes: it is thrown away at once.
+                let began = Instant::now();
+                (0..100_000).for_each(|at_us| recorder.on_event(Role::Sensor, &heard(at_us)));
+                assert!(began.elapsed() < LIMIT, "{:?}", began.elapsed());
+                recorder.stop().expect_err("nothing can be written")
+            }
+        };
+        let RecordingError::NotWritten { path, source, .. } = &error else {
+            panic!("{error}");
+        };
+        assert_eq!(path, Path::new("/dev/full"));
+        assert_eq!(source.kind(), std::io::ErrorKind::StorageFull, "{error}");
+    }
+
+    #[test]
+    fn what_was_heard_is_safe_within_a_second_and_so_counted() {
+        let folder = std::env::temp_dir().join(format!("ridgelink-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        let recorder = Recorder::start(Settings {
+            csv: Some(folder.clone()),
+            ..Settings::default()
+        })
+        .unwrap_or_else(|error| panic!("{error}"));
+        (0..10).for_each(|at_us| recorder.on_event(Role::Display, &heard(at_us)));
+        let end = Instant::now() + LIMIT;
+        while recorder.progress().safe_messages < 10 && Instant::now() < end {
+            thread::park_timeout(Duration::from_millis(1));
+        }
+        let progress = recorder.progress();
+        let bytes: u64 = std::fs::read_dir(&folder)
+            .expect("the folder was made")
+            .map(|file| file.and_then(|file| file.metadata()).expect("a file").len())
+            .sum();
+        assert_eq!((progress.safe_messages, progress.safe_bytes), (10, bytes));
+        let ended = recorder.stop().unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(ended.tally.messages, 10);
+        std::fs::remove_dir_all(&folder).expect("the folder is there");
     }
 }

@@ -10,6 +10,9 @@ use crate::hello::Hello;
 use crate::latest::Latest;
 use crate::status::{PortCounters, Status};
 
+/// Characters in a row of a terminal.
+pub const WIDTH: usize = 80;
+
 /// How every help text begins.
 pub const HELP: [&str; 3] = [
     "One line a second. As soon as a program says Hello, this port speaks frames",
@@ -93,6 +96,13 @@ pub fn counters(line: &mut Line, peer: &PortCounters, missed: u32) {
         .wrapping_add(peer.foreign);
     let lost = peer.lost;
     put(line, format_args!("  lost {lost} bad {bad} miss {missed}"));
+}
+
+/// Takes back what was put since the line was `before` long, if it leaves less than `needed` of [`WIDTH`].
+pub fn make_room(line: &mut Line, before: usize, needed: usize) {
+    if line.len() + needed > WIDTH {
+        line.truncate(before);
+    }
 }
 
 /// Puts words at the end; what does not fit is cut off.
@@ -202,6 +212,16 @@ mod tests {
         };
         counters(&mut line, &peer, 7);
         assert_eq!(line, "  lost 1 bad 1112 miss 7");
+    }
+
+    #[test]
+    fn room_is_made_only_where_it_is_needed() {
+        for (needed, left) in [(76, "four"), (77, "fo")] {
+            let mut line = Line::new();
+            put(&mut line, format_args!("four"));
+            make_room(&mut line, 2, needed);
+            assert_eq!(line, left);
+        }
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::elves;
 pub const BAUD: u32 = 921_600;
 /// What is waited for comes long before.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(1);
 /// How long a port is listened to at a time.
 const LISTENS: Duration = Duration::from_millis(20);
 /// How often one stays: well within what a board waits for at the fastest pace here.
@@ -61,7 +63,8 @@ pub fn until<T>(what: &str, mut wanted: impl FnMut() -> Option<T>) -> T {
             return found;
         }
         assert!(begun.elapsed() < PATIENCE, "{what}: not in a minute");
-        std::thread::yield_now();
+        // Whoever looks without a pause takes from the boards the time in which it happens.
+        std::thread::park_timeout(LOOK);
     }
 }
 

@@ -1,17 +1,14 @@
 //! `host-bridge doctor` before the two boards' own firmware, on an emulated bench at real time.
 
 use std::fs::OpenOptions;
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use hil_sim::serve::{self, Bench, Options, PortName};
+use hil_sim::serve::{self, Bench, PortName};
 use protocol::Role;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
-use tests::bench::BAUD;
+use tests::bench::{Alone, BAUD, bench};
 use tests::bridge::{self, Ended, Running};
-use tests::elves;
 use tests::fake_board::wait_until;
 
 /// Far more than a look takes on a busy machine.
@@ -21,23 +18,6 @@ const LIMIT: Duration = Duration::from_secs(300);
 const GARBLED: Duration = Duration::from_secs(6);
 /// What an emulator that does not keep pace with the wall clock is found by.
 const OF_A_SLOW_MACHINE: [&str; 3] = ["drift", "rate", "round-trip"];
-
-/// One bench at a time: two of them would take each other's time.
-fn alone() -> MutexGuard<'static, ()> {
-    static ALONE: Mutex<()> = Mutex::new(());
-    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn options(test: &str) -> Options {
-    let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("bridge_doctor_boards")
-        .join(test);
-    Options::new(folder)
-}
-
-fn bench(options: Options) -> Bench {
-    Bench::start(options, elves::both()).expect("the bench can be set up")
-}
 
 /// A doctor that looks until it is interrupted: for how long, the boards' time decides, and not how fast
 /// this machine emulates them.
@@ -97,11 +77,21 @@ fn found(board: &str, kind: &str) -> (String, String) {
     (board.to_owned(), kind.to_owned())
 }
 
+/// One pair of boards for all that leaves it as it was: what an emulated pair takes longest for is its start.
+/// Those come first that want nothing found at all.
 #[test]
-fn boards_that_are_well_are_told_so() {
-    let _alone = alone();
-    let bench = bench(options("well"));
-    let ended = look(&bench, 2.2);
+fn a_day_at_one_bench() {
+    let Alone { bench, .. } = &bench("doctor", |_| {});
+    boards_that_are_well_are_told_so(bench);
+    a_second_doctor_is_told_that_the_ports_are_busy(bench);
+    a_cable_pulled_and_put_back_is_noticed(bench);
+    an_emergency_stop_is_named(bench);
+    a_board_that_restarts_is_noticed(bench);
+    a_wrong_baud_rate_is_garbage_and_named(bench);
+}
+
+fn boards_that_are_well_are_told_so(bench: &Bench) {
+    let ended = look(bench, 2.2);
     let document = document(&ended);
     let (findings, is_slow) = findings(&document);
     assert_eq!(findings, [], "{document:#}");
@@ -118,14 +108,11 @@ fn boards_that_are_well_are_told_so() {
     assert_eq!(document["boards"][0]["gauges"][0], "good");
 }
 
-#[test]
-fn an_emergency_stop_is_named() {
-    let _alone = alone();
-    let bench = bench(options("stop"));
+fn an_emergency_stop_is_named(bench: &Bench) {
     bench
         .command(serve::Command::Stop)
         .expect("the bench stands");
-    let document = document(&look(&bench, 1.2));
+    let document = document(&look(bench, 1.2));
     let (findings, _) = findings(&document);
     assert_eq!(findings, [found("display", "stopped")], "{document:#}");
     assert_eq!(
@@ -134,19 +121,16 @@ fn an_emergency_stop_is_named() {
     );
 }
 
-#[test]
-fn a_cable_pulled_and_put_back_is_noticed() {
-    let _alone = alone();
-    let bench = bench(options("cable"));
-    let doctor = start(&bench);
+fn a_cable_pulled_and_put_back_is_noticed(bench: &Bench) {
+    let doctor = start(bench);
     let port = PortName::SensorConsole;
     // The board is heard first.
-    pass(&bench, 0.5);
+    pass(bench, 0.5);
     bench.pull(port).expect("the port is there");
-    pass(&bench, 0.3);
+    pass(bench, 0.3);
     bench.plug(port).expect("the port can be made");
     assert!(wait_until(LIMIT, || bench.has_client(port)));
-    pass(&bench, 1.2);
+    pass(bench, 1.2);
     let ended = end(doctor);
     let document = document(&ended);
     let (findings, _) = findings(&document);
@@ -156,16 +140,13 @@ fn a_cable_pulled_and_put_back_is_noticed() {
     assert_eq!(document["boards"][0]["losses"], 1);
 }
 
-#[test]
-fn a_board_that_restarts_is_noticed() {
-    let _alone = alone();
-    let bench = bench(options("reset"));
-    let doctor = start(&bench);
-    pass(&bench, 0.7);
+fn a_board_that_restarts_is_noticed(bench: &Bench) {
+    let doctor = start(bench);
+    pass(bench, 0.7);
     bench
         .command(serve::Command::Reset(Role::Sensor))
         .expect("the bench stands");
-    pass(&bench, 1.5);
+    pass(bench, 1.5);
     let document = document(&end(doctor));
     let (findings, _) = findings(&document);
     assert!(
@@ -178,12 +159,8 @@ fn a_board_that_restarts_is_noticed() {
 
 #[test]
 fn boards_that_are_not_joined_hear_nothing_of_each_other() {
-    let _alone = alone();
-    let bench = bench(Options {
-        is_apart: true,
-        ..options("apart")
-    });
-    let document = document(&look(&bench, 2.2));
+    let alone = bench("doctor-apart", |options| options.is_apart = true);
+    let document = document(&look(&alone.bench, 2.2));
     let (findings, _) = findings(&document);
     assert!(
         findings.contains(&found("bench", "peer-link")),
@@ -191,10 +168,7 @@ fn boards_that_are_not_joined_hear_nothing_of_each_other() {
     );
 }
 
-#[test]
-fn a_wrong_baud_rate_is_garbage_and_named() {
-    let _alone = alone();
-    let bench = bench(options("baud"));
+fn a_wrong_baud_rate_is_garbage_and_named(bench: &Bench) {
     let path = bench.path(PortName::DisplayConsole);
     // Opened before the doctor has it for itself.
     let port = OpenOptions::new()
@@ -203,11 +177,16 @@ fn a_wrong_baud_rate_is_garbage_and_named() {
         .expect("the port is there");
     // Not by stty, which does not know a rate without a name of its own.
     let rate = || tcgetattr(&port).expect("a terminal").output_speed();
-    let doctor = start(&bench);
+    let set_rate = |rate| {
+        let mut settings = tcgetattr(&port).expect("a terminal");
+        settings.set_speed(rate).expect("a rate");
+        tcsetattr(&port, OptionalActions::Now, &settings).expect("a terminal");
+    };
+    // The doctor before has left its own.
+    set_rate(38_400);
+    let doctor = start(bench);
     assert!(wait_until(LIMIT, || rate() == BAUD));
-    let mut settings = tcgetattr(&port).expect("a terminal");
-    settings.set_speed(115_200).expect("a rate");
-    tcsetattr(&port, OptionalActions::Now, &settings).expect("a terminal");
+    set_rate(115_200);
     let end_of_garbling = Instant::now() + GARBLED;
     assert!(wait_until(LIMIT, || Instant::now() >= end_of_garbling));
     let document = document(&end(doctor));
@@ -220,19 +199,16 @@ fn a_wrong_baud_rate_is_garbage_and_named() {
     assert!(advice.contains("921600 baud, 8N1"), "{advice}");
 }
 
-#[test]
-fn a_second_doctor_is_told_that_the_ports_are_busy() {
-    let _alone = alone();
-    let bench = bench(options("busy"));
-    let first = start(&bench);
+fn a_second_doctor_is_told_that_the_ports_are_busy(bench: &Bench) {
+    let first = start(bench);
     // It finds nobody to listen to, and ends by itself.
-    let second = document(&start(&bench).wait(LIMIT));
+    let second = document(&start(bench).wait(LIMIT));
     assert_eq!(
         findings(&second).0,
         [found("sensor", "busy"), found("display", "busy")]
     );
     // The first one is not disturbed.
-    pass(&bench, 1.2);
+    pass(bench, 1.2);
     let first = document(&end(first));
     assert_eq!(findings(&first).0, [], "{first:#}");
 }

@@ -11,7 +11,9 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
+use host_bridge::recording::reader::Reader;
+use host_bridge::recording::row::Row;
+use protocol::{DisplayState, Hello, Hold, Role, SensorConfiguration, Stop, StopReason};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
 use tests::fake_board::{FakeBoard, wait_until};
@@ -488,15 +490,36 @@ fn a_key_records_what_can_be_watched_again() {
     let file = folder.join("monitor-1.mcap");
     let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > 100_000);
     assert!(wait_until(LIMIT, is_long));
+    // The gauges stream for as long, and nothing else is changed.
+    let streaming = SensorConfiguration {
+        stream_gauges: true,
+        ..SensorConfiguration::DEFAULT
+    };
+    assert_eq!(running.bench().sensing, streaming);
     terminal.type_keys("r");
     assert!(
         terminal.shows(LIMIT, "recorded: "),
         "{}",
         terminal.last_shown()
     );
+    assert_eq!(running.bench().sensing, SensorConfiguration::DEFAULT);
+    // A second one is ended by the end of the program.
+    terminal.type_keys("r");
+    let streams = || running.bench().sensing == streaming;
+    assert!(wait_until(LIMIT, streams));
     terminal.type_keys("q");
     assert!(ended(&mut child).success());
+    assert_eq!(running.bench().sensing, SensorConfiguration::DEFAULT);
     drop(running);
+    let mut reader = Reader::open(&file).unwrap_or_else(|error| panic!("{error}"));
+    let mut has_gauges = false;
+    while let Some(entry) = reader
+        .next_entry()
+        .unwrap_or_else(|error| panic!("{error}"))
+    {
+        has_gauges |= matches!(entry.row, Row::Gauges(_));
+    }
+    assert!(has_gauges);
 
     let mut command = bridge::command();
     command.args(["replay", "--to", "monitor"]).arg(&file);

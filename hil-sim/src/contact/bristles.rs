@@ -47,6 +47,14 @@ impl Bristles {
         self.stiffness_n_per_m
     }
 
+    /// The same with friction that does not fall with speed: kinetic throughout.
+    pub fn without_fall(self) -> Self {
+        Self {
+            friction: self.friction.without_fall(),
+            ..self
+        }
+    }
+
     /// The state of a steady slide at `velocity_m_s`, the spring's stretch left out.
     pub fn sliding(&self, velocity_m_s: f64) -> [f64; 3] {
         let bend_m = self.friction.sliding_n(velocity_m_s) / self.bristles_n_per_m;

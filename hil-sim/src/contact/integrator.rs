@@ -238,12 +238,13 @@ fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> [f64
             .unwrap_or(column);
         matrix.swap(column, pivot);
         right.swap(column, pivot);
-        for row in column + 1..N {
-            let share = matrix[row][column] / matrix[column][column];
-            for k in column..N {
-                matrix[row][k] -= share * matrix[column][k];
+        let (above, below) = matrix.split_at_mut(column + 1);
+        for (row, line) in below.iter_mut().enumerate() {
+            let share = line[column] / above[column][column];
+            for (cell, pivot) in line.iter_mut().zip(above[column]).skip(column) {
+                *cell -= share * pivot;
             }
-            right[row] -= share * right[column];
+            right[column + 1 + row] -= share * right[column];
         }
     }
     for row in (0..N).rev() {

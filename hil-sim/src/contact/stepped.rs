@@ -5,9 +5,11 @@ use super::integrator::{Integrator, System};
 /// Share of a step by which a step may be longer than asked for, so that no splinter is left at a scan's
 /// end.
 const SPLINTER: f64 = 1e-6;
-/// The fingertip rests while it is slower than this, in m/s: in a second it creeps 0.2 mm, a fifth of the
-/// shortest wave. Bristles know no rest that is exact.
+/// The fingertip has come to rest when it is slower than this, in m/s. Bristles know no rest that is exact.
 pub const CREEP_M_S: f64 = 2e-4;
+/// It slips when it is faster than this, in m/s: more than bristles swing by when they catch it, some 60
+/// m/s² over their 7 000 rad/s.
+pub const SLIP_M_S: f64 = 1e-2;
 
 /// The equations, how they are integrated, and where the fingertip is.
 #[derive(Clone, Debug)]
@@ -23,6 +25,8 @@ pub struct Stepped<S, const N: usize> {
     state: Option<[f64; N]>,
     /// Whether it is set down with the arm's velocity, or at rest.
     moving: bool,
+    /// Whether it rests, by [`CREEP_M_S`] and [`SLIP_M_S`].
+    rests: bool,
     /// Passages from rest to slip and back: when, and whether it rests from then on.
     turns: Vec<(f64, bool)>,
 }
@@ -38,6 +42,7 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
             last: None,
             state: None,
             moving,
+            rests: !moving,
             turns: Vec::new(),
         }
     }
@@ -65,19 +70,32 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
         let steps = (time_s / self.step_s - SPLINTER).ceil().max(1.0);
         let step_s = time_s / steps;
         for step in 0..steps as u64 {
-            let before_m_s = state[S::VELOCITY].abs();
+            let before = state[S::VELOCITY];
             state = self
                 .integrator
                 .advance(&self.system, state, step_s, arm_m_s);
-            let after_m_s = state[S::VELOCITY].abs();
-            let rests = after_m_s < CREEP_M_S;
-            if rests != (before_m_s < CREEP_M_S) {
-                let share = (CREEP_M_S - before_m_s) / (after_m_s - before_m_s);
-                self.turns
-                    .push((last_s + (step as f64 + share) * step_s, rests));
-            }
+            self.look(before, state[S::VELOCITY], |share| {
+                last_s + (step as f64 + share) * step_s
+            });
         }
         self.state = Some(state);
+    }
+
+    /// Notes whether the fingertip comes to rest or breaks away in a step from one velocity to the next; `at_s`
+    /// gives the instant of a share of it.
+    fn look(&mut self, before_m_s: f64, after_m_s: f64, at_s: impl Fn(f64) -> f64) {
+        let passed_m_s = if self.rests {
+            (after_m_s.abs() > SLIP_M_S).then_some(SLIP_M_S * after_m_s.signum())
+        } else {
+            // One that turns has come to rest on the way.
+            let comes_to_rest = after_m_s.abs() < CREEP_M_S || after_m_s * before_m_s < 0.0;
+            comes_to_rest.then_some(CREEP_M_S * before_m_s.signum())
+        };
+        if let Some(passed_m_s) = passed_m_s {
+            let share = (passed_m_s - before_m_s) / (after_m_s - before_m_s);
+            self.rests = !self.rests;
+            self.turns.push((at_s(share.clamp(0.0, 1.0)), self.rests));
+        }
     }
 
     /// The state: stretch in m first, then velocity in m/s; all zero before the second scan.
@@ -90,9 +108,9 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
         self.state()[0]
     }
 
-    /// Whether it creeps at most.
+    /// Whether it rests: since it was slower than [`CREEP_M_S`], and not yet faster than [`SLIP_M_S`].
     pub fn sticks(&self) -> bool {
-        self.state()[S::VELOCITY].abs() < CREEP_M_S
+        self.rests
     }
 
     /// Passages from rest to slip and back since this was last asked: when, in s, and whether it rests

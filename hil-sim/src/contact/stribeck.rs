@@ -36,6 +36,14 @@ impl Stribeck {
         }
     }
 
+    /// The same without the surplus at rest: μk at any speed.
+    pub fn without_fall(self) -> Self {
+        Self {
+            surplus_n: 0.0,
+            ..self
+        }
+    }
+
     /// The most that it withstands at rest, μs·N in N.
     pub fn static_n(&self) -> f64 {
         self.kinetic_n + self.surplus_n

@@ -3,7 +3,7 @@
 use super::bounds::STEP;
 use super::table::Table;
 use super::{Contact, Friction, Motion, Rung, SceneError, Solver, Surface};
-use crate::contact::{Integrator, Stribeck, ladder, stability};
+use crate::contact::{EVENT_STEP_S, Integrator, Stribeck, ladder, stability};
 
 /// Longest step of a method that is not told one, in s.
 const DEFAULT_STEP_S: f64 = 50e-6;
@@ -120,7 +120,7 @@ fn solver(
         return match step_us {
             None => Ok(Solver::Stepped {
                 integrator,
-                step_s: f64::INFINITY,
+                step_s: EVENT_STEP_S,
             }),
             Some(_) => Err(table.refuse(
                 "step_us",

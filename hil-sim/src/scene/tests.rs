@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::contact::Integrator;
 
 mod display;
 mod fault;
@@ -287,6 +288,71 @@ fn friction_decides_the_contact_where_it_is_left_open() {
         assert_eq!(contact(&given), Contact::stick_slip(friction));
         let both = format!("{given}\nmodel = \"stick-slip\"");
         assert_eq!(contact(&both), Contact::stick_slip(friction));
+    }
+}
+
+#[test]
+fn a_contact_that_is_left_open_is_the_lowest_rung_that_does_and_says_why() {
+    let scene = |text: &str| Scene::parse(Path::new("x.toml"), text).unwrap();
+    for (text, rung, reason) in [
+        (SURFACE.to_owned(), Rung::Kinematic, "keeps up with"),
+        (
+            "[surface]\nspecimens = [{ wavelength_mm = 1.0, length_mm = 5.0 }, { wavelength_mm = 2.0 }]"
+                .to_owned(),
+            Rung::Rigid,
+            "a border between specimens",
+        ),
+        (
+            format!("{SURFACE}[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 0.83"),
+            Rung::Kinematic,
+            "keeps up with",
+        ),
+        (
+            format!("{SURFACE}[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 8"),
+            Rung::Viscoelastic,
+            "swings on its spring by",
+        ),
+        (
+            format!("{SURFACE}[contact]\nfriction = \"mild\""),
+            Rung::StickSlip,
+            "there is friction",
+        ),
+    ] {
+        let scene = scene(&text);
+        assert_eq!(scene.contact.rung, rung, "{text}");
+        let given = scene.contact_reason.expect("it was left open");
+        assert!(given.contains(reason), "{given}");
+    }
+    let told = scene(&format!("{SURFACE}[contact]\nmodel = \"reference\""));
+    assert_eq!(told.contact, Contact::of(Rung::Reference, None));
+    assert_eq!(told.contact_reason, None);
+}
+
+#[test]
+fn a_step_that_is_left_open_is_one_that_is_borne() {
+    for integrator in Integrator::ALL {
+        let text = format!(
+            "{SURFACE}[contact]\nfriction = \"severe\"\nintegrator = \"{}\"",
+            integrator.name()
+        );
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        let Solver::Stepped {
+            integrator: found,
+            step_s,
+        } = scene.contact.solver
+        else {
+            panic!("it is integrated");
+        };
+        assert_eq!(found, integrator);
+        assert!(
+            (1e-7..=250e-6).contains(&step_s),
+            "{integrator:?}: {step_s}"
+        );
+        // What is said to be borne is.
+        let again = format!("{text}\nstep_us = {}", (step_s * 1e8).floor() / 1e2);
+        if integrator.is_fixed() {
+            Scene::parse(Path::new("x.toml"), &again).unwrap();
+        }
     }
 }
 

@@ -14,7 +14,7 @@ use host_bridge::link::{Event, Link};
 use host_bridge::recording::gauge_stream::GaugeStream;
 use host_bridge::recording::{PART, Progress, Recorder, Settings};
 use host_bridge::state::State;
-use protocol::{Message, PortCounters, Role};
+use protocol::{Message, Role};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -27,8 +27,9 @@ Writes everything that both boards say, and what their links do, to MCAP, to CSV
 Once a second what has been heard is made safe on the disk: that much is kept whatever happens, and only that \
 is counted as safe. The MCAP file reads as it is in Foxglove, PlotJuggler and whatever else knows MCAP with \
 JSON: a channel for each board and kind of message. The sensor board is told to stream its gauges meanwhile, \
-for which its estimators begin anew, and to stop when the recording ends. A board that goes and returns is \
-recorded on.";
+for which its estimators begin anew, and to stop when the recording ends. A board that is not there is named, \
+and recorded from the moment it comes; one that goes and returns is recorded on. A bench that names one board \
+only has only that one.";
 
 /// How it is used.
 pub const EXAMPLES: &str = "\
@@ -36,6 +37,7 @@ Examples:
   host-bridge record rubbing.mcap                    until Ctrl-C
   host-bridge record rubbing.mcap --for 60 --json
   host-bridge record --csv rubbing --no-gauges       a folder of CSV files
+  host-bridge record arm.mcap --sensor /dev/ttyACM0  the sensor board alone
 
 Exit status: 0 recorded, to the end that was asked for; 2 nothing could be recorded, or not to the end: what \
 was said to be safe is.";
@@ -64,7 +66,7 @@ pub struct Record {
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     until: Option<Duration>,
     /// Begins another MCAP file, FILE-2.mcap and so on, after so many minutes; 0 for never: the file's
-    /// index takes 1.8 MB of memory for each hour of it
+    /// index takes 2.5 MB of memory for each hour of it
     #[arg(long, value_name = "MINUTES", default_value_t = PART.as_secs() as f64 / 60.0)]
     split: f64,
     /// Writes over files that are there already
@@ -98,6 +100,8 @@ struct Summary {
     lost: u64,
     gaps: u64,
     unwritten: u64,
+    /// The boards that were never there.
+    absent: Vec<&'static str>,
 }
 
 impl Record {
@@ -118,27 +122,29 @@ impl Record {
         })?);
         let started = Instant::now();
         let (events, told) = channel();
-        let links = [
-            (Role::Sensor, bench.sensor.place()),
-            (Role::Display, bench.display.place()),
-        ]
-        .map(|(role, place)| {
-            let recorder = Arc::clone(&recorder);
-            let events = events.clone();
-            Link::open(role, place, move |event| {
-                recorder.on_event(role, &event);
-                if concerns(&event) {
-                    // Nobody listens any more when the recording ends.
-                    let _ = events.send((role, event));
-                }
+        let roles = bench.roles();
+        let links: Vec<(Role, Link)> = roles
+            .iter()
+            .filter_map(|&role| {
+                let recorder = Arc::clone(&recorder);
+                let events = events.clone();
+                let link = Link::open(role, bench.seat(role)?.place(), move |event| {
+                    recorder.on_event(role, &event);
+                    if concerns(&event) {
+                        // Nobody listens any more when the recording ends.
+                        let _ = events.send((role, event));
+                    }
+                });
+                Some((role, link))
             })
-        });
+            .collect();
         drop(events);
-        Session {
+        let absent = Session {
             recorder: &recorder,
             links: &links,
             told,
             stream: GaugeStream::new(!self.no_gauges),
+            absent: BOARDS.into(),
             screen: Screen::new(self.quiet),
             started,
         }
@@ -147,11 +153,12 @@ impl Record {
         // Nothing is told any more once the links are gone.
         drop(links);
         let progress = recorder.stop()?;
-        self.report(seconds, &progress)?;
+        self.report(seconds, &progress, &absent)?;
         Ok(ExitCode::SUCCESS)
     }
 
-    fn report(&self, seconds: f64, progress: &Progress) -> anyhow::Result<()> {
+    fn report(&self, seconds: f64, progress: &Progress, absent: &[Role]) -> anyhow::Result<()> {
+        let absent: Vec<&str> = absent.iter().map(|role| role.name()).collect();
         let tally = progress.tally;
         if self.json {
             let summary = Summary {
@@ -162,11 +169,16 @@ impl Record {
                 lost: tally.lost,
                 gaps: tally.gaps,
                 unwritten: tally.unwritten,
+                absent,
             };
             return output::print(&serde_json::to_string(&summary)?);
         }
+        let absent = match absent.as_slice() {
+            [] => String::new(),
+            names => format!("; never there: {}", names.join(", ")),
+        };
         output::print(&format!(
-            "{seconds:.1} s: {} messages, {} samples of each gauge, {}{}",
+            "{seconds:.1} s: {} messages, {} samples of each gauge, {}{}{absent}",
             tally.messages,
             tally.samples,
             bytes(progress.safe_bytes),
@@ -212,18 +224,30 @@ fn missing(progress: &Progress) -> String {
 /// A recording while it goes on.
 struct Session<'a> {
     recorder: &'a Recorder,
-    links: &'a [Link; 2],
+    links: &'a [(Role, Link)],
     told: Receiver<(Role, Event)>,
     stream: GaugeStream,
+    /// The boards that have not been there yet.
+    absent: Vec<Role>,
     screen: Screen,
     started: Instant,
 }
 
 impl Session<'_> {
-    /// Records until it is asked to end, or can't go on; then the sensor board is as it was.
-    fn run(mut self, ended: &AtomicBool, until: Option<Duration>) {
+    /// Records until it is asked to end, or can't go on; then the sensor board is as it was. Returns the
+    /// boards that were never there.
+    fn run(mut self, ended: &AtomicBool, until: Option<Duration>) -> Vec<Role> {
+        for role in BOARDS {
+            if self.link(role).is_none() {
+                let name = role.name();
+                self.screen.tell(&format!(
+                    "{name}: absent: only the other board is named; name it with --{name} or in the bench file"
+                ));
+            }
+        }
         self.record(ended, until);
         self.restore();
+        self.absent
     }
 
     fn record(&mut self, ended: &AtomicBool, until: Option<Duration>) {
@@ -247,35 +271,50 @@ impl Session<'_> {
         match self.told.recv_timeout(wait) {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                if let Event::Turned(state) = &event
-                    && !matches!(state, State::Opened { .. })
-                {
-                    self.screen
-                        .tell(&format!("{}: {}", role.name(), words(state)));
+                if let Event::Turned(state) = &event {
+                    self.turn(role, state);
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
         }
         while let Some((role, message)) = self.stream.due(now_us()) {
             // Asked again if it is not answered.
-            let _ = self.link(role).post(&message);
+            self.post(role, &message);
         }
     }
 
-    fn link(&self, role: Role) -> &Link {
-        &self.links[usize::from(role == Role::Display)]
+    /// Tells how the way to a board stands now.
+    fn turn(&mut self, role: Role, state: &State) {
+        if state.is_known() {
+            self.absent.retain(|absent| *absent != role);
+        }
+        if !matches!(state, State::Opened { .. }) {
+            self.screen
+                .tell(&format!("{}: {}", role.name(), words(state)));
+        }
+    }
+
+    fn link(&self, role: Role) -> Option<&Link> {
+        let mut links = self.links.iter();
+        links.find(|(of, _)| *of == role).map(|(_, link)| link)
+    }
+
+    /// Says something to a board; whether it is on its way.
+    fn post(&self, role: Role, message: &Message) -> bool {
+        self.link(role)
+            .is_some_and(|link| link.post(message).is_ok())
     }
 
     /// Records the links' counters and tells the progress.
     fn count(&mut self) {
-        let mut frames = PortCounters::new();
-        for role in BOARDS {
-            let counters = self.link(role).counters();
-            self.recorder.on_counters(role, counters);
-            frames.lost = frames.lost.wrapping_add(counters.lost);
+        let mut lost = 0_u32;
+        for (role, link) in self.links {
+            let counters = link.counters();
+            self.recorder.on_counters(*role, counters);
+            lost = lost.wrapping_add(counters.lost);
         }
         let progress = self.recorder.progress();
-        let frames = match frames.lost {
+        let frames = match lost {
             0 => String::new(),
             lost => format!("; {lost} frames lost on the lines"),
         };
@@ -295,12 +334,12 @@ impl Session<'_> {
             return;
         };
         let end = Instant::now() + RESTORED;
-        let mut said = self.link(Role::Sensor).post(&message).is_ok();
+        let mut said = self.post(Role::Sensor, &message);
         while said && !self.stream.is_quiet() && Instant::now() < end {
             match self.told.recv_timeout(LOOK) {
                 Ok((role, event)) => self.stream.on_event(role, &event),
                 Err(RecvTimeoutError::Timeout) => {
-                    said = self.link(Role::Sensor).post(&message).is_ok();
+                    said = self.post(Role::Sensor, &message);
                 }
                 Err(RecvTimeoutError::Disconnected) => break,
             }

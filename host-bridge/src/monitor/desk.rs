@@ -1,7 +1,8 @@
 //! The desk at which a dashboard is watched: where events come from, and where orders go to.
 
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::time::{Duration, Instant};
 
 use protocol::Role;
 
@@ -11,9 +12,15 @@ use super::keeping::Keeping;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link};
 use crate::recording::RecordingError;
+use crate::recording::gauge_stream::GaugeStream;
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
+
+/// How long the sensor board may take to confirm at the end that it is as it was.
+const RESTORED: Duration = Duration::from_secs(1);
+/// How often it is told meanwhile.
+const AGAIN: Duration = Duration::from_millis(50);
 
 /// Where a monitor hears from.
 pub struct Source {
@@ -33,6 +40,8 @@ pub struct Desk {
     /// Where recordings go.
     folder: PathBuf,
     keeping: Option<Keeping>,
+    /// Has the gauges stream for as long as a recording lasts.
+    stream: GaugeStream,
     lines_us: Option<u64>,
     is_over: bool,
 }
@@ -45,6 +54,7 @@ impl Desk {
             source,
             folder,
             keeping: None,
+            stream: GaugeStream::default(),
             lines_us: None,
             is_over: false,
         }
@@ -88,16 +98,33 @@ impl Desk {
                 self.end_keeping();
             }
         }
+        self.ask();
         self.say();
         came
+    }
+
+    /// Asks for what a recording needs. What is not answered is asked again.
+    fn ask(&mut self) {
+        if self.keeping.is_none() {
+            return;
+        }
+        while let Some((role, message)) = self.stream.due(now_us()) {
+            if let Some(link) = self.link(role) {
+                let _ = link.post(&message);
+            }
+        }
+    }
+
+    fn link(&self, role: Role) -> Option<&Link> {
+        let mut links = self.source.links.iter();
+        links.find(|(of, _)| *of == role).map(|(_, link)| link)
     }
 
     /// Says what the dashboard has to say, at once.
     pub fn say(&mut self) {
         for role in [Role::Sensor, Role::Display] {
             for message in self.dashboard.take_outbox(role) {
-                let link = self.source.links.iter().find(|(of, _)| *of == role);
-                let Some((_, link)) = link else {
+                let Some(link) = self.link(role) else {
                     self.dashboard.on_no_way(&message);
                     continue;
                 };
@@ -109,11 +136,11 @@ impl Desk {
     }
 
     /// Waits for something to come, for `limit` at most, and takes it.
-    pub fn wait(&mut self, limit: std::time::Duration) {
+    pub fn wait(&mut self, limit: Duration) {
         match self.source.events.recv_timeout(limit) {
             Ok((role, event)) => self.on(role, event),
-            Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
-            Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => self.is_over = true,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => self.is_over = true,
         }
     }
 
@@ -131,13 +158,22 @@ impl Desk {
         match Keeping::begin(&self.folder, self.dashboard.now_us) {
             Ok(keeping) => {
                 // What came before it began is a part of it, so that it can be played back to a monitor.
+                self.stream = GaugeStream::new(true);
                 for role in [Role::Sensor, Role::Display] {
                     if let Some(state) = &self.dashboard.board(role).state {
-                        keeping.keep(role, &Event::Turned(state.clone()));
+                        let event = Event::Turned(state.clone());
+                        keeping.keep(role, &event);
+                        self.stream.on_event(role, &event);
                     }
                 }
-                self.dashboard.read_configurations();
                 self.keeping = Some(keeping);
+                self.ask();
+                let gauges = if self.dashboard.sensor.is_known() {
+                    "the sensor board is told to stream its gauges for as long as is recorded"
+                } else {
+                    "no gauges are recorded before the sensor board is there"
+                };
+                self.dashboard.notify(false, gauges.to_owned());
             }
             Err(error) => self
                 .dashboard
@@ -155,13 +191,37 @@ impl Desk {
     /// # Errors
     /// If the last of a recording can't be written.
     pub fn close(mut self) -> Result<(), RecordingError> {
+        self.restore();
         match self.keeping.take() {
             Some(keeping) => keeping.end().map(|_| ()),
             None => Ok(()),
         }
     }
 
+    /// Gives the sensor board its quiet back if a recording took it, and waits until it says so. Whether it
+    /// is as it was.
+    fn restore(&mut self) -> bool {
+        let Some(message) = self.stream.restoration() else {
+            return true;
+        };
+        let end = Instant::now() + RESTORED;
+        let tell = |desk: &Self| {
+            desk.link(Role::Sensor)
+                .is_some_and(|link| link.post(&message).is_ok())
+        };
+        let mut said = tell(self);
+        while said && !self.stream.is_quiet() && Instant::now() < end {
+            match self.source.events.recv_timeout(AGAIN) {
+                Ok((role, event)) => self.on(role, event),
+                Err(RecvTimeoutError::Timeout) => said = tell(self),
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        self.stream.is_quiet()
+    }
+
     fn end_keeping(&mut self) {
+        let is_restored = self.restore();
         let Some(keeping) = self.keeping.take() else {
             return;
         };
@@ -178,11 +238,17 @@ impl Desk {
                 .dashboard
                 .notify(true, format!("RECORDING ENDED: {error}")),
         }
+        if !is_restored {
+            let words =
+                "the sensor board could not be told to stop streaming its gauges: g tells it";
+            self.dashboard.notify(true, words.to_owned());
+        }
     }
 
     fn on(&mut self, role: Role, event: Event) {
         if let Some(keeping) = &self.keeping {
             keeping.keep(role, &event);
+            self.stream.on_event(role, &event);
         }
         self.dashboard.on(now_us(), role, event);
     }

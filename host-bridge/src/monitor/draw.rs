@@ -10,6 +10,7 @@
 
 mod areas;
 mod big;
+mod boards;
 mod fingertip;
 mod gauges;
 mod header;
@@ -39,7 +40,6 @@ const LEFT_WIDTH: u16 = 35;
 const SURFACE_HEIGHT: u16 = 7;
 const FINGERTIP_HEIGHT: u16 = 7;
 const GAUGES_HEIGHT: u16 = 7;
-const PORTS_HEIGHT: u16 = 8;
 const LOG_HEIGHT: u16 = 3;
 
 /// Draws what is `shown`. What must not be late, the supervisor's state and the last notice, is taken
@@ -50,8 +50,9 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
         tiny::draw(frame, area, live, view);
         return;
     }
-    let [header, rest] = cut_top(area, header::height(live, area.width));
-    let [body, keys] = cut_top(rest, rest.height.saturating_sub(1));
+    let [header, rest] = cut_top(area, header::height(live, view, area.width));
+    let keys_height = header::keys_height(live, area.width);
+    let [body, keys] = cut_top(rest, rest.height.saturating_sub(keys_height));
     header::draw(frame, header, live, view);
     header::keys(frame, keys, live, view);
     draw_body(frame, body, shown, view);
@@ -63,7 +64,7 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
 }
 
 fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) {
-    let lower = [GAUGES_HEIGHT, PORTS_HEIGHT, LOG_HEIGHT];
+    let lower = [GAUGES_HEIGHT, ports::HEIGHT, LOG_HEIGHT];
     let all: u16 = lower.iter().sum();
     let upper = SURFACE_HEIGHT + FINGERTIP_HEIGHT;
     let has_room = body.height >= upper + all;
@@ -71,7 +72,11 @@ fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) 
         // Half of what is left goes to the traces.
         upper + (body.height - upper - all) / 2
     } else {
-        upper.min(body.height)
+        let table = match view.panel {
+            Panel::Ports => ports::HEIGHT,
+            Panel::Gauges | Panel::Boards | Panel::Log => 0,
+        };
+        upper.min(body.height.saturating_sub(table))
     };
     let [top, bottom] = cut_top(body, upper);
     let [left, right] = cut_left(top, LEFT_WIDTH);
@@ -91,6 +96,7 @@ fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) 
         match view.panel {
             Panel::Gauges => gauges::draw(frame, bottom, shown, view),
             Panel::Ports => ports::draw(frame, bottom, shown, view.theme),
+            Panel::Boards => boards::draw(frame, bottom, shown, view.theme),
             Panel::Log => log::draw(frame, bottom, shown, view.theme),
         }
     }

@@ -164,3 +164,122 @@ fn gone(error: io::Error, ended: &AtomicBool) -> io::Result<()> {
         Err(error)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::env;
+    use std::fs::{File, OpenOptions};
+    use std::io::{ErrorKind, Read};
+    use std::process::{Command, Stdio};
+    use std::sync::mpsc::Sender;
+
+    use ratatui::crossterm::terminal::is_raw_mode_enabled;
+    use serialport::{SerialPort, TTYPort};
+
+    use super::*;
+
+    /// Far more than anything here takes.
+    const LIMIT: Duration = Duration::from_secs(30);
+    /// Set for the program that has the screen and panics: this one, once more.
+    const WITHIN: &str = "RIDGELINK_TEST_WITHIN_A_TERMINAL";
+    const NAME: &str = "monitor::screen::tests::a_panic_anywhere_restores_the_terminal";
+
+    #[test]
+    fn a_panic_anywhere_restores_the_terminal() {
+        match env::var(WITHIN).as_deref() {
+            Ok("another thread") => panic_in_another_thread(),
+            Ok(_) => panic_in_this_thread(),
+            Err(_) => {
+                for place in ["another thread", "this thread"] {
+                    assert_restored_after(place);
+                }
+            }
+        }
+    }
+
+    /// The hook restores it, before anybody knows of the panic; the guard is never dropped.
+    fn panic_in_another_thread() {
+        let ended = Arc::new(AtomicBool::new(false));
+        let screen = Screen::open(&ended).expect("there is a terminal");
+        assert!(is_raw_mode_enabled().is_ok_and(|is_raw| is_raw));
+        let fallen = thread::spawn(|| panic!("on purpose")).join();
+        assert!(fallen.is_err() && ended.load(Ordering::Acquire));
+        assert!(is_raw_mode_enabled().is_ok_and(|is_raw| !is_raw));
+        std::mem::forget(screen);
+    }
+
+    /// The guard is dropped on the way out, after the hook.
+    fn panic_in_this_thread() {
+        let ended = Arc::new(AtomicBool::new(false));
+        let fallen = panic::catch_unwind(|| {
+            let _screen = Screen::open(&ended).expect("there is a terminal");
+            panic!("on purpose");
+        });
+        assert!(fallen.is_err() && ended.load(Ordering::Acquire));
+        assert!(is_raw_mode_enabled().is_ok_and(|is_raw| !is_raw));
+    }
+
+    fn assert_restored_after(place: &str) {
+        let (mut window, terminal) = TTYPort::pair().expect("the system has pseudo-terminals");
+        let name = terminal.name().expect("it has a name");
+        let end = || {
+            OpenOptions::new()
+                .read(true)
+                .write(true)
+                .open(&name)
+                .expect("the terminal can be opened")
+        };
+        // As a shell leaves it: the pair was made for bytes, not for people.
+        stty(end(), &["sane", "rows", "40", "cols", "120"]);
+        let before = stty(end(), &["-a"]);
+        let (sender, shown) = channel();
+        window.set_timeout(LIMIT).expect("it takes a limit");
+        let reader = thread::spawn(move || read(&mut window, &sender));
+        let this = env::current_exe().expect("a test knows where it is");
+        let status = Command::new(this)
+            .args(["--exact", NAME, "--nocapture"])
+            .env(WITHIN, place)
+            .env("TERM", "xterm-256color")
+            .stdin(end())
+            .stdout(end())
+            .stderr(Stdio::null())
+            .status()
+            .expect("this program can be started");
+        assert!(status.success(), "{place}: {status}");
+        assert_eq!(stty(end(), &["-a"]), before, "{place}");
+        // What was written stays to be read: to its end, once nobody has the terminal open.
+        drop(terminal);
+        reader.join().expect("it only reads");
+        let shown: Vec<u8> = shown.try_iter().flatten().collect();
+        let shown = String::from_utf8_lossy(&shown);
+        let [entered, left, hidden, seen] =
+            ["\x1b[?1049h", "\x1b[?1049l", "\x1b[?25l", "\x1b[?25h"]
+                .map(|words| shown.rfind(words));
+        assert!(entered.is_some() && left > entered, "{place}: {shown:?}");
+        assert!(hidden.is_none() || seen > hidden, "{place}: {shown:?}");
+    }
+
+    /// Passes on what is shown until nobody has the terminal open.
+    fn read(window: &mut TTYPort, shown: &Sender<Vec<u8>>) {
+        let mut bytes = [0; 4_096];
+        loop {
+            match window.read(&mut bytes) {
+                Ok(count @ 1..) => {
+                    let _ = shown.send(bytes[..count].to_vec());
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Ok(0) | Err(_) => return,
+            }
+        }
+    }
+
+    fn stty(terminal: File, arguments: &[&str]) -> String {
+        let output = Command::new("stty")
+            .args(arguments)
+            .stdin(terminal)
+            .output()
+            .expect("stty can be run");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+}

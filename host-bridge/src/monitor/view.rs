@@ -14,6 +14,8 @@ pub enum Panel {
     Gauges,
     /// The counters of every port.
     Ports,
+    /// What is known of the boards themselves.
+    Boards,
     /// What has happened, and the boards' logs.
     Log,
 }
@@ -23,7 +25,8 @@ impl Panel {
     pub const fn next(self) -> Self {
         match self {
             Self::Gauges => Self::Ports,
-            Self::Ports => Self::Log,
+            Self::Ports => Self::Boards,
+            Self::Boards => Self::Log,
             Self::Log => Self::Gauges,
         }
     }

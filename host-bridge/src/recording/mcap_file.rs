@@ -1,7 +1,7 @@
 //! One MCAP file that is being written.
 //!
 //! It is only ever appended to, chunk by chunk, so that whatever cuts it off leaves whole chunks behind.
-//! The writer keeps some 500 bytes of index a chunk until the end, which is why a long recording goes on
+//! The writer keeps some 600 bytes of index a chunk until the end, which is why a long recording goes on
 //! in a new file from time to time: see [`super::Settings::part`].
 
 use std::collections::BTreeMap;

@@ -330,13 +330,53 @@ fn broken_toml_is_refused_at_its_line() {
 }
 
 #[test]
-fn what_this_version_does_not_build_is_refused_as_such() {
-    let refusal = refusal_of("[contact]\nmodel = \"rigid\"");
-    for part in [
-        "x.toml:4: contact.model: \"rigid\"",
-        "known but not built in this version",
+fn a_contact_that_cannot_be_solved_so_is_refused_with_what_can() {
+    for (section, parts) in [
+        (
+            "friction = \"mild\"\nmodel = \"rigid\"",
+            &["contact.friction", "a \"rigid\" contact knows no friction"][..],
+        ),
+        (
+            "model = \"stick-slip\"",
+            &["contact.friction", "without friction nothing sticks"],
+        ),
+        (
+            "model = \"magic\"",
+            &["contact.model", "\"magic\" is unknown", "\"viscoelastic\""],
+        ),
+        (
+            "friction = \"strong\"\nintegrator = \"euler\"\nstep_us = 100",
+            &[
+                "x.toml:6: contact.step_us",
+                "errors grow with \"euler\"",
+                "µs: give less",
+            ],
+        ),
+        (
+            "friction = \"strong\"\nintegrator = \"rk4\"\nstep_us = 1000",
+            &["contact.step_us", "250 (a scan)"],
+        ),
+        (
+            "friction = \"strong\"\nstep_us = 10",
+            &["contact.step_us", "an \"exact\" solution has no steps"],
+        ),
+        (
+            "friction = \"strong\"\nintegrator = \"adaptive\"\nstep_us = 10",
+            &["contact.step_us", "chooses its own steps"],
+        ),
+        (
+            "integrator = \"rk4\"",
+            &["contact.integrator", "there is nothing to integrate"],
+        ),
+        (
+            "model = \"reference\"\nintegrator = \"rk4\"",
+            &["contact.integrator", "the reference has its own"],
+        ),
     ] {
-        assert!(refusal.contains(part), "{refusal}\nwanted {part}");
+        let refusal = refusal_of(&format!("[contact]\n{section}"));
+        for part in parts {
+            assert!(refusal.contains(part), "{refusal}\nwanted {part}");
+        }
     }
     assert!(refusal_of("[estimator]\nmethod = \"magic\"").contains("\"magic\" is unknown"));
 }

@@ -62,7 +62,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
             frame,
             columns[gauge],
             0,
-            name(shown, gauge, extents[gauge], view),
+            name(shown, gauge, extents[gauge], columns[gauge].width, view),
         );
         if let (Some((low, high)), true) = (extents[gauge], streams) {
             let middle = (low + high) / 2.0;
@@ -81,8 +81,22 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     }
 }
 
-fn name(shown: &Dashboard, gauge: usize, extent: Option<(f32, f32)>, view: &View) -> Line<'static> {
+/// Which gauge it is, how it is, and from its lowest to its highest, in a row of `width`.
+fn name(
+    shown: &Dashboard,
+    gauge: usize,
+    extent: Option<(f32, f32)>,
+    width: u16,
+    view: &View,
+) -> Line<'static> {
     let theme = view.theme;
+    // What does not fit is left out as a whole: a number that is cut is another number.
+    let mut room = usize::from(width).saturating_sub(2);
+    let mut fits = |words: &str| {
+        let rest = room.checked_sub(words.len());
+        room = rest.unwrap_or(room);
+        rest.is_some()
+    };
     let mut spans = vec![Span::styled(format!("{gauge} "), theme.strong())];
     if let Some((_, estimate)) = shown.estimate {
         let health = estimate.health[gauge];
@@ -91,13 +105,17 @@ fn name(shown: &Dashboard, gauge: usize, extent: Option<(f32, f32)>, view: &View
         } else {
             theme.bad()
         };
+        fits(health.name());
         spans.push(Span::styled(health.name(), style));
-        if estimate.gauges_used & (1 << gauge) == 0 {
+        if estimate.gauges_used & (1 << gauge) == 0 && fits(" unused") {
             spans.push(Span::styled(" unused", theme.quiet()));
         }
     }
     if let Some((low, high)) = extent {
-        spans.push(Span::styled(format!("  {:.0}", high - low), theme.quiet()));
+        let height = format!(" {:.0}", high - low);
+        if fits(&height) {
+            spans.push(Span::styled(height, theme.quiet()));
+        }
     }
     Line::from(spans)
 }

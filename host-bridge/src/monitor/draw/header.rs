@@ -1,13 +1,13 @@
 //! The boards, the supervisor, and the keys.
 
-use protocol::{DisplayState, Role, RoleCounters, Status};
+use protocol::{DisplayState, Role};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::text;
+use super::{boards, text};
 use crate::monitor::board::Board;
 use crate::monitor::dashboard::{Dashboard, Notice};
 use crate::monitor::theme::Theme;
@@ -16,29 +16,38 @@ use crate::state::State;
 
 /// Width of a board's name with what stands around it.
 const NAME_WIDTH: u16 = 11;
-/// Most rows of a board, whatever there is to say.
+/// Most rows of a board, or of a notice, whatever there is to say.
 const MOST_ROWS: u16 = 4;
 
 /// Rows that the header takes: what is wrong, and the advice, may need some for a board.
-pub fn height(live: &Dashboard, width: u16) -> u16 {
+pub fn height(live: &Dashboard, view: &View, width: u16) -> u16 {
     let rows = |role| board_rows(live, role, width);
-    rows(Role::Sensor) + rows(Role::Display) + 1
+    rows(Role::Sensor) + rows(Role::Display) + supervisor_rows(live, view, width)
+}
+
+/// Rows that the keys take, or the notice in their place.
+pub fn keys_height(live: &Dashboard, width: u16) -> u16 {
+    live.notice().map_or(1, |notice| {
+        rows(&notice.text, width.saturating_sub(1)).min(MOST_ROWS)
+    })
 }
 
 fn board_rows(live: &Dashboard, role: Role, width: u16) -> u16 {
-    let width = usize::from(width.saturating_sub(NAME_WIDTH)).max(1);
-    let mut rows = 1;
-    let mut used = 0;
-    for word in trouble(live.board(role)).unwrap_or_default().split(' ') {
-        let length = word.chars().count();
-        if used > 0 && used + 1 + length > width {
-            rows += 1;
-            used = length;
-        } else {
-            used += usize::from(used > 0) + length;
-        }
-    }
-    rows.min(MOST_ROWS)
+    let trouble = trouble(live.board(role)).unwrap_or_default();
+    rows(&trouble, width.saturating_sub(NAME_WIDTH)).min(MOST_ROWS)
+}
+
+/// The marks get a row of their own where they would be cut.
+fn supervisor_rows(live: &Dashboard, view: &View, width: u16) -> u16 {
+    let marks: usize = marks(live, view).iter().map(Span::width).sum();
+    let fits = supervisor(live, view.theme).width() + marks <= usize::from(width);
+    if fits || marks == 0 { 1 } else { 2 }
+}
+
+/// Rows of so many characters that a text takes.
+fn rows(text: &str, width: u16) -> u16 {
+    let rows = text::broken(text, width.into()).len();
+    u16::try_from(rows).unwrap_or(u16::MAX)
 }
 
 /// What is wrong with the way to a board, and what to do about it.
@@ -64,9 +73,13 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         row += rows;
     }
     let mut line = supervisor(live, view.theme);
-    line.spans.extend(marks(live, view));
-    let style = line.style;
-    text::put(frame, area, row, line.style(style));
+    let marks = marks(live, view);
+    if supervisor_rows(live, view, area.width) > 1 {
+        text::put(frame, area, row + 1, Line::from(marks));
+    } else {
+        line.spans.extend(marks);
+    }
+    text::put(frame, area, row, line);
 }
 
 fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, theme: Theme) {
@@ -85,12 +98,13 @@ fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, t
         width: area.width.saturating_sub(NAME_WIDTH),
         ..area
     };
-    if let Some(State::Known { port, hello }) = &board.state {
-        let [major, minor, patch] = hello.version;
-        let firmware = format!("{major}.{minor}.{patch} {}", hello.chip_name());
-        let mut spans = vec![Span::raw(port.display().to_string())];
-        spans.extend(health(board, live.now_us, theme));
-        spans.push(Span::styled(format!("  {firmware}"), theme.quiet()));
+    if let Some(State::Known { port, .. }) = &board.state {
+        let port = port.display().to_string();
+        let room = usize::from(rest.width).saturating_sub(port.chars().count());
+        let mut spans = vec![Span::raw(port)];
+        for fact in boards::fitting(boards::facts(board, live.now_us, theme), room) {
+            spans.extend(fact.spans(theme));
+        }
         text::put(frame, rest, 0, Line::from(spans));
     } else {
         let words = trouble(board).unwrap_or_else(|| "not looked for yet".to_owned());
@@ -98,43 +112,6 @@ fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, t
             .style(state_style(board, theme))
             .wrap(Wrap { trim: true });
         frame.render_widget(text, rest);
-    }
-}
-
-/// How it is to be reached, how long it runs, and why it started.
-fn health(board: &Board, now_us: u64, theme: Theme) -> Vec<Span<'static>> {
-    let mut spans = Vec::new();
-    let mut add = |name: &'static str, value: String, style: Style| {
-        spans.push(Span::styled(format!("  {name} "), theme.quiet()));
-        spans.push(Span::styled(value, style));
-    };
-    if let Some(clocks) = board.clocks {
-        let offset_s = clocks.offset_us as f64 / 1e6;
-        add("rtt", text::short(clocks.round_trip_us), Style::new());
-        add("clock", format!("{offset_s:+.4} s"), Style::new());
-    }
-    if let Some(uptime_us) = board.uptime_us(now_us) {
-        add("up", text::duration(uptime_us), Style::new());
-    }
-    if let Some((_, status)) = &board.status {
-        let count = |count: u32, if_any: Style| {
-            let style = if count > 0 { if_any } else { Style::new() };
-            (text::brief(count), style)
-        };
-        let (misses, style) = count(missed(status), theme.warning());
-        add("misses", misses, style);
-        let (resets, style) = count(status.watchdog_resets, theme.bad());
-        add("watchdog", resets, style);
-        add("by", status.reset.name().to_owned(), Style::new());
-    }
-    spans
-}
-
-/// What was not done in time: samples, or output ticks.
-const fn missed(status: &Status) -> u32 {
-    match &status.role {
-        RoleCounters::Sensor(counters) => counters.deadline_misses,
-        RoleCounters::Display(counters) => counters.deadline_misses,
     }
 }
 
@@ -200,10 +177,10 @@ fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
         let for_us = live.now_us.saturating_sub(kept.since_us);
         spans.push(Span::styled("  ● recording ", view.theme.bad()));
         spans.push(Span::raw(format!(
-            "{}, {}, {:.1} MB safe",
-            kept.name,
+            "{}, {:.1} MB safe, {}",
             text::duration(for_us),
-            kept.safe_bytes as f64 / 1e6
+            kept.safe_bytes as f64 / 1e6,
+            kept.name
         )));
     }
     spans
@@ -213,21 +190,19 @@ fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
 pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
     let theme = view.theme;
     if let Some(notice) = live.notice() {
-        let line = Line::styled(format!(" {}", notice.text), notice_style(notice, theme));
-        frame.render_widget(line, area);
+        let place = Rect {
+            x: area.x + 1,
+            width: area.width.saturating_sub(1),
+            ..area
+        };
+        let words = Paragraph::new(notice.text.as_str()).wrap(Wrap { trim: true });
+        frame.render_widget(words.style(notice_style(notice, theme)), place);
         return;
     }
     let keys = [
         ("s", "stop"),
         ("c", "configure"),
-        (
-            "r",
-            if view.kept.is_some() {
-                "end recording"
-            } else {
-                "record"
-            },
-        ),
+        ("r", if view.kept.is_some() { "end" } else { "record" }),
         ("g", "gauges"),
         ("f", if view.is_frozen { "go on" } else { "freeze" }),
         ("+-", "time"),

@@ -8,29 +8,28 @@ use ratatui::widgets::{Block, Borders, Clear, Paragraph};
 use crate::monitor::theme::Theme;
 
 /// Each key, or word, and what it means.
-const LINES: [(&str, &str); 20] = [
+const LINES: [(&str, &str); 18] = [
     (
         "s, space",
-        "stop: 0 V at once, until the display board's reset button or power",
+        "stop: 0 V until the display board's reset button or power",
     ),
     ("c", "change a setting of a board"),
-    ("r", "begin or end a recording"),
-    ("g", "stream the gauges, or no longer"),
     (
-        "f",
-        "freeze what is shown, or go on; nothing is missed meanwhile",
+        "r",
+        "begin or end a recording; the gauges stream for as long",
     ),
+    ("g", "stream the gauges, or no longer"),
+    ("f", "freeze what is shown, or go on; nothing is missed"),
     ("+ -", "a shorter or a longer time"),
     (
         "m",
-        "the fingertip's peaks of the last 0.1 s, or its voltages now",
+        "the fingertip's peaks of the last 0.1 s, or its volts now",
     ),
     (
         "Tab",
-        "gauges, ports or log, where there is no room for all",
+        "gauges, ports, boards or log, where there is no room for all",
     ),
     ("q, Ctrl-C", "quit; the boards go on"),
-    ("", ""),
     (
         "λ",
         "the surface's wavelength: bold while the sensor stands by it",
@@ -46,11 +45,7 @@ const LINES: [(&str, &str); 20] = [
     ("LSB", "steps of the 12-bit converter, 3.3 V / 4096"),
     (
         "fingertip",
-        "computed by the firmware's own code from motion and λ;",
-    ),
-    (
-        "",
-        "the display does not send its voltages; their phase is not known",
+        "computed from motion and λ: the display sends no voltages",
     ),
     (
         "rtt, clock",
@@ -58,11 +53,14 @@ const LINES: [(&str, &str); 20] = [
     ),
     (
         "misses, by",
-        "samples or output ticks not done in time; why the board started",
+        "samples or ticks not done in time; why the board started",
     ),
     ("stray", "frames from before the two ends knew each other"),
     ("unread", "good frames that hold no message of this version"),
 ];
+
+/// Width with the frame.
+const WIDTH: u16 = 78;
 
 /// Draws the help over the middle of an area.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, theme: Theme) {
@@ -75,7 +73,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, theme: Theme) {
             ])
         })
         .collect();
-    let place = middle(area, 82, lines.len() as u16 + 2);
+    let place = middle(area, WIDTH, lines.len() as u16 + 2);
     frame.render_widget(Clear, place);
     let block = Block::new()
         .borders(Borders::ALL)

@@ -1,5 +1,7 @@
 //! What has happened, and what the boards' firmware has logged, the newest last.
 
+use std::collections::VecDeque;
+
 use protocol::Role;
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -10,7 +12,10 @@ use crate::monitor::dashboard::Dashboard;
 use crate::monitor::happening::What;
 use crate::monitor::theme::Theme;
 
-/// Draws the last lines.
+/// Width of the time and of the board's name.
+const HEAD_WIDTH: u16 = 19;
+
+/// Draws the last lines, each over as many rows as it takes.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
     let area = text::panel(
         frame,
@@ -18,9 +23,12 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         theme,
         text::title(theme, "log", "s since the monitor's start"),
     );
-    let count = shown.happenings.len();
-    let first = count.saturating_sub(area.height.into());
-    for (row, happening) in (0..).zip(shown.happenings.iter().skip(first)) {
+    let room = usize::from(area.width.saturating_sub(HEAD_WIDTH)).max(1);
+    let mut lines = VecDeque::new();
+    for happening in shown.happenings.iter().rev() {
+        if lines.len() >= area.height.into() {
+            break;
+        }
         let role = match happening.role {
             Role::Sensor => theme.sensor(),
             Role::Display | Role::Host => theme.display(),
@@ -30,14 +38,26 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
             What::Log { .. } => theme.quiet(),
             _ => ratatui::style::Style::new(),
         };
-        let line = Line::from(vec![
+        let head = [
             Span::styled(
                 format!(" {:>9.3} ", happening.at_us as f64 / 1e6),
                 theme.quiet(),
             ),
             Span::styled(format!("{:<8}", happening.role.name()), role),
-            Span::styled(happening.what.to_string(), style),
-        ]);
+        ];
+        let words = happening.what.to_string();
+        let mut rows = text::broken(&words, room);
+        // The newest stands at the bottom, and each from its first row downwards.
+        for row in rows.drain(1..).rev() {
+            let margin = Span::raw(" ".repeat(HEAD_WIDTH.into()));
+            lines.push_front(Line::from(vec![margin, Span::styled(row, style)]));
+        }
+        let mut line = head.to_vec();
+        line.extend(rows.pop().map(|row| Span::styled(row, style)));
+        lines.push_front(Line::from(line));
+    }
+    let excess = lines.len().saturating_sub(area.height.into());
+    for (row, line) in (0..).zip(lines.into_iter().skip(excess)) {
         text::put(frame, area, row, line);
     }
 }

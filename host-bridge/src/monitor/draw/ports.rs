@@ -10,7 +10,7 @@ use crate::monitor::dashboard::Dashboard;
 use crate::monitor::theme::Theme;
 
 /// Width of a port's name, and of a number.
-const NAME: usize = 17;
+const NAME: usize = 16;
 const NUMBER: usize = 8;
 
 /// A counter.
@@ -43,27 +43,42 @@ const COLUMNS: [Column; 13] = [
     column("stray", false, |port| port.unheralded),
     column("foreign", true, |port| port.foreign),
     column("unread", true, |port| port.malformed),
-    column("overlong", true, |port| port.overlong),
+    column("long", true, |port| port.overlong),
 ];
 
-/// Draws the table.
+/// Rows of the table with its heading.
+pub const HEIGHT: u16 = 7;
+
+/// Draws the table. Where there is no room for all counters, the last column adds up what is left of those
+/// that count what should not be.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
-    let area = text::panel(
-        frame,
-        area,
-        theme,
-        text::title(theme, "ports", "frames since their board's start"),
-    );
     let fitting = usize::from(area.width).saturating_sub(NAME) / NUMBER;
-    let columns = &COLUMNS[..fitting.min(COLUMNS.len())];
-    let mut names = vec![Span::raw(" ".repeat(NAME))];
-    names.extend(
-        columns
-            .iter()
-            .map(|column| Span::styled(format!("{:>NUMBER$}", column.name), theme.quiet())),
-    );
-    text::put(frame, area, 0, Line::from(names));
-    for (row, (name, counters)) in (1..).zip(shown.ports()) {
+    let (columns, rest) = if fitting < COLUMNS.len() {
+        COLUMNS.split_at(fitting.saturating_sub(1))
+    } else {
+        COLUMNS.split_at(COLUMNS.len())
+    };
+    let others = |port: &PortCounters| {
+        let bad = rest.iter().filter(|column| column.is_bad);
+        bad.fold(0, |sum: u32, column| {
+            sum.saturating_add((column.count)(port))
+        })
+    };
+    // The names stand in the panel's own line, which takes a row less.
+    let inner = text::panel(frame, area, theme, text::title(theme, "ports", ""));
+    let names: Vec<Span<'_>> = columns
+        .iter()
+        .map(|column| column.name)
+        .chain((!rest.is_empty()).then_some("others"))
+        .map(|name| Span::styled(format!("{name:>NUMBER$}"), theme.quiet()))
+        .collect();
+    let heading = Rect {
+        x: area.x + NAME as u16,
+        width: area.width.saturating_sub(NAME as u16),
+        ..area
+    };
+    text::put(frame, heading, 0, Line::from(names));
+    for (row, (name, counters)) in (0..).zip(shown.ports()) {
         let mut spans = vec![Span::styled(
             format!(" {name:<width$}", width = NAME - 1),
             theme.quiet(),
@@ -71,23 +86,25 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         spans.extend(
             columns
                 .iter()
-                .map(|column| number(column, counters.as_ref(), theme)),
+                .map(|column| number(column.is_bad, counters.as_ref().map(column.count), theme)),
         );
+        if !rest.is_empty() {
+            spans.push(number(true, counters.as_ref().map(others), theme));
+        }
         text::put(
             frame,
-            area,
+            inner,
             row,
             Line::from(spans).alignment(Alignment::Left),
         );
     }
 }
 
-fn number(column: &Column, counters: Option<&PortCounters>, theme: Theme) -> Span<'static> {
-    let Some(counters) = counters else {
+fn number(is_bad: bool, count: Option<u32>, theme: Theme) -> Span<'static> {
+    let Some(count) = count else {
         return Span::styled(format!("{:>NUMBER$}", "-"), theme.quiet());
     };
-    let count = (column.count)(counters);
-    let style = match (column.is_bad, count) {
+    let style = match (is_bad, count) {
         (_, 0) => theme.quiet(),
         (true, _) => theme.warning(),
         (false, _) => ratatui::style::Style::new(),

@@ -4,17 +4,21 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Block, Borders, Clear, Paragraph};
+use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
 use super::help::middle;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::form::Form;
 use crate::monitor::orders::Outcome;
-use crate::monitor::settings;
+use crate::monitor::settings::{self, Kind};
 use crate::monitor::view::View;
 
 /// Width with the frame.
-const WIDTH: u16 = 62;
+const WIDTH: u16 = 74;
+/// Width of a value: the longest word that there is.
+const VALUE: usize = 16;
+/// Rows for what came of a change: a refusal may take two.
+const OUTCOME_HEIGHT: u16 = 2;
 
 /// Draws the form over the middle of an area.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, form: &Form) {
@@ -40,17 +44,22 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, fo
             };
             let wanted = configuration
                 .as_ref()
-                .filter(|_| is_chosen)
+                .filter(|_| is_chosen && !matches!(setting.kind, Kind::Choice(_)))
                 .map(|configuration| setting.wanted(configuration))
                 .unwrap_or_default();
             Line::from(vec![
                 Span::styled(format!(" {:<20}", setting.name), name),
-                Span::styled(format!(" {shown:>10} "), style),
+                Span::styled(format!(" {shown:>VALUE$} "), style),
                 Span::styled(format!("{:<6} ", setting.unit), theme.quiet()),
                 Span::styled(wanted, theme.quiet()),
             ])
         })
         .collect();
+    let choice = chosen
+        .filter(|setting| matches!(setting.kind, Kind::Choice(_)))
+        .zip(configuration.as_ref())
+        .map(|(setting, configuration)| format!(" {}", setting.wanted(configuration)));
+    lines.push(Line::styled(choice.unwrap_or_default(), theme.quiet()));
     let (words, style) = match &live.outcome {
         Some(Outcome::Taken { name, value }) => (format!("{name} is {value} now"), theme.good()),
         Some(Outcome::Refused(refusal)) => (format!("refused: {refusal}"), theme.bad()),
@@ -63,12 +72,17 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, fo
         None => (String::new(), Style::new()),
     };
     lines.push(Line::styled(format!(" {words}"), style));
-    let place = middle(area, WIDTH, lines.len() as u16 + 2);
+    let place = middle(area, WIDTH, lines.len() as u16 + 1 + OUTCOME_HEIGHT);
     frame.render_widget(Clear, place);
     let block = Block::new()
         .borders(Borders::ALL)
         .border_style(theme.quiet())
         .title(format!(" {} board ", form.role.name()))
         .title_bottom(" ↑↓ setting  0-9 ←→ value  Enter send  Tab other board  Esc close ");
-    frame.render_widget(Paragraph::new(lines).block(block), place);
+    frame.render_widget(
+        Paragraph::new(lines)
+            .wrap(Wrap { trim: false })
+            .block(block),
+        place,
+    );
 }

@@ -43,6 +43,11 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         );
         if row == 2 {
             line.spans.push(Span::styled("mm", theme.quiet()));
+            if let Some(estimate) = &estimate {
+                let amplitude = format!("  {:.0} LSB", estimate.amplitude_lsb);
+                let style = faded(Style::new(), is_old, theme);
+                line.spans.push(Span::styled(amplitude, style));
+            }
         }
         text::put(frame, area, row, line);
     }
@@ -97,11 +102,6 @@ fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
             word,
             faded(style.add_modifier(Modifier::BOLD), is_old, theme),
         ),
-        Span::styled("   range ", theme.quiet()),
-        Span::styled(
-            words::range(estimate.range),
-            faded(Style::new(), is_old, theme),
-        ),
         Span::styled("   contact ", theme.quiet()),
         Span::styled(
             words::contact(estimate.contact),
@@ -118,8 +118,8 @@ fn count(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     Line::from(vec![
         Span::styled(" paper's count ", theme.quiet()),
         Span::styled(counted, style),
-        Span::styled("   ", theme.quiet()),
-        Span::styled(format!("{:.0} LSB", estimate.amplitude_lsb), style),
+        Span::styled("   range ", theme.quiet()),
+        Span::styled(words::range(estimate.range), style),
     ])
 }
 
@@ -179,7 +179,7 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
         Span::styled("   ━ ", theme.sensor()),
         Span::styled("valid  ┅ unsure", theme.quiet()),
         Span::styled("  ┅ ", theme.warning()),
-        Span::styled("paper's count", theme.quiet()),
+        Span::styled("paper's", theme.quiet()),
     ]);
     text::panel(frame, area, theme, title);
     let all = series.each_ref().map(|series| series.trace);

@@ -42,6 +42,34 @@ pub fn put(frame: &mut Frame<'_>, area: Rect, row: u16, line: Line<'_>) {
     }
 }
 
+/// A text in rows of at most `width` characters, broken at its spaces; a longer word is broken anywhere.
+/// There is always one row.
+pub fn broken(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let mut rows = Vec::new();
+    let mut row = String::new();
+    let mut used = 0;
+    for word in text.split(' ') {
+        if used > 0 && used + 1 + word.chars().count() > width {
+            rows.push(std::mem::take(&mut row));
+            used = 0;
+        } else if used > 0 {
+            row.push(' ');
+            used += 1;
+        }
+        for letter in word.chars() {
+            if used == width {
+                rows.push(std::mem::take(&mut row));
+                used = 0;
+            }
+            row.push(letter);
+            used += 1;
+        }
+    }
+    rows.push(row);
+    rows
+}
+
 /// Seconds as a person reads them: `0:12:31`, or `3 d 04:05`.
 pub fn duration(us: u64) -> String {
     let s = us / 1_000_000;
@@ -88,5 +116,19 @@ pub fn span(s: f32) -> String {
         format!("{s:.1} s")
     } else {
         format!("{s:.0} s")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_broken_at_its_spaces_and_a_long_word_anywhere() {
+        assert_eq!(broken("one two three", 7), ["one two", "three"]);
+        assert_eq!(broken("one two three", 8), ["one two", "three"]);
+        assert_eq!(broken("a longish word", 4), ["a", "long", "ish", "word"]);
+        assert_eq!(broken("", 4), [""]);
+        assert_eq!(broken("λλλ", 0), ["λ", "λ", "λ"]);
     }
 }

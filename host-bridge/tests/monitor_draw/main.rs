@@ -1,5 +1,7 @@
 //! The monitor's dashboard as it is drawn, at fixed inputs.
 
+mod sizes;
+
 use host_bridge::link::{Clocks, Event};
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::draw::draw;
@@ -166,8 +168,8 @@ fn the_header_says_how_both_boards_and_the_supervisor_are() {
     assert_eq!(
         picture[..3],
         [
-            " sensor  ● /dev/tty-sensor  rtt 350 µs  clock +0.0000 s  up 0:01:10  misses 0  watchdog 2  by watchdog  0.1.0 stm32f429z",
-            " display ● /dev/tty-display  rtt 350 µs  clock +0.0000 s  up 0:01:10  misses 0  watchdog 2  by watchdog  0.1.0 stm32f429",
+            " sensor  ● /dev/tty-sensor  rtt 350 µs  clock +0.0000 s  up 0:01:10  misses 0  watchdog 2  by watchdog  0.1.0",
+            " display ● /dev/tty-display  rtt 350 µs  clock +0.0000 s  up 0:01:10  misses 0  watchdog 2  by watchdog  0.1.0",
             " DRIVING  for 10.0 s",
         ]
     );
@@ -199,10 +201,10 @@ fn the_surface_is_told_in_numbers_three_rows_high_and_in_words() {
         [
             "   ▀▀█   █▀█ █▀█",
             "   █▀▀   █ █ █ █",
-            " λ ▀▀▀ ▀ ▀▀▀ ▀▀▀ mm",
+            " λ ▀▀▀ ▀ ▀▀▀ ▀▀▀ mm  103 LSB",
             " confidence ━━━━━━━━━━━━━─ 0.93",
-            " valid   range T1   contact slip",
-            " paper's count 2.40 mm   103 LSB",
+            " valid   contact slip",
+            " paper's count 2.40 mm   range T1",
         ]
     );
 }
@@ -241,7 +243,8 @@ fn every_panel_can_be_had_on_eighty_by_twenty_four() {
     let mut view = view();
     for (panel, words) in [
         (Panel::Gauges, "4 hum unused"),
-        (Panel::Ports, " sensor peer       1234 k       0       3"),
+        (Panel::Ports, " sensor peer      1234 k       0       3"),
+        (Panel::Boards, " display   rtt 350 µs"),
         (Panel::Log, " display driving"),
     ] {
         assert_eq!(view.panel, panel);
@@ -401,7 +404,7 @@ fn the_form_shows_values_units_and_the_range_of_the_one_chosen() {
     let picture = picture(&busy(DisplayState::Driving), &view, 80, 24);
     assert_has(
         &picture,
-        "│ max_age_ms                   7_ ms     20 to 5000",
+        "│ max_age_ms                         7_ ms     20 to 5000",
     );
-    assert_has(&picture, "│ amplitude_mv               5000 mV");
+    assert_has(&picture, "│ amplitude_mv                     5000 mV");
 }

@@ -1,0 +1,212 @@
+//! Boards that are not there, that come later, and that go and return.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use host_bridge::recording::Entry;
+use host_bridge::recording::row::{LinkEvent, LinkRow, Lost, Row};
+use protocol::{Hello, Message, Ping, Role};
+use tests::bridge::{self, Running};
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::utterance::Speaker;
+
+use crate::{LIMIT, Pair, entries, folder, signal, succeeded};
+
+/// Waits until a board has been asked for its configuration: it is known.
+fn asked(board: &FakeBoard) -> bool {
+    wait_until(LIMIT, || {
+        let heard = board.take_heard();
+        heard
+            .iter()
+            .any(|message| matches!(message, Message::Configure(_)))
+    })
+}
+
+#[test]
+fn a_board_that_goes_and_returns_is_recorded_on_and_the_gap_is_written_down() {
+    let folder = folder("returns");
+    let path = folder.join("returns.mcap");
+    let name = folder.join("ttySensor");
+    let sensor = || {
+        let board = FakeBoard::new(Role::Sensor);
+        board.lose_nothing();
+        symlink(board.path(), &name).expect("a link can be made");
+        board
+    };
+    let board = sensor();
+    let running = Running::start(
+        bridge::command()
+            .args(["record", "--no-gauges"])
+            .arg(&path)
+            .args(["--display", "/dev/null/d", "--sensor"])
+            .arg(&name),
+    );
+    assert!(asked(&board));
+    let mut speaker = Speaker::new(12);
+    board.say(speaker.gauges(0));
+    board.say(speaker.gauges(8));
+    let mut pair = Pair {
+        sensor: board,
+        ..Pair::new()
+    };
+    let answered = |board: &FakeBoard, sent_us| {
+        board.say(Message::Ping(Ping { sent_us }));
+        wait_until(LIMIT, || {
+            board
+                .take_heard()
+                .iter()
+                .any(|message| matches!(message, Message::Pong(pong) if pong.sent_us == sent_us))
+        })
+    };
+    assert!(answered(&pair.sensor, 1));
+    fs::remove_file(&name).expect("the link can be removed");
+    pair.sensor = FakeBoard::saying(Hello::new(Role::Sensor, "unplugged", [0, 0, 0]));
+    let board = sensor();
+    assert!(asked(&board));
+    board.say(speaker.gauges(1_016));
+    assert!(answered(&board, 2));
+    signal(&running, "-INT");
+    succeeded(&running.wait(LIMIT));
+    let (entries, _) = entries(&path);
+    let links: Vec<&LinkRow> = entries
+        .iter()
+        .filter(|entry| entry.role == Role::Sensor)
+        .filter_map(|entry| match &entry.row {
+            Row::Link(link) => Some(link),
+            _ => None,
+        })
+        .collect();
+    let words: Vec<&str> = links
+        .iter()
+        .filter_map(|link| link.state.as_ref())
+        .map(|word| word.0.as_str())
+        .filter(|word| matches!(*word, "known" | "absent"))
+        .collect();
+    assert!(words.ends_with(&["known", "absent", "known"]), "{words:?}");
+    let gap = links.iter().find(|link| link.event == LinkEvent::Gap);
+    let gap = gap.expect("the gap is written down");
+    assert_eq!((gap.lost, gap.missing), (Some(Lost::Samples), Some(1_000)));
+}
+
+#[test]
+fn one_board_that_is_named_alone_is_recorded_alone() {
+    for (role, other) in [(Role::Sensor, Role::Display), (Role::Display, Role::Sensor)] {
+        let path = folder(&format!("alone-{}", role.name())).join("alone.mcap");
+        let board = FakeBoard::new(role);
+        let running = Running::start(
+            bridge::command()
+                .args(["record", "--no-gauges", "--json"])
+                .arg(&path)
+                .arg(format!("--{}", role.name()))
+                .arg(board.path()),
+        );
+        assert!(asked(&board));
+        signal(&running, "-INT");
+        let ended = running.wait(LIMIT);
+        succeeded(&ended);
+        let other = other.name();
+        let said =
+            format!("{other}: absent: only the other board is named; name it with --{other}");
+        assert!(ended.stderr.contains(&said), "{}", ended.stderr);
+        let summary: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
+        assert_eq!(summary["absent"], serde_json::json!([other]), "{summary}");
+        let (entries, is_cut) = entries(&path);
+        assert!(!is_cut && !entries.is_empty());
+        // Nobody has looked for the other one among this machine's ports.
+        assert!(entries.iter().all(|entry| entry.role == role));
+    }
+}
+
+#[test]
+fn a_board_that_comes_later_is_recorded_from_then_on() {
+    let folder = folder("later");
+    let path = folder.join("later.mcap");
+    let name = folder.join("ttyDisplay");
+    let sensor = FakeBoard::new(Role::Sensor);
+    let record = |name: &Path| {
+        Running::start(
+            bridge::command()
+                .args(["record", "--no-gauges", "--force"])
+                .arg(&path)
+                .arg("--sensor")
+                .arg(sensor.path())
+                .arg("--display")
+                .arg(name),
+        )
+    };
+    let running = record(&name);
+    assert!(asked(&sensor));
+    signal(&running, "-INT");
+    let ended = running.wait(LIMIT);
+    succeeded(&ended);
+    let absent = format!("display: {}: not there: plug the board in", name.display());
+    assert!(ended.stderr.contains(&absent), "{}", ended.stderr);
+    assert!(
+        ended.stdout.trim_end().ends_with("; never there: display"),
+        "{}",
+        ended.stdout
+    );
+
+    let running = record(&name);
+    assert!(asked(&sensor));
+    let display = FakeBoard::new(Role::Display);
+    symlink(display.path(), &name).expect("a link can be made");
+    assert!(asked(&display));
+    display.say(Speaker::new(3).motion());
+    display.say(Message::Ping(Ping { sent_us: 9 }));
+    let is_answered = wait_until(LIMIT, || {
+        let heard = display.take_heard();
+        heard
+            .iter()
+            .any(|message| matches!(message, Message::Pong(pong) if pong.sent_us == 9))
+    });
+    assert!(is_answered);
+    signal(&running, "-INT");
+    let ended = running.wait(LIMIT);
+    succeeded(&ended);
+    assert!(ended.stderr.contains(&absent), "{}", ended.stderr);
+    let came = format!("display: {}: display 0.1.0 on stm32f429zi", name.display());
+    assert!(ended.stderr.contains(&came), "{}", ended.stderr);
+    assert!(!ended.stdout.contains("never there"), "{}", ended.stdout);
+    let (entries, _) = entries(&path);
+    let of = |role: Role| entries.iter().filter(move |entry| entry.role == role);
+    let is_motion = |entry: &Entry| matches!(entry.row, Row::Motion(_));
+    assert_eq!(
+        of(Role::Display).filter(|entry| is_motion(entry)).count(),
+        1
+    );
+    let words: Vec<&str> = of(Role::Display)
+        .filter_map(|entry| match &entry.row {
+            Row::Link(link) => Some(link.state.as_ref()?.0.as_str()),
+            _ => None,
+        })
+        .filter(|word| matches!(*word, "known" | "absent"))
+        .collect();
+    assert_eq!(words, ["absent", "known"]);
+}
+
+#[test]
+fn a_recording_ends_by_itself_when_it_is_told_to() {
+    let path = folder("for").join("for.mcap");
+    let started = Instant::now();
+    let ended = bridge::run(
+        [
+            "record",
+            path.to_str().expect("UTF-8"),
+            "--for",
+            "0.3",
+            "--sensor",
+            "/dev/null/s",
+            "--display",
+            "/dev/null/d",
+        ],
+        LIMIT,
+    );
+    succeeded(&ended);
+    assert!(started.elapsed() >= Duration::from_millis(300));
+    let (entries, is_cut) = entries(&path);
+    // Both are absent, and nothing was said.
+    assert_eq!((entries.len(), is_cut), (2, false));
+}

@@ -1,0 +1,199 @@
+//! What was said to be safe is, whatever happens to the program, the disk and the file.
+
+use std::fs;
+use std::process::Command;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use host_bridge::recording::row::Row;
+use protocol::{GAUGE_BLOCK, Message};
+use tests::bridge;
+use tests::fake_board::wait_until;
+use tests::utterance::Speaker;
+
+use crate::{LIMIT, Pair, entries, folder, signal};
+
+#[test]
+fn a_program_that_is_killed_leaves_what_it_said_is_safe() {
+    let path = folder("killed").join("killed.mcap");
+    let pair = Pair::new();
+    let running = pair.record(
+        &mut bridge::command(),
+        &[path.to_str().expect("UTF-8"), "--no-gauges"],
+    );
+    pair.wait_for_questions();
+    // Until some seconds of it are safe: the file grows with each.
+    let end = Instant::now() + LIMIT;
+    let (mut sizes, mut last) = (0, 0);
+    let mut speaker = Speaker::new(8);
+    let mut said = Vec::new();
+    while sizes < 3 {
+        assert!(Instant::now() < end, "the file does not grow");
+        let motion = speaker.motion();
+        pair.display.say(motion.clone());
+        said.push(motion);
+        thread::park_timeout(Duration::from_millis(1));
+        let size = fs::metadata(&path).map_or(0, |facts| facts.len());
+        sizes += u32::from(size > last && last > 0);
+        last = size;
+    }
+    signal(&running, "-KILL");
+    let ended = running.wait(LIMIT);
+    assert_eq!(ended.status.code(), None);
+    let safe = number_before(&ended.stderr, "messages");
+    let (read, is_cut) = entries(&path);
+    assert!(is_cut);
+    let motions: Vec<Message> = read
+        .iter()
+        .filter_map(|entry| match entry.row {
+            Row::Motion(motion) => Some(Message::Motion(motion)),
+            _ => None,
+        })
+        .collect();
+    // Answers to its own pings are counted, too.
+    let pongs = read
+        .iter()
+        .filter(|entry| matches!(entry.row, Row::Clock(_)))
+        .count();
+    assert!(
+        (motions.len() + pongs) as u64 >= safe,
+        "{} of {safe}",
+        motions.len()
+    );
+    assert!(motions.len() > 100 && said.starts_with(&motions));
+}
+
+#[test]
+fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
+    let path = folder("full").join("full.mcap");
+    let pair = Pair::new();
+    // The shell's blocks are of 512 or 1024 bytes. A limit does what a full disk does, without one.
+    let mut limited = Command::new("sh");
+    limited
+        .args(["-c", "trap '' XFSZ; ulimit -f 2000; exec \"$0\" \"$@\""])
+        .arg(bridge::path())
+        .env_remove("RIDGELINK_BENCH")
+        .env_remove("HOME")
+        .env_remove("XDG_CONFIG_HOME")
+        .stdin(std::process::Stdio::null())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped());
+    let mut running = pair.record(
+        &mut limited,
+        &[path.to_str().expect("UTF-8"), "--no-gauges"],
+    );
+    pair.wait_for_questions();
+    let mut speaker = Speaker::new(11);
+    let mut first = 0;
+    let ended = wait_until(LIMIT, || {
+        // Some 700 kB a second.
+        pair.sensor.say(speaker.gauges(first));
+        first += GAUGE_BLOCK as u32;
+        running
+            .child
+            .try_wait()
+            .expect("a child can be waited for")
+            .is_some()
+    });
+    assert!(ended, "it goes on");
+    let ended = running.wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    let want = format!(
+        "{}: can't be written any further: File too large",
+        path.display()
+    );
+    assert!(ended.stderr.contains(&want), "{}", ended.stderr);
+    let (read, is_cut) = entries(&path);
+    assert!(is_cut);
+    let samples: Vec<u32> = read
+        .iter()
+        .filter_map(|entry| match entry.row {
+            Row::Gauges(row) => Some(row.sample),
+            _ => None,
+        })
+        .collect();
+    assert!(samples.iter().copied().eq(0..samples.len() as u32));
+    let safe = number_before(&ended.stderr, "samples,");
+    assert!(
+        samples.len() as u64 >= safe && safe > 0,
+        "{} of {safe}",
+        samples.len()
+    );
+    // What is safe is all that is there: the file ends with a whole chunk.
+    let bytes = number_before(&ended.stderr, "bytes of it are safe");
+    assert_eq!(fs::metadata(&path).expect("it is there").len(), bytes);
+}
+
+#[test]
+fn places_that_take_no_file_are_named_with_the_reason() {
+    let folder = folder("places");
+    let file = folder.join("file");
+    fs::write(&file, "").expect("the file can be written");
+    let within = file.join("x.mcap");
+    let absent = folder.join("absent").join("x.mcap");
+    let boards = ["--sensor", "/dev/null/s", "--display", "/dev/null/d"];
+    for (words, want) in [
+        (vec!["/proc/x.mcap"], "/proc/x.mcap: can't be made: "),
+        (vec!["/sys/x.mcap"], "/sys/x.mcap: can't be made: "),
+        (
+            vec![within.to_str().expect("UTF-8")],
+            "x.mcap: can't be made: Not a directory",
+        ),
+        (
+            vec![absent.to_str().expect("UTF-8")],
+            "x.mcap: can't be made: No such file or directory",
+        ),
+        (
+            vec![file.to_str().expect("UTF-8")],
+            "file: is there already: give another name, or --force",
+        ),
+        (vec!["--csv", "/proc/x"], "/proc/x: can't be made: "),
+        (
+            vec!["/dev/full", "--force"],
+            "/dev/full: can't be written any further: No space left",
+        ),
+    ] {
+        let ended = bridge::run(
+            ["record"]
+                .into_iter()
+                .chain(words.iter().copied())
+                .chain(boards),
+            LIMIT,
+        );
+        assert_eq!(ended.status.code(), Some(2), "{words:?}: {}", ended.stderr);
+        assert!(ended.stderr.contains(want), "{words:?}: {}", ended.stderr);
+    }
+    assert_eq!(fs::read(&file).expect("still there"), b"");
+}
+
+#[test]
+fn a_file_that_is_removed_ends_the_recording() {
+    let folder = folder("removed").join("gone");
+    fs::create_dir(&folder).expect("a folder can be made");
+    let path = folder.join("gone.mcap");
+    let pair = Pair::new();
+    let running = pair.record(
+        &mut bridge::command(),
+        &[path.to_str().expect("UTF-8"), "--no-gauges"],
+    );
+    pair.wait_for_questions();
+    fs::remove_dir_all(&folder).expect("it can be removed");
+    let ended = running.wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    let want = format!("{}: was removed while it was being written", path.display());
+    assert!(ended.stderr.contains(&want), "{}", ended.stderr);
+}
+
+/// The number in front of a word of the last line that has it.
+fn number_before(text: &str, word: &str) -> u64 {
+    let line = text
+        .lines()
+        .rev()
+        .find(|line| line.contains(word))
+        .unwrap_or_else(|| panic!("no {word:?} in {text:?}"));
+    let before = line.split(word).next().unwrap_or_default().trim_end();
+    let digits = before.rsplit([' ', ',', ';']).next().unwrap_or_default();
+    digits
+        .parse()
+        .unwrap_or_else(|_| panic!("no number before {word:?} in {line:?}"))
+}

@@ -1,0 +1,159 @@
+//! `host-bridge record`: everything that the boards say is in the file, and what was said to be safe stays
+//! so, whatever happens to the program, the disk and the boards.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use host_bridge::recording::Entry;
+use host_bridge::recording::reader::Reader;
+use host_bridge::replay::{Pace, play};
+use protocol::{Message, Ping, Role};
+use tests::bridge::{Ended, Running};
+use tests::fake_board::{FakeBoard, wait_until};
+
+mod boards;
+mod disk;
+mod said;
+
+/// Far more than anything here takes.
+const LIMIT: Duration = Duration::from_secs(30);
+
+/// An empty folder for one test.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("bridge_record")
+        .join(test);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+/// Two boards that lose nothing, and what they have heard.
+struct Pair {
+    sensor: FakeBoard,
+    display: FakeBoard,
+    pings: u64,
+}
+
+impl Pair {
+    fn new() -> Self {
+        let board = |role| {
+            let board = FakeBoard::new(role);
+            board.lose_nothing();
+            board
+        };
+        Self {
+            sensor: board(Role::Sensor),
+            display: board(Role::Display),
+            pings: 0,
+        }
+    }
+
+    fn board(&self, role: Role) -> &FakeBoard {
+        match role {
+            Role::Display => &self.display,
+            Role::Sensor | Role::Host => &self.sensor,
+        }
+    }
+
+    /// Starts the program on these boards; `words` are the rest of its command line.
+    fn record(&self, command: &mut Command, words: &[&str]) -> Running {
+        command.arg("record").args(words);
+        command.arg("--sensor").arg(self.sensor.path());
+        command.arg("--display").arg(self.display.path());
+        Running::start(command)
+    }
+
+    /// Waits until both boards have been asked for their configuration: they are known.
+    fn wait_for_questions(&self) {
+        for role in [Role::Sensor, Role::Display] {
+            let board = self.board(role);
+            let asked = || {
+                let heard = board.take_heard();
+                heard
+                    .iter()
+                    .any(|message| matches!(message, Message::Configure(_)))
+            };
+            assert!(wait_until(LIMIT, asked), "the {} is not asked", role.name());
+        }
+    }
+
+    /// Waits until the program has heard everything that was said: it answers in order.
+    fn wait_until_heard(&mut self) {
+        for role in [Role::Sensor, Role::Display] {
+            self.pings += 1;
+            let sent_us = self.pings;
+            let board = self.board(role);
+            board.say(Message::Ping(Ping { sent_us }));
+            let answered = || {
+                board.take_heard().iter().any(
+                    |message| matches!(message, Message::Pong(pong) if pong.sent_us == sent_us),
+                )
+            };
+            assert!(
+                wait_until(LIMIT, answered),
+                "the {} is not answered",
+                role.name()
+            );
+        }
+    }
+}
+
+fn signal(running: &Running, name: &str) {
+    let sent = Command::new("kill")
+        .args([name, &running.child.id().to_string()])
+        .status();
+    assert!(
+        sent.is_ok_and(|status| status.success()),
+        "{name} can be sent"
+    );
+}
+
+/// Everything in a file, and whether it was cut off.
+fn entries(path: &Path) -> (Vec<Entry>, bool) {
+    let mut reader = Reader::open(path).unwrap_or_else(|error| panic!("{error}"));
+    let mut entries = Vec::new();
+    while let Some(entry) = reader
+        .next_entry()
+        .unwrap_or_else(|error| panic!("{error}"))
+    {
+        entries.push(entry);
+    }
+    (entries, reader.is_cut())
+}
+
+/// The messages in a file, without the answers to the program's own pings.
+fn messages(path: &Path) -> Vec<(Role, Message)> {
+    let mut messages = Vec::new();
+    let recording = Reader::open(path).unwrap_or_else(|error| panic!("{error}"));
+    let pace = Pace {
+        speed: 100.0,
+        ..Pace::default()
+    };
+    play(recording, &pace, &AtomicBool::new(false), |role, event| {
+        if let host_bridge::link::Event::Heard { message, .. } = event {
+            messages.push((role, message));
+        }
+    })
+    .unwrap_or_else(|error| panic!("{error}"));
+    messages.retain(|(_, message)| !matches!(message, Message::Pong(_)));
+    messages
+}
+
+fn of(role: Role, messages: &[(Role, Message)]) -> Vec<&Message> {
+    let of = messages.iter().filter(|(said, _)| *said == role);
+    of.map(|(_, message)| message).collect()
+}
+
+fn succeeded(ended: &Ended) {
+    assert_eq!(
+        ended.status.code(),
+        Some(0),
+        "{}{}",
+        ended.stdout,
+        ended.stderr
+    );
+}

@@ -1,0 +1,165 @@
+//! Everything that is said is recorded, and nothing is changed but the gauges' streaming.
+
+use std::fs;
+
+use host_bridge::recording::row::Row;
+use protocol::{
+    Configuration, ConfigurationReport, DisplayConfiguration, GAUGE_BLOCK, Message, Refusal, Role,
+    SensorConfiguration, Setting,
+};
+use tests::bridge;
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::utterance::Speaker;
+
+use crate::{LIMIT, Pair, entries, folder, messages, of, signal, succeeded};
+
+/// Says the same to both, for `turns`, without what the program answers by itself.
+fn talk(pair: &Pair, turns: u32) -> Vec<(Role, Message)> {
+    let mut said = Vec::new();
+    let mut speakers = [
+        (Role::Sensor, Speaker::new(1)),
+        (Role::Display, Speaker::new(2)),
+    ];
+    for turn in 0..turns {
+        for (role, speaker) in &mut speakers {
+            let message = match (turn % 5, *role) {
+                (0, Role::Sensor) => speaker.gauges(turn / 5 * GAUGE_BLOCK as u32),
+                (3, _) if turn % 50 == 3 => speaker.oddity(),
+                (_, role) => speaker.message(role),
+            };
+            if !matches!(message, Message::Pong(_)) {
+                pair.board(*role).say(message.clone());
+                said.push((*role, message));
+            }
+        }
+    }
+    said
+}
+
+#[test]
+fn everything_that_is_said_is_in_the_file_once_and_in_order() {
+    let folder = folder("everything");
+    let path = folder.join("everything.mcap");
+    let csv = folder.join("tables");
+    let mut pair = Pair::new();
+    let words = [
+        path.to_str().expect("UTF-8"),
+        "--csv",
+        csv.to_str().expect("UTF-8"),
+        "--no-gauges",
+        "--json",
+    ];
+    let running = pair.record(&mut bridge::command(), &words);
+    pair.wait_for_questions();
+    let said = talk(&pair, 5_000);
+    pair.wait_until_heard();
+    signal(&running, "-INT");
+    let ended = running.wait(LIMIT);
+    succeeded(&ended);
+
+    let (_, is_cut) = entries(&path);
+    assert!(!is_cut);
+    let read = messages(&path);
+    for role in [Role::Sensor, Role::Display] {
+        let (read, said) = (of(role, &read), of(role, &said));
+        for (at, (read, said)) in read.iter().zip(&said).enumerate() {
+            assert_eq!(read, said, "the {}'s {at}", role.name());
+        }
+        assert_eq!(read.len(), said.len(), "the {}'s", role.name());
+    }
+    let summary: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
+    assert_eq!(summary["samples"], 8_000, "{summary}");
+    assert_eq!(summary["unwritten"], 0, "{summary}");
+    let lines = |name: &str| {
+        let text = fs::read_to_string(csv.join(name)).expect("the table can be read");
+        text.lines().count() - 1
+    };
+    assert_eq!(lines("sensor-gauges.csv"), 8_000);
+    let motions = said
+        .iter()
+        .filter(|(_, message)| matches!(message, Message::Motion(_)));
+    assert_eq!(lines("display-motion.csv"), motions.count());
+}
+
+/// Answers as a board does that has this configuration; returns the one that is then in force.
+fn configure(
+    board: &FakeBoard,
+    role: Role,
+    in_force: Configuration,
+    asked: &Configuration,
+) -> Configuration {
+    let own = matches!(
+        (role, asked),
+        (Role::Sensor, Configuration::Sensor(_)) | (Role::Display, Configuration::Display(_))
+    );
+    let refused = (!own).then_some(Refusal {
+        setting: Setting::Role,
+        index: 0,
+        low: 0,
+        high: 0,
+    });
+    let configuration = if own { *asked } else { in_force };
+    board.say(Message::Configuration(ConfigurationReport {
+        refused,
+        hash: configuration.hash(),
+        configuration,
+    }));
+    configuration
+}
+
+#[test]
+fn gauges_are_streamed_while_they_are_recorded_and_nothing_else_is_changed() {
+    let path = folder("gauges").join("gauges.mcap");
+    let pair = Pair::new();
+    let running = pair.record(&mut bridge::command(), &[path.to_str().expect("UTF-8")]);
+    let before = SensorConfiguration {
+        window_ms: 123,
+        bank_travel_percent: 77,
+        ..SensorConfiguration::DEFAULT
+    };
+    let streaming = SensorConfiguration {
+        stream_gauges: true,
+        ..before
+    };
+    let mut in_force = Configuration::Sensor(before);
+    let mut display = Configuration::Display(DisplayConfiguration::DEFAULT);
+    let mut asked = Vec::new();
+    let mut hear = |wanted: SensorConfiguration| {
+        wait_until(LIMIT, || {
+            for (role, own) in [(Role::Sensor, &mut in_force), (Role::Display, &mut display)] {
+                for message in pair.board(role).take_heard() {
+                    if let Message::Configure(configuration) = message {
+                        *own = configure(pair.board(role), role, *own, &configuration);
+                        asked.push((role, configuration));
+                    }
+                }
+            }
+            in_force == Configuration::Sensor(wanted)
+        })
+    };
+    assert!(hear(streaming), "the gauges are not asked for");
+    signal(&running, "-TERM");
+    assert!(hear(before), "the board is not as it was");
+    succeeded(&running.wait(LIMIT));
+    assert_eq!(
+        display,
+        Configuration::Display(DisplayConfiguration::DEFAULT)
+    );
+    // Each board was asked with what is for the other; the sensor was set twice.
+    let set = asked
+        .iter()
+        .filter(|asked| matches!(asked, (Role::Sensor, Configuration::Sensor(_))));
+    assert_eq!(set.count(), 2, "{asked:?}");
+    let (entries, _) = entries(&path);
+    let reported = |wanted: SensorConfiguration| {
+        entries.iter().any(
+            |entry| matches!(&entry.row, Row::SensorConfiguration(row) if row.in_force == wanted),
+        )
+    };
+    assert!(reported(before) && reported(streaming));
+    assert!(
+        entries
+            .iter()
+            .any(|entry| matches!(entry.row, Row::DisplayConfiguration(_)))
+    );
+}
