@@ -238,10 +238,11 @@ fn of_stroke(points: &[(f64, f64)], hand: &Track, stroke: usize) -> Vec<Wave> {
 mod tests {
     use super::*;
     use crate::analysis::synthetic::Run;
+    use crate::analysis::track::COUNT_MM;
 
-    /// A tick's travel at 70 mm/s, in mm, between whose ends places are straight lines: the hand's speed
-    /// changes by 70 · 2π · 0.83 mm/s² at most, so a line misses it by a(0.5 ms)²/8 = 1.1e-5 mm.
-    const LINE_MM: f64 = 1.2e-5;
+    /// A stimulus follows the hand's encoder: a count, 5 µm, at either end of a wave. What straight lines
+    /// between ticks miss is far less: of a crossing (2π · 35 Hz · 0.5 ms)³/16π = 2.6e-5 of a wave.
+    const WAVE_MM: f64 = 2.0 * COUNT_MM;
 
     fn felt(run: &Run) -> Felt {
         Felt::of(&run.record(), ACTUATOR, 0.0, f64::INFINITY).unwrap()
@@ -250,17 +251,11 @@ mod tests {
     #[test]
     fn a_clean_stimulus_presents_its_wavelength_at_every_wave() {
         let felt = felt(&Run::swinging(70.0, 0.83, 2.0));
-        // Voltages are straight between ticks: at 35 Hz a crossing is off by (2π·35·0.5 ms)³/(12·2π) of a
-        // wave at most, 1.8e-5, and four flanks stand for a wave.
-        let bound_mm = 4.0 * (1.8e-5 * 2.0 + LINE_MM) + 4.0 * 0.005 * 1e-3;
         for wave in felt.waves() {
-            assert!(
-                (wave.wavelength_mm - 2.0).abs() < 0.01 + bound_mm,
-                "{wave:?}"
-            );
+            assert!((wave.wavelength_mm - 2.0).abs() < WAVE_MM, "{wave:?}");
         }
-        assert!((felt.mean_mm() - 2.0).abs() < 2e-3, "{}", felt.mean_mm());
-        assert!(felt.error_percent(2.0) < 0.3, "{}", felt.error_percent(2.0));
+        assert!((felt.mean_mm() - 2.0).abs() < WAVE_MM);
+        assert!(felt.error_percent(2.0) < 100.0 * WAVE_MM / 2.0);
     }
 
     #[test]
@@ -271,12 +266,8 @@ mod tests {
             standing_v: Box::new(|_| 0.5),
             ..Run::to_and_fro(50.0, 0.6, 2.0)
         });
-        assert!((clean.mean_mm() - lifted.mean_mm()).abs() < 1e-3);
-        assert!(
-            lifted.scatter_percent() < 0.3,
-            "{}",
-            lifted.scatter_percent()
-        );
+        assert!((clean.mean_mm() - lifted.mean_mm()).abs() < WAVE_MM);
+        assert!(lifted.scatter_percent() < 100.0 * WAVE_MM / 2.0);
     }
 
     #[test]
