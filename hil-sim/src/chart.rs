@@ -17,7 +17,7 @@
 
 pub mod bound;
 pub mod contest;
-mod cores;
+pub(crate) mod cores;
 pub mod costs;
 pub mod delay;
 pub mod efficiency;
@@ -47,7 +47,7 @@ pub const fn word_of_mode(mode: protocol::Mode) -> &'static str {
 }
 
 /// The text of a finished table.
-fn finish_csv(table: csv::Writer<Vec<u8>>) -> Result<String, csv::Error> {
+pub(crate) fn finish_csv(table: csv::Writer<Vec<u8>>) -> Result<String, csv::Error> {
     let bytes = table
         .into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))?;

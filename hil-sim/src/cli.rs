@@ -20,6 +20,8 @@ mod golden;
 mod init;
 mod map;
 mod models;
+mod paper;
+mod people;
 mod run;
 mod scene_files;
 #[cfg(target_os = "linux")]
@@ -80,6 +82,12 @@ enum Command {
     /// console as a pseudo-terminal, until it is told to quit
     #[cfg(target_os = "linux")]
     Serve(serve::Serve),
+    /// The paper, figure by figure: Tables I to IV and Figs 4 to 8, ours beside the paper's, as one HTML page
+    /// with a CSV for each
+    Paper(paper::Paper),
+    /// The paper's experiments with people, simulated: an observer with Table II's limens feels the
+    /// actuators' real voltages. Prints Tables II to IV beside the paper's, and writes them as CSV
+    People(people::People),
     /// Runs both ELFs for long, with random strokes over several specimens through bad weather, and holds
     /// every counter against what was seen: exit status 1 if one does not fit
     Soak(soak::Soak),
@@ -163,6 +171,8 @@ impl Arguments {
             Command::Timing(timing) => timing.execute(),
             #[cfg(target_os = "linux")]
             Command::Serve(serve) => serve.execute(),
+            Command::Paper(paper) => paper.execute(),
+            Command::People(people) => people.execute(),
             Command::Soak(soak) => soak.execute(),
         }
     }

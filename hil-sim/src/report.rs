@@ -1,7 +1,7 @@
 //! A run for a person to look at: one HTML file that needs nothing else.
 
-mod chart;
-mod crossings;
+pub(crate) mod chart;
+pub(crate) mod crossings;
 mod faults;
 pub mod palette;
 mod plots;
@@ -133,7 +133,7 @@ fn write_figure(page: &mut String, figure: &Figure) {
 }
 
 /// Text as HTML shows it.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -8,7 +8,7 @@ use std::thread;
 ///
 /// # Errors
 /// The first of `work`'s, by the inputs' order.
-pub(super) fn on_all_cores<I: Sync, O: Send, E: Send>(
+pub(crate) fn on_all_cores<I: Sync, O: Send, E: Send>(
     inputs: &[I],
     work: impl Fn(&I) -> Result<O, E> + Sync,
 ) -> Result<Vec<O>, E> {

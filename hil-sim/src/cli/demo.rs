@@ -6,18 +6,12 @@ use anyhow::Context;
 use firmware_sensor::counting::predicted_mean_mm;
 use hil_sim::elf::{self, Firmwares};
 use hil_sim::outcome::Outcome;
+use hil_sim::paper::table_1::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
 use hil_sim::report::html;
 use hil_sim::scene::Scene;
 
 use super::{Demo, number};
 
-/// Speeds of Table I, in mm/s, with its mean estimates for 1, 2, 3 and 4 mm (Okamoto et al. 2009).
-const TABLE_1: [(f64, [f64; 4]); 3] = [
-    (30.0, [1.006, 2.072, 3.390, 4.321]),
-    (50.0, [1.006, 1.844, 3.096, 4.038]),
-    (70.0, [1.128, 1.978, 3.023, 4.075]),
-];
-const WAVELENGTHS_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// The paper's counting window.
 const WINDOW_S: f64 = 0.080;
 /// The paper's two seconds of estimates, and what the filters need to settle before.
@@ -39,8 +33,8 @@ impl Demo {
         println!("{HEADER}");
         let mut outcomes = Vec::new();
         let mut as_predicted = true;
-        for (speed_mm_s, paper_mm) in TABLE_1 {
-            for (wavelength_mm, paper_mm) in WAVELENGTHS_MM.into_iter().zip(paper_mm) {
+        for (speed_mm_s, paper_mm) in SPEEDS_MM_S.into_iter().zip(PAPER_MM) {
+            for (wavelength_mm, paper_mm) in CELLS_MM.into_iter().zip(paper_mm) {
                 let outcome = rub(wavelength_mm, speed_mm_s, &firmwares)?;
                 let predicted_mm = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
                 println!(

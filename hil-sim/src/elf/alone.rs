@@ -63,6 +63,31 @@ impl Said {
             amplitude_lsb: 300.0,
         }
     }
+
+    /// What a sensor says that sees this at `instant_us` while its arm moves at `velocity_mm_s`: valid from
+    /// 5 mm/s on.
+    pub(crate) fn estimate(self, sequence: u32, instant_us: u64, velocity_mm_s: f64) -> Estimate {
+        let moves = velocity_mm_s.abs() >= SLOWEST_MM_S;
+        Estimate {
+            sequence,
+            instant_us,
+            wavelength_mm: moves.then_some(self.wavelength_mm as f32),
+            valid: moves,
+            confidence: if moves { 0.9 } else { 0.0 },
+            amplitude_lsb: if moves { self.amplitude_lsb } else { 0.0 },
+            counted_mm: None,
+            range: Range::T1,
+            contact: if moves {
+                Contact::Slip
+            } else {
+                Contact::Unknown
+            },
+            velocity_um_s: (velocity_mm_s * 1e3).round() as i32,
+            lag_um: None,
+            gauges_used: if moves { 0b1_1111 } else { 0 },
+            health: [GaugeHealth::Good; protocol::GAUGES],
+        }
+    }
 }
 
 /// λ and amplitude over s since the start.
@@ -381,26 +406,8 @@ impl FarEnd {
         let t_s = now_ns as f64 * 1e-9;
         let said = (self.alone.surface)(t_s);
         let velocity_mm_s = self.alone.hand.velocity_mm_s(t_s);
-        let moves = velocity_mm_s.abs() >= SLOWEST_MM_S;
-        let estimate = Estimate {
-            sequence: self.estimates.len() as u32,
-            instant_us: now_ns / 1_000,
-            wavelength_mm: moves.then_some(said.wavelength_mm as f32),
-            valid: moves,
-            confidence: if moves { 0.9 } else { 0.0 },
-            amplitude_lsb: if moves { said.amplitude_lsb } else { 0.0 },
-            counted_mm: None,
-            range: Range::T1,
-            contact: if moves {
-                Contact::Slip
-            } else {
-                Contact::Unknown
-            },
-            velocity_um_s: (velocity_mm_s * 1e3).round() as i32,
-            lag_um: None,
-            gauges_used: if moves { 0b1_1111 } else { 0 },
-            health: [GaugeHealth::Good; protocol::GAUGES],
-        };
+        let sequence = self.estimates.len() as u32;
+        let estimate = said.estimate(sequence, now_ns / 1_000, velocity_mm_s);
         self.estimates.push(EstimateRecord {
             made_ns: now_ns,
             received_ns: None,

@@ -33,6 +33,8 @@ pub enum Mark {
     Thin(Colour, Vec<(f64, f64)>),
     /// A dot at each point.
     Dots(Colour, Vec<(f64, f64)>),
+    /// A disc at each point, where there are few.
+    Discs(Colour, Vec<(f64, f64)>),
     /// Upright strokes at x, from one y to another.
     Strokes(Colour, Vec<f64>, Range<f64>),
     /// Rectangles: stretches of x, each from one y to another.
@@ -67,8 +69,14 @@ impl Axis {
 
 /// Draws a chart of a height (of 2 000 wide) as one SVG element. The error is plotters' text.
 pub fn draw(height: u32, x: &Axis, y: &Axis, marks: &[Mark]) -> Result<String, String> {
+    draw_at((WIDTH, height), x, y, marks)
+}
+
+/// The same of a width and a height. What is shown narrower than 2 000 is drawn narrower, for its text to
+/// stay as large.
+pub fn draw_at(size: (u32, u32), x: &Axis, y: &Axis, marks: &[Mark]) -> Result<String, String> {
     let mut svg = String::new();
-    draw_into(&mut svg, height, x, y, marks).map_err(|error| error.to_string())?;
+    draw_into(&mut svg, size, x, y, marks).map_err(|error| error.to_string())?;
     Ok(svg)
 }
 
@@ -76,12 +84,12 @@ type DrawingError = Box<dyn std::error::Error>;
 
 fn draw_into(
     svg: &mut String,
-    height: u32,
+    size: (u32, u32),
     x: &Axis,
     y: &Axis,
     marks: &[Mark],
 ) -> Result<(), DrawingError> {
-    let area = SVGBackend::with_string(svg, (WIDTH, height)).into_drawing_area();
+    let area = SVGBackend::with_string(svg, size).into_drawing_area();
     let (x_ticks, y_ticks) = (x.ticks(), y.ticks());
     let text = ("sans-serif", FONT).into_font().color(&INK.drawn());
     let mut chart = ChartBuilder::on(&area)
@@ -140,6 +148,11 @@ fn draw_into(
                 let style = colour.drawn().filled();
                 let dots = points.iter().map(|&point| Circle::new(point, 5, style));
                 chart.draw_series(dots)?;
+            }
+            Mark::Discs(colour, points) => {
+                let style = colour.drawn().filled();
+                let discs = points.iter().map(|&point| Circle::new(point, 11, style));
+                chart.draw_series(discs)?;
             }
             Mark::Strokes(colour, places, height) => {
                 let style = colour.drawn().stroke_width(3);
