@@ -16,15 +16,19 @@ mod demo;
 mod display;
 mod faults;
 mod goals;
+mod golden;
+mod init;
 mod map;
 mod models;
 mod paper;
 mod people;
 mod run;
+mod scene_files;
 #[cfg(target_os = "linux")]
 mod serve;
 mod size;
 mod soak;
+mod way;
 
 /// Ridgelink's simulator.
 #[derive(Debug, Parser)]
@@ -38,7 +42,12 @@ pub struct Arguments {
 enum Command {
     /// Runs scenes and judges them by what they expect: exit status 0 if all is as expected, 1 if
     /// not, 2 if a scene or a file cannot be used
-    Run(Run),
+    Run(run::Run),
+    /// Writes a first scene, with comments, to start from
+    Init(init::Init),
+    /// Compares the hashes of scenes' runs with golden ones, or renews those
+    #[command(subcommand)]
+    Golden(golden::Command),
     /// Rubs the paper's four specimens at its three speeds on the ELFs and prints Table I three times
     /// over: the paper's, predicted, and this ELF's
     Demo(Demo),
@@ -104,24 +113,6 @@ struct Cost {
     elf: PathBuf,
 }
 
-#[derive(Debug, clap::Args)]
-struct Run {
-    /// Scenes: TOML files
-    #[arg(required = true)]
-    scenes: Vec<PathBuf>,
-    /// What runs the firmware
-    #[arg(long, value_enum, default_value_t = EngineName::Native)]
-    engine: EngineName,
-    /// Where to write every result as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Where to write a report with plots, as one HTML page
-    #[arg(long, value_name = "FILE")]
-    report: Option<PathBuf>,
-    #[command(flatten)]
-    elves: Elves,
-}
-
 /// Where the boards' firmwares are.
 #[derive(Debug, clap::Args)]
 struct Elves {
@@ -166,6 +157,8 @@ impl Arguments {
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::Run(run) => run.execute(),
+            Command::Init(init) => init.execute(),
+            Command::Golden(golden) => golden.execute(),
             Command::Demo(demo) => demo.execute(),
             Command::Size(elves) => size::execute(&elves),
             Command::Cost(cost) => cost.execute(),

@@ -3,7 +3,7 @@
 use crate::analysis::Verdict;
 use crate::scene::Expect;
 
-/// A line for each expectation that the verdict does not meet. What could not be measured meets none.
+/// A line for each expectation that the verdict does not meet, its key first ([`key_of`]). What could not be measured meets none.
 pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
     let (summary, actuators) = (&verdict.summary, &verdict.actuators);
     let frequency_percent = match (actuators.frequency_hz, actuators.truth_hz) {
@@ -77,6 +77,11 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
     lines
 }
 
+/// The key in `[expect]` that a line of [`unmet`]'s is about.
+pub fn key_of(line: &str) -> &str {
+    line.split(':').next().unwrap_or(line)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,10 +139,7 @@ mod tests {
             e.wrong_share_max = Some(0.001);
             e.frequency_percent = Some(0.3);
         });
-        let keys: Vec<&str> = unmet
-            .iter()
-            .map(|line| line.split(':').next().unwrap())
-            .collect();
+        let keys: Vec<&str> = unmet.iter().map(|line| key_of(line)).collect();
         assert_eq!(
             keys,
             [

@@ -138,6 +138,29 @@ pub fn to_json(results: &[SceneResult]) -> serde_json::Result<String> {
     String::from_utf8(bytes).map_err(serde::ser::Error::custom)
 }
 
+/// The same list, written object by object, so that none has to be kept.
+#[derive(Debug, Default)]
+pub struct JsonList {
+    begun: bool,
+}
+
+impl JsonList {
+    /// The text to be written for the next run, of which `alone` is what [`to_json`] makes.
+    pub fn next(&mut self, alone: &str) -> String {
+        let object = alone.trim_end_matches("\n]\n");
+        if std::mem::replace(&mut self.begun, true) {
+            object.replacen('[', ",", 1)
+        } else {
+            object.to_owned()
+        }
+    }
+
+    /// The text to be written at the end.
+    pub fn end(&self) -> &'static str {
+        if self.begun { "\n]\n" } else { "[]\n" }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use serde_json::{Value, json};
@@ -214,6 +237,26 @@ mod tests {
             "skew_us",
         ] {
             assert!(actuators.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_list_written_piece_by_piece_is_the_list_written_at_once() {
+        let run = Run::steady(50.0, 2.0);
+        let truth = Truth::new("a scene", "counting", &*run.surface_mm);
+        let recording = run.record();
+        let verdict = judge(&truth, &recording);
+        let results: Vec<SceneResult> = (0..3)
+            .map(|_| SceneResult::new(&truth, &recording, &verdict))
+            .collect();
+        for count in 0..=3 {
+            let mut list = JsonList::default();
+            let mut text = String::new();
+            for result in &results[..count] {
+                text += &list.next(&to_json(std::slice::from_ref(result)).unwrap());
+            }
+            text += list.end();
+            assert_eq!(text, to_json(&results[..count]).unwrap());
         }
     }
 

@@ -1,7 +1,9 @@
 //! Ridgelink's simulator: scenes, the world that a scene describes, and engines that run the firmware in it.
 
 pub mod analysis;
+pub mod annotation;
 pub mod arm;
+pub mod batch;
 pub mod chart;
 pub mod contact;
 pub mod dac81416;
@@ -11,7 +13,9 @@ pub mod event;
 pub mod expectation;
 pub mod fault;
 pub mod gauges;
+pub mod golden;
 pub mod json;
+pub mod junit;
 pub mod listener;
 pub mod map;
 pub mod motion;

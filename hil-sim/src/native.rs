@@ -13,7 +13,7 @@ use std::time::Instant;
 use crate::arm::Arm;
 use crate::digest::Digest;
 use crate::fault::catalogue::Needs;
-use crate::fault::{Clock, GaugeFaults, HandFault, Signs, Way};
+use crate::fault::{Clock, Fault, GaugeFaults, HandFault, Signs, Way};
 use crate::listener::Said;
 use crate::motion::encoder;
 use crate::recording::{
@@ -58,6 +58,26 @@ pub fn run(scene: &Scene) -> Result<Recording, SceneError> {
     Ok(pair.into_recording(scene.duration_s, wall_s))
 }
 
+/// Whether this engine can run a scene: it has no boards to break.
+///
+/// # Errors
+/// The first fault that needs a board; its file is the scene's name.
+pub fn check(scene: &Scene) -> Result<(), SceneError> {
+    let needs_boards = |fault: &Fault| fault.kind.row().needs == Needs::Boards;
+    match scene.faults.iter().position(needs_boards) {
+        None => Ok(()),
+        Some(at) => Err(SceneError {
+            file: scene.name.clone(),
+            line: None,
+            key: format!("fault[{at}].kind"),
+            message: format!(
+                "\"{}\" breaks a board, and this engine has none: give --engine elf",
+                scene.faults[at].kind.name()
+            ),
+        }),
+    }
+}
+
 /// Both boards, the wires between them, and the world around them.
 struct Pair {
     world: World,
@@ -81,21 +101,7 @@ struct Pair {
 
 impl Pair {
     fn new(scene: &Scene) -> Result<Self, SceneError> {
-        if let Some(at) = scene
-            .faults
-            .iter()
-            .position(|fault| fault.kind.row().needs == Needs::Boards)
-        {
-            return Err(SceneError {
-                file: scene.name.clone(),
-                line: None,
-                key: format!("fault[{at}].kind"),
-                message: format!(
-                    "\"{}\" breaks a board, and this engine has none: give --engine elf",
-                    scene.faults[at].kind.name()
-                ),
-            });
-        }
+        check(scene)?;
         let end = |role, mark, to| End::new(role, Way::new(scene, to), mark);
         Ok(Self {
             world: World::new(scene)?,

@@ -23,7 +23,7 @@ pub struct Outcome {
     pub unmet: Vec<String>,
     /// What became of the scene's faults, in their order.
     pub findings: Vec<Finding>,
-    wavelength_mm: Box<dyn Fn(f64) -> f64>,
+    wavelength_mm: Box<dyn Fn(f64) -> f64 + Send>,
 }
 
 impl Outcome {

@@ -1,7 +1,7 @@
 //! A scene: what is rubbed, how, through which link, and what must come out.
 //!
 //! Scenes are TOML files ([`Scene::load`]); [`Scene::constant`] builds the paper's in code. A scene that
-//! loaded has been checked as a whole, its CSV files included: nothing in it can stop a run.
+//! loaded has been checked as a whole, the files that it names included: nothing in it can stop a run.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,10 +14,13 @@ use crate::motion::LiveHand;
 
 mod bounds;
 mod contact;
+mod csv_rows;
 mod display;
 mod error;
 mod fault;
+mod place;
 mod read;
+mod recorded;
 mod series;
 mod table;
 #[cfg(test)]
@@ -25,6 +28,7 @@ mod tests;
 
 pub use display::Display;
 pub use error::SceneError;
+pub use place::line_of;
 pub use series::Series;
 
 /// Everything that decides a run. Two runs of equal scenes are equal, byte for byte.
@@ -91,7 +95,7 @@ pub enum Profile {
     Sine,
     /// A grating with ridges as wide as its grooves and ramps of 0.1 λ.
     Trapezoid,
-    /// Measured heights over x, in any unit; `file` has the columns `x_mm,height`. The specimens are
+    /// Measured heights over x, in any unit, from CSV, WAV or MCAP: see `docs/recordings.md`. The specimens are
     /// then only the truth to judge against.
     Recorded(Arc<Series>),
 }
@@ -111,7 +115,7 @@ pub enum Motion {
         /// In Hz, above 0, to 20.
         frequency_hz: f64,
     },
-    /// Measured positions, straight lines between them; `file` has the columns `t_s,x_mm`.
+    /// Measured positions, straight lines between them, from CSV, WAV or MCAP: see `docs/recordings.md`.
     Recorded(Arc<Series>),
     /// Moved while the scene runs. No file has it.
     Live(Arc<LiveHand>),
@@ -262,7 +266,8 @@ pub struct Force {
 pub enum Gauges {
     /// Computed: each gauge feels the texture under its own place. See [`crate::gauges`].
     Kinematic(Kinematic),
-    /// Voltages at the pins; `file` has the columns `t_s,g0,g1,g2,g3,g4` and, optionally, `tangential`.
+    /// Voltages at the pins, five columns or six with the tangential force, from CSV, WAV or MCAP: see
+    /// `docs/recordings.md`.
     Recorded(Arc<Series>),
 }
 

@@ -23,7 +23,7 @@ const POINTS_LOG2: u32 = 11;
 /// What is left of a phase of 32 bits below the point's number.
 const FRACTION_BITS: u32 = 32 - POINTS_LOG2;
 /// Spacing of a recorded profile once it is blurred, in mm: a sixth of the blur.
-const GRID_MM: f64 = 0.02;
+pub const GRID_MM: f64 = 0.02;
 
 /// One period, its first point repeated at the end.
 pub(crate) type Period = [f32; POINTS + 1];

@@ -27,4 +27,5 @@ pub mod outward;
 pub mod reach;
 pub mod report;
 pub mod site;
+pub mod stops;
 pub mod wire;

@@ -42,15 +42,19 @@ fn take(times_us: &Mutex<Histogram>) -> Histogram {
 fn bare(seconds: Duration) -> Result<(), Box<dyn Error>> {
     let display = SwiftBoard::new(Role::Display, |_, _| {})?;
     let (ends, ended): (_, Receiver<u64>) = channel();
-    let link = Link::open(Role::Display, Place::Port(display.path), move |event| {
-        if let Event::Heard {
-            at_us,
-            message: Message::Motion(Motion { instant_us, .. }),
-        } = event
-        {
-            let _ = ends.send(at_us.saturating_sub(instant_us));
-        }
-    });
+    let link = Link::open(
+        Role::Display,
+        Place::Port(display.path.clone()),
+        move |event| {
+            if let Event::Heard {
+                at_us,
+                message: Message::Motion(Motion { instant_us, .. }),
+            } = event
+            {
+                let _ = ends.send(at_us.saturating_sub(instant_us));
+            }
+        },
+    );
     let mut times_us = Histogram::default();
     ended.recv_timeout(LIMIT)?;
     let end = Instant::now() + seconds;

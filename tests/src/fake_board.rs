@@ -9,7 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use protocol::{Hello, MAX_FRAME, Message, Port, Role};
+use protocol::{
+    DisplayState, Hello, MAX_FRAME, Message, Port, Role, Safety, Stop, StopReason, Trip,
+};
 
 use crate::pty::Near;
 
@@ -22,6 +24,7 @@ enum Order {
     Bytes(Vec<u8>),
     Mute(bool),
     Deafen(bool),
+    Disobey(bool),
     Restart,
     Patience,
     End,
@@ -93,6 +96,12 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Deafen(is_deaf));
     }
 
+    /// Has the board take no notice of a Stop, for as long as it disobeys; a display obeys otherwise, and
+    /// says so.
+    pub fn disobey(&self, disobeys: bool) {
+        let _ = self.orders.send(Order::Disobey(disobeys));
+    }
+
     /// Restarts the board: its clock, its counters and whom it knows.
     pub fn restart(&self) {
         let _ = self.orders.send(Order::Restart);
@@ -130,6 +139,7 @@ fn run(
     let mut started = Instant::now();
     let mut port = Port::new(hello);
     let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
+    let mut obeys = hello.role == Role::Display.byte();
     let mut bytes = [0; 4_096];
     let mut out = [0; MAX_FRAME];
     loop {
@@ -144,13 +154,18 @@ fn run(
             }
         };
         let now_us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        let mut stop = None;
         port.receive(now_us, &bytes[..count], |message| {
+            if let Message::Stop(Stop { reason }) = message {
+                stop = Some(reason);
+            }
             heard
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(message);
         });
-        let mut said = script(now_us).into_iter();
+        let answer = stop.filter(|_| obeys).map(|reason| stopped(now_us, reason));
+        let mut said = script(now_us).into_iter().chain(answer);
         loop {
             while let count @ 1.. = port.take(&mut out) {
                 if !is_mute && !write(&mut master, &out[..count], is_patient) {
@@ -169,6 +184,7 @@ fn run(
                 }
                 Ok(Order::Mute(now)) => is_mute = now,
                 Ok(Order::Deafen(now)) => is_deaf = now,
+                Ok(Order::Disobey(now)) => obeys = !now,
                 Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {
                     port = Port::new(hello);
@@ -179,6 +195,16 @@ fn run(
             }
         }
     }
+}
+
+/// What a display says at `instant_us` when it has obeyed a Stop.
+fn stopped(instant_us: u64, reason: StopReason) -> Message {
+    let trip = match reason {
+        StopReason::Operator => Trip::Operator,
+        StopReason::Host => Trip::Host,
+    };
+    let state = DisplayState::Stopped(trip);
+    Message::Safety(Safety { instant_us, state })
 }
 
 /// Writes all of it; false if it found no room, in spite of all patience.

@@ -3,7 +3,9 @@
 use std::io::{self, Read, Write};
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
-use std::thread;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use host_bridge::host_clock::now_us;
@@ -16,10 +18,13 @@ use crate::relay::{ESTIMATE_US, MOTION_US, estimate, motion};
 const PATIENCE: Duration = Duration::from_millis(1);
 
 /// A board on a pseudo-terminal that says what the board of its role always says, at its pace, with the
-/// instant of [`now_us`] in it at which it is written.
+/// instant of [`now_us`] in it at which it is written. Dropping it ends it, so that it takes nothing from
+/// what is measured next.
 pub struct SwiftBoard {
     /// Its port.
     pub path: PathBuf,
+    is_ended: Arc<AtomicBool>,
+    line: Option<JoinHandle<()>>,
     _kept: OwnedFd,
 }
 
@@ -30,12 +35,29 @@ impl SwiftBoard {
     /// If the system has no pseudo-terminal.
     pub fn new(role: Role, hear: impl FnMut(Message, u64) + Send + 'static) -> io::Result<Self> {
         let (near, kept, path) = Near::pair(PATIENCE)?;
-        thread::spawn(move || run(near, role, hear));
-        Ok(Self { path, _kept: kept })
+        let is_ended = Arc::<AtomicBool>::default();
+        let ends = Arc::clone(&is_ended);
+        let line = thread::spawn(move || run(near, role, hear, &ends));
+        Ok(Self {
+            path,
+            is_ended,
+            line: Some(line),
+            _kept: kept,
+        })
     }
 }
 
-fn run(mut near: Near, role: Role, mut hear: impl FnMut(Message, u64)) {
+impl Drop for SwiftBoard {
+    fn drop(&mut self) {
+        self.is_ended.store(true, Ordering::Relaxed);
+        if let Some(line) = self.line.take() {
+            // One that panicked has said so on standard error.
+            let _ = line.join();
+        }
+    }
+}
+
+fn run(mut near: Near, role: Role, mut hear: impl FnMut(Message, u64), ends: &AtomicBool) {
     let mut port = Port::new(Hello::new(role, "stm32f429zi", [0, 1, 0]));
     let mut bytes = [0; 4_096];
     let mut frame = [0; MAX_FRAME];
@@ -44,7 +66,7 @@ fn run(mut near: Near, role: Role, mut hear: impl FnMut(Message, u64)) {
         _ => (MOTION_US, motion),
     };
     let (began_us, mut said) = (now_us(), 0_u32);
-    loop {
+    while !ends.load(Ordering::Relaxed) {
         let count = near.read(&mut bytes).unwrap_or(0);
         let read_us = now_us();
         port.receive(read_us, &bytes[..count], |message| hear(message, read_us));

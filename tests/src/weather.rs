@@ -27,6 +27,8 @@ struct Sky {
     is_closed: AtomicBool,
     ended: AtomicBool,
     connections: AtomicUsize,
+    /// Connections up to this number lead nowhere any more.
+    stranded: AtomicUsize,
     open: Mutex<Vec<TcpStream>>,
 }
 
@@ -49,6 +51,7 @@ impl Weather {
             is_closed: AtomicBool::new(false),
             ended: AtomicBool::new(false),
             connections: AtomicUsize::new(0),
+            stranded: AtomicUsize::new(0),
             open: Mutex::new(Vec::new()),
         });
         let accepting = Arc::clone(&sky);
@@ -69,6 +72,14 @@ impl Weather {
     /// Holds everything up, and lets all of it go on again: a network that is stuck.
     pub fn hold_still(&self, is_still: bool) {
         self.sky.is_still.store(is_still, Ordering::Relaxed);
+    }
+
+    /// Lets all connections that there are lead nowhere from now on, without a word to either end, as when
+    /// one of them gets another address; new ones are as good as ever.
+    pub fn strand(&self) {
+        self.sky
+            .stranded
+            .store(self.connections(), Ordering::Relaxed);
     }
 
     /// Cuts all connections. While it is `closed`, new ones are cut as well.
@@ -100,7 +111,7 @@ impl Sky {
             if self.ended.load(Ordering::Relaxed) {
                 return;
             }
-            self.connections.fetch_add(1, Ordering::Relaxed);
+            let number = self.connections.fetch_add(1, Ordering::Relaxed) + 1;
             let Ok(near) = stream else { continue };
             if self.is_closed.load(Ordering::Relaxed) {
                 continue;
@@ -114,17 +125,17 @@ impl Sky {
                     (from.try_clone(), to.try_clone(), to.try_clone())
                 {
                     locked(&self.open).push(open);
-                    Arc::clone(&self).carry(from, to);
+                    Arc::clone(&self).carry(number, from, to);
                 }
             }
         }
     }
 
-    /// Carries one direction of a connection.
-    fn carry(self: Arc<Self>, mut from: TcpStream, to: TcpStream) {
+    /// Carries one direction of the connection of this number.
+    fn carry(self: Arc<Self>, number: usize, mut from: TcpStream, to: TcpStream) {
         let (put, taken) = channel();
         let later = Arc::clone(&self);
-        thread::spawn(move || later.release(&taken, to));
+        thread::spawn(move || later.release(number, &taken, to));
         thread::spawn(move || {
             let mut chunk = [0; CHUNK];
             let mut number: u64 = 1;
@@ -139,11 +150,9 @@ impl Sky {
         });
     }
 
-    fn release(&self, taken: &Receiver<(Instant, Vec<u8>)>, mut to: TcpStream) {
+    fn release(&self, number: usize, taken: &Receiver<(Instant, Vec<u8>)>, mut to: TcpStream) {
         for (due, bytes) in taken {
-            while self.is_still.load(Ordering::Relaxed) && !self.ended.load(Ordering::Relaxed) {
-                thread::park_timeout(LOOK);
-            }
+            self.wait_while(|| self.is_still.load(Ordering::Relaxed) || self.is_stranded(number));
             loop {
                 let wait = due.saturating_duration_since(Instant::now());
                 if wait.is_zero() {
@@ -155,6 +164,18 @@ impl Sky {
                 break;
             }
         }
+        self.wait_while(|| self.is_stranded(number));
         let _ = to.shutdown(Shutdown::Both);
+    }
+
+    fn is_stranded(&self, number: usize) -> bool {
+        number <= self.stranded.load(Ordering::Relaxed)
+    }
+
+    /// Waits while `holds`, for as long as there is weather.
+    fn wait_while(&self, holds: impl Fn() -> bool) {
+        while holds() && !self.ended.load(Ordering::Relaxed) {
+            thread::park_timeout(LOOK);
+        }
     }
 }

@@ -6,6 +6,8 @@ use std::os::unix::fs::symlink;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use host_bridge::relay::flow::LATE_SPACING_US;
+use host_bridge::relay::network::LEASE;
 use protocol::{Message, Role, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
@@ -61,6 +63,14 @@ fn assert_rising(heard: &[Message]) {
     }
 }
 
+fn is_motion(message: &Message) -> bool {
+    matches!(message, Message::Motion(_))
+}
+
+fn is_stop(message: &Message) -> bool {
+    matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator)
+}
+
 /// The last report that a bridge printed.
 fn last_report(lines: &[String]) -> Value {
     let last = lines.last().expect("a bridge reports");
@@ -76,7 +86,6 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
     let estimates = listen(&display, LIMIT, at_least(200));
     assert_rising(&motions);
     assert_rising(&estimates);
-    let is_motion = |message: &Message| matches!(message, Message::Motion(_));
     let is_estimate = |message: &Message| matches!(message, Message::Estimate(_));
     let is_housekeeping =
         |message: &Message| matches!(message, Message::Ping(_) | Message::Pong(_));
@@ -86,23 +95,32 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
             .iter()
             .all(|m| is_estimate(m) || is_housekeeping(m))
     );
-    let numbers = sequences(&motions);
-    let missing = (numbers[numbers.len() - 1] - numbers[0]) as usize + 1 - numbers.len();
-    assert!(
-        missing < numbers.len() / 20,
-        "{missing} of {} missing",
-        numbers.len()
-    );
 
     for bridge in [&pair.sensor, &pair.display] {
         bridge.signal(Signal::INT);
     }
+    let (_, lines, _) = pair.sensor.wait(LIMIT);
+    let incoming = last_report(&lines)["incoming"].clone();
     let (status, lines, words) = pair.display.wait(LIMIT);
     assert_eq!(status.code(), Some(0), "{words}");
     let report = last_report(&lines);
     assert_eq!(report["total"], true);
     assert_eq!(report["site"], "display");
     assert_eq!(report["incoming"]["lost"], 0);
+    // A busy machine brings two at once, of which one is replaced, but none goes without being counted.
+    let numbers = sequences(&motions);
+    let missing = u64::from(numbers[numbers.len() - 1] - numbers[0]) + 1 - numbers.len() as u64;
+    let reasons = ["replaced", "stale", "stuck", "undated", "boardless"];
+    let counts = reasons.map(|reason| incoming[reason].as_u64());
+    let counted = counts
+        .into_iter()
+        .chain([report["outgoing"]["held"].as_u64()])
+        .sum::<Option<u64>>();
+    assert!(
+        Some(missing) <= counted,
+        "{missing} missing: {incoming}, {report}"
+    );
+    assert!(missing < numbers.len() as u64 / 2, "{missing} missing");
     assert!(
         report["incoming"]["passed"].as_u64() >= Some(200),
         "{report}"
@@ -152,17 +170,20 @@ fn a_network_slower_than_anything_may_be_is_named_and_nothing_is_played() {
 
 #[test]
 fn what_was_held_up_too_long_is_never_played() {
+    const MAX_AGE_MS: u64 = 150;
+    const STILL_MS: u64 = 1_000;
+    const TIMES: u64 = 3;
     let sensor = talking_board(Role::Sensor);
     let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &["--max-age", "150"]);
+    let pair = Pair::new(&sensor, &display, &["--max-age", &MAX_AGE_MS.to_string()]);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
-    for _ in 0..3 {
+    for _ in 0..TIMES {
         pair.weather.hold_still(true);
         // So long that the silence is noticed and what was on its way is old.
         let still = Instant::now();
         let silent = || {
             motions.extend(sensor.take_heard());
-            still.elapsed() >= Duration::from_millis(1_000)
+            still.elapsed() >= Duration::from_millis(STILL_MS)
         };
         wait_until(LIMIT, silent);
         let newest_held = sequences(&motions).last().copied().unwrap_or(0);
@@ -182,7 +203,12 @@ fn what_was_held_up_too_long_is_never_played() {
     println!("ended after {:?}", asked.elapsed());
     assert_eq!(status.code(), Some(0), "{words}");
     let report = last_report(&lines);
-    assert!(report["incoming"]["stale"].as_u64() >= Some(1), "{report}");
+    // While answers are late, a message goes into the network that stands still every so often. All of
+    // them come, but for the last 150 ms too old; a loaded machine says half as many.
+    let said = TIMES * (STILL_MS - MAX_AGE_MS) * 1_000 / LATE_SPACING_US;
+    let stale = report["incoming"]["stale"].as_u64();
+    println!("{stale:?} too old, {said} said");
+    assert!(stale >= Some(said / 2), "{said} said: {report}");
 }
 
 #[test]
@@ -208,6 +234,40 @@ fn a_router_that_is_killed_and_started_again_brings_the_stream_back() {
         motions.extend(listen(&sensor, LIMIT, at_least(100)));
         listen(&display, LIMIT, at_least(10));
     }
+    assert_rising(&motions);
+}
+
+#[test]
+fn a_site_whose_address_changes_is_back_within_some_seconds() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let pair = Pair::new(&sensor, &display, &[]);
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    listen(&display, LIMIT, at_least(20));
+    let before = pair.weather.connections();
+    pair.weather.strand();
+    let changed = Instant::now();
+    // Nothing tells either end. What is on the way when this is asked has come from before.
+    for bridge in [&pair.sensor, &pair.display] {
+        bridge.says("silent", LIMIT);
+    }
+    motions.extend(sensor.take_heard());
+    display.take_heard();
+    let (mut of_sensor, mut of_display) = (false, false);
+    let both = || {
+        let heard = sensor.take_heard();
+        of_sensor |= heard.iter().any(is_motion);
+        motions.extend(heard);
+        of_display |= !sequences(&display.take_heard()).is_empty();
+        of_sensor && of_display
+    };
+    assert!(wait_until(LIMIT, both));
+    println!("back {:?} after the change", changed.elapsed());
+    // The connection is given up when it was silent for so long; then a new one is made.
+    let most = LEASE + Duration::from_secs(2);
+    assert!(changed.elapsed() < most, "{:?}", changed.elapsed());
+    assert!(pair.weather.connections() > before);
+    motions.extend(listen(&sensor, LIMIT, at_least(100)));
     assert_rising(&motions);
 }
 
@@ -294,8 +354,7 @@ fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
 }
 
 #[test]
-fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_board() {
-    let is_stop = |message: &Message| matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator);
+fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
     let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
     let pair = Pair::new(&sensor, &display, &[]);
     listen(&sensor, LIMIT, at_least(10));
@@ -303,9 +362,17 @@ fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_b
     pair.sensor.signal(Signal::USR1);
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
     listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
-    pair.sensor
-        .says("Stop: with the board at the display's site", LIMIT);
+    pair.sensor.says(
+        "Stop: the board at the display's site has stopped: by the operator",
+        LIMIT,
+    );
     pair.display.says("Stop, said by the sensor's site", LIMIT);
+    pair.display
+        .says("Stop: the board here has stopped: by the operator", LIMIT);
+
+    pair.display.signal(Signal::USR1);
+    pair.display
+        .says("Stop: with the board at the sensor's site", LIMIT);
 
     // Said while the network is away, it comes when it is back.
     pair.weather.cut(true);
@@ -314,17 +381,59 @@ fn stop_reaches_the_display_from_the_other_site_and_from_an_operator_without_a_b
     pair.sensor.signal(Signal::USR1);
     pair.weather.cut(false);
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+}
 
+#[test]
+fn relay_stop_ends_well_only_when_the_display_itself_says_that_it_has_stopped() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &[]);
+    listen(&sensor, LIMIT, at_least(10));
     let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
-    display.take_heard();
-    let (status, _, words) = Relay::start(["stop", "--connect", &at]).wait(LIMIT);
-    assert_eq!(status.code(), Some(0), "{words}");
-    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    let stop = |more: &[&str]| {
+        Relay::start(
+            ["stop", "--connect", &at]
+                .into_iter()
+                .chain(more.iter().copied()),
+        )
+    };
+    let fails = |stop: Relay, what: &str| {
+        let (status, _, words) = stop.wait(LIMIT);
+        assert_eq!(status.code(), Some(1), "{words}");
+        for part in [
+            "NOT STOPPED",
+            what,
+            "press the emergency stop, or cut the display's power",
+        ] {
+            assert!(words.contains(part), "{words}");
+        }
+    };
 
-    let other = ["stop", "--connect", &at, "--name", "other", "--within", "1"];
-    let (status, _, words) = Relay::start(other).wait(LIMIT);
-    assert_eq!(status.code(), Some(1), "{words}");
-    assert!(words.contains("press the emergency stop"), "{words}");
+    // Its bridge has written it, and yet the display goes on.
+    display.disobey(true);
+    let short = ["--within", "1"];
+    fails(stop(&short), "does not say that it has stopped");
+    let told = display.take_heard().into_iter().filter(is_stop).count();
+    assert!(
+        told > 1,
+        "a line may garble what is said: told {told} times"
+    );
+
+    // It is told until it obeys.
+    let stopping = stop(&[]);
+    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    display.disobey(false);
+    let (status, _, words) = stopping.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+    assert!(
+        words.contains("the display has stopped: by the operator"),
+        "{words}"
+    );
+
+    let other = ["--name", "other", "--within", "1"];
+    fails(stop(&other), "no word from the display's bridge");
+    drop(display);
+    pair.display.says("not there", LIMIT);
+    fails(stop(&short), "its board is not there");
 }
 
 #[test]

@@ -79,6 +79,17 @@ fn what_is_felt_comes_over_the_network_ends_with_it_and_comes_back() {
             back.elapsed()
         );
     }
+    // The board's own word, carried back.
+    let stopped = Relay::start(["stop", "--connect", &at]);
+    let asked = Instant::now();
+    let (status, _, said) = stopped.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{said}, {:?}", words());
+    assert!(
+        said.contains("the display has stopped: by the operator"),
+        "{said}"
+    );
+    println!("stopped and known within {:.2?}", asked.elapsed());
+    assert!(!is_felt(&bench));
     for bridge in bridges {
         bridge.signal(Signal::INT);
         let (status, lines, words) = bridge.wait(LIMIT);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use hil_sim::fault::{Fault, Kind};
-use hil_sim::scene::{Estimator, Gauges, Kinematic, Link, Motion, Scene, Series};
+use hil_sim::scene::{Gauges, Kinematic, Link, Motion, Scene, Series};
 use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError};
 use protocol::{
     Configuration, DisplayState, Message, Role, RoleCounters, SensorConfiguration, Trip,
@@ -29,6 +29,11 @@ fn velocity_mm_s(message: Message) -> Option<f64> {
     }
 }
 
+/// The bench that stands for a day.
+const DAY: &str = "day";
+/// What its sensor board is set to, and no board is by default.
+const WINDOW_MS: u16 = 120;
+
 /// One specimen of 2 mm under a hand that goes at 50 mm/s.
 fn steady(options: &mut Options) {
     options.scene = Scene::constant(2.0, 50.0);
@@ -38,7 +43,12 @@ fn steady(options: &mut Options) {
 #[test]
 fn a_day_at_one_bench() {
     let begun = Instant::now();
-    let Alone { bench, .. } = &bench("day", steady);
+    let alone = bench(DAY, |options| {
+        steady(options);
+        options.scene.estimator.window_ms = WINDOW_MS;
+    });
+    let bench = &alone.bench;
+    boards_are_set_as_the_scene_asks_before_their_ports_appear(bench);
     a_host_on_either_console_hears_the_whole_conversation_and_time_keeps_behind_the_wall_clock(
         bench, begun,
     );
@@ -46,6 +56,7 @@ fn a_day_at_one_bench() {
     a_pulled_cable_hangs_up_and_comes_back_under_its_name(bench);
     at_a_wrong_baud_rate_neither_side_understands_the_other_and_at_the_right_one_they_do(bench);
     the_emergency_stop_stops_and_a_reset_brings_the_board_and_its_log_back(bench);
+    the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is(alone);
 }
 
 fn a_host_on_either_console_hears_the_whole_conversation_and_time_keeps_behind_the_wall_clock(
@@ -80,9 +91,7 @@ fn a_host_on_either_console_hears_the_whole_conversation_and_time_keeps_behind_t
     assert_eq!(standing.sensed.wavelength_mm, 2.0);
 }
 
-#[test]
-fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is() {
-    let alone = bench("file", |_| {});
+fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is(alone: Alone) {
     let file = alone.bench.bench_file();
     let text = fs::read_to_string(&file).unwrap();
     for (name, key) in [
@@ -99,7 +108,7 @@ fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is() {
         );
     }
     assert!(text.contains("firmware-sensor\""), "{text}");
-    let refused = Bench::start(Options::new(folder("file")), elves::both());
+    let refused = Bench::start(Options::new(folder(DAY)), elves::both());
     assert!(
         matches!(refused, Err(ServeError::Taken { .. })),
         "{refused:?}"
@@ -109,7 +118,7 @@ fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is() {
     alone.bench.stop().unwrap();
     assert!(!file.exists());
     for name in PortName::ALL {
-        assert!(fs::symlink_metadata(folder("file").join(name.name())).is_err());
+        assert!(fs::symlink_metadata(folder(DAY).join(name.name())).is_err());
     }
 }
 
@@ -284,16 +293,8 @@ fn the_emergency_stop_stops_and_a_reset_brings_the_board_and_its_log_back(bench:
     display.hear("a display that drives again", driving);
 }
 
-#[test]
-fn boards_are_set_as_the_scene_asks_before_their_ports_appear() {
-    let alone = bench("setup", |options| {
-        steady(options);
-        options.scene.estimator = Estimator {
-            window_ms: 120,
-            ..Estimator::default()
-        };
-    });
-    let mut client = Client::open(&alone.bench.path(PortName::SensorConsole), BAUD);
+fn boards_are_set_as_the_scene_asks_before_their_ports_appear(bench: &Bench) {
+    let mut client = Client::open(&bench.path(PortName::SensorConsole), BAUD);
     client.hear("an estimate", estimate);
     // Asked for the other role's, a board refuses and tells its own.
     let other = Configuration::Display(protocol::DisplayConfiguration::DEFAULT);
@@ -303,7 +304,7 @@ fn boards_are_set_as_the_scene_asks_before_their_ports_appear() {
         _ => None,
     });
     let wanted = SensorConfiguration {
-        window_ms: 120,
+        window_ms: WINDOW_MS,
         ..SensorConfiguration::DEFAULT
     };
     assert_eq!(configuration, Configuration::Sensor(wanted));

@@ -1,82 +1,253 @@
 //! `hil-sim run`.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
-use hil_sim::json::to_json;
+use anyhow::Context;
+use hil_sim::annotation::Annotation;
+use hil_sim::batch;
+use hil_sim::expectation::key_of;
+use hil_sim::golden::{Golden, Standing, complaint};
+use hil_sim::json::{JsonList, to_json};
+use hil_sim::junit::{self, Case, Fate};
+use hil_sim::map::shard::Shard;
 use hil_sim::outcome::Outcome;
+use hil_sim::recording::{Engine, Recording};
 use hil_sim::report::html;
-use hil_sim::scene::Scene;
-use hil_sim::{elf, native};
+use hil_sim::scene::{SceneError, line_of};
 
-use super::{EngineName, Run, number};
+use super::number;
+use super::scene_files::scene_files;
+use super::way::{Loaded, Way};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Exit status:
+  0  every scene is as it expects, and as its golden hash says
+  1  one is not
+  2  a scene or a file cannot be used; scenes are all read before one runs")]
+pub(super) struct Run {
+    /// Scenes: TOML files, or folders of them
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    #[command(flatten)]
+    way: Way,
+    /// Run the i-th of n parts of the scenes only: each scene is in exactly one part
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Where to write every result as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Where to write a report with plots, as one HTML page
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Where to write the results as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Golden hashes to compare the runs with, as hil-sim golden renew makes them
+    #[arg(long, value_name = "FILE")]
+    golden: Option<PathBuf>,
+}
+
+/// What is left of a run once it has been judged.
+struct Judged {
+    row: String,
+    unmet: Vec<String>,
+    hash: u64,
+    wall_s: f64,
+    /// As a list of one.
+    json: Option<String>,
+    /// Only if a report is to be made of it.
+    outcome: Option<Outcome>,
+}
 
 impl Run {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let scenes = self.load()?;
-        let firmwares = match self.engine {
-            EngineName::Native => None,
-            EngineName::Elf => Some(self.elves.read()?),
-        };
+        let files = scene_files(&self.scenes, self.shard)?;
+        let loaded = self.way.load(&files);
+        let refusals: Vec<&SceneError> =
+            loaded.iter().filter_map(|one| one.as_ref().err()).collect();
+        if !refusals.is_empty() {
+            if let Some((file, path)) = self.junit.as_deref().map(create).transpose()? {
+                let cases: Vec<Case> = files.iter().zip(&loaded).map(unrun).collect();
+                write_junit(self.way.engine(), &cases, file, path)?;
+            }
+            return Err(self.way.refuse(&refusals));
+        }
+        let scenes: Vec<Loaded> = loaded.into_iter().flatten().collect();
+        let ready = self.way.ready()?;
+        let golden = self.golden.as_deref().map(Golden::read).transpose()?;
         // Opened first: a run is not to be lost for a folder that is not there.
         let json = self.json.as_deref().map(create).transpose()?;
         let report = self.report.as_deref().map(create).transpose()?;
+        let junit = self.junit.as_deref().map(create).transpose()?;
 
         println!("{HEADER}");
-        let mut outcomes = Vec::with_capacity(scenes.len());
-        for scene in scenes {
-            let recording = match &firmwares {
-                None => native::run(&scene)?,
-                Some(firmwares) => elf::run(&scene, firmwares)?.0,
-            };
-            let outcome = Outcome::new(scene, recording);
-            println!("{}", row(&outcome));
-            for line in &outcome.unmet {
-                println!("  not as expected: {line}");
-            }
-            outcomes.push(outcome);
+        let mut books = Books {
+            way: &self.way,
+            golden,
+            json: json.map(|(file, path)| (file, path, JsonList::default())),
+            cases: Vec::with_capacity(scenes.len()),
+            outcomes: Vec::new(),
+            met: true,
+        };
+        let work = |loaded: &Loaded| {
+            let recording = ready.run(&loaded.scene)?;
+            Judged::new(loaded, recording, self.json.is_some(), report.is_some())
+        };
+        let ran = batch::in_order(&scenes, self.way.threads(), work, |index, judged| {
+            books.enter(&scenes[index], judged)
+        });
+        if let Some((file, path)) = junit {
+            let rest = scenes.iter().skip(books.cases.len());
+            books
+                .cases
+                .extend(rest.map(|loaded| case(&loaded.path, &loaded.scene.name, Fate::Skipped)));
+            write_junit(self.way.engine(), &books.cases, file, path)?;
         }
-
-        if let Some((mut file, path)) = json {
-            let results: Vec<_> = outcomes.iter().map(Outcome::result).collect();
-            let text = to_json(&results)?;
-            file.write_all(text.as_bytes())
+        ran?;
+        if let Some((mut file, path, list)) = books.json {
+            file.write_all(list.end().as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
         }
         if let Some((mut file, path)) = report {
-            let chapters: Vec<_> = outcomes.iter().map(Outcome::chapter).collect();
+            let chapters: Vec<_> = books.outcomes.iter().map(Outcome::chapter).collect();
             let page = html(&chapters)?;
             file.write_all(page.as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
             println!("report: {}", path.display());
         }
-        let met = outcomes.iter().all(|outcome| outcome.unmet.is_empty());
-        Ok(if met {
+        Ok(if books.met {
             ExitCode::SUCCESS
         } else {
             ExitCode::from(1)
         })
     }
+}
 
-    /// All scenes, or every reason why not.
-    fn load(&self) -> anyhow::Result<Vec<Scene>> {
-        let mut scenes = Vec::with_capacity(self.scenes.len());
-        let mut refusals = Vec::new();
-        for path in &self.scenes {
-            match Scene::load(path) {
-                Ok(scene) => scenes.push(scene),
-                Err(error) => refusals.push(error.to_string()),
+impl Judged {
+    /// Judges a run; what is not asked for is dropped.
+    fn new(
+        loaded: &Loaded,
+        recording: Recording,
+        json: bool,
+        report: bool,
+    ) -> anyhow::Result<Self> {
+        let (hash, wall_s) = (recording.hash, recording.wall_s);
+        let outcome = Outcome::new(loaded.scene.clone(), recording);
+        Ok(Self {
+            row: row(&outcome),
+            unmet: outcome.unmet.clone(),
+            hash,
+            wall_s,
+            json: json.then(|| to_json(&[outcome.result()])).transpose()?,
+            outcome: report.then_some(outcome),
+        })
+    }
+}
+
+/// What is written down of the runs, in their order.
+struct Books<'a> {
+    way: &'a Way,
+    golden: Option<Golden>,
+    json: Option<(File, &'a Path, JsonList)>,
+    cases: Vec<Case>,
+    outcomes: Vec<Outcome>,
+    /// Whether all was as expected so far.
+    met: bool,
+}
+
+impl Books<'_> {
+    fn enter(&mut self, loaded: &Loaded, judged: anyhow::Result<Judged>) -> anyhow::Result<()> {
+        let Loaded { path, scene } = loaded;
+        let mut judged = match judged {
+            Ok(judged) => judged,
+            Err(error) => {
+                let file = path.display().to_string();
+                let reason = format!("{error:#}");
+                self.way.annotate(&Annotation {
+                    file: &file,
+                    line: None,
+                    title: &format!("{} could not be run", scene.name),
+                    message: &reason,
+                });
+                self.cases
+                    .push(case(path, &scene.name, Fate::Unusable(reason)));
+                return Err(error.context(file));
             }
+        };
+        let text = fs::read_to_string(path).unwrap_or_default();
+        // Each line with the file and the line of it that it is about.
+        let mut places: Vec<(&Path, Option<usize>)> = judged
+            .unmet
+            .iter()
+            .map(|line| (path.as_path(), line_of(&text, &["expect", key_of(line)])))
+            .collect();
+        if let Some(golden) = &self.golden {
+            let name = golden.name(path)?;
+            let standing = golden.standing(&name, self.way.engine(), judged.hash);
+            judged
+                .unmet
+                .extend(complaint(&standing, judged.hash, golden, &name));
+            places.push(match standing {
+                Standing::Other(_, at) => (golden.path(), at),
+                Standing::Same | Standing::Missing => (path.as_path(), None),
+            });
         }
-        if refusals.is_empty() {
-            Ok(scenes)
-        } else {
-            bail!(refusals.join("\n"))
+        let is_met = judged.unmet.is_empty();
+        judged.row += if is_met { "  ok" } else { "  FAILED" };
+        println!("{}", judged.row);
+        for (line, (file, at)) in judged.unmet.iter().zip(places) {
+            println!("  not as expected: {line}");
+            self.way.annotate(&Annotation {
+                file: &file.display().to_string(),
+                line: at,
+                title: &format!("{} is not as expected", scene.name),
+                message: line,
+            });
+        }
+        self.met &= is_met;
+        if let (Some((file, path, list)), Some(alone)) = (&mut self.json, &judged.json) {
+            file.write_all(list.next(alone).as_bytes())
+                .with_context(|| format!("{}", path.display()))?;
+        }
+        self.outcomes.extend(judged.outcome);
+        let fate = Fate::Ran {
+            wall_s: judged.wall_s,
+            hash: judged.hash,
+            row: judged.row,
+            unmet: judged.unmet,
+        };
+        self.cases.push(case(path, &scene.name, fate));
+        Ok(())
+    }
+}
+
+fn case(path: &Path, name: &str, fate: Fate) -> Case {
+    Case {
+        file: path.display().to_string(),
+        name: name.to_owned(),
+        fate,
+    }
+}
+
+/// The case of a scene that has not run, because it or another cannot be used.
+fn unrun((path, loaded): (&PathBuf, &Result<Loaded, SceneError>)) -> Case {
+    match loaded {
+        Ok(loaded) => case(path, &loaded.scene.name, Fate::Skipped),
+        Err(error) => {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            case(path, &name, Fate::Unusable(error.to_string()))
         }
     }
+}
+
+fn write_junit(engine: Engine, cases: &[Case], mut file: File, path: &Path) -> anyhow::Result<()> {
+    let text = junit::xml(engine, cases)?;
+    file.write_all(text.as_bytes())
+        .with_context(|| format!("{}", path.display()))
 }
 
 fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
@@ -92,11 +263,12 @@ fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
 const HEADER: &str = "\
 scene                       λ mm     rms %  valid  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
+/// A scene's line, up to whether it is as expected.
 fn row(outcome: &Outcome) -> String {
     let summary = &outcome.verdict.summary;
     let actuators = &outcome.verdict.actuators;
     format!(
-        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}  {}",
+        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
         outcome.scene.name,
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
@@ -105,11 +277,6 @@ fn row(outcome: &Outcome) -> String {
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),
         pace(outcome.recording.realtime_factor()),
-        if outcome.unmet.is_empty() {
-            "ok"
-        } else {
-            "FAILED"
-        },
     )
 }
 

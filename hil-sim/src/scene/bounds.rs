@@ -128,3 +128,28 @@ pub(super) const INSTANT: Bounds = Bounds {
     give: "a time in s, 0 to 600",
     allows: |s| (0.0..=600.0).contains(&s),
 };
+pub(super) const SCALE: Bounds = Bounds {
+    what: "a scale",
+    give: "a number other than 0, within ± 1e9",
+    allows: |scale| scale != 0.0 && scale.abs() <= 1e9,
+};
+pub(super) const OFFSET_V: Bounds = Bounds {
+    what: "an offset at an ADC pin",
+    give: "a voltage within ± 1000 V; 1.65 is in the middle of the ADC's range",
+    allows: |volts| volts.abs() <= 1000.0,
+};
+pub(super) const RATE: Bounds = Bounds {
+    what: "a recording's rate",
+    give: "a rate in Hz, 1 to 10 000 000",
+    allows: |hz| (1.0..=1e7).contains(&hz),
+};
+pub(super) const SPACING: Bounds = Bounds {
+    what: "a spacing of samples",
+    give: "a length above 0 in mm, 10 at most",
+    allows: |mm| mm > 0.0 && mm <= 10.0,
+};
+pub(super) const FILE_INSTANT: Bounds = Bounds {
+    what: "an instant of a recording",
+    give: "a time in s within ± 1e10",
+    allows: |s| s.abs() <= 1e10,
+};

@@ -17,8 +17,8 @@ use super::{
     ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link, Motion, Profile,
     Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
-use super::{display, fault};
-use crate::gauges::{PLACES_MM, SCAN_RATE_HZ};
+use super::{display, fault, recorded};
+use crate::gauges::PLACES_MM;
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let source = Source::new(path, text);
@@ -134,7 +134,7 @@ fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
     let profile = match kind {
         't' => Profile::Trapezoid,
         's' => Profile::Sine,
-        _ => Profile::Recorded(series(&mut table, &["x_mm,height"], |_, _| Ok(()))?),
+        _ => Profile::Recorded(recorded::profile(&mut table)?),
     };
     table.finish(if kind == 'r' {
         ""
@@ -204,8 +204,7 @@ fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
             })
         }
         _ => {
-            let positions = series(&mut table, POSITIONS, check_position)?;
-            covers_time(&table, &positions, duration_s)?;
+            let positions = recorded::motion(&mut table, duration_s, POSITIONS, &check_position)?;
             table.finish(" with kind = \"recorded\"")?;
             Ok(Motion::Recorded(positions))
         }
@@ -252,30 +251,13 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
     if kind == 'k' {
         return Ok((Gauges::Kinematic(kinematic(table)?), force));
     }
-    let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
-    let volts = series(&mut table, &headers, |before, row| {
-        if let Some(column) = (1..row.len()).find(|&column| !(-0.3..=4.0).contains(&row[column])) {
-            return Err((
-                column,
-                "is no voltage that an ADC pin bears: give −0.3 to 4.0 V".to_owned(),
-            ));
-        }
-        // A little slack for times written in decimals.
-        if before.is_some_and(|before| row[0] - before[0] > 1.001e-3) {
-            return Err((
-                0,
-                "comes more than 1 ms after the row before: give 1 kHz or more".to_owned(),
-            ));
-        }
-        Ok(())
-    })?;
+    let volts = recorded::gauges(&mut table, duration_s, tangential)?;
     if tangential == Some(true) && volts.width == 5 {
         return Err(table.refuse(
             "tangential",
-            "true, but the file has no column of that name: add it or give false",
+            "true, but the file has no column of that name: add it, name a sixth channel, or give false",
         ));
     }
-    covers_time(&table, &volts, duration_s)?;
     table.finish(" with kind = \"recorded\"")?;
     let present = tangential.unwrap_or(volts.width == 6);
     Ok((Gauges::Recorded(volts), Force { present, ..force }))
@@ -468,18 +450,6 @@ pub(super) fn series(
             ))
         }
     }
-}
-
-fn covers_time(table: &Table<'_>, series: &Series, duration_s: f64) -> Result<(), SceneError> {
-    let (first, last) = series.extent();
-    // The last scan is one scan before the end.
-    if first <= 0.0 && last >= duration_s - 1.0 / f64::from(SCAN_RATE_HZ) {
-        return Ok(());
-    }
-    let message = format!(
-        "lasts from {first} to {last} s, the scene from 0 to {duration_s} s: give a longer file or a shorter duration_s"
-    );
-    Err(table.refuse("file", message))
 }
 
 fn covers_travel(

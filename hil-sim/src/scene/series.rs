@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::SceneError;
+use super::csv_rows::CsvRows;
 
 /// Rows of numbers, in the order of their first column, which strictly increases. At least two rows;
 /// every number is finite.
@@ -16,6 +17,11 @@ pub struct Series {
     pub width: usize,
 }
 
+/// What to say of a row whose first column does not increase.
+pub(super) fn unsorted(before: f64) -> String {
+    format!("does not increase, after {before}: sort the rows, without doubles")
+}
+
 impl Series {
     /// Reads CSV from `bytes`, to be called `path`, whose first line must be one of `headers`. `check` sees
     /// each row after the one before it, and may refuse it: column index and what to do.
@@ -25,104 +31,47 @@ impl Series {
         headers: &[&str],
         check: impl Fn(Option<&[f64]>, &[f64]) -> Result<(), (usize, String)>,
     ) -> Result<Self, SceneError> {
-        let refuse = |line: Option<usize>, key: String, message: String| SceneError {
-            file: path.display().to_string(),
-            line,
-            key,
-            message,
-        };
-        // The reader's own count stands before the empty lines that it passes over.
-        let line_at = |position: Option<&csv::Position>| {
-            let start = (position?.byte() as usize).min(bytes.len());
-            let empty = bytes[start..]
-                .iter()
-                .take_while(|byte| b"\r\n".contains(byte))
-                .count();
-            Some(
-                1 + bytes[..start + empty]
-                    .iter()
-                    .filter(|&&byte| byte == b'\n')
-                    .count(),
-            )
-        };
-        let broken = |error: csv::Error| {
-            let message = match error.kind() {
-                csv::ErrorKind::UnequalLengths {
-                    expected_len, len, ..
-                } => {
-                    format!(
-                        "{len} cells where the first line has {expected_len}: give one for each column"
-                    )
-                }
-                csv::ErrorKind::Utf8 { .. } => "is not text: give CSV in UTF-8".to_owned(),
-                _ => format!("cannot be read: {error}"),
-            };
-            refuse(line_at(error.position()), String::new(), message)
-        };
-
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(bytes);
-        let header: Vec<String> = reader
-            .headers()
-            .map_err(broken)?
-            .iter()
-            .map(str::to_owned)
-            .collect();
-        if !headers.contains(&header.join(",").as_str()) {
+        let rows = CsvRows::open(path, bytes)?;
+        let header = rows.first().join(",");
+        if !headers.contains(&header.as_str()) {
             let message = format!(
-                "the first line is {:?}: it must be {}",
-                header.join(","),
+                "the first line is {header:?}: it must be {}",
                 headers.join(" or ")
             );
-            return Err(refuse(Some(1), String::new(), message));
+            return Err(rows.refuse(Some(1), message));
         }
-
-        let mut series = Self {
-            at: Vec::new(),
-            values: Vec::new(),
-            width: header.len() - 1,
-        };
-        let mut record = csv::StringRecord::new();
+        let columns: Vec<usize> = (0..rows.first().len()).collect();
+        let mut series = Self::empty(columns.len() - 1);
         let mut before: Option<Vec<f64>> = None;
-        while reader.read_record(&mut record).map_err(broken)? {
-            let refuse_cell = |column: usize, message: String| {
-                let key = format!("column {} ({})", column + 1, header[column]);
-                refuse(
-                    line_at(record.position()),
-                    key,
-                    format!("{:?} {message}", &record[column]),
-                )
-            };
-            let mut row = Vec::with_capacity(header.len());
-            for (column, cell) in record.iter().enumerate() {
-                let number: f64 = cell.parse().map_err(|_| {
-                    refuse_cell(column, "is no number: give one such as 12.5".to_owned())
-                })?;
-                if !number.is_finite() {
-                    let message = "is not finite: give a number or take the row out".to_owned();
-                    return Err(refuse_cell(column, message));
-                }
-                row.push(number);
-            }
+        rows.each(&columns, false, |row| {
             if let Some(before) = before.as_ref().filter(|before| row[0] <= before[0]) {
-                let message = format!(
-                    "does not increase, after {}: sort the rows, without doubles",
-                    before[0]
-                );
-                return Err(refuse_cell(0, message));
+                return Err((0, unsorted(before[0])));
             }
-            check(before.as_deref(), &row)
-                .map_err(|(column, message)| refuse_cell(column, message))?;
+            check(before.as_deref(), row)?;
             series.at.push(row[0]);
             series.values.extend_from_slice(&row[1..]);
-            before = Some(row);
-        }
+            before = Some(row.to_vec());
+            Ok(())
+        })?;
         if series.at.len() < 2 {
             let message = format!("{} row(s) of numbers: give two or more", series.at.len());
-            return Err(refuse(None, String::new(), message));
+            return Err(SceneError {
+                file: path.display().to_string(),
+                line: None,
+                key: String::new(),
+                message,
+            });
         }
         Ok(series)
+    }
+
+    /// A series with so many columns and no row yet, which is not to be asked for anything.
+    pub(super) fn empty(width: usize) -> Self {
+        Self {
+            at: Vec::new(),
+            values: Vec::new(),
+            width,
+        }
     }
 
     /// The first column's first and last number.

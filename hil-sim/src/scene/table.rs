@@ -26,6 +26,22 @@ pub(super) struct Table<'t> {
 
 type Value<'t> = Spanned<DeValue<'t>>;
 
+/// A column of a file: by its name or by its number, from 0 on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Column<'t> {
+    Named(&'t str),
+    Numbered(usize),
+}
+
+impl std::fmt::Display for Column<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Named(name) => write!(formatter, "{name:?}"),
+            Self::Numbered(number) => write!(formatter, "{number}"),
+        }
+    }
+}
+
 impl<'t> Source<'t> {
     pub fn new(path: &'t Path, text: &'t str) -> Self {
         Self { path, text }
@@ -270,6 +286,38 @@ impl<'t> Table<'t> {
         Ok(chosen)
     }
 
+    /// A column's name or number.
+    pub fn column(&mut self, key: &'static str) -> Result<Option<Column<'t>>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        match column_of(value) {
+            Some(column) => Ok(Some(column)),
+            None => Err(self.wrong_type(value, key, "a column's name in quotes, or its number")),
+        }
+    }
+
+    /// A list of columns' names or numbers; the same may be there several times.
+    pub fn columns(&mut self, key: &'static str) -> Result<Option<Vec<Column<'t>>>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(value, key, "a list of columns' names or numbers"));
+        };
+        let columns = items.iter().enumerate().map(|(index, item)| {
+            column_of(item).ok_or_else(|| {
+                let written = &self.source.text[item.span()];
+                let path = format!("{}[{index}]", self.path_of(key));
+                let message = format!(
+                    "{written} is no column: give its name in quotes, or its number, from 0 on"
+                );
+                self.source.error(item.span().start, &path, message)
+            })
+        });
+        columns.collect::<Result<Vec<_>, _>>().map(Some)
+    }
+
     /// Refuses every key that nobody asked for. `with` says what decided which keys there are, or is empty.
     pub fn finish(self, with: &str) -> Result<(), SceneError> {
         let unknown = self
@@ -324,6 +372,16 @@ impl<'t> Table<'t> {
             key,
             format!("holds {}: give {wanted}", kind_of(value.get_ref())),
         )
+    }
+}
+
+fn column_of<'t>(value: &'t Value<'t>) -> Option<Column<'t>> {
+    match value.get_ref() {
+        DeValue::String(name) => Some(Column::Named(name)),
+        DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix())
+            .ok()
+            .map(Column::Numbered),
+        _ => None,
     }
 }
 

@@ -15,7 +15,7 @@ use host_bridge::relay::endpoint::Endpoint;
 use host_bridge::relay::far::site;
 use host_bridge::relay::name::Name;
 use host_bridge::relay::network::{Ends, Network};
-use host_bridge::relay::operator;
+use host_bridge::relay::operator::{self, Progress};
 use host_bridge::relay::report::Report;
 use host_bridge::relay::site::{Settings, Site, opposite};
 use protocol::{Role, Stop, StopReason};
@@ -39,7 +39,8 @@ With a router in between, both connect to it:
 With tls/ in place of tcp/, all of them want --ca, --certificate and --key, and whoever has no certificate \
 of that CA is refused.
 
-Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards. Once a second a bridge \
+Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards until the display says \
+that it has stopped. Once a second a bridge \
 says on standard error how it goes; --json says it on standard output, and leaves nothing out.";
 
 /// What `relay` is asked for.
@@ -57,8 +58,8 @@ enum Part {
     Display(Bridge),
     /// Carries on what bridges say, where neither site can be reached from the other
     Router(Router),
-    /// Says Stop to the boards; exit status 0 as soon as the display's bridge has written it to its
-    /// board, 1 if nobody says so: whether the board has stopped is not asked
+    /// Says Stop to the boards; exit status 0 as soon as the display's board itself says that it has
+    /// stopped, 1 if it does not: then press the emergency stop, or cut the display's power
     Stop(Stopping),
 }
 
@@ -107,7 +108,7 @@ struct Stopping {
     /// Where a bridge or a router listens
     #[arg(long, value_name = "ENDPOINT", required = true)]
     connect: Vec<Endpoint>,
-    /// How long to try
+    /// How long to say so and to wait for the board's word
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=3_600))]
     within: u32,
 }
@@ -262,16 +263,32 @@ impl Stopping {
         let stop = Stop {
             reason: StopReason::Operator,
         };
-        let is_heard = operator::stop(&network, &self.meeting.name, stop, within);
-        if let Ok(true) = is_heard {
-            say("host-bridge: Stop: with the display");
+        let stopping = operator::stop(&network, &self.meeting.name, stop, within);
+        let (progress, trip) = match &stopping {
+            Ok(stopping) => (stopping.progress, stopping.trip),
+            Err(_) => (Progress::Unheard, None),
+        };
+        if let Some(trip) = trip {
+            say(&format!(
+                "host-bridge: Stop: the display has stopped: {}",
+                trip.name()
+            ));
             return Ok(ExitCode::SUCCESS);
         }
+        let so_far = match progress {
+            Progress::Unheard => "no word from the display's bridge",
+            Progress::Heard => {
+                "the display's bridge has heard it, but its board is not there or takes nothing"
+            }
+            Progress::Told | Progress::Stopped => {
+                "the display's board was told, but does not say that it has stopped"
+            }
+        };
         say(&format!(
-            "host-bridge: Stop: no word from the display's bridge in {} s: press the emergency stop",
+            "host-bridge: NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
             self.within
         ));
-        if let Err(error) = is_heard {
+        if let Err(error) = stopping {
             say(&format!("host-bridge: {error}"));
         }
         Ok(ExitCode::from(1))

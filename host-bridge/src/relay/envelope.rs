@@ -7,13 +7,13 @@
 //! The [`Hello`] and the version behind it never move, so that any two builds can say that they differ.
 
 use protocol::frame::MAX_PAYLOAD;
-use protocol::{Estimate, HELLO_LENGTH, Hello, Message, Ping, Pong, Role, Stop};
+use protocol::{Estimate, HELLO_LENGTH, Hello, Message, Ping, Pong, Role, Stop, Trip};
 use serde::{Deserialize, Serialize};
 
 use crate::relay::gate::Saying;
 
 /// The version of everything in this file.
-pub const ENVELOPE_VERSION: u8 = 1;
+pub const ENVELOPE_VERSION: u8 = 2;
 
 /// Bytes in front of the content.
 const HEADER: usize = HELLO_LENGTH + 1 + 3 * size_of::<u64>();
@@ -52,10 +52,20 @@ pub enum Content {
         /// What the board is to be told.
         stop: Stop,
     },
-    /// The Stop of this number is with the board.
+    /// The Stop of this number is done.
     Stopped {
         /// Which one.
         id: u64,
+        /// The reason for which the display's board says that it has stopped; none from the sensor's
+        /// bridge, whose board has the Stop and nothing to stop.
+        trip: Option<Trip>,
+    },
+    /// The Stop of this number was heard, and the board has not said yet that it has stopped.
+    Stopping {
+        /// Which one.
+        id: u64,
+        /// Whether the board has been told.
+        is_told: bool,
     },
 }
 
@@ -268,7 +278,15 @@ mod tests {
                 },
             ),
             of(Role::Host, Content::Stop { id, stop }),
-            of(Role::Display, Content::Stopped { id }),
+            of(
+                Role::Display,
+                Content::Stopped {
+                    id,
+                    trip: Some(Trip::StackOverflow),
+                },
+            ),
+            of(Role::Sensor, Content::Stopped { id, trip: None }),
+            of(Role::Display, Content::Stopping { id, is_told: true }),
         ]
     }
 

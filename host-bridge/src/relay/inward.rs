@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-use protocol::{Ping, Pong, Role, Stop};
+use protocol::{Ping, Pong, Role, Stop, Trip};
 
 use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, saying};
 use crate::relay::far::Far;
+use crate::relay::flow::Answer;
 use crate::relay::gate::{Gate, Order};
 use crate::relay::histogram::{Histogram, Percentiles};
 use crate::relay::outbox::Waiting;
@@ -26,16 +27,11 @@ pub enum Heard {
     /// A ping of this session is to be answered.
     Asked(u64, Ping),
     /// A ping of one's own was answered.
-    Answered {
-        /// When it was sent, in µs.
-        sent_us: u64,
-        /// What it took, in µs.
-        round_trip_us: u64,
-    },
+    Answered(Answer),
     /// The board is to be told, and then the sender.
     Stop(u64, Stop),
-    /// The Stop of this number is with the other site's board.
-    Stopped(u64),
+    /// The Stop of this number is done at the other site: see [`Content::Stopped`].
+    Stopped(u64, Option<Trip>),
 }
 
 /// The inward direction of a bridge.
@@ -110,7 +106,9 @@ impl Inward {
                 }
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
-            Content::Stopped { id } => Heard::Stopped(id),
+            Content::Stopped { id, trip } => Heard::Stopped(id, trip),
+            // It is said again, until it is done.
+            Content::Stopping { .. } => Heard::Nothing,
         }
     }
 
@@ -186,10 +184,11 @@ impl Inward {
             return Heard::Nothing;
         };
         self.round_trip_us = round_trip_us;
-        Heard::Answered {
+        Heard::Answered(Answer {
             sent_us: pong.sent_us,
+            there_us: i128::from(pong.received_us) - i128::from(pong.sent_us),
             round_trip_us,
-        }
+        })
     }
 
     fn weigh(&mut self, envelope: Envelope, now_us: u64, mut tell: impl FnMut(Notice)) -> Heard {

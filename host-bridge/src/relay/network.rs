@@ -18,7 +18,7 @@ const RETRY_FIRST: Duration = Duration::from_millis(100);
 const RETRY_LONGEST: Duration = Duration::from_millis(300);
 /// After this long without a word a connection is given up. What a lossy network holds up for a while
 /// comes well before; a computer whose address changed, or one that was switched off, does not.
-const LEASE: Duration = Duration::from_secs(4);
+pub const LEASE: Duration = Duration::from_secs(4);
 /// What may wait to be sent, in bytes, twice for each priority: when a network is stuck, little that is
 /// old comes out of it later.
 const BATCH_BYTES: u16 = 4_096;

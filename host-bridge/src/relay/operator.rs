@@ -3,7 +3,7 @@
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use protocol::{Role, Stop};
+use protocol::{Role, Stop, Trip};
 
 use crate::host_clock::now_us;
 use crate::relay::envelope::{Content, Envelope};
@@ -15,8 +15,30 @@ use crate::relay::wire::{Ear, Wire};
 /// Between two times that Stop is said, and between two tries to connect.
 const AGAIN: Duration = Duration::from_millis(100);
 
-/// Says Stop at the bench called `name` until the display's bridge says that its board has it, for at most
-/// `within`. Whether it did.
+/// How far a Stop has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Progress {
+    /// The display's bridge has said nothing.
+    Unheard,
+    /// The display's bridge has it, but its board takes nothing.
+    Heard,
+    /// The display's board was told, and has not said that it has stopped.
+    Told,
+    /// The display's board says that it has stopped.
+    Stopped,
+}
+
+/// What has come of a Stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopping {
+    /// How far it has come.
+    pub progress: Progress,
+    /// The reason for which the display's board says that it has stopped, if it does.
+    pub trip: Option<Trip>,
+}
+
+/// Says Stop at the bench called `name` until the display's board says that it has stopped, for at most
+/// `within`: how far that came.
 ///
 /// # Errors
 /// If nobody was reached in that time.
@@ -25,7 +47,7 @@ pub fn stop(
     name: &Name,
     stop: Stop,
     within: Duration,
-) -> Result<bool, NetworkError> {
+) -> Result<Stopping, NetworkError> {
     let end = Instant::now() + within;
     let session = loop {
         match network.open() {
@@ -39,16 +61,19 @@ pub fn stop(
         keys: name.key(Role::Display, Channel::Stop),
         hear: Box::new(move |bytes| {
             if let Ok(envelope) = Envelope::from_bytes(bytes)
-                && let Content::Stopped { id } = envelope.content
+                && envelope.role() == Some(Role::Display)
             {
-                let _ = heard.send(id);
+                let _ = heard.send(envelope.content);
             }
         }),
     };
     let wire = Wire::new(session, name, Role::Host, vec![ear])?;
     let id = random_number();
-    let mut is_heard = false;
-    while !is_heard && Instant::now() < end {
+    let mut stopping = Stopping {
+        progress: Progress::Unheard,
+        trip: None,
+    };
+    while stopping.progress < Progress::Stopped && Instant::now() < end {
         let envelope = Envelope {
             hello: bridge_hello(Role::Host),
             session: id,
@@ -58,14 +83,30 @@ pub fn stop(
         };
         wire.say(Channel::Stop, &envelope);
         let again = Instant::now() + AGAIN;
-        while let Ok(stopped) = hears.recv_timeout(again.saturating_duration_since(Instant::now()))
+        while let Ok(content) = hears.recv_timeout(again.saturating_duration_since(Instant::now()))
         {
-            is_heard |= stopped == id;
-            if is_heard {
+            if let Some(now) = told(&content, id) {
+                stopping = now;
+            }
+            if stopping.progress == Progress::Stopped {
                 break;
             }
         }
     }
     wire.close();
-    Ok(is_heard)
+    Ok(stopping)
+}
+
+/// What the display's bridge says of the Stop numbered `ours`.
+fn told(content: &Content, ours: u64) -> Option<Stopping> {
+    let (id, progress, trip) = match *content {
+        Content::Stopped {
+            id,
+            trip: Some(trip),
+        } => (id, Progress::Stopped, Some(trip)),
+        Content::Stopping { id, is_told: true } => (id, Progress::Told, None),
+        Content::Stopping { id, is_told: false } => (id, Progress::Heard, None),
+        _ => return None,
+    };
+    (id == ours).then_some(Stopping { progress, trip })
 }

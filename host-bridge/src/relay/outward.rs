@@ -4,7 +4,7 @@
 use protocol::{Hello, Message};
 
 use crate::relay::envelope::{Content, Envelope, saying};
-use crate::relay::flow::Flow;
+use crate::relay::flow::{Answer, Flow};
 use crate::relay::gate::Saying;
 use crate::relay::report::Outgoing;
 
@@ -46,7 +46,7 @@ impl Outward {
             self.start = self.start.wrapping_add(1);
         }
         self.last = Some(said);
-        if !self.flow.takes_more(now_us) {
+        if !self.flow.admits(now_us) {
             self.counts.held += 1;
             return None;
         }
@@ -76,9 +76,9 @@ impl Outward {
         }
     }
 
-    /// A ping of `sent_us` was answered after `round_trip_us`.
-    pub fn on_answer(&mut self, sent_us: u64, round_trip_us: u64) {
-        self.flow.on_answer(sent_us, round_trip_us);
+    /// A ping was answered.
+    pub fn on_answer(&mut self, answer: Answer) {
+        self.flow.on_answer(answer);
     }
 
     /// How the network does.
@@ -112,10 +112,18 @@ mod tests {
         })
     }
 
+    fn answer(sent_us: u64) -> Answer {
+        Answer {
+            sent_us,
+            there_us: 0,
+            round_trip_us: 10_000,
+        }
+    }
+
     /// A bridge whose network has just answered.
     fn answered() -> Outward {
         let mut outward = Outward::new(host_hello(), 1);
-        outward.on_answer(0, 10_000);
+        outward.on_answer(answer(0));
         outward
     }
 
@@ -142,10 +150,10 @@ mod tests {
     fn what_a_stuck_network_does_not_take_is_held_back_and_not_numbered() {
         let mut outward = Outward::new(host_hello(), 1);
         assert_eq!(outward.carry(9, 9, motion(5)), None);
-        outward.on_answer(0, 10_000);
+        outward.on_answer(answer(0));
         assert_eq!(carried(&mut outward, 6), (0, 0));
-        assert_eq!(outward.carry(9, 1_000_000, motion(7)), None);
-        outward.on_answer(990_000, 10_000);
+        assert_eq!(outward.carry(9, 9_000_000, motion(7)), None);
+        outward.on_answer(answer(9_000_000));
         assert_eq!(carried(&mut outward, 8), (1, 0));
         assert_eq!(outward.counts().held, 2);
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use protocol::Role;
+use protocol::{Role, Trip};
 use serde::Serialize;
 
 use crate::relay::endpoint::Endpoint;
@@ -205,10 +205,13 @@ pub enum Notice {
     Unvisited(Role),
     /// Stop, said at this site.
     StopSaid(Role),
-    /// The Stop is with this site's board.
+    /// This site's board was told to stop.
     StopPassed,
-    /// The Stop said here is with the board of that site.
-    StopHeard(Role),
+    /// This site's board says that it has stopped, for this reason.
+    Stopped(Trip),
+    /// The Stop said here is done at that site: the reason for which its board says that it has stopped,
+    /// if it is one that can.
+    StopHeard(Role, Option<Trip>),
 }
 
 impl fmt::Display for Notice {
@@ -250,7 +253,14 @@ impl fmt::Display for Notice {
             ),
             Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),
             Self::StopPassed => f.write_str("Stop: with the board here"),
-            Self::StopHeard(role) => write!(f, "Stop: with the board at {}", site(*role)),
+            Self::Stopped(trip) => write!(f, "Stop: the board here has stopped: {}", trip.name()),
+            Self::StopHeard(role, None) => write!(f, "Stop: with the board at {}", site(*role)),
+            Self::StopHeard(role, Some(trip)) => write!(
+                f,
+                "Stop: the board at {} has stopped: {}",
+                site(*role),
+                trip.name()
+            ),
         }
     }
 }

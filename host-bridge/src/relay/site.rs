@@ -10,7 +10,6 @@
 
 mod keeper;
 
-use std::collections::VecDeque;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -30,6 +29,7 @@ use crate::relay::network::{Network, NetworkError};
 use crate::relay::outbox::{Due, Outbox};
 use crate::relay::outward::Outward;
 use crate::relay::report::{Notice, Report};
+use crate::relay::stops::{Outcome, Standing, Stops};
 use crate::relay::wire::{Ear, Wire};
 use crate::state::State;
 use keeper::Keeper;
@@ -40,8 +40,6 @@ const CONNECT_AGAIN: Duration = Duration::from_millis(250);
 const STOP_AGAIN: Duration = Duration::from_millis(20);
 /// Longest wait of the writer for something to write.
 const IDLE: Duration = Duration::from_secs(1);
-/// Stops that are remembered as done.
-const DONE: usize = 64;
 
 /// What a bridge is told.
 pub struct Settings {
@@ -83,15 +81,6 @@ struct Shared {
     told_rival: AtomicBool,
     notices: Sender<Notice>,
     is_ended: AtomicBool,
-}
-
-/// Stops on their way.
-#[derive(Default)]
-struct Stops {
-    /// Said here and not yet known to be with the other site's board.
-    unheard: Vec<(u64, Stop)>,
-    /// With this site's board.
-    done: VecDeque<u64>,
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -185,11 +174,12 @@ impl Site {
         Ok((site, told))
     }
 
-    /// Says Stop to both boards: to this one now, to the other one as soon as the network lets it through.
+    /// Says Stop to both boards: to this one now, to the other one as soon as the network lets it through,
+    /// and to a display's board again until it says that it has stopped.
     pub fn stop(&self, stop: Stop) {
         let id = random_number();
+        locked(&self.shared.stops).say(id, stop);
         self.shared.outbox.stop(id, stop);
-        locked(&self.shared.stops).unheard.push((id, stop));
         self.shared.tell(Notice::StopSaid(self.shared.role));
     }
 
@@ -286,6 +276,14 @@ impl Shared {
 
     /// The board has said something.
     fn carry(&self, at_us: u64, message: Message) {
+        let obeyed = locked(&self.stops).obeyed(at_us, &message);
+        if let Some((trip, ids)) = obeyed {
+            self.tell(Notice::Stopped(trip));
+            for id in ids {
+                let trip = Some(trip);
+                self.say(Channel::Stop, Content::Stopped { id, trip });
+            }
+        }
         if !is_carried(self.role, &message) {
             return;
         }
@@ -319,24 +317,18 @@ impl Shared {
                 };
                 self.say(Channel::Clock, Content::Pong { to, pong });
             }
-            Heard::Answered {
-                sent_us,
-                round_trip_us,
-            } => {
+            Heard::Answered(answer) => {
                 drop(inward);
-                locked(&self.outward).on_answer(sent_us, round_trip_us);
+                locked(&self.outward).on_answer(answer);
             }
             Heard::Stop(id, stop) => {
                 drop(inward);
                 self.on_stop(self.far, id, stop);
             }
-            Heard::Stopped(id) => {
+            Heard::Stopped(id, trip) => {
                 drop(inward);
-                let mut stops = locked(&self.stops);
-                let before = stops.unheard.len();
-                stops.unheard.retain(|(unheard, _)| *unheard != id);
-                if stops.unheard.len() < before {
-                    self.tell(Notice::StopHeard(self.far));
+                if locked(&self.stops).on_outcome(id) {
+                    self.tell(Notice::StopHeard(self.far, trip));
                 }
             }
         }
@@ -362,11 +354,21 @@ impl Shared {
     }
 
     fn on_stop(&self, by: Role, id: u64, stop: Stop) {
-        if locked(&self.stops).done.contains(&id) {
-            self.say(Channel::Stop, Content::Stopped { id });
-        } else if self.outbox.stop(id, stop) {
-            self.tell(Notice::StopSaid(by));
-        }
+        let standing = locked(&self.stops).hear(id, stop);
+        let content = match standing {
+            Standing::New => {
+                self.outbox.stop(id, stop);
+                self.tell(Notice::StopSaid(by));
+                return;
+            }
+            Standing::Pending { is_told } => Content::Stopping { id, is_told },
+            Standing::Done(Outcome::Passed) => Content::Stopped { id, trip: None },
+            Standing::Done(Outcome::Stopped(trip)) => {
+                let trip = Some(trip);
+                Content::Stopped { id, trip }
+            }
+        };
+        self.say(Channel::Stop, content);
     }
 
     /// Says to the board what is due, until the bridge ends.
@@ -376,9 +378,7 @@ impl Shared {
                 Due::Closed => return,
                 Due::Nothing => {}
                 Due::Stop(id, stop) => {
-                    if voice.post(&Message::Stop(stop)).is_ok() {
-                        self.on_stopped(id);
-                    } else {
+                    if self.tell_board(voice, id, stop).is_err() {
                         self.outbox.stop(id, stop);
                         thread::sleep(STOP_AGAIN);
                     }
@@ -396,12 +396,24 @@ impl Shared {
         }
     }
 
-    fn on_stopped(&self, id: u64) {
+    /// Says Stop to the board. A display's answers by its state; a sensor's has nothing to stop.
+    fn tell_board(&self, voice: &Voice, id: u64, stop: Stop) -> Result<(), NotSent> {
+        // The lock keeps an answer that is quicker than this thread from being heard before.
         let mut stops = locked(&self.stops);
-        stops.done.truncate(DONE - 1);
-        stops.done.push_front(id);
+        let told_us = now_us();
+        voice.post(&Message::Stop(stop))?;
+        let is_first = stops.tell(id, told_us);
+        let is_over = self.role != Role::Display;
+        if is_over {
+            stops.pass(id);
+        }
         drop(stops);
-        self.tell(Notice::StopPassed);
-        self.say(Channel::Stop, Content::Stopped { id });
+        if is_first {
+            self.tell(Notice::StopPassed);
+        }
+        if is_over {
+            self.say(Channel::Stop, Content::Stopped { id, trip: None });
+        }
+        Ok(())
     }
 }

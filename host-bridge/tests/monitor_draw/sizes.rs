@@ -124,14 +124,14 @@ fn what_a_port_counts_is_there_or_added_up() {
     for words in [
         "─ ports ────────    sent   heard    lost corrupt dropped overrun   noise  others",
         // Late, unread and overlong; stray frames are none that should not be.
-        " here, display    99999  9876 k       0       0       0       0       0     321",
+        " here, display     99999  9876 k       0       0       0       0       0     321",
     ] {
         assert_has(&narrow, words);
     }
     let wide = picture(&widest(), &view, 120, 40);
     for words in [
         "   noise    late   twice   stray foreign  unread    long",
-        " here, sensor     99999  9876 k       0       0       0       0       0       1       0    4000       0      20     300",
+        " here, sensor      99999  9876 k       0       0       0       0       0       1       0    4000       0      20     300",
     ] {
         assert_has(&wide, words);
     }

@@ -99,7 +99,7 @@ fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
 }
 
 #[test]
-fn recorded_gauges_are_played_and_refused_below_a_kilohertz() {
+fn recorded_gauges_are_played_and_refused_below_200_hz() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
     let folder = Folder::new("gauges");
     let rows: String = (0..=3000)
@@ -113,7 +113,7 @@ fn recorded_gauges_are_played_and_refused_below_a_kilohertz() {
     for (csv, want) in [
         (
             "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.01,1,1,1,1,1\n",
-            "data.csv:3: column 1 (t_s): \"0.01\" comes more than 1 ms",
+            "data.csv:3: column 1 (t_s): \"0.01\" comes more than 5 ms",
         ),
         (
             "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,12\n",

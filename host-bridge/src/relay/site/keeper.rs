@@ -19,7 +19,7 @@ use crate::relay::report::Notice;
 const LOOK: Duration = Duration::from_millis(25);
 /// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
 const KNOCK_US: u64 = 100_000;
-/// Between two repetitions of a Stop that nobody has heard, in µs.
+/// Between two repetitions of a Stop that nobody has heard or that the board has not obeyed, in µs.
 const STOP_US: u64 = 100_000;
 /// How long nobody is heard before it is found out why, in µs.
 const PUZZLED_US: u64 = 3_000_000;
@@ -61,8 +61,8 @@ impl Keeper {
 
     fn ping(&mut self, at_us: u64) {
         locked(&self.shared.inward).elapse(at_us, |notice| self.shared.tell(notice));
-        let takes_more = locked(&self.shared.outward).flow().takes_more(at_us);
-        if takes_more || is_due(self.pinged_us, KNOCK_US, at_us) {
+        let is_answered = locked(&self.shared.outward).flow().is_answered(at_us);
+        if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
             let ping = Ping { sent_us: now_us() };
             self.shared.say(Channel::Clock, Content::Ping(ping));
@@ -73,9 +73,14 @@ impl Keeper {
         if !is_due(self.stopped_us, STOP_US, at_us) {
             return;
         }
-        let unheard = locked(&self.shared.stops).unheard.clone();
-        if !unheard.is_empty() {
+        let stops = locked(&self.shared.stops);
+        let (unheard, unobeyed) = (stops.unheard(), stops.unobeyed());
+        drop(stops);
+        if !unheard.is_empty() || !unobeyed.is_empty() {
             self.stopped_us = Some(at_us);
+        }
+        for (id, stop) in unobeyed {
+            self.shared.outbox.stop(id, stop);
         }
         for (id, stop) in unheard {
             self.shared.say(Channel::Stop, Content::Stop { id, stop });

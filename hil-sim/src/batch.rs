@@ -1,0 +1,170 @@
+//! The same work on many inputs on several threads, its results handed over in the inputs' order, with only so
+//! many of them waiting as there are threads.
+
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::thread;
+
+/// What may be begun.
+struct Desk {
+    /// The next input.
+    next: usize,
+    /// Inputs below this one may be begun.
+    open: usize,
+}
+
+/// Lets the other threads end when one of them panics: nothing would open the desk for them.
+struct Alarm<'d>(&'d (Mutex<Desk>, Condvar));
+
+impl Drop for Alarm<'_> {
+    fn drop(&mut self) {
+        if thread::panicking() {
+            locked(&self.0.0).next = usize::MAX;
+            self.0.1.notify_all();
+        }
+    }
+}
+
+fn locked(desk: &Mutex<Desk>) -> MutexGuard<'_, Desk> {
+    desk.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The input to work on next; none if there is none any more. Waits until one may be begun.
+fn taken((desk, opened): &(Mutex<Desk>, Condvar), inputs: usize) -> Option<usize> {
+    let mut desk = locked(desk);
+    loop {
+        if desk.next >= inputs {
+            return None;
+        }
+        if desk.next < desk.open {
+            desk.next += 1;
+            return Some(desk.next - 1);
+        }
+        desk = opened.wait(desk).unwrap_or_else(PoisonError::into_inner);
+    }
+}
+
+/// Does `work` on each input on so many threads, and hands each result with its input's index to `finished`,
+/// on the calling thread and in the inputs' order. No thread is more than two inputs a thread ahead of what has
+/// been handed over: memory does not grow with the inputs. After an error of `finished`'s nothing more is begun.
+///
+/// # Errors
+/// The first of `finished`'s.
+///
+/// # Panics
+/// If `work` does.
+pub fn in_order<I: Sync, O: Send, E>(
+    inputs: &[I],
+    threads: NonZero<usize>,
+    work: impl Fn(&I) -> O + Sync,
+    mut finished: impl FnMut(usize, O) -> Result<(), E>,
+) -> Result<(), E> {
+    let ahead = 2 * threads.get();
+    let desk = (
+        Mutex::new(Desk {
+            next: 0,
+            open: ahead,
+        }),
+        Condvar::new(),
+    );
+    let (sender, receiver) = mpsc::channel();
+    thread::scope(|scope| {
+        for _ in 0..threads.get().min(inputs.len()) {
+            let (sender, desk, work) = (sender.clone(), &desk, &work);
+            scope.spawn(move || {
+                let _alarm = Alarm(desk);
+                while let Some(index) = taken(desk, inputs.len()) {
+                    // Nobody listens any more after an error.
+                    if sender.send((index, work(&inputs[index]))).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut waiting = BTreeMap::new();
+        let mut due = 0;
+        for (index, result) in receiver {
+            waiting.insert(index, result);
+            while let Some(result) = waiting.remove(&due) {
+                let handed = finished(due, result);
+                due += 1;
+                let mut now = locked(&desk.0);
+                now.open = due + ahead;
+                if handed.is_err() {
+                    now.next = usize::MAX;
+                }
+                drop(now);
+                desk.1.notify_all();
+                handed?;
+            }
+        }
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    fn threads(count: usize) -> NonZero<usize> {
+        NonZero::new(count).unwrap()
+    }
+
+    #[test]
+    fn results_come_in_the_inputs_order_whichever_is_done_first() {
+        // Even inputs take longer.
+        let work = |n: &u64| {
+            let turns = if n.is_multiple_of(2) { 20_000 } else { 10 };
+            (0..turns).fold(*n, |n, _| n.wrapping_mul(6_364_136_223_846_793_005))
+        };
+        let inputs: Vec<u64> = (0..100).collect();
+        for count in [1, 2, 7] {
+            let mut seen = Vec::new();
+            let all: Result<(), ()> = in_order(&inputs, threads(count), work, |index, result| {
+                assert_eq!(result, work(&inputs[index]));
+                seen.push(index);
+                Ok(())
+            });
+            assert_eq!(all, Ok(()));
+            assert_eq!(seen, (0..100).collect::<Vec<_>>());
+        }
+        let none: Result<(), ()> = in_order(&[], threads(2), work, |_, _| Err(()));
+        assert_eq!(none, Ok(()));
+    }
+
+    #[test]
+    fn no_more_wait_than_there_is_room_for() {
+        let (begun, handed) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let work = |_: &usize| {
+            let begun = begun.fetch_add(1, Ordering::SeqCst) + 1;
+            assert!(begun <= handed.load(Ordering::SeqCst) + 2 * 3 + 1);
+        };
+        let inputs: Vec<usize> = (0..500).collect();
+        let all: Result<(), ()> = in_order(&inputs, threads(3), work, |_, ()| {
+            handed.fetch_add(1, Ordering::SeqCst);
+            Ok(())
+        });
+        assert_eq!((all, begun.into_inner()), (Ok(()), 500));
+    }
+
+    #[test]
+    fn an_error_ends_it_and_so_does_a_panic() {
+        let begun = AtomicUsize::new(0);
+        let work = |_: &usize| begun.fetch_add(1, Ordering::SeqCst);
+        let inputs: Vec<usize> = (0..500).collect();
+        let refused = in_order(&inputs, threads(2), work, |index, _| {
+            if index == 20 { Err(index) } else { Ok(()) }
+        });
+        assert_eq!(refused, Err(20));
+        assert!(begun.into_inner() <= 25);
+        let panics = std::panic::catch_unwind(|| {
+            let work = |n: &usize| assert_ne!(*n, 20, "meant");
+            let _: Result<(), ()> = in_order(&inputs, threads(2), work, |_, ()| Ok(()));
+        });
+        assert!(panics.is_err());
+    }
+}

@@ -1,0 +1,176 @@
+//! `hil-sim golden`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::bail;
+use hil_sim::annotation::Annotation;
+use hil_sim::batch;
+use hil_sim::golden::{Golden, Standing, complaint};
+use hil_sim::scene::SceneError;
+
+use super::runs;
+use super::scene_files::scene_files;
+use super::way::{Loaded, Way};
+
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Command {
+    /// Runs scenes and compares their hashes with the golden ones: exit status 1 if one is another or is
+    /// missing, 2 if a scene or a file cannot be used
+    Check {
+        #[command(flatten)]
+        what: What,
+        /// Run each scene so many times, and compare every run
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+        repeat: u32,
+    },
+    /// Runs scenes and takes their hashes as the golden ones: do it once the changes have been looked at
+    Renew {
+        #[command(flatten)]
+        what: What,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+pub(super) struct What {
+    /// Scenes: TOML files, or folders of them
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// The file of golden hashes
+    #[arg(long, value_name = "FILE", default_value = "golden.toml")]
+    file: PathBuf,
+    #[command(flatten)]
+    way: Way,
+}
+
+/// A scene's runs so far.
+#[derive(Clone, Debug, Default)]
+struct Seen {
+    /// Each hash, and how many runs had it.
+    hashes: Vec<(u64, u32)>,
+}
+
+impl Command {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        match self {
+            Self::Check { what, repeat } => what.check(repeat),
+            Self::Renew { what } => what.renew(),
+        }
+    }
+}
+
+impl What {
+    fn check(&self, repeat: u32) -> anyhow::Result<ExitCode> {
+        let golden = Golden::read(&self.file)?;
+        let scenes = self.load()?;
+        let started = Instant::now();
+        let seen = self.run(&scenes, repeat)?;
+        let wall_s = started.elapsed().as_secs_f64();
+        let engine = self.way.engine();
+        let mut met = true;
+        for (Loaded { path, scene }, seen) in scenes.iter().zip(&seen) {
+            let name = golden.name(path)?;
+            for &(hash, count) in &seen.hashes {
+                let standing = golden.standing(&name, engine, hash);
+                let Some(line) = complaint(&standing, hash, &golden, &name) else {
+                    continue;
+                };
+                met = false;
+                println!("{}: {line} ({count} of {repeat} runs)", path.display());
+                let (file, at) = match standing {
+                    Standing::Other(_, at) => (golden.path(), at),
+                    Standing::Same | Standing::Missing => (path.as_path(), None),
+                };
+                self.way.annotate(&Annotation {
+                    file: &file.display().to_string(),
+                    line: at,
+                    title: &format!("{} is not as it was", scene.name),
+                    message: &line,
+                });
+            }
+        }
+        let runs = scenes.len() as u64 * u64::from(repeat);
+        println!(
+            "{} scenes, {runs} runs ({}) in {wall_s:.1} s: {}",
+            scenes.len(),
+            engine.name(),
+            if met {
+                "all hashes are the golden ones"
+            } else {
+                "not all hashes are the golden ones"
+            }
+        );
+        Ok(if met {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::from(1)
+        })
+    }
+
+    fn renew(&self) -> anyhow::Result<ExitCode> {
+        let mut golden = Golden::open(&self.file)?;
+        let scenes = self.load()?;
+        let seen = self.run(&scenes, 1)?;
+        let engine = self.way.engine();
+        let mut same = 0;
+        for (Loaded { path, .. }, seen) in scenes.iter().zip(&seen) {
+            let name = golden.name(path)?;
+            for &(hash, _) in &seen.hashes {
+                let hash_text = format!("{hash:016x}");
+                match golden.renew(&name, engine, hash) {
+                    Some(before) if before == hash_text => same += 1,
+                    Some(before) => println!("{name}: {}: {before} -> {hash_text}", engine.name()),
+                    None => println!("{name}: {}: {hash_text}, new", engine.name()),
+                }
+            }
+        }
+        golden.write()?;
+        println!(
+            "{}: written, {same} of {} unchanged",
+            golden.path().display(),
+            scenes.len()
+        );
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn load(&self) -> anyhow::Result<Vec<Loaded>> {
+        let files: Vec<PathBuf> = scene_files(&self.scenes, None)?;
+        let own = |path: &Path| path.canonicalize().ok() == self.file.canonicalize().ok();
+        if let Some(path) = files.iter().find(|path| path.exists() && own(path)) {
+            bail!(
+                "{}: holds the golden hashes, and is no scene: leave it out",
+                path.display()
+            );
+        }
+        let loaded = self.way.load(&files);
+        let refusals: Vec<&SceneError> =
+            loaded.iter().filter_map(|one| one.as_ref().err()).collect();
+        if !refusals.is_empty() {
+            return Err(self.way.refuse(&refusals));
+        }
+        Ok(loaded.into_iter().flatten().collect())
+    }
+
+    /// Runs each scene so often, one after the other in turn.
+    fn run(&self, scenes: &[Loaded], repeat: u32) -> anyhow::Result<Vec<Seen>> {
+        let ready = self.way.ready()?;
+        let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();
+        let bar = runs(inputs.len() as u64);
+        let mut seen = vec![Seen::default(); scenes.len()];
+        let work = |&index: &usize| ready.run(&scenes[index].scene).map(|run| run.hash);
+        batch::in_order(&inputs, self.way.threads(), work, |at, hash| {
+            let hash = hash
+                .map_err(|error| error.context(format!("{}", scenes[inputs[at]].path.display())))?;
+            bar.inc(1);
+            let hashes = &mut seen[inputs[at]].hashes;
+            match hashes.iter_mut().find(|(other, _)| *other == hash) {
+                Some((_, count)) => *count += 1,
+                None => hashes.push((hash, 1)),
+            }
+            anyhow::Ok(())
+        })?;
+        bar.finish_and_clear();
+        Ok(seen)
+    }
+}
