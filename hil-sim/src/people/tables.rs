@@ -282,13 +282,15 @@ fn recount(study: &Study) -> String {
          - Table IV follows from Table III to its last digit if the cell of 1.00 is left out. Its intervals\n\
          \x20 (parametric bootstrap of shares (k + ½)/(n + 1)) are as wide as the scale: ten trials a pair order\n\
          \x20 the samples, and measure no distances.\n\
-         - With that cell at 0.95, {}.\n\
+         - With that cell at 0.95:\n\
+         \x20 {}.\n\
          \x20 The paper has {CHI_SQUARE} too, takes {FREEDOM} degrees of freedom, critical {CRITICAL} ({:.2} here), and\n\
          \x20 says that the model fits. Four samples have (4 − 1)(4 − 2)/2 = 3: at {:.0} % it does not fit.\n\
          - Without the cell, {}.\n\
          - With the cell at 1, {}.\n\
          - Ten trials a pair are few for this test: of {} tables drawn from the paper's own scale, so that Case V\n\
-         \x20 holds, it rejects {:.0} % instead of {:.0} %. Held against those tables, {}.\n\
+         \x20 holds, it rejects {:.0} % instead of {:.0} %. Held against those tables:\n\
+         \x20 {}.\n\
          - Nine of ten right, which the paper marks as significant at 95 %, come about by guessing in {:.1} %,\n\
          \x20 each pair by itself (exact, one-sided); for six pairs at once (Bonferroni) in up to {:.1} %. Only the\n\
          \x20 pair of 2 and 4 mm (ten of ten: {:.2} %, times six {:.1} %) stands that.\n",
