@@ -34,7 +34,6 @@ pub(super) fn read(
             ("stick-slip", Some(Rung::StickSlip)),
             ("reference", Some(Rung::Reference)),
         ],
-        &[],
     )?;
     let friction = table.choice(
         "friction",
@@ -44,7 +43,6 @@ pub(super) fn read(
             ("strong", Some(Friction::Strong)),
             ("severe", Some(Friction::Severe)),
         ],
-        &[],
     )?;
     match (model, friction) {
         (Some(rung @ (Rung::Kinematic | Rung::Rigid | Rung::Viscoelastic)), Some(_)) => {
@@ -96,7 +94,7 @@ fn solver(
     let integrators: Vec<(&str, Option<Integrator>)> = std::iter::once(("exact", None))
         .chain(Integrator::ALL.map(|integrator| (integrator.name(), Some(integrator))))
         .collect();
-    let integrator = table.choice("integrator", &integrators, &[])?;
+    let integrator = table.choice("integrator", &integrators)?;
     let step_us = table.number("step_us", &STEP)?;
     let Some(integrator) = integrator else {
         return match step_us {

@@ -46,7 +46,6 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
     let mode = table.choice(
         "mode",
         &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
-        &[],
     )?;
     let update_rate = match table.whole("update_rate_hz", 2_000, 4_000)? {
         None | Some(2_000) => UpdateRate::Hz2000,

@@ -129,7 +129,6 @@ fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
     let kind = table.choice(
         "profile",
         &[("trapezoid", 't'), ("sine", 's'), ("recorded", 'r')],
-        &[],
     )?;
     let profile = match kind {
         't' => Profile::Trapezoid,
@@ -187,7 +186,6 @@ fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
     match table.choice(
         "kind",
         &[("constant", 'c'), ("sinusoid", 's'), ("recorded", 'r')],
-        &[],
     )? {
         'c' => {
             let speed_mm_s = table.number("speed_mm_s", &SPEED)?.unwrap_or(50.0);
@@ -215,7 +213,6 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
     let follows = table.choice(
         "follows",
         &[("motion", Follows::Motion), ("link", Follows::Link)],
-        &[],
     )?;
     let lag_ms = table.number("lag_ms", &LAG)?.unwrap_or(0.0);
     if lag_ms > 0.0 && follows == Follows::Motion {
@@ -236,7 +233,7 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
 }
 
 fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), SceneError> {
-    let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')], &[])?;
+    let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')])?;
     let tangential = table.boolean("tangential")?;
     let defaults = Force::default();
     let force = Force {
@@ -350,7 +347,7 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
         ("counting", Method::Counting),
         ("counting-adapted", Method::AdaptedCounting),
     ];
-    let method = table.choice("method", &methods, &[])?;
+    let method = table.choice("method", &methods)?;
     let window_ms = table
         .whole("window_ms", 10, 200)?
         .map_or(defaults.window_ms, |ms| ms as u16);
@@ -377,7 +374,6 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
             ("configured", Stiffness::Configured),
             ("estimated", Stiffness::Estimated),
         ],
-        &[],
     )?;
     if stiffness == Stiffness::Estimated && !force.present {
         return Err(table.refuse(

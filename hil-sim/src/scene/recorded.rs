@@ -68,7 +68,7 @@ const LENGTH: Words = Words {
 /// none if nothing is said of it.
 fn on_lines(table: &mut Table<'_>) -> Result<Option<bool>, SceneError> {
     let words = [("band-limited", false), ("lines", true)];
-    let lines = table.choice("interpolation", &words, &[])?;
+    let lines = table.choice("interpolation", &words)?;
     Ok(table.contains("interpolation").then_some(lines))
 }
 

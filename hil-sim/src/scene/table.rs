@@ -228,13 +228,11 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// One of the words in `built`, the first if the key is absent. Those in `planned` are known and
-    /// refused as such.
+    /// One of the words in `built`, the first if the key is absent.
     pub fn choice<T: Copy>(
         &mut self,
         key: &'static str,
         built: &[(&str, T)],
-        planned: &[&str],
     ) -> Result<T, SceneError> {
         let Some(word) = self.text(key)? else {
             return Ok(built[0].1);
@@ -247,14 +245,7 @@ impl<'t> Table<'t> {
             .map(|(name, _)| format!("\"{name}\""))
             .collect();
         let give = names.join(" or ");
-        Err(self.refuse(
-            key,
-            if planned.contains(&word) {
-                format!("\"{word}\" is known but not built in this version: give {give}")
-            } else {
-                format!("\"{word}\" is unknown: give {give}")
-            },
-        ))
+        Err(self.refuse(key, format!("\"{word}\" is unknown: give {give}")))
     }
 
     /// A list of gauge numbers, none of them twice.
