@@ -4,14 +4,16 @@
 //! | --- | --- |
 //! | friction | `stick-slip` |
 //! | an arm that speeds up so fast that the spring swings | `viscoelastic` |
-//! | more than one specimen | `rigid` |
+//! | specimens so short that a patch lies on several, short waves beside long ones in noise, a strong second harmonic | `rigid` |
 //! | none of these | `kinematic` |
 //!
 //! hil-sim/tests/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
 //! by less than [`ENOUGH_PERCENT`] or [`ENOUGH_SHARE`] of itself, whichever is more. And for each rung it
-//! has a scene that the rung below does not do.
+//! has a scene that the rung below does not do. While a border passes, nothing is compared: for as long as
+//! two specimens are in an estimator's memory, its error hangs on one or two estimates, whichever the rung.
 
-use crate::scene::{Friction, Motion, Rung, Surface};
+use crate::patch::{REACH_MM, felt_share};
+use crate::scene::{Friction, Gauges, Motion, Rung, Surface};
 
 use super::spring::Hanging;
 
@@ -22,6 +24,15 @@ pub const ENOUGH_SHARE: f64 = 0.25;
 /// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
 /// on single hops, and no two models of friction hop alike.
 pub const ENOUGH_BLIND_PERCENT: f64 = 2.0;
+/// The same in percent of λ of the paper's count: one impulse more or less in its window is as much and more.
+pub const ENOUGH_COUNT_PERCENT: f64 = 10.0;
+/// For so long after a border, in s, nothing is compared.
+pub const BORDER_S: f64 = 0.25;
+/// Share of the strongest specimen's amplitude below which a patch weakens one so far that noise tells.
+pub const FAINT_SHARE: f64 = 0.3;
+/// A second harmonic above this share of the fundamental may pass for the wave itself; a patch feels less of
+/// it.
+pub const HARMONIC_SHARE: f64 = 0.5;
 /// RMS of the velocity by which a fingertip on a spring may differ from the arm's, as a share of the arm's
 /// RMS velocity: what goes into λ as it is.
 pub const SWING_SHARE: f64 = 0.005;
@@ -45,6 +56,7 @@ pub struct Choice {
 pub fn choose(
     surface: &Surface,
     motion: &Motion,
+    gauges: &Gauges,
     friction: Option<Friction>,
     stiffness_n_per_m: f64,
     duration_s: f64,
@@ -66,15 +78,13 @@ pub fn choose(
             ),
         );
     }
-    if surface.specimens.len() > 1 {
-        return choice(
-            Rung::Rigid,
-            "a border between specimens passes under the fingertip bit by bit".to_owned(),
-        );
+    if let Some(reason) = needs_patch(surface, gauges) {
+        return choice(Rung::Rigid, reason);
     }
     choice(
         Rung::Kinematic,
-        "one specimen, no friction, and a hand that the fingertip keeps up with".to_owned(),
+        "no friction, a hand that the fingertip keeps up with, and specimens that a point can tell apart"
+            .to_owned(),
     )
 }
 
@@ -99,4 +109,44 @@ fn swing_share(motion: &Motion, stiffness_n_per_m: f64, duration_s: f64) -> f64 
         before_m = arm_m;
     }
     if all > 0.0 { (off / all).sqrt() } else { 0.0 }
+}
+
+/// Why a point is too simple, if it is.
+fn needs_patch(surface: &Surface, gauges: &Gauges) -> Option<String> {
+    let Gauges::Kinematic(kinematic) = gauges else {
+        return None;
+    };
+    if kinematic.second_harmonic > HARMONIC_SHARE {
+        return Some(format!(
+            "of a second harmonic of {} of the fundamental a patch feels less than a point",
+            kinematic.second_harmonic
+        ));
+    }
+    // The first and the last go on for ever.
+    let inner = surface.specimens.get(1..surface.specimens.len() - 1);
+    let short = inner
+        .unwrap_or_default()
+        .iter()
+        .find(|specimen| specimen.length_mm < 2.0 * REACH_MM);
+    if let Some(short) = short {
+        return Some(format!(
+            "a specimen of {} mm is shorter than what a gauge feels, {} mm",
+            short.length_mm,
+            2.0 * REACH_MM
+        ));
+    }
+    let shares = || {
+        surface
+            .specimens
+            .iter()
+            .map(|specimen| felt_share(specimen.wavelength_mm))
+    };
+    let faintest = shares().fold(f64::INFINITY, f64::min) / shares().fold(0.0, f64::max);
+    let noisy = kinematic.snr_db.is_some() || kinematic.hum_50_hz > 0.0 || kinematic.pink > 0.0;
+    (faintest < FAINT_SHARE && noisy).then(|| {
+        format!(
+            "of the shortest waves a patch feels {:.0} % of the longest's amplitude, in noise",
+            100.0 * faintest
+        )
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::bounds::STEP;
 use super::table::Table;
-use super::{Contact, Friction, Motion, Rung, SceneError, Solver, Surface};
+use super::{Contact, Friction, Gauges, Motion, Rung, SceneError, Solver, Surface};
 use crate::contact::{EVENT_STEP_S, Integrator, Stribeck, ladder, stability};
 
 /// Longest step of a method that is not told one, in s.
@@ -14,6 +14,7 @@ const DEFAULT_SHARE: f64 = 0.5;
 pub(super) struct Scenery<'a> {
     pub surface: &'a Surface,
     pub motion: &'a Motion,
+    pub gauges: &'a Gauges,
     pub stiffness_n_per_m: f64,
     pub duration_s: f64,
 }
@@ -68,6 +69,7 @@ pub(super) fn read(
             let choice = ladder::choose(
                 scenery.surface,
                 scenery.motion,
+                scenery.gauges,
                 friction,
                 scenery.stiffness_n_per_m,
                 scenery.duration_s,

@@ -38,6 +38,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
             &Scenery {
                 surface: &surface,
                 motion: &motion,
+                gauges: &gauges,
                 stiffness_n_per_m: force.stiffness_n_per_m,
                 duration_s,
             },

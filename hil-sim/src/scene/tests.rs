@@ -299,8 +299,25 @@ fn a_contact_that_is_left_open_is_the_lowest_rung_that_does_and_says_why() {
         (
             "[surface]\nspecimens = [{ wavelength_mm = 1.0, length_mm = 5.0 }, { wavelength_mm = 2.0 }]"
                 .to_owned(),
+            Rung::Kinematic,
+            "a point can tell apart",
+        ),
+        (
+            "[surface]\nspecimens = [{ wavelength_mm = 1.0, length_mm = 50.0 }, { wavelength_mm = 2.0, length_mm = 5.0 }, { wavelength_mm = 3.0 }]"
+                .to_owned(),
             Rung::Rigid,
-            "a border between specimens",
+            "a specimen of 5 mm is shorter",
+        ),
+        (
+            "[surface]\nspecimens = [{ wavelength_mm = 0.7, length_mm = 50.0 }, { wavelength_mm = 4.0 }]\n[gauges]\nsnr_db = 20"
+                .to_owned(),
+            Rung::Rigid,
+            "of the longest's amplitude, in noise",
+        ),
+        (
+            format!("{SURFACE}[gauges]\nsecond_harmonic = 0.8"),
+            Rung::Rigid,
+            "of a second harmonic of 0.8",
         ),
         (
             format!("{SURFACE}[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 0.83"),
