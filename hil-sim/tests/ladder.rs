@@ -59,7 +59,7 @@ fn rms_percent(scene: &Scene, rung: Rung) -> Option<f64> {
         .filter(|estimate| estimate.valid && is_settled(estimate.t_s))
         .filter_map(|estimate| {
             let (found_mm, truth_mm) = (estimate.wavelength_mm?, estimate.truth_mm?);
-            Some(100.0 * (f64::from(found_mm) / truth_mm - 1.0))
+            Some(100.0 * (found_mm / truth_mm - 1.0))
         })
         .collect();
     let squares: f64 = errors.iter().map(|error| error * error).sum();
