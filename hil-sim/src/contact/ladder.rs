@@ -12,10 +12,12 @@
 //! has a scene that the rung below does not do. While a border passes, nothing is compared: for as long as
 //! two specimens are in an estimator's memory, its error hangs on one or two estimates, whichever the rung.
 
+use std::f64::consts::TAU;
+
 use crate::patch::{REACH_MM, felt_share};
 use crate::scene::{Friction, Gauges, Motion, Rung, Surface};
 
-use super::spring::Hanging;
+use super::spring::Spring;
 
 /// Change of λ̂'s RMS error that is no reason for a higher rung, in percent of λ.
 pub const ENOUGH_PERCENT: f64 = 0.25;
@@ -33,14 +35,9 @@ pub const FAINT_SHARE: f64 = 0.3;
 /// A second harmonic above this share of the fundamental may pass for the wave itself; a patch feels less of
 /// it.
 pub const HARMONIC_SHARE: f64 = 0.5;
-/// RMS of the velocity by which a fingertip on a spring may differ from the arm's, as a share of the arm's
-/// RMS velocity: what goes into λ as it is.
+/// Share of a swinging arm's motion by which a fingertip on a spring may move otherwise: what goes into λ as
+/// it is.
 pub const SWING_SHARE: f64 = 0.005;
-
-/// Between two places of the arm that are looked at, in s: a scan.
-const LOOK_S: f64 = 250e-6;
-/// The longest that is looked at, in s: of a long scene its beginning.
-const LONGEST_S: f64 = 30.0;
 
 /// A rung, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,15 +48,14 @@ pub struct Choice {
     pub reason: String,
 }
 
-/// The lowest rung that is good enough for computed gauges on `surface` that are moved as `motion` says
-/// for `duration_s`; `stiffness_n_per_m` is the fingertip's, towards shear.
+/// The lowest rung that is good enough for computed gauges on `surface` that are moved as `motion` says;
+/// `stiffness_n_per_m` is the fingertip's, towards shear.
 pub fn choose(
     surface: &Surface,
     motion: &Motion,
     gauges: &Gauges,
     friction: Option<Friction>,
     stiffness_n_per_m: f64,
-    duration_s: f64,
 ) -> Choice {
     let choice = |rung, reason| Choice { rung, reason };
     if friction.is_some() {
@@ -68,12 +64,12 @@ pub fn choose(
             "there is friction: the fingertip sticks and slips".to_owned(),
         );
     }
-    let swing = swing_share(motion, stiffness_n_per_m, duration_s);
+    let swing = swing_share(motion, stiffness_n_per_m);
     if swing > SWING_SHARE {
         return choice(
             Rung::Viscoelastic,
             format!(
-                "the hand speeds up so fast that the fingertip swings on its spring by {:.1} % of the hand's velocity",
+                "the hand speeds up so fast that the fingertip swings on its spring by {:.1} % of the hand's motion",
                 100.0 * swing
             ),
         );
@@ -88,27 +84,17 @@ pub fn choose(
     )
 }
 
-/// RMS of v − v_arm over the RMS of v_arm, of a fingertip on a spring; 0 of an arm at rest.
-fn swing_share(motion: &Motion, stiffness_n_per_m: f64, duration_s: f64) -> f64 {
-    if let Motion::Constant { .. } | Motion::Live(_) = motion {
+/// By how much a fingertip on a spring moves otherwise than a swinging arm, as a share of the arm's motion:
+/// |H − 1| = r²/|1 − r² + 2jζr| with r = ω/ω0. Of other motions none: a steady arm makes nothing swing, and
+/// the corners of a recorded one are its rows', not the hand's.
+fn swing_share(motion: &Motion, stiffness_n_per_m: f64) -> f64 {
+    let Motion::Sinusoid { frequency_hz, .. } = motion else {
         return 0.0;
-    }
-    let mut hanging = Hanging::new(stiffness_n_per_m);
-    let (mut off, mut all) = (0.0, 0.0);
-    let looks = (duration_s.min(LONGEST_S) / LOOK_S).ceil() as u64;
-    let mut before_m = motion.position_mm(0.0) * 1e-3;
-    for look in 0..=looks {
-        let t_s = look as f64 * LOOK_S;
-        let arm_m = motion.position_mm(t_s) * 1e-3;
-        hanging.follow(t_s, arm_m);
-        if look > 0 {
-            let arm_m_s = (arm_m - before_m) / LOOK_S;
-            off += (hanging.velocity_m_s() - arm_m_s).powi(2);
-            all += arm_m_s * arm_m_s;
-        }
-        before_m = arm_m;
-    }
-    if all > 0.0 { (off / all).sqrt() } else { 0.0 }
+    };
+    let spring = Spring { stiffness_n_per_m };
+    let ratio = TAU * frequency_hz / spring.omega();
+    let square = ratio * ratio;
+    square / (1.0 - square).hypot(2.0 * spring.damping() * ratio)
 }
 
 /// Why a point is too simple, if it is.

@@ -227,9 +227,15 @@ mod tests {
         }
     }
 
-    /// What a small deviation from rest, or from a steady slide, has grown to after 400 steps, relative to
-    /// what it was.
-    fn grown(integrator: Integrator, bristles: &Bristles, velocity_m_s: f64, step_s: f64) -> f64 {
+    /// What a small deviation from rest, or from a steady slide, has grown to within 400 steps at most, and
+    /// what is left of it in the end, relative to what it was. One that grows so far that the slide slows
+    /// down may be gone again.
+    fn grown(
+        integrator: Integrator,
+        bristles: &Bristles,
+        velocity_m_s: f64,
+        step_s: f64,
+    ) -> (f64, f64) {
         let steady = if velocity_m_s == 0.0 {
             [0.0; 3]
         } else {
@@ -241,10 +247,13 @@ mod tests {
         let deviation_m = 1e-12;
         let mut state = steady;
         state[2] += deviation_m;
+        let (mut most, mut left) = (1.0f64, 1.0);
         for _ in 0..400 {
             state = integrator.advance(bristles, state, step_s, velocity_m_s);
+            left = (state[2] - steady[2]).abs() / deviation_m;
+            most = most.max(left);
         }
-        (state[2] - steady[2]).abs() / deviation_m
+        (most, left)
     }
 
     #[test]
@@ -259,10 +268,10 @@ mod tests {
                     } else {
                         longest_sliding_s(integrator, &bristles, velocity_m_s)
                     };
-                    let below = grown(integrator, &bristles, velocity_m_s, 0.95 * limit_s);
-                    let above = grown(integrator, &bristles, velocity_m_s, 1.05 * limit_s);
+                    let (_, below) = grown(integrator, &bristles, velocity_m_s, 0.95 * limit_s);
+                    let (above, _) = grown(integrator, &bristles, velocity_m_s, 1.05 * limit_s);
                     assert!(
-                        below < 1.0 && (above > 10.0 || above.is_nan()),
+                        below < 1.0 && above > 10.0,
                         "{integrator:?}, {bristles_n_per_m} N/m, {velocity_m_s} m/s: {below}, {above}"
                     );
                 }

@@ -16,7 +16,6 @@ pub(super) struct Scenery<'a> {
     pub motion: &'a Motion,
     pub gauges: &'a Gauges,
     pub stiffness_n_per_m: f64,
-    pub duration_s: f64,
 }
 
 /// The contact, and why if it was left open. With recorded gauges there is none, and the section must be
@@ -72,7 +71,6 @@ pub(super) fn read(
                 scenery.gauges,
                 friction,
                 scenery.stiffness_n_per_m,
-                scenery.duration_s,
             );
             (choice.rung, Some(choice.reason))
         }

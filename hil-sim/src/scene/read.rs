@@ -40,7 +40,6 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
                 motion: &motion,
                 gauges: &gauges,
                 stiffness_n_per_m: force.stiffness_n_per_m,
-                duration_s,
             },
         )?,
         Gauges::Recorded(_) if root.contains("contact") => {
