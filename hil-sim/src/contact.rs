@@ -20,6 +20,7 @@ use crate::scene::{self, Friction, Rung, Solver};
 mod bristles;
 pub mod integrator;
 pub mod ladder;
+mod path;
 mod slider;
 mod spring;
 pub mod stability;

@@ -12,6 +12,7 @@
 //! zero is shortened to end there. So the slip events do not lie on any grid. Only a velocity that turns
 //! and comes back within one step, hundredths of a mm/s deep, is not seen to turn.
 
+use super::path::Path;
 use super::stribeck::Stribeck;
 
 /// Mass of the slider, in kg: a guess.
@@ -38,8 +39,7 @@ pub struct Slider {
     friction: Stribeck,
     stiffness_n_per_m: f64,
     longest_step_s: f64,
-    /// The last instant and the arm's place then; none before the fingertip is set down.
-    last: Option<(f64, f64)>,
+    path: Path,
     state: State,
     phase: Phase,
     /// Passages from rest to slip and back that have not been taken: when, and whether it rests then.
@@ -70,7 +70,7 @@ impl Slider {
             friction,
             stiffness_n_per_m,
             longest_step_s: STEP_SHARE / fastest_per_s,
-            last: None,
+            path: Path::default(),
             state: State {
                 stretch_m: 0.0,
                 velocity_m_s: 0.0,
@@ -83,16 +83,9 @@ impl Slider {
     /// Moves on to `t_s`, the arm in a straight line to `arm_m`. Nothing happens if `t_s` is not after
     /// the last.
     pub fn follow(&mut self, t_s: f64, arm_m: f64) {
-        let Some((last_s, last_m)) = self.last else {
-            self.last = Some((t_s, arm_m));
-            return;
-        };
-        let time_s = t_s - last_s;
-        if time_s <= 0.0 {
-            return;
+        if let Some(leg) = self.path.to(t_s, arm_m) {
+            self.advance(t_s, leg.time_s, leg.arm_m_s);
         }
-        self.last = Some((t_s, arm_m));
-        self.advance(t_s, time_s, (arm_m - last_m) / time_s);
     }
 
     /// Passages from rest to slip and back since this was last asked: when, in s, and whether it rests

@@ -5,6 +5,7 @@
 //! Solved exactly while the arm moves in a straight line: in the arm's own frame nothing drives it.
 
 use super::integrator::System;
+use super::path::{Leg, Path};
 use super::slider::{DAMPING_N_S_PER_M, MASS_KG};
 
 /// Mass, spring and damper.
@@ -89,8 +90,7 @@ impl Swing {
 #[derive(Clone, Debug)]
 pub struct Hanging {
     spring: Spring,
-    /// The last instant and the arm's place then; none before the fingertip is set down.
-    last: Option<(f64, f64)>,
+    path: Path,
     /// Stretch in m and velocity in m/s; none until the arm's first velocity is known: it is set down
     /// with that.
     state: Option<[f64; 2]>,
@@ -103,7 +103,7 @@ impl Hanging {
         let spring = Spring { stiffness_n_per_m };
         Self {
             spring,
-            last: None,
+            path: Path::default(),
             state: None,
             swing: spring.over(0.0),
         }
@@ -112,16 +112,12 @@ impl Hanging {
     /// Moves on to `t_s`, the arm in a straight line to `arm_m`. Nothing happens if `t_s` is not after
     /// the last.
     pub fn follow(&mut self, t_s: f64, arm_m: f64) {
-        let Some((last_s, last_m)) = self.last else {
-            self.last = Some((t_s, arm_m));
+        let Some(Leg {
+            time_s, arm_m_s, ..
+        }) = self.path.to(t_s, arm_m)
+        else {
             return;
         };
-        let time_s = t_s - last_s;
-        if time_s <= 0.0 {
-            return;
-        }
-        self.last = Some((t_s, arm_m));
-        let arm_m_s = (arm_m - last_m) / time_s;
         // Scans repeat to the last digits of their instants; so small a change changes nothing.
         if (time_s - self.swing.time_s).abs() > 1e-9 * time_s {
             self.swing = self.spring.over(time_s);

@@ -1,6 +1,7 @@
 //! A fingertip whose equations are integrated by steps.
 
 use super::integrator::{Integrator, System};
+use super::path::{Leg, Path};
 
 /// Share of a step by which a step may be longer than asked for, so that no splinter is left at a scan's
 /// end.
@@ -18,8 +19,7 @@ pub struct Stepped<S, const N: usize> {
     integrator: Integrator,
     /// Longest step; infinite to go from scan to scan at once.
     step_s: f64,
-    /// The last instant and the arm's place then; none before the fingertip is set down.
-    last: Option<(f64, f64)>,
+    path: Path,
     /// Stretch in m, velocity in m/s, and what else the system has; none until the arm's first velocity
     /// is known.
     state: Option<[f64; N]>,
@@ -39,7 +39,7 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
             system,
             integrator,
             step_s,
-            last: None,
+            path: Path::default(),
             state: None,
             moving,
             rests: !moving,
@@ -50,16 +50,14 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
     /// Moves on to `t_s`, the arm in a straight line to `arm_m`. Nothing happens if `t_s` is not after
     /// the last.
     pub fn follow(&mut self, t_s: f64, arm_m: f64) {
-        let Some((last_s, last_m)) = self.last else {
-            self.last = Some((t_s, arm_m));
+        let Some(Leg {
+            begin_s,
+            time_s,
+            arm_m_s,
+        }) = self.path.to(t_s, arm_m)
+        else {
             return;
         };
-        let time_s = t_s - last_s;
-        if time_s <= 0.0 {
-            return;
-        }
-        self.last = Some((t_s, arm_m));
-        let arm_m_s = (arm_m - last_m) / time_s;
         let mut state = self.state.unwrap_or_else(|| {
             let mut state = [0.0; N];
             if self.moving {
@@ -75,7 +73,7 @@ impl<S: System<N>, const N: usize> Stepped<S, N> {
                 .integrator
                 .advance(&self.system, state, step_s, arm_m_s);
             self.look(before, state[S::VELOCITY], |share| {
-                last_s + (step as f64 + share) * step_s
+                begin_s + (step as f64 + share) * step_s
             });
         }
         self.state = Some(state);
