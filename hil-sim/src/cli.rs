@@ -23,6 +23,7 @@ mod models;
 mod paper;
 mod people;
 mod run;
+mod say;
 mod scene_files;
 #[cfg(target_os = "linux")]
 mod serve;

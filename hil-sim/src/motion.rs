@@ -19,9 +19,11 @@ pub fn encoder(position_mm: f64) -> u16 {
 /// The same of an encoder that goes on by `step_counts` at a time, 1 or more.
 pub fn coarse_encoder(position_mm: f64, step_counts: u16) -> u16 {
     let counts = (position_mm / MM_PER_COUNT).floor() as i64;
-    let step_counts = i64::from(step_counts);
     // Two's complement: a negative position wraps downwards.
-    (counts.div_euclid(step_counts) * step_counts) as u16
+    match i64::from(step_counts) {
+        1 => counts as u16,
+        step_counts => (counts.div_euclid(step_counts) * step_counts) as u16,
+    }
 }
 
 impl Motion {

@@ -229,6 +229,7 @@ pub(crate) fn period_of(waves: &[(u32, f64, f64)]) -> Box<Period> {
         let theta = std::f64::consts::TAU * point as f64 / POINTS as f64;
         let sum: f64 = waves
             .iter()
+            .filter(|wave| wave.1 != 0.0)
             .map(|&(n, amplitude, ahead)| amplitude * (f64::from(n) * theta + ahead).sin())
             .sum();
         *value = sum as f32;

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use hil_sim::scene::Estimator;
 
@@ -129,4 +129,25 @@ fn no_scene_and_unknown_engines_exit_2() {
             "{arguments:?}"
         );
     }
+}
+
+#[test]
+fn a_reader_that_goes_away_changes_neither_files_nor_exit_status() {
+    let folder = folder("unread");
+    let scene = format!("{SOUND}[expect]\nmean_mm = 3.0\n");
+    fs::write(folder.join("a.toml"), scene).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args(["run", "a.toml", "--json", "o.json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", errors(&output));
+    assert_eq!(errors(&output), "");
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    assert_eq!(json[0]["name"], "a");
 }

@@ -362,6 +362,7 @@ fn every_frame_of_a_full_line_is_heard_in_order() {
     /// Frames that may be under way: what a pseudo-terminal holds.
     const AHEAD: u64 = 1_000;
     let board = FakeBoard::new(Role::Display);
+    board.lose_nothing();
     let heard = Arc::new(AtomicU64::new(0));
     let wrong = Arc::new(Mutex::new(Vec::new()));
     let (count, faults) = (Arc::clone(&heard), Arc::clone(&wrong));

@@ -11,8 +11,8 @@ use crate::analysis::phase::DuePhase;
 use crate::analysis::phase_error::phase_error;
 use crate::analysis::reaction::{Reaction, reaction};
 use crate::analysis::track::{COUNT_MM, Track};
-use crate::analysis::voltage::{peak_v, voltage};
-use crate::recording::{ACTUATORS, Recording, WORD_V};
+use crate::analysis::voltage::{edges, peak_v, voltage};
+use crate::recording::{ACTUATORS, Recording, WORD_V, volts};
 use crate::truth::Truth;
 
 /// Voltage below which an actuator does not vibrate, in V.
@@ -108,24 +108,24 @@ fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
 
 /// The mean of the channel farthest from 0 V over all whole cycles of the reference.
 fn worst_mean_v(recording: &Recording, cycles: &[Cycle], due: &DuePhase) -> Option<f64> {
-    let weights = weights(&voltage(recording, 0), cycles, due);
+    let edges = edges(recording);
+    let weights = weights(&edges, cycles, due);
     let whole: f64 = weights.iter().sum();
-    (0..ACTUATORS)
-        .filter_map(|actuator| {
-            let voltage = voltage(recording, actuator);
-            let sum: f64 = voltage
-                .iter()
-                .zip(&weights)
-                .map(|(point, w)| point.1 * w)
-                .sum();
-            finite(sum / whole)
-        })
+    let mut sums_v = [0.0; ACTUATORS];
+    for (&(_, number), weight) in edges.iter().zip(weights) {
+        for (sum_v, &word) in sums_v.iter_mut().zip(&recording.outputs[number].words) {
+            *sum_v += weight * volts(word);
+        }
+    }
+    sums_v
+        .into_iter()
+        .filter_map(|sum_v| finite(sum_v / whole))
         .max_by(|one, other| one.abs().total_cmp(&other.abs()))
 }
 
-/// What each point of a voltage (every channel has its points at the same instants) adds to the
-/// integral over phase of the straight lines between them, within the cycles.
-fn weights(points: &[(f64, f64)], cycles: &[Cycle], due: &DuePhase) -> Vec<f64> {
+/// What the voltage at each of the points adds to the integral over phase of the straight lines between
+/// them, within the cycles.
+fn weights(points: &[(f64, usize)], cycles: &[Cycle], due: &DuePhase) -> Vec<f64> {
     let mut weights = vec![0.0; points.len()];
     for (index, pair) in points.windows(2).enumerate() {
         let (from_s, to_s) = (pair[0].0, pair[1].0);

@@ -36,7 +36,10 @@ impl DuePhase {
         let mut before_mm = None;
         for tick in &recording.ticks {
             let outputs = &recording.outputs[output..];
-            output += outputs.partition_point(|output| output.at_ns < tick.at_ns);
+            output += outputs
+                .iter()
+                .take_while(|output| output.at_ns < tick.at_ns)
+                .count();
             // A wave crosses 0 V; silence stays there.
             let heard = recording.outputs[output.saturating_sub(2)..output]
                 .iter()

@@ -37,12 +37,18 @@ pub fn reaction(recording: &Recording, due: &DuePhase) -> Option<Reaction> {
     let mut spreads = Vec::new();
     let outputs = &recording.outputs;
     let peaks = peaks(outputs);
+    let mut next = 0;
     for pair in recording.ticks.windows(2) {
         let [before, tick] = [pair[0], pair[1]];
         if before.encoder == tick.encoder {
             continue;
         }
-        let next = outputs.partition_point(|output| output.at_ns < tick.at_ns);
+        while outputs
+            .get(next)
+            .is_some_and(|output| output.at_ns < tick.at_ns)
+        {
+            next += 1;
+        }
         let held = next.checked_sub(1).and_then(|last| outputs.get(last));
         let (Some(held), Some(edge)) = (held, outputs.get(next)) else {
             continue;
@@ -97,11 +103,14 @@ fn is_over_crests(held: &OutputRecord, peaks: &[f64; ACTUATORS], travel_cycles: 
         .all(|(&word, peak)| volts(word).abs() >= share * peak - WORD_V)
 }
 
-/// The time that a share of all movement stays below, found by halving, to well below a ns.
+/// How closely a quantile is found, in ns.
+const CLOSE_NS: f64 = 1e-3;
+
+/// The time that a share of all movement stays below, found by halving.
 fn quantile_ns(spreads: &[Spread], share: f64, longest_ns: f64) -> f64 {
     let whole: f64 = spreads.iter().map(|s| s.longest_ns - s.shortest_ns).sum();
     let (mut low, mut high) = (0.0, longest_ns);
-    for _ in 0..60 {
+    while high - low > CLOSE_NS {
         let middle = 0.5 * (low + high);
         let below: f64 = spreads
             .iter()

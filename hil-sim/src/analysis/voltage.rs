@@ -6,21 +6,28 @@ use crate::recording::{Recording, volts};
 /// A gap between two edges longer than this many ticks is a hold, not a slope.
 const HOLD_TICKS: f64 = 1.5;
 
-/// The voltage of an actuator at every LDAC edge, in s and V. Where the words did not change for a
-/// while (a hand at rest needs no edge), a point just before the next edge keeps the hold level.
-pub fn voltage(recording: &Recording, actuator: usize) -> Vec<(f64, f64)> {
+/// The instant of every LDAC edge in s, and the number of its output. Where the words did not change for a
+/// while (a hand at rest needs no edge), a point just before the next edge keeps the last output.
+pub fn edges(recording: &Recording) -> Vec<(f64, usize)> {
     let tick_s = tick_s(recording);
-    let mut points: Vec<(f64, f64)> = Vec::with_capacity(recording.outputs.len());
-    for output in &recording.outputs {
+    let mut points: Vec<(f64, usize)> = Vec::with_capacity(recording.outputs.len());
+    for (number, output) in recording.outputs.iter().enumerate() {
         let t_s = seconds(output.at_ns);
-        if let (Some(&(before_s, before_v)), Some(tick_s)) = (points.last(), tick_s)
+        if let (Some(&(before_s, before)), Some(tick_s)) = (points.last(), tick_s)
             && t_s - before_s > HOLD_TICKS * tick_s
         {
-            points.push((t_s - tick_s, before_v));
+            points.push((t_s - tick_s, before));
         }
-        points.push((t_s, volts(output.words[actuator])));
+        points.push((t_s, number));
     }
     points
+}
+
+/// The voltage of an actuator at each of [`edges`], in s and V.
+pub fn voltage(recording: &Recording, actuator: usize) -> Vec<(f64, f64)> {
+    let of = |number: usize| volts(recording.outputs[number].words[actuator]);
+    let edges = edges(recording).into_iter();
+    edges.map(|(t_s, number)| (t_s, of(number))).collect()
 }
 
 /// The time between two ticks, in s: the median of the recorded ones.

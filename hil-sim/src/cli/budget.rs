@@ -10,6 +10,7 @@ use hil_sim::scene::Motion;
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
 use super::display::Measured;
+use super::say::say;
 
 /// Of all instructions, the display may take this many, in percent.
 const GOAL_PERCENT: f64 = 15.0;
@@ -84,7 +85,7 @@ impl Budget {
         if self.closer
             && let Some((_, counted)) = columns.last()
         {
-            println!();
+            say!("");
             let mut places: Vec<(&String, &u64)> = counted
                 .by_place
                 .iter()
@@ -92,7 +93,7 @@ impl Budget {
                 .collect();
             places.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
             for (place, count) in places {
-                println!("{:10.1} {place}", *count as f64 / counted.ticks as f64);
+                say!("{:10.1} {place}", *count as f64 / counted.ticks as f64);
             }
         }
         let met = columns
@@ -119,18 +120,18 @@ fn print(columns: &[(String, Counted)]) {
     });
     let cells = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(" | ");
     let heads = cells(&mut columns.iter().map(|(head, _)| head.clone()));
-    println!("| instructions an update | {heads} |");
-    println!("| --- |{}", " ---: |".repeat(columns.len()));
+    say!("| instructions an update | {heads} |");
+    say!("| --- |{}", " ---: |".repeat(columns.len()));
     for (part, row) in &parts {
         let row = cells(&mut row.iter().map(|count| format!("{count:.1}")));
-        println!("| {part} | {row} |");
+        say!("| {part} | {row} |");
     }
     let whole = cells(
         &mut columns
             .iter()
             .map(|(_, counted)| format!("{:.1}", counted.total as f64 / counted.ticks as f64)),
     );
-    println!("| **in all** | {whole} |");
+    say!("| **in all** | {whole} |");
     let mut peripherals: Vec<&str> = columns
         .iter()
         .flat_map(|(_, counted)| counted.accesses.keys().copied())
@@ -151,13 +152,13 @@ fn print(columns: &[(String, Counted)]) {
             .iter()
             .map(|(_, counted)| format!("{:.2}", percent(counted))),
     );
-    println!(
+    say!(
         "| **% of {} M instructions a second** | {shares} |",
         BUDGET / 1_000_000
     );
     for of in peripherals.into_iter().map(Some).chain([None]) {
         let row = cells(&mut columns.iter().map(|(_, counted)| accesses(counted, of)));
-        println!(
+        say!(
             "| accesses to registers: {} | {row} |",
             of.unwrap_or("in all")
         );

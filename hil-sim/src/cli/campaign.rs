@@ -15,6 +15,7 @@ use hil_sim::elf::ElfError;
 use hil_sim::fault::Kind;
 use hil_sim::fault::campaign::{Plan, Tally, Trial, unmet};
 
+use super::say::say;
 use super::{Elves, number, progress};
 
 /// What came of a run.
@@ -97,12 +98,12 @@ impl Campaign {
             .map(|&kind| Tally::of(kind, &trials))
             .collect();
 
-        println!("{HEADER}");
+        say!("{HEADER}");
         for tally in &tallies {
-            println!("{}", line(tally));
+            say!("{}", line(tally));
         }
         let wall_s = started.elapsed().as_secs_f64();
-        println!(
+        say!(
             "{} faults of {} kinds in {virtual_s:.0} s of virtual time, {} runs; {wall_s:.0} s, {:.2} × real time",
             trials.len(),
             tallies.len(),
@@ -113,7 +114,7 @@ impl Campaign {
             let unmet = trial.finding.unmet();
             if !unmet.is_empty() {
                 let fault = &trial.finding.fault;
-                println!(
+                say!(
                     "  {} at {:.6} s of {} ({}, {}){}: {}",
                     fault.kind.name(),
                     fault.at_s,
@@ -127,7 +128,7 @@ impl Campaign {
         }
         let unmet = unmet(&tallies);
         for line in &unmet {
-            println!("not met: {line}");
+            say!("not met: {line}");
         }
         if let Some((mut file, path)) = json {
             let text = serde_json::to_string_pretty(&tallies)?;

@@ -14,6 +14,7 @@ use hil_sim::chart::result::{ContestResult, Entry};
 use hil_sim::chart::score::Score;
 use hil_sim::scene::Scene;
 
+use super::say::say;
 use super::{display, models, number, progress};
 
 #[derive(Debug, clap::Args)]
@@ -139,13 +140,13 @@ impl Bound {
         let progress = progress(efficiency::SCENES);
         let rows = efficiency::measure(|| progress.inc(1))?;
         progress.finish_and_clear();
-        println!(
+        say!(
             "| profile | v/λ, Hz | one gauge: rms % | of it bias % | bound % | ratio | five gauges: ratio |"
         );
-        println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+        say!("| --- | ---: | ---: | ---: | ---: | ---: | ---: |");
         let (one, five) = rows.split_at(rows.len() / 2);
         for (one, five) in one.iter().zip(five) {
-            println!(
+            say!(
                 "| {} | {} | {} | {} | {:.3} | {} | {} |",
                 one.profile,
                 one.frequency_hz,
@@ -177,6 +178,6 @@ pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
 
 pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
-    println!("{}", path.display());
+    say!("{}", path.display());
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use hil_sim::elf::cost::measure;
 
 use super::Cost;
+use super::say::say;
 
 /// Milliseconds of samples that each part works through.
 const MILLISECONDS: u64 = 1_000;
@@ -24,8 +25,8 @@ const PARTS: [(u64, &str); 9] = [
 impl Cost {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let taken = measure(&self.elf)?;
-        println!("| part | instructions a millisecond | the longest millisecond |");
-        println!("| --- | ---: | ---: |");
+        say!("| part | instructions a millisecond | the longest millisecond |");
+        say!("| --- | ---: | ---: |");
         let or_dash =
             |count: Option<u64>| count.map_or("–".to_owned(), |count| count.to_string());
         for (part, name) in PARTS {
@@ -35,7 +36,7 @@ impl Cost {
             let largest = taken
                 .filter(|taken| taken.pieces > 1)
                 .map(|taken| taken.largest);
-            println!("| {name} | {} | {} |", or_dash(mean), or_dash(largest));
+            say!("| {name} | {} | {} |", or_dash(mean), or_dash(largest));
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -10,6 +10,7 @@ use hil_sim::paper::table_1::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
 use hil_sim::report::html;
 use hil_sim::scene::Scene;
 
+use super::say::say;
 use super::{Demo, number};
 
 /// The paper's counting window.
@@ -25,19 +26,19 @@ const FREQUENCY_TOLERANCE: f64 = 0.001;
 impl Demo {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let firmwares = self.elves.read()?;
-        println!(
+        say!(
             "Two emulated boards, a UART between them, {} and {}:\n",
             firmwares.sensor.path.display(),
             firmwares.display.path.display()
         );
-        println!("{HEADER}");
+        say!("{HEADER}");
         let mut outcomes = Vec::new();
         let mut as_predicted = true;
         for (speed_mm_s, paper_mm) in SPEEDS_MM_S.into_iter().zip(PAPER_MM) {
             for (wavelength_mm, paper_mm) in CELLS_MM.into_iter().zip(paper_mm) {
                 let outcome = rub(wavelength_mm, speed_mm_s, &firmwares)?;
                 let predicted_mm = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
-                println!(
+                say!(
                     "{}",
                     row(wavelength_mm, speed_mm_s, paper_mm, predicted_mm, &outcome)
                 );
@@ -50,8 +51,8 @@ impl Demo {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         std::fs::write(&self.report, html(&chapters)?)
             .with_context(|| self.report.display().to_string())?;
-        println!("\n{}", verdict(as_predicted));
-        println!("Plots of every cell: {}", self.report.display());
+        say!("\n{}", verdict(as_predicted));
+        say!("Plots of every cell: {}", self.report.display());
         Ok(if as_predicted {
             ExitCode::SUCCESS
         } else {

@@ -9,6 +9,7 @@ use hil_sim::elf::{Firmware, FirmwareError};
 use protocol::Role;
 
 use super::chart::{create_folder, write};
+use super::say::say;
 use super::{number, runs};
 
 /// The display's ELF, and where to write what it does.
@@ -62,13 +63,13 @@ impl Purity {
         let progress = runs(purity::runs(measured.extent()));
         let rows = purity::measure(&firmware, measured.extent(), || progress.inc(1))?;
         progress.finish_and_clear();
-        println!(
+        say!(
             "| rate, Hz | mode | hand | mm/s | λ, mm | stimulus, Hz | V | worst spur, dBc | at, Hz | \
              mean over whole cycles, mV | over any second, mV |"
         );
-        println!("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+        say!("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
         for row in &rows {
-            println!(
+            say!(
                 "| {} | {} | {} | {:.1} | {:.2} | {} | {} | {} | {} | {:.2} | {:.1} |{}",
                 row.rate_hz,
                 word_of_mode(row.mode),
@@ -112,16 +113,16 @@ impl Timing {
         let progress = runs(timing::runs(*quick));
         let rows = timing::measure(&firmware, *quick, || progress.inc(1))?;
         progress.finish_and_clear();
-        println!(
+        say!(
             "| rate, Hz | delay, ms | jitter, ms | loss, % | LDAC after tick, µs | its jitter p50, µs | p99 | \
              longest | skew, µs | hand to output p50, ms | p99 | longest | estimates arrived |"
         );
-        println!(
+        say!(
             "| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         );
         for row in &rows {
             let edges = &row.edges;
-            println!(
+            say!(
                 "| {} | {} | {} | {:.0} | {:.2} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | \
                  {} of {} |{}",
                 row.rate_hz,
@@ -162,13 +163,13 @@ impl Stop {
         let Measured { out, quick, .. } = &self.measured;
         let firmware = self.measured.begin()?;
         let stops = stop::measure(&firmware, *quick)?;
-        println!(
+        say!(
             "| rate, Hz | mode | crest, V | last count to 0 V, ms | the last channel's, ms | first count to \
              voltage, ms | largest step, V | of the wave itself, V |"
         );
-        println!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
+        say!("| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |");
         for row in &stops {
-            println!(
+            say!(
                 "| {} | {} | {:.2} | {} | {} | {} | {:.3} | {:.3} |{}",
                 row.rate_hz,
                 word_of_mode(row.mode),
@@ -204,14 +205,14 @@ impl Delay {
         let progress = runs(delay::runs(*quick));
         let rows = delay::measure(&firmware, *quick, || progress.inc(1))?;
         progress.finish_and_clear();
-        println!(
+        say!(
             "| delay, ms | jitter, ms | loss, % | ours: phase error RMS, cycles | hand to output p50, ms | \
              relayed: phase error RMS, cycles | late, ms |"
         );
-        println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+        say!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
         for row in &rows {
             let relayed = (row.link.loss == 0.0).then_some(row);
-            println!(
+            say!(
                 "| {} | {} | {:.0} | {} | {} | {} | {} |",
                 row.link.delay_ms,
                 row.link.jitter_ms,

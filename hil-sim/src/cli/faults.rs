@@ -3,12 +3,13 @@
 use std::fmt::Write;
 use std::process::ExitCode;
 
+use super::say::say;
 use hil_sim::fault::catalogue::{Lasts, Needs, Row, rows};
 
 /// Prints the list.
 pub(super) fn execute() -> anyhow::Result<ExitCode> {
     let list: Vec<String> = rows().iter().map(entry).collect();
-    println!("{}", list.join("\n"));
+    say!("{}", list.join("\n"));
     Ok(ExitCode::SUCCESS)
 }
 

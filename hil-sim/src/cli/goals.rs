@@ -12,6 +12,7 @@ use hil_sim::outcome::Outcome;
 use hil_sim::scene::Scene;
 use hil_sim::{elf, native};
 
+use super::say::say;
 use super::{Elves, EngineName, number, progress};
 
 /// Every family of scenes, judged by what its scenes expect, as a table
@@ -48,18 +49,18 @@ impl Goals {
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
         let judged = run(&scenes, firmwares.as_ref())?;
 
-        println!("{HEADER}");
+        say!("{HEADER}");
         let mut rest = &judged[..];
         for family in &families {
             let (these, others) = rest.split_at(family.scenes.len());
             rest = others;
-            println!("{}", row(family, these));
+            say!("{}", row(family, these));
         }
         let mut met = true;
         for (scene, judged) in scenes.iter().zip(&judged) {
             for line in &judged.unmet {
                 met = false;
-                println!("{}: not as expected: {line}", scene.name);
+                say!("{}: not as expected: {line}", scene.name);
             }
         }
         Ok(if met {

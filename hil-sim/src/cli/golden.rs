@@ -11,6 +11,7 @@ use hil_sim::golden::{Golden, Standing, complaint};
 use hil_sim::scene::SceneError;
 
 use super::runs;
+use super::say::say;
 use super::scene_files::scene_files;
 use super::way::{Loaded, Way};
 
@@ -77,7 +78,7 @@ impl What {
                     continue;
                 };
                 met = false;
-                println!("{}: {line} ({count} of {repeat} runs)", path.display());
+                say!("{}: {line} ({count} of {repeat} runs)", path.display());
                 let (file, at) = match standing {
                     Standing::Other(_, at) => (golden.path(), at),
                     Standing::Same | Standing::Missing => (path.as_path(), None),
@@ -91,7 +92,7 @@ impl What {
             }
         }
         let runs = scenes.len() as u64 * u64::from(repeat);
-        println!(
+        say!(
             "{} scenes, {runs} runs ({}) in {wall_s:.1} s: {}",
             scenes.len(),
             engine.name(),
@@ -120,13 +121,13 @@ impl What {
                 let hash_text = format!("{hash:016x}");
                 match golden.renew(&name, engine, hash) {
                     Some(before) if before == hash_text => same += 1,
-                    Some(before) => println!("{name}: {}: {before} -> {hash_text}", engine.name()),
-                    None => println!("{name}: {}: {hash_text}, new", engine.name()),
+                    Some(before) => say!("{name}: {}: {before} -> {hash_text}", engine.name()),
+                    None => say!("{name}: {}: {hash_text}, new", engine.name()),
                 }
             }
         }
         golden.write()?;
-        println!(
+        say!(
             "{}: written, {same} of {} unchanged",
             golden.path().display(),
             scenes.len()

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use super::say::say;
 use anyhow::Context;
 
 /// What a first scene looks like.
@@ -31,7 +32,7 @@ impl Init {
             })?;
         file.write_all(FIRST.as_bytes())
             .with_context(|| format!("{name}"))?;
-        println!("{name}: written; now: hil-sim run {name} --report report.html");
+        say!("{name}: written; now: hil-sim run {name} --report report.html");
         Ok(ExitCode::SUCCESS)
     }
 }

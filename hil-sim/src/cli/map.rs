@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::thread;
 
+use super::say::{self, say};
 use hil_sim::map::survey::whole_methods;
 use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -91,7 +92,7 @@ impl Maps {
             table.extend(make(map, &plan, self.merge)?);
         }
         if plan.shard.is_none() {
-            println!("{}", table.join("\n"));
+            say!("{}", table.join("\n"));
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -130,8 +131,8 @@ fn progress(name: &'static str, runs: usize) -> ProgressBar {
 }
 
 fn list(maps: &[Map]) {
-    println!("| map | cells | along x | along y | in all cells |");
-    println!("| --- | ---: | --- | --- | --- |");
+    say!("| map | cells | along x | along y | in all cells |");
+    say!("| --- | ---: | --- | --- | --- |");
     for map in maps {
         let axis = |axis: &hil_sim::map::axis::Axis| {
             format!(
@@ -141,7 +142,7 @@ fn list(maps: &[Map]) {
                 axis.places()
             )
         };
-        println!(
+        say!(
             "| {} | {} | {} | {} | {} |",
             map.name,
             map.len(),
@@ -160,6 +161,6 @@ fn print_scene(maps: &[Map], place: &str, methods: &[String]) -> anyhow::Result<
     };
     let cell = map.nearest(x.trim(), y.trim())?;
     let method = methods.first().map_or(METHODS[0], String::as_str);
-    print!("{}", map.scene_text(cell, method));
+    say::text(format_args!("{}", map.scene_text(cell, method)));
     Ok(())
 }

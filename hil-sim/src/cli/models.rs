@@ -8,6 +8,7 @@ use hil_sim::scene::Rung;
 
 use super::chart::{create_folder, write};
 use super::runs;
+use super::say::say;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Models {
@@ -29,10 +30,10 @@ impl Models {
         let progress = runs(models::runs());
         let rows = models::measure(|| progress.inc(1));
         progress.finish_and_clear();
-        println!("| case | rung | virtual s per s | error, % |");
-        println!("| --- | --- | ---: | ---: |");
+        say!("| case | rung | virtual s per s | error, % |");
+        say!("| --- | --- | ---: | ---: |");
         for row in rows.iter().filter(|row| row.entrant.integrator.is_none()) {
-            println!(
+            say!(
                 "| {} | {} | {:.0} | {} |",
                 row.case,
                 row.entrant.rung.name(),

@@ -11,6 +11,7 @@ use hil_sim::people::bench::Job;
 use hil_sim::people::study::Plan;
 
 use super::people::bench;
+use super::say::say;
 use super::{Elves, EngineName};
 
 #[derive(Debug, clap::Args)]
@@ -58,7 +59,7 @@ impl Paper {
             std::fs::write(&path, text).with_context(|| path.display().to_string())?;
         }
         std::fs::write(&self.out, &report.html).with_context(|| self.out.display().to_string())?;
-        println!(
+        say!(
             "Tables I to IV and Figs 4 to 8, ours beside the paper's: {}\nTheir numbers as CSV: {}\n{:.0} s in all",
             self.out.display(),
             folder.display(),

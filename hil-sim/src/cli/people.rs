@@ -9,6 +9,7 @@ use hil_sim::people::bench::Bench;
 use hil_sim::people::study::{self, Friction, Plan, Study};
 use hil_sim::people::{record, tables};
 
+use super::say::{self, say};
 use super::{Elves, EngineName, runs};
 
 #[derive(Debug, clap::Args)]
@@ -76,10 +77,10 @@ impl People {
             std::fs::write(&path, text).with_context(|| path.display().to_string())?;
         }
         if self.json {
-            println!("{}", record::json(&study)?);
+            say!("{}", record::json(&study)?);
         } else {
-            print!("{}", tables::text(&study));
-            println!("\nEvery number as CSV: {}", self.out.display());
+            say::text(format_args!("{}", tables::text(&study)));
+            say!("\nEvery number as CSV: {}", self.out.display());
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -19,6 +19,7 @@ use hil_sim::report::html;
 use hil_sim::scene::{SceneError, line_of};
 
 use super::number;
+use super::say::say;
 use super::scene_files::scene_files;
 use super::way::{Loaded, Way};
 
@@ -84,7 +85,7 @@ impl Run {
         let report = self.report.as_deref().map(create).transpose()?;
         let junit = self.junit.as_deref().map(create).transpose()?;
 
-        println!("{HEADER}");
+        say!("{HEADER}");
         let mut books = Books {
             way: &self.way,
             golden,
@@ -117,7 +118,7 @@ impl Run {
             let page = html(&chapters)?;
             file.write_all(page.as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
-            println!("report: {}", path.display());
+            say!("report: {}", path.display());
         }
         Ok(if books.met {
             ExitCode::SUCCESS
@@ -198,9 +199,9 @@ impl Books<'_> {
         }
         let is_met = judged.unmet.is_empty();
         judged.row += if is_met { "  ok" } else { "  FAILED" };
-        println!("{}", judged.row);
+        say!("{}", judged.row);
         for (line, (file, at)) in judged.unmet.iter().zip(places) {
-            println!("  not as expected: {line}");
+            say!("  not as expected: {line}");
             self.way.annotate(&Annotation {
                 file: &file.display().to_string(),
                 line: at,

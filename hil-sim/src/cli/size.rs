@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use object::{Object, ObjectSection, SectionKind};
 
 use super::Elves;
+use super::say::say;
 
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0820_0000;
 const RAM: std::ops::Range<u64> = 0x2000_0000..0x2003_0000;
@@ -22,14 +23,14 @@ pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
     let firmwares = elves.read()?;
     let flash_total = FLASH.end - FLASH.start;
     let ram_total = RAM.end - RAM.start;
-    println!("| ELF | flash, bytes | of 2 MiB | static RAM, bytes | of 192 KiB |");
-    println!("| --- | ---: | ---: | ---: | ---: |");
+    say!("| ELF | flash, bytes | of 2 MiB | static RAM, bytes | of 192 KiB |");
+    say!("| --- | ---: | ---: | ---: | ---: |");
     for (name, firmware) in [
         ("firmware-sensor", &firmwares.sensor),
         ("firmware-display", &firmwares.display),
     ] {
         let Footprint { flash, ram } = footprint(&object::File::parse(&*firmware.elf)?);
-        println!(
+        say!(
             "| {name} | {flash} | {:.1} % | {ram} | {:.1} % |",
             100.0 * flash as f64 / flash_total as f64,
             100.0 * ram as f64 / ram_total as f64,

@@ -7,6 +7,7 @@ use hil_sim::elf::soak::{self, SHORTEST_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Elves;
+use super::say::say;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Soak {
@@ -49,23 +50,23 @@ impl Soak {
             move |t_s| told.set_position(t_s as u64),
         )?;
         bar.finish_and_clear();
-        println!("| counted | |");
-        println!("| --- | ---: |");
+        say!("| counted | |");
+        say!("| --- | ---: |");
         for (what, count) in &soaked.counts {
-            println!("| {what} | {count} |");
+            say!("| {what} | {count} |");
         }
-        println!("\n| checked | seen |");
-        println!("| --- | ---: |");
+        say!("\n| checked | seen |");
+        say!("| --- | ---: |");
         for check in &soaked.checks {
             let verdict = if check.holds {
                 ""
             } else {
                 " not as it must be"
             };
-            println!("| {} | {} |{verdict}", check.what, check.seen);
+            say!("| {} | {} |{verdict}", check.what, check.seen);
         }
         let wall_s = begun.elapsed().as_secs_f64();
-        println!(
+        say!(
             "\n{duration_s:.0} virtual s in {wall_s:.0} s: {}",
             if soaked.holds() {
                 "all as it must be"

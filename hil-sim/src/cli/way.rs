@@ -12,6 +12,7 @@ use hil_sim::recording::{Engine, Recording};
 use hil_sim::scene::{Scene, SceneError, line_of};
 use hil_sim::{elf, native};
 
+use super::say::say;
 use super::{Elves, EngineName};
 
 /// How scenes are run, and how it is told.
@@ -95,7 +96,7 @@ impl Way {
             Annotate::Off => false,
         };
         if wanted {
-            println!("{annotation}");
+            say!("{annotation}");
         }
     }
 

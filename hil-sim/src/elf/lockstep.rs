@@ -1,5 +1,5 @@
-//! Two emulated boards in step: each on a thread of its own, exchanging what their wires carried at
-//! the end of every quantum of virtual time. Which thread runs when decides nothing.
+//! Two emulated boards in step: each on a thread of its own, exchanging what their wires carried in
+//! portions of virtual time. Which thread runs when decides nothing.
 
 use std::sync::mpsc::{Receiver, SyncSender};
 
@@ -17,9 +17,16 @@ use crate::fault::{Clock, Fault, Way};
 use crate::recording::ScanRecord;
 use crate::scene::Scene;
 
-/// What a byte takes from board to board at the least, and how often the boards wait for each other.
+/// What a byte takes from board to board at the least, the scene's delay included, and how often what stands
+/// beside the boards has its turn.
 /// Smaller is closer to a bare cable and slower; at 500 µs the pair keeps ahead of a wall clock.
 pub const QUANTUM_NS: u64 = 500_000;
+/// How often the boards hand each other their bytes. It is shorter than what a byte takes, so that neither
+/// waits for what the other says in the portion before it needs it: the one that has more to do just then
+/// falls behind by a portion and catches up in the next.
+const PORTION_NS: u64 = QUANTUM_NS / 2;
+/// Portions of the other board's that may lie ready: what it is ahead by at most.
+pub(super) const PORTIONS_READY: usize = 3;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
 
@@ -136,11 +143,16 @@ pub struct Lockstep<W> {
     cable: Cable,
     /// What the peer's bytes go through.
     way: Way,
+    /// What the scene's delay leaves of [`QUANTUM_NS`].
+    more_ns: u64,
     injector: Injector,
     /// The board's.
     clock: Clock,
+    /// What the board has sent in this quantum's portions.
+    sent: Vec<TimedByte>,
     /// By the scene's clock, as all that follows.
     next_exchange_ns: u64,
+    next_quantum_ns: u64,
     next_log_ns: u64,
     /// Resets seen so far.
     resets: usize,
@@ -155,6 +167,7 @@ pub struct Lockstep<W> {
 impl<W> Lockstep<W> {
     /// The driver of the board of `role` in `scene`, which runs `elf`.
     pub fn new(scene: &Scene, role: Role, elf: &[u8], cable: Cable, witness: W) -> Self {
+        let delay_ns = (scene.link.delay_ms * 1e6).round() as u64;
         let clock = match role {
             Role::Sensor => Clock::new(&scene.faults),
             _ => Clock::default(),
@@ -162,9 +175,12 @@ impl<W> Lockstep<W> {
         Self {
             cable,
             way: Way::new(scene, role),
+            more_ns: QUANTUM_NS.saturating_sub(delay_ns),
             injector: Injector::new(scene, role, elf, clock.clone()),
             clock,
-            next_exchange_ns: QUANTUM_NS,
+            sent: Vec::new(),
+            next_exchange_ns: PORTION_NS,
+            next_quantum_ns: QUANTUM_NS,
             next_log_ns: LOG_PERIOD_NS,
             resets: 0,
             witness,
@@ -183,28 +199,38 @@ impl<W> Lockstep<W> {
         &self.injector
     }
 
-    /// Gives the other board what this one sent and takes what it sent; false if it is gone.
+    /// Gives the other board what this one has sent in the portion that ends at `now_ns`, and takes what it
+    /// sent in the one before; false if it is gone.
     fn exchange<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
     where
         W: Witness<P>,
     {
-        self.witness.begin(now_ns);
-        let mut sent = board.wire(PEER_UART).take_sent();
-        for (at_ns, _) in &mut sent {
+        let mut portion = board.wire(PEER_UART).take_sent();
+        for (at_ns, _) in &mut portion {
             *at_ns = self.clock.true_ns(*at_ns);
         }
-        self.witness.sent(board, &sent);
-        let (Ok(()), Ok(received)) = (self.cable.to_peer.send(sent), self.cable.from_peer.recv())
-        else {
-            self.abandoned = true;
-            return false;
-        };
-        if self.witness.is_joined(now_ns) {
-            for (at_ns, byte) in received {
-                self.way.push(at_ns + QUANTUM_NS, byte);
+        self.sent.extend_from_slice(&portion);
+        if now_ns >= self.next_quantum_ns {
+            self.witness.begin(now_ns);
+            self.witness.sent(board, &self.sent);
+            self.sent.clear();
+        }
+        // At the end of a run the other board may be gone already, with all that it had to say said: only
+        // what does not come tells that it failed.
+        let _ = self.cable.to_peer.send(portion);
+        // Nothing came before the first portion.
+        if self.next_exchange_ns > PORTION_NS {
+            let Ok(received) = self.cable.from_peer.recv() else {
+                self.abandoned = true;
+                return false;
+            };
+            if self.witness.is_joined(now_ns) {
+                for (at_ns, byte) in received {
+                    self.way.push(at_ns + self.more_ns, byte);
+                }
             }
         }
-        while let Some((due_ns, byte)) = self.way.pop(now_ns + QUANTUM_NS) {
+        while let Some((due_ns, byte)) = self.way.pop(now_ns + PORTION_NS) {
             if self.injector.is_off {
                 continue;
             }
@@ -276,6 +302,9 @@ impl<P: Watched, W: Witness<P>> Driver<Nucleo<P>> for Lockstep<W> {
             if !self.exchange(session.board_mut(), now_ns) {
                 return None;
             }
+            self.next_exchange_ns += PORTION_NS;
+        }
+        if now_ns >= self.next_quantum_ns {
             self.witness.attend(Between {
                 session: &mut *session,
                 host,
@@ -287,7 +316,7 @@ impl<P: Watched, W: Witness<P>> Driver<Nucleo<P>> for Lockstep<W> {
                 self.is_done = true;
                 return None;
             }
-            self.next_exchange_ns += QUANTUM_NS;
+            self.next_quantum_ns += QUANTUM_NS;
         }
         Some(self.next_stop(session.board_mut(), board_ns))
     }

@@ -9,7 +9,7 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use super::display::DisplayPins;
-use super::lockstep::{Cable, Lockstep, QUANTUM_NS, Watched, Witness};
+use super::lockstep::{Cable, Lockstep, PORTIONS_READY, QUANTUM_NS, Watched, Witness};
 use super::nucleo::Nucleo;
 use super::sensor::SensorPins;
 use super::traps::Traps;
@@ -56,8 +56,8 @@ where
 {
     let (sensor_world, display_world) = (World::new(scene)?, World::new(scene)?);
     let arm = Arm::new(&scene.arm, &scene.motion);
-    let (to_display, from_sensor) = sync_channel(1);
-    let (to_sensor, from_display) = sync_channel(1);
+    let (to_display, from_sensor) = sync_channel(PORTIONS_READY);
+    let (to_sensor, from_display) = sync_channel(PORTIONS_READY);
     let sensor_cable = Cable {
         to_peer: to_display,
         from_peer: from_display,

@@ -109,6 +109,9 @@ impl Way {
     /// When the next byte arrives, or may do so.
     #[inline]
     pub fn next_due(&self) -> Option<u64> {
+        if !self.listens {
+            return self.weather.next_due();
+        }
         let out_ns = self.out.front().map(|&(due_ns, _)| due_ns);
         let events = [
             out_ns,

@@ -19,9 +19,12 @@ const RETRY_LONGEST: Duration = Duration::from_millis(300);
 /// After this long without a word a connection is given up. What a lossy network holds up for a while
 /// comes well before; a computer whose address changed, or one that was switched off, does not.
 pub const LEASE: Duration = Duration::from_secs(4);
-/// What may wait to be sent, in bytes, twice for each priority: when a network is stuck, little that is
-/// old comes out of it later.
+/// What may be sent at once, in bytes: far more than any of ours.
 const BATCH_BYTES: u16 = 4_096;
+/// Messages of a stream that may wait to be sent, 1 to 16; one that finds no room within a millisecond is
+/// lost. As many as are said while a busy computer does not get round to sending, 32 ms of motions: the
+/// engine's own two hold out for 4 ms. When a network is stuck, as little that is old comes out of it later.
+const STREAM_MESSAGES: usize = 16;
 /// Longest message that is taken from the network, in bytes: far more than any of ours.
 const MAX_MESSAGE_BYTES: u32 = 65_536;
 
@@ -220,6 +223,10 @@ impl Network {
             ("transport/link/protocols", json!([transport])),
             ("transport/link/tx/lease", json!(LEASE.as_millis())),
             ("transport/link/tx/batch_size", json!(BATCH_BYTES)),
+            (
+                "transport/link/tx/queue/size/interactive_high",
+                json!(STREAM_MESSAGES),
+            ),
             (
                 "transport/link/rx/max_message_size",
                 json!(MAX_MESSAGE_BYTES),

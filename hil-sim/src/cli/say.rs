@@ -1,0 +1,26 @@
+//! Results on standard output.
+
+use std::fmt::Arguments;
+use std::io::{self, Write};
+use std::process;
+
+/// Prints a line. A reader that has gone away (`| head`) has seen enough: the work goes on, and what it
+/// writes to files is whole.
+macro_rules! say {
+    ($($text:tt)*) => {
+        $crate::cli::say::text(format_args!("{}\n", format_args!($($text)*)))
+    };
+}
+pub(super) use say;
+
+/// Prints `text` as it is. If it can't be written, for another reason than that nobody reads it, the
+/// program ends with a complaint and exit status 2.
+pub(super) fn text(text: Arguments<'_>) {
+    let mut out = io::stdout().lock();
+    if let Err(error) = out.write_fmt(text).and_then(|()| out.flush())
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        eprintln!("standard output can't be written: {error}");
+        process::exit(2);
+    }
+}
