@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{Mode, OFlags, open};
+use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -33,6 +33,8 @@ impl Near {
         let near = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&near)?;
         unlockpt(&near)?;
+        // A line with room for some of the bytes takes some: whoever writes is never held for the rest.
+        fcntl_setfl(&near, OFlags::RDWR | OFlags::NONBLOCK)?;
         let name = ptsname(&near, Vec::new())?;
         let path = PathBuf::from(name.to_str().map_err(io::Error::other)?);
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;

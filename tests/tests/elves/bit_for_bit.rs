@@ -3,9 +3,12 @@
 use std::sync::LazyLock;
 
 use hil_sim::scene::Scene;
+use protocol::SensorConfiguration;
 use tests::history;
 use tests::run::{Run, scene};
 use tests::sensing::{replay, share_explained};
+
+use crate::configuration::assert_taken;
 
 /// To and fro over a boundary, with noise; for a second one gauge is dead and one saturates.
 fn rubbing(method: &str, duration_s: f64) -> Scene {
@@ -55,7 +58,13 @@ fn the_sensors_estimates_are_those_of_the_library_fed_with_the_same_codes() {
         last.instant_us
     );
     assert_eq!(said.len() as u32, last.sequence - first.sequence + 1);
+    // The boards run by their defaults, and nobody asks them.
+    assert_eq!(
+        RUBBED.scene.sensor_configuration(),
+        SensorConfiguration::DEFAULT
+    );
     assert_eq!(RUBBED.facts.sensor_told, None);
+    assert_eq!(RUBBED.facts.display_told, None);
     let share = share_explained(&RUBBED).unwrap();
     assert!(share > 0.7, "{share} valid");
 }
@@ -64,8 +73,11 @@ fn the_sensors_estimates_are_those_of_the_library_fed_with_the_same_codes() {
 fn so_are_those_of_every_other_method() {
     for method in ["crossings", "counting", "counting-adapted"] {
         let run = Run::of(rubbing(method, 3.2));
-        let told = run.facts.sensor_told.expect("it is not the default");
-        assert_eq!(told.report.refused, None);
+        assert_ne!(
+            run.scene.sensor_configuration().method,
+            SensorConfiguration::DEFAULT.method
+        );
+        assert_taken(&run);
         let share = share_explained(&run).unwrap();
         // The filters' 0.7 s are not valid, nor 13 % of the rest, in T2, nor half a window at either end
         // of it.

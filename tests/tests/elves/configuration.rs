@@ -1,7 +1,6 @@
 //! What a scene says of the boards reaches their own configurations, as a whole or not at all.
 
 use hil_sim::elf::{self, ElfError};
-use hil_sim::scene::Scene;
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, Mode, SensorConfiguration,
     UpdateRate, actuators,
@@ -9,50 +8,27 @@ use protocol::{
 use tests::elves;
 use tests::run::{Run, scene};
 
-/// What a sensor board answers to the configuration that a scene with `sections` asks of it, or none if
-/// it is not asked.
-fn answer(sections: &str) -> (Scene, Option<ConfigurationReport>, Run) {
-    let scene = scene(&format!(
-        "duration_s = 0.2\n[surface]\nspecimens = [{{ wavelength_mm = 2.0 }}]\n{sections}"
-    ));
-    let run = Run::of(scene.clone());
-    let report = run.facts.sensor_told.map(|told| told.report);
-    (scene, report, run)
-}
-
-/// That the board confirms what the scene asks for.
-fn assert_taken(sections: &str) -> SensorConfiguration {
-    let (scene, report, _) = answer(sections);
-    let wanted = scene.sensor_configuration();
+/// That the sensor board confirms what a run's scene asks for.
+pub fn assert_taken(run: &Run) {
+    let wanted = Configuration::Sensor(run.scene.sensor_configuration());
     let taken = ConfigurationReport {
         refused: None,
-        hash: Configuration::Sensor(wanted).hash(),
-        configuration: Configuration::Sensor(wanted),
+        hash: wanted.hash(),
+        configuration: wanted,
     };
-    assert_eq!(report, Some(taken), "{sections}");
-    wanted
+    let report = run.facts.sensor_told.map(|told| told.report);
+    assert_eq!(report, Some(taken), "{}", run.scene.name);
 }
 
 #[test]
-fn the_board_runs_by_its_default_and_nobody_asks_it() {
-    let (scene, report, run) = answer("");
-    assert_eq!(report, None);
-    assert_eq!(scene.sensor_configuration(), SensorConfiguration::DEFAULT);
-    assert_eq!(run.facts.display_told, None);
-}
-
-#[test]
-fn every_method_of_a_scene_becomes_the_boards() {
-    for method in ["crossings", "counting", "counting-adapted"] {
-        let taken = assert_taken(&format!("[estimator]\nmethod = \"{method}\"\n"));
-        assert_ne!(taken.method, SensorConfiguration::DEFAULT.method);
-    }
-}
-
-#[test]
-fn every_other_setting_of_the_estimator_becomes_the_boards() {
-    let taken = assert_taken(
+fn every_setting_of_the_estimator_but_the_method_becomes_the_boards() {
+    let run = Run::of(scene(
         r#"
+        duration_s = 0.2
+
+        [surface]
+        specimens = [{ wavelength_mm = 2.0 }]
+
         [gauges]
         tangential = true
         tangential_n_per_v = 1.5
@@ -66,7 +42,8 @@ fn every_other_setting_of_the_estimator_becomes_the_boards() {
         travel_wavelengths = 1.5
         candidates = 20
         "#,
-    );
+    ));
+    assert_taken(&run);
     let expected = SensorConfiguration {
         window_ms: 60,
         counted_gauge: 1,
@@ -78,7 +55,7 @@ fn every_other_setting_of_the_estimator_becomes_the_boards() {
         stiffness_n_per_m: 600,
         ..SensorConfiguration::DEFAULT
     };
-    assert_eq!(taken, expected);
+    assert_eq!(run.scene.sensor_configuration(), expected);
 }
 
 #[test]

@@ -6,6 +6,8 @@ use protocol::{MAX_FRAME, PortCounters, RoleCounters, Status};
 use tests::history;
 use tests::run::{Run, scene};
 
+use crate::PLAIN;
+
 /// Frames a second: a hundred estimates and a status; 500 motions and a status.
 const SENSOR_FRAMES_PER_S: f64 = 101.0;
 const DISPLAY_FRAMES_PER_S: f64 = 501.0;
@@ -37,17 +39,6 @@ static WEATHER: LazyLock<Run> = LazyLock::new(|| {
         corrupt = {CORRUPT}
         "#
     )))
-});
-
-static CLEAN: LazyLock<Run> = LazyLock::new(|| {
-    Run::of(scene(
-        r#"
-        duration_s = 2.2
-
-        [surface]
-        specimens = [{ wavelength_mm = 2.0 }]
-        "#,
-    ))
 });
 
 /// The last statuses of sensor and display.
@@ -82,7 +73,7 @@ fn errors(counters: &PortCounters) -> PortCounters {
 
 #[test]
 fn a_clean_link_counts_no_error_at_either_end() {
-    let (sensor, display) = statuses(&CLEAN);
+    let (sensor, display) = statuses(&PLAIN);
     assert_eq!(errors(&sensor.peer), PortCounters::default(), "sensor");
     assert_eq!(errors(&display.peer), PortCounters::default(), "display");
     let RoleCounters::Display(counters) = display.role else {
@@ -93,7 +84,7 @@ fn a_clean_link_counts_no_error_at_either_end() {
 
 #[test]
 fn on_a_clean_link_each_end_receives_what_the_other_sends() {
-    let (sensor, display) = statuses(&CLEAN);
+    let (sensor, display) = statuses(&PLAIN);
     for (from, to, frames_per_s) in [
         (&sensor, &display, SENSOR_FRAMES_PER_S),
         (&display, &sensor, DISPLAY_FRAMES_PER_S),

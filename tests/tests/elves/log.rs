@@ -1,20 +1,8 @@
 //! What the boards say of themselves: log lines by defmt, counters by Status.
 
-use std::sync::LazyLock;
-
 use protocol::{PortCounters, ResetCause, RoleCounters, Status};
-use tests::run::{Run, scene};
 
-static RUN: LazyLock<Run> = LazyLock::new(|| {
-    Run::of(scene(
-        r#"
-        duration_s = 2.2
-
-        [surface]
-        specimens = [{ wavelength_mm = 2.0 }]
-        "#,
-    ))
-});
+use crate::PLAIN;
 
 /// Time after the clock's start by which a board has set up its peripherals, in s.
 const START_UP_S: f64 = 0.1;
@@ -22,18 +10,18 @@ const START_UP_S: f64 = 0.1;
 const CARE_S: f64 = 0.05;
 
 fn lines(board: &str) -> Vec<&'static str> {
-    let log = RUN.recording.log.iter();
+    let log = PLAIN.recording.log.iter();
     log.filter(|(_, from, _)| *from == board)
         .map(|(_, _, line)| line.as_str())
         .collect()
 }
 
 fn sensor() -> Status {
-    RUN.recording.sensor_status.unwrap()
+    PLAIN.recording.sensor_status.unwrap()
 }
 
 fn display() -> Status {
-    RUN.recording.display_status.unwrap()
+    PLAIN.recording.display_status.unwrap()
 }
 
 /// Whether `count` is what `rate_hz` makes of a board's time, start-up and the status' age allowed for.
@@ -61,13 +49,13 @@ fn both_boards_log_that_they_started_and_why() {
         );
     }
     // Within the first tenth of a second, sensor and display.
-    let last_ns = RUN.recording.log.iter().map(|&(at_ns, ..)| at_ns).max();
+    let last_ns = PLAIN.recording.log.iter().map(|&(at_ns, ..)| at_ns).max();
     assert!(last_ns.unwrap() as f64 * 1e-9 <= START_UP_S);
 }
 
 #[test]
 fn nothing_was_reset_cleared_or_garbled() {
-    let facts = &RUN.facts;
+    let facts = &PLAIN.facts;
     assert_eq!(
         (facts.resets, facts.clears, facts.dac_frame_errors),
         (0, 0, 0)
@@ -118,12 +106,16 @@ fn the_display_counts_ticks_updates_and_estimates_at_their_rates_and_no_fault() 
     };
     assert_rate(counters.ticks, 2_000.0, &status);
     assert!(counters.updates <= counters.ticks, "{counters:?}");
-    let outputs = RUN.recording.outputs.len() as u32;
+    let outputs = PLAIN.recording.outputs.len() as u32;
     assert!(
         (1..=outputs).contains(&counters.updates),
         "{counters:?}, {outputs} outputs"
     );
-    let valid = RUN.recording.estimates.iter().filter(|r| r.estimate.valid);
+    let valid = PLAIN
+        .recording
+        .estimates
+        .iter()
+        .filter(|r| r.estimate.valid);
     let valid = valid.count() as u32;
     assert!(
         (1..=valid).contains(&counters.estimates),

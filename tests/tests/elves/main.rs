@@ -1,6 +1,10 @@
 //! The ELFs on emulated boards, by their pins, links, consoles and logs alone: no wall clock has a part in it,
 //! so that as many may run at once as a machine likes.
 
+use std::sync::LazyLock;
+
+use tests::run::{Run, scene};
+
 mod arm;
 mod bit_for_bit;
 mod configuration;
@@ -14,3 +18,15 @@ mod reversal;
 mod silence;
 mod table_1;
 mod travelling;
+
+/// Nothing out of the ordinary, for two statuses of either board.
+static PLAIN: LazyLock<Run> = LazyLock::new(|| {
+    Run::of(scene(
+        r#"
+        duration_s = 2.2
+
+        [surface]
+        specimens = [{ wavelength_mm = 2.0 }]
+        "#,
+    ))
+});
