@@ -1,5 +1,5 @@
 //! Records an hour of everything, as fast as it goes, and says what it took:
-//! `cargo run -p tests --example record_hour [HOURS [FILE]]`, once `cargo build --workspace --bins` has built
+//! `cargo run --example record_hour [HOURS [FILE]]`, once `cargo build --workspace --bins` has built
 //! `host-bridge`.
 //!
 //! Two boards that are not there say what real ones say in that time: samples of the gauges at 1 kHz,

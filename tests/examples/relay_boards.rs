@@ -1,6 +1,6 @@
 //! Two boards for bridges that are started by hand, be it in two network namespaces.
 //!
-//! `cargo run -p tests --example relay_boards -- 60` prints the two ports, and then once a second what
+//! `cargo run --example relay_boards -- 60` prints the two ports, and then once a second what
 //! each board has heard: how much, how old, and how often something came that was not newer than what
 //! came before, which must never be. Exit status 1 if it was.
 

@@ -1,6 +1,6 @@
 //! What a relay adds: two bridges in two processes over loopback, beside a bare line.
 //!
-//! `cargo build --workspace --bins && cargo run -p tests --example relay_latency -- 60`: a display says
+//! `cargo build --workspace --bins && cargo run --example relay_latency -- 60`: a display says
 //! a motion 500 times a second, with the instant in it at which it is written to its pseudo-terminal; a
 //! sensor on another one notes when it reads it. Both are in this program and share a clock. The bare
 //! line is one pseudo-terminal with the bridge's own link at its other end; the way over the bridges has

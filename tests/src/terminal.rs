@@ -2,6 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Read, Write};
+use std::num::NonZeroU16;
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -17,11 +18,16 @@ use crate::pty::Near;
 /// How long keys may wait.
 const LOOK: Duration = Duration::from_millis(10);
 
+const ROWS: NonZeroU16 = NonZeroU16::new(40).unwrap();
+const COLUMNS: NonZeroU16 = NonZeroU16::new(120).unwrap();
+
 /// A terminal of 120 × 40 characters.
 pub struct Terminal {
     path: PathBuf,
     keys: Sender<String>,
     shown: Arc<Mutex<String>>,
+    /// What stands in the window.
+    screen: Arc<Mutex<vt100::Parser>>,
     ended: Arc<AtomicBool>,
     window: JoinHandle<()>,
     /// Keeps the terminal alive while no program has it open.
@@ -40,17 +46,21 @@ impl Terminal {
             Arc::<Mutex<String>>::default(),
             Arc::<AtomicBool>::default(),
         );
+        let screen = Arc::new(Mutex::new(vt100::Parser::new(ROWS, COLUMNS, 0)));
         let (theirs, their_end) = (Arc::clone(&shown), Arc::clone(&ended));
+        let drawn = Arc::clone(&screen);
         let terminal = Self {
             path,
             keys,
             shown,
+            screen,
             ended,
-            window: thread::spawn(move || run(window, &typed, &theirs, &their_end)),
+            window: thread::spawn(move || run(window, &typed, &theirs, &drawn, &their_end)),
             _kept: kept,
         };
         // As a shell leaves it: the pair was made for bytes, not for people.
-        terminal.stty(&["sane", "rows", "40", "cols", "120"]);
+        let (rows, columns) = (ROWS.to_string(), COLUMNS.to_string());
+        terminal.stty(&["sane", "rows", &rows, "cols", &columns]);
         terminal
     }
 
@@ -102,9 +112,14 @@ impl Terminal {
             .collect()
     }
 
-    /// Waits until `words` were shown; whether they were.
+    /// Waits until `words` stand in a row of the window, or were sent in one piece; whether they were. A
+    /// program that writes only what has changed sends words in pieces where others stood before.
     pub fn shows(&self, limit: Duration, words: &str) -> bool {
-        wait_until(limit, || self.shown().contains(words))
+        let stand = || {
+            let screen = self.screen.lock().unwrap_or_else(PoisonError::into_inner);
+            screen.screen().contents().contains(words)
+        };
+        wait_until(limit, || stand() || self.shown().contains(words))
     }
 
     /// How the terminal is set, as `stty` says it.
@@ -136,14 +151,22 @@ impl Default for Terminal {
 }
 
 /// The window: shows what comes, and passes on what is typed.
-fn run(mut window: Near, typed: &Receiver<String>, shown: &Mutex<String>, ended: &AtomicBool) {
+fn run(
+    mut window: Near,
+    typed: &Receiver<String>,
+    shown: &Mutex<String>,
+    screen: &Mutex<vt100::Parser>,
+    ended: &AtomicBool,
+) {
     let mut bytes = [0; 4_096];
     while !ended.load(Ordering::Acquire) {
         match window.read(&mut bytes) {
-            Ok(count) => shown
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push_str(&String::from_utf8_lossy(&bytes[..count])),
+            Ok(count) => {
+                let mut screen = screen.lock().unwrap_or_else(PoisonError::into_inner);
+                screen.process(&bytes[..count]);
+                let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                shown.push_str(&String::from_utf8_lossy(&bytes[..count]));
+            }
             Err(error) if error.kind() == ErrorKind::TimedOut => {}
             Err(_) => return,
         }

@@ -24,7 +24,7 @@ pub const QUANTUM_NS: u64 = 500_000;
 /// How often the boards hand each other their bytes. It is shorter than what a byte takes, so that neither
 /// waits for what the other says in the portion before it needs it: the one that has more to do just then
 /// falls behind by a portion and catches up in the next.
-const PORTION_NS: u64 = QUANTUM_NS / 2;
+pub(super) const PORTION_NS: u64 = QUANTUM_NS / 2;
 /// Portions of the other board's that may lie ready: what it is ahead by at most.
 pub(super) const PORTIONS_READY: usize = 3;
 /// How often the log is read: well before the 1 KiB of RTT are full.

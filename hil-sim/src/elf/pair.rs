@@ -9,7 +9,7 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use super::display::DisplayPins;
-use super::lockstep::{Cable, Lockstep, PORTIONS_READY, QUANTUM_NS, Watched, Witness};
+use super::lockstep::{Cable, Lockstep, PORTION_NS, PORTIONS_READY, Watched, Witness};
 use super::nucleo::Nucleo;
 use super::sensor::SensorPins;
 use super::traps::Traps;
@@ -117,7 +117,7 @@ fn drive<P: Watched, W: Witness<P>>(
         reason,
     };
     let board = board.map_err(|error| board_error(error.to_string()))?;
-    let first_stop = VirtualNanos(QUANTUM_NS);
+    let first_stop = VirtualNanos(PORTION_NS);
     let session = Session::new(Box::new(board), 0, first_stop)
         .map_err(|error| board_error(error.to_string()))?;
     let mut images = vec![firmware.image.clone()];
