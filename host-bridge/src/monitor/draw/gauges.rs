@@ -53,8 +53,10 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
             "from lowest to highest in LSB; {height:.0} LSB high, {}",
             text::span(plots[0].span_s())
         )
-    } else {
+    } else if shown.sensor.is_known() {
         "not streamed: g streams them".to_owned()
+    } else {
+        "not streamed".to_owned()
     };
     text::panel(frame, area, theme, text::title(theme, "gauges", &about));
     for gauge in 0..GAUGES {
