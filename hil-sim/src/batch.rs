@@ -104,6 +104,26 @@ pub fn in_order<I: Sync, O: Send, E>(
     })
 }
 
+/// What `work` makes of each input, in the inputs' order, on all cores. After an error no further work is begun.
+///
+/// # Errors
+/// The first of `work`'s, by the inputs' order.
+///
+/// # Panics
+/// If `work` does.
+pub fn on_all_cores<I: Sync, O: Send, E: Send>(
+    inputs: &[I],
+    work: impl Fn(&I) -> Result<O, E> + Sync,
+) -> Result<Vec<O>, E> {
+    let cores = thread::available_parallelism().unwrap_or(NonZero::MIN);
+    let mut outputs = Vec::with_capacity(inputs.len());
+    in_order(inputs, cores, work, |_, result| {
+        outputs.push(result?);
+        Ok(())
+    })?;
+    Ok(outputs)
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -149,6 +169,15 @@ mod tests {
             Ok(())
         });
         assert_eq!((all, begun.into_inner()), (Ok(()), 500));
+    }
+
+    #[test]
+    fn on_all_cores_gives_all_outputs_or_the_first_error() {
+        let inputs: Vec<u32> = (0..50).collect();
+        let doubled: Result<Vec<u32>, ()> = on_all_cores(&inputs, |n| Ok(2 * n));
+        assert_eq!(doubled, Ok((0..50).map(|n| 2 * n).collect()));
+        let refused = on_all_cores(&inputs, |n| if *n == 20 { Err(*n) } else { Ok(*n) });
+        assert_eq!(refused, Err(20));
     }
 
     #[test]

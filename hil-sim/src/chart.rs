@@ -17,7 +17,6 @@
 
 pub mod bound;
 pub mod contest;
-pub(crate) mod cores;
 pub mod costs;
 pub mod delay;
 pub mod efficiency;

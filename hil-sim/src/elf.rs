@@ -8,6 +8,7 @@ mod display;
 mod firmware;
 mod injector;
 pub mod instructions;
+mod kept;
 mod lockstep;
 mod nucleo;
 mod pair;

@@ -19,7 +19,6 @@ pub mod row;
 pub mod shard;
 pub mod standing;
 pub mod survey;
-pub mod work;
 
 use std::fmt::Write;
 use std::hash::Hasher;

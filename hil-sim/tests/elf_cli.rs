@@ -30,14 +30,20 @@ fn elf(role: Role) -> Vec<u8> {
     })
 }
 
-/// Runs a scene with this file as the sensor's firmware, in a folder of the test's own: exit status,
-/// what it printed, and what it complained about.
-fn run_with_sensor(name: &str, bytes: Option<&[u8]>) -> (Option<i32>, String, String) {
+/// An empty folder of a test's own.
+fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("elf-cli")
         .join(name);
     fs::remove_dir_all(&folder).ok();
     fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Runs a scene with this file as the sensor's firmware, in a folder of the test's own: exit status,
+/// what it printed, and what it complained about.
+fn run_with_sensor(name: &str, bytes: Option<&[u8]>) -> (Option<i32>, String, String) {
+    let folder = folder(name);
     fs::write(folder.join("a.toml"), SCENE).unwrap();
     if let Some(bytes) = bytes {
         fs::write(folder.join("sensor.elf"), bytes).unwrap();
@@ -81,6 +87,40 @@ fn the_two_firmwares_run_a_scene() {
     let (status, printed, complaint) = run_with_sensor("sound", Some(&elf(Role::Sensor)));
     assert_eq!(status, Some(0), "{complaint}");
     assert!(printed.contains("ok"), "{printed}");
+}
+
+/// The hashes of scenes that are run one after the other, by one process.
+fn hashes(folder: &Path, scenes: &[&str]) -> Vec<String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(folder)
+        .args(["run", "--engine", "elf", "-j", "1", "--json", "out.json"])
+        .arg("--sensor-elf")
+        .arg(built(Role::Sensor))
+        .arg("--display-elf")
+        .arg(built(Role::Display))
+        .args(scenes)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let results: Vec<serde_json::Value> =
+        serde_json::from_slice(&fs::read(folder.join("out.json")).unwrap()).unwrap();
+    let hash = |result: &serde_json::Value| result["hash"].as_str().unwrap().to_owned();
+    results.iter().map(hash).collect()
+}
+
+#[test]
+fn boards_that_have_run_other_scenes_run_as_fresh_ones_do() {
+    let folder = folder("one-after-the-other");
+    fs::write(folder.join("a.toml"), SCENE).unwrap();
+    // Another method, on a sensor that is led through its configuration, and a board that starts anew.
+    let other = format!(
+        "{SCENE}[estimator]\nmethod = \"counting\"\n[[fault]]\nkind = \"power-cycle\"\nat_s = 0.2\n"
+    );
+    fs::write(folder.join("b.toml"), other).unwrap();
+    let alone = [&["a.toml"], &["b.toml"]].map(|scene| hashes(&folder, scene));
+    let after = hashes(&folder, &["b.toml", "a.toml", "b.toml"]);
+    assert_ne!(alone[0], alone[1]);
+    assert_eq!(after, [&*alone[1], &*alone[0], &*alone[1]].concat());
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! Runs of scenes on the ELFs.
 
+use std::convert::Infallible;
 use std::path::Path;
 
 use hil_sim::analysis::Verdict;
+use hil_sim::batch;
 use hil_sim::elf::{self, BoardFacts};
 use hil_sim::outcome::Outcome;
 use hil_sim::recording::Recording;
@@ -44,6 +46,17 @@ impl Run {
             facts,
         }
     }
+}
+
+/// The run of each input's scene, in the inputs' order.
+///
+/// # Panics
+/// The same as [`Run::of`].
+pub fn runs_of<I: Sync>(inputs: &[I], scene: impl Fn(&I) -> Scene + Sync) -> Vec<Run> {
+    let runs: Result<_, Infallible> =
+        batch::on_all_cores(inputs, |input| Ok(Run::of(scene(input))));
+    let Ok(runs) = runs;
+    runs
 }
 
 /// A scene from TOML, as a file would hold it; the files it names are relative to `folder`.

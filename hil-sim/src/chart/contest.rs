@@ -3,14 +3,12 @@
 //! A scene is run once, by the native engine; the scans that its sensor board was given are then given to
 //! every contestant, and what it says of λ every tenth millisecond is judged as the board's estimates are.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-
 use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
 use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range, SensorConfiguration};
 
 use crate::analysis::Summary;
 use crate::analysis::estimates;
+use crate::batch::on_all_cores;
 use crate::native;
 use crate::recording::{EstimateRecord, Recording};
 use crate::scene::{Scene, SceneError};
@@ -216,24 +214,11 @@ pub fn run(
     from_s: impl Fn(&Scene) -> f64 + Sync,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Vec<Summary>>, SceneError> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(vec![None; scenes.len()]);
-    std::thread::scope(|scope| {
-        for _ in 0..cores.min(scenes.len()) {
-            scope.spawn(|| {
-                while let index = next.fetch_add(1, Ordering::Relaxed)
-                    && let Some(scene) = scenes.get(index)
-                {
-                    let result = run_scene(contestants, scene, from_s(scene));
-                    results.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(result);
-                    done();
-                }
-            });
-        }
-    });
-    let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
-    results.into_iter().flatten().collect()
+    on_all_cores(scenes, |scene| {
+        let result = run_scene(contestants, scene, from_s(scene));
+        done();
+        result
+    })
 }
 
 fn run_scene(

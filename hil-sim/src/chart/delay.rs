@@ -16,7 +16,7 @@ pub mod picture;
 
 use protocol::DisplayConfiguration;
 
-use super::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use super::timing::{STROKE, WAVELENGTH_MM};
 use crate::analysis::actuators;
 use crate::analysis::edges::edges;

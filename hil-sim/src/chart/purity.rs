@@ -10,7 +10,7 @@ mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use super::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use crate::analysis::mean::{Held, about_a_second_s};
 use crate::analysis::spectrum::{Line, Spectrum, spectra};
 use crate::elf::alone::{self, Alone};

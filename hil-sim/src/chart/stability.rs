@@ -6,7 +6,7 @@
 
 pub mod picture;
 
-use super::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use crate::contact::{Bristles, Integrator, MASS_KG, Spring, Stribeck, stability};
 use crate::scene::Friction;
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use super::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use crate::elf::alone::{self, Alone, AloneRun};
 use crate::elf::{ElfError, Firmware};
 use crate::motion::MM_PER_COUNT;

@@ -5,7 +5,7 @@ pub mod picture;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use super::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use crate::analysis::actuators;
 use crate::analysis::edges::{Edges, edges};
 use crate::analysis::reaction::Reaction;

@@ -2,24 +2,20 @@
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::num::NonZeroUsize;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
+use hil_sim::batch;
 use hil_sim::elf::ElfError;
 use hil_sim::fault::Kind;
-use hil_sim::fault::campaign::{Plan, Tally, Trial, unmet};
+use hil_sim::fault::campaign::{Plan, Shift, Tally, Trial, unmet};
 
 use super::say::say;
 use super::{Elves, number, progress};
-
-/// What came of a run.
-type RunResult = Result<Vec<Trial>, ElfError>;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Campaign {
@@ -47,7 +43,7 @@ pub(super) struct Campaign {
 
 /// As many as there are processors: the boards of a run wait for each other half of the time.
 fn jobs() -> usize {
-    thread::available_parallelism().map_or(1, NonZeroUsize::get)
+    thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 impl Campaign {
@@ -66,32 +62,15 @@ impl Campaign {
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
         let bar = progress(shifts.len() as u64);
         let started = Instant::now();
-        let next = AtomicUsize::new(0);
-        let done: Mutex<Vec<(usize, RunResult)>> = Mutex::new(Vec::new());
-        thread::scope(|scope| {
-            for _ in 0..self.jobs.clamp(1, shifts.len().max(1)) {
-                scope.spawn(|| {
-                    while let Some((number, shift)) = {
-                        let number = next.fetch_add(1, Ordering::Relaxed);
-                        shifts.get(number).map(|shift| (number, shift))
-                    } {
-                        let trials = shift.run(&firmwares);
-                        bar.inc(1);
-                        // A thread that panicked has taken the campaign with it.
-                        if let Ok(mut done) = done.lock() {
-                            done.push((number, trials));
-                        }
-                    }
-                });
-            }
-        });
-        bar.finish_and_clear();
-        let mut done = done.into_inner().unwrap_or_default();
-        done.sort_by_key(|&(number, _)| number);
         let mut trials = Vec::new();
-        for (_, run) in done {
-            trials.extend(run?);
-        }
+        let jobs = NonZero::new(self.jobs).unwrap_or(NonZero::MIN);
+        let work = |shift: &Shift| shift.run(&firmwares);
+        batch::in_order(&shifts, jobs, work, |_, tried| {
+            trials.extend(tried?);
+            bar.inc(1);
+            Ok::<_, ElfError>(())
+        })?;
+        bar.finish_and_clear();
         let tallies: Vec<Tally> = plan
             .kinds
             .iter()

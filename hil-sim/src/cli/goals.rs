@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hil_sim::analysis::Summary;
+use hil_sim::batch::on_all_cores;
 use hil_sim::chart::family::{self, Family};
 use hil_sim::elf::Firmwares;
 use hil_sim::outcome::Outcome;
@@ -74,47 +73,20 @@ impl Goals {
 /// Runs the scenes, on all cores: an emulated pair keeps two of them half busy.
 fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<Judged>> {
     let bar = progress(scenes.len() as u64);
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(Vec::with_capacity(scenes.len()));
-    let work = || -> anyhow::Result<()> {
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(scene) = scenes.get(index) else {
-                return Ok(());
-            };
-            let recording = match firmwares {
-                None => native::run(scene)?,
-                Some(firmwares) => elf::run(scene, firmwares)?.0,
-            };
-            let outcome = Outcome::new((*scene).clone(), recording);
-            let judged = Judged {
-                summary: outcome.verdict.summary,
-                unmet: outcome.unmet,
-            };
-            bar.inc(1);
-            let mut done = done
-                .lock()
-                .map_err(|_| anyhow::anyhow!("another scene's run broke off"))?;
-            done.push((index, judged));
-        }
-    };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        workers
-            .into_iter()
-            .map(|worker| match worker.join() {
-                Ok(result) => result,
-                Err(_) => Err(anyhow::anyhow!("a scene's run broke off")),
-            })
-            .collect::<anyhow::Result<Vec<()>>>()
-    })?;
+    let judged = on_all_cores(scenes, |scene| {
+        let recording = match firmwares {
+            None => native::run(scene)?,
+            Some(firmwares) => elf::run(scene, firmwares)?.0,
+        };
+        let outcome = Outcome::new((*scene).clone(), recording);
+        bar.inc(1);
+        Ok(Judged {
+            summary: outcome.verdict.summary,
+            unmet: outcome.unmet,
+        })
+    });
     bar.finish_and_clear();
-    let mut done = done
-        .into_inner()
-        .map_err(|_| anyhow::anyhow!("a scene's run broke off"))?;
-    done.sort_by_key(|(index, _)| *index);
-    Ok(done.into_iter().map(|(_, judged)| judged).collect())
+    judged
 }
 
 const HEADER: &str = "\

@@ -191,7 +191,8 @@ pub(super) fn run_before<W: Witness>(
         DisplayPins::fit,
     )
     .map_err(|error| board_error(error.to_string()))?;
-    let session = Session::new(Box::new(board), 0, VirtualNanos(LOOK_NS))
+    let images = [firmware.image.clone()];
+    let session = Session::new(Box::new(board.running(&images)), 0, VirtualNanos(LOOK_NS))
         .map_err(|error| board_error(error.to_string()))?;
     let driver = Solo {
         far: FarEnd::new(alone),
@@ -203,7 +204,6 @@ pub(super) fn run_before<W: Witness>(
         witness,
     };
     let started = Instant::now();
-    let images = [firmware.image.clone()];
     let mut finished = emulator::run(session, &Start::new(&images), driver)
         .map_err(|error| board_error(error.to_string()))?;
     let ended = Instant::now();

@@ -9,6 +9,7 @@ use std::num::{NonZeroU32, NonZeroU64};
 
 use rigless::chip::uart::Rate;
 use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::image::Image;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
@@ -18,6 +19,7 @@ use rigless::soc::stm32f427::generated::{TIM3 as TIM3_REGISTERS, TIM4};
 use rigless::soc::{Bus, Error, Width};
 use rigless::time::VirtualNanos;
 
+use super::kept;
 use super::wire::Wire;
 
 /// What the ST-LINK puts on OSC_IN.
@@ -66,6 +68,8 @@ pub trait Pins: Debug + Send + 'static {
 #[derive(Debug)]
 pub struct Nucleo<P> {
     mcu: Wired<P>,
+    /// What it is going to run, if its processor is to be kept.
+    program: Option<u64>,
 }
 
 /// The part with its pins connected.
@@ -96,7 +100,17 @@ impl<P: Pins> Nucleo<P> {
                 loses_power: false,
                 triggered_ns: 0,
             },
+            program: None,
         })
+    }
+
+    /// The same board, about to run `images`: it takes over a processor that has run them before, if one is
+    /// idle.
+    pub fn running(self, images: &[Image]) -> Self {
+        Self {
+            program: Some(kept::program(images)),
+            ..self
+        }
     }
 
     /// What is on the pins, and the part.
@@ -224,7 +238,7 @@ impl<P: Pins> Board for Nucleo<P> {
     fn targets(&mut self) -> Vec<Target<'_>> {
         let interrupt_lines = NonZeroU32::new(self.mcu.cpu().interrupt_lines.into())
             .expect("the part has interrupts");
-        let core = armv7m::Core {
+        let mut core = armv7m::Core {
             variant: armv7m::Variant::M4,
             clock_hz: CORE_CLOCK_HZ,
             interrupt_lines,
@@ -238,6 +252,9 @@ impl<P: Pins> Board for Nucleo<P> {
             armv7m::Fpu::FpV4Sp,
             armv7m::MpuRegions::Eight,
         );
+        if let Some(program) = self.program {
+            kept::keep(&mut core, program);
+        }
         vec![Target::new("stm32f427", &mut self.mcu, core)]
     }
 }

@@ -117,11 +117,11 @@ fn drive<P: Watched, W: Witness<P>>(
         reason,
     };
     let board = board.map_err(|error| board_error(error.to_string()))?;
-    let first_stop = VirtualNanos(PORTION_NS);
-    let session = Session::new(Box::new(board), 0, first_stop)
-        .map_err(|error| board_error(error.to_string()))?;
     let mut images = vec![firmware.image.clone()];
     images.extend(driver.injector().traps().and_then(Traps::image));
+    let first_stop = VirtualNanos(PORTION_NS);
+    let session = Session::new(Box::new(board.running(&images)), 0, first_stop)
+        .map_err(|error| board_error(error.to_string()))?;
     let mut finished = emulator::run(session, &Start::new(&images), driver)
         .map_err(|error| board_error(error.to_string()))?;
     let at_ns = finished.stop.map_or(0, |stop| stop.at.0);

@@ -8,10 +8,11 @@ use super::Map;
 use super::error::MapError;
 use super::fingerprint::Fingerprints;
 use super::journal::{self, Journal, Rows};
+use super::measurement::Measurement;
 use super::picture;
 use super::row::{Row, rank};
 use super::shard::Shard;
-use super::work::measure;
+use crate::batch::in_order;
 use crate::scene::Scene;
 
 /// How maps are to be made.
@@ -168,7 +169,7 @@ impl<'a> Survey<'a> {
             .iter()
             .map(|(cell, method)| scene(map, *cell, method))
             .collect::<Result<_, _>>()?;
-        measure(&scenes, self.plan.threads, |index, measurement| {
+        in_order(&scenes, self.plan.threads, Measurement::of, |index, measurement| {
             let measurement = measurement.map_err(|source| MapError::Scene {
                 map: map.name,
                 source,

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::chart::cores::on_all_cores;
+use crate::batch::on_all_cores;
 use crate::elf::{self, ElfError, Firmwares};
 use crate::native;
 use crate::people::given::Course;

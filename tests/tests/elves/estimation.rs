@@ -3,16 +3,11 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use hil_sim::expectation;
 use hil_sim::scene::{Expect, Scene};
-use tests::run::Run;
+use tests::run::{Run, runs_of};
 use tests::sensing::share_explained;
-
-/// Boards run side by side: each pair keeps two cores half busy.
-const PAIRS_AT_ONCE: usize = 2;
 
 /// A committed scene, and for how long it is run here, in s. The start, until the estimator stands by
 /// anything, is no longer than 0.3 s in any.
@@ -41,25 +36,13 @@ fn path(name: &str) -> PathBuf {
 
 /// The scenes' runs.
 static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut runs = Vec::new();
-        while let Some((name, duration_s)) = SCENES.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let scene = Scene::load(&path(name)).unwrap_or_else(|error| panic!("{error}"));
-            assert!(*duration_s < scene.duration_s, "{name}");
-            runs.push(Run::of(Scene {
-                duration_s: *duration_s,
-                ..scene
-            }));
+    runs_of(&SCENES, |(name, duration_s)| {
+        let scene = Scene::load(&path(name)).unwrap_or_else(|error| panic!("{error}"));
+        assert!(*duration_s < scene.duration_s, "{name}");
+        Scene {
+            duration_s: *duration_s,
+            ..scene
         }
-        runs
-    };
-    thread::scope(|scope| {
-        let workers: Vec<_> = (0..PAIRS_AT_ONCE).map(|_| scope.spawn(work)).collect();
-        let runs = workers
-            .into_iter()
-            .flat_map(|worker| worker.join().unwrap());
-        runs.collect()
     })
 });
 

@@ -2,21 +2,16 @@
 //! the ELFs.
 
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 
 use firmware_sensor::counting::predicted_mean_mm;
 use hil_sim::scene::{Estimator, Scene};
 use protocol::Method;
-use tests::run::Run;
+use tests::run::{Run, runs_of};
 
 /// The counting window A, in s.
 const WINDOW_S: f64 = 0.080;
 /// The settled estimates' mean comes within this of the predicted one, in mm.
 const MEAN_BOUND_MM: f64 = 0.03;
-/// Boards run side by side: each pair keeps two cores half busy.
-const PAIRS_AT_ONCE: usize = 2;
-
 /// A cell of the table.
 struct Cell {
     speed_mm_s: f64,
@@ -48,38 +43,24 @@ const CELLS: [Cell; 12] = [
     cell(70.0, 4.0, 4.107),
 ];
 
-/// Every cell and its run.
-static RUNS: LazyLock<Vec<(&Cell, Run)>> = LazyLock::new(|| {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut runs = Vec::new();
-        while let Some(cell) = CELLS.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let scene = Scene {
-                // 0.3 s until band-pass and window are settled, and the 2 s of the paper's mean.
-                duration_s: 2.3,
-                estimator: Estimator {
-                    method: Method::Counting,
-                    ..Estimator::default()
-                },
-                ..Scene::constant(cell.wavelength_mm, cell.speed_mm_s)
-            };
-            runs.push((cell, Run::of(scene)));
-        }
-        runs
-    };
-    thread::scope(|scope| {
-        let workers: Vec<_> = (0..PAIRS_AT_ONCE).map(|_| scope.spawn(work)).collect();
-        let runs = workers
-            .into_iter()
-            .flat_map(|worker| worker.join().unwrap());
-        runs.collect()
+/// The run of each cell.
+static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| {
+    runs_of(&CELLS, |cell| Scene {
+        // 0.3 s until band-pass and window are settled, and the 2 s of the paper's mean.
+        duration_s: 2.3,
+        estimator: Estimator {
+            method: Method::Counting,
+            ..Estimator::default()
+        },
+        ..Scene::constant(cell.wavelength_mm, cell.speed_mm_s)
     })
 });
 
 fn in_every_cell(judge: impl Fn(&Cell, &Run) -> Result<(), String>) {
     assert_eq!(RUNS.len(), CELLS.len());
-    let failures: Vec<String> = RUNS
+    let failures: Vec<String> = CELLS
         .iter()
+        .zip(&*RUNS)
         .filter_map(|(cell, run)| {
             let what = judge(cell, run).err()?;
             Some(format!(
