@@ -115,7 +115,7 @@ pub fn on_all_cores<I: Sync, O: Send, E: Send>(
     inputs: &[I],
     work: impl Fn(&I) -> Result<O, E> + Sync,
 ) -> Result<Vec<O>, E> {
-    let cores = thread::available_parallelism().unwrap_or(NonZero::MIN);
+    let cores = thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN);
     let mut outputs = Vec::with_capacity(inputs.len());
     in_order(inputs, cores, work, |_, result| {
         outputs.push(result?);

@@ -16,10 +16,10 @@ pub mod picture;
 
 use protocol::DisplayConfiguration;
 
-use crate::batch::on_all_cores;
 use super::timing::{STROKE, WAVELENGTH_MM};
 use crate::analysis::actuators;
 use crate::analysis::edges::edges;
+use crate::batch::on_all_cores;
 use crate::elf::alone::{self, Alone};
 use crate::elf::{ElfError, Firmware};
 use crate::recording::volts;

@@ -10,9 +10,9 @@ mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::batch::on_all_cores;
 use crate::analysis::mean::{Held, about_a_second_s};
 use crate::analysis::spectrum::{Line, Spectrum, spectra};
+use crate::batch::on_all_cores;
 use crate::elf::alone::{self, Alone};
 use crate::elf::{ElfError, Firmware};
 use crate::motion::MM_PER_COUNT;

@@ -5,10 +5,10 @@ pub mod picture;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::batch::on_all_cores;
 use crate::analysis::actuators;
 use crate::analysis::edges::{Edges, edges};
 use crate::analysis::reaction::Reaction;
+use crate::batch::on_all_cores;
 use crate::elf::alone::{self, Alone};
 use crate::elf::{ElfError, Firmware};
 use crate::scene::{Link, Motion};

@@ -63,7 +63,7 @@ impl Campaign {
         let bar = progress(shifts.len() as u64);
         let started = Instant::now();
         let mut trials = Vec::new();
-        let jobs = NonZero::new(self.jobs).unwrap_or(NonZero::MIN);
+        let jobs = NonZero::new(self.jobs).unwrap_or(NonZero::<usize>::MIN);
         let work = |shift: &Shift| shift.run(&firmwares);
         batch::in_order(&shifts, jobs, work, |_, tried| {
             trials.extend(tried?);

@@ -5,6 +5,7 @@
 //! does: instants are counted in instructions, and a block is translated from the same bytes.
 
 use std::fmt::{self, Debug, Formatter};
+use std::hash::Hasher;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -59,7 +60,7 @@ fn idle(program: u64) -> Option<Kept> {
 /// A page of a kept processor's ground, as large and as aligned as the emulator's own.
 #[derive(Clone)]
 #[repr(align(4096))]
-struct Page([u8; Page::SIZE]);
+struct Page(#[expect(dead_code, reason = "only its address counts")] [u8; Page::SIZE]);
 
 impl Page {
     const SIZE: usize = 4096;
@@ -170,8 +171,13 @@ impl Processor for Lent {
     }
 
     fn ask(&mut self, queued: Queued) {
-        // A page that is looked at is looked at for good.
-        self.is_as_made &= !matches!(queued, Queued::Route(_));
+        match queued {
+            // Before the first instruction that is the program, which is where it was.
+            Queued::Invalidate(..) if self.retired() == 0 => return,
+            // A page that is looked at is looked at for good.
+            Queued::Route(_) => self.is_as_made = false,
+            _ => {}
+        }
         self.processor_mut().ask(queued);
     }
 

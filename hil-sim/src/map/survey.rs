@@ -169,22 +169,27 @@ impl<'a> Survey<'a> {
             .iter()
             .map(|(cell, method)| scene(map, *cell, method))
             .collect::<Result<_, _>>()?;
-        in_order(&scenes, self.plan.threads, Measurement::of, |index, measurement| {
-            let measurement = measurement.map_err(|source| MapError::Scene {
-                map: map.name,
-                source,
-            })?;
-            let (cell, method) = missing[index].clone();
-            let row = Row {
-                cell,
-                method,
-                measurement,
-            };
-            journal.append(&row, keys)?;
-            rows.insert((row.method.clone(), row.cell), row);
-            step();
-            Ok(())
-        })?;
+        in_order(
+            &scenes,
+            self.plan.threads,
+            Measurement::of,
+            |index, measurement| {
+                let measurement = measurement.map_err(|source| MapError::Scene {
+                    map: map.name,
+                    source,
+                })?;
+                let (cell, method) = missing[index].clone();
+                let row = Row {
+                    cell,
+                    method,
+                    measurement,
+                };
+                journal.append(&row, keys)?;
+                rows.insert((row.method.clone(), row.cell), row);
+                step();
+                Ok(())
+            },
+        )?;
         missing.clear();
         Ok(())
     }
