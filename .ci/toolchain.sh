@@ -103,3 +103,8 @@ board_cargo() {
 build_firmwares() {
     board_cargo build --release -p firmware-sensor -p firmware-display
 }
+
+# What hil-sim cost and hil-sim chart estimators count the instructions of.
+build_cost_examples() {
+    board_cargo build --release -p firmware-sensor --example filter_cost --example estimator_cost
+}

@@ -45,6 +45,7 @@ mod board {
     use embassy_stm32 as _;
     use firmware_sensor::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan, Sensor};
     use protocol::{CHANNELS, GAUGES, SensorConfiguration};
+    use static_cell::ConstStaticCell;
 
     use crate::parts::{FRONT, MILLISECONDS, RIVALS_FROM, SETTINGS_FROM, TRANSFORM};
     use crate::rivals::Rival;
@@ -68,14 +69,16 @@ mod board {
     /// Half the width of an even spread with the RMS of 20 dB in 500 of 2 000 Hz: √3 · √(½ · 0.01 · 4).
     const NOISE: f32 = AMPLITUDE * 0.245;
 
+    // Never on the stack, which holds less.
+    static SIGNAL: ConstStaticCell<Signal> =
+        ConstStaticCell::new([[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS as usize]);
+
     #[cortex_m_rt::entry]
     fn main() -> ! {
         enable_marks();
-        let signal = cortex_m::singleton!(: Signal = [[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS as usize]);
-        if let Some(signal) = signal {
-            rub(signal);
-            run(signal);
-        }
+        let signal = SIGNAL.take();
+        rub(signal);
+        run(signal);
         mark(DONE);
         loop {
             cortex_m::asm::wfi();

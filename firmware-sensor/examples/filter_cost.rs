@@ -48,36 +48,38 @@ mod board {
         MICROMETRES_PER_COUNT, MID_RAIL_CODE, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan, Sensor,
     };
     use protocol::{CHANNELS, GAUGES, Method, SensorConfiguration};
+    use static_cell::ConstStaticCell;
 
     const MILLISECONDS: usize = 1_000;
 
     type Millisecond = [Scan; SCANS_PER_SAMPLE];
     type Signal = [Millisecond; MILLISECONDS];
 
+    // Statics, and never on the stack, which holds less.
+    static SCANS: ConstStaticCell<Signal> =
+        ConstStaticCell::new([[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS]);
+    static SAMPLES: ConstStaticCell<[[f32; GAUGES]; MILLISECONDS]> =
+        ConstStaticCell::new([[0.0; GAUGES]; MILLISECONDS]);
+    static ENCODER: ConstStaticCell<[u16; MILLISECONDS]> = ConstStaticCell::new([0; MILLISECONDS]);
+
     #[cortex_m_rt::entry]
     fn main() -> ! {
         enable_marks();
-        let scans =
-            cortex_m::singleton!(: Signal = [[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS]);
-        let samples =
-            cortex_m::singleton!(: [[f32; GAUGES]; MILLISECONDS] = [[0.0; GAUGES]; MILLISECONDS]);
-        let encoder = cortex_m::singleton!(: [u16; MILLISECONDS] = [0; MILLISECONDS]);
-        if let (Some(scans), Some(samples), Some(encoder)) = (scans, samples, encoder) {
-            let mut noise = Noise(1);
-            for (scans, sample) in scans.iter_mut().zip(samples.iter_mut()) {
-                *scans = [[(); CHANNELS]; SCANS_PER_SAMPLE].map(|scan| scan.map(|()| noise.code()));
-                *sample = [(); GAUGES].map(|()| f32::from(noise.code()) - f32::from(MID_RAIL_CODE));
-            }
-            run(scans, samples);
-            rub(scans, encoder, &mut noise);
-            for (number, method) in [
-                (5, Method::Counting),
-                (6, Method::AdaptedCounting),
-                (7, Method::Crossings),
-                (8, Method::Bank),
-            ] {
-                sense(number, method, scans, encoder);
-            }
+        let (scans, samples, encoder) = (SCANS.take(), SAMPLES.take(), ENCODER.take());
+        let mut noise = Noise(1);
+        for (scans, sample) in scans.iter_mut().zip(samples.iter_mut()) {
+            *scans = [[(); CHANNELS]; SCANS_PER_SAMPLE].map(|scan| scan.map(|()| noise.code()));
+            *sample = [(); GAUGES].map(|()| f32::from(noise.code()) - f32::from(MID_RAIL_CODE));
+        }
+        run(scans, samples);
+        rub(scans, encoder, &mut noise);
+        for (number, method) in [
+            (5, Method::Counting),
+            (6, Method::AdaptedCounting),
+            (7, Method::Crossings),
+            (8, Method::Bank),
+        ] {
+            sense(number, method, scans, encoder);
         }
         mark(DONE);
         loop {

@@ -14,11 +14,19 @@ const BUILT: &str = "target/thumbv7em-none-eabihf/release";
 
 /// Where the ELF of a board is, whether it has been built or not.
 pub fn path(role: Role) -> PathBuf {
-    let folder = env::var_os(FOLDER_VARIABLE).map_or_else(
+    folder().join(format!("firmware-{}", role.name()))
+}
+
+/// Where the ELF of an example of the sensor's is.
+pub fn example(name: &str) -> PathBuf {
+    folder().join("examples").join(name)
+}
+
+fn folder() -> PathBuf {
+    env::var_os(FOLDER_VARIABLE).map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(BUILT),
         PathBuf::from,
-    );
-    folder.join(format!("firmware-{}", role.name()))
+    )
 }
 
 /// Both ELFs, read and checked once.

@@ -9,6 +9,7 @@ mod arm;
 mod bit_for_bit;
 mod configuration;
 mod console;
+mod cost;
 mod determinism;
 mod estimation;
 mod faults;

@@ -1,0 +1,36 @@
+//! What the sensor's parts take in the ELF, counted as `hil-sim cost` and `hil-sim chart estimators` do.
+
+use std::collections::BTreeMap;
+
+use hil_sim::elf::cost::{Taken, measure_example};
+use hil_sim::elf::instructions::BUDGET;
+use tests::elves;
+
+/// What a board has in a millisecond.
+const GIVEN: u64 = BUDGET / 1_000;
+/// The whole sensor, by each method in turn, in `filter_cost`.
+const METHODS: [u64; 4] = [5, 6, 7, 8];
+
+fn measured(example: &str) -> BTreeMap<u64, Taken> {
+    measure_example(&elves::example(example), "firmware-sensor --examples")
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn no_method_ever_takes_a_quarter_of_a_millisecond() {
+    let taken = measured("filter_cost");
+    for method in METHODS {
+        let Taken {
+            largest, pieces, ..
+        } = taken[&method];
+        assert_eq!(pieces, 1_000, "method {method}");
+        assert!(largest < GIVEN / 4, "method {method}: {largest}");
+    }
+}
+
+#[test]
+fn every_setting_and_rival_of_the_chart_comes_to_its_end() {
+    let taken = measured("estimator_cost");
+    assert!(taken.len() > 20, "{taken:?}");
+    assert!(taken.values().all(|taken| taken.total > 0), "{taken:?}");
+}
