@@ -1,7 +1,7 @@
 //! Emulated processors that outlive their runs, with what they have translated of the firmware.
 //!
-//! A fresh processor takes some two seconds of a core until the firmware runs translated; the next run of the
-//! same program takes it over as it was, put back to power-up. What it has translated changes nothing of what it
+//! A fresh processor takes a second or two of a core until the firmware runs translated; the next run of the same
+//! program takes it over as it was, put back to power-up. What it has translated changes nothing of what it
 //! does: instants are counted in instructions, and a block is translated from the same bytes.
 
 use std::fmt::{self, Debug, Formatter};
@@ -9,7 +9,9 @@ use std::hash::Hasher;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rigless::emulator::{CoreBus, CoreSpec, DataModel, Error, Exit, Processor, Queued};
+use rigless::emulator::{
+    CoreBus, CoreSpec, DataModel, Error, Exit, Processor, ProcessorConstructor, Queued,
+};
 use rigless::image::Image;
 use rigless::soc::{Endian, Width};
 use rigless::time::VirtualNanos;
@@ -38,7 +40,7 @@ pub fn keep(spec: &mut CoreSpec, program: u64) {
     spec.processor = Arc::new(move |endian| {
         let kept = match idle(program) {
             Some(kept) => kept,
-            None => Kept::new(make(endian)?, program),
+            None => Kept::new(&make, endian, program)?,
         };
         Ok(Box::new(Lent {
             kept: Some(kept),
@@ -69,6 +71,10 @@ impl Page {
 /// A processor, and what it takes to use it again.
 struct Kept {
     processor: Box<dyn Processor>,
+    /// Another one that never runs, once there has been a reset.
+    twin: Option<Box<dyn Processor>>,
+    make: ProcessorConstructor,
+    endian: Endian,
     /// Its state before its first run.
     at_power_up: Vec<u8>,
     program: u64,
@@ -79,23 +85,47 @@ struct Kept {
 }
 
 impl Kept {
-    fn new(processor: Box<dyn Processor>, program: u64) -> Self {
-        Self {
+    fn new(make: &ProcessorConstructor, endian: Endian, program: u64) -> Result<Self, Error> {
+        let processor = make(endian)?;
+        Ok(Self {
             at_power_up: processor.save(),
             processor,
+            twin: None,
+            make: Arc::clone(make),
+            endian,
             program,
             runs_left: RUNS,
             ground: Vec::new(),
-        }
+        })
     }
 
-    /// Takes the run's memory away from under the processor: all of it is the ground from here on.
+    /// Resets the processor. By its own reset it would drop what it has translated, which is none of its state:
+    /// so its state goes to the twin, is reset there, and comes back.
+    fn reset(&mut self) -> Result<(), Error> {
+        let twin = match &mut self.twin {
+            Some(twin) => twin,
+            None => self.twin.insert((self.make)(self.endian)?),
+        };
+        twin.load(&self.processor.save())?;
+        twin.reset();
+        self.processor.load(&twin.save())?;
+        // No part of the state that is saved.
+        self.processor.take_reset_request();
+        Ok(())
+    }
+
+    /// Takes the run's memory away from under the processor: all of it is the ground from here on. False if
+    /// that is too short, and the processor not to be kept.
     #[expect(unsafe_code, reason = "the emulator hands over memory by raw pointer")]
-    fn ground(&mut self, mapped: &[Mapped]) {
+    fn ground(&mut self, mapped: &[Mapped]) -> bool {
         let longest = mapped.iter().map(|memory| memory.length).max();
         let pages = (longest.unwrap_or(0) as usize).div_ceil(Page::SIZE);
-        if self.ground.len() < pages {
+        // Once only: whatever has been mapped to it stays so.
+        if self.ground.is_empty() {
             self.ground = vec![Page([0; Page::SIZE]); pages];
+        }
+        if self.ground.len() < pages {
+            return false;
         }
         let host = self.ground.as_mut_ptr().cast();
         for memory in mapped {
@@ -103,14 +133,14 @@ impl Kept {
                 let end = memory.start + memory.length;
                 self.processor.ask(Queued::Invalidate(memory.start, end));
             }
-            // SAFETY: the ground is aligned, at least as long, and neither moves nor goes before the processor
-            // does or is given other memory: it is behind a `Vec` that only grows here, just above, once nothing
-            // maps what it was before. Nobody else reads or writes it, and nothing runs while it is mapped.
+            // SAFETY: the ground is aligned and at least as long, does not move, and goes after the processor,
+            // which is declared before it. Nobody reads or writes it, and nothing runs while it is mapped.
             unsafe {
                 let Mapped { start, length, .. } = *memory;
                 self.processor.map(start, length, host, false);
             }
         }
+        true
     }
 }
 
@@ -149,9 +179,10 @@ impl Drop for Lent {
         if !self.is_as_made || kept.runs_left == 0 || std::thread::panicking() {
             return;
         }
-        kept.ground(&self.mapped);
-        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
-        idle.push(kept);
+        if kept.ground(&self.mapped) {
+            let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+            idle.push(kept);
+        }
     }
 }
 
@@ -205,7 +236,11 @@ impl Processor for Lent {
     }
 
     fn reset(&mut self) {
-        self.processor_mut().reset();
+        if let Some(kept) = &mut self.kept
+            && kept.reset().is_err()
+        {
+            kept.processor.reset();
+        }
     }
 
     fn take_reset_request(&mut self) -> bool {
