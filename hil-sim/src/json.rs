@@ -2,6 +2,8 @@
 
 mod lines;
 
+use std::io::{self, Write};
+
 use protocol::Status;
 use serde::Serialize;
 
@@ -9,7 +11,7 @@ use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
 use crate::event::Event;
 use crate::fault::judge::Finding;
 use crate::json::lines::Lines;
-use crate::recording::Recording;
+use crate::recording::Ran;
 use crate::scene::{Gauges, Scene};
 use crate::truth::Truth;
 
@@ -104,19 +106,19 @@ impl From<&Finding> for Fault {
 
 impl<'a> SceneResult<'a> {
     /// The object of one run, without faults, contact and events.
-    pub fn new(truth: &Truth<'a>, recording: &Recording, verdict: &'a Verdict) -> Self {
+    pub fn new(truth: &Truth<'a>, ran: &Ran, verdict: &'a Verdict) -> Self {
         Self {
             name: truth.name,
-            engine: recording.engine.name(),
+            engine: ran.engine.name(),
             method: truth.method,
-            hash: format!("{:016x}", recording.hash),
-            realtime_factor: recording.realtime_factor(),
+            hash: format!("{:016x}", ran.hash),
+            realtime_factor: ran.realtime_factor(),
             estimates: &verdict.estimates,
             summary: verdict.summary,
             actuators: verdict.actuators,
             link: Link {
-                sensor: recording.sensor_status,
-                display: recording.display_status,
+                sensor: ran.sensor_status,
+                display: ran.display_status,
             },
             faults: Vec::new(),
             contact: None,
@@ -145,14 +147,16 @@ pub struct JsonList {
 }
 
 impl JsonList {
-    /// The text to be written for the next run, of which `alone` is what [`to_json`] makes.
-    pub fn next(&mut self, alone: &str) -> String {
+    /// Writes the next run, of which `alone` is what [`to_json`] makes.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&mut self, alone: &str, out: &mut impl Write) -> io::Result<()> {
         let object = alone.trim_end_matches("\n]\n");
-        if std::mem::replace(&mut self.begun, true) {
-            object.replacen('[', ",", 1)
-        } else {
-            object.to_owned()
-        }
+        let (bracket, rest) = object.split_at(1);
+        let begun = std::mem::replace(&mut self.begun, true);
+        out.write_all(if begun { b"," } else { bracket.as_bytes() })?;
+        out.write_all(rest.as_bytes())
     }
 
     /// The text to be written at the end.
@@ -173,7 +177,7 @@ mod tests {
         let truth = Truth::new("a scene", "counting", &*run.surface_mm);
         let recording = run.record();
         let verdict = judge(&truth, &recording);
-        let text = to_json(&[SceneResult::new(&truth, &recording, &verdict)]).unwrap();
+        let text = to_json(&[SceneResult::new(&truth, &recording.ran(), &verdict)]).unwrap();
         serde_json::from_str(&text).unwrap()
     }
 
@@ -247,16 +251,17 @@ mod tests {
         let recording = run.record();
         let verdict = judge(&truth, &recording);
         let results: Vec<SceneResult> = (0..3)
-            .map(|_| SceneResult::new(&truth, &recording, &verdict))
+            .map(|_| SceneResult::new(&truth, &recording.ran(), &verdict))
             .collect();
         for count in 0..=3 {
             let mut list = JsonList::default();
-            let mut text = String::new();
+            let mut text = Vec::new();
             for result in &results[..count] {
-                text += &list.next(&to_json(std::slice::from_ref(result)).unwrap());
+                let alone = to_json(std::slice::from_ref(result)).unwrap();
+                list.write(&alone, &mut text).unwrap();
             }
-            text += list.end();
-            assert_eq!(text, to_json(&results[..count]).unwrap());
+            text.extend(list.end().bytes());
+            assert_eq!(text, to_json(&results[..count]).unwrap().into_bytes());
         }
     }
 

@@ -1,13 +1,19 @@
 //! A scene that was run, judged.
 
+use protocol::{Estimate, Role};
+
 use crate::analysis::{self, Verdict};
-use crate::event::events;
+use crate::event::{Event, Events, events};
 use crate::expectation;
-use crate::fault::judge::{Finding, judge};
+use crate::fault::Reset;
+use crate::fault::judge::{self, Finding, judge};
 use crate::json::{ContactResult, Fault, SceneResult};
-use crate::recording::Recording;
+use crate::listener::Said;
+use crate::native;
+use crate::onlooker::Onlooker;
+use crate::recording::{OutputRecord, Ran, Recording, ScanRecord, TickRecord};
 use crate::report::Chapter;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 use crate::surface::Surface;
 use crate::truth::Truth;
 
@@ -55,7 +61,7 @@ impl Outcome {
             contact: ContactResult::of(&self.scene),
             events: events(&self.scene, &self.recording),
             faults: self.findings.iter().map(Fault::from).collect(),
-            ..SceneResult::new(&self.truth(), &self.recording, &self.verdict)
+            ..SceneResult::new(&self.truth(), &self.recording.ran(), &self.verdict)
         }
     }
 
@@ -69,6 +75,107 @@ impl Outcome {
             findings: &self.findings,
             contact: ContactResult::of(&self.scene).map(|contact| contact.sentence()),
         }
+    }
+}
+
+/// A scene that was judged while it ran, and of which nothing else is left.
+#[derive(Clone, Debug)]
+pub struct Judgement<'a> {
+    /// What was run.
+    pub scene: &'a Scene,
+    /// What is known of the run.
+    pub ran: Ran,
+    /// The run, judged.
+    pub verdict: Verdict,
+    /// A line for each expectation of the scene that was not met.
+    pub unmet: Vec<String>,
+    /// What became of the scene's faults, in their order.
+    pub findings: Vec<Finding>,
+    /// What happened, and when, if it was asked for.
+    pub events: Vec<Event>,
+}
+
+impl<'a> Judgement<'a> {
+    /// Runs a scene on the native engine and judges it meanwhile, to the same ends as [`Outcome::new`]. Events
+    /// take the contact model to be led through the scene once more.
+    ///
+    /// # Errors
+    /// If the scene cannot be run.
+    pub fn of(scene: &'a Scene, with_events: bool) -> Result<Self, SceneError> {
+        let surface = Surface::new(&scene.surface, 0.0);
+        let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
+        let mut judges = Judges {
+            run: analysis::Judge::new(&truth(scene, &wavelength_mm)),
+            faults: judge::Judge::new(&scene.faults, scene.duration_s),
+            events: with_events.then(|| Events::new(scene)),
+        };
+        let ran = native::run_before(scene, &mut judges)?;
+        let verdict = judges.run.finish();
+        Ok(Self {
+            scene,
+            ran,
+            unmet: expectation::unmet(&scene.expect, &verdict),
+            verdict,
+            findings: judges.faults.finish(),
+            events: judges.events.map(Events::finish).unwrap_or_default(),
+        })
+    }
+
+    /// The object in the JSON.
+    pub fn result(&self) -> SceneResult<'_> {
+        // No surface is asked for any more.
+        let truth = truth(self.scene, &|_| f64::NAN);
+        SceneResult {
+            contact: ContactResult::of(self.scene),
+            events: self.events.clone(),
+            faults: self.findings.iter().map(Fault::from).collect(),
+            ..SceneResult::new(&truth, &self.ran, &self.verdict)
+        }
+    }
+}
+
+/// All who judge a run.
+struct Judges<'a> {
+    run: analysis::Judge<'a>,
+    faults: judge::Judge,
+    events: Option<Events<'a>>,
+}
+
+impl Onlooker for Judges<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.run.scan(scan);
+        if let Some(events) = &mut self.events {
+            events.scan(scan);
+        }
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.run.made(made_ns, estimate);
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.run.tick(tick);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.run.output(output);
+        self.faults.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.run.received(number, received_ns);
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        self.faults.said(role, said);
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        self.faults.reset(reset);
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        self.faults.cleared(at_ns);
     }
 }
 

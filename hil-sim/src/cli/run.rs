@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
+use hil_sim::analysis::Verdict;
 use hil_sim::annotation::Annotation;
 use hil_sim::batch;
 use hil_sim::expectation::key_of;
@@ -13,10 +14,10 @@ use hil_sim::golden::{Golden, Standing, complaint};
 use hil_sim::json::{JsonList, to_json};
 use hil_sim::junit::{self, Case, Fate};
 use hil_sim::map::shard::Shard;
-use hil_sim::outcome::Outcome;
-use hil_sim::recording::{Engine, Recording};
+use hil_sim::outcome::{Judgement, Outcome};
+use hil_sim::recording::{Engine, Ran};
 use hil_sim::report::html;
-use hil_sim::scene::{SceneError, line_of};
+use hil_sim::scene::{Scene, SceneError, line_of};
 
 use super::number;
 use super::say::say;
@@ -95,8 +96,12 @@ impl Run {
             met: true,
         };
         let work = |loaded: &Loaded| {
+            if report.is_none() && self.way.engine() == Engine::Native {
+                return Judged::on_the_fly(&loaded.scene, self.json.is_some());
+            }
             let recording = ready.run(&loaded.scene)?;
-            Judged::new(loaded, recording, self.json.is_some(), report.is_some())
+            let outcome = Outcome::new(loaded.scene.clone(), recording);
+            Judged::recorded(outcome, self.json.is_some(), report.is_some())
         };
         let ran = batch::in_order(&scenes, self.way.threads(), work, |index, judged| {
             books.enter(&scenes[index], judged)
@@ -129,20 +134,27 @@ impl Run {
 }
 
 impl Judged {
-    /// Judges a run; what is not asked for is dropped.
-    fn new(
-        loaded: &Loaded,
-        recording: Recording,
-        json: bool,
-        report: bool,
-    ) -> anyhow::Result<Self> {
-        let (hash, wall_s) = (recording.hash, recording.wall_s);
-        let outcome = Outcome::new(loaded.scene.clone(), recording);
+    /// Runs a scene on the native engine and judges it meanwhile: no recording is made.
+    fn on_the_fly(scene: &Scene, json: bool) -> anyhow::Result<Self> {
+        let judgement = Judgement::of(scene, json)?;
         Ok(Self {
-            row: row(&outcome),
+            row: row(&scene.name, &judgement.verdict, &judgement.ran),
+            hash: judgement.ran.hash,
+            wall_s: judgement.ran.wall_s,
+            json: json.then(|| to_json(&[judgement.result()])).transpose()?,
+            unmet: judgement.unmet,
+            outcome: None,
+        })
+    }
+
+    /// Judges a recorded run; what is not asked for is dropped.
+    fn recorded(outcome: Outcome, json: bool, report: bool) -> anyhow::Result<Self> {
+        let ran = outcome.recording.ran();
+        Ok(Self {
+            row: row(&outcome.scene.name, &outcome.verdict, &ran),
             unmet: outcome.unmet.clone(),
-            hash,
-            wall_s,
+            hash: ran.hash,
+            wall_s: ran.wall_s,
             json: json.then(|| to_json(&[outcome.result()])).transpose()?,
             outcome: report.then_some(outcome),
         })
@@ -211,7 +223,7 @@ impl Books<'_> {
         }
         self.met &= is_met;
         if let (Some((file, path, list)), Some(alone)) = (&mut self.json, &judged.json) {
-            file.write_all(list.next(alone).as_bytes())
+            list.write(alone, file)
                 .with_context(|| format!("{}", path.display()))?;
         }
         self.outcomes.extend(judged.outcome);
@@ -265,19 +277,18 @@ const HEADER: &str = "\
 scene                       λ mm     rms %  valid  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
 /// A scene's line, up to whether it is as expected.
-fn row(outcome: &Outcome) -> String {
-    let summary = &outcome.verdict.summary;
-    let actuators = &outcome.verdict.actuators;
+fn row(name: &str, verdict: &Verdict, ran: &Ran) -> String {
+    let summary = &verdict.summary;
+    let actuators = &verdict.actuators;
     format!(
-        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
-        outcome.scene.name,
+        "{name:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
         number(summary.valid_share, 2),
         number(actuators.frequency_hz, 3),
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),
-        pace(outcome.recording.realtime_factor()),
+        pace(ran.realtime_factor()),
     )
 }
 
