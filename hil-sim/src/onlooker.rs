@@ -75,22 +75,23 @@ pub fn retell(recording: &Recording, to: &mut impl Onlooker) {
         if next_ns == OVER_NS {
             break;
         } else if scan_ns == next_ns {
-            scans.next().into_iter().for_each(|scan| to.scan(scan));
+            if let Some(scan) = scans.next() {
+                to.scan(scan);
+            }
         } else if made_ns == next_ns {
-            for record in made.next() {
+            if let Some(record) = made.next() {
                 to.made(record.made_ns, &record.estimate);
             }
         } else if tick_ns == next_ns {
-            ticks.next().into_iter().for_each(|tick| to.tick(tick));
-        } else if output_ns == next_ns {
-            outputs
-                .next()
-                .into_iter()
-                .for_each(|output| to.output(output));
-        } else {
-            for (received_ns, number) in arrivals.next() {
-                to.received(number, received_ns);
+            if let Some(tick) = ticks.next() {
+                to.tick(tick);
             }
+        } else if output_ns == next_ns {
+            if let Some(output) = outputs.next() {
+                to.output(output);
+            }
+        } else if let Some((received_ns, number)) = arrivals.next() {
+            to.received(number, received_ns);
         }
     }
     let signs = &recording.signs;

@@ -55,13 +55,18 @@ impl Outcome {
         truth(&self.scene, &*self.wavelength_mm)
     }
 
-    /// The outcome's object in the JSON.
-    pub fn result(&self) -> SceneResult<'_> {
-        SceneResult {
-            contact: ContactResult::of(&self.scene),
-            events: events(&self.scene, &self.recording),
-            faults: self.findings.iter().map(Fault::from).collect(),
-            ..SceneResult::new(&self.truth(), &self.recording.ran(), &self.verdict)
+    /// The same without the recording; events on demand.
+    pub fn judgement(&self, with_events: bool) -> Judgement {
+        Judgement {
+            ran: self.recording.ran(),
+            verdict: self.verdict.clone(),
+            unmet: self.unmet.clone(),
+            findings: self.findings.clone(),
+            events: if with_events {
+                events(&self.scene, &self.recording)
+            } else {
+                Vec::new()
+            },
         }
     }
 
@@ -78,11 +83,9 @@ impl Outcome {
     }
 }
 
-/// A scene that was judged while it ran, and of which nothing else is left.
-#[derive(Clone, Debug)]
-pub struct Judgement<'a> {
-    /// What was run.
-    pub scene: &'a Scene,
+/// What came of a run, of which nothing else need be left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
     /// What is known of the run.
     pub ran: Ran,
     /// The run, judged.
@@ -95,13 +98,13 @@ pub struct Judgement<'a> {
     pub events: Vec<Event>,
 }
 
-impl<'a> Judgement<'a> {
+impl Judgement {
     /// Runs a scene on the native engine and judges it meanwhile, to the same ends as [`Outcome::new`]. Events
     /// take the contact model to be led through the scene once more.
     ///
     /// # Errors
     /// If the scene cannot be run.
-    pub fn of(scene: &'a Scene, with_events: bool) -> Result<Self, SceneError> {
+    pub fn of(scene: &Scene, with_events: bool) -> Result<Self, SceneError> {
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
         let mut judges = Judges {
@@ -112,7 +115,6 @@ impl<'a> Judgement<'a> {
         let ran = native::run_before(scene, &mut judges)?;
         let verdict = judges.run.finish();
         Ok(Self {
-            scene,
             ran,
             unmet: expectation::unmet(&scene.expect, &verdict),
             verdict,
@@ -121,15 +123,14 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// The object in the JSON.
-    pub fn result(&self) -> SceneResult<'_> {
-        // No surface is asked for any more.
-        let truth = truth(self.scene, &|_| f64::NAN);
+    /// The object in the JSON; `scene` is the one that was run.
+    pub fn result<'a>(&'a self, scene: &'a Scene) -> SceneResult<'a> {
+        let method = scene.estimator.method_name();
         SceneResult {
-            contact: ContactResult::of(self.scene),
+            contact: ContactResult::of(scene),
             events: self.events.clone(),
             faults: self.findings.iter().map(Fault::from).collect(),
-            ..SceneResult::new(&truth, &self.ran, &self.verdict)
+            ..SceneResult::new(&scene.name, method, &self.ran, &self.verdict)
         }
     }
 }

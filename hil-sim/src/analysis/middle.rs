@@ -155,7 +155,7 @@ mod tests {
     use crate::analysis::stimulus::{Stimulus, Told};
     use crate::analysis::synthetic::Run;
     use crate::onlooker::{Onlooker, retell};
-    use crate::recording::{OutputRecord, TickRecord, WORD_V, volts};
+    use crate::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V, volts};
     use crate::truth::Truth;
 
     /// For each stroke, the instants in s and the voltage of actuator 0 about its middle.
@@ -268,5 +268,25 @@ mod tests {
             strokes(&Run::to_and_fro(50.0, 0.039, 2.0)),
             Vec::<Vec<_>>::new()
         );
+    }
+
+    #[test]
+    fn outputs_that_change_while_the_hand_rests_are_given_up() {
+        let mut middle = AboutMiddle::default();
+        let mut handed_on = 0;
+        for number in 0..3 * POINTS_KEPT {
+            let edge = Edge {
+                t_s: number as f64 * 500e-6,
+                words: [0x9000; ACTUATORS],
+            };
+            let point = Point {
+                edge,
+                volts: 0.0,
+                travelled_cycles: 7.25,
+            };
+            middle.add(point, |about| handed_on += usize::from(about.is_some()));
+            assert!(middle.held() <= POINTS_KEPT);
+        }
+        assert_eq!(handed_on, 0);
     }
 }

@@ -7,10 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hil_sim::analysis::Summary;
 use hil_sim::chart::family::{self, Family};
-use hil_sim::elf::Firmwares;
-use hil_sim::outcome::Outcome;
+use hil_sim::elf::{self, Firmwares};
+use hil_sim::outcome::{Judgement, Outcome};
 use hil_sim::scene::Scene;
-use hil_sim::{elf, native};
 
 use super::say::say;
 use super::{Elves, EngineName, number, progress};
@@ -82,14 +81,16 @@ fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<J
             let Some(scene) = scenes.get(index) else {
                 return Ok(());
             };
-            let recording = match firmwares {
-                None => native::run(scene)?,
-                Some(firmwares) => elf::run(scene, firmwares)?.0,
+            let judgement = match firmwares {
+                None => Judgement::of(scene, false)?,
+                Some(firmwares) => {
+                    let (recording, _) = elf::run(scene, firmwares)?;
+                    Outcome::new((*scene).clone(), recording).judgement(false)
+                }
             };
-            let outcome = Outcome::new((*scene).clone(), recording);
             let judged = Judged {
-                summary: outcome.verdict.summary,
-                unmet: outcome.unmet,
+                summary: judgement.verdict.summary,
+                unmet: judgement.unmet,
             };
             bar.inc(1);
             let mut done = done
