@@ -172,6 +172,20 @@ mod tests {
 
         fn tick(&mut self, tick: &TickRecord) {
             self.stimulus.tick(tick);
+            self.follow();
+        }
+
+        fn output(&mut self, output: &OutputRecord) {
+            self.stimulus.output(output);
+        }
+
+        fn received(&mut self, number: usize, received_ns: u64) {
+            self.stimulus.received(number, received_ns);
+        }
+    }
+
+    impl Strokes {
+        fn follow(&mut self) {
             while let Some(told) = self.stimulus.take() {
                 let (edge, due) = match told {
                     Told::Turned(cycles) => {
@@ -195,14 +209,6 @@ mod tests {
                 });
             }
         }
-
-        fn output(&mut self, output: &OutputRecord) {
-            self.stimulus.output(output);
-        }
-
-        fn received(&mut self, number: usize, received_ns: u64) {
-            self.stimulus.received(number, received_ns);
-        }
     }
 
     fn strokes(run: &Run) -> Vec<Vec<(f64, f64)>> {
@@ -212,6 +218,8 @@ mod tests {
             found: vec![Vec::new()],
         };
         retell(&run.record(), &mut strokes);
+        strokes.stimulus.end();
+        strokes.follow();
         strokes.found.retain(|stroke| !stroke.is_empty());
         strokes.found
     }
