@@ -1,8 +1,9 @@
 //! What is told of a run while it goes on: to whoever writes it down, or judges it.
 //!
 //! ```text
-//! native ──────────────┬─> Tape ─> Recording ─┐
-//! elf ─> Recording ─ retell ─> judges <─ native └─ retell ─> judges
+//! native ─┬──────────────────────────────────┐
+//!         └─> Tape ─> Recording ─> retell ───┼─> judges
+//! elf ──────────────> Recording ─> retell ───┘
 //! ```
 //!
 //! A judge keeps only what it still needs, so that a run that is told to it directly needs no more memory

@@ -99,8 +99,9 @@ impl Cycles {
 
     /// A cycle ends between two points, and the next one begins.
     ///
-    /// The cycles travelled at a crossing are on a straight line between the points about it, at most a tick
-    /// apart but where a slow hand keeps one voltage for longer.
+    /// The cycles travelled at a crossing are on a straight line between the points about it: a tick apart, but
+    /// where a slow hand keeps one voltage for longer. Where edges come after their ticks, the hand's speed changes
+    /// between two points, which moves the cycles of a stretch by a millionth.
     fn cross(&mut self, t_s: f64, travelled_cycles: f64, before: &Point, point: &Point) {
         let edges = (&before.edge, &point.edge);
         let here = (t_s, travelled_cycles);

@@ -21,7 +21,7 @@ pub struct Edge {
 /// edge), a point a tick before the next edge keeps the last output.
 #[derive(Clone, Debug)]
 pub struct Edges {
-    /// The time between two ticks, in s.
+    /// The time between two ticks as the display is set, in s.
     tick_s: f64,
     last: Option<Edge>,
     waiting: VecDeque<Edge>,
