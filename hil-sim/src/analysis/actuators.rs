@@ -161,6 +161,7 @@ impl Judge {
                         edge,
                         volts,
                         travelled_cycles: due.travelled_cycles,
+                        tick: due.tick,
                     };
                     self.middle.add(point, |about| self.cycles.add(about));
                 }

@@ -83,9 +83,9 @@ impl Cycles {
             return;
         };
         if before_v < 0.0 && volts >= 0.0 {
-            let straight = |from: f64, to: f64| from + (to - from) * before_v / (before_v - volts);
-            let t_s = straight(before.edge.t_s, point.edge.t_s);
-            let cycles = straight(before.travelled_cycles, point.travelled_cycles);
+            let length_s = point.edge.t_s - before.edge.t_s;
+            let t_s = before.edge.t_s + length_s * before_v / (before_v - volts);
+            let cycles = travelled_cycles(&before, point, t_s);
             self.cross(t_s, cycles, &before, point);
         } else if let Some(open) = &mut self.open {
             let from = (before.edge.t_s, before.travelled_cycles);
@@ -98,10 +98,6 @@ impl Cycles {
     }
 
     /// A cycle ends between two points, and the next one begins.
-    ///
-    /// The cycles travelled at a crossing are on a straight line between the points about it: a tick apart, but
-    /// where a slow hand keeps one voltage for longer. Where edges come after their ticks, the hand's speed changes
-    /// between two points, which moves the cycles of a stretch by a millionth.
     fn cross(&mut self, t_s: f64, travelled_cycles: f64, before: &Point, point: &Point) {
         let edges = (&before.edge, &point.edge);
         let here = (t_s, travelled_cycles);
@@ -186,6 +182,26 @@ impl Cycles {
     /// How many crossings are held, and how many sums.
     pub fn held(&self) -> (usize, usize) {
         (self.crossings.len(), self.means.held())
+    }
+}
+
+/// The cycles travelled at an instant between two points: straight but for the tick before the second. Only where
+/// a slow hand keeps one voltage for longer there were other ticks before.
+fn travelled_cycles(before: &Point, point: &Point, t_s: f64) -> f64 {
+    let mut from = (before.edge.t_s, before.travelled_cycles);
+    let mut to = (point.edge.t_s, point.travelled_cycles);
+    if from.0 < point.tick.0 && point.tick.0 < to.0 {
+        if t_s < point.tick.0 {
+            to = point.tick;
+        } else {
+            from = point.tick;
+        }
+    }
+    let length_s = to.0 - from.0;
+    if length_s > 0.0 {
+        from.1 + (to.1 - from.1) * (t_s - from.0) / length_s
+    } else {
+        from.1
     }
 }
 

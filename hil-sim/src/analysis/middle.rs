@@ -32,6 +32,8 @@ pub struct Point {
     pub volts: f64,
     /// The cycles travelled by then: never falls.
     pub travelled_cycles: f64,
+    /// The last tick by then, in s, and the cycles travelled by that.
+    pub tick: (f64, f64),
 }
 
 /// The points whose middle is not known yet, and those that it takes.
@@ -198,6 +200,7 @@ mod tests {
                     edge,
                     volts: volts(edge.words[0]),
                     travelled_cycles: due.travelled_cycles,
+                    tick: due.tick,
                 };
                 self.middle.add(point, |about| match about {
                     Some((volts, point)) => {
@@ -291,6 +294,7 @@ mod tests {
                 edge,
                 volts: 0.0,
                 travelled_cycles: 7.25,
+                tick: (edge.t_s, 7.25),
             };
             middle.add(point, |about| handed_on += usize::from(about.is_some()));
             assert!(middle.held() <= POINTS_KEPT);

@@ -53,6 +53,8 @@ pub struct Due {
     pub cycles: f64,
     /// The cycles gone through so far, forwards and backwards alike: never falls.
     pub travelled_cycles: f64,
+    /// The last tick by then, in s, and the cycles gone through by that: they go straight from tick to tick.
+    pub tick: (f64, f64),
 }
 
 impl DuePhase {
@@ -103,6 +105,7 @@ impl DuePhase {
             t_s,
             cycles,
             travelled_cycles,
+            tick: before.map_or((t_s, travelled_cycles), |tick| tick.tick),
         }
     }
 
@@ -146,10 +149,12 @@ impl Onlooker for DuePhase {
             let shortest_mm = self.shortest_mm.unwrap_or(f64::INFINITY);
             self.shortest_mm = Some(shortest_mm.min(1.0 / per_mm));
         }
+        let t_s = seconds(tick.at_ns);
         self.ticks.push_back(Due {
-            t_s: seconds(tick.at_ns),
+            t_s,
             cycles: self.cycles + self.place_mm * per_mm,
             travelled_cycles: self.travelled,
+            tick: (t_s, self.travelled),
         });
         if self.ticks.len() > TICKS_KEPT {
             self.ticks.pop_front();
