@@ -1,6 +1,7 @@
 //! Judging a run: what the estimates and the actuators did, in numbers.
 
 pub mod actuators;
+mod channels;
 mod cycles;
 pub mod edges;
 pub mod estimates;
@@ -10,16 +11,20 @@ pub mod phase;
 mod phase_error;
 pub mod reaction;
 pub mod spectrum;
+mod stimulus;
 #[cfg(test)]
 pub(crate) mod synthetic;
 pub mod track;
 mod voltage;
 pub mod words;
 
-use crate::recording::Recording;
+use protocol::Estimate;
+
+use crate::onlooker::{Onlooker, retell};
+use crate::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
 use crate::truth::Truth;
 
-pub use actuators::Actuators;
+pub use actuators::{Actuators, Held};
 pub use estimates::{JudgedEstimate, Summary};
 
 /// A recording, judged against its truth.
@@ -35,11 +40,68 @@ pub struct Verdict {
 
 /// Judges a recording. What a recording is too short or too empty to tell is none, never NaN.
 pub fn judge(truth: &Truth, recording: &Recording) -> Verdict {
-    let (estimates, summary) = estimates::judge(truth, recording);
-    Verdict {
-        estimates,
-        summary,
-        actuators: actuators::judge(truth, recording),
+    let mut judge = Judge::new(truth);
+    retell(recording, &mut judge);
+    judge.finish()
+}
+
+/// Judges a run as it goes on, the same as [`judge`] does once it is recorded. It keeps the estimates, a few
+/// numbers for each cycle of the stimulus, and no more of the rest than the hand takes for a cycle.
+pub struct Judge<'a> {
+    estimates: estimates::Judge<'a>,
+    actuators: actuators::Judge,
+}
+
+impl<'a> Judge<'a> {
+    /// Before the run.
+    pub fn new(truth: &Truth<'a>) -> Self {
+        Self {
+            estimates: estimates::Judge::new(truth),
+            actuators: actuators::Judge::new(truth),
+        }
+    }
+
+    /// The run, judged.
+    pub fn finish(self) -> Verdict {
+        let (estimates, summary) = self.estimates.finish();
+        Verdict {
+            estimates,
+            summary,
+            actuators: self.actuators.finish(),
+        }
+    }
+
+    /// How much is held of what is not the estimates.
+    pub fn held(&self) -> Held {
+        let held = self.actuators.held();
+        Held {
+            points: held.points + self.estimates.held(),
+            ..held
+        }
+    }
+}
+
+impl Onlooker for Judge<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.estimates.scan(scan);
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.estimates.made(made_ns, estimate);
+        self.actuators.made(made_ns, estimate);
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.actuators.tick(tick);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.actuators.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.estimates.received(number, received_ns);
+        self.actuators.received(number, received_ns);
     }
 }
 

@@ -7,7 +7,8 @@
 use serde::Serialize;
 
 use crate::contact::Contact;
-use crate::recording::Recording;
+use crate::onlooker::{Onlooker, retell};
+use crate::recording::{Recording, ScanRecord};
 use crate::scene::{Follows, Gauges, Motion, Scene};
 use crate::skew::Skew;
 use crate::surface::Surface;
@@ -50,27 +51,69 @@ pub enum Kind {
 
 /// Everything that happened in a run of `scene`, in its order.
 pub fn events(scene: &Scene, recording: &Recording) -> Vec<Event> {
-    let mut events: Vec<Event> = hand_reversals_s(&scene.motion, scene.duration_s)
-        .into_iter()
-        .map(|t_s| Event {
-            t_s,
-            kind: Kind::HandReversal,
-        })
-        .collect();
-    if scene.arm.follows == Follows::Link {
-        arm_reversals(scene, recording, &mut events);
+    let mut events = Events::new(scene);
+    retell(recording, &mut events);
+    events.finish()
+}
+
+/// Finds what happens in a run as it goes on: the events are kept, of the scans the last two.
+pub struct Events<'a> {
+    scene: &'a Scene,
+    turns: Option<ArmTurns>,
+    touches: Option<Touches>,
+    arm_reversals: Vec<Event>,
+    touched: Vec<Event>,
+}
+
+impl<'a> Events<'a> {
+    /// Before the run of `scene`.
+    pub fn new(scene: &'a Scene) -> Self {
+        Self {
+            scene,
+            turns: (scene.arm.follows == Follows::Link).then(|| ArmTurns::new(scene)),
+            touches: match &scene.gauges {
+                Gauges::Kinematic(kinematic) => {
+                    Some(Touches::new(scene, Skew::new(kinematic.skew_us)))
+                }
+                Gauges::Recorded(_) => None,
+            },
+            arm_reversals: Vec::new(),
+            touched: Vec::new(),
+        }
     }
-    if let Gauges::Kinematic(kinematic) = &scene.gauges {
-        touches(scene, recording, Skew::new(kinematic.skew_us), &mut events);
+
+    /// Everything that happened, in its order.
+    pub fn finish(self) -> Vec<Event> {
+        let mut events: Vec<Event> = hand_reversals_s(&self.scene.motion, self.scene.duration_s)
+            .into_iter()
+            .map(|t_s| Event {
+                t_s,
+                kind: Kind::HandReversal,
+            })
+            .collect();
+        events.extend(self.arm_reversals);
+        events.extend(self.touched);
+        events.extend(self.scene.faults.iter().map(|fault| Event {
+            t_s: fault.at_s,
+            kind: Kind::Fault {
+                fault: fault.kind.name(),
+            },
+        }));
+        events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        events
     }
-    events.extend(scene.faults.iter().map(|fault| Event {
-        t_s: fault.at_s,
-        kind: Kind::Fault {
-            fault: fault.kind.name(),
-        },
-    }));
-    events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-    events
+}
+
+impl Onlooker for Events<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        let t_s = scan.at_ns as f64 * 1e-9;
+        if let Some(turns) = &mut self.turns {
+            self.arm_reversals.extend(turns.scan(t_s, scan.position_mm));
+        }
+        if let Some(touches) = &mut self.touches {
+            touches.scan(t_s, scan.position_mm, &mut self.touched);
+        }
+    }
 }
 
 /// When a hand turns back within `duration_s`, in s. Of a hand that rests in between, when it turns.
@@ -105,62 +148,95 @@ pub fn hand_reversals_s(motion: &Motion, duration_s: f64) -> Vec<f64> {
 
 /// Turns of a driven arm: at a scan if its drive has no lag, else where the parabola through the three
 /// scans around it turns.
-fn arm_reversals(scene: &Scene, recording: &Recording, events: &mut Vec<Event>) {
-    let mut direction = 0.0;
-    for scans in recording.scans.windows(3) {
-        let [a, b, c] = scans else { continue };
-        let times = [a, b, c].map(|scan| scan.at_ns as f64 * 1e-9);
-        let before_mm = b.position_mm - a.position_mm;
-        let after_mm = c.position_mm - b.position_mm;
+struct ArmTurns {
+    lags: bool,
+    /// The scan before the last, and the last, in s and mm.
+    before: [Option<(f64, f64)>; 2],
+    direction: f64,
+}
+
+impl ArmTurns {
+    fn new(scene: &Scene) -> Self {
+        Self {
+            lags: scene.arm.lag_ms != 0.0,
+            before: [None; 2],
+            direction: 0.0,
+        }
+    }
+
+    /// The turn about the scan before this one.
+    fn scan(&mut self, t_s: f64, position_mm: f64) -> Option<Event> {
+        let c = (t_s, position_mm);
+        let [a, b] = self.before;
+        self.before = [b, Some(c)];
+        let (a, b) = (a?, b?);
+        let before_mm = b.1 - a.1;
+        let after_mm = c.1 - b.1;
         if before_mm != 0.0 {
-            direction = before_mm.signum();
+            self.direction = before_mm.signum();
         }
-        if after_mm == 0.0 || after_mm.signum() != -direction {
-            continue;
+        if after_mm == 0.0 || after_mm.signum() != -self.direction {
+            return None;
         }
-        let half_s = 0.5 * (times[2] - times[0]) / 2.0;
-        let t_s = if scene.arm.lag_ms == 0.0 || before_mm == 0.0 {
-            times[1]
+        let half_s = 0.5 * (c.0 - a.0) / 2.0;
+        let t_s = if !self.lags || before_mm == 0.0 {
+            b.0
         } else {
-            times[1] + half_s * (before_mm + after_mm) / (before_mm - after_mm)
+            b.0 + half_s * (before_mm + after_mm) / (before_mm - after_mm)
         };
-        events.push(Event {
+        Some(Event {
             t_s,
             kind: Kind::ArmReversal,
-        });
+        })
     }
 }
 
 /// Borders, sticks and slips: the contact is led once more along the scans of the run.
-fn touches(scene: &Scene, recording: &Recording, mut skew: Skew, events: &mut Vec<Event>) {
-    let surface = Surface::new(&scene.surface, 0.0);
-    let borders = borders_mm(scene);
-    let mut contact = Contact::new(scene.contact, scene.force.stiffness_n_per_m);
-    let mut before: Option<(f64, f64)> = None;
-    for scan in &recording.scans {
-        let t_s = scan.at_ns as f64 * 1e-9;
-        let arm_mm = skew.at_gauges_mm(t_s, scan.position_mm);
-        let here_mm = contact.follow(t_s, arm_mm).position_mm;
-        events.extend(contact.take_turns().into_iter().map(|(t_s, rests)| Event {
+struct Touches {
+    surface: Surface,
+    borders_mm: Vec<f64>,
+    contact: Contact,
+    skew: Skew,
+    /// The last scan, in s, and where the skin touched then, in mm.
+    before: Option<(f64, f64)>,
+}
+
+impl Touches {
+    fn new(scene: &Scene, skew: Skew) -> Self {
+        Self {
+            surface: Surface::new(&scene.surface, 0.0),
+            borders_mm: borders_mm(scene),
+            contact: Contact::new(scene.contact, scene.force.stiffness_n_per_m),
+            skew,
+            before: None,
+        }
+    }
+
+    /// Adds what happened since the scan before.
+    fn scan(&mut self, t_s: f64, position_mm: f64, events: &mut Vec<Event>) {
+        let arm_mm = self.skew.at_gauges_mm(t_s, position_mm);
+        let here_mm = self.contact.follow(t_s, arm_mm).position_mm;
+        let turns = self.contact.take_turns().into_iter();
+        events.extend(turns.map(|(t_s, rests)| Event {
             t_s,
             kind: if rests { Kind::Stick } else { Kind::Slip },
         }));
-        if let Some((before_s, before_mm)) = before {
-            let (low_mm, high_mm) = (before_mm.min(here_mm), before_mm.max(here_mm));
-            for &border_mm in &borders {
-                if low_mm < border_mm && border_mm <= high_mm {
-                    let share = (border_mm - before_mm) / (here_mm - before_mm);
-                    events.push(Event {
-                        t_s: before_s + share * (t_s - before_s),
-                        kind: Kind::Border {
-                            from_mm: surface.wavelength_mm(before_mm),
-                            to_mm: surface.wavelength_mm(here_mm),
-                        },
-                    });
-                }
+        let Some((before_s, before_mm)) = self.before.replace((t_s, here_mm)) else {
+            return;
+        };
+        let (low_mm, high_mm) = (before_mm.min(here_mm), before_mm.max(here_mm));
+        for &border_mm in &self.borders_mm {
+            if low_mm < border_mm && border_mm <= high_mm {
+                let share = (border_mm - before_mm) / (here_mm - before_mm);
+                events.push(Event {
+                    t_s: before_s + share * (t_s - before_s),
+                    kind: Kind::Border {
+                        from_mm: self.surface.wavelength_mm(before_mm),
+                        to_mm: self.surface.wavelength_mm(here_mm),
+                    },
+                });
             }
         }
-        before = Some((t_s, here_mm));
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod lines;
 
+use std::io::{self, Write};
+
 use protocol::Status;
 use serde::Serialize;
 
@@ -9,9 +11,8 @@ use crate::analysis::{Actuators, JudgedEstimate, Summary, Verdict};
 use crate::event::Event;
 use crate::fault::judge::Finding;
 use crate::json::lines::Lines;
-use crate::recording::Recording;
+use crate::recording::Ran;
 use crate::scene::{Gauges, Scene};
-use crate::truth::Truth;
 
 /// A scene's object. A number that could not be measured is null.
 #[derive(Clone, Debug, Serialize)]
@@ -103,20 +104,21 @@ impl From<&Finding> for Fault {
 }
 
 impl<'a> SceneResult<'a> {
-    /// The object of one run, without faults, contact and events.
-    pub fn new(truth: &Truth<'a>, recording: &Recording, verdict: &'a Verdict) -> Self {
+    /// The object of one run, without faults, contact and events: of a scene's name, and of how λ was estimated,
+    /// as the scene writes it.
+    pub fn new(name: &'a str, method: &'a str, ran: &Ran, verdict: &'a Verdict) -> Self {
         Self {
-            name: truth.name,
-            engine: recording.engine.name(),
-            method: truth.method,
-            hash: format!("{:016x}", recording.hash),
-            realtime_factor: recording.realtime_factor(),
+            name,
+            engine: ran.engine.name(),
+            method,
+            hash: format!("{:016x}", ran.hash),
+            realtime_factor: ran.realtime_factor(),
             estimates: &verdict.estimates,
             summary: verdict.summary,
             actuators: verdict.actuators,
             link: Link {
-                sensor: recording.sensor_status,
-                display: recording.display_status,
+                sensor: ran.sensor_status,
+                display: ran.display_status,
             },
             faults: Vec::new(),
             contact: None,
@@ -145,14 +147,15 @@ pub struct JsonList {
 }
 
 impl JsonList {
-    /// The text to be written for the next run, of which `alone` is what [`to_json`] makes.
-    pub fn next(&mut self, alone: &str) -> String {
-        let object = alone.trim_end_matches("\n]\n");
-        if std::mem::replace(&mut self.begun, true) {
-            object.replacen('[', ",", 1)
-        } else {
-            object.to_owned()
-        }
+    /// Writes the next run.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&mut self, result: &SceneResult, out: &mut impl Write) -> io::Result<()> {
+        let begun = std::mem::replace(&mut self.begun, true);
+        out.write_all(if begun { b",\n  " } else { b"[\n  " })?;
+        let mut out = serde_json::Serializer::with_formatter(out, Lines::in_a_list());
+        Ok(result.serialize(&mut out)?)
     }
 
     /// The text to be written at the end.
@@ -168,12 +171,19 @@ mod tests {
     use super::*;
     use crate::analysis::judge;
     use crate::analysis::synthetic::Run;
+    use crate::truth::Truth;
 
     fn parsed(run: &Run) -> Value {
         let truth = Truth::new("a scene", "counting", &*run.surface_mm);
         let recording = run.record();
         let verdict = judge(&truth, &recording);
-        let text = to_json(&[SceneResult::new(&truth, &recording, &verdict)]).unwrap();
+        let text = to_json(&[SceneResult::new(
+            truth.name,
+            truth.method,
+            &recording.ran(),
+            &verdict,
+        )])
+        .unwrap();
         serde_json::from_str(&text).unwrap()
     }
 
@@ -247,16 +257,16 @@ mod tests {
         let recording = run.record();
         let verdict = judge(&truth, &recording);
         let results: Vec<SceneResult> = (0..3)
-            .map(|_| SceneResult::new(&truth, &recording, &verdict))
+            .map(|_| SceneResult::new(truth.name, truth.method, &recording.ran(), &verdict))
             .collect();
         for count in 0..=3 {
             let mut list = JsonList::default();
-            let mut text = String::new();
+            let mut text = Vec::new();
             for result in &results[..count] {
-                text += &list.next(&to_json(std::slice::from_ref(result)).unwrap());
+                list.write(result, &mut text).unwrap();
             }
-            text += list.end();
-            assert_eq!(text, to_json(&results[..count]).unwrap());
+            text.extend(list.end().bytes());
+            assert_eq!(text, to_json(&results[..count]).unwrap().into_bytes());
         }
     }
 

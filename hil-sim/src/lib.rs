@@ -20,6 +20,7 @@ pub mod listener;
 pub mod map;
 pub mod motion;
 pub mod native;
+pub mod onlooker;
 pub mod outcome;
 pub mod paper;
 pub mod patch;

@@ -16,8 +16,9 @@ use crate::fault::catalogue::Needs;
 use crate::fault::{Clock, Fault, GaugeFaults, HandFault, Signs, Way};
 use crate::listener::Said;
 use crate::motion::encoder;
+use crate::onlooker::Onlooker;
 use crate::recording::{
-    ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
+    Engine, EstimateRecord, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
 };
 use crate::scene::{Scene, SceneError};
 use crate::weather::BYTE_NS;
@@ -46,16 +47,38 @@ const fn number(text: &str) -> u8 {
     }
 }
 
-/// Runs a scene.
+/// Runs a scene and writes everything down.
+///
+/// # Errors
+/// If the scene cannot be run.
 pub fn run(scene: &Scene) -> Result<Recording, SceneError> {
-    let mut pair = Pair::new(scene)?;
+    let mut tape = Tape::new(scene.duration_s);
+    let ran = run_before(scene, &mut tape)?;
+    Ok(tape.into_recording(ran))
+}
+
+/// Runs a scene before an onlooker; nothing else is kept.
+///
+/// # Errors
+/// If the scene cannot be run.
+pub fn run_before(scene: &Scene, onlooker: &mut impl Onlooker) -> Result<Ran, SceneError> {
+    let mut pair = Pair::new(scene, onlooker)?;
     let steps = (scene.duration_s * f64::from(firmware_sensor::SCAN_RATE_HZ)).round() as u64;
     let started = Instant::now();
     for step in 0..steps {
         pair.step(step);
     }
     let wall_s = started.elapsed().as_secs_f64();
-    Ok(pair.into_recording(scene.duration_s, wall_s))
+    let (sensor, display) = pair.statuses((scene.duration_s * 1e9).round() as u64);
+    Ok(Ran {
+        engine: Engine::Native,
+        duration_s: scene.duration_s,
+        warm_up_s: 0.0,
+        wall_s,
+        hash: pair.digest.finish(),
+        sensor_status: Some(sensor),
+        display_status: Some(display),
+    })
 }
 
 /// Whether this engine can run a scene: it has no boards to break.
@@ -79,7 +102,7 @@ pub fn check(scene: &Scene) -> Result<(), SceneError> {
 }
 
 /// Both boards, the wires between them, and the world around them.
-struct Pair {
+struct Pair<'o, O> {
     world: World,
     arm: Arm,
     sensor: Sensor,
@@ -96,11 +119,14 @@ struct Pair {
     scan_count: u64,
     gauges: GaugeFaults,
     hand: HandFault,
-    tape: Tape,
+    digest: Digest,
+    /// The supervisor's last state.
+    state: Option<DisplayState>,
+    onlooker: &'o mut O,
 }
 
-impl Pair {
-    fn new(scene: &Scene) -> Result<Self, SceneError> {
+impl<'o, O: Onlooker> Pair<'o, O> {
+    fn new(scene: &Scene, onlooker: &'o mut O) -> Result<Self, SceneError> {
         check(scene)?;
         let end = |role, mark, to| End::new(role, Way::new(scene, to), mark);
         Ok(Self {
@@ -120,15 +146,17 @@ impl Pair {
             scan_count: 0,
             gauges: GaugeFaults::new(&scene.faults),
             hand: HandFault::new(&scene.faults),
-            tape: Tape::new(scene.duration_s),
+            digest: Digest::default(),
+            state: None,
+            onlooker,
         })
     }
 
     fn step(&mut self, step: u64) {
         let now_ns = step * STEP_NS;
         let t_s = step as f64 / f64::from(firmware_sensor::SCAN_RATE_HZ);
-        self.sensor_end.greet(now_ns, &mut self.tape.digest);
-        self.display_end.greet(now_ns, &mut self.tape.digest);
+        self.sensor_end.greet(now_ns, &mut self.digest);
+        self.display_end.greet(now_ns, &mut self.digest);
         if self.clock.is_true() {
             self.scan(step, now_ns, t_s);
         }
@@ -147,19 +175,12 @@ impl Pair {
         self.sensor_hears(now_ns);
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
-            for (said, status) in [
-                (&mut self.tape.signs.sensor, sensor),
-                (&mut self.tape.signs.display, display),
-            ] {
-                said.push(Said {
-                    at_ns: now_ns,
-                    message: Message::Status(status),
-                });
-            }
+            self.say(Role::Sensor, now_ns, Message::Status(sensor));
+            self.say(Role::Display, now_ns, Message::Status(display));
             self.sensor_end
-                .send(now_ns, &Message::Status(sensor), &mut self.tape.digest);
+                .send(now_ns, &Message::Status(sensor), &mut self.digest);
             self.display_end
-                .send(now_ns, &Message::Status(display), &mut self.tape.digest);
+                .send(now_ns, &Message::Status(display), &mut self.digest);
         }
     }
 
@@ -188,7 +209,7 @@ impl Pair {
             display,
             sensor_end,
             display_end,
-            tape,
+            onlooker,
             ..
         } = self;
         display_end.hear(
@@ -196,7 +217,8 @@ impl Pair {
             now_ns,
             |due_ns, message| match message {
                 Message::Estimate(estimate) => {
-                    tape.received(&estimate, due_ns);
+                    // The sensor counts its estimates from its start.
+                    onlooker.received(estimate.sequence as usize, due_ns);
                     display.on_estimate(&estimate);
                 }
                 Message::Stop(stop) => display.stop(stop.reason),
@@ -211,7 +233,7 @@ impl Pair {
         let codes = self.world.codes(t_s, position_mm);
         let codes = self.gauges.apply(now_ns, codes);
         let encoder = self.world.arm_encoder(t_s, position_mm);
-        self.tape.scans.push(ScanRecord {
+        self.onlooker.scan(&ScanRecord {
             at_ns: now_ns,
             codes,
             encoder,
@@ -231,24 +253,17 @@ impl Pair {
             self.arm.command(t_s, self.command_mm_s());
         }
         if let Some(estimate) = output.estimate {
-            self.tape.signs.sensor.push(Said {
-                at_ns: now_ns,
-                message: Message::Estimate(estimate),
-            });
-            self.tape.estimates.push(EstimateRecord {
-                made_ns: now_ns,
-                received_ns: None,
-                estimate,
-            });
-            let sent =
-                self.sensor_end
-                    .send(now_ns, &Message::Estimate(estimate), &mut self.tape.digest);
+            self.say(Role::Sensor, now_ns, Message::Estimate(estimate));
+            self.onlooker.made(now_ns, &estimate);
+            let sent = self
+                .sensor_end
+                .send(now_ns, &Message::Estimate(estimate), &mut self.digest);
             self.sensor_counters.estimates =
                 self.sensor_counters.estimates.wrapping_add(u32::from(sent));
         }
         if let Some(gauges) = output.gauges {
             self.sensor_end
-                .send(now_ns, &Message::Gauges(gauges), &mut self.tape.digest);
+                .send(now_ns, &Message::Gauges(gauges), &mut self.digest);
         }
     }
 
@@ -256,25 +271,29 @@ impl Pair {
     fn tick(&mut self, now_ns: u64, t_s: f64) {
         let position_mm = self.world.hand_position_mm(t_s);
         let encoder = self.hand.counts(now_ns, encoder(position_mm));
-        self.tape.ticks.push(TickRecord {
+        self.onlooker.tick(&TickRecord {
             at_ns: now_ns,
             encoder,
             position_mm,
         });
         if self.display.tick(encoder, &Senses::default()).send {
-            self.tape.output(now_ns, self.display.words());
+            let output = OutputRecord {
+                at_ns: now_ns,
+                words: *self.display.words(),
+                skew_ns: 0,
+            };
+            self.digest.output(&output);
+            self.onlooker.output(&output);
         }
         let state = self.display.state();
-        if self.tape.state.replace(state) != Some(state) {
+        if self.state.replace(state) != Some(state) {
             let instant_us = now_ns / 1_000;
-            self.tape.signs.display.push(Said {
-                at_ns: now_ns,
-                message: Message::Safety(Safety { instant_us, state }),
-            });
+            let safety = Message::Safety(Safety { instant_us, state });
+            self.say(Role::Display, now_ns, safety);
         }
         if let Some(motion) = self.display.motion(now_ns / 1_000) {
             self.display_end
-                .send(now_ns, &Message::Motion(motion), &mut self.tape.digest);
+                .send(now_ns, &Message::Motion(motion), &mut self.digest);
         }
     }
 
@@ -307,23 +326,9 @@ impl Pair {
         )
     }
 
-    fn into_recording(self, duration_s: f64, wall_s: f64) -> Recording {
-        let (sensor, display) = self.statuses((duration_s * 1e9).round() as u64);
-        Recording {
-            engine: Engine::Native,
-            duration_s,
-            warm_up_s: 0.0,
-            wall_s,
-            hash: self.tape.digest.finish(),
-            scans: self.tape.scans,
-            ticks: self.tape.ticks,
-            estimates: self.tape.estimates,
-            outputs: self.tape.outputs,
-            sensor_status: Some(sensor),
-            display_status: Some(display),
-            log: Vec::new(),
-            signs: self.tape.signs,
-        }
+    /// Tells what a board says of itself.
+    fn say(&mut self, role: Role, at_ns: u64, message: Message) {
+        self.onlooker.said(role, &Said { at_ns, message });
     }
 }
 
@@ -413,16 +418,13 @@ impl End {
     }
 }
 
-/// What is written down while the pair runs.
+/// Writes everything down.
 struct Tape {
-    digest: Digest,
     scans: Vec<ScanRecord>,
     ticks: Vec<TickRecord>,
     estimates: Vec<EstimateRecord>,
     outputs: Vec<OutputRecord>,
     signs: Signs,
-    /// The supervisor's last.
-    state: Option<DisplayState>,
 }
 
 impl Tape {
@@ -430,30 +432,65 @@ impl Tape {
     fn new(duration_s: f64) -> Self {
         let room = |rate_hz: u32| (duration_s * f64::from(rate_hz)).ceil() as usize + 1;
         Self {
-            digest: Digest::default(),
             scans: Vec::with_capacity(room(firmware_sensor::SCAN_RATE_HZ)),
             ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
             outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             signs: Signs::default(),
-            state: None,
         }
     }
 
-    fn output(&mut self, at_ns: u64, words: &[u16; ACTUATORS]) {
-        let output = OutputRecord {
-            at_ns,
-            words: *words,
-            skew_ns: 0,
-        };
-        self.digest.output(&output);
-        self.outputs.push(output);
+    fn into_recording(self, ran: Ran) -> Recording {
+        Recording {
+            engine: ran.engine,
+            duration_s: ran.duration_s,
+            warm_up_s: ran.warm_up_s,
+            wall_s: ran.wall_s,
+            hash: ran.hash,
+            scans: self.scans,
+            ticks: self.ticks,
+            estimates: self.estimates,
+            outputs: self.outputs,
+            sensor_status: ran.sensor_status,
+            display_status: ran.display_status,
+            log: Vec::new(),
+            signs: self.signs,
+        }
+    }
+}
+
+impl Onlooker for Tape {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.scans.push(*scan);
     }
 
-    fn received(&mut self, estimate: &Estimate, due_ns: u64) {
-        // The sensor counts its estimates from its start, as the tape does.
-        if let Some(record) = self.estimates.get_mut(estimate.sequence as usize) {
-            record.received_ns = Some(due_ns);
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.estimates.push(EstimateRecord {
+            made_ns,
+            received_ns: None,
+            estimate: *estimate,
+        });
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.ticks.push(*tick);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.outputs.push(*output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        if let Some(record) = self.estimates.get_mut(number) {
+            record.received_ns.get_or_insert(received_ns);
+        }
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        match role {
+            Role::Sensor => self.signs.sensor.push(said.clone()),
+            Role::Display => self.signs.display.push(said.clone()),
+            Role::Host => {}
         }
     }
 }

@@ -1,13 +1,19 @@
 //! A scene that was run, judged.
 
+use protocol::{Estimate, Role};
+
 use crate::analysis::{self, Verdict};
-use crate::event::events;
+use crate::event::{Event, Events, events};
 use crate::expectation;
-use crate::fault::judge::{Finding, judge};
+use crate::fault::Reset;
+use crate::fault::judge::{self, Finding, judge};
 use crate::json::{ContactResult, Fault, SceneResult};
-use crate::recording::Recording;
+use crate::listener::Said;
+use crate::native;
+use crate::onlooker::Onlooker;
+use crate::recording::{OutputRecord, Ran, Recording, ScanRecord, TickRecord};
 use crate::report::Chapter;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 use crate::surface::Surface;
 use crate::truth::Truth;
 
@@ -49,13 +55,18 @@ impl Outcome {
         truth(&self.scene, &*self.wavelength_mm)
     }
 
-    /// The outcome's object in the JSON.
-    pub fn result(&self) -> SceneResult<'_> {
-        SceneResult {
-            contact: ContactResult::of(&self.scene),
-            events: events(&self.scene, &self.recording),
-            faults: self.findings.iter().map(Fault::from).collect(),
-            ..SceneResult::new(&self.truth(), &self.recording, &self.verdict)
+    /// The same without the recording; events on demand.
+    pub fn judgement(&self, with_events: bool) -> Judgement {
+        Judgement {
+            ran: self.recording.ran(),
+            verdict: self.verdict.clone(),
+            unmet: self.unmet.clone(),
+            findings: self.findings.clone(),
+            events: if with_events {
+                events(&self.scene, &self.recording)
+            } else {
+                Vec::new()
+            },
         }
     }
 
@@ -69,6 +80,103 @@ impl Outcome {
             findings: &self.findings,
             contact: ContactResult::of(&self.scene).map(|contact| contact.sentence()),
         }
+    }
+}
+
+/// What came of a run, of which nothing else need be left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// What is known of the run.
+    pub ran: Ran,
+    /// The run, judged.
+    pub verdict: Verdict,
+    /// A line for each expectation of the scene that was not met.
+    pub unmet: Vec<String>,
+    /// What became of the scene's faults, in their order.
+    pub findings: Vec<Finding>,
+    /// What happened, and when, if it was asked for.
+    pub events: Vec<Event>,
+}
+
+impl Judgement {
+    /// Runs a scene on the native engine and judges it meanwhile, to the same ends as [`Outcome::new`]. Events
+    /// take the contact model to be led through the scene once more.
+    ///
+    /// # Errors
+    /// If the scene cannot be run.
+    pub fn of(scene: &Scene, with_events: bool) -> Result<Self, SceneError> {
+        let surface = Surface::new(&scene.surface, 0.0);
+        let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
+        let mut judges = Judges {
+            run: analysis::Judge::new(&truth(scene, &wavelength_mm)),
+            faults: judge::Judge::new(&scene.faults, scene.duration_s),
+            events: with_events.then(|| Events::new(scene)),
+        };
+        let ran = native::run_before(scene, &mut judges)?;
+        let verdict = judges.run.finish();
+        Ok(Self {
+            ran,
+            unmet: expectation::unmet(&scene.expect, &verdict),
+            verdict,
+            findings: judges.faults.finish(),
+            events: judges.events.map(Events::finish).unwrap_or_default(),
+        })
+    }
+
+    /// The object in the JSON; `scene` is the one that was run.
+    pub fn result<'a>(&'a self, scene: &'a Scene) -> SceneResult<'a> {
+        let method = scene.estimator.method_name();
+        SceneResult {
+            contact: ContactResult::of(scene),
+            events: self.events.clone(),
+            faults: self.findings.iter().map(Fault::from).collect(),
+            ..SceneResult::new(&scene.name, method, &self.ran, &self.verdict)
+        }
+    }
+}
+
+/// All who judge a run.
+struct Judges<'a> {
+    run: analysis::Judge<'a>,
+    faults: judge::Judge,
+    events: Option<Events<'a>>,
+}
+
+impl Onlooker for Judges<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.run.scan(scan);
+        if let Some(events) = &mut self.events {
+            events.scan(scan);
+        }
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.run.made(made_ns, estimate);
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.run.tick(tick);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.run.output(output);
+        self.faults.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.run.received(number, received_ns);
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        self.faults.said(role, said);
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        self.faults.reset(reset);
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        self.faults.cleared(at_ns);
     }
 }
 

@@ -80,6 +80,33 @@ pub fn volts(word: u16) -> f64 {
     (f64::from(word) - 32_768.0) * WORD_V
 }
 
+/// What is known of a run once it is over, whether it was recorded or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ran {
+    /// Who ran it.
+    pub engine: Engine,
+    /// Virtual time run, in s.
+    pub duration_s: f64,
+    /// As in [`Recording::warm_up_s`], in s.
+    pub warm_up_s: f64,
+    /// Wall time that the rest took, in s: with what onlookers did meanwhile.
+    pub wall_s: f64,
+    /// XXH3 of every link byte and every DAC word with its instant.
+    pub hash: u64,
+    /// The sensor's last counters, if it got to send any.
+    pub sensor_status: Option<Status>,
+    /// The display's last counters, if it got to send any.
+    pub display_status: Option<Status>,
+}
+
+impl Ran {
+    /// Virtual time run per wall time; none if that was too short to be measured.
+    pub fn realtime_factor(&self) -> Option<f64> {
+        let factor = (self.duration_s - self.warm_up_s) / self.wall_s;
+        factor.is_finite().then_some(factor)
+    }
+}
+
 /// Everything a run leaves behind.
 #[derive(Clone, Debug)]
 pub struct Recording {
@@ -113,9 +140,21 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// What is known of the run without its records.
+    pub fn ran(&self) -> Ran {
+        Ran {
+            engine: self.engine,
+            duration_s: self.duration_s,
+            warm_up_s: self.warm_up_s,
+            wall_s: self.wall_s,
+            hash: self.hash,
+            sensor_status: self.sensor_status,
+            display_status: self.display_status,
+        }
+    }
+
     /// Virtual time run per wall time; none if that was too short to be measured.
     pub fn realtime_factor(&self) -> Option<f64> {
-        let factor = (self.duration_s - self.warm_up_s) / self.wall_s;
-        factor.is_finite().then_some(factor)
+        self.ran().realtime_factor()
     }
 }

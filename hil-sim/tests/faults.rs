@@ -89,7 +89,8 @@ fn the_json_lists_every_fault_in_the_order_of_the_scene() {
     let scene = Scene::parse(Path::new("x.toml"), text).unwrap();
     let recording = native::run(&scene).unwrap();
     let outcome = Outcome::new(scene, recording);
-    let json = serde_json::to_value(outcome.result()).unwrap();
+    let judgement = outcome.judgement(true);
+    let json = serde_json::to_value(judgement.result(&outcome.scene)).unwrap();
     let faults = json["faults"].as_array().unwrap();
     assert_eq!(faults.len(), 2);
     assert_eq!(faults[0]["kind"], "hand-encoder-jump");

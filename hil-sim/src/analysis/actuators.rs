@@ -2,17 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use protocol::Estimate;
 use serde::Serialize;
 
-use crate::analysis::cycles::{self, Cycle};
+use crate::analysis::cycles::Cycles;
 use crate::analysis::finite;
-use crate::analysis::middle::about_middle;
-use crate::analysis::phase::DuePhase;
-use crate::analysis::phase_error::phase_error;
-use crate::analysis::reaction::{Reaction, reaction};
-use crate::analysis::track::{COUNT_MM, Track};
-use crate::analysis::voltage::{edges, peak_v, voltage};
-use crate::recording::{ACTUATORS, Recording, WORD_V, volts};
+use crate::analysis::middle::{AboutMiddle, Point};
+use crate::analysis::phase_error::Demodulator;
+use crate::analysis::reaction::{Peaks, Reaction, Reactions};
+use crate::analysis::stimulus::{Stimulus, Told};
+use crate::analysis::track::COUNT_MM;
+use crate::onlooker::{Onlooker, retell};
+use crate::recording::{ACTUATORS, OutputRecord, Recording, TickRecord, WORD_V, volts};
 use crate::truth::Truth;
 
 /// Voltage below which an actuator does not vibrate, in V.
@@ -49,102 +50,155 @@ pub struct Actuators {
 
 /// Judges the outputs of a recording.
 pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
-    let due = DuePhase::new(truth, recording);
-    let hand = Track::of_hand(recording);
-    let reference = voltage(recording, truth.reference_actuator.min(ACTUATORS - 1));
-    let reaction = reaction(recording, &due);
-    let mut actuators = Actuators {
-        max_step_v: max_step_v(recording),
-        natural_step_v: natural_step_v(truth, &hand, &due),
-        skew_us: recording
-            .outputs
-            .iter()
-            .map(|o| o.skew_ns)
-            .max()
-            .map(|ns| ns as f64 * 1e-3),
-        hand_to_output_p99_ms: reaction.map(|reaction| reaction.p99_ms),
-        hand_to_output: reaction,
-        ..Actuators::default()
-    };
-    if peak_v(&reference) < STILL_V {
-        return actuators;
-    }
-    let cycles = cycles::cycles(&about_middle(&reference, &hand, &due), &due);
-    if let Some((stretch, count)) = cycles::longest_stretch(&cycles) {
-        let stretch_s = stretch.to_s - stretch.from_s;
-        let travelled = due.travelled_cycles(stretch.to_s) - due.travelled_cycles(stretch.from_s);
-        actuators.frequency_hz = finite(count as f64 / stretch_s);
-        actuators.truth_hz = finite(travelled / stretch_s);
-    }
-    let error = phase_error(&reference, &due);
-    actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
-    actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
-    actuators.mean_v = worst_mean_v(recording, &cycles::continued(&cycles), &due);
-    actuators
+    let mut judge = Judge::new(truth);
+    retell(recording, &mut judge);
+    judge.finish()
 }
 
-/// The largest change of any channel at one edge; before the first all are at 0 V.
-fn max_step_v(recording: &Recording) -> Option<f64> {
-    let mut before = [0x8000_u16; ACTUATORS];
-    let mut largest: Option<u16> = None;
-    for output in &recording.outputs {
-        for (from, to) in before.iter().zip(&output.words) {
-            largest = largest.max(Some(from.abs_diff(*to)));
-        }
-        before = output.words;
-    }
-    largest.map(|steps| f64::from(steps) * WORD_V)
+/// Judges the outputs of a run as it goes on.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    reference: usize,
+    /// In V.
+    amplitude_v: f64,
+    stimulus: Stimulus,
+    middle: AboutMiddle,
+    cycles: Cycles,
+    demodulator: Demodulator,
+    reactions: Reactions,
+    peaks: Peaks,
+    /// The words before the next edge: all are at 0 V before the first.
+    words: [u16; ACTUATORS],
+    /// In steps of the DAC; none before the first edge.
+    max_step: Option<u16>,
+    skew_ns: u64,
+    /// The hand's place at the last tick, and its longest travel in one, in mm.
+    hand_mm: Option<f64>,
+    longest_mm: Option<f64>,
 }
 
-fn natural_step_v(truth: &Truth, hand: &Track, due: &DuePhase) -> Option<f64> {
-    let travel_mm = hand
-        .points()
-        .windows(2)
-        .map(|pair| (pair[1].1 - pair[0].1).abs())
-        .fold(f64::NAN, f64::max);
-    let amplitude_v = f64::from(truth.display.amplitude_mv) * 1e-3;
-    finite(amplitude_v * TAU * (travel_mm + COUNT_MM) / due.shortest_mm()? + WORD_V)
+/// How much a judge holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Held {
+    /// Points of the outputs, sums of cycles and different reaction times: bounded.
+    pub points: usize,
+    /// Numbers of cycles: so many a cycle at most.
+    pub cycles: usize,
 }
 
-/// The mean of the channel farthest from 0 V over all whole cycles of the reference.
-fn worst_mean_v(recording: &Recording, cycles: &[Cycle], due: &DuePhase) -> Option<f64> {
-    let edges = edges(recording);
-    let weights = weights(&edges, cycles, due);
-    let whole: f64 = weights.iter().sum();
-    let mut sums_v = [0.0; ACTUATORS];
-    for (&(_, number), weight) in edges.iter().zip(weights) {
-        for (sum_v, &word) in sums_v.iter_mut().zip(&recording.outputs[number].words) {
-            *sum_v += weight * volts(word);
+impl Judge {
+    /// Before the run.
+    pub fn new(truth: &Truth) -> Self {
+        Self {
+            reference: truth.reference_actuator.min(ACTUATORS - 1),
+            amplitude_v: f64::from(truth.display.amplitude_mv) * 1e-3,
+            stimulus: Stimulus::new(truth),
+            middle: AboutMiddle::default(),
+            cycles: Cycles::default(),
+            demodulator: Demodulator::default(),
+            reactions: Reactions::default(),
+            peaks: Peaks::NONE,
+            words: [0x8000; ACTUATORS],
+            max_step: None,
+            skew_ns: 0,
+            hand_mm: None,
+            longest_mm: None,
         }
     }
-    sums_v
-        .into_iter()
-        .filter_map(|sum_v| finite(sum_v / whole))
-        .max_by(|one, other| one.abs().total_cmp(&other.abs()))
+
+    /// What the actuators did.
+    pub fn finish(mut self) -> Actuators {
+        self.stimulus.end();
+        self.follow();
+        let shortest_mm = self.stimulus.shortest_mm();
+        let reaction = self.reactions.finish(&self.peaks, shortest_mm);
+        let mut actuators = Actuators {
+            max_step_v: self.max_step.map(|steps| f64::from(steps) * WORD_V),
+            natural_step_v: self.longest_mm.zip(shortest_mm).and_then(
+                |(longest_mm, shortest_mm)| {
+                    finite(self.amplitude_v * TAU * (longest_mm + COUNT_MM) / shortest_mm + WORD_V)
+                },
+            ),
+            skew_us: self.max_step.map(|_| self.skew_ns as f64 * 1e-3),
+            hand_to_output_p99_ms: reaction.map(|reaction| reaction.p99_ms),
+            hand_to_output: reaction,
+            ..Actuators::default()
+        };
+        let peak_v = self.peaks.volts(self.reference);
+        if peak_v < STILL_V {
+            return actuators;
+        }
+        if let Some(stretch) = self.cycles.longest_stretch() {
+            actuators.frequency_hz = finite(stretch.cycles as f64 / stretch.length_s);
+            actuators.truth_hz = finite(stretch.travelled_cycles / stretch.length_s);
+        }
+        let error = self.demodulator.finish(peak_v);
+        actuators.phase_error_rms_cycles = error.map(|error| error.rms_cycles);
+        actuators.phase_error_mean_cycles = error.map(|error| error.mean_cycles);
+        actuators.mean_v = self.cycles.worst_mean_v();
+        actuators
+    }
+
+    /// How much is held.
+    pub fn held(&self) -> Held {
+        let (crossings, sums) = self.cycles.held();
+        let (late, spreads) = self.reactions.held();
+        Held {
+            points: self.stimulus.held() + self.middle.held() + sums + spreads,
+            cycles: crossings + self.demodulator.held() + late,
+        }
+    }
+
+    /// Takes what the stimulus tells.
+    fn follow(&mut self) {
+        while let Some(told) = self.stimulus.take() {
+            match told {
+                Told::Turned(cycles) => self.middle.turn(cycles),
+                Told::Point(edge, due) => {
+                    let volts = volts(edge.words[self.reference]);
+                    self.demodulator.add(due, volts);
+                    let point = Point {
+                        edge,
+                        volts,
+                        travelled_cycles: due.travelled_cycles,
+                        tick: due.tick,
+                    };
+                    self.middle.add(point, |about| self.cycles.add(about));
+                }
+            }
+        }
+    }
 }
 
-/// What the voltage at each of the points adds to the integral over phase of the straight lines between
-/// them, within the cycles.
-fn weights(points: &[(f64, usize)], cycles: &[Cycle], due: &DuePhase) -> Vec<f64> {
-    let mut weights = vec![0.0; points.len()];
-    for (index, pair) in points.windows(2).enumerate() {
-        let (from_s, to_s) = (pair[0].0, pair[1].0);
-        if to_s <= from_s {
-            continue;
-        }
-        let next = cycles.partition_point(|cycle| cycle.to_s <= from_s);
-        for cycle in cycles[next..]
-            .iter()
-            .take_while(|cycle| cycle.from_s < to_s)
-        {
-            let (start_s, end_s) = (from_s.max(cycle.from_s), to_s.min(cycle.to_s));
-            let advance = due.travelled_cycles(end_s) - due.travelled_cycles(start_s);
-            let way = (0.5 * (start_s + end_s) - from_s) / (to_s - from_s);
-            weights[index] += (1.0 - way) * advance;
-            weights[index + 1] += way * advance;
-        }
+impl Onlooker for Judge {
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.stimulus.made(made_ns, estimate);
     }
-    weights
+
+    fn tick(&mut self, tick: &TickRecord) {
+        if let Some(before_mm) = self.hand_mm.replace(tick.position_mm) {
+            let travel_mm = (tick.position_mm - before_mm).abs();
+            self.longest_mm = Some(self.longest_mm.unwrap_or(0.0).max(travel_mm));
+        }
+        self.reactions.tick(tick);
+        self.stimulus.tick(tick);
+        self.follow();
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        let steps = self.words.iter().zip(&output.words);
+        let step = steps.map(|(from, to)| from.abs_diff(*to)).max();
+        self.max_step = self.max_step.max(step);
+        self.words = output.words;
+        self.skew_ns = self.skew_ns.max(output.skew_ns);
+        self.peaks.add(&output.words);
+        self.reactions.output(output, self.stimulus.shortest_mm());
+        self.stimulus.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.stimulus.received(number, received_ns);
+    }
 }
 
 #[cfg(test)]

@@ -1,100 +1,208 @@
 //! The whole cycles of a stimulus: from one upward crossing of its middle to the next.
 
-use crate::analysis::phase::DuePhase;
+use crate::analysis::channels::{Cycle, Means};
+use crate::analysis::finite;
+use crate::analysis::middle::Point;
 
 /// Share of the usual amplitude from which on a cycle counts as at full amplitude.
 const FULL: f64 = 0.95;
 
-/// A cycle at full amplitude, half a cycle or more away from where the hand turned.
+/// An upward crossing of the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cycle {
-    /// Its first upward crossing, in s.
-    pub from_s: f64,
-    /// Its last, in s.
-    pub to_s: f64,
+struct Crossing {
+    t_s: f64,
+    travelled_cycles: f64,
+    /// Of the cycle that ends here, in V; none if none does.
+    amplitude_v: Option<f64>,
 }
 
-/// The cycles at full amplitude of each stroke's voltage about its middle (s, V), in order.
-pub fn cycles(strokes: &[Vec<(f64, f64)>], due: &DuePhase) -> Vec<Cycle> {
-    let mut cycles: Vec<(Cycle, f64)> = strokes
-        .iter()
-        .flat_map(|stroke| of_stroke(stroke, due))
-        .collect();
-    let mut amplitudes: Vec<f64> = cycles.iter().map(|cycle| cycle.1).collect();
-    amplitudes.sort_by(f64::total_cmp);
-    // The upper quartile: neither fades nor a single odd cycle decide what is usual.
-    let usual_v = amplitudes
-        .get(amplitudes.len() * 3 / 4)
-        .copied()
-        .unwrap_or(0.0);
-    cycles.retain(|cycle| cycle.1 >= FULL * usual_v);
-    cycles.into_iter().map(|cycle| cycle.0).collect()
+/// The longest time in which cycles at full amplitude follow each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// Cycles of the voltage.
+    pub cycles: usize,
+    /// Cycles travelled.
+    pub travelled_cycles: f64,
+    /// Its length, in s.
+    pub length_s: f64,
 }
 
-/// The cycles of a stroke, each with its amplitude in V.
-fn of_stroke(stroke: &[(f64, f64)], due: &DuePhase) -> Vec<(Cycle, f64)> {
-    let mut cycles = Vec::new();
-    let mut start: Option<(f64, usize)> = None;
-    for (index, pair) in stroke.windows(2).enumerate() {
-        let [(from_s, from_v), (to_s, to_v)] = [pair[0], pair[1]];
-        if from_v < 0.0 && to_v >= 0.0 {
-            let crossing_s = from_s + (to_s - from_s) * from_v / (from_v - to_v);
-            if let Some((start_s, first)) = start {
-                let cycle = Cycle {
-                    from_s: start_s,
-                    to_s: crossing_s,
-                };
-                cycles.push((cycle, amplitude_v(cycle, &stroke[first..=index], due)));
-            }
-            start = Some((crossing_s, index + 1));
+/// The cycles of each stroke's voltage about its middle, half a cycle or more away from where the hand turned:
+/// their crossings are kept, of their voltages only sums.
+#[derive(Clone, Debug, Default)]
+pub struct Cycles {
+    crossings: Vec<Crossing>,
+    /// The last point, and its voltage about the middle; none where a stroke begins.
+    before: Option<(f64, Point)>,
+    open: Option<Open>,
+    means: Means,
+}
+
+/// A cycle that has not ended.
+#[derive(Clone, Debug)]
+struct Open {
+    begins_cycles: f64,
+    /// The integral over travel of the squared voltage, in V²·cycles.
+    square: f64,
+    /// Where that has come to, in cycles, and the squared voltage there, in V².
+    before: (f64, f64),
+    /// The voltages of all channels.
+    cycle: Cycle,
+    /// The amplitude of the cycle that it follows, in V.
+    follows_v: Option<f64>,
+}
+
+impl Open {
+    fn add(&mut self, cycles: f64, volts: f64) {
+        let now = (cycles, volts * volts);
+        self.square += 0.5 * (self.before.1 + now.1) * (now.0 - self.before.0);
+        self.before = now;
+    }
+
+    /// √2 of the root mean square over the cycle's travel, in V, however few its points and however uneven the
+    /// speed; 0 without travel.
+    fn amplitude_v(&self) -> f64 {
+        let whole = self.before.0 - self.begins_cycles;
+        if whole > 0.0 {
+            (2.0 * self.square / whole).sqrt()
+        } else {
+            0.0
         }
     }
-    cycles
 }
 
-/// √2 of the root mean square over a cycle of travel, however few its points and however uneven the
-/// speed; 0 without travel.
-fn amplitude_v(cycle: Cycle, within: &[(f64, f64)], due: &DuePhase) -> f64 {
-    let mut before = (due.travelled_cycles(cycle.from_s), 0.0);
-    let (mut sum, start) = (0.0, before.0);
-    for &(t_s, v) in within.iter().chain(&[(cycle.to_s, 0.0)]) {
-        let now = (due.travelled_cycles(t_s), v * v);
-        sum += 0.5 * (before.1 + now.1) * (now.0 - before.0);
-        before = now;
-    }
-    let whole = before.0 - start;
-    if whole > 0.0 {
-        (2.0 * sum / whole).sqrt()
-    } else {
-        0.0
-    }
-}
-
-/// The cycles that follow another one at full amplitude. The first after a fade may still have grown
-/// by a few percent, which gives it a mean of its own.
-pub fn continued(cycles: &[Cycle]) -> Vec<Cycle> {
-    let pairs = cycles
-        .windows(2)
-        .filter(|pair| pair[0].to_s == pair[1].from_s);
-    pairs.map(|pair| pair[1]).collect()
-}
-
-/// The longest run of cycles that follow each other, as one, but for the first and the last of it: beside
-/// these the stimulus may have faded, which moves the middle of their outer crossings. Also how many it has.
-pub fn longest_stretch(cycles: &[Cycle]) -> Option<(Cycle, usize)> {
-    let runs = cycles.chunk_by(|one, next| one.to_s == next.from_s);
-    runs.filter_map(|run| {
-        let [_, inner @ .., _] = run else { return None };
-        let stretch = Cycle {
-            from_s: inner.first()?.from_s,
-            to_s: inner.last()?.to_s,
+impl Cycles {
+    /// Takes the next point of a stroke, with its voltage about the middle, in V; none where a stroke ends.
+    pub fn add(&mut self, about: Option<(f64, &Point)>) {
+        let Some((volts, point)) = about else {
+            self.before = None;
+            self.open = None;
+            return;
         };
-        Some((stretch, inner.len()))
-    })
-    .max_by(|(one, _), (other, _)| {
-        let duration_s = |cycle: &Cycle| cycle.to_s - cycle.from_s;
-        duration_s(one).total_cmp(&duration_s(other))
-    })
+        let Some((before_v, before)) = self.before.replace((volts, *point)) else {
+            return;
+        };
+        if before_v < 0.0 && volts >= 0.0 {
+            let length_s = point.edge.t_s - before.edge.t_s;
+            let t_s = before.edge.t_s + length_s * before_v / (before_v - volts);
+            let cycles = travelled_cycles(&before, point, t_s);
+            self.cross(t_s, cycles, &before, point);
+        } else if let Some(open) = &mut self.open {
+            let from = (before.edge.t_s, before.travelled_cycles);
+            let to = (point.edge.t_s, point.travelled_cycles);
+            open.cycle.add((&before.edge, &point.edge), from, to);
+        }
+        if let Some(open) = &mut self.open {
+            open.add(point.travelled_cycles, volts);
+        }
+    }
+
+    /// A cycle ends between two points, and the next one begins.
+    fn cross(&mut self, t_s: f64, travelled_cycles: f64, before: &Point, point: &Point) {
+        let edges = (&before.edge, &point.edge);
+        let here = (t_s, travelled_cycles);
+        let ended = self.open.take().map(|mut open| {
+            let from = (before.edge.t_s, before.travelled_cycles);
+            open.add(travelled_cycles, 0.0);
+            open.cycle.add(edges, from, here);
+            open
+        });
+        let amplitude_v = ended.as_ref().map(Open::amplitude_v);
+        if let Some(Open {
+            cycle,
+            follows_v: Some(follows_v),
+            ..
+        }) = ended
+            && let Some(amplitude_v) = amplitude_v
+        {
+            // Counts if it is at full amplitude, and the one before too.
+            self.means
+                .add(follows_v.min(amplitude_v), cycle, &point.edge);
+        }
+        self.crossings.push(Crossing {
+            t_s,
+            travelled_cycles,
+            amplitude_v,
+        });
+        let mut cycle = Cycle::default();
+        cycle.add(edges, here, (point.edge.t_s, point.travelled_cycles));
+        self.open = Some(Open {
+            begins_cycles: travelled_cycles,
+            square: 0.0,
+            before: (travelled_cycles, 0.0),
+            cycle,
+            follows_v: amplitude_v,
+        });
+    }
+
+    /// The amplitude from which on a cycle counts as full, in V.
+    fn full_v(&self) -> f64 {
+        let mut amplitudes: Vec<f64> = self
+            .crossings
+            .iter()
+            .filter_map(|crossing| crossing.amplitude_v)
+            .collect();
+        let usual = amplitudes.len() * 3 / 4;
+        if amplitudes.is_empty() {
+            return 0.0;
+        }
+        // The upper quartile: neither fades nor a single odd cycle decide what is usual.
+        let (_, usual_v, _) = amplitudes.select_nth_unstable_by(usual, f64::total_cmp);
+        FULL * *usual_v
+    }
+
+    /// The longest run of full cycles that follow each other, as one, but for the first and the last of it:
+    /// beside these the stimulus may have faded, which moves the middle of their outer crossings.
+    pub fn longest_stretch(&self) -> Option<Stretch> {
+        let full_v = self.full_v();
+        let full = |crossing: &Crossing| crossing.amplitude_v.is_some_and(|volts| volts >= full_v);
+        let runs = self.crossings.chunk_by(|_, next| full(next));
+        runs.filter_map(|run| {
+            let [_, from, .., to, _] = run else {
+                return None;
+            };
+            Some(Stretch {
+                cycles: run.len() - 3,
+                travelled_cycles: to.travelled_cycles - from.travelled_cycles,
+                length_s: to.t_s - from.t_s,
+            })
+        })
+        .max_by(|one, other| one.length_s.total_cmp(&other.length_s))
+    }
+
+    /// The mean of the channel for which it is farthest from 0, in V, over the full cycles that follow another
+    /// one: the first after a fade may still have grown by a few percent, which gives it a mean of its own.
+    pub fn worst_mean_v(&self) -> Option<f64> {
+        let means_v = self.means.from(self.full_v()).into_iter();
+        means_v
+            .filter_map(finite)
+            .max_by(|one, other| one.abs().total_cmp(&other.abs()))
+    }
+
+    /// How many crossings are held, and how many sums.
+    pub fn held(&self) -> (usize, usize) {
+        (self.crossings.len(), self.means.held())
+    }
+}
+
+/// The cycles travelled at an instant between two points: straight but for the tick before the second. Only where
+/// a slow hand keeps one voltage for longer there were other ticks before.
+fn travelled_cycles(before: &Point, point: &Point, t_s: f64) -> f64 {
+    let mut from = (before.edge.t_s, before.travelled_cycles);
+    let mut to = (point.edge.t_s, point.travelled_cycles);
+    if from.0 < point.tick.0 && point.tick.0 < to.0 {
+        if t_s < point.tick.0 {
+            to = point.tick;
+        } else {
+            from = point.tick;
+        }
+    }
+    let length_s = to.0 - from.0;
+    if length_s > 0.0 {
+        from.1 + (to.1 - from.1) * (t_s - from.0) / length_s
+    } else {
+        from.1
+    }
 }
 
 #[cfg(test)]
@@ -223,16 +331,25 @@ mod tests {
 
     #[test]
     fn the_longest_stretch_is_without_what_may_border_on_a_fade() {
-        let cycle = |from: u32| Cycle {
-            from_s: f64::from(from),
-            to_s: f64::from(from + 1),
+        // A run of crossings for each of these, with so many cycles, a second each.
+        let stretch = |runs: &[usize]| {
+            let mut cycles = Cycles::default();
+            for (run, &count) in runs.iter().enumerate() {
+                cycles.crossings.extend((0..=count).map(|number| Crossing {
+                    t_s: (100 * run + number) as f64,
+                    travelled_cycles: (200 * run + 2 * number) as f64,
+                    amplitude_v: (number > 0).then_some(5.0),
+                }));
+            }
+            cycles.longest_stretch()
         };
-        let stretch = |cycles: &[u32]| {
-            let cycles: Vec<Cycle> = cycles.iter().copied().map(cycle).collect();
-            longest_stretch(&cycles).map(|(stretch, count)| (stretch.from_s, stretch.to_s, count))
+        let longest = Stretch {
+            cycles: 3,
+            travelled_cycles: 6.0,
+            length_s: 3.0,
         };
-        assert_eq!(stretch(&[0, 1, 2, 5, 6, 7, 8, 9]), Some((6.0, 9.0, 3)));
-        assert_eq!(stretch(&[0, 1, 5, 6]), None);
+        assert_eq!(stretch(&[3, 5, 2]), Some(longest));
+        assert_eq!(stretch(&[2, 2]), None);
         assert_eq!(stretch(&[]), None);
     }
 }

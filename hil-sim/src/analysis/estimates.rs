@@ -1,11 +1,12 @@
 //! The estimates beside the truth.
 
-use protocol::{Contact, GAUGES, GaugeHealth, Range};
+use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range};
 use serde::Serialize;
 
-use crate::analysis::track::Track;
+use crate::analysis::track::interpolate;
 use crate::analysis::{finite, mean, seconds, words};
-use crate::recording::Recording;
+use crate::onlooker::{Onlooker, retell};
+use crate::recording::{Recording, ScanRecord};
 use crate::truth::Truth;
 
 /// Speed from which on the arm counts as in motion, in mm/s.
@@ -100,100 +101,165 @@ impl JudgedEstimate {
 
 /// Judges the estimates of a recording, one by one and as a whole.
 pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summary) {
-    let arm = Track::of_arm(recording);
-    let estimates: Vec<JudgedEstimate> = recording
-        .estimates
-        .iter()
-        .map(|record| {
-            let t_s = seconds(record.made_ns);
-            let estimate = &record.estimate;
-            let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
-            JudgedEstimate {
-                t_s,
-                truth_mm: arm
-                    .position_mm(t_s)
-                    .and_then(|x_mm| truth.wavelength_at(x_mm)),
-                wavelength_mm: millimetres(estimate.wavelength_mm),
-                confidence: finite(estimate.confidence.into()),
-                valid: estimate.valid,
-                counted_mm: millimetres(estimate.counted_mm),
-                range: estimate.range,
-                amplitude_lsb: finite(estimate.amplitude_lsb.into()),
-                contact: estimate.contact,
-                lag_um: estimate.lag_um,
-                gauges_used: estimate.gauges_used,
-                health: estimate.health,
+    let mut judge = Judge::new(truth);
+    retell(recording, &mut judge);
+    judge.finish()
+}
+
+/// Judges the estimates of a run as it goes on: they are kept, of the scans only the last.
+pub struct Judge<'a> {
+    truth: Truth<'a>,
+    estimates: Vec<JudgedEstimate>,
+    /// Estimates before this one are beside the truth: that takes the scan after them.
+    placed: usize,
+    /// When each was made, in ns, until it has arrived.
+    travelling_ns: Vec<Option<u64>>,
+    /// Of the time from an estimate to its arrival, in ms, and how many arrived.
+    latency_ms: (f64, usize),
+    /// The arm at the last scan, in s and mm.
+    arm: Option<(f64, f64)>,
+    /// Estimates made by the scan before the last one.
+    made: usize,
+    moving_s: f64,
+    valid_s: f64,
+    /// λ under the sensor at the last scan with a surface, in mm.
+    here_mm: Option<f64>,
+    /// When the sensor last crossed from one specimen to another, in s.
+    boundary_s: Option<f64>,
+}
+
+impl<'a> Judge<'a> {
+    /// Before the run.
+    pub fn new(truth: &Truth<'a>) -> Self {
+        Self {
+            truth: *truth,
+            estimates: Vec::new(),
+            placed: 0,
+            travelling_ns: Vec::new(),
+            latency_ms: (0.0, 0),
+            arm: None,
+            made: 0,
+            moving_s: 0.0,
+            valid_s: 0.0,
+            here_mm: None,
+            boundary_s: None,
+        }
+    }
+
+    /// The estimates beside the truth, in the order they were made, and as a whole.
+    pub fn finish(mut self) -> (Vec<JudgedEstimate>, Summary) {
+        if let Some(last) = self.arm {
+            self.place(&[last], f64::INFINITY);
+        }
+        let estimates = self.estimates;
+        let errors = || estimates.iter().filter_map(JudgedEstimate::relative_error);
+        let counted = estimates.iter().filter_map(JudgedEstimate::counted_error);
+        let (latency_ms, arrived) = self.latency_ms;
+        let summary = Summary {
+            rms_percent: rms_percent(errors()),
+            bias_percent: mean(errors()).map(|e| 100.0 * e),
+            mean_mm: mean(
+                estimates
+                    .iter()
+                    .filter(|e| e.valid)
+                    .filter_map(|e| e.wavelength_mm),
+            ),
+            valid_share: finite(self.valid_s / self.moving_s),
+            wrong_share: mean(estimates.iter().map(|e| f64::from(u8::from(e.is_wrong())))),
+            counted_rms_percent: rms_percent(counted),
+            settling_ms: self
+                .boundary_s
+                .and_then(|at_s| settling_ms(at_s, &estimates)),
+            latency_ms: finite(latency_ms / arrived as f64),
+        };
+        (estimates, summary)
+    }
+
+    /// How many scans, and estimates whose truth is not known, are held.
+    pub fn held(&self) -> usize {
+        usize::from(self.arm.is_some()) + self.estimates.len() - self.placed
+    }
+
+    /// Puts the estimates made before `until_s` beside the truth, by the arm's track about them.
+    fn place(&mut self, track: &[(f64, f64)], until_s: f64) {
+        while let Some(estimate) = self.estimates.get_mut(self.placed)
+            && estimate.t_s < until_s
+        {
+            let x_mm = interpolate(track, estimate.t_s);
+            estimate.truth_mm = x_mm.and_then(|x_mm| self.truth.wavelength_at(x_mm));
+            self.placed += 1;
+        }
+    }
+
+    /// Time in motion counts as valid if the last estimate made is.
+    fn count(&mut self, (from_s, from_mm): (f64, f64), (to_s, to_mm): (f64, f64)) {
+        let step_s = to_s - from_s;
+        if step_s <= 0.0 || ((to_mm - from_mm) / step_s).abs() <= MOTION_MM_S {
+            return;
+        }
+        self.moving_s += step_s;
+        while self
+            .estimates
+            .get(self.made)
+            .is_some_and(|estimate| estimate.t_s <= from_s)
+        {
+            self.made += 1;
+        }
+        let last = self.made.checked_sub(1).map(|last| &self.estimates[last]);
+        if last.is_some_and(|e| e.valid && from_s - e.t_s < ESTIMATE_LASTS_S) {
+            self.valid_s += step_s;
+        }
+    }
+}
+
+impl Onlooker for Judge<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        let here @ (t_s, x_mm) = (seconds(scan.at_ns), scan.position_mm);
+        match self.arm.replace(here) {
+            Some(before) => {
+                self.place(&[before, here], t_s);
+                self.count(before, here);
             }
-        })
-        .collect();
-    let errors = || estimates.iter().filter_map(JudgedEstimate::relative_error);
-    let received = recording
-        .estimates
-        .iter()
-        .filter_map(|record| Some((record.received_ns? as f64 - record.made_ns as f64) * 1e-6));
-    let counted = estimates.iter().filter_map(JudgedEstimate::counted_error);
-    let summary = Summary {
-        rms_percent: rms_percent(errors()),
-        bias_percent: mean(errors()).map(|e| 100.0 * e),
-        mean_mm: mean(
-            estimates
-                .iter()
-                .filter(|e| e.valid)
-                .filter_map(|e| e.wavelength_mm),
-        ),
-        valid_share: valid_share(&arm, &estimates),
-        wrong_share: mean(estimates.iter().map(|e| f64::from(u8::from(e.is_wrong())))),
-        counted_rms_percent: rms_percent(counted),
-        settling_ms: last_boundary_s(truth, &arm).and_then(|at_s| settling_ms(at_s, &estimates)),
-        latency_ms: mean(received),
-    };
-    (estimates, summary)
+            None => self.place(&[here], t_s),
+        }
+        if let Some(here_mm) = self.truth.wavelength_at(x_mm) {
+            let before_mm = self.here_mm.replace(here_mm);
+            if before_mm.is_some_and(|before_mm| (here_mm / before_mm - 1.0).abs() > BOUNDARY) {
+                self.boundary_s = Some(t_s);
+            }
+        }
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
+        self.travelling_ns.push(Some(made_ns));
+        self.estimates.push(JudgedEstimate {
+            t_s: seconds(made_ns),
+            truth_mm: None,
+            wavelength_mm: millimetres(estimate.wavelength_mm),
+            confidence: finite(estimate.confidence.into()),
+            valid: estimate.valid,
+            counted_mm: millimetres(estimate.counted_mm),
+            range: estimate.range,
+            amplitude_lsb: finite(estimate.amplitude_lsb.into()),
+            contact: estimate.contact,
+            lag_um: estimate.lag_um,
+            gauges_used: estimate.gauges_used,
+            health: estimate.health,
+        });
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        if let Some(made_ns) = self.travelling_ns.get_mut(number).and_then(Option::take) {
+            self.latency_ms.0 += (received_ns as f64 - made_ns as f64) * 1e-6;
+            self.latency_ms.1 += 1;
+        }
+    }
 }
 
 /// Root of the mean square of relative errors, in %; none if there are none.
 fn rms_percent(errors: impl Iterator<Item = f64>) -> Option<f64> {
     mean(errors.map(|e| e * e)).map(|square| 100.0 * square.sqrt())
-}
-
-/// Share of the time in motion for which the last estimate made is valid.
-fn valid_share(arm: &Track, estimates: &[JudgedEstimate]) -> Option<f64> {
-    let (mut moving_s, mut valid_s) = (0.0, 0.0);
-    let mut made = 0;
-    for pair in arm.points().windows(2) {
-        let [(from_s, from_mm), (to_s, to_mm)] = [pair[0], pair[1]];
-        let step_s = to_s - from_s;
-        if step_s <= 0.0 || ((to_mm - from_mm) / step_s).abs() <= MOTION_MM_S {
-            continue;
-        }
-        moving_s += step_s;
-        while estimates
-            .get(made)
-            .is_some_and(|estimate| estimate.t_s <= from_s)
-        {
-            made += 1;
-        }
-        let last = made.checked_sub(1).and_then(|last| estimates.get(last));
-        if last.is_some_and(|e| e.valid && from_s - e.t_s < ESTIMATE_LASTS_S) {
-            valid_s += step_s;
-        }
-    }
-    finite(valid_s / moving_s)
-}
-
-/// When the sensor last crossed from one specimen to another, in s.
-fn last_boundary_s(truth: &Truth, arm: &Track) -> Option<f64> {
-    let mut last_s = None;
-    let mut before_mm = None;
-    for &(t_s, x_mm) in arm.points() {
-        let Some(here_mm) = truth.wavelength_at(x_mm) else {
-            continue;
-        };
-        if before_mm.is_some_and(|before: f64| (here_mm / before - 1.0).abs() > BOUNDARY) {
-            last_s = Some(t_s);
-        }
-        before_mm = Some(here_mm);
-    }
-    last_s
 }
 
 /// Time from `boundary_s` to the first valid estimate after which none is off by more than

@@ -10,100 +10,221 @@
 //! - of an offset that decays with τ, a cycle of T leaves (T/τ)²/24.
 //!
 //! Where the hand turned within that cycle there is none, and nothing is said.
+//!
+//! So a point waits until the hand has gone on for half a cycle, and is kept for as long again.
 
-use crate::analysis::phase::DuePhase;
-use crate::analysis::track::Track;
+use std::collections::VecDeque;
+
+use crate::analysis::voltage::Edge;
 
 /// Half of the cycle about an instant.
 const HALF: f64 = 0.5;
+/// Points kept at most. A slow hand over a long wave has two for each of its counts, 8 000 a cycle of 20 mm; more
+/// come only of outputs that change while the hand rests, which are given up as though it had turned.
+const POINTS_KEPT: usize = 16_384;
 
-/// For each stroke of the hand that is longer than a cycle, in order: a voltage (s, V) less its middle, but
-/// for the half cycles beside the turning points, or beside the ends of the voltage.
-pub fn about_middle(voltage: &[(f64, f64)], hand: &Track, due: &DuePhase) -> Vec<Vec<(f64, f64)>> {
-    let area = Area::new(voltage, due);
-    let strokes = hand.strokes().into_iter().map(|(from_s, to_s)| {
-        let from = due.travelled_cycles(from_s).max(area.first_cycles()) + HALF;
-        let to = due.travelled_cycles(to_s).min(area.last_cycles()) - HALF;
-        let first = voltage.partition_point(|point| point.0 < from_s);
-        let end = voltage.partition_point(|point| point.0 <= to_s);
-        (first..end.max(first))
-            .filter_map(|index| {
-                let at = area.cycles[index];
-                let (t_s, volts) = voltage[index];
-                (from..=to)
-                    .contains(&at)
-                    .then(|| (t_s, volts - area.until(at + HALF) + area.until(at - HALF)))
-            })
-            .collect::<Vec<_>>()
-    });
-    strokes.filter(|stroke| !stroke.is_empty()).collect()
+/// A point of the outputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// When, and the words.
+    pub edge: Edge,
+    /// The voltage looked at, in V.
+    pub volts: f64,
+    /// The cycles travelled by then: never falls.
+    pub travelled_cycles: f64,
+    /// The last tick by then, in s, and the cycles travelled by that.
+    pub tick: (f64, f64),
 }
 
-/// The integral over travel of a voltage that goes straight from point to point.
-struct Area<'a> {
-    voltage: &'a [(f64, f64)],
-    /// How far each point is, in cycles travelled: never falls.
-    cycles: Vec<f64>,
-    /// Of all before each point, in V·cycles.
-    areas: Vec<f64>,
+/// The points whose middle is not known yet, and those that it takes.
+#[derive(Clone, Debug, Default)]
+pub struct AboutMiddle {
+    points: VecDeque<Kept>,
+    /// The first point that waits.
+    next: usize,
+    /// Cycles travelled where the hand turned last, or at the first point.
+    begins_cycles: Option<f64>,
+    /// The same of the point that was handed on last.
+    handed_cycles: f64,
 }
 
-impl<'a> Area<'a> {
-    fn new(voltage: &'a [(f64, f64)], due: &DuePhase) -> Self {
-        let cycles: Vec<f64> = voltage
-            .iter()
-            .map(|point| due.travelled_cycles(point.0))
-            .collect();
-        let mut area = 0.0;
-        let mut areas = Vec::with_capacity(voltage.len());
-        for index in 0..voltage.len() {
-            if let Some(before) = index.checked_sub(1) {
-                area += HALF
-                    * (voltage[before].1 + voltage[index].1)
-                    * (cycles[index] - cycles[before]);
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    point: Point,
+    /// The integral over travel of the voltage before it, in V·cycles: straight from point to point.
+    area: f64,
+    /// Cycles travelled at the ends of the stroke that it is in; the end is infinite until it is known.
+    begins_cycles: f64,
+    ends_cycles: f64,
+}
+
+impl AboutMiddle {
+    /// The hand has turned back at `cycles` travelled, after all points so far.
+    pub fn turn(&mut self, cycles: f64) {
+        let open = |kept: &&mut Kept| kept.ends_cycles.is_infinite();
+        for kept in self.points.iter_mut().rev().take_while(open) {
+            kept.ends_cycles = cycles;
+        }
+        if self.begins_cycles.is_some() {
+            self.begins_cycles = Some(cycles);
+        }
+    }
+
+    /// Takes the next point. Hands on, in order, each point whose middle is known now, with its voltage less
+    /// that; none for one that is within half a cycle of a turning point or of the beginning, and none between
+    /// two strokes.
+    pub fn add(&mut self, point: Point, mut hand_on: impl FnMut(Option<(f64, &Point)>)) {
+        if self.points.len() >= POINTS_KEPT {
+            *self = Self::default();
+            hand_on(None);
+        }
+        let begins_cycles = *self.begins_cycles.get_or_insert(point.travelled_cycles);
+        let area = self.points.back().map_or(0.0, |before| {
+            let way = point.travelled_cycles - before.point.travelled_cycles;
+            before.area + HALF * (before.point.volts + point.volts) * way
+        });
+        self.points.push_back(Kept {
+            point,
+            area,
+            begins_cycles,
+            ends_cycles: f64::INFINITY,
+        });
+        let last_cycles = point.travelled_cycles - HALF;
+        while let Some(kept) = self.points.get(self.next)
+            && kept.point.travelled_cycles <= last_cycles
+        {
+            if kept.begins_cycles != self.handed_cycles {
+                self.handed_cycles = kept.begins_cycles;
+                hand_on(None);
             }
-            areas.push(area);
+            let at = kept.point.travelled_cycles;
+            let stroke = kept.begins_cycles + HALF..=kept.ends_cycles - HALF;
+            hand_on(stroke.contains(&at).then(|| {
+                let volts = kept.point.volts - self.area(at + HALF) + self.area(at - HALF);
+                (volts, &kept.point)
+            }));
+            self.next += 1;
         }
-        Self {
-            voltage,
-            cycles,
-            areas,
-        }
+        self.forget();
     }
 
-    fn first_cycles(&self) -> f64 {
-        self.cycles.first().copied().unwrap_or(0.0)
+    /// How many points are held.
+    pub fn held(&self) -> usize {
+        self.points.len()
     }
 
-    fn last_cycles(&self) -> f64 {
-        self.cycles.last().copied().unwrap_or(0.0)
+    /// Lets go of what no point that waits needs.
+    fn forget(&mut self) {
+        let first_cycles = self
+            .points
+            .get(self.next)
+            .map_or(f64::INFINITY, |kept| kept.point.travelled_cycles - HALF);
+        while self.next > 0
+            && let Some(second) = self.points.get(1)
+            && second.point.travelled_cycles < first_cycles
+        {
+            self.points.pop_front();
+            self.next -= 1;
+        }
     }
 
     /// From the first point to `cycles`, which is not beyond the ends, in V·cycles.
-    fn until(&self, cycles: f64) -> f64 {
-        let after = self.cycles.partition_point(|&before| before < cycles);
-        let (Some(before), true) = (after.checked_sub(1), after < self.cycles.len()) else {
-            return self.areas.get(after).copied().unwrap_or(0.0);
-        };
-        let (from_v, to_v) = (self.voltage[before].1, self.voltage[after].1);
-        let way = cycles - self.cycles[before];
-        let share = way / (self.cycles[after] - self.cycles[before]);
-        self.areas[before] + way * (from_v + HALF * share * (to_v - from_v))
+    fn area(&self, cycles: f64) -> f64 {
+        let after = self
+            .points
+            .partition_point(|kept| kept.point.travelled_cycles < cycles);
+        let before = after
+            .checked_sub(1)
+            .and_then(|before| self.points.get(before));
+        match (before, self.points.get(after)) {
+            (Some(from), Some(to)) => {
+                let way = cycles - from.point.travelled_cycles;
+                let share = way / (to.point.travelled_cycles - from.point.travelled_cycles);
+                let rise_v = to.point.volts - from.point.volts;
+                from.area + way * (from.point.volts + HALF * share * rise_v)
+            }
+            (Some(end), None) | (None, Some(end)) => end.area,
+            (None, None) => 0.0,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use protocol::Estimate;
+
     use super::*;
+    use crate::analysis::stimulus::{Stimulus, Told};
     use crate::analysis::synthetic::Run;
-    use crate::analysis::voltage::voltage;
-    use crate::recording::WORD_V;
+    use crate::onlooker::{Onlooker, retell};
+    use crate::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V, volts};
     use crate::truth::Truth;
 
+    /// For each stroke, the instants in s and the voltage of actuator 0 about its middle.
+    struct Strokes {
+        stimulus: Stimulus,
+        middle: AboutMiddle,
+        found: Vec<Vec<(f64, f64)>>,
+    }
+
+    impl Onlooker for Strokes {
+        fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+            self.stimulus.made(made_ns, estimate);
+        }
+
+        fn tick(&mut self, tick: &TickRecord) {
+            self.stimulus.tick(tick);
+            self.follow();
+        }
+
+        fn output(&mut self, output: &OutputRecord) {
+            self.stimulus.output(output);
+        }
+
+        fn received(&mut self, number: usize, received_ns: u64) {
+            self.stimulus.received(number, received_ns);
+        }
+    }
+
+    impl Strokes {
+        fn follow(&mut self) {
+            while let Some(told) = self.stimulus.take() {
+                let (edge, due) = match told {
+                    Told::Turned(cycles) => {
+                        self.middle.turn(cycles);
+                        continue;
+                    }
+                    Told::Point(edge, due) => (edge, due),
+                };
+                let point = Point {
+                    edge,
+                    volts: volts(edge.words[0]),
+                    travelled_cycles: due.travelled_cycles,
+                    tick: due.tick,
+                };
+                self.middle.add(point, |about| match about {
+                    Some((volts, point)) => {
+                        if let Some(stroke) = self.found.last_mut() {
+                            stroke.push((point.edge.t_s, volts));
+                        }
+                    }
+                    None => self.found.push(Vec::new()),
+                });
+            }
+        }
+    }
+
     fn strokes(run: &Run) -> Vec<Vec<(f64, f64)>> {
-        let recording = run.record();
-        let due = DuePhase::new(&Truth::new("", "", &*run.surface_mm), &recording);
-        about_middle(&voltage(&recording, 0), &Track::of_hand(&recording), &due)
+        let mut strokes = Strokes {
+            stimulus: Stimulus::new(&Truth::new("", "", &*run.surface_mm)),
+            middle: AboutMiddle::default(),
+            found: vec![Vec::new()],
+        };
+        retell(&run.record(), &mut strokes);
+        strokes.stimulus.end();
+        strokes.follow();
+        strokes.found.retain(|stroke| !stroke.is_empty());
+        strokes.found
     }
 
     #[test]
@@ -158,5 +279,26 @@ mod tests {
             strokes(&Run::to_and_fro(50.0, 0.039, 2.0)),
             Vec::<Vec<_>>::new()
         );
+    }
+
+    #[test]
+    fn outputs_that_change_while_the_hand_rests_are_given_up() {
+        let mut middle = AboutMiddle::default();
+        let mut handed_on = 0;
+        for number in 0..3 * POINTS_KEPT {
+            let edge = Edge {
+                t_s: number as f64 * 500e-6,
+                words: [0x9000; ACTUATORS],
+            };
+            let point = Point {
+                edge,
+                volts: 0.0,
+                travelled_cycles: 7.25,
+                tick: (edge.t_s, 7.25),
+            };
+            middle.add(point, |about| handed_on += usize::from(about.is_some()));
+            assert!(middle.held() <= POINTS_KEPT);
+        }
+        assert_eq!(handed_on, 0);
     }
 }

@@ -3,8 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::analysis::mean;
-use crate::analysis::phase::DuePhase;
-use crate::analysis::voltage::peak_v;
+use crate::analysis::phase::Due;
 
 /// Root mean square of a window's voltage, over the highest voltage, from which on the stimulus
 /// counts as at full amplitude: a full sine has 0.71, one that fades in over half the window 0.58.
@@ -21,78 +20,121 @@ pub struct PhaseError {
     pub mean_cycles: f64,
 }
 
-/// A point of a voltage beside the phase due then.
-struct Point {
-    volts: f64,
-    due_cycles: f64,
-    travelled_cycles: f64,
-    /// Cycles travelled for which it stands: half of the way to each neighbour.
-    weight: f64,
+/// Demodulates a voltage by its due phase φ: least squares of a sin 2πφ + b cos 2πφ over
+/// each cycle of travel, forwards or backwards; the phase error is atan2(b, a)/2π.
+#[derive(Clone, Debug, Default)]
+pub struct Demodulator {
+    /// The last point and its voltage, whose weight is not known before the next one, and the cycles travelled
+    /// at the point before it.
+    last: Option<(Due, f64)>,
+    before_cycles: f64,
+    window: Window,
+    demodulated: Vec<Demodulated>,
 }
 
-/// Demodulates a voltage (s, V) by its due phase φ: least squares of a sin 2πφ + b cos 2πφ over
-/// each cycle of travel, forwards or backwards; the phase error is atan2(b, a)/2π. None if the
-/// stimulus never was at full amplitude for a cycle.
-pub fn phase_error(voltage: &[(f64, f64)], due: &DuePhase) -> Option<PhaseError> {
-    let full_v = FULL * peak_v(voltage);
-    let errors: Vec<f64> = points(voltage, due)
-        .chunk_by(|one, other| one.travelled_cycles.floor() == other.travelled_cycles.floor())
-        .filter(|window| window.len() >= ENOUGH_POINTS)
-        .filter_map(|window| demodulate(window, full_v))
-        .collect();
-    Some(PhaseError {
-        rms_cycles: mean(errors.iter().map(|error| error * error))?.sqrt(),
-        mean_cycles: mean(errors.iter().copied())?,
-    })
+/// A window's sums, each point weighted with the cycles travelled for which it stands: half of the way to each
+/// neighbour.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    /// Cycles travelled before it, a whole number.
+    number: f64,
+    points: usize,
+    ss: f64,
+    sc: f64,
+    cc: f64,
+    sv: f64,
+    cv: f64,
+    vv: f64,
 }
 
-fn points(voltage: &[(f64, f64)], due: &DuePhase) -> Vec<Point> {
-    let travelled: Vec<f64> = voltage
-        .iter()
-        .map(|point| due.travelled_cycles(point.0))
-        .collect();
-    voltage
-        .iter()
-        .enumerate()
-        .map(|(at, &(t_s, volts))| {
-            let before = travelled[at.saturating_sub(1)];
-            let after = travelled[(at + 1).min(travelled.len() - 1)];
-            Point {
-                volts,
-                due_cycles: due.cycles(t_s),
-                travelled_cycles: travelled[at],
-                weight: 0.5 * (after - before),
-            }
+/// A window's phase error, and what decides whether it counts.
+#[derive(Clone, Copy, Debug)]
+struct Demodulated {
+    error_cycles: f64,
+    /// Of the squared voltage, in V²·cycles.
+    square: f64,
+    /// Of the weights, in cycles.
+    whole: f64,
+}
+
+impl Demodulator {
+    /// The voltage at the next point, in V.
+    pub fn add(&mut self, due: Due, volts: f64) {
+        self.weigh(due.travelled_cycles);
+        self.last = Some((due, volts));
+    }
+
+    /// The errors of the windows at full amplitude, of a voltage of which `peak_v` is the highest; none if the
+    /// stimulus never was at full amplitude for a cycle.
+    pub fn finish(mut self, peak_v: f64) -> Option<PhaseError> {
+        if let Some((last, _)) = self.last {
+            self.weigh(last.travelled_cycles);
+        }
+        self.demodulated.extend(self.window.demodulated());
+        let full_v = FULL * peak_v;
+        let full = |window: &&Demodulated| window.square >= full_v * full_v * window.whole;
+        let errors = || {
+            let windows = self.demodulated.iter().filter(full);
+            windows.map(|window| window.error_cycles)
+        };
+        Some(PhaseError {
+            rms_cycles: mean(errors().map(|error| error * error))?.sqrt(),
+            mean_cycles: mean(errors())?,
         })
-        .collect()
+    }
+
+    /// How many windows are held.
+    pub fn held(&self) -> usize {
+        self.demodulated.len()
+    }
+
+    /// Enters the last point, now that the cycles travelled at the next one are known.
+    fn weigh(&mut self, next_cycles: f64) {
+        let Some((due, volts)) = self.last else {
+            self.before_cycles = next_cycles;
+            return;
+        };
+        let number = due.travelled_cycles.floor();
+        if number != self.window.number {
+            self.demodulated.extend(self.window.demodulated());
+            self.window = Window {
+                number,
+                ..Window::default()
+            };
+        }
+        let weight = 0.5 * (next_cycles - self.before_cycles);
+        self.window.add(due.cycles, volts, weight);
+        self.before_cycles = due.travelled_cycles;
+    }
 }
 
-/// The phase of a window's voltage relative to its due phase, in cycles.
-fn demodulate(window: &[Point], full_v: f64) -> Option<f64> {
-    let [mut ss, mut sc, mut cc, mut sv, mut cv, mut vv] = [0.0; 6];
-    for &Point {
-        volts,
-        due_cycles,
-        weight,
-        ..
-    } in window
-    {
+impl Window {
+    fn add(&mut self, due_cycles: f64, volts: f64, weight: f64) {
         let (s, c) = (TAU * due_cycles).sin_cos();
-        ss += weight * s * s;
-        sc += weight * s * c;
-        cc += weight * c * c;
-        sv += weight * s * volts;
-        cv += weight * c * volts;
-        vv += weight * volts * volts;
+        self.points += 1;
+        self.ss += weight * s * s;
+        self.sc += weight * s * c;
+        self.cc += weight * c * c;
+        self.sv += weight * s * volts;
+        self.cv += weight * c * volts;
+        self.vv += weight * volts * volts;
     }
-    // sin² + cos² = 1: this is the sum of the weights.
-    let whole = ss + cc;
-    let determinant = ss * cc - sc * sc;
-    // A window in which the phase hardly moved does not tell a from b.
-    if determinant <= 1e-3 * whole * whole || vv < full_v * full_v * whole {
-        return None;
+
+    /// The phase of the voltage relative to its due phase.
+    fn demodulated(&self) -> Option<Demodulated> {
+        // sin² + cos² = 1: this is the sum of the weights.
+        let whole = self.ss + self.cc;
+        let determinant = self.ss * self.cc - self.sc * self.sc;
+        // A window in which the phase hardly moved does not tell a from b.
+        if self.points < ENOUGH_POINTS || determinant <= 1e-3 * whole * whole {
+            return None;
+        }
+        let a = (self.sv * self.cc - self.cv * self.sc) / determinant;
+        let b = (self.cv * self.ss - self.sv * self.sc) / determinant;
+        Some(Demodulated {
+            error_cycles: b.atan2(a) / TAU,
+            square: self.vv,
+            whole,
+        })
     }
-    let a = (sv * cc - cv * sc) / determinant;
-    let b = (cv * ss - sv * sc) / determinant;
-    Some(b.atan2(a) / TAU)
 }

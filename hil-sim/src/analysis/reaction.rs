@@ -1,13 +1,13 @@
 //! How long a movement of the hand takes to reach the outputs.
 
+use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use firmware_display::ZERO_VOLT;
 use serde::Serialize;
 
-use crate::analysis::finite;
-use crate::analysis::phase::DuePhase;
 use crate::analysis::track::COUNT_MM;
-use crate::recording::{ACTUATORS, OutputRecord, Recording, WORD_V, volts};
+use crate::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V};
 
 /// Time from a movement of the hand to the LDAC edge that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -20,11 +20,74 @@ pub struct Reaction {
     pub max_ms: f64,
 }
 
+/// How far each actuator has been from 0 V.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peaks([u16; ACTUATORS]);
+
+impl Peaks {
+    /// Before the first output.
+    pub const NONE: Self = Self([0; ACTUATORS]);
+    /// As far as they go.
+    const FARTHEST: Self = Self([ZERO_VOLT; ACTUATORS]);
+
+    /// Takes the next words.
+    pub fn add(&mut self, words: &[u16; ACTUATORS]) {
+        for (peak, word) in self.0.iter_mut().zip(words) {
+            *peak = (*peak).max(word.abs_diff(ZERO_VOLT));
+        }
+    }
+
+    /// The highest voltage of either sign that an actuator had, in V.
+    pub fn volts(&self, actuator: usize) -> f64 {
+        f64::from(self.0[actuator]) * WORD_V
+    }
+}
+
 /// Times that are uniformly spread between two bounds, in ns.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Spread {
-    shortest_ns: f64,
-    longest_ns: f64,
+    shortest_ns: u64,
+    longest_ns: u64,
+}
+
+/// Movement between two ticks that no edge has carried so far.
+#[derive(Clone, Copy, Debug)]
+struct Moved {
+    from_ns: u64,
+    to_ns: u64,
+    travel_mm: f64,
+}
+
+/// Movement without an edge at its tick: whether it asked for one is known at the end.
+#[derive(Clone, Debug)]
+struct Late {
+    spread: Spread,
+    travel_mm: f64,
+    held: Held,
+}
+
+/// The words that were held.
+#[derive(Clone, Debug)]
+enum Held {
+    Alike(u16),
+    Apart(Box<[u16; ACTUATORS]>),
+}
+
+impl Held {
+    fn new(words: &[u16; ACTUATORS]) -> Self {
+        if words.iter().all(|&word| word == words[0]) {
+            Self::Alike(words[0])
+        } else {
+            Self::Apart(Box::new(*words))
+        }
+    }
+
+    fn words(&self) -> [u16; ACTUATORS] {
+        match self {
+            Self::Alike(word) => [*word; ACTUATORS],
+            Self::Apart(words) => **words,
+        }
+    }
 }
 
 /// Measures every instant of movement while the stimulus is on.
@@ -32,91 +95,132 @@ struct Spread {
 /// Movement between two ticks shows at the second one's encoder reading and is carried by the first
 /// edge after it: its times are spread uniformly from that tick's to a tick more. Movement that asks
 /// for no edge is left out: below one count, while every output is at 0 V (no λ yet, faded out), or
-/// from one side of a crest to the other, where a tick may end at the voltage it began with.
-pub fn reaction(recording: &Recording, due: &DuePhase) -> Option<Reaction> {
-    let mut spreads = Vec::new();
-    let outputs = &recording.outputs;
-    let peaks = peaks(outputs);
-    let mut next = 0;
-    for pair in recording.ticks.windows(2) {
-        let [before, tick] = [pair[0], pair[1]];
-        if before.encoder == tick.encoder {
-            continue;
-        }
-        while outputs
-            .get(next)
-            .is_some_and(|output| output.at_ns < tick.at_ns)
+/// from one side of a crest to the other, where a tick may end at the voltage it began with. Where crests
+/// are, the highest voltages and the shortest λ̂ of the whole run tell.
+///
+/// Kept is how much movement took which times, and what may have been over a crest: two ticks a cycle at most,
+/// while outputs change at all.
+#[derive(Clone, Debug, Default)]
+pub struct Reactions {
+    tick: Option<TickRecord>,
+    /// What the outputs hold, if they are not all at 0 V.
+    held: Option<[u16; ACTUATORS]>,
+    moved: Vec<Moved>,
+    /// From `native` there are few different ones.
+    spreads: BTreeMap<Spread, u64>,
+    late: Vec<Late>,
+}
+
+impl Reactions {
+    /// A tick of the display's.
+    pub fn tick(&mut self, tick: &TickRecord) {
+        if let Some(before) = self.tick.replace(*tick)
+            && before.encoder != tick.encoder
+            && self.held.is_some()
         {
-            next += 1;
+            self.moved.push(Moved {
+                from_ns: before.at_ns,
+                to_ns: tick.at_ns,
+                travel_mm: (tick.position_mm - before.position_mm).abs() + COUNT_MM,
+            });
         }
-        let held = next.checked_sub(1).and_then(|last| outputs.get(last));
-        let (Some(held), Some(edge)) = (held, outputs.get(next)) else {
-            continue;
-        };
-        let period_ns = tick.at_ns.saturating_sub(before.at_ns);
-        let prompt = edge.at_ns < tick.at_ns + period_ns;
-        let travel_mm = (tick.position_mm - before.position_mm).abs() + COUNT_MM;
-        let travel_cycles = due
-            .shortest_mm()
-            .map_or(0.0, |shortest_mm| travel_mm / shortest_mm);
-        if is_at_rest(held) || (!prompt && is_over_crests(held, &peaks, travel_cycles)) {
-            continue;
-        }
-        spreads.push(Spread {
-            shortest_ns: edge.at_ns as f64 - tick.at_ns as f64,
-            longest_ns: edge.at_ns as f64 - before.at_ns as f64,
-        });
     }
-    let longest_ns = spreads
-        .iter()
-        .map(|spread| spread.longest_ns)
-        .fold(f64::NAN, f64::max);
-    Some(Reaction {
-        p50_ms: quantile_ns(&spreads, 0.5, longest_ns) * 1e-6,
-        p99_ms: quantile_ns(&spreads, 0.99, longest_ns) * 1e-6,
-        max_ms: finite(longest_ns)? * 1e-6,
+
+    /// The outputs have changed, while `shortest_mm` is the shortest λ̂ so far.
+    pub fn output(&mut self, output: &OutputRecord, shortest_mm: Option<f64>) {
+        if let Some(held) = &self.held {
+            for moved in self.moved.drain(..) {
+                let spread = Spread {
+                    shortest_ns: output.at_ns - moved.to_ns,
+                    longest_ns: output.at_ns - moved.from_ns,
+                };
+                let period_ns = moved.to_ns - moved.from_ns;
+                if spread.shortest_ns < period_ns {
+                    *self.spreads.entry(spread).or_default() += 1;
+                } else if !is_over_crests(held, &Peaks::FARTHEST, moved.travel_mm, shortest_mm) {
+                    // What is over a crest of the highest voltage there is, is so whatever follows: a shorter
+                    // λ̂ only widens it.
+                    self.late.push(Late {
+                        spread,
+                        travel_mm: moved.travel_mm,
+                        held: Held::new(held),
+                    });
+                }
+            }
+        }
+        let is_at_rest = output.words.iter().all(|&word| word == ZERO_VOLT);
+        self.held = (!is_at_rest).then_some(output.words);
+    }
+
+    /// The times, with the `peaks` and the shortest λ̂ of the whole run; none without movement.
+    pub fn finish(mut self, peaks: &Peaks, shortest_mm: Option<f64>) -> Option<Reaction> {
+        for late in &self.late {
+            if !is_over_crests(&late.held.words(), peaks, late.travel_mm, shortest_mm) {
+                *self.spreads.entry(late.spread).or_default() += 1;
+            }
+        }
+        let longest_ns = self.spreads.keys().map(|spread| spread.longest_ns).max()? as f64;
+        let spreads: Vec<Weighed> = self.spreads.iter().map(Weighed::from).collect();
+        Some(Reaction {
+            p50_ms: quantile_ns(&spreads, 0.5, longest_ns) * 1e-6,
+            p99_ms: quantile_ns(&spreads, 0.99, longest_ns) * 1e-6,
+            max_ms: longest_ns * 1e-6,
+        })
+    }
+
+    /// How many movements are held, and how many different times.
+    pub fn held(&self) -> (usize, usize) {
+        (self.moved.len() + self.late.len(), self.spreads.len())
+    }
+}
+
+/// Whether every actuator is so near a crest that the travel may take it as far behind as it is
+/// before it now, within the rounding of the words.
+fn is_over_crests(
+    held: &[u16; ACTUATORS],
+    peaks: &Peaks,
+    travel_mm: f64,
+    shortest_mm: Option<f64>,
+) -> bool {
+    let travel_cycles = shortest_mm.map_or(0.0, |shortest_mm| travel_mm / shortest_mm);
+    let share = (PI * travel_cycles).min(FRAC_PI_2).cos();
+    held.iter().enumerate().all(|(actuator, word)| {
+        let held_v = f64::from(word.abs_diff(ZERO_VOLT)) * WORD_V;
+        held_v >= share * peaks.volts(actuator) - WORD_V
     })
 }
 
-/// The highest voltage of either sign that each actuator ever had.
-fn peaks(outputs: &[OutputRecord]) -> [f64; ACTUATORS] {
-    let mut peaks = [0.0; ACTUATORS];
-    for output in outputs {
-        for (peak, &word) in peaks.iter_mut().zip(&output.words) {
-            *peak = f64::max(*peak, volts(word).abs());
+/// So much movement took times that are spread between two bounds, in ns.
+struct Weighed {
+    shortest_ns: f64,
+    longest_ns: f64,
+    count: f64,
+}
+
+impl From<(&Spread, &u64)> for Weighed {
+    fn from((spread, &count): (&Spread, &u64)) -> Self {
+        Self {
+            shortest_ns: spread.shortest_ns as f64,
+            longest_ns: spread.longest_ns as f64,
+            count: count as f64,
         }
     }
-    peaks
-}
-
-fn is_at_rest(output: &OutputRecord) -> bool {
-    output.words.iter().all(|&word| volts(word) == 0.0)
-}
-
-/// Whether every actuator is so near a crest that `travel_cycles` may take it as far behind as it is
-/// before it now, within the rounding of the words.
-fn is_over_crests(held: &OutputRecord, peaks: &[f64; ACTUATORS], travel_cycles: f64) -> bool {
-    let share = (PI * travel_cycles).min(FRAC_PI_2).cos();
-    held.words
-        .iter()
-        .zip(peaks)
-        .all(|(&word, peak)| volts(word).abs() >= share * peak - WORD_V)
 }
 
 /// How closely a quantile is found, in ns.
 const CLOSE_NS: f64 = 1e-3;
 
 /// The time that a share of all movement stays below, found by halving.
-fn quantile_ns(spreads: &[Spread], share: f64, longest_ns: f64) -> f64 {
-    let whole: f64 = spreads.iter().map(|s| s.longest_ns - s.shortest_ns).sum();
+fn quantile_ns(spreads: &[Weighed], share: f64, longest_ns: f64) -> f64 {
+    let below = |ns: f64| -> f64 {
+        let spent = |s: &Weighed| s.count * (ns.clamp(s.shortest_ns, s.longest_ns) - s.shortest_ns);
+        spreads.iter().map(spent).sum()
+    };
+    let due = share * below(longest_ns);
     let (mut low, mut high) = (0.0, longest_ns);
     while high - low > CLOSE_NS {
         let middle = 0.5 * (low + high);
-        let below: f64 = spreads
-            .iter()
-            .map(|s| middle.clamp(s.shortest_ns, s.longest_ns) - s.shortest_ns)
-            .sum();
-        if below < share * whole {
+        if below(middle) < due {
             low = middle
         } else {
             high = middle
@@ -128,7 +232,9 @@ fn quantile_ns(spreads: &[Spread], share: f64, longest_ns: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::actuators::judge;
     use crate::analysis::synthetic::Run;
+    use crate::recording::Recording;
     use crate::truth::Truth;
 
     /// Bound in ms: instants are whole ns.
@@ -136,10 +242,7 @@ mod tests {
 
     fn measured(recording: &Recording) -> Option<Reaction> {
         let surface = |_| 2.0;
-        reaction(
-            recording,
-            &DuePhase::new(&Truth::new("", "", &surface), recording),
-        )
+        judge(&Truth::new("", "", &surface), recording).hand_to_output
     }
 
     fn near(value: f64, expected: f64) -> bool {

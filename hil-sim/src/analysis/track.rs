@@ -58,17 +58,15 @@ impl Track {
         let (Some(first), Some(last)) = (self.points.first(), self.points.last()) else {
             return Vec::new();
         };
+        let mut turns = Turns::default();
         let mut strokes = Vec::new();
-        let (mut from_s, mut forwards) = (first.0, None);
-        for pair in self.points.windows(2) {
-            let step_mm = pair[1].1 - pair[0].1;
-            if step_mm == 0.0 {
-                continue;
+        let (mut from_s, mut before_s) = (first.0, first.0);
+        for &(t_s, position_mm) in &self.points {
+            if turns.turned(position_mm) {
+                strokes.push((from_s, before_s));
+                from_s = before_s;
             }
-            if forwards.replace(step_mm > 0.0) == Some(step_mm < 0.0) {
-                strokes.push((from_s, pair[0].0));
-                from_s = pair[0].0;
-            }
+            before_s = t_s;
         }
         strokes.push((from_s, last.0));
         strokes
@@ -83,6 +81,22 @@ impl Track {
             return None;
         }
         Some((self.position_mm(to)? - self.position_mm(from)?) / (to - from))
+    }
+}
+
+/// Finds where something turns back, from one point to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Turns {
+    before_mm: Option<f64>,
+    forwards: Option<bool>,
+}
+
+impl Turns {
+    /// Whether it turned at the point before this one, in mm. What rests before it turns back turns when it
+    /// goes again.
+    pub fn turned(&mut self, position_mm: f64) -> bool {
+        let step_mm = position_mm - self.before_mm.replace(position_mm).unwrap_or(position_mm);
+        step_mm != 0.0 && self.forwards.replace(step_mm > 0.0) == Some(step_mm < 0.0)
     }
 }
 

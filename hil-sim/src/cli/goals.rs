@@ -6,10 +6,9 @@ use std::process::ExitCode;
 use hil_sim::analysis::Summary;
 use hil_sim::batch::on_all_cores;
 use hil_sim::chart::family::{self, Family};
-use hil_sim::elf::Firmwares;
-use hil_sim::outcome::Outcome;
+use hil_sim::elf::{self, Firmwares};
+use hil_sim::outcome::{Judgement, Outcome};
 use hil_sim::scene::Scene;
-use hil_sim::{elf, native};
 
 use super::say::say;
 use super::{Elves, EngineName, number, progress};
@@ -74,15 +73,17 @@ impl Goals {
 fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<Judged>> {
     let bar = progress(scenes.len() as u64);
     let judged = on_all_cores(scenes, |scene| {
-        let recording = match firmwares {
-            None => native::run(scene)?,
-            Some(firmwares) => elf::run(scene, firmwares)?.0,
+        let judgement = match firmwares {
+            None => Judgement::of(scene, false)?,
+            Some(firmwares) => {
+                let (recording, _) = elf::run(scene, firmwares)?;
+                Outcome::new((*scene).clone(), recording).judgement(false)
+            }
         };
-        let outcome = Outcome::new((*scene).clone(), recording);
         bar.inc(1);
         Ok(Judged {
-            summary: outcome.verdict.summary,
-            unmet: outcome.unmet,
+            summary: judgement.verdict.summary,
+            unmet: judgement.unmet,
         })
     });
     bar.finish_and_clear();

@@ -159,7 +159,7 @@ impl What {
         let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();
         let bar = runs(inputs.len() as u64);
         let mut seen = vec![Seen::default(); scenes.len()];
-        let work = |&index: &usize| ready.run(&scenes[index].scene).map(|run| run.hash);
+        let work = |&index: &usize| ready.hash(&scenes[index].scene);
         batch::in_order(&inputs, self.way.threads(), work, |at, hash| {
             let hash = hash
                 .map_err(|error| error.context(format!("{}", scenes[inputs[at]].path.display())))?;

@@ -1,7 +1,7 @@
 //! `hil-sim run`.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -10,11 +10,11 @@ use hil_sim::annotation::Annotation;
 use hil_sim::batch;
 use hil_sim::expectation::key_of;
 use hil_sim::golden::{Golden, Standing, complaint};
-use hil_sim::json::{JsonList, to_json};
+use hil_sim::json::JsonList;
 use hil_sim::junit::{self, Case, Fate};
 use hil_sim::map::shard::Shard;
-use hil_sim::outcome::Outcome;
-use hil_sim::recording::{Engine, Recording};
+use hil_sim::outcome::{Judgement, Outcome};
+use hil_sim::recording::Engine;
 use hil_sim::report::html;
 use hil_sim::scene::{SceneError, line_of};
 
@@ -54,12 +54,7 @@ pub(super) struct Run {
 
 /// What is left of a run once it has been judged.
 struct Judged {
-    row: String,
-    unmet: Vec<String>,
-    hash: u64,
-    wall_s: f64,
-    /// As a list of one.
-    json: Option<String>,
+    judgement: Judgement,
     /// Only if a report is to be made of it.
     outcome: Option<Outcome>,
 }
@@ -89,14 +84,26 @@ impl Run {
         let mut books = Books {
             way: &self.way,
             golden,
-            json: json.map(|(file, path)| (file, path, JsonList::default())),
+            json: json.map(|(file, path)| (BufWriter::new(file), path, JsonList::default())),
             cases: Vec::with_capacity(scenes.len()),
             outcomes: Vec::new(),
             met: true,
         };
         let work = |loaded: &Loaded| {
+            // Events are for the JSON.
+            let events = self.json.is_some();
+            if report.is_none() && self.way.engine() == Engine::Native {
+                return Ok(Judged {
+                    judgement: Judgement::of(&loaded.scene, events)?,
+                    outcome: None,
+                });
+            }
             let recording = ready.run(&loaded.scene)?;
-            Judged::new(loaded, recording, self.json.is_some(), report.is_some())
+            let outcome = Outcome::new(loaded.scene.clone(), recording);
+            anyhow::Ok(Judged {
+                judgement: outcome.judgement(events),
+                outcome: report.is_some().then_some(outcome),
+            })
         };
         let ran = batch::in_order(&scenes, self.way.threads(), work, |index, judged| {
             books.enter(&scenes[index], judged)
@@ -111,6 +118,7 @@ impl Run {
         ran?;
         if let Some((mut file, path, list)) = books.json {
             file.write_all(list.end().as_bytes())
+                .and_then(|()| file.flush())
                 .with_context(|| format!("{}", path.display()))?;
         }
         if let Some((mut file, path)) = report {
@@ -128,32 +136,11 @@ impl Run {
     }
 }
 
-impl Judged {
-    /// Judges a run; what is not asked for is dropped.
-    fn new(
-        loaded: &Loaded,
-        recording: Recording,
-        json: bool,
-        report: bool,
-    ) -> anyhow::Result<Self> {
-        let (hash, wall_s) = (recording.hash, recording.wall_s);
-        let outcome = Outcome::new(loaded.scene.clone(), recording);
-        Ok(Self {
-            row: row(&outcome),
-            unmet: outcome.unmet.clone(),
-            hash,
-            wall_s,
-            json: json.then(|| to_json(&[outcome.result()])).transpose()?,
-            outcome: report.then_some(outcome),
-        })
-    }
-}
-
 /// What is written down of the runs, in their order.
 struct Books<'a> {
     way: &'a Way,
     golden: Option<Golden>,
-    json: Option<(File, &'a Path, JsonList)>,
+    json: Option<(BufWriter<File>, &'a Path, JsonList)>,
     cases: Vec<Case>,
     outcomes: Vec<Outcome>,
     /// Whether all was as expected so far.
@@ -163,7 +150,7 @@ struct Books<'a> {
 impl Books<'_> {
     fn enter(&mut self, loaded: &Loaded, judged: anyhow::Result<Judged>) -> anyhow::Result<()> {
         let Loaded { path, scene } = loaded;
-        let mut judged = match judged {
+        let Judged { judgement, outcome } = match judged {
             Ok(judged) => judged,
             Err(error) => {
                 let file = path.display().to_string();
@@ -179,28 +166,28 @@ impl Books<'_> {
                 return Err(error.context(file));
             }
         };
+        let (hash, wall_s) = (judgement.ran.hash, judgement.ran.wall_s);
+        let mut row = row(&scene.name, &judgement);
+        let mut unmet = judgement.unmet.clone();
         let text = fs::read_to_string(path).unwrap_or_default();
         // Each line with the file and the line of it that it is about.
-        let mut places: Vec<(&Path, Option<usize>)> = judged
-            .unmet
+        let mut places: Vec<(&Path, Option<usize>)> = unmet
             .iter()
             .map(|line| (path.as_path(), line_of(&text, &["expect", key_of(line)])))
             .collect();
         if let Some(golden) = &self.golden {
             let name = golden.name(path)?;
-            let standing = golden.standing(&name, self.way.engine(), judged.hash);
-            judged
-                .unmet
-                .extend(complaint(&standing, judged.hash, golden, &name));
+            let standing = golden.standing(&name, self.way.engine(), hash);
+            unmet.extend(complaint(&standing, hash, golden, &name));
             places.push(match standing {
                 Standing::Other(_, at) => (golden.path(), at),
                 Standing::Same | Standing::Missing => (path.as_path(), None),
             });
         }
-        let is_met = judged.unmet.is_empty();
-        judged.row += if is_met { "  ok" } else { "  FAILED" };
-        say!("{}", judged.row);
-        for (line, (file, at)) in judged.unmet.iter().zip(places) {
+        let is_met = unmet.is_empty();
+        row += if is_met { "  ok" } else { "  FAILED" };
+        say!("{row}");
+        for (line, (file, at)) in unmet.iter().zip(places) {
             say!("  not as expected: {line}");
             self.way.annotate(&Annotation {
                 file: &file.display().to_string(),
@@ -210,16 +197,16 @@ impl Books<'_> {
             });
         }
         self.met &= is_met;
-        if let (Some((file, path, list)), Some(alone)) = (&mut self.json, &judged.json) {
-            file.write_all(list.next(alone).as_bytes())
+        if let Some((file, path, list)) = &mut self.json {
+            list.write(&judgement.result(scene), file)
                 .with_context(|| format!("{}", path.display()))?;
         }
-        self.outcomes.extend(judged.outcome);
+        self.outcomes.extend(outcome);
         let fate = Fate::Ran {
-            wall_s: judged.wall_s,
-            hash: judged.hash,
-            row: judged.row,
-            unmet: judged.unmet,
+            wall_s,
+            hash,
+            row,
+            unmet,
         };
         self.cases.push(case(path, &scene.name, fate));
         Ok(())
@@ -265,19 +252,18 @@ const HEADER: &str = "\
 scene                       λ mm     rms %  valid  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
 /// A scene's line, up to whether it is as expected.
-fn row(outcome: &Outcome) -> String {
-    let summary = &outcome.verdict.summary;
-    let actuators = &outcome.verdict.actuators;
+fn row(name: &str, judgement: &Judgement) -> String {
+    let summary = &judgement.verdict.summary;
+    let actuators = &judgement.verdict.actuators;
     format!(
-        "{:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
-        outcome.scene.name,
+        "{name:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
         number(summary.valid_share, 2),
         number(actuators.frequency_hz, 3),
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),
-        pace(outcome.recording.realtime_factor()),
+        pace(judgement.ran.realtime_factor()),
     )
 }
 

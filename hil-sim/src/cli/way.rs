@@ -64,6 +64,14 @@ impl Ready {
             Self::Elf(firmwares) => elf::run(scene, firmwares)?.0,
         })
     }
+
+    /// The hash of a scene's run.
+    pub fn hash(&self, scene: &Scene) -> anyhow::Result<u64> {
+        Ok(match self {
+            Self::Native => native::run_before(scene, &mut ())?.hash,
+            Self::Elf(firmwares) => elf::run(scene, firmwares)?.0.hash,
+        })
+    }
 }
 
 impl Way {

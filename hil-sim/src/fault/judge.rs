@@ -1,23 +1,19 @@
 //! What became of a fault: seen or not, and when the outputs were at 0 V.
 
-use firmware_display::ZERO_VOLT;
+mod outputs;
+
+use std::ops::Range;
+
 use protocol::{
     DisplayCounters, DisplayState, Estimate, GaugeHealth, Message, PortCounters, Role,
     RoleCounters, SensorCounters, Status,
 };
 
-use super::{Class, Fault, Kind, Signs};
+use self::outputs::Outputs;
+use super::{Fault, Kind, Reset};
 use crate::listener::Said;
-use crate::recording::{ACTUATORS, OutputRecord, Recording};
-
-/// Longest time in ns that an output may stand at one voltage that is not 0: as long as any fault's
-/// outputs have to be at 0 V.
-const STANDING_NS: u64 = 20_000_000;
-/// How long before a fault an output has to have been driven for the stimulus to be called on: half a
-/// cycle of 25 Hz passes 0 V once.
-const DRIVEN_NS: u64 = 20_000_000;
-/// All outputs at 0 V for so long, in ns, is no wave's passing: ten ticks.
-const SILENCE_NS: u64 = 5_000_000;
+use crate::onlooker::Onlooker;
+use crate::recording::{OutputRecord, Recording};
 
 /// What became of one fault.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,181 +93,200 @@ impl Finding {
 /// Judges every fault of a recording, each until the next one that takes the display's power, or else
 /// until the end.
 pub fn judge(faults: &[Fault], recording: &Recording) -> Vec<Finding> {
-    let end_ns = (recording.duration_s * 1e9) as u64;
-    faults
-        .iter()
-        .map(|fault| {
+    let mut judge = Judge::new(faults, recording.duration_s);
+    for watch in &mut judge.watches {
+        watch.review(recording);
+    }
+    judge.finish()
+}
+
+/// Judges one fault of a recording by what came before `until_ns`.
+pub fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
+    let mut watch = Watch::new(fault, until_ns);
+    watch.review(recording);
+    watch.finish()
+}
+
+/// Judges the faults of a run as it goes on: what is kept of each does not grow.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    watches: Vec<Watch>,
+}
+
+impl Judge {
+    /// Before a run of `duration_s` with these faults.
+    pub fn new(faults: &[Fault], duration_s: f64) -> Self {
+        let end_ns = (duration_s * 1e9) as u64;
+        let watch = |fault: &Fault| {
             let next_ns = faults
                 .iter()
                 .filter(|next| next.kind == Kind::PowerCycle)
                 .map(Fault::begins_ns)
                 .filter(|&at_ns| at_ns > fault.begins_ns())
                 .min();
-            finding(fault, next_ns.unwrap_or(end_ns).min(end_ns), recording)
-        })
-        .collect()
-}
+            Watch::new(fault, next_ns.unwrap_or(end_ns).min(end_ns))
+        };
+        Self {
+            watches: faults.iter().map(watch).collect(),
+        }
+    }
 
-/// Judges one fault of a recording by what came before `until_ns`.
-pub fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
-    let from_ns = fault.begins_ns();
-    let outputs = &recording.outputs;
-    let rest_ns = fault.ends_ns().unwrap_or(until_ns);
-    let rest_ns = match fault.kind.row().class {
-        // What is over stays answered.
-        Class::Stops => until_ns,
-        _ => rest_ns.min(until_ns),
-    };
-    let safe_ns = silent_from(outputs, from_ns, rest_ns);
-    let sign = first_sign(fault, until_ns, &recording.signs);
-    let resets =
-        recording.signs.resets.iter().filter(|reset| {
-            reset.role == Role::Display && (from_ns..until_ns).contains(&reset.at_ns)
-        });
-    let answered_ns = answered(outputs, from_ns, until_ns).unwrap_or(until_ns);
-    Finding {
-        fault: *fault,
-        was_driving: is_driven(outputs, from_ns.saturating_sub(DRIVEN_NS), from_ns),
-        detected_ns: sign.as_ref().map(|(at_ns, _)| at_ns - from_ns),
-        sign: sign.map(|(_, sign)| sign).unwrap_or_default(),
-        safe_ns: safe_ns.map(|at_ns| at_ns - from_ns),
-        stuck: stuck(fault, outputs, rest_ns, until_ns),
-        drives_again: is_driven(outputs, answered_ns + 1, until_ns),
-        resets: resets.count(),
+    /// What became of each fault.
+    pub fn finish(self) -> Vec<Finding> {
+        self.watches.into_iter().map(Watch::finish).collect()
     }
 }
 
-fn is_silent(output: &OutputRecord) -> bool {
-    output.words.iter().all(|&word| word == ZERO_VOLT)
+impl Onlooker for Judge {
+    fn output(&mut self, output: &OutputRecord) {
+        for watch in &mut self.watches {
+            watch.output(output);
+        }
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        for watch in &mut self.watches {
+            watch.said(role, said);
+        }
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        for watch in &mut self.watches {
+            watch.reset(reset);
+        }
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        for watch in &mut self.watches {
+            watch.cleared(at_ns);
+        }
+    }
 }
 
-/// The outputs from `from_ns` on: what holds then, and every change before `until_ns`.
-fn within(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> &[OutputRecord] {
-    let first = outputs.partition_point(|output| output.at_ns <= from_ns);
-    let last = outputs.partition_point(|output| output.at_ns < until_ns);
-    &outputs[first.saturating_sub(1)..last.max(first)]
+/// Looks on a fault.
+#[derive(Clone, Debug)]
+struct Watch {
+    fault: Fault,
+    /// What concerns it is in this time, in ns.
+    due_ns: Range<u64>,
+    outputs: Outputs,
+    /// The first clear, in ns.
+    clear_ns: Option<u64>,
+    /// The first reset that the scene did not bring about.
+    reset: Option<Reset>,
+    resets: usize,
+    display: Voice,
+    sensor: Voice,
 }
 
-fn is_driven(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> bool {
-    from_ns < until_ns
-        && within(outputs, from_ns, until_ns)
+/// What a board says.
+#[derive(Clone, Debug, Default)]
+struct Voice {
+    /// The last counters that the board has not forgotten.
+    before: Option<Status>,
+    /// When the fault first showed, in ns, and how.
+    sign: Option<(u64, String)>,
+}
+
+impl Watch {
+    fn new(fault: &Fault, until_ns: u64) -> Self {
+        Self {
+            fault: *fault,
+            due_ns: fault.begins_ns()..until_ns,
+            outputs: Outputs::new(fault, until_ns),
+            clear_ns: None,
+            reset: None,
+            resets: 0,
+            display: Voice::default(),
+            sensor: Voice::default(),
+        }
+    }
+
+    /// Looks on a run after the fact.
+    fn review(&mut self, recording: &Recording) {
+        let signs = &recording.signs;
+        recording
+            .outputs
             .iter()
-            .any(|output| !is_silent(output))
-}
-
-/// From when on, `from_ns` at the earliest, all outputs stay at 0 V until `until_ns`.
-fn silent_from(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> Option<u64> {
-    let held = within(outputs, from_ns, until_ns);
-    match held.iter().rposition(|output| !is_silent(output)) {
-        None => Some(from_ns),
-        Some(last) => held.get(last + 1).map(|output| output.at_ns),
-    }
-}
-
-/// From when on all outputs were at 0 V for longer than a wave that passes it.
-fn answered(outputs: &[OutputRecord], from_ns: u64, until_ns: u64) -> Option<u64> {
-    let held = within(outputs, from_ns, until_ns);
-    let ends_ns = held.iter().skip(1).map(|next| next.at_ns).chain([until_ns]);
-    let silent = held
-        .iter()
-        .zip(ends_ns)
-        .filter(|(output, _)| is_silent(output))
-        .map(|(output, end_ns)| (output.at_ns.max(from_ns), end_ns));
-    let mut long = silent.filter(|(at_ns, end_ns)| end_ns - at_ns >= SILENCE_NS);
-    long.next().map(|(at_ns, _)| at_ns)
-}
-
-/// Outputs that are driven 20 ms after a fault that can put out a wrong voltage, or that stand at a
-/// voltage for longer than that.
-fn stuck(fault: &Fault, outputs: &[OutputRecord], rest_ns: u64, until_ns: u64) -> usize {
-    let from_ns = fault.begins_ns();
-    let is_dangerous = fault.kind.row().safe_within_ms.is_some();
-    let late_ns = from_ns + STANDING_NS;
-    (0..ACTUATORS)
-        .filter(|&actuator| {
-            let word = |output: &OutputRecord| output.words[actuator];
-            let is_late = is_dangerous
-                && late_ns < rest_ns
-                && within(outputs, late_ns, late_ns)
-                    .iter()
-                    .any(|output| word(output) != ZERO_VOLT);
-            is_late || longest_standing_ns(outputs, from_ns, until_ns, word) > STANDING_NS
-        })
-        .count()
-}
-
-/// The longest time at one voltage that is not 0.
-fn longest_standing_ns(
-    outputs: &[OutputRecord],
-    from_ns: u64,
-    until_ns: u64,
-    word: impl Fn(&OutputRecord) -> u16,
-) -> u64 {
-    let mut longest_ns = 0;
-    let mut held: Option<(u64, u16)> = None;
-    for output in within(outputs, from_ns, until_ns) {
-        let now = word(output);
-        if held.is_some_and(|(_, word)| word == now) {
-            continue;
-        }
-        if let Some((since_ns, word)) = held.replace((output.at_ns.max(from_ns), now))
-            && word != ZERO_VOLT
-        {
-            longest_ns = longest_ns.max(output.at_ns.saturating_sub(since_ns));
-        }
-    }
-    match held {
-        Some((since_ns, word)) if word != ZERO_VOLT => longest_ns.max(until_ns - since_ns),
-        _ => longest_ns,
-    }
-}
-
-/// The first sign of a fault, and when it could be seen.
-fn first_sign(fault: &Fault, until_ns: u64, signs: &Signs) -> Option<(u64, String)> {
-    let from_ns = fault.begins_ns();
-    let is_due = |at_ns: u64| (from_ns..until_ns).contains(&at_ns);
-    let clear = signs
-        .clears_ns
-        .iter()
-        .copied()
-        .filter(|&at_ns| is_due(at_ns));
-    let resets = signs
-        .resets
-        .iter()
-        .filter(|reset| !reset.is_injected && is_due(reset.at_ns));
-    let mut found: Vec<(u64, String)> = clear
-        .map(|at_ns| (at_ns, "CLR fell".to_owned()))
-        .chain(resets.map(|reset| (reset.at_ns, format!("{} reset", reset.role.name()))))
-        .collect();
-    for (said, role) in [
-        (&signs.display, Role::Display),
-        (&signs.sensor, Role::Sensor),
-    ] {
-        let mut before = before(said, from_ns);
-        let first = said
+            .for_each(|output| self.output(output));
+        signs
+            .display
             .iter()
-            .filter(|said| is_due(said.at_ns))
-            .find_map(|said| {
-                let sign = sign_of(fault, &said.message, &mut before)?;
-                Some((said.at_ns, format!("{}: {sign}", role.name())))
-            });
-        found.extend(first);
+            .for_each(|said| self.said(Role::Display, said));
+        signs
+            .sensor
+            .iter()
+            .for_each(|said| self.said(Role::Sensor, said));
+        signs.resets.iter().for_each(|reset| self.reset(reset));
+        signs
+            .clears_ns
+            .iter()
+            .for_each(|&at_ns| self.cleared(at_ns));
     }
-    found.into_iter().min_by_key(|&(at_ns, _)| at_ns)
-}
 
-/// The last counters before a fault that the board has not forgotten.
-fn before(said: &[Said], from_ns: u64) -> Option<Status> {
-    let before = said.iter().take_while(|said| said.at_ns < from_ns);
-    let mut status = None;
-    for said in before {
-        match &said.message {
-            Message::Status(counted) => status = Some(*counted),
-            Message::Hello(hello) if hello.asks != 0 => status = None,
-            _ => {}
+    fn finish(self) -> Finding {
+        let from_ns = self.due_ns.start;
+        let clear = self.clear_ns.map(|at_ns| (at_ns, "CLR fell".to_owned()));
+        let reset = self
+            .reset
+            .map(|reset| (reset.at_ns, format!("{} reset", reset.role.name())));
+        let sign = [clear, reset, self.display.sign, self.sensor.sign]
+            .into_iter()
+            .flatten()
+            .min_by_key(|&(at_ns, _)| at_ns);
+        let outputs = self.outputs.finish();
+        Finding {
+            fault: self.fault,
+            was_driving: outputs.was_driving,
+            detected_ns: sign.as_ref().map(|(at_ns, _)| at_ns - from_ns),
+            sign: sign.map(|(_, sign)| sign).unwrap_or_default(),
+            safe_ns: outputs.safe_ns.map(|at_ns| at_ns - from_ns),
+            stuck: outputs.stuck,
+            drives_again: outputs.drives_again,
+            resets: self.resets,
         }
     }
-    status
+}
+
+impl Onlooker for Watch {
+    fn output(&mut self, output: &OutputRecord) {
+        self.outputs.add(output);
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        let voice = match role {
+            Role::Display => &mut self.display,
+            Role::Sensor => &mut self.sensor,
+            Role::Host => return,
+        };
+        if said.at_ns < self.due_ns.start {
+            match &said.message {
+                Message::Status(counted) => voice.before = Some(*counted),
+                Message::Hello(hello) if hello.asks != 0 => voice.before = None,
+                _ => {}
+            }
+        } else if self.due_ns.contains(&said.at_ns) && voice.sign.is_none() {
+            let sign = sign_of(&self.fault, &said.message, &mut voice.before);
+            voice.sign = sign.map(|sign| (said.at_ns, format!("{}: {sign}", role.name())));
+        }
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        if !self.due_ns.contains(&reset.at_ns) {
+            return;
+        }
+        self.resets += usize::from(reset.role == Role::Display);
+        let is_earlier = self.reset.is_none_or(|first| reset.at_ns < first.at_ns);
+        if !reset.is_injected && is_earlier {
+            self.reset = Some(*reset);
+        }
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        if self.due_ns.contains(&at_ns) {
+            self.clear_ns = Some(self.clear_ns.map_or(at_ns, |first_ns| first_ns.min(at_ns)));
+        }
+    }
 }
 
 /// What a message tells of a fault.

@@ -17,6 +17,14 @@ pub struct Lines {
 }
 
 impl Lines {
+    /// Within a list that is not closed yet.
+    pub fn in_a_list() -> Self {
+        Self {
+            depth: 1,
+            filled: false,
+        }
+    }
+
     fn open<W: ?Sized + Write>(&mut self, out: &mut W, bracket: &[u8]) -> Result<()> {
         self.depth += 1;
         self.filled = false;

@@ -24,16 +24,17 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Runs a scene on the native engine and judges it.
+    /// Runs a scene on the native engine and judges it meanwhile.
     ///
     /// # Errors
     /// If the scene cannot be run.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
-        let recording = native::run(scene)?;
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
         let truth = Truth::new(&scene.name, scene.estimator.method_name(), &wavelength_mm);
-        let (judged, summary) = estimates::judge(&truth, &recording);
+        let mut judge = estimates::Judge::new(&truth);
+        native::run_before(scene, &mut judge)?;
+        let (judged, summary) = judge.finish();
         let count = |which: fn(&JudgedEstimate) -> bool| {
             judged.iter().filter(|estimate| which(estimate)).count() as u32
         };

@@ -1,10 +1,12 @@
 //! Recordings of displays that answer a fault well, or badly.
 
+use firmware_display::ZERO_VOLT;
 use protocol::{Safety, Trip};
 
 use super::*;
 use crate::analysis::synthetic::Run;
-use crate::fault::Reset;
+use crate::fault::{Reset, Signs};
+use crate::recording::ACTUATORS;
 
 const MS: u64 = 1_000_000;
 const AT_MS: u64 = 100;
