@@ -11,7 +11,7 @@
 
 use protocol::{Estimate, Role};
 
-use crate::fault::Reset;
+use crate::fault::{Reset, Signs};
 use crate::listener::Said;
 use crate::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
 
@@ -95,15 +95,21 @@ pub fn retell(recording: &Recording, to: &mut impl Onlooker) {
             to.received(number, received_ns);
         }
     }
-    let signs = &recording.signs;
-    signs
-        .display
-        .iter()
-        .for_each(|said| to.said(Role::Display, said));
-    signs
-        .sensor
-        .iter()
-        .for_each(|said| to.said(Role::Sensor, said));
-    signs.resets.iter().for_each(|reset| to.reset(reset));
-    signs.clears_ns.iter().for_each(|&at_ns| to.cleared(at_ns));
+    retell_signs(&recording.signs, to);
+}
+
+/// Tells of what shows of faults alone.
+pub fn retell_signs(signs: &Signs, to: &mut impl Onlooker) {
+    for said in &signs.display {
+        to.said(Role::Display, said);
+    }
+    for said in &signs.sensor {
+        to.said(Role::Sensor, said);
+    }
+    for reset in &signs.resets {
+        to.reset(reset);
+    }
+    for &at_ns in &signs.clears_ns {
+        to.cleared(at_ns);
+    }
 }

@@ -12,7 +12,7 @@ use protocol::{
 use self::outputs::Outputs;
 use super::{Fault, Kind, Reset};
 use crate::listener::Said;
-use crate::onlooker::Onlooker;
+use crate::onlooker::{Onlooker, retell_signs};
 use crate::recording::{OutputRecord, Recording};
 
 /// What became of one fault.
@@ -204,24 +204,10 @@ impl Watch {
 
     /// Looks on a run after the fact.
     fn review(&mut self, recording: &Recording) {
-        let signs = &recording.signs;
-        recording
-            .outputs
-            .iter()
-            .for_each(|output| self.output(output));
-        signs
-            .display
-            .iter()
-            .for_each(|said| self.said(Role::Display, said));
-        signs
-            .sensor
-            .iter()
-            .for_each(|said| self.said(Role::Sensor, said));
-        signs.resets.iter().for_each(|reset| self.reset(reset));
-        signs
-            .clears_ns
-            .iter()
-            .for_each(|&at_ns| self.cleared(at_ns));
+        for output in &recording.outputs {
+            self.output(output);
+        }
+        retell_signs(&recording.signs, self);
     }
 
     fn finish(self) -> Finding {
