@@ -117,10 +117,10 @@ fn boards_that_have_run_other_scenes_run_as_fresh_ones_do() {
         "{SCENE}[estimator]\nmethod = \"counting\"\n[[fault]]\nkind = \"power-cycle\"\nat_s = 0.2\n"
     );
     fs::write(folder.join("b.toml"), other).unwrap();
-    let alone = [&["a.toml"], &["b.toml"]].map(|scene| hashes(&folder, scene));
-    let after = hashes(&folder, &["b.toml", "a.toml", "b.toml"]);
-    assert_ne!(alone[0], alone[1]);
-    assert_eq!(after, [&*alone[1], &*alone[0], &*alone[1]].concat());
+    let [a, b] = [["a.toml"], ["b.toml"]].map(|scene| hashes(&folder, &scene));
+    assert_ne!(a, b);
+    let after = hashes(&folder, &["b.toml", "a.toml", "b.toml", "a.toml"]);
+    assert_eq!(after, [&*b, &*a, &*b, &*a].concat());
 }
 
 #[test]
