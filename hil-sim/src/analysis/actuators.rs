@@ -27,7 +27,7 @@ pub struct Actuators {
     pub frequency_hz: Option<f64>,
     /// Mean of |v|/λ̂ over the same stretch, in Hz.
     pub truth_hz: Option<f64>,
-    /// Root mean square of the phase error, cycle by cycle, against [`DuePhase`], in cycles.
+    /// Root mean square of the phase error, cycle by cycle, against [`crate::analysis::phase::DuePhase`], in cycles.
     pub phase_error_rms_cycles: Option<f64>,
     /// Its mean, in cycles: above 0 where the stimulus is ahead.
     pub phase_error_mean_cycles: Option<f64>,
