@@ -72,13 +72,16 @@ mod board {
     // Never on the stack, which holds less.
     static SIGNAL: ConstStaticCell<Signal> =
         ConstStaticCell::new([[[0; CHANNELS]; SCANS_PER_SAMPLE]; MILLISECONDS as usize]);
+    static SENSOR: ConstStaticCell<Option<Sensor>> = ConstStaticCell::new(None);
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
         enable_marks();
         let signal = SIGNAL.take();
         rub(signal);
-        run(signal);
+        run_settings(signal);
+        run_rivals(signal);
+        run_front(signal);
         mark(DONE);
         loop {
             cortex_m::asm::wfi();
@@ -103,18 +106,29 @@ mod board {
         }
     }
 
-    fn run(signal: &Signal) {
+    // Each of these, and each rival, has a frame of its own: the stack does not hold all of them at once.
+    #[inline(never)]
+    fn run_settings(signal: &Signal) {
+        let place = SENSOR.take();
         for (part, setting) in (SETTINGS_FROM..).zip(&SETTINGS) {
-            let mut sensor = Sensor::new(setting.on(SensorConfiguration::DEFAULT));
+            let sensor = place.insert(Sensor::new(setting.on(SensorConfiguration::DEFAULT)));
             part_of(part, signal, |ms, scans, encoder| {
                 black_box(sensor.step(ms as u64 * 1_000, scans, encoder));
             });
         }
+    }
+
+    #[inline(never)]
+    fn run_rivals(signal: &Signal) {
         let mut field = Field {
             signal,
             next: RIVALS_FROM,
         };
         show_all::<MicroFft>(&mut field);
+    }
+
+    #[inline(never)]
+    fn run_front(signal: &Signal) {
         let mut front = Entrant::new(Silent);
         part_of(FRONT, signal, |_, scans, encoder| {
             black_box(front.step(scans, encoder));
@@ -148,6 +162,7 @@ mod board {
     }
 
     impl Visitor for Field<'_> {
+        #[inline(never)]
         fn visit<R: Rival + 'static>(&mut self, _: &'static str, _: u16, rival: fn() -> R) {
             let mut entrant = Entrant::new(rival());
             part_of(self.next, self.signal, |_, scans, encoder| {

@@ -18,7 +18,7 @@
 //! | 5 | the whole of `Sensor::step`, `Method::Counting` |
 //! | 6 | the same with `Method::AdaptedCounting` |
 //! | 7 | the same with `Method::Crossings` |
-//! | 8 | the same with `Method::Bank` |
+//! | 8 | the same with `Method::Spectrum` |
 //!
 //! On a computer this is an empty program: `cargo bench -p firmware-sensor` measures there.
 #![cfg_attr(target_os = "none", no_std)]
@@ -77,7 +77,7 @@ mod board {
             (5, Method::Counting),
             (6, Method::AdaptedCounting),
             (7, Method::Crossings),
-            (8, Method::Bank),
+            (8, Method::Spectrum),
         ] {
             sense(number, method, scans, encoder);
         }

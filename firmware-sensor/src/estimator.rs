@@ -33,7 +33,8 @@ pub struct Touch {
     pub place: Place,
     /// The counted gauge behind the band-pass, as the paper has it: with whatever hum there is.
     pub counted: f32,
-    /// Variance of the white noise in each of `gauges`, in ADC steps².
+    /// Variance of the noise in each of `gauges` as far as it reaches 200 to 500 Hz, in ADC steps²: see
+    /// [`crate::noise`].
     pub noise: [f32; GAUGES],
     /// What may be hum in `gauges`, as long as that is not known.
     pub pickup: Pickup,

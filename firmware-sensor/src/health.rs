@@ -31,7 +31,7 @@ const SPEAKING_PER_NOISE: f32 = 4.0;
 /// The typical gauge's power is taken for no less, in ADC steps²: noise and hum that are below it do no
 /// harm, and a power near 0 is what rounding leaves of its offset.
 const LEAST_TYPICAL: f32 = 4.0;
-/// White noise, relative to the typical gauge's whole power, above which a gauge is of no use.
+/// Noise, relative to the typical gauge's whole power, above which a gauge is of no use.
 const TOO_NOISY: f32 = 3.0;
 /// Own hum's power, relative to the typical gauge's, above which a gauge is left out.
 const TOO_MUCH_HUM: f32 = 0.5;
@@ -77,7 +77,7 @@ struct History {
 /// What others know of the gauges.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Signs {
-    /// Variance of each gauge's white noise, in ADC steps².
+    /// Variance of each gauge's noise behind the anti-aliasing filter, in ADC steps².
     pub noise: [f32; GAUGES],
     /// Power of each gauge's own hum, in ADC steps².
     pub hum: [f32; GAUGES],
@@ -312,7 +312,7 @@ mod tests {
                         .sum::<f32>()
                         / 4.0
                 });
-                self.noise.push(&scans);
+                self.noise.push(&sample);
                 self.health.push(&scans, &sample);
                 self.ms += 1;
             }
@@ -394,11 +394,12 @@ mod tests {
         let still = 21;
         // The mean over 0.3 s falls from 0.85 of the scans at the ends, at most, to 0.1.
         let off_the_rails = 30.0 * libm::log(0.85 / 0.1);
-        // ±1 900 evenly, of which 0.22 of the power is left in the band, is 19 times the median power of the
-        // others; the threshold is at 3, the time constant 50 estimates. Three deviations of 200 squares.
-        let ratio = 19.0 / 3.0;
-        let noisy = 50.0 * libm::log(ratio / (ratio - 1.3));
-        let quiet_again = 50.0 * libm::log(1.3 * ratio);
+        // ±1 900 evenly, of which a quarter of the power is left in the band, is 22 times the median power of the
+        // others; the threshold is at 3. The second quietest of eight looks is noisy after seven, quiet after two;
+        // then it is followed with a time constant of fifty, and swings by a third before.
+        let ratio = 22.0 / 3.0;
+        let noisy = 7.0 + 50.0 * libm::log(ratio / (ratio - 1.5));
+        let quiet_again = 2.0 + 50.0 * libm::log(1.5 * ratio);
         let faults: [(usize, GaugeHealth, Fault, u32, f64); 5] = [
             (1, GaugeHealth::Dead, |_, _| 3.0, still, 1.0),
             (2, GaugeHealth::Stuck, |_, _| 700.0, still, 1.0),

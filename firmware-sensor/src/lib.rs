@@ -1,9 +1,10 @@
 //! The sensor board's logic, from ADC scans to λ: pure, no hardware, the same on the board and on a host.
 //!
 //! ```text
-//! 4 kHz scans ─┬─> noise, health
-//!              └─> decimate ─┬─> hum ──────────┬─> Touch ─> the configured estimator ──┬─> Estimate, 100 Hz
-//! encoder ─────> travel ─────┼─> slip: x − F/k ┘    (bank, crossings, counting)        │
+//! 4 kHz scans ─┬─> health
+//!              └─> decimate ─┬─> noise ─> health
+//!                            ├─> hum ──────────┬─> Touch ─> the configured estimator ──┬─> Estimate, 100 Hz
+//! encoder ─────> travel ─────┼─> slip: x − F/k ┘    (spectrum, crossings, counting)    │
 //!                            └─> bandpass ─> crossing ─> counting: the paper's, always ─┘
 //! Motion ──────> arm ─> Drive
 //! ```
@@ -15,7 +16,6 @@ pub mod adapted;
 pub mod amplitude;
 pub mod arm;
 pub mod bandpass;
-pub mod bank;
 pub mod block;
 pub mod counting;
 pub mod crossing;
@@ -31,6 +31,7 @@ pub mod noise;
 pub mod phasor;
 pub mod sensor;
 pub mod slip;
+pub mod spectrum;
 pub mod stroke;
 pub mod travel;
 

@@ -3,10 +3,10 @@
 use protocol::{Method, SensorConfiguration};
 
 use crate::adapted::AdaptedCounting;
-use crate::bank::Bank;
 use crate::counting::Counting;
 use crate::crossings::Crossings;
 use crate::estimator::{Estimator, Finding, Touch};
+use crate::spectrum::Spectrum;
 use crate::travel::Travel;
 
 /// One estimator of four, as large as the largest: which one is known at run time only, and there is no
@@ -17,8 +17,8 @@ use crate::travel::Travel;
     reason = "there is one Running on a board, and no heap to put its larger variant on"
 )]
 pub enum Running {
-    /// [`Method::Bank`]
-    Bank(Bank),
+    /// [`Method::Spectrum`]
+    Spectrum(Spectrum),
     /// [`Method::Counting`]
     Counting(Counting),
     /// [`Method::AdaptedCounting`]
@@ -35,7 +35,7 @@ impl Running {
             Method::Counting => Self::Counting(Counting::new(configuration)),
             Method::AdaptedCounting => Self::AdaptedCounting(AdaptedCounting::new(configuration)),
             Method::Crossings => Self::Crossings(Crossings::new(configuration)),
-            Method::Bank => Self::Bank(Bank::new(configuration)),
+            Method::Spectrum => Self::Spectrum(Spectrum::new(configuration)),
         }
     }
 }
@@ -43,14 +43,14 @@ impl Running {
 impl Running {
     /// Whether the estimator has to wait until the start has died down in the filters.
     pub fn waits(&self) -> bool {
-        !matches!(self, Self::Bank(_))
+        !matches!(self, Self::Spectrum(_))
     }
 }
 
 impl Estimator for Running {
     fn push(&mut self, touch: &Touch) {
         match self {
-            Self::Bank(bank) => bank.push(touch),
+            Self::Spectrum(spectrum) => spectrum.push(touch),
             Self::Counting(counting) => counting.push(touch),
             Self::AdaptedCounting(counting) => counting.push(touch),
             Self::Crossings(crossings) => crossings.push(touch),
@@ -59,7 +59,7 @@ impl Estimator for Running {
 
     fn find(&mut self, travel: &Travel) -> Finding {
         match self {
-            Self::Bank(bank) => bank.find(travel),
+            Self::Spectrum(spectrum) => spectrum.find(travel),
             Self::Counting(counting) => counting.find(travel),
             Self::AdaptedCounting(counting) => counting.find(travel),
             Self::Crossings(crossings) => crossings.find(travel),

@@ -142,7 +142,7 @@ impl Sensor {
         started.travel.push(encoder);
 
         let raw: [f32; GAUGES] = core::array::from_fn(|gauge| sample[gauge]);
-        self.noise.push(scans);
+        self.noise.push(&raw);
         self.health.push(scans, &raw);
         let usable = self.health.good() & self.configuration.gauges;
         let mut gauges = raw;
@@ -176,8 +176,11 @@ impl Sensor {
             let contact = contact(&self.slip, &started.travel, &finding);
             // Gauges that may not take part are witnesses nevertheless.
             let witnesses = self.health.good();
-            self.hum
-                .renew(witnesses, frequency_hz(&started.travel, &finding));
+            self.hum.renew(
+                witnesses,
+                started.travel.velocity_mm_s(0).abs(),
+                frequency_hz(&started.travel, &finding),
+            );
             self.health.judge(&Signs {
                 noise: touch.noise,
                 hum: self.hum.own_powers(witnesses),

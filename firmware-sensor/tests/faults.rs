@@ -225,7 +225,7 @@ fn a_new_configuration_on_the_way_starts_the_estimator_over_and_nothing_else() {
     // Gauge 1 is stuck, and known to be.
     let before = bench.rub(2_000, |_| 40.0, but(1, 2.0, |_, _| 500.0));
     assert_eq!(before.last().unwrap().gauges_used, 0b11101);
-    for (method, settled_ms) in [(Method::Bank, 250), (Method::Crossings, 250)] {
+    for (method, settled_ms) in [(Method::Spectrum, 250), (Method::Crossings, 250)] {
         let configuration = SensorConfiguration {
             method,
             gauges: 0b11011,

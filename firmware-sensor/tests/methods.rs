@@ -91,7 +91,7 @@ fn survey() {
         Method::Counting,
         Method::AdaptedCounting,
         Method::Crossings,
-        Method::Bank,
+        Method::Spectrum,
     ] {
         println!("\n{method:?}");
         for (name, rubs) in families() {

@@ -5,6 +5,7 @@ mod channels;
 mod cycles;
 pub mod edges;
 pub mod estimates;
+pub mod felt;
 pub mod mean;
 mod middle;
 pub mod phase;
@@ -26,6 +27,7 @@ use crate::truth::Truth;
 
 pub use actuators::{Actuators, Held};
 pub use estimates::{JudgedEstimate, Summary};
+use felt::Waves;
 
 /// A recording, judged against its truth.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +52,7 @@ pub fn judge(truth: &Truth, recording: &Recording) -> Verdict {
 pub struct Judge<'a> {
     estimates: estimates::Judge<'a>,
     actuators: actuators::Judge,
+    felt: felt::Judge,
 }
 
 impl<'a> Judge<'a> {
@@ -58,15 +61,21 @@ impl<'a> Judge<'a> {
         Self {
             estimates: estimates::Judge::new(truth),
             actuators: actuators::Judge::new(truth),
+            felt: felt::Judge::default(),
         }
     }
 
     /// The run, judged.
     pub fn finish(self) -> Verdict {
         let (estimates, summary) = self.estimates.finish();
+        let felt = self.felt.finish();
         Verdict {
             estimates,
-            summary,
+            summary: Summary {
+                felt_right_share: felt.right_share,
+                felt_wrong_share: felt.wrong_share,
+                ..summary
+            },
             actuators: self.actuators.finish(),
         }
     }
@@ -93,10 +102,16 @@ impl Onlooker for Judge<'_> {
 
     fn tick(&mut self, tick: &TickRecord) {
         self.actuators.tick(tick);
+        let waves = Waves {
+            in_force_per_mm: self.actuators.in_force_per_mm(),
+            under_mm: self.estimates.under_mm(),
+        };
+        self.felt.tick(tick, waves);
     }
 
     fn output(&mut self, output: &OutputRecord) {
         self.actuators.output(output);
+        self.felt.output(output);
     }
 
     fn received(&mut self, number: usize, received_ns: u64) {

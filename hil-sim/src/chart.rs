@@ -8,14 +8,18 @@
 //! | [`rivals`], [`pitch`], [`fourier`] | the field's methods, by crates where there are good ones |
 //! | [`contest`] | all of them on the same samples, [`score`] |
 //! | [`costs`], [`tally`], [`parts`] | instructions on the Cortex-M4F |
+//! | [`bank`] | the former default's last rows |
 //! | [`bound`] | the Cramér–Rao bound |
-//! | [`efficiency`] | how near the bank comes to it |
+//! | [`efficiency`] | how near the default estimator comes to it |
+//! | [`confidence`] | whether it is a probability, on strangers' surfaces |
 //! | [`result`], [`picture`] | CSV and SVG |
 //! | [`models`] | speed and error of the contact models |
 //! | [`stability`] | where integrators fail |
 //! | [`purity`], [`stop`], [`timing`], [`delay`] | the display's ELF, measured |
 
+pub mod bank;
 pub mod bound;
+pub mod confidence;
 pub mod contest;
 pub mod costs;
 pub mod delay;

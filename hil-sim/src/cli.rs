@@ -11,6 +11,7 @@ use protocol::Role;
 mod budget;
 mod campaign;
 mod chart;
+mod confidence;
 mod cost;
 mod demo;
 mod display;
@@ -18,6 +19,7 @@ mod faults;
 mod goals;
 mod golden;
 mod init;
+mod jury;
 mod map;
 mod models;
 mod paper;
@@ -63,6 +65,9 @@ enum Command {
     /// Maps where the methods fail: error, valid share and wrong share over grids of scenes, as CSV and
     /// heat maps. Run again, it goes on where it was stopped
     Map(map::Maps),
+    /// Judges λ on surfaces that the simulator has not made: drawn at random, or a folder of recordings.
+    /// Right, wrong and silent by class, with intervals
+    Jury(jury::Jury),
     /// Runs the estimation scenes and prints, family by family, how far the default estimator is off:
     /// exit status 1 if a scene is not as expected
     Goals(goals::Goals),
@@ -165,6 +170,7 @@ impl Arguments {
             Command::Cost(cost) => cost.execute(),
             Command::Budget(budget) => budget.execute(),
             Command::Map(maps) => maps.execute(),
+            Command::Jury(jury) => jury.execute(),
             Command::Goals(goals) => goals.execute(),
             Command::Faults => faults::execute(),
             Command::Campaign(campaign) => campaign.execute(),

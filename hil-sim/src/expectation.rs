@@ -40,6 +40,16 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
             summary.wrong_share,
         ),
         (
+            "felt_right_share_min",
+            expect.felt_right_share_min.map(|least| least..=1.0),
+            summary.felt_right_share,
+        ),
+        (
+            "felt_wrong_share_max",
+            expect.felt_wrong_share_max.map(|most| 0.0..=most),
+            summary.felt_wrong_share,
+        ),
+        (
             "settling_ms",
             expect.settling_ms.map(most),
             summary.settling_ms,
@@ -97,6 +107,8 @@ mod tests {
         verdict.summary.mean_mm = Some(2.02);
         verdict.summary.valid_share = Some(0.9);
         verdict.summary.wrong_share = Some(0.002);
+        verdict.summary.felt_right_share = Some(0.85);
+        verdict.summary.felt_wrong_share = Some(0.01);
         verdict.actuators.frequency_hz = Some(25.1);
         verdict.actuators.truth_hz = Some(25.0);
         verdict
@@ -124,6 +136,8 @@ mod tests {
             e.mean_mm = Some(2.0);
             e.valid_share_min = Some(0.9);
             e.wrong_share_max = Some(0.002);
+            e.felt_right_share_min = Some(0.85);
+            e.felt_wrong_share_max = Some(0.01);
             e.frequency_percent = Some(0.5);
         });
         assert!(unmet.is_empty(), "{unmet:?}");
@@ -137,6 +151,8 @@ mod tests {
             e.mean_mm = Some(2.06);
             e.valid_share_min = Some(0.91);
             e.wrong_share_max = Some(0.001);
+            e.felt_right_share_min = Some(0.86);
+            e.felt_wrong_share_max = Some(0.009);
             e.frequency_percent = Some(0.3);
         });
         let keys: Vec<&str> = unmet.iter().map(|line| key_of(line)).collect();
@@ -148,6 +164,8 @@ mod tests {
                 "mean_mm",
                 "valid_share_min",
                 "wrong_share_max",
+                "felt_right_share_min",
+                "felt_wrong_share_max",
                 "frequency_percent"
             ]
         );

@@ -54,7 +54,7 @@ const VOLTS_FULL_SCALE: f64 = 3.3;
 const CODES: f64 = 4096.0;
 const CODES_PER_UNIT: f64 = VOLTS_PER_UNIT / VOLTS_FULL_SCALE * CODES;
 const MID_RAIL_CODE: f32 = (MID_RAIL_VOLTS / VOLTS_FULL_SCALE * CODES) as f32;
-const HUM_HZ: f64 = 50.0;
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 
 /// What gauges feel of a surface.
 pub trait Texture {
@@ -93,7 +93,9 @@ pub struct KinematicGauges {
     broken: [Lane; GAUGES],
     trouble: Trouble,
     resonance: Option<(Resonance, [Option<Ring>; GAUGES])>,
-    hum_codes: f64,
+    /// Amplitude at each of the mains' frequencies.
+    hum_codes: [f64; 2],
+    hum_off_hz: f64,
     noise_codes: Option<f32>,
     noise: Xoshiro256PlusPlus,
     slow: Option<Slow>,
@@ -128,7 +130,8 @@ impl KinematicGauges {
             resonance: kinematic
                 .resonance
                 .map(|resonance| (Resonance::new(resonance), [None; GAUGES])),
-            hum_codes: kinematic.hum_50_hz * CODES_PER_UNIT,
+            hum_codes: [kinematic.hum_50_hz, kinematic.hum_60_hz].map(|hum| hum * CODES_PER_UNIT),
+            hum_off_hz: kinematic.hum_off_hz,
             noise_codes: kinematic
                 .snr_db
                 .map(|db| (noise_per_unit(db) * CODES_PER_UNIT) as f32),
@@ -140,12 +143,14 @@ impl KinematicGauges {
     /// One scan at `t_s`, the fingertip's middle at `fingertip_mm` of the surface.
     #[inline]
     pub fn scan(&mut self, texture: &impl Texture, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
-        let hum_phase = || (TAU * (HUM_HZ * t_s).fract()).sin();
-        let hum = if self.hum_codes == 0.0 {
-            0.0
-        } else {
-            (self.hum_codes * hum_phase()) as f32
-        };
+        let off_hz = self.hum_off_hz;
+        let mains = |nominal_hz: f64| (TAU * ((nominal_hz + off_hz) * t_s).fract()).sin();
+        let mut hum = 0.0;
+        for (codes, nominal_hz) in self.hum_codes.into_iter().zip(MAINS_HZ) {
+            if codes != 0.0 {
+                hum += (codes * mains(nominal_hz)) as f32;
+            }
+        }
         let slow = self.slow.as_mut().map(|slow| slow.scan(t_s));
         let broken = self.trouble.is_on(t_s);
         let lanes = if broken { &self.broken } else { &self.sound };
@@ -165,7 +170,7 @@ impl KinematicGauges {
             }
             let mut level = MID_RAIL_CODE + signal * lane.signal_codes + pickup * lane.pickup;
             if broken {
-                level = self.trouble.level(gauge, level, hum_phase);
+                level = self.trouble.level(gauge, level, || mains(MAINS_HZ[0]));
             }
             *code_out = code(level);
         }

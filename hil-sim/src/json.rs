@@ -234,6 +234,8 @@ mod tests {
             "counted_rms_percent",
             "settling_ms",
             "latency_ms",
+            "felt_right_share",
+            "felt_wrong_share",
         ] {
             assert!(summary.contains(&name), "{name}");
         }

@@ -16,6 +16,7 @@ pub mod gauges;
 pub mod golden;
 pub mod json;
 pub mod junit;
+pub mod jury;
 pub mod listener;
 pub mod map;
 pub mod motion;

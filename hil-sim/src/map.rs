@@ -1,7 +1,7 @@
 //! Maps of where the estimators fail: error, valid share and valid-but-wrong share over grids of scenes.
 //!
 //! ```text
-//! catalogue ─> grid of cells ─> scene text ─> native engine, all cores ─> journal (CSV) ─> picture (SVG)
+//! catalogue ─> grid of cells ─> scene text ─> native engine, all cores ─> journal (CSV) ─> picture (SVG), words
 //! ```
 //!
 //! Every cell is an ordinary scene ([`Map::scene_text`]); `hil-sim run` gives the same numbers for it.
@@ -19,6 +19,7 @@ pub mod row;
 pub mod shard;
 pub mod standing;
 pub mod survey;
+pub mod words;
 
 use std::fmt::Write;
 use std::hash::Hasher;
@@ -35,7 +36,7 @@ pub use error::MapError;
 pub use survey::{Plan, Survey};
 
 /// Methods that a map compares if none are asked for, in the order of the pictures' rows.
-pub const METHODS: [&str; 3] = ["bank", "crossings", "counting"];
+pub const METHODS: [&str; 3] = ["spectrum", "crossings", "counting"];
 /// Virtual time of a cell's scene, in s: a thousand estimates, one of which is the 0.1 % that may be
 /// wrong.
 pub const DURATION_S: f64 = 10.0;

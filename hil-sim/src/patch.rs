@@ -42,7 +42,7 @@ pub struct Patch {
     sharp: Surface,
     sections: Vec<Section>,
     gauges: [Vec<(f64, f32)>; GAUGES],
-    /// A recorded profile has no period.
+    /// A recorded profile has no period, nor has an irregular one.
     is_periodic: bool,
 }
 
@@ -124,7 +124,8 @@ impl Patch {
             sharp: Surface::of_waves(surface, amplitudes),
             sections,
             gauges,
-            is_periodic: !matches!(surface.profile, Profile::Recorded(_)),
+            is_periodic: surface.irregularity.is_none()
+                && !matches!(surface.profile, Profile::Recorded(_)),
         }
     }
 }
@@ -209,6 +210,7 @@ mod tests {
                 .collect(),
             start_mm: 0.0,
             profile,
+            irregularity: scene::Irregularity::NONE,
         }
     }
 

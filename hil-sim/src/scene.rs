@@ -18,6 +18,7 @@ mod csv_rows;
 mod display;
 mod error;
 mod fault;
+mod note;
 mod place;
 mod read;
 mod recorded;
@@ -25,11 +26,15 @@ mod series;
 mod table;
 #[cfg(test)]
 mod tests;
+mod waveform;
+mod windowed_sinc;
 
 pub use display::Display;
 pub use error::SceneError;
+pub use note::Note;
 pub use place::line_of;
 pub use series::Series;
+pub use waveform::Waveform;
 
 /// Everything that decides a run. Two runs of equal scenes are equal, byte for byte.
 #[derive(Clone, Debug)]
@@ -65,6 +70,8 @@ pub struct Scene {
     pub faults: Vec<Fault>,
     /// What must come out.
     pub expect: Expect,
+    /// What its author should know, though it runs.
+    pub notes: Vec<Note>,
 }
 
 /// `[surface]`: specimens side by side along x.
@@ -77,6 +84,41 @@ pub struct Surface {
     pub start_mm: f64,
     /// The shape of the ridges. Default trapezoid.
     pub profile: Profile,
+    /// What a real surface has on top. None with a recorded profile. Default none.
+    pub irregularity: Irregularity,
+}
+
+/// `[surface]`: what real surfaces have and gratings have not. "Relative" is to the amplitude of the
+/// fundamental, as the gauges feel it. The truth stays the specimens' λ: no second wave is stronger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Irregularity {
+    /// RMS of heights at random, relative, 0 to 10: see [`crate::surface`]. Default 0.
+    pub random: f64,
+    /// Amplitude of a second wave, a sine, relative, 0 to 1. Default 0.
+    pub second_wave: f64,
+    /// Its wavelength over λ, 0.1 to 10. Default the golden section, so that the two have no short period
+    /// in common.
+    pub second_ratio: f64,
+    /// Share of the ridges that are missing, at random, 0 to 0.9. Default 0.
+    pub worn: f64,
+    /// Which heights and ridges: the scene's seed.
+    pub seed: u64,
+}
+
+impl Irregularity {
+    /// A grating.
+    pub const NONE: Self = Self {
+        random: 0.0,
+        second_wave: 0.0,
+        second_ratio: 0.618,
+        worn: 0.0,
+        seed: 1,
+    };
+
+    /// Whether there is nothing irregular.
+    pub fn is_none(&self) -> bool {
+        self.random == 0.0 && self.second_wave == 0.0 && self.worn == 0.0
+    }
 }
 
 /// A piece of a surface with one wavelength.
@@ -268,7 +310,7 @@ pub enum Gauges {
     Kinematic(Kinematic),
     /// Voltages at the pins, five columns or six with the tangential force, from CSV, WAV or MCAP: see
     /// `docs/recordings.md`.
-    Recorded(Arc<Series>),
+    Recorded(Arc<Waveform>),
 }
 
 /// The computed gauges' imperfections. "Relative" is to the amplitude of the fundamental at unit gain.
@@ -280,6 +322,10 @@ pub struct Kinematic {
     /// Mains hum, common to all gauges, its amplitude relative to the fundamental's at unit gain, 0 to
     /// 10. Default 0.
     pub hum_50_hz: f64,
+    /// The same where the mains have 60 Hz. Default 0.
+    pub hum_60_hz: f64,
+    /// How far off nominal the mains are, in Hz, −2 to 2; that of `humming` gauges, too. Default 0.
+    pub hum_off_hz: f64,
     /// A second harmonic, relative to the fundamental, 0 to 1. Default 0.
     pub second_harmonic: f64,
     /// Gauges that say nothing: mid-rail, without signal, hum or noise. Default none.
@@ -346,11 +392,11 @@ pub struct Estimator {
     pub counted_gauge: u8,
     /// Gauges that may take part in the estimate, at least one. Default all.
     pub gauges: [bool; GAUGES],
-    /// Travel over which the bank averages, as percent of λ, 30 to 300 (`travel_wavelengths`, in λ).
-    /// Default 70.
-    pub travel_percent: u16,
-    /// Wavenumbers in the bank, 12 to 24. Default 24.
-    pub candidates: u8,
+    /// The longest fit, in wavelengths of travel, 2 to 8: the knob between accuracy and latency. Default 8.
+    pub waves: u8,
+    /// An estimate is stood by when its confidence, the probability that it is within 5 %, is at least
+    /// this many percent, 50 to 99. Default 90.
+    pub valid_percent: u8,
     /// Where the fingertip's stiffness comes from. Default configured.
     pub stiffness: Stiffness,
 }
@@ -379,6 +425,10 @@ pub struct Expect {
     pub valid_share_min: Option<f64>,
     /// `wrong_share` at most this, 0 to 1.
     pub wrong_share_max: Option<f64>,
+    /// `felt_right_share` at least this, 0 to 1.
+    pub felt_right_share_min: Option<f64>,
+    /// `felt_wrong_share` at most this, 0 to 1.
+    pub felt_wrong_share_max: Option<f64>,
     /// `settling_ms` at most this.
     pub settling_ms: Option<f64>,
     /// `latency_ms` at most this.
@@ -417,6 +467,7 @@ impl Scene {
                 }],
                 start_mm: 0.0,
                 profile: Profile::Trapezoid,
+                irregularity: Irregularity::NONE,
             },
             motion: Motion::Constant { speed_mm_s },
             arm: ArmDrive::default(),
@@ -429,6 +480,7 @@ impl Scene {
             display: Display::default(),
             faults: Vec::new(),
             expect: Expect::default(),
+            notes: Vec::new(),
         }
     }
 
@@ -443,8 +495,8 @@ impl Scene {
             gauges: (0..GAUGES).fold(0, |set, gauge| {
                 set | u8::from(estimator.gauges[gauge]) << gauge
             }),
-            bank_travel_percent: estimator.travel_percent,
-            bank_candidates: estimator.candidates,
+            waves: estimator.waves,
+            valid_percent: estimator.valid_percent,
             force_channel: self.force.present,
             force_mn_per_v: (1_000.0 * self.force.n_per_v).round() as u16,
             stiffness_n_per_m: match estimator.stiffness {
@@ -497,8 +549,8 @@ impl Default for Estimator {
             window_ms: defaults.window_ms,
             counted_gauge: defaults.counted_gauge,
             gauges: std::array::from_fn(|gauge| defaults.gauges >> gauge & 1 == 1),
-            travel_percent: defaults.bank_travel_percent,
-            candidates: defaults.bank_candidates,
+            waves: defaults.waves,
+            valid_percent: defaults.valid_percent,
             stiffness: Stiffness::Configured,
         }
     }
@@ -508,7 +560,7 @@ impl Estimator {
     /// The method's name in scenes and in the JSON.
     pub const fn method_name(&self) -> &'static str {
         match self.method {
-            Method::Bank => "bank",
+            Method::Spectrum => "spectrum",
             Method::Counting => "counting",
             Method::AdaptedCounting => "counting-adapted",
             Method::Crossings => "crossings",

@@ -5,9 +5,15 @@
 //! Each specimen begins with a rising flank at mid-height, so its neighbour meets it in a step, as two
 //! plates that are laid side by side do.
 //!
+//! On top of that, or in its place, comes what makes a surface irregular, if a scene asks for it.
+//!
 //! The blur and the ramp are guesses of the numerical study behind this project, not measurements.
 
 use crate::scene::{self, Profile, Series};
+use irregular::{GROOVE, Irregular};
+
+mod grain;
+mod irregular;
 
 /// Width of the contact, the standard deviation of a Gaussian, in mm: a guess.
 pub const CONTACT_BLUR_MM: f64 = 0.12;
@@ -33,6 +39,7 @@ pub(crate) type Period = [f32; POINTS + 1];
 pub struct Surface {
     patches: Vec<Patch>,
     recorded: Option<Recorded>,
+    irregular: Option<Irregular>,
 }
 
 #[derive(Clone, Debug)]
@@ -96,7 +103,11 @@ impl Surface {
             Profile::Recorded(heights) => Some(Recorded::new(heights, blur_mm)),
             Profile::Sine | Profile::Trapezoid => None,
         };
-        Self { patches, recorded }
+        Self {
+            patches,
+            recorded,
+            irregular: Irregular::new(&surface.irregularity),
+        }
     }
 
     /// The true wavelength at `x_mm`, in mm.
@@ -108,19 +119,28 @@ impl Surface {
     /// a share of its period, in 2⁻³² cycles; a recorded one is not shifted.
     #[inline]
     pub fn feel(&self, x_mm: f64, advance: u32) -> f32 {
-        match &self.recorded {
-            Some(recorded) => recorded.feel(x_mm),
-            None => self.patch(x_mm).feel(x_mm, advance),
+        match (&self.recorded, &self.irregular) {
+            (Some(recorded), _) => recorded.feel(x_mm),
+            (None, None) => self.patch(x_mm).feel(x_mm, advance),
+            (None, Some(irregular)) => {
+                let specimen = self.specimen(x_mm);
+                self.patches[specimen].feel_irregular(irregular, specimen, x_mm, advance)
+            }
         }
     }
 
     #[inline]
     fn patch(&self, x_mm: f64) -> &Patch {
-        let after = self.patches[1..]
+        &self.patches[self.specimen(x_mm)]
+    }
+
+    /// The number of the specimen at a place.
+    #[inline]
+    fn specimen(&self, x_mm: f64) -> usize {
+        self.patches[1..]
             .iter()
             .take_while(|patch| patch.start_mm <= x_mm)
-            .count();
-        &self.patches[after]
+            .count()
     }
 }
 
@@ -129,6 +149,25 @@ impl Patch {
     fn feel(&self, x_mm: f64, advance: u32) -> f32 {
         let cycles = (x_mm - self.start_mm) * self.cycles_per_mm;
         feel(&self.period, cycles, advance)
+    }
+
+    fn feel_irregular(
+        &self,
+        irregular: &Irregular,
+        specimen: usize,
+        x_mm: f64,
+        advance: u32,
+    ) -> f32 {
+        let from_start_mm = x_mm - self.start_mm;
+        let cycles = from_start_mm * self.cycles_per_mm;
+        // A phase behind is a small negative one.
+        let ahead = f64::from(advance as i32) / 4_294_967_296.0;
+        let ridges = if irregular.is_worn(specimen, cycles + ahead) {
+            feel(&self.period, GROOVE, 0)
+        } else {
+            feel(&self.period, cycles, advance)
+        };
+        ridges + irregular.added(x_mm, from_start_mm, self.wavelength_mm) as f32
     }
 }
 
@@ -258,6 +297,7 @@ mod tests {
                 specimens,
                 start_mm: 10.0,
                 profile,
+                irregularity: scene::Irregularity::NONE,
             },
             0.0,
         )

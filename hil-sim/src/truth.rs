@@ -53,7 +53,9 @@ impl<'a> Truth<'a> {
     pub fn window_s(&self) -> f64 {
         1e-3 * match self.sensor.method {
             Method::Counting => f64::from(self.sensor.window_ms),
-            Method::Bank | Method::AdaptedCounting | Method::Crossings => PAPERS_WINDOW_MS as f64,
+            Method::Spectrum | Method::AdaptedCounting | Method::Crossings => {
+                PAPERS_WINDOW_MS as f64
+            }
         }
     }
 

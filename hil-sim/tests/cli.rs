@@ -52,6 +52,28 @@ fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
 }
 
 #[test]
+fn a_scene_of_the_banks_runs_with_its_successor_and_standard_error_says_so_once() {
+    let folder = folder("successor");
+    let text = format!("{SOUND}[estimator]\nmethod = \"bank\"\n");
+    fs::write(folder.join("a.toml"), text).unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "o.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(
+        errors(&output),
+        "a.toml:5: estimator.method: method = \"bank\" is now \"spectrum\", its successor\n"
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    assert_eq!(json[0]["method"], "spectrum");
+    // What is felt is in the summary, and in the line that is printed.
+    let right = json[0]["summary"]["felt_right_share"].as_f64().unwrap();
+    assert!((0.5..=1.0).contains(&right), "{right}");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("felt right  felt wrong"), "{said}");
+    assert!(said.contains(&format!("  {right:.2}  ")), "{said}");
+}
+
+#[test]
 fn an_expectation_that_fails_exits_1_and_json_is_written_all_the_same() {
     let folder = folder("not-as-expected");
     fs::write(

@@ -86,7 +86,7 @@ fn streaming_is_switched_in_the_configuration_that_is_in_force_and_nothing_else_
     assert_eq!(dashboard.take_outbox(Role::Sensor).len(), 1);
     let before = SensorConfiguration {
         window_ms: 123,
-        bank_candidates: 13,
+        waves: 3,
         ..SensorConfiguration::DEFAULT
     };
     says(

@@ -9,9 +9,9 @@ use crate::frame::{CRC_32, MAX_PAYLOAD};
 /// How λ is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Method {
-    /// A bank of wavenumbers over the arm's travel.
+    /// The wavenumber of the line that stays put in the gauges' spectrum over the arm's travel.
     #[default]
-    Bank,
+    Spectrum,
     /// The paper's count of zero crossings in a fixed window, equations (1), (2) and (5).
     Counting,
     /// The same in the window that equation (11) asks for at the hand's present frequency.
@@ -31,11 +31,12 @@ pub struct SensorConfiguration {
     pub counted_gauge: u8,
     /// Bit g set: gauge g may take part in the estimate, 1 to 31.
     pub gauges: u8,
-    /// Travel over which the bank averages, as percent of λ, 30 to 300: the knob between accuracy and
-    /// latency.
-    pub bank_travel_percent: u16,
-    /// Wavenumbers in the bank, 12 to 24.
-    pub bank_candidates: u8,
+    /// The longest fit of [`Method::Spectrum`], in wavelengths of travel, 2 to 8: the knob between
+    /// accuracy and latency.
+    pub waves: u8,
+    /// An estimate of [`Method::Spectrum`] is stood by when its [`crate::Estimate::confidence`], the
+    /// probability that it is within 5 %, is at least this many percent, 50 to 99.
+    pub valid_percent: u8,
     /// Whether the sixth channel carries the tangential force.
     pub force_channel: bool,
     /// Scale of the force channel in mN/V, 1 to 60 000; mid-rail is no force.
@@ -51,12 +52,12 @@ pub struct SensorConfiguration {
 impl SensorConfiguration {
     /// What a board starts with: safe, and the paper's numbers where it gives some.
     pub const DEFAULT: Self = Self {
-        method: Method::Bank,
+        method: Method::Spectrum,
         window_ms: 80,
         counted_gauge: 2,
         gauges: 0b11111,
-        bank_travel_percent: 70,
-        bank_candidates: 24,
+        waves: 8,
+        valid_percent: 70,
         force_channel: false,
         force_mn_per_v: 1_000,
         stiffness_n_per_m: 400,
@@ -236,10 +237,10 @@ pub enum Setting {
     CountedGauge,
     /// [`SensorConfiguration::gauges`]
     Gauges,
-    /// [`SensorConfiguration::bank_travel_percent`]
-    BankTravel,
-    /// [`SensorConfiguration::bank_candidates`]
-    BankCandidates,
+    /// [`SensorConfiguration::waves`]
+    Waves,
+    /// [`SensorConfiguration::valid_percent`]
+    ValidPercent,
     /// [`SensorConfiguration::force_mn_per_v`]
     ForceScale,
     /// [`SensorConfiguration::stiffness_n_per_m`]
@@ -278,13 +279,8 @@ impl SensorConfiguration {
         within(self.window_ms.into(), 10, 200, Setting::WindowMs)?;
         within(self.counted_gauge.into(), 0, 4, Setting::CountedGauge)?;
         within(self.gauges.into(), 1, 31, Setting::Gauges)?;
-        within(
-            self.bank_travel_percent.into(),
-            30,
-            300,
-            Setting::BankTravel,
-        )?;
-        within(self.bank_candidates.into(), 12, 24, Setting::BankCandidates)?;
+        within(self.waves.into(), 2, 8, Setting::Waves)?;
+        within(self.valid_percent.into(), 50, 99, Setting::ValidPercent)?;
         within(self.force_mn_per_v.into(), 1, 60_000, Setting::ForceScale)?;
         if self.stiffness_n_per_m != 0 {
             within(

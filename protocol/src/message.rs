@@ -27,7 +27,7 @@ use crate::safety::Safety;
 use crate::status::Status;
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
@@ -140,7 +140,7 @@ pub struct Estimate {
     pub wavelength_mm: Option<f32>,
     /// Whether the estimator stands by `wavelength_mm`. Never true without one.
     pub valid: bool,
-    /// From 0 (a guess) to 1 (certain).
+    /// The probability, 0 to 1, that `wavelength_mm` is within 5 % of the truth; 0 without one.
     pub confidence: f32,
     /// Amplitude of the surface's fundamental in ADC steps (3.3 V / 4096), RMS over the gauges used,
     /// whatever the speed; 0 or above.

@@ -55,11 +55,9 @@ fn each_of_the_sensors_settings_is_taken_in_its_range_and_refused_beside_it() {
         sensor(|c| c.counted_gauge = n as u8)
     });
     assert_range(Setting::Gauges, 1, 31, |n| sensor(|c| c.gauges = n as u8));
-    assert_range(Setting::BankTravel, 30, 300, |n| {
-        sensor(|c| c.bank_travel_percent = n as u16)
-    });
-    assert_range(Setting::BankCandidates, 12, 24, |n| {
-        sensor(|c| c.bank_candidates = n as u8)
+    assert_range(Setting::Waves, 2, 8, |n| sensor(|c| c.waves = n as u8));
+    assert_range(Setting::ValidPercent, 50, 99, |n| {
+        sensor(|c| c.valid_percent = n as u8)
     });
     assert_range(Setting::ForceScale, 1, 60_000, |n| {
         sensor(|c| c.force_mn_per_v = n as u16)
@@ -106,7 +104,7 @@ fn each_of_the_displays_settings_is_taken_in_its_range_and_refused_beside_it() {
 fn the_first_setting_out_of_its_range_is_named() {
     let refused = sensor(|c| {
         c.gauges = 0;
-        c.bank_candidates = 0;
+        c.waves = 0;
         c.arm_full_scale_um_s = 0;
     });
     assert_eq!(

@@ -19,8 +19,8 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c0315b86bcc75a20842907353544d3332463432395a49010101010102010601b9\
-         81eec200",
+        "030201065244474c0415f3564a4a0c23eae67353544d3332463432395a4901010101010201060110\
+         9f1d8400",
     ),
     (
         "estimate",
@@ -52,7 +52,7 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configure a sensor",
-        "04020105150150021796011401dc0b900301c09a0c7b54c22700",
+        "040201051401500217055f01dc0b900301c09a0cded527bf00",
     ),
     (
         "configure a display",
@@ -60,7 +60,7 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configuration taken",
-        "0402010606f8d2bac101150150021796011401dc0b900301c09a0c72295c2300",
+        "0402010606f896f0b60e1401500217055f01dc0b900301c09a0cb2d8b05f00",
     ),
     (
         "configuration refused",
@@ -143,8 +143,8 @@ fn every_choice_within_a_message_has_its_byte() {
 
 #[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 3);
-    assert_eq!(SCHEMA_HASH, 0x9042_08a2_75cc_6bb8);
+    assert_eq!(PROTOCOL_VERSION, 4);
+    assert_eq!(SCHEMA_HASH, 0xe6ea_230c_4a4a_56f3);
 }
 
 #[test]

@@ -261,7 +261,7 @@ impl Speaker {
     fn sensor_configuration(&mut self) -> SensorConfiguration {
         SensorConfiguration {
             method: self.one(&[
-                Method::Bank,
+                Method::Spectrum,
                 Method::Counting,
                 Method::AdaptedCounting,
                 Method::Crossings,
@@ -269,8 +269,8 @@ impl Speaker {
             window_ms: self.u32() as u16,
             counted_gauge: self.u32() as u8,
             gauges: self.u32() as u8,
-            bank_travel_percent: self.u32() as u16,
-            bank_candidates: self.u32() as u8,
+            waves: self.u32() as u8,
+            valid_percent: self.u32() as u8,
             force_channel: self.chance(),
             force_mn_per_v: self.u32() as u16,
             stiffness_n_per_m: self.u32() as u16,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use hil_sim::fault::{Fault, Kind};
-use hil_sim::scene::{Gauges, Kinematic, Link, Motion, Scene, Series};
+use hil_sim::scene::{Gauges, Kinematic, Link, Motion, Scene, Series, Waveform};
 use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError};
 use protocol::{
     Configuration, DisplayState, Message, Role, RoleCounters, SensorConfiguration, Trip,
@@ -398,7 +398,7 @@ fn what_a_bench_cannot_do_is_refused_with_what_to_do() {
         width: 5,
     };
     let recorded = refusal(&|options| {
-        options.scene.gauges = Gauges::Recorded(Arc::new(volts.clone()));
+        options.scene.gauges = Gauges::Recorded(Arc::new(Waveform::on_lines(volts.clone())));
         options.hand = Hand::Recorded(Motion::Constant { speed_mm_s: 1.0 });
     });
     assert!(recorded.contains("kinematic"), "{recorded}");

@@ -149,6 +149,11 @@ impl Judge {
         }
     }
 
+    /// The wavenumber in force over the last tick's travel, in cycles per mm; 0 before there is any.
+    pub fn in_force_per_mm(&self) -> f64 {
+        self.stimulus.in_force_per_mm()
+    }
+
     /// Takes what the stimulus tells.
     fn follow(&mut self) {
         while let Some(told) = self.stimulus.take() {

@@ -28,7 +28,7 @@ pub struct JudgedEstimate {
     pub truth_mm: Option<f64>,
     /// The estimated λ in mm.
     pub wavelength_mm: Option<f64>,
-    /// From 0 (a guess) to 1 (certain).
+    /// The estimator's own probability that λ̂ is within 5 % of the truth, 0 to 1.
     pub confidence: Option<f64>,
     /// Whether the estimator stands by it.
     pub valid: bool,
@@ -74,6 +74,13 @@ pub struct Summary {
     pub settling_ms: Option<f64>,
     /// Mean time from an estimate's instant to its last byte at the display, in ms.
     pub latency_ms: Option<f64>,
+    /// Share of the time in which the hand moves over a surface with a λ, in which the display drives at a λ
+    /// within 5 % of it, 0 to 1: see [`crate::analysis::felt`]. None without such time, or if only the
+    /// estimates were judged.
+    pub felt_right_share: Option<f64>,
+    /// Share of the time in which the hand moves, in which the display drives at a λ more than [`SETTLED`] off,
+    /// or at any where there is none, 0 to 1. None without motion, or if only the estimates were judged.
+    pub felt_wrong_share: Option<f64>,
 }
 
 impl JudgedEstimate {
@@ -122,6 +129,8 @@ pub struct Judge<'a> {
     made: usize,
     moving_s: f64,
     valid_s: f64,
+    /// λ under the sensor at the last scan, in mm; none if there is no surface.
+    under_mm: Option<f64>,
     /// λ under the sensor at the last scan with a surface, in mm.
     here_mm: Option<f64>,
     /// When the sensor last crossed from one specimen to another, in s.
@@ -141,6 +150,7 @@ impl<'a> Judge<'a> {
             made: 0,
             moving_s: 0.0,
             valid_s: 0.0,
+            under_mm: None,
             here_mm: None,
             boundary_s: None,
         }
@@ -171,8 +181,15 @@ impl<'a> Judge<'a> {
                 .boundary_s
                 .and_then(|at_s| settling_ms(at_s, &estimates)),
             latency_ms: finite(latency_ms / arrived as f64),
+            felt_right_share: None,
+            felt_wrong_share: None,
         };
         (estimates, summary)
+    }
+
+    /// λ under the sensor at the last scan, in mm; none if there is no surface there.
+    pub fn under_mm(&self) -> Option<f64> {
+        self.under_mm
     }
 
     /// How many scans, and estimates whose truth is not known, are held.
@@ -222,7 +239,8 @@ impl Onlooker for Judge<'_> {
             }
             None => self.place(&[here], t_s),
         }
-        if let Some(here_mm) = self.truth.wavelength_at(x_mm) {
+        self.under_mm = self.truth.wavelength_at(x_mm);
+        if let Some(here_mm) = self.under_mm {
             let before_mm = self.here_mm.replace(here_mm);
             if before_mm.is_some_and(|before_mm| (here_mm / before_mm - 1.0).abs() > BOUNDARY) {
                 self.boundary_s = Some(t_s);

@@ -109,6 +109,11 @@ impl DuePhase {
         }
     }
 
+    /// The wavenumber in force over the last tick's travel, in cycles per mm; 0 before there is any.
+    pub fn in_force_per_mm(&self) -> f64 {
+        self.followed.per_mm
+    }
+
     /// The shortest λ̂ that has been in force, in mm.
     pub fn shortest_mm(&self) -> Option<f64> {
         self.shortest_mm

@@ -55,6 +55,11 @@ impl Stimulus {
         self.known_s = f64::INFINITY;
     }
 
+    /// The wavenumber in force over the last tick's travel, in cycles per mm; 0 before there is any.
+    pub fn in_force_per_mm(&self) -> f64 {
+        self.due.in_force_per_mm()
+    }
+
     /// The shortest λ̂ that has been in force, in mm.
     pub fn shortest_mm(&self) -> Option<f64> {
         self.due.shortest_mm()

@@ -2,9 +2,16 @@
 //! error, whatever it does.
 //!
 //! The window holds, for each gauge, a tone of the common frequency v/λ with an amplitude, a phase and an
-//! offset that are not known, in white noise. The relative bounds of frequency and of λ are the same.
+//! offset that are not known (and, if so asked, a slope), in white noise. The relative bounds of frequency
+//! and of λ are the same.
+//!
+//! The noise of a scene is white up to 2 kHz and goes through the anti-aliasing filter with the tone. Only
+//! its density about the tone matters over many waves, which that filter changes for both alike: it is the
+//! density of noise at 1 kHz with the power that the signal-to-noise ratio counts in 0–500 Hz.
 
 use std::f64::consts::TAU;
+
+use protocol::SensorConfiguration;
 
 use crate::gauges::{GAINS, PHASES_RAD, PLACES_MM};
 
@@ -12,8 +19,8 @@ const SAMPLE_RATE_HZ: f64 = firmware_sensor::SAMPLE_RATE_HZ as f64;
 /// Phases of the tone in the window over which the bound is averaged.
 const PHASES: u32 = 72;
 
-/// Share of the bank's kernel's weight that counts as what it used.
-pub const KERNEL_SHARE: f64 = 0.99;
+/// Waves that the default estimator fits at most.
+pub const WAVES: u8 = SensorConfiguration::DEFAULT.waves;
 
 /// A tone that gauges feel while the arm moves steadily.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +33,8 @@ pub struct Tone<'a> {
     pub snr_db: f64,
     /// The gauges that are given, 0 to 4.
     pub gauges: &'a [usize],
+    /// Whether each gauge drifts steadily, by a slope that is not known.
+    pub slope: bool,
 }
 
 impl Tone<'_> {
@@ -37,7 +46,7 @@ impl Tone<'_> {
         let frequency_hz = self.speed_mm_s.abs() / self.wavelength_mm;
         let omega = TAU * frequency_hz;
         let samples = (window_s * SAMPLE_RATE_HZ).round().max(1.0) as usize;
-        let [cc, cs, ss] = information(omega, samples);
+        let [cc, cs, ss] = information(omega, samples, self.slope);
         let noise = 0.5 * 10f64.powf(-self.snr_db / 10.0);
         let mean_square = (0..PHASES)
             .map(|phase| {
@@ -61,23 +70,29 @@ impl Tone<'_> {
     }
 }
 
-/// What a tone of amplitude 1 in noise of variance 1 says of its angular frequency, once amplitude, phase
-/// and offset have taken their part: a quadratic form [cc, cs, ss] in cosine and sine of its phase.
+/// What a tone of amplitude 1 in noise of variance 1 says of its angular frequency, once amplitude, phase,
+/// offset and, if it is not known, slope have taken their part: a quadratic form [cc, cs, ss] in cosine and sine of its phase.
 ///
 /// Fisher's information of the derivatives by frequency, t·cos ωt and t·sin ωt, less their projection on
-/// those by the other parameters: cos ωt, sin ωt and 1.
-fn information(omega: f64, samples: usize) -> [f64; 3] {
+/// those by the other parameters: cos ωt, sin ωt, 1 and t.
+fn information(omega: f64, samples: usize, slope: bool) -> [f64; 3] {
     let middle = (samples as f64 - 1.0) / 2.0;
     let instants: Vec<f64> = (0..samples)
         .map(|sample| (sample as f64 - middle) / SAMPLE_RATE_HZ)
         .collect();
     let column = |f: &dyn Fn(f64) -> f64| instants.iter().map(|&t| f(t)).collect::<Vec<f64>>();
-    let mut known: Vec<Vec<f64>> = Vec::with_capacity(3);
-    for mut column in [
+    let mut known: Vec<Vec<f64>> = Vec::with_capacity(4);
+    let mut others = vec![
         column(&|_| 1.0),
         column(&|t| (omega * t).cos()),
         column(&|t| (omega * t).sin()),
-    ] {
+    ];
+    if slope {
+        // In windows: as long as the others.
+        let window_s = samples as f64 / SAMPLE_RATE_HZ;
+        others.push(column(&|t| t / window_s));
+    }
+    for mut column in others {
         take_off(&known, &mut column);
         let length = dot(&column, &column).sqrt();
         if length > 1e-9 {
@@ -112,22 +127,9 @@ fn take_off(known: &[Vec<f64>], column: &mut [f64]) {
     }
 }
 
-/// Travel in mm that the bank's kernel holds [`KERNEL_SHARE`] of its weight in, at a knob of
-/// `travel_percent`.
-///
-/// Two cascaded one-pole filters whose constant is a = qλ of travel have the kernel x·exp(−x/a)/a²; its
-/// share within X is 1 − (1 + X/a)·exp(−X/a), 0.99 at X = 6.64 a.
-pub fn bank_travel_mm(travel_percent: u16, wavelength_mm: f64) -> f64 {
-    let mut reach = 1.0;
-    while 1.0 - (1.0 + reach) * f64::exp(-reach) < KERNEL_SHARE {
-        reach += 1e-3;
-    }
-    reach * f64::from(travel_percent) / 100.0 * wavelength_mm
-}
-
-/// Travel in mm of an evenly weighted window that has the bank's error in white noise: (192)^(1/3) a.
-pub fn bank_equivalent_mm(travel_percent: u16, wavelength_mm: f64) -> f64 {
-    192f64.cbrt() * f64::from(travel_percent) / 100.0 * wavelength_mm
+/// Travel in mm of a window of so many waves, evenly weighted: what the estimator fits its waves to.
+pub fn window_mm(waves: u8, wavelength_mm: f64) -> f64 {
+    f64::from(waves) * wavelength_mm
 }
 
 #[cfg(test)]
@@ -142,6 +144,7 @@ mod tests {
             speed_mm_s,
             snr_db,
             gauges,
+            slope: false,
         }
     }
 
@@ -185,7 +188,7 @@ mod tests {
         each_cell(rows, |wavelength_mm, speed_mm_s, bound| {
             let highest = tone(wavelength_mm, speed_mm_s, 0.0, &ALL).relative_percent(0.080);
             let omega = TAU * speed_mm_s / wavelength_mm;
-            let [cc, _, ss] = information(omega, 80);
+            let [cc, _, ss] = information(omega, 80, false);
             let lowest = 100.0 * (0.5 / (power * 0.5 * (cc + ss))).sqrt() / omega;
             let digits = if bound < 10.0 { 0.0051 } else { 0.051 };
             assert!(
@@ -212,9 +215,23 @@ mod tests {
     }
 
     #[test]
-    fn the_banks_kernel_is_longer_than_its_even_equivalent() {
-        let (kernel, even) = (bank_travel_mm(70, 2.0), bank_equivalent_mm(70, 2.0));
-        assert!((kernel / 1.4 - 6.64).abs() < 0.005, "{kernel}");
-        assert!((even / 1.4 - 5.77).abs() < 0.005, "{even}");
+    fn an_unknown_slope_costs_a_little_and_next_to_nothing_over_eight_waves() {
+        // 25 Hz: a wave is 40 ms. Over n whole waves the slope takes a share of 1152/(2πn)⁴ of what t·cos
+        // says of the frequency, which is half of all, and more of it through the sine, by 1/(n² − …): at
+        // most ten times that.
+        for waves in [2u8, 3, 5, 8] {
+            let window_s = window_mm(waves, 2.0) / 50.0;
+            let without = tone(2.0, 50.0, 20.0, &ALL);
+            let with = Tone {
+                slope: true,
+                ..without
+            };
+            let more = with.relative_percent(window_s) / without.relative_percent(window_s) - 1.0;
+            let first_order = 1_152.0 / (TAU * f64::from(waves)).powi(4);
+            assert!(
+                more > 0.0 && more < 10.0 * first_order,
+                "{more} over {waves} waves, {first_order}"
+            );
+        }
     }
 }

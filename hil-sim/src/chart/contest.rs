@@ -30,7 +30,7 @@ pub enum Contestant {
     Rival {
         /// Its name.
         method: &'static str,
-        /// Its window in ms; the PLL's natural frequency in Hz.
+        /// Its window in ms; the notch's memory in ms, the PLL's bandwidth in Hz.
         value: u16,
         /// Its cost.
         work: Work,
@@ -102,7 +102,11 @@ impl Contestant {
     pub fn knob(&self) -> &'static str {
         match self {
             Self::Ours(setting) => setting.knob_name(),
-            Self::Rival { method: "PLL", .. } => "natural_hz",
+            Self::Rival { method: "PLL", .. } => "bandwidth_hz",
+            Self::Rival {
+                method: "Pei–Tseng notch",
+                ..
+            } => "memory_ms",
             Self::Rival { .. } => "window_ms",
         }
     }
@@ -313,6 +317,23 @@ mod tests {
         1.1 * moved * 1_000.0 / (std::f64::consts::TAU * 3.0)
     }
 
+    /// By how much the tone's image at −f, and the mean that the swing is without, move the peak of a
+    /// Hann window's spectrum. In the window's own lines the main lobe is 1 − 0.645 x², the slope of the
+    /// side lobes x away at most 1/(x (x² − 1)), and what is moved is their sum over 2 · 0.645 (a tenth
+    /// for the second order). The mean of a sine over the window is at most 1/(π cycles). Goertzel's
+    /// recursion in f32 leaves some hundred roundings in each of the three powers of the last parabola,
+    /// 1/24 of a Fourier line apart.
+    fn image_hz(frequency_hz: f64, window_ms: f64) -> f64 {
+        let cycles = frequency_hz * window_ms / 1_000.0;
+        let slope = |lines: f64| 1.0 / (lines * (lines * lines - 1.0));
+        let mean = 2.0 / (std::f64::consts::PI * cycles);
+        let moved = (slope(2.0 * cycles) + mean * slope(cycles)) / 1.29;
+        let step_hz = 1_000.0 / 512.0 / 24.0;
+        let bend = 2.0 * 1.29 * (step_hz * window_ms / 1_000.0).powi(2);
+        let rounded_hz = step_hz * 100.0 * f64::from(f32::EPSILON) / (2.0 * bend);
+        1.1 * moved * 1_000.0 / window_ms + rounded_hz
+    }
+
     struct Check;
 
     impl Visitor for Check {
@@ -329,8 +350,17 @@ mod tests {
                     "Goertzel" => 0.25 * 1_000.0 / window,
                     "FFT" => 0.5 * 1_000.0 / window,
                     "AR(2)" => ripple_hz(frequency_hz, window),
-                    // The PLL's bandwidth.
-                    _ => window,
+                    "harmonic NLS" => image_hz(frequency_hz, window),
+                    // It takes the tone out wholly, so only rounding is left: of the coefficient's
+                    // 2⁻²³, say a hundred, at df = dc / (2 sin ω).
+                    "Pei–Tseng notch" => {
+                        let omega = std::f64::consts::TAU * frequency_hz / 1_000.0;
+                        100.0 * f64::from(f32::EPSILON) / (2.0 * omega.sin()) * 1_000.0
+                            / std::f64::consts::TAU
+                    }
+                    // The PLL's quadrature is off by 0.7°, which swings the phase by half of that at
+                    // twice the frequency: so much frequency if the loop followed all of it.
+                    _ => 2.0 * frequency_hz * 0.5 * 0.7f64.to_radians(),
                 };
                 let error = error_hz(&mut rival(), frequency_hz);
                 assert!(

@@ -128,12 +128,15 @@ impl Family {
     }
 
     /// The root of the mean square over the scenes of the Cramér–Rao bound in percent, over a window
-    /// that depends on λ in mm and v in mm/s, in s. None unless every scene is a steady tone in white
+    /// that depends on λ in mm and v in mm/s, in s, each gauge's slope unknown or not. None unless every scene is a steady tone in white
     /// noise on sound gauges, which is what the bound is of.
-    pub fn bound_percent(&self, window_s: impl Fn(f64, f64) -> f64) -> Option<f64> {
+    pub fn bound_percent(&self, slope: bool, window_s: impl Fn(f64, f64) -> f64) -> Option<f64> {
         let mut squares = 0.0;
         for scene in &self.scenes {
-            let tone = tone(scene)?;
+            let tone = Tone {
+                slope,
+                ..tone(scene)?
+            };
             let window_s = window_s(tone.wavelength_mm, tone.speed_mm_s);
             squares += tone.relative_percent(window_s).powi(2);
         }
@@ -149,6 +152,7 @@ fn tone(scene: &Scene) -> Option<Tone<'static>> {
         return None;
     };
     let sound = kinematic.hum_50_hz == 0.0
+        && kinematic.hum_60_hz == 0.0
         && kinematic.second_harmonic == 0.0
         && scene.contact == Contact::KINEMATIC
         && !kinematic
@@ -161,6 +165,7 @@ fn tone(scene: &Scene) -> Option<Tone<'static>> {
         speed_mm_s: *speed_mm_s,
         snr_db: kinematic.snr_db?,
         gauges: &[0, 1, 2, 3, 4],
+        slope: false,
     })
 }
 
@@ -206,7 +211,7 @@ mod tests {
     fn only_steady_tones_in_white_noise_are_bound() {
         for family in load(&root()).unwrap() {
             let bound = ["table-1-20-db", "table-1-0-db", "off-grid", "slow-fast"];
-            let got = family.bound_percent(|_, _| 0.08);
+            let got = family.bound_percent(false, |_, _| 0.08);
             assert_eq!(
                 got.is_some(),
                 bound.contains(&family.folder),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::bank;
 use super::family::Family;
 use super::panel::{
     AROUND, COLUMNS, Look, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes,
@@ -10,18 +11,22 @@ use super::panel::{
 use super::result::{ContestResult, Entry, WINDOWS, Window};
 
 /// Above the panels, for the legend.
-const HEAD: f64 = 96.0;
+const HEAD: f64 = 136.0;
 
 /// Okabe and Ito's colours, which the colour-blind tell apart; no two methods share shape and colour.
-const LOOKS: [Look; 10] = [
-    look("bank", "#0072B2", Shape::Circle),
+const LOOKS: [Look; 13] = [
+    look("spectrum", "#0072B2", Shape::Circle),
     look("crossings", "#D55E00", Shape::Square),
     look("counting", "#000000", Shape::Up),
+    // At the end of the legend's first line, where there is room for it.
+    look(bank::METHOD, "#8a939c", Shape::Circle),
     look("adapted count", "#000000", Shape::Down),
     look("Goertzel", "#009E73", Shape::Diamond),
     look("FFT", "#009E73", Shape::Square),
+    look("harmonic NLS", "#009E73", Shape::Up),
     look("AR(2)", "#CC79A7", Shape::Up),
     look("PLL", "#CC79A7", Shape::Down),
+    look("Pei–Tseng notch", "#CC79A7", Shape::Diamond),
     look("YIN", "#B58900", Shape::Circle),
     look("McLeod", "#B58900", Shape::Diamond),
 ];
@@ -33,8 +38,8 @@ pub fn draw(result: &ContestResult) -> String {
     let height = HEAD + rows as f64 * PANEL_HEIGHT + MARGIN;
     let mut svg = page(height);
     legend(&mut svg);
-    let cost = Scale::decades(700.0, 30_000.0, "instructions a ms");
-    let error = Scale::decades(0.03, 300.0, "");
+    let cost = Scale::decades(700.0, 60_000.0, "instructions a ms");
+    let error = Scale::decades(0.01, 300.0, "");
     let settling = Scale::even(0.0, 400.0, 100.0, "");
     for index in 0..panels {
         let (column, row) = (index % COLUMNS, index / COLUMNS);
@@ -124,16 +129,15 @@ fn goals_ms(family: &Family) -> Vec<f64> {
 
 fn legend(svg: &mut String) {
     for (index, look) in LOOKS.iter().enumerate() {
-        let x = MARGIN + 14.0 + (index % 5) as f64 * 150.0;
-        let y = 20.0 + (index / 5) as f64 * 20.0;
+        let x = MARGIN + 14.0 + (index % 4) as f64 * 235.0;
+        let y = 20.0 + (index / 4) as f64 * 20.0;
         mark(svg, (x, y - 4.0), look, estimated(look.method), 1.0);
         text(svg, x + 11.0, y, "font-size=\"13\"", look.method);
     }
-    let y = 66.0;
+    let y = 106.0;
     let mut x = MARGIN + 8.0;
     for (dash, words) in [
-        (knob_dash("travel_percent"), "bank: travel 50–150 % of λ"),
-        (knob_dash("candidates"), "bank: 12–24 candidates"),
+        (knob_dash("waves"), "spectrum: fits of 2–8 λ"),
         (knob_dash("gauges"), "1, 3, 5 gauges"),
     ] {
         let style = format!("stroke=\"#0072B2\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"");
@@ -151,10 +155,10 @@ fn legend(svg: &mut String) {
     text(
         svg,
         MARGIN + 8.0,
-        86.0,
+        126.0,
         &format!("font-size=\"12\" fill=\"{SOFT}\""),
         "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated \
-         Cortex-M4F. Dashed: Cramér–Rao bound for the bank’s travel, 80 ms and 160 ms.",
+         Cortex-M4F. Dashed: Cramér–Rao bound over 8 λ, 80 ms and 160 ms.",
     );
 }
 
@@ -177,7 +181,7 @@ fn bounds(svg: &mut String, panel: &Panel<'_>, family: &Family) {
         let (left, y) = panel.at(panel.x.low, percent);
         let right = left + Panel::WIDE;
         let words = match window {
-            Window::BankTravel => "bound, travel".to_owned(),
+            Window::Waves(waves) => format!("bound, {waves} λ"),
             Window::Ms(ms) => format!("bound, {ms} ms"),
         };
         line(
@@ -256,7 +260,7 @@ fn marks(
     }
 }
 
-/// The values of the bank's travel beside their marks.
+/// The fits' lengths beside their marks.
 fn travels(
     svg: &mut String,
     panel: &Panel<'_>,
@@ -264,12 +268,13 @@ fn travels(
     place: impl Fn(&Entry) -> Option<(f64, f64)>,
 ) {
     for entry in &result.entries {
-        if entry.knob == "travel_percent"
+        if entry.knob == "waves"
             && let Some((x, y)) = place(entry)
+            && x <= panel.x.high
         {
             let (x, y) = panel.at(x, y);
             let style = "text-anchor=\"middle\" font-size=\"10\"";
-            text(svg, x, y + 19.0, style, &format!("{} %", entry.value));
+            text(svg, x, y + 19.0, style, &format!("{} λ", entry.value));
         }
     }
 }

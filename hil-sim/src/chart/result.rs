@@ -2,7 +2,7 @@
 
 use protocol::SensorConfiguration;
 
-use super::bound::bank_travel_mm;
+use super::bound::{WAVES, window_mm};
 use super::costs::Cost;
 use super::family::Family;
 use super::score::Score;
@@ -44,13 +44,13 @@ pub struct ContestResult {
 }
 
 /// The windows that the Cramér–Rao bound is drawn for.
-pub const WINDOWS: [Window; 3] = [Window::BankTravel, Window::Ms(80), Window::Ms(160)];
+pub const WINDOWS: [Window; 3] = [Window::Waves(WAVES), Window::Ms(80), Window::Ms(160)];
 
 /// A window of the bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Window {
-    /// The travel that the bank uses with its default knobs.
-    BankTravel,
+    /// So many waves of travel, each gauge's slope unknown too.
+    Waves(u8),
     /// A time.
     Ms(u16),
 }
@@ -58,11 +58,12 @@ pub enum Window {
 impl Window {
     /// The bound on a family in percent, if it is of the kind that has one.
     pub fn bound_percent(self, family: &Family) -> Option<f64> {
-        let travel_percent = SensorConfiguration::DEFAULT.bank_travel_percent;
-        family.bound_percent(|wavelength_mm, speed_mm_s| match self {
-            Self::BankTravel => bank_travel_mm(travel_percent, wavelength_mm) / speed_mm_s.abs(),
-            Self::Ms(ms) => f64::from(ms) * 1e-3,
-        })
+        match self {
+            Self::Waves(waves) => family.bound_percent(true, |wavelength_mm, speed_mm_s| {
+                window_mm(waves, wavelength_mm) / speed_mm_s.abs()
+            }),
+            Self::Ms(ms) => family.bound_percent(false, |_, _| f64::from(ms) * 1e-3),
+        }
     }
 }
 
@@ -127,7 +128,7 @@ impl ContestResult {
                     continue;
                 };
                 let (knob, value) = match window {
-                    Window::BankTravel => ("bank_travel", String::new()),
+                    Window::Waves(waves) => ("waves", waves.to_string()),
                     Window::Ms(ms) => ("window_ms", ms.to_string()),
                 };
                 let bound = field(Some(bound), 4);
@@ -233,8 +234,8 @@ mod tests {
     }
 
     #[test]
-    fn the_default_is_one_point_of_each_sweep_of_the_bank() {
-        for knob in [Knob::Travel, Knob::Candidates, Knob::Gauges] {
+    fn the_default_is_one_point_of_each_sweep_of_the_spectrum() {
+        for knob in [Knob::Waves, Knob::Gauges] {
             let defaults = SETTINGS.iter().filter(|setting| {
                 let default = SensorConfiguration::DEFAULT;
                 setting.knob == knob && setting.on(default) == default

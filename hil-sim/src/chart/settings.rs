@@ -6,10 +6,8 @@ use protocol::{Method, SensorConfiguration};
 /// What is swept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Knob {
-    /// Travel over which the bank averages, in percent of λ.
-    Travel,
-    /// Wavenumbers in the bank.
-    Candidates,
+    /// The longest fit in wavelengths of travel.
+    Waves,
     /// How many gauges take part.
     Gauges,
     /// Which gauges take part, bit g for gauge g.
@@ -40,18 +38,14 @@ const fn setting(method: Method, knob: Knob, value: u16) -> Setting {
 }
 
 /// All of them. A knob's values rise.
-pub const SETTINGS: [Setting; 18] = [
-    setting(Method::Bank, Knob::Travel, 50),
-    setting(Method::Bank, Knob::Travel, 70),
-    setting(Method::Bank, Knob::Travel, 100),
-    setting(Method::Bank, Knob::Travel, 150),
-    setting(Method::Bank, Knob::Candidates, 12),
-    setting(Method::Bank, Knob::Candidates, 16),
-    setting(Method::Bank, Knob::Candidates, 20),
-    setting(Method::Bank, Knob::Candidates, 24),
-    setting(Method::Bank, Knob::Gauges, 1),
-    setting(Method::Bank, Knob::Gauges, 3),
-    setting(Method::Bank, Knob::Gauges, 5),
+pub const SETTINGS: [Setting; 14] = [
+    setting(Method::Spectrum, Knob::Waves, 2),
+    setting(Method::Spectrum, Knob::Waves, 3),
+    setting(Method::Spectrum, Knob::Waves, 5),
+    setting(Method::Spectrum, Knob::Waves, 8),
+    setting(Method::Spectrum, Knob::Gauges, 1),
+    setting(Method::Spectrum, Knob::Gauges, 3),
+    setting(Method::Spectrum, Knob::Gauges, 5),
     setting(Method::Crossings, Knob::Gauges, 1),
     setting(Method::Crossings, Knob::Gauges, 3),
     setting(Method::Crossings, Knob::Gauges, 5),
@@ -69,13 +63,12 @@ impl Setting {
             method: self.method,
             window_ms: defaults.window_ms,
             gauges: defaults.gauges,
-            bank_travel_percent: defaults.bank_travel_percent,
-            bank_candidates: defaults.bank_candidates,
+            waves: defaults.waves,
+            valid_percent: defaults.valid_percent,
             ..scene
         };
         match self.knob {
-            Knob::Travel => configuration.bank_travel_percent = self.value,
-            Knob::Candidates => configuration.bank_candidates = self.value as u8,
+            Knob::Waves => configuration.waves = self.value as u8,
             Knob::Gauges => {
                 configuration.gauges = match self.value {
                     // The counted one; the outermost ones too; all.
@@ -94,7 +87,7 @@ impl Setting {
     /// The method's name in the chart.
     pub const fn method_name(&self) -> &'static str {
         match self.method {
-            Method::Bank => "bank",
+            Method::Spectrum => "spectrum",
             Method::Crossings => "crossings",
             Method::Counting => "counting",
             Method::AdaptedCounting => "adapted count",
@@ -104,8 +97,7 @@ impl Setting {
     /// The knob's name in the CSV.
     pub const fn knob_name(&self) -> &'static str {
         match self.knob {
-            Knob::Travel => "travel_percent",
-            Knob::Candidates => "candidates",
+            Knob::Waves => "waves",
             Knob::Gauges => "gauges",
             Knob::GaugeSet => "gauge_set",
             Knob::Window => "window_ms",

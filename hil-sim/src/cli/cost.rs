@@ -19,7 +19,7 @@ const PARTS: [(u64, &str); 9] = [
     (5, "the whole sensor, counting"),
     (6, "the whole sensor, adapted counting"),
     (7, "the whole sensor, crossings"),
-    (8, "the whole sensor, bank"),
+    (8, "the whole sensor, spectrum"),
 ];
 
 impl Cost {

@@ -91,8 +91,8 @@ fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<J
 }
 
 const HEADER: &str = "\
-| scenes | how many | worst rms, % | goal | least valid share | valid yet > 10 % off, worst, % | longest to settle, ms | the paper's count, worst rms, % |
-| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |";
+| scenes | how many | worst rms, % | goal | least valid share | valid yet > 10 % off, worst, % | least felt right | most felt wrong, % | longest to settle, ms | the paper's count, worst rms, % |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |";
 
 fn row(family: &Family, judged: &[Judged]) -> String {
     let most = |number: fn(&Summary) -> Option<f64>| {
@@ -101,19 +101,26 @@ fn row(family: &Family, judged: &[Judged]) -> String {
             .filter_map(|judged| number(&judged.summary))
             .reduce(f64::max)
     };
-    let least_valid = judged
-        .iter()
-        .filter_map(|judged| judged.summary.valid_share)
-        .reduce(f64::min);
+    let least = |number: fn(&Summary) -> Option<f64>| {
+        judged
+            .iter()
+            .filter_map(|judged| number(&judged.summary))
+            .reduce(f64::min)
+    };
     format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
         family.title,
         judged.len(),
         number(most(|summary| summary.rms_percent), 2),
         number(family.goal_percent(), 1),
-        number(least_valid, 3),
+        number(least(|summary| summary.valid_share), 3),
         number(
             most(|summary| summary.wrong_share).map(|share| 100.0 * share),
+            2
+        ),
+        number(least(|summary| summary.felt_right_share), 3),
+        number(
+            most(|summary| summary.felt_wrong_share).map(|share| 100.0 * share),
             2
         ),
         number(most(|summary| summary.settling_ms), 0),

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use std::thread;
 
 use super::say::{self, say};
+use super::way::tell_notes;
 use hil_sim::map::survey::whole_methods;
-use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing};
+use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing, words};
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Debug, clap::Args)]
@@ -15,7 +16,7 @@ pub(super) struct Maps {
     /// Maps, all of them if none is named
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// Methods to compare, as scenes write them [default: bank, crossings, counting]
+    /// Methods to compare, as scenes write them [default: spectrum, crossings, counting]
     #[arg(long = "method", value_name = "METHOD")]
     methods: Vec<String>,
     /// Folder for the CSV files and pictures
@@ -87,19 +88,27 @@ impl Maps {
         for map in &maps {
             plan.check(map)?;
         }
+        if let Some(map) = maps.first() {
+            for method in &plan.methods {
+                tell_notes(&map.scene(0, method)?);
+            }
+        }
         let mut table = vec![standing::HEADER.to_owned()];
+        let mut words = Vec::new();
         for map in &maps {
-            table.extend(make(map, &plan, self.merge)?);
+            let (lines, said) = make(map, &plan, self.merge)?;
+            table.extend(lines);
+            words.push(said);
         }
         if plan.shard.is_none() {
-            say!("{}", table.join("\n"));
+            say!("{}\n\n{}", table.join("\n"), words.join("\n").trim_end());
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Makes one map and gives its lines of the table.
-fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Vec<String>> {
+/// Makes one map and gives its lines of the table, and where each method fails.
+fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, String)> {
     let mut survey = Survey::open(map, plan)?;
     if merge {
         survey.complete()?;
@@ -109,14 +118,15 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Vec<String>> {
     bar.finish_and_clear();
     let (files, rows) = survey.finish()?;
     eprintln!("{}", files.csv.display());
-    if let Some(picture) = files.picture {
-        eprintln!("{}", picture.display());
+    for file in [files.picture, files.words].into_iter().flatten() {
+        eprintln!("{}", file.display());
     }
-    let lines = whole_methods(map, &rows)
-        .into_iter()
+    let methods = whole_methods(map, &rows);
+    let lines = methods
+        .iter()
         .map(|method| standing::line(map, method, &rows))
         .collect();
-    Ok(lines)
+    Ok((lines, words::text(map, &methods, &rows)))
 }
 
 /// A bar on stderr; none if that is no terminal.

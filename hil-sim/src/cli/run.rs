@@ -249,17 +249,19 @@ fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
 }
 
 const HEADER: &str = "\
-scene                       λ mm     rms %  valid  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
+scene                       λ mm     rms %  valid  felt right  felt wrong  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
 /// A scene's line, up to whether it is as expected.
 fn row(name: &str, judgement: &Judgement) -> String {
     let summary = &judgement.verdict.summary;
     let actuators = &judgement.verdict.actuators;
     format!(
-        "{name:<24} {:>8} {:>8}  {:>5}  {:>12}  {:>9}  {:>9}  {:>11}",
+        "{name:<24} {:>8} {:>8}  {:>5}  {:>10}  {:>10}  {:>12}  {:>9}  {:>9}  {:>11}",
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
         number(summary.valid_share, 2),
+        number(summary.felt_right_share, 2),
+        number(summary.felt_wrong_share, 3),
         number(actuators.frequency_hz, 3),
         number(actuators.truth_hz, 3),
         number(actuators.phase_error_rms_cycles, 4),

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use hil_sim::scene::{Motion, Scene};
 use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, Standing};
 
+use super::way::tell_notes;
 use super::{Elves, number};
 use input::{Input, Keys};
 use screen::Screen;
@@ -90,7 +91,11 @@ impl Serve {
         let defaults = Options::new(&self.dir);
         let options = Options {
             scene: match &self.scene {
-                Some(path) => Scene::load(path)?,
+                Some(path) => {
+                    let scene = Scene::load(path)?;
+                    tell_notes(&scene);
+                    scene
+                }
                 None => defaults.scene,
             },
             hand: match &self.hand {

@@ -58,6 +58,14 @@ pub(super) struct Loaded {
 }
 
 impl Ready {
+    /// Reads the firmwares, if they are to run.
+    pub fn new(engine: EngineName, elves: &Elves) -> anyhow::Result<Self> {
+        Ok(match engine {
+            EngineName::Native => Self::Native,
+            EngineName::Elf => Self::Elf(Box::new(elves.read()?)),
+        })
+    }
+
     pub fn run(&self, scene: &Scene) -> anyhow::Result<Recording> {
         Ok(match self {
             Self::Native => native::run(scene)?,
@@ -84,10 +92,7 @@ impl Way {
 
     /// Reads the firmwares, if they are to run.
     pub fn ready(&self) -> anyhow::Result<Ready> {
-        Ok(match self.engine {
-            EngineName::Native => Ready::Native,
-            EngineName::Elf => Ready::Elf(Box::new(self.elves.read()?)),
-        })
+        Ready::new(self.engine, &self.elves)
     }
 
     pub fn threads(&self) -> NonZero<usize> {
@@ -108,16 +113,13 @@ impl Way {
         }
     }
 
-    /// Reads all scenes, or gives every reason why not.
+    /// Reads all scenes, or gives every reason why not. What their authors should know goes to standard
+    /// error.
     pub fn load(&self, files: &[PathBuf]) -> Vec<Result<Loaded, SceneError>> {
         let load = |path: &PathBuf| {
-            let scene = Scene::load(path)?;
-            if let EngineName::Native = self.engine {
-                native::check(&scene).map_err(|error| at_home(path, error))?;
-            }
             Ok(Loaded {
                 path: path.clone(),
-                scene,
+                scene: load(path, self.engine)?,
             })
         };
         files.iter().map(load).collect()
@@ -136,6 +138,23 @@ impl Way {
         let lines: Vec<String> = refusals.iter().map(ToString::to_string).collect();
         anyhow::anyhow!(lines.join("\n"))
     }
+}
+
+/// Tells on standard error what a scene's author should know.
+pub(super) fn tell_notes(scene: &Scene) {
+    for note in &scene.notes {
+        eprintln!("{note}");
+    }
+}
+
+/// Reads a scene that an engine is to run, and tells on standard error what its author should know.
+pub(super) fn load(path: &Path, engine: EngineName) -> Result<Scene, SceneError> {
+    let scene = Scene::load(path)?;
+    tell_notes(&scene);
+    if let EngineName::Native = engine {
+        native::check(&scene).map_err(|error| at_home(path, error))?;
+    }
+    Ok(scene)
 }
 
 /// A refusal of an engine's, with the scene's file and line.

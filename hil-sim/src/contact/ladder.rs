@@ -128,7 +128,8 @@ fn needs_patch(surface: &Surface, gauges: &Gauges) -> Option<String> {
             .map(|specimen| felt_share(specimen.wavelength_mm))
     };
     let faintest = shares().fold(f64::INFINITY, f64::min) / shares().fold(0.0, f64::max);
-    let noisy = kinematic.snr_db.is_some() || kinematic.hum_50_hz > 0.0 || kinematic.pink > 0.0;
+    let hum = kinematic.hum_50_hz > 0.0 || kinematic.hum_60_hz > 0.0;
+    let noisy = kinematic.snr_db.is_some() || hum || kinematic.pink > 0.0;
     (faintest < FAINT_SHARE && noisy).then(|| {
         format!(
             "of the shortest waves a patch feels {:.0} % of the longest's amplitude, in noise",

@@ -109,6 +109,38 @@ fn hum_is_common_to_all_gauges_and_relative_to_the_signal() {
 }
 
 #[test]
+fn mains_of_60_hz_and_off_nominal_are_where_they_are_said_to_be() {
+    for (kinematic, hz) in [
+        (
+            Kinematic {
+                hum_60_hz: 2.0,
+                ..Kinematic::default()
+            },
+            60.0,
+        ),
+        (
+            Kinematic {
+                hum_50_hz: 2.0,
+                hum_off_hz: -0.5,
+                ..Kinematic::default()
+            },
+            49.5,
+        ),
+    ] {
+        let scans = scans(kinematic, 1);
+        for gauge in 0..GAUGES {
+            // Ten seconds hold whole cycles, and none of the texture's 25 Hz and its odd harmonics.
+            let (amplitude, phase) = tone(&lane(&scans, gauge), hz);
+            assert!(
+                (amplitude - 2.0 * CODES_PER_UNIT).abs() < 0.1,
+                "{hz} Hz, {gauge}: {amplitude}"
+            );
+            assert!(phase.abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
 fn a_dead_gauge_rests_a_saturated_one_clips_and_the_others_stay_as_they_were() {
     let mut broken = Kinematic {
         snr_db: Some(20.0),

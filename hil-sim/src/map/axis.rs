@@ -132,7 +132,7 @@ impl Axis {
     }
 
     /// The step's own name: of a named axis its values, of any other its number.
-    fn place(&self, step: &Step) -> String {
+    pub(super) fn place(&self, step: &Step) -> String {
         if self.scale != Scale::Named {
             return step.label.clone();
         }

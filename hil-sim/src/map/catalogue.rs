@@ -14,6 +14,10 @@ const SPEED_MM_S: f64 = 50.0;
 /// Reversals of the paper's Fig. 7, in Hz.
 const FIG_7_HZ: f64 = 0.83;
 
+/// λ of the map of second waves, in mm. They are weaker than the first, and not near twice as long: there λ
+/// is the first's beyond dispute.
+const SECOND_WAVE_TO_MM: f64 = 2.0;
+
 /// Encoders, in µm: the model's counter has steps of 5 µm.
 const ENCODER_UM: [f64; 11] = [
     5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 70.0, 100.0, 150.0, 200.0,
@@ -91,6 +95,44 @@ pub fn catalogue() -> Vec<Map> {
             title: "Hum of 50 Hz × wavelength",
             conditions: "50 mm/s, 20 dB: at 1 mm the signal is 50 Hz too",
             x: Axis::linear("hum of 50 Hz, relative", Knob::Hum, 0.0, 2.0, 21),
+            y: wavelength(-3..=19),
+            base: vec![noise(), speed()],
+        },
+        Map {
+            name: "random-wavelength",
+            title: "Random heights × wavelength",
+            conditions: "50 mm/s, 20 dB",
+            x: Axis::linear("random heights, rms, relative", Knob::Random, 0.0, 2.0, 21),
+            y: wavelength(-3..=19),
+            base: vec![noise(), speed()],
+        },
+        Map {
+            name: "second-wave-ratio",
+            title: "A second wave: amplitude × wavelength",
+            conditions: "λ = 2 mm, 50 mm/s, 20 dB",
+            x: Axis::linear(
+                "amplitude of the second wave, relative",
+                Knob::SecondWave,
+                0.0,
+                0.9,
+                19,
+            ),
+            y: Axis::log("its wavelength over λ", Knob::SecondRatio, 0.3, 1.7, 26),
+            base: vec![noise(), speed(), Knob::Wavelength.at(SECOND_WAVE_TO_MM)],
+        },
+        Map {
+            name: "pink-wavelength",
+            title: "1/f noise × wavelength",
+            conditions: "50 mm/s, 20 dB of white noise",
+            x: Axis::linear("1/f noise, rms, relative", Knob::Pink, 0.0, 2.0, 21),
+            y: wavelength(-3..=19),
+            base: vec![noise(), speed()],
+        },
+        Map {
+            name: "worn-wavelength",
+            title: "Missing ridges × wavelength",
+            conditions: "50 mm/s, 20 dB",
+            x: Axis::linear("share of ridges missing", Knob::Worn, 0.0, 0.9, 19),
             y: wavelength(-3..=19),
             base: vec![noise(), speed()],
         },

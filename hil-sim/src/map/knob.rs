@@ -28,6 +28,16 @@ pub enum Knob {
     SecondHarmonic,
     /// Relative to the fundamental at unit gain.
     Hum,
+    /// RMS of 1/f noise, relative to the fundamental at unit gain.
+    Pink,
+    /// RMS of heights at random, relative to the fundamental.
+    Random,
+    /// Amplitude of a second wave, relative to the fundamental.
+    SecondWave,
+    /// Its wavelength over λ.
+    SecondRatio,
+    /// Share of missing ridges.
+    Worn,
 }
 
 /// A knob and what it is turned to, as TOML writes it (texts without quotes).
@@ -67,19 +77,29 @@ impl Knob {
             Knob::Skew => "skew_us",
             Knob::SecondHarmonic => "second_harmonic",
             Knob::Hum => "hum_50_hz",
+            Knob::Pink => "pink",
+            Knob::Random => "random",
+            Knob::SecondWave => "second_wave",
+            Knob::SecondRatio => "second_ratio",
+            Knob::Worn => "worn",
         }
     }
 
     /// The scene's section, one of [`SECTIONS`].
     pub const fn section(self) -> &'static str {
         match self {
-            Knob::Wavelength => "surface",
+            Knob::Wavelength | Knob::Random | Knob::SecondWave | Knob::SecondRatio | Knob::Worn => {
+                "surface"
+            }
             Knob::Speed | Knob::Reversal => "motion",
             Knob::Encoder => "arm",
             Knob::Friction => "contact",
-            Knob::Tangential | Knob::Snr | Knob::Skew | Knob::SecondHarmonic | Knob::Hum => {
-                "gauges"
-            }
+            Knob::Tangential
+            | Knob::Snr
+            | Knob::Skew
+            | Knob::SecondHarmonic
+            | Knob::Hum
+            | Knob::Pink => "gauges",
         }
     }
 

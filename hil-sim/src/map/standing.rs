@@ -3,14 +3,12 @@
 use super::Map;
 use super::journal::Rows;
 use super::measurement::Measurement;
+use super::words::{WRONG_SHARE, settings};
 
 /// The table's head, in Markdown.
 pub const HEADER: &str = "\
 | map | method | cells | never valid | rms %, median | cells above 10 % | valid share, median | wrong %, all | wrong %, worst cell | cells above 0.1 % | the worst |
 | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | --- |";
-
-/// Most of the estimates that may be wrong.
-const WRONG_SHARE: f64 = 0.001;
 
 /// The table's line of a method that has every cell.
 pub fn line(map: &Map, method: &str, rows: &Rows) -> String {
@@ -47,22 +45,10 @@ pub fn line(map: &Map, method: &str, rows: &Rows) -> String {
         number(worst.map(|worst| 100.0 * worst.1), 1),
         wrongs().filter(|share| *share > WRONG_SHARE).count(),
         match worst {
-            Some((cell, share)) if share > 0.0 => place(map, cell),
+            Some((cell, share)) if share > 0.0 => settings(map, cell),
             _ => "–".to_owned(),
         },
     )
-}
-
-/// A cell as `--scene` takes it, with the names of what it is.
-fn place(map: &Map, cell: usize) -> String {
-    let columns = map.columns();
-    let parameters = map.parameters(cell);
-    let settings: Vec<String> = columns
-        .iter()
-        .zip(parameters)
-        .map(|(column, value)| format!("{column} = {value}"))
-        .collect();
-    settings.join(", ")
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

@@ -12,6 +12,7 @@ use super::measurement::Measurement;
 use super::picture;
 use super::row::{Row, rank};
 use super::shard::Shard;
+use super::words;
 use crate::batch::in_order;
 use crate::scene::Scene;
 
@@ -48,6 +49,8 @@ pub struct Files {
     pub csv: PathBuf,
     /// The picture; none of a shard.
     pub picture: Option<PathBuf>,
+    /// Where each method fails, in sentences; none of a shard.
+    pub words: Option<PathBuf>,
 }
 
 impl Plan {
@@ -194,7 +197,7 @@ impl<'a> Survey<'a> {
         Ok(())
     }
 
-    /// Sorts the CSV and, of a whole map, draws the picture.
+    /// Sorts the CSV and, of a whole map, draws the picture and writes the sentences.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -203,15 +206,22 @@ impl<'a> Survey<'a> {
         let mut files = Files {
             csv: self.path,
             picture: None,
+            words: None,
         };
         if self.plan.shard.is_none() {
-            let path = files.csv.with_extension("svg");
-            let svg = picture::draw(self.map, &whole_methods(self.map, &self.rows), &self.rows);
-            fs::write(&path, svg).map_err(MapError::file(
-                &path,
-                "cannot be written: give another --out",
-            ))?;
-            files.picture = Some(path);
+            let methods = whole_methods(self.map, &self.rows);
+            let write = |ending: &str, text: String| {
+                let path = files.csv.with_extension(ending);
+                let written = fs::write(&path, text);
+                written.map_err(MapError::file(
+                    &path,
+                    "cannot be written: give another --out",
+                ))?;
+                Ok(Some(path))
+            };
+            let picture = write("svg", picture::draw(self.map, &methods, &self.rows))?;
+            let words = write("md", words::text(self.map, &methods, &self.rows))?;
+            (files.picture, files.words) = (picture, words);
         }
         Ok((files, self.rows))
     }

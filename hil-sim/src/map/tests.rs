@@ -57,7 +57,7 @@ fn refusal(map: &Map, plan: &Plan) -> String {
 #[test]
 fn every_map_has_a_name_and_cells_of_its_own() {
     let maps = catalogue();
-    assert_eq!(maps.len(), 8);
+    assert_eq!(maps.len(), 12);
     let names: BTreeSet<&str> = maps.iter().map(|map| map.name).collect();
     assert_eq!(names.len(), maps.len());
     for map in &maps {
@@ -133,6 +133,8 @@ fn a_map_is_measured_written_and_drawn() {
     for label in ["speed v in mm/s", "wavelength λ in mm", "counting"] {
         assert!(svg.contains(label), "{label}");
     }
+    let words = fs::read_to_string(files.words.unwrap()).unwrap();
+    assert!(words.contains("\n- counting is valid for "), "{words}");
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub fn index(chapters: &[Chapter]) -> String {
         let _ = writeln!(
             rows,
             "<tr><th scope=row><a href=\"#scene-{at}\">{}</a></th><td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             escape(truth.name),
             if chapter.unmet.is_empty() {
                 ""
@@ -45,6 +45,8 @@ pub fn index(chapters: &[Chapter]) -> String {
             number(summary.mean_mm, 3, " mm"),
             number(summary.rms_percent, 2, " %"),
             number(summary.wrong_share.map(|share| 100.0 * share), 2, " %"),
+            number(summary.felt_right_share.map(|share| 100.0 * share), 1, " %"),
+            number(summary.felt_wrong_share.map(|share| 100.0 * share), 2, " %"),
             number(actuators.frequency_hz, 3, " Hz"),
             number(actuators.truth_hz, 3, " Hz"),
             number(recording.realtime_factor(), 1, " ×"),
@@ -52,7 +54,7 @@ pub fn index(chapters: &[Chapter]) -> String {
     }
     format!(
         "<div class=wide><table><thead><tr><th>scene</th><th></th><th>engine</th><th>method</th><th>mean λ̂</th>\
-         <th>RMS error</th><th>valid, wrong</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
+         <th>RMS error</th><th>valid, wrong</th><th>felt right</th><th>felt wrong</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
          <tbody>{rows}</tbody></table></div>\n"
     )
 }
@@ -73,6 +75,11 @@ pub fn summary(chapter: &Chapter) -> String {
         (
             "valid and more than 10 % off",
             number(s.wrong_share.map(|share| 100.0 * share), 2, " %"),
+        ),
+        ("felt right while in motion", percent(s.felt_right_share)),
+        (
+            "felt and more than 10 % off",
+            number(s.felt_wrong_share.map(|share| 100.0 * share), 2, " %"),
         ),
         (
             "RMS error of the paper's count in T1",

@@ -63,6 +63,16 @@ pub(super) const SHARE: Bounds = Bounds {
     give: "a number from 0 to 1",
     allows: |share| (0.0..=1.0).contains(&share),
 };
+pub(super) const RATIO: Bounds = Bounds {
+    what: "a ratio of two wavelengths",
+    give: "a number from 0.1 to 10",
+    allows: |ratio| (0.1..=10.0).contains(&ratio),
+};
+pub(super) const WORN: Bounds = Bounds {
+    what: "a share of missing ridges",
+    give: "a number from 0 to 0.9",
+    allows: |share| (0.0..=0.9).contains(&share),
+};
 pub(super) const SNR: Bounds = Bounds {
     what: "a signal-to-noise ratio",
     give: "a ratio in dB, −40 to 120, or take it out for no noise",
@@ -73,10 +83,10 @@ pub(super) const HUM: Bounds = Bounds {
     give: "a number from 0 to 10, relative to the signal",
     allows: |ratio| (0.0..=10.0).contains(&ratio),
 };
-pub(super) const TRAVEL: Bounds = Bounds {
-    what: "a travel to average over",
-    give: "a number of wavelengths, 0.3 to 3",
-    allows: |wavelengths| (0.3..=3.0).contains(&wavelengths),
+pub(super) const MAINS_OFF: Bounds = Bounds {
+    what: "an offset of the mains",
+    give: "a number of Hz, −2 to 2",
+    allows: |hz| (-2.0..=2.0).contains(&hz),
 };
 pub(super) const BOUND: Bounds = Bounds {
     what: "a bound",

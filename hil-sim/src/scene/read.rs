@@ -7,15 +7,15 @@ use protocol::{GAUGES, Method};
 
 use super::bounds::{
     AMPLITUDE, BOUND, DAMPING, DELAY, DURATION, ENCODER_STEP, FORCE_SCALE, FREQUENCY, HUM, INSTANT,
-    LAG, LENGTH, MOST_SPEED_MM_S, PLACE, RELATIVE, RESONANCE, SHARE, SKEW, SNR, SPEED, STIFFNESS,
-    TRAVEL, WAVELENGTH,
+    LAG, LENGTH, MAINS_OFF, MOST_SPEED_MM_S, PLACE, RATIO, RELATIVE, RESONANCE, SHARE, SKEW, SNR,
+    SPEED, STIFFNESS, WAVELENGTH, WORN,
 };
 use super::contact::{self, Scenery};
 use super::series::Series;
 use super::table::{Source, Table};
 use super::{
-    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Kinematic, Link, Motion, Profile,
-    Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Irregularity, Kinematic, Link,
+    Motion, Note, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 use super::{display, fault, recorded};
 use crate::gauges::PLACES_MM;
@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let name = name(&mut root, path)?;
     let seed = root.whole("seed", 0, i64::MAX as u64)?.unwrap_or(1);
     let duration_s = root.number("duration_s", &DURATION)?.unwrap_or(3.0);
-    let surface = surface(root.table("surface")?)?;
+    let surface = surface(root.table("surface")?, seed)?;
     let motion = motion(root.table("motion")?, duration_s)?;
     let arm = arm(root.table("arm")?)?;
     let (gauges, force) = gauges(root.table("gauges")?, duration_s)?;
@@ -51,7 +51,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         Gauges::Recorded(_) => (Contact::KINEMATIC, None),
     };
     let link = link(root.table("link")?)?;
-    let estimator = estimator(root.table("estimator")?, &force)?;
+    let mut notes = Vec::new();
+    let estimator = estimator(root.table("estimator")?, &force, &mut notes)?;
     let display = display::read(root.table("display")?)?;
     let faults = fault::read(root.tables("fault")?, duration_s)?;
     let expect = expect(root.table("expect")?)?;
@@ -75,6 +76,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         display,
         faults,
         expect,
+        notes,
     })
 }
 
@@ -96,7 +98,7 @@ fn name(root: &mut Table<'_>, path: &Path) -> Result<String, SceneError> {
     }
 }
 
-fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
+fn surface(mut table: Table<'_>, seed: u64) -> Result<Surface, SceneError> {
     let mut specimens = Vec::new();
     let rows = table.tables("specimens")?;
     let last = rows.len().saturating_sub(1);
@@ -135,8 +137,12 @@ fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
         's' => Profile::Sine,
         _ => Profile::Recorded(recorded::profile(&mut table)?),
     };
+    let irregularity = match kind {
+        'r' => Irregularity::NONE,
+        _ => irregularity(&mut table, seed)?,
+    };
     table.finish(if kind == 'r' {
-        ""
+        " with profile = \"recorded\""
     } else {
         " unless profile = \"recorded\""
     })?;
@@ -144,6 +150,26 @@ fn surface(mut table: Table<'_>) -> Result<Surface, SceneError> {
         specimens,
         start_mm,
         profile,
+        irregularity,
+    })
+}
+
+fn irregularity(table: &mut Table<'_>, seed: u64) -> Result<Irregularity, SceneError> {
+    let none = Irregularity::NONE;
+    let second_wave = table.number("second_wave", &SHARE)?;
+    let second_ratio = table.number("second_ratio", &RATIO)?;
+    if second_ratio.is_some() && second_wave.is_none() {
+        return Err(table.refuse(
+            "second_ratio",
+            "there is no second wave: give second_wave too",
+        ));
+    }
+    Ok(Irregularity {
+        random: table.number("random", &RELATIVE)?.unwrap_or(none.random),
+        second_wave: second_wave.unwrap_or(none.second_wave),
+        second_ratio: second_ratio.unwrap_or(none.second_ratio),
+        worn: table.number("worn", &WORN)?.unwrap_or(none.worn),
+        seed,
     })
 }
 
@@ -249,14 +275,14 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
         return Ok((Gauges::Kinematic(kinematic(table)?), force));
     }
     let volts = recorded::gauges(&mut table, duration_s, tangential)?;
-    if tangential == Some(true) && volts.width == 5 {
+    if tangential == Some(true) && volts.width() == 5 {
         return Err(table.refuse(
             "tangential",
             "true, but the file has no column of that name: add it, name a sixth channel, or give false",
         ));
     }
     table.finish(" with kind = \"recorded\"")?;
-    let present = tangential.unwrap_or(volts.width == 6);
+    let present = tangential.unwrap_or(volts.width() == 6);
     Ok((Gauges::Recorded(volts), Force { present, ..force }))
 }
 
@@ -273,6 +299,8 @@ fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
     let kinematic = Kinematic {
         snr_db: table.number("snr_db", &SNR)?,
         hum_50_hz: table.number("hum_50_hz", &HUM)?.unwrap_or(0.0),
+        hum_60_hz: table.number("hum_60_hz", &HUM)?.unwrap_or(0.0),
+        hum_off_hz: table.number("hum_off_hz", &MAINS_OFF)?.unwrap_or(0.0),
         second_harmonic: table.number("second_harmonic", &SHARE)?.unwrap_or(0.0),
         dead: table.gauges("dead")?,
         saturated: table.gauges("saturated")?,
@@ -338,16 +366,31 @@ fn link(mut table: Table<'_>) -> Result<Link, SceneError> {
     Ok(link)
 }
 
-fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneError> {
+/// What `[estimator] method = "bank"` is told.
+const BANK_IS_SPECTRUM: &str = "method = \"bank\" is now \"spectrum\", its successor";
+/// What knobs of the bank's are told.
+const NO_KNOB: &str =
+    "no longer does anything: take it out; \"spectrum\" has waves and valid_percent";
+
+fn estimator(
+    mut table: Table<'_>,
+    force: &Force,
+    notes: &mut Vec<Note>,
+) -> Result<Estimator, SceneError> {
     let defaults = Estimator::default();
     let methods = [
         ("default", defaults.method),
-        ("bank", Method::Bank),
+        ("spectrum", Method::Spectrum),
         ("crossings", Method::Crossings),
         ("counting", Method::Counting),
         ("counting-adapted", Method::AdaptedCounting),
     ];
-    let method = table.choice("method", &methods)?;
+    let method = if table.text("method")? == Some("bank") {
+        notes.push(table.note("method", BANK_IS_SPECTRUM));
+        Method::Spectrum
+    } else {
+        table.choice("method", &methods)?
+    };
     let window_ms = table
         .whole("window_ms", 10, 200)?
         .map_or(defaults.window_ms, |ms| ms as u16);
@@ -362,12 +405,17 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
             return Err(table.refuse("gauges", "there are none: name one or more of 0 to 4"));
         }
     };
-    let travel_percent = table
-        .number("travel_wavelengths", &TRAVEL)?
-        .map_or(defaults.travel_percent, |q| (100.0 * q).round() as u16);
-    let candidates = table
-        .whole("candidates", 12, 24)?
-        .map_or(defaults.candidates, |count| count as u8);
+    let waves = table
+        .whole("waves", 2, 8)?
+        .map_or(defaults.waves, |waves| waves as u8);
+    let valid_percent = table
+        .whole("valid_percent", 50, 99)?
+        .map_or(defaults.valid_percent, |percent| percent as u8);
+    for key in ["travel_wavelengths", "candidates"] {
+        if table.retired(key) {
+            notes.push(table.note(key, NO_KNOB));
+        }
+    }
     let stiffness = table.choice(
         "stiffness",
         &[
@@ -387,8 +435,8 @@ fn estimator(mut table: Table<'_>, force: &Force) -> Result<Estimator, SceneErro
         window_ms,
         counted_gauge,
         gauges,
-        travel_percent,
-        candidates,
+        waves,
+        valid_percent,
         stiffness,
     })
 }
@@ -409,6 +457,8 @@ fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
         mean_tolerance_mm: mean_tolerance_mm.unwrap_or(0.03),
         valid_share_min: table.number("valid_share_min", &SHARE)?,
         wrong_share_max: table.number("wrong_share_max", &SHARE)?,
+        felt_right_share_min: table.number("felt_right_share_min", &SHARE)?,
+        felt_wrong_share_max: table.number("felt_wrong_share_max", &SHARE)?,
         settling_ms: table.number("settling_ms", &BOUND)?,
         latency_ms: table.number("latency_ms", &BOUND)?,
         frequency_percent: table.number("frequency_percent", &BOUND)?,

@@ -1,7 +1,7 @@
 //! `kind = "recorded"` and `profile = "recorded"`: CSV, WAV and MCAP, at whatever rate they are.
 //!
 //! ```text
-//! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series
+//! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series, waveform
 //! ```
 
 use std::cell::Cell;
@@ -13,6 +13,7 @@ use super::SceneError;
 use super::bounds::{FILE_INSTANT, OFFSET_V, PLACE, RATE, SCALE, SPACING};
 use super::series::Series;
 use super::table::{Column, Table};
+use super::waveform::Waveform;
 use crate::gauges::{MID_RAIL_VOLTS, SCAN_RATE_HZ};
 use crate::surface::GRID_MM;
 
@@ -72,13 +73,13 @@ fn on_lines(table: &mut Table<'_>) -> Result<Option<bool>, SceneError> {
     Ok(table.contains("interpolation").then_some(lines))
 }
 
-/// The voltages of `[gauges]`: five columns or six, at the ADC's instants unless they lie on lines.
-/// `tangential` is the key of that name.
+/// The voltages of `[gauges]`: five columns or six, band-limited and laid on the native engine's instants unless they
+/// lie on lines. `tangential` is the key of that name.
 pub(super) fn gauges(
     table: &mut Table<'_>,
     duration_s: f64,
     tangential: Option<bool>,
-) -> Result<Arc<Series>, SceneError> {
+) -> Result<Arc<Waveform>, SceneError> {
     let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
     let source = Source::of(table, &TIME, &headers)?;
     let start_s = table.number("start_s", &FILE_INSTANT)?.unwrap_or(0.0);
@@ -93,7 +94,6 @@ pub(super) fn gauges(
     };
     let as_it_is = conversion.scale == 1.0 && conversion.offset == 0.0;
     let first_step_s = Cell::new(None);
-    let is_dense = Cell::new(true);
     let check: Check<'_> = &|before, row| {
         let beyond = |&column: &usize| !PIN_VOLTS.contains(&row[column]);
         if let Some(column) = (1..row.len()).find(beyond) {
@@ -114,7 +114,6 @@ pub(super) fn gauges(
         if step_s <= DENSE_S {
             return Ok(());
         }
-        is_dense.set(false);
         if lines == Some(true) {
             let message = "comes more than 1 ms after the row before: give 1 kHz or more with interpolation = \"lines\"";
             return Err((0, message.to_owned()));
@@ -175,17 +174,17 @@ pub(super) fn gauges(
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
     covers_time(table, extent, duration_s)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
-    // Volts at 1 to 4 kHz have always been that, and old scenes stay as they are. What the lines leave above half
-    // of such a rate is also where the sensor measures white noise.
-    let is_table = is_own && is_dense.get() && !is_denser(&rows, per_unit);
-    if lines.unwrap_or(is_table) {
-        return Ok(Arc::new(rows));
+    if lines == Some(true) {
+        return Ok(Arc::new(Waveform::on_lines(rows)));
     }
     let adc = Raster {
         per_unit,
         through_zero: true,
     };
-    laid(table, rows, adc)
+    let laid = laid(table, rows, adc)?;
+    // Written times are rounded: the raster knows better.
+    let first = (laid.at[0] * per_unit).round() / per_unit;
+    Ok(Arc::new(Waveform::band_limited(laid, first, per_unit)))
 }
 
 /// The positions of `[motion]`, one column.
@@ -219,7 +218,7 @@ pub(super) fn motion(
         per_unit,
         through_zero: true,
     };
-    laid(table, rows, adc)
+    laid(table, rows, adc).map(Arc::new)
 }
 
 /// The heights of `[surface]`, one column.
@@ -244,7 +243,7 @@ pub(super) fn profile(table: &mut Table<'_>) -> Result<Arc<Series>, SceneError> 
         per_unit: GRID_MM.recip(),
         through_zero: false,
     };
-    laid(table, rows, grid)
+    laid(table, rows, grid).map(Arc::new)
 }
 
 /// The one column of a section that needs one.
@@ -275,10 +274,10 @@ fn is_denser(rows: &Series, per_unit: f64) -> bool {
     (rows.at.len() - 1) as f64 > 1.01 * (last - first) * per_unit
 }
 
-fn laid(table: &Table<'_>, rows: Series, raster: Raster) -> Result<Arc<Series>, SceneError> {
+fn laid(table: &Table<'_>, rows: Series, raster: Raster) -> Result<Series, SceneError> {
     let step = Even::of(&rows.at).map_or(f64::NAN, |even| even.step);
     match raster.lay(rows) {
-        Some(series) => Ok(Arc::new(series)),
+        Some(series) => Ok(series),
         None => {
             let message = format!(
                 "samples that are {step} apart cannot be brought to {} in one: resample the file",

@@ -6,8 +6,8 @@ use protocol::GAUGES;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::SceneError;
 use super::bounds::Bounds;
+use super::{Note, SceneError};
 
 /// The scene's text and where it came from.
 pub(super) struct Source<'t> {
@@ -22,6 +22,8 @@ pub(super) struct Table<'t> {
     offset: usize,
     entries: Option<&'t DeTable<'t>>,
     asked: Vec<&'static str>,
+    /// Keys that earlier versions asked for.
+    retired: Vec<&'static str>,
 }
 
 type Value<'t> = Spanned<DeValue<'t>>;
@@ -82,6 +84,7 @@ impl<'t> Table<'t> {
             offset: 0,
             entries: Some(entries),
             asked: Vec::new(),
+            retired: Vec::new(),
         }
     }
 
@@ -93,6 +96,28 @@ impl<'t> Table<'t> {
         };
         self.source
             .error(offset, &self.path_of(key), message.into())
+    }
+
+    /// A word about `key`, which is no reason to refuse the scene.
+    pub fn note(&self, key: &str, message: &str) -> Note {
+        let SceneError {
+            file,
+            line,
+            key,
+            message,
+        } = self.refuse(key, message);
+        Note {
+            file,
+            line,
+            key,
+            message,
+        }
+    }
+
+    /// Whether there is `key`, which earlier versions asked for. Whatever it holds is let pass.
+    pub fn retired(&mut self, key: &'static str) -> bool {
+        self.retired.push(key);
+        self.contains(key)
     }
 
     pub fn contains(&self, key: &str) -> bool {
@@ -113,6 +138,7 @@ impl<'t> Table<'t> {
                 offset: self.offset,
                 entries: None,
                 asked: Vec::new(),
+                retired: Vec::new(),
             }),
             Some(value) => self.table_in(value, self.path_of(key)),
         }
@@ -315,7 +341,10 @@ impl<'t> Table<'t> {
             .entries
             .into_iter()
             .flatten()
-            .filter(|(key, _)| !self.asked.contains(&key.get_ref().as_ref()))
+            .filter(|(key, _)| {
+                let key = key.get_ref().as_ref();
+                !self.asked.contains(&key) && !self.retired.contains(&key)
+            })
             .min_by_key(|(key, _)| key.span().start);
         let Some((key, _)) = unknown else {
             return Ok(());
@@ -350,6 +379,7 @@ impl<'t> Table<'t> {
                 offset,
                 entries: Some(entries),
                 asked: Vec::new(),
+                retired: Vec::new(),
             }),
             other => {
                 let message = format!("holds {}: give a table", kind_of(other));

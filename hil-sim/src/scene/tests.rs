@@ -26,6 +26,29 @@ fn refusal_of(section: &str) -> String {
 }
 
 #[test]
+fn an_irregular_surface_has_the_scenes_seed_and_a_grating_is_none() {
+    let text = format!(
+        "seed = 9\n{SURFACE}random = 0.4\nsecond_wave = 0.5\nsecond_ratio = 1.7\nworn = 0.2\n"
+    );
+    let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+    assert_eq!(
+        scene.surface.irregularity,
+        Irregularity {
+            random: 0.4,
+            second_wave: 0.5,
+            second_ratio: 1.7,
+            worn: 0.2,
+            seed: 9,
+        }
+    );
+    let zeros = format!("{SURFACE}random = 0\nsecond_wave = 0.0\nworn = 0\n");
+    for text in [SURFACE, &zeros] {
+        let scene = Scene::parse(Path::new("x.toml"), text).unwrap();
+        assert!(scene.surface.irregularity.is_none());
+    }
+}
+
+#[test]
 fn every_key_of_the_contract_parses() {
     let scene = Scene::parse(
         Path::new("x.toml"),
@@ -81,14 +104,16 @@ fn every_key_of_the_contract_parses() {
         window_ms = 60
         counted_gauge = 1
         gauges = [0, 1, 4]
-        travel_wavelengths = 1.5
-        candidates = 20
+        waves = 5
+        valid_percent = 95
         stiffness = "estimated"
         [display]
         mode = "travelling"
         [expect]
         wavelength_rms_percent = 1.0
         wrong_share_max = 0.001
+        felt_right_share_min = 0.85
+        felt_wrong_share_max = 0.01
         "#,
     )
     .unwrap();
@@ -134,6 +159,8 @@ fn every_key_of_the_contract_parses() {
     assert_eq!(scene.display.configuration.mode, protocol::Mode::Travelling);
     assert_eq!(scene.expect.wavelength_rms_percent, Some(1.0));
     assert_eq!(scene.expect.wrong_share_max, Some(0.001));
+    assert_eq!(scene.expect.felt_right_share_min, Some(0.85));
+    assert_eq!(scene.expect.felt_wrong_share_max, Some(0.01));
     assert_eq!(
         scene.estimator,
         Estimator {
@@ -141,8 +168,8 @@ fn every_key_of_the_contract_parses() {
             window_ms: 60,
             counted_gauge: 1,
             gauges: [true, true, false, false, true],
-            travel_percent: 150,
-            candidates: 20,
+            waves: 5,
+            valid_percent: 95,
             stiffness: Stiffness::Estimated,
         }
     );
@@ -154,7 +181,7 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
         Path::new("x.toml"),
         &format!(
             "{SURFACE}[estimator]\nmethod = \"counting-adapted\"\nwindow_ms = 60\n\
-             counted_gauge = 1\ngauges = [0, 1, 4]\ntravel_wavelengths = 1.5\ncandidates = 20\n"
+             counted_gauge = 1\ngauges = [0, 1, 4]\nwaves = 5\nvalid_percent = 95\n"
         ),
     )
     .unwrap();
@@ -166,19 +193,17 @@ fn what_the_estimator_section_says_is_what_the_sensor_is_configured_to() {
             window_ms: 60,
             counted_gauge: 1,
             gauges: 0b1_0011,
-            bank_travel_percent: 150,
-            bank_candidates: 20,
+            waves: 5,
+            valid_percent: 95,
             ..SensorConfiguration::DEFAULT
         }
     );
     // Both ends of every range that a scene may give are in the sensor's.
-    for [travel, candidates, window_ms, gauge] in
-        [["0.3", "12", "10", "0"], ["3", "24", "200", "4"]]
-    {
+    for [waves, percent, window_ms, gauge] in [["2", "50", "10", "0"], ["8", "99", "200", "4"]] {
         let scene = Scene::parse(
             Path::new("x.toml"),
             &format!(
-                "{SURFACE}[estimator]\ntravel_wavelengths = {travel}\ncandidates = {candidates}\n\
+                "{SURFACE}[estimator]\nwaves = {waves}\nvalid_percent = {percent}\n\
                  window_ms = {window_ms}\ncounted_gauge = {gauge}\ngauges = [{gauge}]\n"
             ),
         );
@@ -217,7 +242,7 @@ fn the_force_channel_is_the_sensors_as_the_gauges_section_has_it() {
 fn every_method_has_its_word_and_the_default_is_the_boards() {
     for (word, method) in [
         ("default", SensorConfiguration::DEFAULT.method),
-        ("bank", Method::Bank),
+        ("spectrum", Method::Spectrum),
         ("crossings", Method::Crossings),
         ("counting", Method::Counting),
         ("counting-adapted", Method::AdaptedCounting),
@@ -227,6 +252,42 @@ fn every_method_has_its_word_and_the_default_is_the_boards() {
         assert_eq!(scene.sensor_configuration().method, method);
         assert!(word == "default" || scene.estimator.method_name() == word);
     }
+}
+
+#[test]
+fn a_scene_of_the_banks_runs_by_its_successor_and_is_told_so_where_it_says_it() {
+    let text = format!(
+        "{SURFACE}[estimator]\nmethod = \"bank\"\ntravel_wavelengths = 0.8\ncandidates = 20\n"
+    );
+    let scene = Scene::parse(Path::new("scenes/x.toml"), &text).unwrap();
+    assert_eq!(scene.estimator, Estimator::default());
+    let notes: Vec<String> = scene.notes.iter().map(Note::to_string).collect();
+    let knob = "no longer does anything: take it out; \"spectrum\" has waves and valid_percent";
+    assert_eq!(
+        notes,
+        [
+            "scenes/x.toml:4: estimator.method: method = \"bank\" is now \"spectrum\", its successor"
+                .to_owned(),
+            format!("scenes/x.toml:5: estimator.travel_wavelengths: {knob}"),
+            format!("scenes/x.toml:6: estimator.candidates: {knob}"),
+        ]
+    );
+    let new = format!("{SURFACE}[estimator]\nmethod = \"spectrum\"\n");
+    let scene = Scene::parse(Path::new("x.toml"), &new).unwrap();
+    assert_eq!(scene.notes, []);
+}
+
+#[test]
+fn old_words_are_not_offered_to_those_who_mistake_a_word() {
+    let text = refusal_of("[estimator]\nmethod = \"bunk\"");
+    assert!(
+        text.contains("give \"default\" or \"spectrum\" or \"crossings\""),
+        "{text}"
+    );
+    assert!(!text.contains("bank"), "{text}");
+    let text = refusal_of("[estimator]\ncandidate = 20");
+    assert!(text.contains("valid_percent, stiffness"), "{text}");
+    assert!(!text.contains("candidates"), "{text}");
 }
 
 #[test]

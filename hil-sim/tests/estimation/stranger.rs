@@ -60,6 +60,8 @@ pub struct Stranger {
     pub snr_db: f64,
     /// Rows per second in the file.
     pub rows_per_s: usize,
+    /// How many rows earlier than at the scene's instants the rows lie, 0 to 1: the scans then fall between them.
+    pub rows_early: f64,
     /// What follows in the scene.
     pub rest_of_scene: &'static str,
     /// In s.
@@ -77,6 +79,7 @@ impl Default for Stranger {
             force: false,
             snr_db: 20.0,
             rows_per_s: RECORDED_HZ[1],
+            rows_early: 0.0,
             rest_of_scene: "",
             duration_s: 8.0,
             seed: 1,
@@ -149,6 +152,7 @@ impl Stranger {
         let mut csv = "t_s,g0,g1,g2,g3,g4".to_owned();
         csv.push_str(if self.force { ",tangential\n" } else { "\n" });
         let steps_per_row = STEPS_PER_S / self.rows_per_s;
+        let early_s = self.rows_early / self.rows_per_s as f64;
         for step in 0..=(self.duration_s * STEPS_PER_S as f64) as usize + steps_per_row {
             let t_s = step as f64 * STEP_S;
             let arm_mm = (self.arm_mm)(t_s);
@@ -158,7 +162,7 @@ impl Stranger {
             };
             let row = step.is_multiple_of(steps_per_row);
             if row {
-                write!(csv, "{t_s:.6}").unwrap();
+                write!(csv, "{:.6}", t_s - early_s).unwrap();
             }
             if step.is_multiple_of(STEPS_PER_S / 1_000) {
                 for pink in &mut pink {

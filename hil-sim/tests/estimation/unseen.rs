@@ -314,8 +314,8 @@ fn mild_stick_slip_without_the_force_channel_is_never_wrong() {
 fn recordings_in_rows_of_a_millisecond_are_right_at_any_noise() {
     let goal = Goal {
         rms_percent: Some(1.5),
-        // Measured 0.84 to 0.92: their noise is told from stick-slip by its steadiness alone.
-        valid_share: Some(0.8),
+        // The start takes 2.1 wavelengths of travel, as with more rows.
+        valid_share: Some(0.97),
         ..RIGHT
     };
     let noisy = Stranger {
@@ -326,12 +326,7 @@ fn recordings_in_rows_of_a_millisecond_are_right_at_any_noise() {
         ("steady-3.6mm-35mm-s-slowly", slowly(of(3.6, at_35))),
         ("strokes-1.6mm-slowly", slowly(of(1.6, strokes))),
         ("hand-2.3mm-slowly", slowly(of(2.3, hand))),
+        ("0-db-1.6mm-50mm-s-slowly", slowly(noisy)),
     ];
     meet(goal, &recordings);
-    // At 0 dB measured 0.33, all of it right.
-    let few = Goal {
-        valid_share: Some(0.2),
-        ..goal
-    };
-    meet(few, &[("0-db-1.6mm-50mm-s-slowly", slowly(noisy))]);
 }

@@ -191,8 +191,8 @@ pub static SENSOR: [Setting; 11] = [
             Some(())
         },
     },
-    number!(sensor, sensor_mut, bank_travel_percent, "% of λ"),
-    number!(sensor, sensor_mut, bank_candidates, ""),
+    number!(sensor, sensor_mut, waves, "λ"),
+    number!(sensor, sensor_mut, valid_percent, "%"),
     choice!(sensor, sensor_mut, force_channel, "", SWITCH),
     number!(sensor, sensor_mut, force_mn_per_v, "mN/V"),
     number!(sensor, sensor_mut, stiffness_n_per_m, "N/m"),

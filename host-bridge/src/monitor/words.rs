@@ -22,7 +22,7 @@ pub const fn contact(contact: Contact) -> &'static str {
 
 /// Every method, by its word.
 pub const METHODS: [(&str, Method); 4] = [
-    ("bank", Method::Bank),
+    ("spectrum", Method::Spectrum),
     ("counting", Method::Counting),
     ("counting-adapted", Method::AdaptedCounting),
     ("crossings", Method::Crossings),

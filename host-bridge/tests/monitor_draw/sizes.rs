@@ -260,8 +260,8 @@ fn the_form_is_there_to_its_last_word() {
         let shown = picture(&dashboard, &view, width, height);
         for words in [
             "┌ sensor board ──",
-            "│ method                           bank ",
-            "│ bank or counting or counting-adapted or crossings ",
+            "│ method                       spectrum ",
+            "│ spectrum or counting or counting-adapted or crossings ",
             "│ arm_full_scale_um_s ",
             " µm/s ",
             "refused: Actuators names neither the description in force nor the one",

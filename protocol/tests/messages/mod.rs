@@ -134,7 +134,7 @@ pub fn any_hello() -> impl Strategy<Value = Hello> {
 
 /// Every [`Method`], in the wire's order.
 pub const METHODS: [Method; 4] = [
-    Method::Bank,
+    Method::Spectrum,
     Method::Counting,
     Method::AdaptedCounting,
     Method::Crossings,
@@ -162,8 +162,8 @@ pub const SETTINGS: [Setting; 21] = [
     Setting::WindowMs,
     Setting::CountedGauge,
     Setting::Gauges,
-    Setting::BankTravel,
-    Setting::BankCandidates,
+    Setting::Waves,
+    Setting::ValidPercent,
     Setting::ForceScale,
     Setting::Stiffness,
     Setting::ArmFullScale,
@@ -326,19 +326,14 @@ fn configuration() -> impl Strategy<Value = Configuration> {
     prop_oneof![
         (
             proptest::sample::select(METHODS.to_vec()),
-            any::<([u16; 4], [u8; 3], [bool; 2], u32)>()
+            any::<([u16; 3], [u8; 4], [bool; 2], u32)>()
         )
             .prop_map(
                 |(
                     method,
                     (
-                        [
-                            window_ms,
-                            bank_travel_percent,
-                            force_mn_per_v,
-                            stiffness_n_per_m,
-                        ],
-                        [counted_gauge, gauges, bank_candidates],
+                        [window_ms, force_mn_per_v, stiffness_n_per_m],
+                        [counted_gauge, gauges, waves, valid_percent],
                         [force_channel, stream_gauges],
                         arm_full_scale_um_s,
                     ),
@@ -348,8 +343,8 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                         window_ms,
                         counted_gauge,
                         gauges,
-                        bank_travel_percent,
-                        bank_candidates,
+                        waves,
+                        valid_percent,
                         force_channel,
                         force_mn_per_v,
                         stiffness_n_per_m,

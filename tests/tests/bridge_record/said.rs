@@ -114,7 +114,7 @@ fn gauges_are_streamed_while_they_are_recorded_and_nothing_else_is_changed() {
     let running = pair.record(&mut bridge::command(), &[path.to_str().expect("UTF-8")]);
     let before = SensorConfiguration {
         window_ms: 123,
-        bank_travel_percent: 77,
+        valid_percent: 77,
         ..SensorConfiguration::DEFAULT
     };
     let streaming = SensorConfiguration {

@@ -35,12 +35,12 @@ fn every_setting_of_the_estimator_but_the_method_becomes_the_boards() {
         stiffness_n_per_m = 600
 
         [estimator]
-        method = "bank"
+        method = "spectrum"
         window_ms = 60
         counted_gauge = 1
         gauges = [0, 1, 4]
-        travel_wavelengths = 1.5
-        candidates = 20
+        waves = 5
+        valid_percent = 95
         "#,
     ));
     assert_taken(&run);
@@ -48,8 +48,8 @@ fn every_setting_of_the_estimator_but_the_method_becomes_the_boards() {
         window_ms: 60,
         counted_gauge: 1,
         gauges: 0b1_0011,
-        bank_travel_percent: 150,
-        bank_candidates: 20,
+        waves: 5,
+        valid_percent: 95,
         force_channel: true,
         force_mn_per_v: 1_500,
         stiffness_n_per_m: 600,
@@ -84,7 +84,7 @@ fn no_gauge_takes_part_that_the_scene_leaves_out() {
 #[test]
 fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
     let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
-    scene.estimator.candidates = 25;
+    scene.estimator.waves = 9;
     let error = elf::run(&scene, elves::both()).unwrap_err();
     assert!(
         matches!(
@@ -96,7 +96,7 @@ fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
         ),
         "{error:?}"
     );
-    let wanted = "BankCandidates is out of range: give 12 to 24";
+    let wanted = "Waves is out of range: give 2 to 8";
     assert!(error.to_string().contains(wanted), "{error}");
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use hil_sim::expectation;
+use hil_sim::outcome::Judgement;
 use hil_sim::scene::{Expect, Scene};
 use tests::run::{Run, runs_of};
 use tests::sensing::share_explained;
@@ -77,6 +78,28 @@ fn every_estimate_of_every_family_is_the_librarys_bit_for_bit() {
         // But where stick-slip hides the texture, and nothing tells.
         let blind = run.scene.name.starts_with("stick-slip-blind");
         assert!(blind || share > 0.5, "{}: {share} valid", run.scene.name);
+    }
+}
+
+#[test]
+fn the_finger_feels_the_same_on_both_engines() {
+    for run in &*RUNS {
+        let native = Judgement::of(&run.scene, false).unwrap_or_else(|error| panic!("{error}"));
+        let (ours, theirs) = (native.verdict.summary, run.verdict.summary);
+        // The boards scan between the native engine's scans, so an estimate may be stood by one sooner or
+        // later, 10 ms, and be in force two ticks later: at the start, and at each boundary.
+        let surfaces = run.scene.surface.specimens.len() as f64;
+        let bound = surfaces * 0.011 / run.scene.duration_s;
+        for (ours, theirs) in [
+            (ours.felt_right_share, theirs.felt_right_share),
+            (ours.felt_wrong_share, theirs.felt_wrong_share),
+        ] {
+            let (Some(ours), Some(theirs)) = (ours, theirs) else {
+                panic!("{}: the hand moves", run.scene.name);
+            };
+            let off = (ours - theirs).abs();
+            assert!(off <= bound, "{}: {ours} {theirs}", run.scene.name);
+        }
     }
 }
 

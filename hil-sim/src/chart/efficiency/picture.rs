@@ -1,12 +1,12 @@
 //! The picture: error over bound, and both, over frequency.
 
-use super::{GOAL, Row};
+use super::{Cell, MEAN_GOAL, Row, WORST_GOAL};
 use crate::chart::panel::{
     AROUND, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes, goal, line, look,
     mark, page, text,
 };
 
-/// The bank's error over the Cramér–Rao bound, over frequency.
+/// The estimator's error over the Cramér–Rao bound, over frequency.
 pub fn draw(rows: &[Row]) -> String {
     let height = 32.0 + PANEL_HEIGHT + MARGIN;
     let mut svg = page(height);
@@ -14,22 +14,24 @@ pub fn draw(rows: &[Row]) -> String {
         &mut svg,
         MARGIN + 8.0,
         20.0,
-        &format!("font-size=\"12\" fill=\"{SOFT}\""),
-        "The bank’s RMS error over the Cramér–Rao bound for the travel that holds 99 % of its kernel; \
-         steady speed, 20 dB. Circles: a sine; squares: a trapezoid.",
+        &format!("font-size=\"11\" fill=\"{SOFT}\""),
+        "The default estimator’s RMS error over the Cramér–Rao bound for the 8 λ that it fits; steady \
+         speed, 20 dB, a minute or more a mark. Circles: sines; squares: trapezoids.",
     );
     let frequency = Scale::decades(4.0, 125.0, "v/λ, Hz");
-    let error = Scale::decades(0.02, 2.0, "");
-    let ratio = Scale::even(0.0, 5.0, 1.0, "");
+    let error = Scale::decades(0.005, 0.2, "");
+    let ratio = Scale::even(0.8, 2.0, 0.2, "");
     let looks = [
         ("sine", look("sine", "#0072B2", Shape::Circle)),
         ("trapezoid", look("trapezoid", "#D55E00", Shape::Square)),
     ];
-    type Value = fn(&Row) -> Option<f64>;
+    type Value = fn(&Cell) -> Option<f64>;
     let panels: [(&str, usize, &Scale, Value); 3] = [
-        ("one gauge: error over bound", 1, &ratio, Row::ratio),
-        ("five gauges: error over bound", 5, &ratio, Row::ratio),
-        ("one gauge: RMS error, %", 1, &error, |row| row.rms_percent),
+        ("one gauge: error over bound", 1, &ratio, Cell::ratio),
+        ("five gauges: error over bound", 5, &ratio, Cell::ratio),
+        ("five gauges: RMS error, %", 5, &error, |cell| {
+            cell.rms_percent
+        }),
     ];
     for (column, (title, gauges, y, value)) in panels.into_iter().enumerate() {
         let left = MARGIN + column as f64 * PANEL_WIDTH + AROUND[0];
@@ -46,8 +48,8 @@ pub fn draw(rows: &[Row]) -> String {
         };
         if y.logarithmic {
             for bound in shown("sine").collect::<Vec<_>>().windows(2) {
-                let [from, to] = [bound[0], bound[1]]
-                    .map(|row| panel.at(row.frequency_hz, row.kernel_bound_percent));
+                let [from, to] =
+                    [bound[0], bound[1]].map(|row| panel.at(row.frequency_hz, row.bound_percent()));
                 line(
                     &mut svg,
                     from,
@@ -55,12 +57,18 @@ pub fn draw(rows: &[Row]) -> String {
                     "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
                 );
             }
-        } else if gauges == 1 {
-            goal(&mut svg, &panel, GOAL, &format!("goal {GOAL}"));
+        } else if gauges == 5 {
+            goal(&mut svg, &panel, MEAN_GOAL, &format!("mean {MEAN_GOAL:.2}"));
+            goal(
+                &mut svg,
+                &panel,
+                WORST_GOAL,
+                &format!("worst {WORST_GOAL:.2}"),
+            );
         }
         for (profile, look) in &looks {
             for row in shown(profile) {
-                if let Some(value) = value(row) {
+                for value in row.cells.iter().filter_map(value) {
                     mark(
                         &mut svg,
                         panel.at(row.frequency_hz, value),

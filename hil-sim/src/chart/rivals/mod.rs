@@ -7,7 +7,9 @@
 
 pub mod entrant;
 pub mod goertzel;
+pub mod harmonic_sum;
 pub mod linear_prediction;
+pub mod notch;
 pub mod phase_lock;
 pub mod roster;
 pub mod spectrum;

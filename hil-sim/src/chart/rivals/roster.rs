@@ -3,7 +3,9 @@
 
 use super::Rival;
 use super::goertzel::Goertzel;
+use super::harmonic_sum::HarmonicSum;
 use super::linear_prediction::LinearPrediction;
+use super::notch::Notch;
 use super::phase_lock::PhaseLock;
 use super::spectrum::{Spectrum, Transform};
 
@@ -13,8 +15,8 @@ pub trait Visitor {
     fn visit<R: Rival + 'static>(&mut self, method: &'static str, value: u16, rival: fn() -> R);
 }
 
-/// Shows all of them, with `T` for the Fourier transform. The knob is the window in ms; the loop's is
-/// its natural frequency in Hz.
+/// Shows all of them, with `T` for the Fourier transform. The knob is the window in ms; the notch's is its
+/// memory in ms, the loop's its bandwidth in Hz.
 pub fn show_all<T: Transform + Default + 'static>(visitor: &mut impl Visitor) {
     visitor.visit("Goertzel", 80, Goertzel::<80>::default);
     visitor.visit("Goertzel", 160, Goertzel::<160>::default);
@@ -22,6 +24,14 @@ pub fn show_all<T: Transform + Default + 'static>(visitor: &mut impl Visitor) {
     visitor.visit("FFT", 160, || Spectrum::<160, T>::new(T::default()));
     visitor.visit("AR(2)", 80, LinearPrediction::<80>::default);
     visitor.visit("AR(2)", 160, LinearPrediction::<160>::default);
+    visitor.visit("harmonic NLS", 160, || {
+        HarmonicSum::<160, T>::new(T::default())
+    });
+    visitor.visit("harmonic NLS", 320, || {
+        HarmonicSum::<320, T>::new(T::default())
+    });
+    visitor.visit("Pei–Tseng notch", 80, || Notch::new(80));
+    visitor.visit("Pei–Tseng notch", 160, || Notch::new(160));
     visitor.visit("PLL", 2, || PhaseLock::new(2.0));
     visitor.visit("PLL", 5, || PhaseLock::new(5.0));
 }

@@ -1,6 +1,12 @@
 //! Lays rows on an even raster: the ADC's instants, or the points at which a surface is stored.
+//!
+//! ```text
+//! rows ─> even raster of their own ─┬─ denser ─> resampler ─┬─ between the wanted points ─> windowed sinc ─┬─> points
+//!                                   └───────────────────────┴──────────────── on them ─────────────────────┘
+//! ```
 
 use super::super::series::Series;
+use super::super::waveform::Waveform;
 use super::resampler::{Ratio, resample};
 
 /// Rows may lie so far beside an even raster, in its steps, and be evenly spaced all the same: their times
@@ -10,9 +16,9 @@ const ROUNDED: f64 = 0.25;
 const THERE: f64 = 0.01;
 /// What a raster that is only nearly the wanted one may be off at the end of a recording, in steps.
 const DRIFT: f64 = 0.001;
-/// If the recording's raster lies beside the wanted one, points are taken on the straight line between two of a
-/// raster that is so much denser: at 500 Hz that is 0.03 % off at most.
-const DENSER: usize = 16;
+/// A recording's step relative to the wanted one below which it is denser: above, the windowed sinc folds half a
+/// percent of the band at most.
+const DENSER: f64 = 0.99;
 
 /// A raster that a recording is brought to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +63,8 @@ impl Even {
 }
 
 impl Raster {
-    /// Two rows or more on this raster: as they are if they lie there, else band-limited. None if the ratio of
-    /// the two rates is beyond all reason.
+    /// Two rows or more on this raster: as they are if they lie there, else band-limited to the lower one of the two
+    /// rates. None if the ratio of the two rates is beyond all reason.
     pub fn lay(self, rows: Series) -> Option<Series> {
         if self.holds(&rows.at) {
             return Some(rows);
@@ -68,35 +74,43 @@ impl Raster {
             Some(even) => (even, rows.values),
             None => stretched(&rows),
         };
-        let frames = values.len() / width;
-        let span = even.step * frames as f64 * self.per_unit;
-        let ratio = Ratio::near((even.step * self.per_unit).recip(), DRIFT / span)?;
-        let values = resample(&values, width, ratio)?;
-        let start = if self.through_zero {
-            even.first * self.per_unit
+        let origin = self.origin(even.first);
+        let (step, values) = if even.step * self.per_unit < DENSER {
+            let span = even.step * (values.len() / width) as f64 * self.per_unit;
+            let ratio = Ratio::near((even.step * self.per_unit).recip(), DRIFT / span)?;
+            (self.per_unit.recip(), resample(&values, width, ratio)?)
         } else {
-            0.0
+            (even.step, values)
         };
-        let (at, values): (Vec<f64>, _) = if (start - start.round()).abs() <= THERE {
-            let origin = if self.through_zero { 0.0 } else { even.first };
-            let place = |index| origin + (start.round() + index as f64) / self.per_unit;
-            ((0..values.len() / width).map(place).collect(), values)
-        } else {
-            let denser = Ratio {
-                input: 1,
-                output: DENSER,
-            };
-            let values = resample(&values, width, denser)?;
-            let step = (DENSER as f64 * self.per_unit).recip();
-            let place = |index| even.first + index as f64 * step;
-            ((0..values.len() / width).map(place).collect(), values)
+        let count = values.len() / width;
+        let at = |index: usize| even.first + index as f64 * step;
+        let own = Series {
+            at: (0..count).map(at).collect(),
+            values,
+            width,
         };
+        let (first, last) = own.extent();
+        let points = [first, last].map(|end| (end - origin) * self.per_unit);
+        let point = |number: f64| origin + number / self.per_unit;
+        // A point this close to an end is there.
+        let numbers = (points[0] - THERE).ceil() as i64..=(points[1] + THERE).floor() as i64;
+        let at: Vec<f64> = numbers.map(|number| point(number as f64)).collect();
+        let waveform = Waveform::band_limited(own, even.first, step.recip());
+        let mut values = vec![0.0; at.len() * width];
+        for (&at, values) in at.iter().zip(values.chunks_exact_mut(width)) {
+            waveform.read(at, &mut 0, values);
+        }
         Some(Series { at, values, width })
+    }
+
+    /// One of its points; `first` is where the recording begins.
+    pub fn origin(self, first: f64) -> f64 {
+        if self.through_zero { 0.0 } else { first }
     }
 
     /// Whether each of the rows is where a point is, and none is left out between them.
     fn holds(self, at: &[f64]) -> bool {
-        let origin = if self.through_zero { 0.0 } else { at[0] };
+        let origin = self.origin(at[0]);
         let first = ((at[0] - origin) * self.per_unit).round();
         at.iter().enumerate().all(|(index, here)| {
             ((here - origin) * self.per_unit - first - index as f64).abs() <= THERE

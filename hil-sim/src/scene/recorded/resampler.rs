@@ -1,9 +1,9 @@
-//! Brings a recording to another rate: band-limited, without a shift in time.
+//! Brings a recording to a lower rate: band-limited, without a shift in time.
 //!
 //! rubato's synchronous resampler does it: the spectrum is cut by a linear-phase low-pass (a sinc under a
 //! squared Blackman–Harris window) whose delay is a whole number of samples, which are dropped. What lies above
-//! half of the lower one of the two rates is suppressed by more than 100 dB; what lies below 0.94 of that is
-//! let through within 0.01 dB. Beyond its ends a recording stands at its first and last value.
+//! half of the new rate is suppressed by more than 100 dB; what lies below 0.94 of that is let through within
+//! 0.01 dB. Beyond its ends a recording stands at its first and last value.
 
 use rubato::audioadapter_buffers::direct::InterleavedSlice;
 use rubato::{Fft, FixedSync, Resampler, WindowFunction};
@@ -149,11 +149,9 @@ mod tests {
     }
 
     #[test]
-    fn what_both_rates_can_carry_stays_as_it_is_and_the_rest_is_taken_out() {
-        for input_hz in [
-            200.0, 1_000.0, 2_500.0, 8_000.0, 11_025.0, 44_100.0, 48_000.0,
-        ] {
-            let half_hz = f64::min(input_hz, 4_000.0) / 2.0;
+    fn what_the_lower_rate_can_carry_stays_as_it_is_and_the_rest_is_taken_out() {
+        for input_hz in [4_100.0, 8_000.0, 11_025.0, 44_100.0, 48_000.0] {
+            let half_hz = 2_000.0;
             for tone_hz in [0.02 * half_hz, 0.5 * half_hz, 0.94 * half_hz] {
                 // 0.01 dB is 1.2e-3; a shift of a thousandth of a scan would be 1.5e-3 at 1.88 kHz.
                 let (_, off) = tone(tone_hz, input_hz);
@@ -170,7 +168,7 @@ mod tests {
 
     #[test]
     fn a_level_stays_to_the_last_digit_up_to_both_ends() {
-        for (input, output) in [(1, 4), (5, 8), (441, 40), (12, 1), (1_237, 977)] {
+        for (input, output) in [(8, 5), (441, 40), (12, 1), (1_237, 977)] {
             let values: Vec<f64> = (0..3_001).flat_map(|_| [1.65, -3.3]).collect();
             let out = resample(&values, 2, Ratio { input, output }).unwrap();
             assert_eq!(out.len(), 2 * (3_000 * output / input + 1));
@@ -184,8 +182,8 @@ mod tests {
                 &[],
                 1,
                 Ratio {
-                    input: 1,
-                    output: 4
+                    input: 4,
+                    output: 1
                 }
             ),
             Some(Vec::new())

@@ -374,7 +374,7 @@ fn a_hand_is_read_from_wav_too() {
 }
 
 #[test]
-fn a_table_of_volts_from_1_to_4_khz_lies_on_straight_lines_unless_it_is_told_otherwise() {
+fn volts_are_band_limited_between_their_rows_unless_straight_lines_are_asked_for() {
     let folder = Folder::new("lines");
     let code = |step_s: f64, keys: &str| {
         let rows: String = (0..=(2.0 / step_s) as u32)
@@ -389,12 +389,12 @@ fn a_table_of_volts_from_1_to_4_khz_lies_on_straight_lines_unless_it_is_told_oth
         let scene = folder.load(&section, "x.csv", csv.as_bytes()).unwrap();
         World::new(&scene).unwrap().codes(1.00025, 0.0)[0]
     };
-    // A quarter of the way from 0 to 1 V; half of a rate is at the end of what is let through.
-    assert_eq!(code(1e-3, ""), 310);
+    // A quarter of the way from 0 to 1 V and back, on a cosine: (1 − cos 45°)/2 V.
+    assert_eq!(code(1e-3, ""), 181);
+    assert_eq!(code(1e-3, "interpolation = \"band-limited\"\n"), 181);
     assert_eq!(code(1e-3, "interpolation = \"lines\"\n"), 310);
-    assert_eq!(code(1e-3, "interpolation = \"band-limited\"\n"), 620);
-    // Slower than any table was before, and denser than the ADC can follow.
-    assert_eq!(code(2e-3, ""), 620);
+    // An eighth of the way, and denser than the ADC can follow.
+    assert_eq!(code(2e-3, ""), 47);
     assert_eq!(code(125e-6, ""), 620);
     assert_eq!(code(125e-6, "interpolation = \"lines\"\n"), 0);
 }

@@ -19,6 +19,26 @@ fn a_refusal_says_file_line_key_and_what_to_do() {
 fn impossible_values_are_refused_at_their_line_and_key() {
     for (section, want) in [
         (
+            "random = -0.1",
+            "x.toml:3: surface.random: -0.1 is not a disturbance",
+        ),
+        (
+            "second_wave = 1.1",
+            "x.toml:3: surface.second_wave: 1.1 is not a share",
+        ),
+        (
+            "second_wave = 0.5\nsecond_ratio = 0",
+            "x.toml:4: surface.second_ratio: 0 is not a ratio of two wavelengths: give a number from 0.1 to 10",
+        ),
+        (
+            "second_ratio = 0.5",
+            "x.toml:3: surface.second_ratio: there is no second wave: give second_wave too",
+        ),
+        (
+            "worn = 0.95",
+            "x.toml:3: surface.worn: 0.95 is not a share of missing ridges: give a number from 0 to 0.9",
+        ),
+        (
             "[motion]\nspeed_mm_s = 1000.1",
             "x.toml:4: motion.speed_mm_s: 1000.1 is not a speed",
         ),
@@ -69,6 +89,14 @@ fn impossible_values_are_refused_at_their_line_and_key() {
         (
             "[gauges]\nhum_50_hz = -1",
             "x.toml:4: gauges.hum_50_hz: -1 is not",
+        ),
+        (
+            "[gauges]\nhum_60_hz = 11",
+            "x.toml:4: gauges.hum_60_hz: 11 is not",
+        ),
+        (
+            "[gauges]\nhum_off_hz = 2.5",
+            "x.toml:4: gauges.hum_off_hz: 2.5 is not",
         ),
         (
             "[gauges]\ndead = [0, 5]",
@@ -183,12 +211,12 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:4: estimator.counted_gauge: 5 is out of range",
         ),
         (
-            "[estimator]\ntravel_wavelengths = 0.29",
-            "x.toml:4: estimator.travel_wavelengths: 0.29 is not a travel to average over",
+            "[estimator]\nwaves = 9",
+            "x.toml:4: estimator.waves: 9 is out of range: give a whole number from 2 to 8",
         ),
         (
-            "[estimator]\ncandidates = 25",
-            "x.toml:4: estimator.candidates: 25 is out of range",
+            "[estimator]\nvalid_percent = 49",
+            "x.toml:4: estimator.valid_percent: 49 is out of range",
         ),
         (
             "[estimator]\nstiffness = \"guessed\"",
@@ -201,6 +229,14 @@ fn impossible_values_are_refused_at_their_line_and_key() {
         (
             "[expect]\nwrong_share_max = 1.1",
             "x.toml:4: expect.wrong_share_max: 1.1 is not a share",
+        ),
+        (
+            "[expect]\nfelt_right_share_min = 1.1",
+            "x.toml:4: expect.felt_right_share_min: 1.1 is not a share",
+        ),
+        (
+            "[expect]\nfelt_wrong_share_max = -0.1",
+            "x.toml:4: expect.felt_wrong_share_max: -0.1 is not a share",
         ),
         (
             "[expect]\nwavelength_rms_percent = 0",

@@ -119,7 +119,7 @@ fn force(lines: &mut String, sensor: &SensorConfiguration) -> Result<(), SceneEr
 
 fn estimator(lines: &mut String, sensor: &SensorConfiguration) {
     let method = match sensor.method {
-        Method::Bank => "bank",
+        Method::Spectrum => "spectrum",
         Method::Counting => "counting",
         Method::AdaptedCounting => "counting-adapted",
         Method::Crossings => "crossings",
@@ -128,14 +128,13 @@ fn estimator(lines: &mut String, sensor: &SensorConfiguration) {
         .filter(|gauge| sensor.gauges >> gauge & 1 == 1)
         .map(|gauge| gauge.to_string())
         .collect();
-    let travel = f64::from(sensor.bank_travel_percent) / 100.0;
     line(lines, "[estimator]");
     line(lines, &format!("method = \"{method}\""));
     line(lines, &format!("window_ms = {}", sensor.window_ms));
     line(lines, &format!("counted_gauge = {}", sensor.counted_gauge));
     line(lines, &format!("gauges = [{}]", gauges.join(", ")));
-    line(lines, &format!("travel_wavelengths = {travel:?}"));
-    line(lines, &format!("candidates = {}", sensor.bank_candidates));
+    line(lines, &format!("waves = {}", sensor.waves));
+    line(lines, &format!("valid_percent = {}", sensor.valid_percent));
     if sensor.force_channel && sensor.stiffness_n_per_m == 0 {
         line(lines, "stiffness = \"estimated\"");
     }

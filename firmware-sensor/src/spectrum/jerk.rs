@@ -3,7 +3,6 @@
 use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
-use crate::bank::candidate::gauges_of;
 use crate::estimator::Touch;
 use crate::phasor::phasor;
 
@@ -11,6 +10,8 @@ use crate::phasor::phasor;
 pub(super) const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
 /// The same for noise that is white up to 500 Hz, as in a recording of one row a millisecond.
 pub(super) const SECOND_DIFFERENCE_WHITE_GAIN: f32 = 6.0;
+/// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
+pub(super) const STEADY_DOUBT: f32 = 1.2;
 /// Share of the samples that are the quiet ones, the step that their bound is followed in, and its least,
 /// relative to the mean.
 const QUIET_SHARE: f32 = 0.1;
@@ -18,8 +19,6 @@ const QUIET_SHARE: f32 = 0.1;
 const QUIET_STEP: f32 = 0.02;
 /// See [`QUIET_SHARE`].
 const QUIET_LEAST: f32 = 1e-3;
-/// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
-pub(super) const STEADY_DOUBT: f32 = 1.2;
 /// The tenth percentile of χ² over its mean, with one to five degrees of freedom: white noise's quiet
 /// bound, by the number of gauges.
 const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
@@ -79,4 +78,9 @@ pub(super) fn second_difference_gain(frequency_hz: f32) -> f32 {
     let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
     let square = 4.0 * sin * sin;
     square * square
+}
+
+/// The gauges whose bit is set.
+fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
+    (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
 }

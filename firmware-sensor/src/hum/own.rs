@@ -1,0 +1,104 @@
+//! Hum of a gauge's own: what it holds at a mains frequency beyond what is common to the gauges.
+
+use protocol::GAUGES;
+
+use super::common::{Amplitudes, conjugate_product, square, sum};
+use crate::ESTIMATE_RATE_HZ;
+
+/// Estimates in a row without a texture that is known to be at the frequency, before what a gauge holds
+/// there may be blamed on it: three of the followers' time constants of 0.25 s.
+const SURE_ESTIMATES: u16 = (3 * ESTIMATE_RATE_HZ / 4) as u16;
+/// Estimates from the start on before anything can be blamed on a gauge: what is found is too much texture.
+const FIRST_ESTIMATES: u16 = 40;
+/// Power relative to the median of three gauges or more, from which on it is hum of the gauge's own whatever
+/// the texture does: that would be in all of them.
+const OUTSTANDING: f32 = 16.0;
+/// A gauge's gain for common hum, relative to the others' mean, above which it is its own: amplifiers
+/// differ from 0.3 to 1.5.
+const MOST_GAIN: f32 = 5.0;
+
+/// Whether a texture may be what a gauge holds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Own {
+    /// How far the texture was from the frequency last, in Hz; 0 if it was not known.
+    off_hz: f32,
+    /// It is known to be elsewhere now.
+    elsewhere: bool,
+    /// Estimates since the start.
+    heard: u16,
+    /// Estimates since it was known to be here.
+    clean: u16,
+}
+
+impl Own {
+    /// Takes how far the texture is from the frequency in Hz, if that is known, and whether that or
+    /// a harmonic is near.
+    pub fn learn(&mut self, off_hz: Option<f32>, near: bool) {
+        self.heard = self.heard.saturating_add(1);
+        let now_hz = off_hz.unwrap_or(0.0);
+        // A stroke may pass the frequency between two estimates.
+        let near = near || now_hz * self.off_hz < 0.0;
+        self.off_hz = now_hz;
+        self.elsewhere = off_hz.is_some() && !near;
+        self.clean = if near {
+            0
+        } else {
+            self.clean.saturating_add(1)
+        };
+    }
+
+    /// Power of each gauge's own hum in ADC steps², of what is `found` at the frequency while the arm rests
+    /// or moves; 0 as long as it may be texture.
+    pub fn powers(&self, found: &Amplitudes, usable: u8, rests: bool) -> [f32; GAUGES] {
+        if self.heard < FIRST_ESTIMATES {
+            [0.0; GAUGES]
+        } else if rests || (self.elsewhere && self.clean >= SURE_ESTIMATES) {
+            not_common(found, usable)
+        } else {
+            outstanding(found, usable)
+        }
+    }
+}
+
+/// Power beyond what the other usable gauges have in common.
+fn not_common(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
+    let sum = sum(found, usable);
+    core::array::from_fn(|gauge| {
+        let z = found[gauge];
+        let take = f32::from(usable >> gauge & 1);
+        let others = [sum[0] - take * z[0], sum[1] - take * z[1]];
+        let count = (usable & !(1 << gauge)).count_ones().max(1) as f32;
+        let [along, _] = conjugate_product(z, others);
+        // What is common to them is this one's too: no more than an amplifier may make of their mean,
+        // nor against it.
+        let most = MOST_GAIN / count;
+        let common = if along <= 0.0 {
+            0.0
+        } else if along <= most * square(others) {
+            along * along / square(others)
+        } else {
+            most * (2.0 * along - most * square(others))
+        };
+        0.5 * (square(z) - common).max(0.0)
+    })
+}
+
+/// Power of those gauges that have far more of it than the usable ones.
+fn outstanding(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
+    let powers = found.map(|z| 0.5 * square(z));
+    let mut sorted = [0.0; GAUGES];
+    let mut count = 0;
+    for (gauge, power) in powers.iter().enumerate() {
+        if usable >> gauge & 1 == 1 {
+            sorted[count] = *power;
+            count += 1;
+        }
+    }
+    if count < 3 {
+        return [0.0; GAUGES];
+    }
+    let sorted = &mut sorted[..count];
+    sorted.sort_unstable_by(f32::total_cmp);
+    let most = OUTSTANDING * sorted[count / 2];
+    powers.map(|power| if power > most { power } else { 0.0 })
+}

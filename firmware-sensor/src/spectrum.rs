@@ -1,0 +1,659 @@
+//! The default estimator: a spectrum over travel, averaged over fresh ground, and a fit to its line.
+//!
+//! ```text
+//! touches ─> knots ─┬─> periodogram ─> the line: where it has stayed put ─┐
+//!                   │        └───────> the wave: what there is now ───────┼─> fits ─> evidence ─> λ̂, confidence
+//!                   └──────────────────────────────────────────────────────┘
+//! ```
+//!
+//! Position, not time, is the independent variable, so a change of speed or direction changes nothing. On
+//! a real surface the wave explains a quarter of what the gauges say, and chance explains nearly as much:
+//! what tells them apart is whether a line stays where it is over fresh ground. So each estimate has two
+//! suppositions. The *line* is the highest peak of the averaged spectrum; the *wave* is the highest peak of
+//! the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
+//! waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
+//!
+//! λ̂ is the period: a line at 2 λ or 3 λ that is at least a third as high as one at λ is taken for the
+//! fundamental, if a fit over three waves finds it there. Of waves that have no common period the
+//! strongest is λ̂.
+//!
+//! The work of an estimate is spread over the ten milliseconds before it: see [`Spectrum::push`].
+
+use protocol::{GAUGES, SensorConfiguration};
+
+use crate::SAMPLE_RATE_HZ;
+use crate::estimator::{
+    Estimator, Finding, MIN_AMPLITUDE_LSB, PLACES_PER_MM, PLACES_PER_UM, Touch,
+};
+use crate::travel::Travel;
+
+use evidence::{LineEvidence, WaveEvidence};
+use fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};
+use jerk::{
+    Jerk, SECOND_DIFFERENCE_NOISE_GAIN, SECOND_DIFFERENCE_WHITE_GAIN, STEADY_DOUBT,
+    second_difference_gain,
+};
+use knots::Knots;
+use periodogram::{
+    CANDIDATES, PER_OCTAVE, Periodogram, Spectrum as Energies, highest_peak, is_peak, sharpness,
+    vertex_mm,
+};
+use play::Play;
+
+mod evidence;
+mod fit;
+mod jerk;
+mod knots;
+mod periodogram;
+mod play;
+
+/// The shortest and the longest wavelength that are stood by, in mm.
+pub const SHORTEST_MM: f32 = 0.6;
+/// See [`SHORTEST_MM`].
+pub const LONGEST_MM: f32 = 8.0;
+/// The lowest and the highest frequency v/λ̂ that are stood by, in Hz: below, drift is not told from
+/// texture; above, the sensor's resonance and the anti-aliasing filter are.
+pub const LOWEST_HZ: f32 = 2.5;
+/// See [`LOWEST_HZ`].
+pub const HIGHEST_HZ: f32 = 150.0;
+
+/// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
+/// the encoder, so that one that dithers between counts is no travel. The force channel's noise, some
+/// 5 µm, needs a little more.
+const PLAY_UM: i32 = 10;
+/// See [`PLAY_UM`].
+const PLAY_WITH_FORCE_UM: i32 = 12;
+/// What is kept of the highest speed from one estimate to the next, e^(−10 / 300): as long as the jerk is.
+const SPEED_KEPT: f32 = 0.967;
+/// Samples without travel after which nothing is stood by any more.
+const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
+/// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
+const STRONG: f32 = 0.8;
+/// What a strong wave explains over three waves, relative to what it usually does, from which on it is all
+/// there, and up to which it is gone.
+const STAYS: f32 = 0.8;
+/// See [`STAYS`].
+const GONE: f32 = 0.5;
+/// What a strong wave's usual share loses in a wave that explains less.
+const FORGOTTEN: f32 = 0.02;
+/// A supposition that moves by more than this share is another one.
+const SAME: f32 = 0.1;
+/// The line's memory in wavelengths, as the periodogram's.
+const MEMORY_WAVES: f32 = 8.0;
+/// Probability of a wave from which on it is the surface, once it has been there for a wavelength.
+const CONVINCING: f32 = 0.8;
+/// Estimates for which a period that a fit has refused is not looked for again.
+const REFUSED_ESTIMATES: u8 = 20;
+/// Power at high frequencies that is not stood by without a force channel, relative to the wave's: a
+/// fingertip that sticks and slips is fast while it slips, whatever the arm does, and hops over ridges.
+const MOST_JERK: f32 = 0.02;
+/// What is left of a probability where that hints at stick and slip: a rough surface has as much power there,
+/// and λ̂ is right on most of them, but below the default level of 70 %.
+const WHERE_JERKY: f32 = 0.65;
+/// Millisecond of the ten in which an estimate's work begins, and knots that a millisecond goes through.
+const SURVEY_SLOT: u8 = 5;
+/// See [`SURVEY_SLOT`].
+const KNOTS_PER_SLOT: usize = 64;
+
+/// The estimator.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    force_channel: bool,
+    /// Lengths of [`LENGTHS`] that a fit may have.
+    lengths: usize,
+    level: f32,
+    play: Play,
+    knots: Knots,
+    periodogram: Periodogram,
+    jerk: Jerk,
+    touch: Touch,
+    rested: u32,
+    /// Speed in mm/s, falling no faster than the jerk is forgotten.
+    speed_mm_s: f32,
+    /// Travel since the last survey, and since the start or the last change of surface, in mm.
+    fresh_mm: f32,
+    travelled_mm: f32,
+    /// Milliseconds since the last estimate.
+    slot: u8,
+    survey: Survey,
+    line: Line,
+    wave: Wave,
+    /// Estimates for which no longer period is looked for.
+    refused: u8,
+    /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
+    known_mm: f32,
+    known_share: f32,
+}
+
+/// The spectra's peaks, and what fits are under way.
+#[derive(Clone, Debug, Default)]
+struct Survey {
+    /// Travel that it is about.
+    fresh_mm: f32,
+    energies: Energies,
+    line_mm: Option<f32>,
+    maturity: f32,
+    presence: f32,
+    sharpness: f32,
+    /// The moment's highest peak is the line's.
+    agree: bool,
+    /// The line is twice or three times as long as the highest peak.
+    longer: bool,
+    line_pass: Option<Pass>,
+    wave_pass: Option<Pass>,
+}
+
+/// The line, from one estimate to the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    mm: f32,
+    held_waves: f32,
+    /// The last fit, in mm, and its share over two waves; 0 without one.
+    fitted_mm: f32,
+    share: f32,
+    /// Wavelengths to go until a line that took another's place stands by itself.
+    young_waves: f32,
+    /// Averages over the line's memory, and their weight.
+    agreement: f32,
+    squares: [f32; 2],
+    shares: [f32; 2],
+    /// The share over three waves that it has had lately, falling slowly.
+    usual: f32,
+    /// 1 as long as a strong line is still there, falling to 0 as it goes.
+    there: f32,
+    weight: f32,
+    /// Mean and variance of ln λ over twice that memory.
+    mean: f32,
+    variance: f32,
+}
+
+/// The wave of the moment, from one estimate to the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wave {
+    mm: f32,
+    held_waves: f32,
+}
+
+/// A supposition with what speaks for it.
+#[derive(Clone, Copy, Debug)]
+struct Supposition {
+    wavelength_mm: f32,
+    probability: f32,
+    fitted: Option<Fitted>,
+    /// What was felt before a change of surface is no sign of stick and slip after it.
+    new: bool,
+}
+
+impl Spectrum {
+    /// Before its first touch, as `configuration` wants it; that must have passed its check.
+    pub fn new(configuration: &SensorConfiguration) -> Self {
+        let play_um = if configuration.force_channel {
+            PLAY_WITH_FORCE_UM
+        } else {
+            PLAY_UM
+        };
+        let waves = f32::from(configuration.waves);
+        Self {
+            force_channel: configuration.force_channel,
+            lengths: LENGTHS.iter().filter(|&&length| length <= waves).count(),
+            level: f32::from(configuration.valid_percent) / 100.0,
+            play: Play::new(play_um * PLACES_PER_UM),
+            knots: Knots::new(),
+            periodogram: Periodogram::new(),
+            jerk: Jerk::default(),
+            touch: Touch::default(),
+            rested: 0,
+            speed_mm_s: 0.0,
+            fresh_mm: 0.0,
+            travelled_mm: 0.0,
+            slot: 0,
+            survey: Survey::default(),
+            line: Line::default(),
+            wave: Wave::default(),
+            refused: 0,
+            known_mm: 0.0,
+            known_share: 0.0,
+        }
+    }
+
+    /// Finds the peaks, and prepares the fits.
+    fn survey(&mut self) {
+        let usable = self.touch.usable;
+        let fresh_mm = core::mem::take(&mut self.fresh_mm);
+        let (short, energies) = self.periodogram.energies(usable);
+        self.periodogram.average(&energies, fresh_mm);
+        let averaged = self.periodogram.averaged();
+        self.survey = Survey {
+            fresh_mm,
+            energies,
+            ..Survey::default()
+        };
+        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
+        else {
+            return;
+        };
+        let kept = self.kept_peak(&averaged, highest);
+        let (number, line_mm) = self
+            .longer_period(&averaged, &energies, kept)
+            .unwrap_or((kept, vertex_mm(&averaged, kept, true)));
+        let momentary = fundamental_of(&energies, momentary, number, line_mm);
+        let momentary_mm = vertex_mm(&energies, momentary, true);
+        let survey = &mut self.survey;
+        survey.line_mm = Some(line_mm);
+        survey.longer = number != kept;
+        survey.sharpness = sharpness(&averaged, number);
+        survey.maturity = self.periodogram.maturity(number);
+        let total: f32 = energies.iter().sum();
+        survey.presence = energies[number] / (total * averaged[number]).max(f32::MIN_POSITIVE);
+        survey.agree = off(momentary_mm, line_mm) < 0.12;
+
+        let base = self.periodogram.level();
+        let strong = self.line.share > STRONG;
+        let near = if strong { 0.2 } else { 0.06 };
+        let start_mm = if off(self.line.fitted_mm, line_mm) < near
+            && (!strong || off(self.line.fitted_mm, momentary_mm) < 0.15)
+        {
+            self.line.fitted_mm
+        } else if survey.agree && !survey.longer {
+            momentary_mm
+        } else {
+            line_mm
+        };
+        survey.line_pass = Some(Pass::new(&self.knots, start_mm, self.lengths, usable, base));
+        // The short kernel sees a new surface first.
+        let newest = highest_peak(&short)
+            .map(|number| vertex_mm(&short, number, false))
+            .filter(|&mm| {
+                let known = self.known_mm > 0.0 && off(mm, self.known_mm) > 0.25;
+                off(mm, line_mm) > 0.12 && (known || off(mm, self.wave.mm) < SAME)
+            });
+        let wave_mm = newest.or((!survey.agree).then_some(momentary_mm));
+        survey.wave_pass = wave_mm.map(|mm| {
+            let start_mm = if off(self.wave.mm, mm) < 0.06 {
+                self.wave.mm
+            } else {
+                mm
+            };
+            Pass::new(&self.knots, start_mm, 3.min(self.lengths), usable, base)
+        });
+    }
+
+    /// The peak where the line was, as long as there is one that is not much lower than the highest.
+    fn kept_peak(&self, averaged: &Energies, highest: usize) -> usize {
+        let was_mm = self.line.mm;
+        (1..CANDIDATES - 1)
+            .filter(|&i| is_peak(averaged, i) && averaged[i] > 0.4 * averaged[highest])
+            .find(|&i| {
+                was_mm > 0.0
+                    && self.line.held_waves > 3.0
+                    && off(periodogram::wavelength_mm(i), was_mm) < 0.11
+            })
+            .unwrap_or(highest)
+    }
+
+    /// A period of which the peak is the second or third harmonic, and its candidate.
+    fn longer_period(
+        &mut self,
+        averaged: &Energies,
+        energies: &Energies,
+        peak: usize,
+    ) -> Option<(usize, f32)> {
+        if self.refused > 0 {
+            self.refused -= 1;
+            return None;
+        }
+        let peak_mm = vertex_mm(averaged, peak, true);
+        for (ratio, up) in [(2.0, PER_OCTAVE), (3.0, 10)] {
+            for i in [peak + up, peak + up - 1, peak + up + 1] {
+                if i + 1 < CANDIDATES
+                    && is_peak(averaged, i)
+                    && averaged[i] > 0.3 * averaged[peak]
+                    && energies[i] > 0.09 * energies[peak]
+                    && off(vertex_mm(averaged, i, true), ratio * peak_mm) < 0.06
+                {
+                    return Some((i, ratio * peak_mm));
+                }
+            }
+        }
+        None
+    }
+
+    /// Power that the gauges hold at high frequencies beyond noise and what a wave with sharp edges would
+    /// make at this speed, over the wave's.
+    fn jerk_over(&self, wavelength_mm: f32, explained: f32) -> f32 {
+        let hz = self.speed_mm_s / wavelength_mm;
+        let smooth = second_difference_gain(hz)
+            + second_difference_gain(2.0 * hz) / 10.0
+            + second_difference_gain(3.0 * hz) / 9.0
+            + second_difference_gain(5.0 * hz) / 25.0;
+        let usable = self.touch.usable;
+        let steady = self.jerk.steady(usable.count_ones());
+        let known: f32 = (0..GAUGES)
+            .filter(|gauge| usable >> gauge & 1 == 1)
+            .map(|gauge| self.touch.noise[gauge])
+            .sum();
+        let noise = known.max(steady / SECOND_DIFFERENCE_WHITE_GAIN);
+        let quiet = (STEADY_DOUBT * steady).max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
+        let power = self.jerk.power - quiet - 0.5 * noise;
+        power / explained.max(f32::MIN_POSITIVE) - smooth
+    }
+
+    /// What is to be said of the line, where there is one.
+    fn weigh_line(&mut self) -> Option<Supposition> {
+        let line_mm = self.survey.line_mm?;
+        let found = self.survey.line_pass.as_ref()?.found;
+        let near = |n: usize, share: f32| {
+            found[n].filter(|fitted| off(fitted.wavelength_mm, line_mm) < share)
+        };
+        if self.survey.longer && found[2].is_some() && near(2, 0.03).is_none() {
+            self.refused = REFUSED_ESTIMATES;
+        }
+        let share = near(1, 0.2).map_or(0.0, |fitted| fitted.share());
+        let fitted = if share > STRONG {
+            longest_that_agrees(&found)
+        } else {
+            near(4, 0.06).or(near(3, 0.06))
+        };
+        // A weak line's fit wanders: the average knows better.
+        let wavelength_mm = fitted.map_or(line_mm, |fitted| {
+            let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
+            line_mm * libm::powf(fitted.wavelength_mm / line_mm, trust)
+        });
+        self.line.fitted_mm = fitted.map_or(0.0, |fitted| fitted.wavelength_mm);
+        self.line.share = if fitted.is_some() { share } else { 0.0 };
+        let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
+        let wander =
+            |n: usize| found[n].map_or(0.15, |fitted| off(fitted.wavelength_mm, line_mm).min(0.15));
+        self.line.follow(
+            line_mm,
+            self.survey.fresh_mm,
+            self.survey.agree,
+            [wander(2), wander(4)],
+            [share_over(2), share_over(4)],
+        );
+        // A strong wave that explains much less than it used to is going, whatever its past says.
+        self.line.there = if self.line.usual > STRONG {
+            let share = share_over(2) / self.line.usual;
+            ((share - GONE) / (STAYS - GONE)).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
+        let inherited = if self.line.young_waves > 0.0 && share_over(1) > STRONG {
+            share_over(1)
+        } else {
+            0.0
+        };
+        let evidence = LineEvidence {
+            maturity: self.survey.maturity,
+            travelled_waves: self.travelled_mm / line_mm,
+            held_waves: self.line.held_waves,
+            shares: [share_over(1), share_over(2), share_over(4)],
+            wander: self.line.squares.map(libm::sqrtf),
+            agreement: self.line.agreement,
+            distance: off(wavelength_mm, line_mm),
+            presence: self.survey.presence,
+            sharpness: self.survey.sharpness,
+            spread: libm::sqrtf(self.line.variance),
+            kept_shares: self.line.shares,
+        };
+        Some(Supposition {
+            wavelength_mm,
+            probability: (self.line.there * evidence.probability()).max(inherited),
+            fitted: found[2].or(found[1]).or(fitted),
+            new: false,
+        })
+    }
+
+    /// What is to be said of a wave that the line is not.
+    fn weigh_wave(&mut self) -> Option<Supposition> {
+        let found = self.survey.wave_pass.as_ref().map(|pass| pass.found);
+        let best = found.and_then(|found| {
+            let explains = |fitted: &Option<Fitted>| fitted.map_or(0.0, |fitted| fitted.share());
+            (0..3)
+                .filter(|&n| found[n].is_some())
+                .max_by(|&one, &other| explains(&found[one]).total_cmp(&explains(&found[other])))
+                .and_then(|n| Some((found[n]?, LENGTHS[n])))
+        });
+        let (Some(found), Some((best, waves))) = (found, best) else {
+            self.wave = Wave::default();
+            return None;
+        };
+        if off(best.wavelength_mm, self.wave.mm) < SAME {
+            self.wave.held_waves += self.survey.fresh_mm / best.wavelength_mm;
+        } else {
+            self.wave.held_waves = 0.0;
+        }
+        self.wave.mm = best.wavelength_mm;
+        let evidence = WaveEvidence {
+            share: best.share(),
+            waves,
+            held_waves: self.wave.held_waves,
+            known_share: self.known_share,
+            distance: found[0].zip(found[2]).map_or(0.3, |(short, long)| {
+                off(short.wavelength_mm, long.wavelength_mm)
+            }),
+            sigma: found[1].map_or(1.0, |fitted| fitted.sigma),
+        };
+        // Where a strong line has gone, something has taken its place.
+        let follows =
+            self.line.there < 0.5 && self.known_share > STRONG && self.wave.held_waves > 0.0;
+        let least = if follows { best.share() } else { 0.0 };
+        Some(Supposition {
+            wavelength_mm: best.wavelength_mm,
+            probability: evidence.probability().max(least),
+            fitted: Some(best),
+            new: follows,
+        })
+    }
+}
+
+impl Spectrum {
+    /// The wave of the moment is the surface from now on.
+    fn begin_anew(&mut self) {
+        self.periodogram.restart(&self.survey.energies, 0.3);
+        self.travelled_mm = self.wave.held_waves * self.wave.mm;
+        self.line = Line {
+            mm: self.wave.mm,
+            held_waves: self.wave.held_waves,
+            fitted_mm: self.wave.mm,
+            young_waves: MEMORY_WAVES,
+            ..Line::default()
+        };
+        self.refused = 0;
+        self.jerk = Jerk::default();
+    }
+
+    /// What is said of the likelier supposition.
+    fn say(&mut self, said: &Supposition) -> Finding {
+        let usable = self.touch.usable;
+        let count = usable.count_ones().max(1) as f32;
+        let fitted = said.fitted.unwrap_or_default();
+        let amplitude_lsb = libm::sqrtf(2.0 * fitted.explained / count);
+        let hz = self.speed_mm_s / said.wavelength_mm;
+        let jerky = !self.force_channel
+            && !said.new
+            && self.jerk_over(said.wavelength_mm, fitted.explained) > MOST_JERK;
+        let in_range = (SHORTEST_MM..=LONGEST_MM).contains(&said.wavelength_mm)
+            && (LOWEST_HZ..=HIGHEST_HZ).contains(&hz)
+            && amplitude_lsb >= MIN_AMPLITUDE_LSB
+            && self.rested < REST_SAMPLES;
+        let stands = in_range && usable != 0 && !self.touch.pickup.hides(amplitude_lsb, hz);
+        let confidence = match (stands, jerky) {
+            (true, false) => said.probability,
+            (true, true) => WHERE_JERKY * said.probability,
+            (false, _) => 0.0,
+        };
+        let valid = confidence >= self.level;
+        if valid {
+            self.known_mm = said.wavelength_mm;
+            self.known_share += 0.1 * (fitted.share() - self.known_share);
+        }
+        Finding {
+            wavelength_mm: Some(said.wavelength_mm).filter(|mm| mm.is_finite() && *mm > 0.0),
+            valid,
+            confidence,
+            amplitude_lsb,
+            gauges_used: usable,
+            misfits: misfits(&fitted, usable, valid),
+            jerky,
+        }
+    }
+}
+
+/// Gauges that the wave explains less than half of, though it explains the others: all of them where λ̂ is
+/// stood by, else one alone, and only if the others agree well.
+fn misfits(fitted: &Fitted, usable: u8, valid: bool) -> u8 {
+    let mut misfits = 0;
+    for gauge in 0..GAUGES {
+        let (mut total, mut explained) = (fitted.total, fitted.explained);
+        if usable >> gauge & 1 == 1 {
+            total -= fitted.totals[gauge];
+            explained -= fitted.explaineds[gauge];
+        }
+        let others_agree = explained > STRONG * total && total > 0.0;
+        if others_agree && fitted.explaineds[gauge] < 0.5 * fitted.totals[gauge] {
+            misfits |= 1 << gauge;
+        }
+    }
+    if valid || (misfits & usable).is_power_of_two() {
+        misfits
+    } else {
+        0
+    }
+}
+
+impl Line {
+    /// Goes on at `mm`, `fresh_mm` of travel later.
+    fn follow(&mut self, mm: f32, fresh_mm: f32, agrees: bool, wander: [f32; 2], shares: [f32; 2]) {
+        let waves = fresh_mm / mm;
+        self.young_waves -= waves;
+        if off(mm, self.mm) < SAME {
+            self.held_waves += waves;
+        } else {
+            self.held_waves = 0.0;
+            self.weight = 0.0;
+            self.mean = libm::logf(mm);
+            self.variance = 0.0;
+            self.usual = 0.0;
+            self.young_waves = 0.0;
+        }
+        self.mm = mm;
+        let slow = waves / (2.0 * MEMORY_WAVES + waves);
+        let away = libm::logf(mm) - self.mean;
+        self.mean += slow * away;
+        self.variance += slow * (away * away - self.variance);
+        let follow = waves / (MEMORY_WAVES + waves);
+        self.weight += follow * (1.0 - self.weight);
+        let share = if self.weight > follow {
+            follow / self.weight
+        } else {
+            1.0
+        };
+        self.agreement += share * (f32::from(u8::from(agrees)) - self.agreement);
+        for (square, wander) in self.squares.iter_mut().zip(wander) {
+            *square += share * (wander * wander - *square);
+        }
+        for (kept, now) in self.shares.iter_mut().zip(shares) {
+            *kept += share * (now - *kept);
+        }
+        self.usual = self.shares[0].max(self.usual - FORGOTTEN * waves);
+    }
+}
+
+/// The longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on.
+fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<Fitted> {
+    let shortest = found[1]?;
+    let (mut low, mut high) = (0.0_f32, f32::MAX);
+    let mut longest = None;
+    for fitted in found[1..].iter().map_while(|fitted| *fitted) {
+        let interval = (4.0 * fitted.sigma).max(0.003);
+        low = low.max(fitted.wavelength_mm * (1.0 - interval));
+        high = high.min(fitted.wavelength_mm * (1.0 + interval));
+        if low > high || fitted.share() < STRONG * shortest.share() {
+            break;
+        }
+        longest = Some(fitted);
+    }
+    longest
+}
+
+/// The moment's highest peak, or the line's where that peak is its second or third harmonic.
+fn fundamental_of(energies: &Energies, peak: usize, line: usize, line_mm: f32) -> usize {
+    let ratio = line_mm / periodogram::wavelength_mm(peak);
+    if (ratio - 2.0).abs() < 0.2 || (ratio - 3.0).abs() < 0.3 {
+        for i in [line, line - 1, line + 1] {
+            if is_peak(energies, i) && energies[i] > 0.09 * energies[peak] {
+                return i;
+            }
+        }
+    }
+    peak
+}
+
+/// Relative distance.
+fn off(one: f32, other: f32) -> f32 {
+    (one / other - 1.0).abs()
+}
+
+impl Estimator for Spectrum {
+    /// Gathers knots, and works on the next estimate: the peaks five milliseconds before it, then the fits.
+    fn push(&mut self, touch: &Touch) {
+        self.touch = *touch;
+        let travel = self.play.follow(touch.place);
+        self.jerk.push(touch);
+        if travel == 0 {
+            self.rested = self.rested.saturating_add(1);
+        } else {
+            self.rested = 0;
+            let completed = self.knots.push(touch.place, travel.abs(), &touch.gauges);
+            self.periodogram.push(&completed);
+            let mm = travel.abs() as f32 * (1.0 / PLACES_PER_MM as f32);
+            self.fresh_mm += mm;
+            self.travelled_mm += mm;
+        }
+        match self.slot {
+            SURVEY_SLOT => self.survey(),
+            6 => {
+                if let Some(pass) = &mut self.survey.wave_pass {
+                    pass.run(&self.knots, KNOTS_PER_SLOT);
+                }
+            }
+            7.. => {
+                if let Some(pass) = &mut self.survey.line_pass {
+                    pass.run(&self.knots, KNOTS_PER_SLOT);
+                }
+            }
+            _ => {}
+        }
+        self.slot = (self.slot + 1).min(9);
+    }
+
+    fn find(&mut self, travel: &Travel) -> Finding {
+        self.slot = 0;
+        let speed_mm_s = travel.velocity_mm_s(0).abs();
+        self.speed_mm_s = speed_mm_s.max(self.speed_mm_s * SPEED_KEPT);
+        let line = self.weigh_line();
+        let wave = self.weigh_wave();
+        if let Some(wave) = &wave
+            && wave.probability > CONVINCING
+            && self.wave.held_waves > 1.0
+        {
+            self.begin_anew();
+        }
+        let likelier = |one: Supposition, other: Supposition| {
+            if other.probability > one.probability {
+                other
+            } else {
+                one
+            }
+        };
+        let said = match (line, wave) {
+            (Some(line), Some(wave)) => likelier(line, wave),
+            (line, wave) => match line.or(wave) {
+                Some(said) => said,
+                None => return Finding::default(),
+            },
+        };
+        self.say(&said)
+    }
+}

@@ -1,0 +1,261 @@
+//! One step of Gauss and Newton: a wave with a constant and a slope in each gauge, one wavenumber for all,
+//! least squares over the last few waves of the path.
+//!
+//! s = c + d τ + a cos kx + b sin kx, each gauge with its own c, d, a, b. The slope over travel τ takes
+//! drift. A pass goes through the knots once, from the newest back, and is solved each time it has covered
+//! one of the asked-for lengths, so that all lengths cost no more than the longest.
+//!
+//! With white noise the wavenumber is as good as the Cramér–Rao bound of that length allows, once the pass
+//! starts within a quarter of a cycle over the length; starting from the last estimate's result, it does.
+
+use protocol::GAUGES;
+
+use super::knots::{Backwards, Knot, Knots, spacing_for};
+use crate::estimator::{PLACES_PER_MM, Place};
+use crate::phasor::phasor;
+
+/// The lengths that a pass is solved at, in waves.
+pub(super) const LENGTHS: [f32; LENGTH_COUNT] = [1.5, 2.0, 3.0, 5.0, 8.0];
+/// How many there are.
+pub(super) const LENGTH_COUNT: usize = 5;
+
+/// Fewer knots than unknowns and a few more say nothing.
+const LEAST_KNOTS: u16 = 8;
+/// Pivot below which the unknowns are not told apart: the path covers too little of a wave.
+const LEAST_PIVOT: f32 = 1e-4;
+
+/// Unknowns of a gauge, and with the two derivatives of the wave by ln k.
+const LINEAR: usize = 4;
+const ALL: usize = 6;
+
+/// What the last waves of the path say of a wavelength.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Fitted {
+    /// λ after the step, in mm.
+    pub wavelength_mm: f32,
+    /// Standard deviation of ln λ, if what is left is white.
+    pub sigma: f32,
+    /// Energy of the usable gauges around their lines, and of it what the wave explains, in ADC steps².
+    pub total: f32,
+    /// See `total`.
+    pub explained: f32,
+    /// The same of each gauge, whether usable or not.
+    pub totals: [f32; GAUGES],
+    /// See `totals`.
+    pub explaineds: [f32; GAUGES],
+}
+
+impl Fitted {
+    /// Share of the energy that the wave explains, 0 to 1.
+    pub fn share(&self) -> f32 {
+        if self.total > 0.0 {
+            self.explained / self.total
+        } else {
+            0.0
+        }
+    }
+}
+
+/// A pass through the latest waves, in portions.
+#[derive(Clone, Debug)]
+pub(super) struct Pass {
+    wavelength_mm: f32,
+    lengths: usize,
+    /// Length that is next.
+    next: usize,
+    usable: u8,
+    reader: Backwards,
+    origin: Option<Place>,
+    increment: u32,
+    radians_per_place: f32,
+    base: [f32; GAUGES],
+    sums: Sums,
+    /// What was found at each length.
+    pub found: [Option<Fitted>; LENGTH_COUNT],
+    done: bool,
+}
+
+/// The normal equations so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    waves: f32,
+    knots: u16,
+    /// Lower triangle of Σ w f fᵀ, f = (1, τ, cos, sin, θ cos, θ sin).
+    normal: [[f32; ALL]; ALL],
+    /// Σ w f s of each gauge.
+    right: [[f32; ALL]; GAUGES],
+    square: [f32; GAUGES],
+}
+
+impl Pass {
+    /// A pass from the newest knot back, for the first `lengths` of [`LENGTHS`], starting at
+    /// `wavelength_mm` above 0. `base` is taken off the gauges: anything near their mean.
+    pub fn new(
+        knots: &Knots,
+        wavelength_mm: f32,
+        lengths: usize,
+        usable: u8,
+        base: [f32; GAUGES],
+    ) -> Self {
+        let places = wavelength_mm * PLACES_PER_MM as f32;
+        Self {
+            wavelength_mm,
+            lengths: lengths.min(LENGTH_COUNT),
+            next: 0,
+            usable,
+            reader: knots.backwards(spacing_for(wavelength_mm)),
+            origin: None,
+            increment: (4_294_967_296.0 / f64::from(places)) as u32,
+            radians_per_place: 2.0 * core::f32::consts::PI / places,
+            base,
+            sums: Sums::default(),
+            found: [None; LENGTH_COUNT],
+            done: false,
+        }
+    }
+
+    /// Goes on through at most `knots` more. True once there is nothing left to do.
+    pub fn run(&mut self, path: &Knots, knots: usize) -> bool {
+        for _ in 0..knots {
+            if self.done {
+                break;
+            }
+            match path.next(&mut self.reader) {
+                Some(knot) => self.take(&knot),
+                None => self.done = true,
+            }
+        }
+        self.done
+    }
+
+    fn take(&mut self, knot: &Knot) {
+        let origin = *self.origin.get_or_insert(knot.place);
+        let away = knot.place.wrapping_sub(origin);
+        let [cos, sin] = phasor((away as u32).wrapping_mul(self.increment));
+        let angle = away as f32 * self.radians_per_place;
+        let mut left = knot.travel_mm / self.wavelength_mm;
+        while self.next < self.lengths {
+            let room = LENGTHS[self.next] - self.sums.waves;
+            if left < room {
+                break;
+            }
+            // The knot straddles the end of this length.
+            self.sums.add(room, [cos, sin], angle, knot, &self.base);
+            left -= room;
+            self.found[self.next] =
+                self.sums
+                    .solve(self.wavelength_mm, LENGTHS[self.next], self.usable);
+            self.next += 1;
+        }
+        if self.next == self.lengths {
+            self.done = true;
+        } else {
+            self.sums.add(left, [cos, sin], angle, knot, &self.base);
+        }
+        self.sums.knots += 1;
+    }
+}
+
+impl Sums {
+    #[inline]
+    fn add(&mut self, w: f32, [cos, sin]: [f32; 2], angle: f32, knot: &Knot, base: &[f32; GAUGES]) {
+        let tau = self.waves + 0.5 * w;
+        self.waves += w;
+        let f = [1.0, tau, cos, sin, angle * cos, angle * sin];
+        let wf = f.map(|f| w * f);
+        for (row, wf) in self
+            .normal
+            .iter_mut()
+            .zip(wf)
+            .enumerate()
+            .map(|(i, (row, wf))| (&mut row[..=i], wf))
+        {
+            for (sum, f) in row.iter_mut().zip(f) {
+                *sum += wf * f;
+            }
+        }
+        for (((right, square), value), base) in self
+            .right
+            .iter_mut()
+            .zip(&mut self.square)
+            .zip(knot.gauges)
+            .zip(base)
+        {
+            let x = value - base;
+            for (sum, wf) in right.iter_mut().zip(wf) {
+                *sum += wf * x;
+            }
+            *square += w * x * x;
+        }
+    }
+
+    /// The step, of a pass that started at `wavelength_mm`, over `waves`. `None` if the path does not tell
+    /// the unknowns apart.
+    fn solve(&self, wavelength_mm: f32, waves: f32, usable: u8) -> Option<Fitted> {
+        if self.knots < LEAST_KNOTS {
+            return None;
+        }
+        let scale = 1.0 / self.waves;
+        // Cholesky's factor of the linear part; below it the derivatives' Schur complement.
+        let mut l = [[0.0_f32; ALL]; ALL];
+        for i in 0..ALL {
+            for j in 0..=i {
+                let mut z = self.normal[i][j] * scale;
+                let (upper, lower) = (&l[j], &l[i]);
+                for (one, other) in upper.iter().zip(lower).take(j.min(LINEAR)) {
+                    z -= one * other;
+                }
+                l[i][j] = if i < LINEAR && i == j {
+                    if z < LEAST_PIVOT {
+                        return None;
+                    }
+                    libm::sqrtf(z)
+                } else if j < LINEAR {
+                    z / l[j][j]
+                } else {
+                    z
+                };
+            }
+        }
+        let mut fitted = Fitted::default();
+        let (mut along, mut curvature, mut rest, mut count) = (0.0, 0.0, 0.0, 0_u16);
+        for gauge in 0..GAUGES {
+            let mut y = [0.0_f32; ALL];
+            for i in 0..ALL {
+                let mut z = self.right[gauge][i] * scale;
+                for q in 0..i.min(LINEAR) {
+                    z -= l[i][q] * y[q];
+                }
+                y[i] = if i < LINEAR { z / l[i][i] } else { z };
+            }
+            let total = (self.square[gauge] * scale - y[0] * y[0] - y[1] * y[1]).max(0.0);
+            let explained = (y[2] * y[2] + y[3] * y[3]).min(total);
+            fitted.totals[gauge] = total;
+            fitted.explaineds[gauge] = explained;
+            if usable >> gauge & 1 == 0 {
+                continue;
+            }
+            let b = y[3] / l[3][3];
+            let a = (y[2] - l[3][2] * b) / l[2][2];
+            // d/d ln k of a cos θ + b sin θ is θ (b cos θ − a sin θ).
+            along += b * y[4] - a * y[5];
+            curvature += b * b * l[4][4] - 2.0 * a * b * l[5][4] + a * a * l[5][5];
+            fitted.total += total;
+            fitted.explained += explained;
+            rest += total - explained;
+            count += 1;
+        }
+        if curvature.is_nan() || curvature <= 0.0 {
+            return None;
+        }
+        let most = 0.5 / waves;
+        let step = (along / curvature).clamp(-most, most);
+        let rest = (rest - along * along / curvature).max(1e-9 * fitted.total);
+        let free = self.knots * count;
+        let unknowns = LINEAR as u16 * count + 2;
+        fitted.sigma =
+            libm::sqrtf(rest / curvature / f32::from(free.saturating_sub(unknowns).max(1)));
+        fitted.wavelength_mm = wavelength_mm / (1.0 + step);
+        Some(fitted)
+    }
+}

@@ -1,0 +1,196 @@
+//! The path in knots: what the gauges say, gathered by travel instead of time.
+//!
+//! A knot is the mean place and the mean of each gauge over a piece of travel. Knots follow the path, so a
+//! reversal needs nothing special, and a slow arm costs no more than a fast one. Short pieces are merged
+//! to longer ones for long waves, so that a wave is never more than some twenty knots.
+
+use protocol::GAUGES;
+
+use crate::estimator::{PLACES_PER_MM, Place};
+
+/// Least travel of a knot at each spacing, in mm.
+pub(super) const SPACINGS_MM: [f32; SPACINGS] = [0.1, 0.22, 0.44];
+/// Number of spacings.
+pub(super) const SPACINGS: usize = 3;
+/// From these wavelengths on, in mm, the next coarser spacing serves: nine knots a wave are left.
+const COARSER_FROM_MM: [f32; SPACINGS - 1] = [2.0, 4.0];
+/// Knots kept at each spacing: eight waves of the longest wavelength that it serves, of 8 mm at most,
+/// and those that come while a fit goes through them.
+const KEPT: usize = 180;
+/// Those that may come while a fit goes through them: one a millisecond at most, of five.
+const SPARE: usize = 10;
+
+/// The spacing that serves a wavelength: the coarsest that leaves nine knots a wave.
+pub(super) fn spacing_for(wavelength_mm: f32) -> usize {
+    COARSER_FROM_MM
+        .iter()
+        .filter(|&&from_mm| wavelength_mm >= from_mm)
+        .count()
+}
+
+/// A piece of travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Knot {
+    /// Its mean place.
+    pub place: Place,
+    /// Its travel in mm.
+    pub travel_mm: f32,
+    /// The mean of each gauge over it, in ADC steps from mid-rail.
+    pub gauges: [f32; GAUGES],
+}
+
+/// A knot that is not complete.
+#[derive(Clone, Copy, Debug, Default)]
+struct Gathering {
+    first: Place,
+    travel_mm: f32,
+    /// Travel times places from `first`, and times gauges.
+    moment: f32,
+    gauges: [f32; GAUGES],
+}
+
+impl Gathering {
+    fn add(&mut self, piece: &Knot) {
+        if self.travel_mm == 0.0 {
+            self.first = piece.place;
+        }
+        self.travel_mm += piece.travel_mm;
+        self.moment += piece.travel_mm * piece.place.wrapping_sub(self.first) as f32;
+        for (sum, x) in self.gauges.iter_mut().zip(piece.gauges) {
+            *sum += piece.travel_mm * x;
+        }
+    }
+
+    fn knot(&self) -> Option<Knot> {
+        (self.travel_mm > 0.0).then(|| {
+            let scale = 1.0 / self.travel_mm;
+            Knot {
+                place: self.first.wrapping_add((self.moment * scale) as i32),
+                travel_mm: self.travel_mm,
+                gauges: self.gauges.map(|sum| sum * scale),
+            }
+        })
+    }
+}
+
+/// The latest knots at one spacing.
+#[derive(Clone, Debug)]
+struct Ring {
+    spacing_mm: f32,
+    gathering: Gathering,
+    /// Knots so far; wraps.
+    count: usize,
+    knots: [Knot; KEPT],
+}
+
+impl Ring {
+    const fn new(spacing_mm: f32) -> Self {
+        const NONE: Knot = Knot {
+            place: 0,
+            travel_mm: 0.0,
+            gauges: [0.0; GAUGES],
+        };
+        Self {
+            spacing_mm,
+            gathering: Gathering {
+                first: 0,
+                travel_mm: 0.0,
+                moment: 0.0,
+                gauges: [0.0; GAUGES],
+            },
+            count: 0,
+            knots: [NONE; KEPT],
+        }
+    }
+
+    /// The knot that `piece` completes, if it does.
+    fn push(&mut self, piece: &Knot) -> Option<Knot> {
+        self.gathering.add(piece);
+        if self.gathering.travel_mm < self.spacing_mm {
+            return None;
+        }
+        let knot = self.gathering.knot()?;
+        self.gathering = Gathering::default();
+        self.knots[self.count % KEPT] = knot;
+        self.count = self.count.wrapping_add(1);
+        // Beyond one turn only the remainder matters; this keeps "how many are there" true for ever.
+        if self.count == 4 * KEPT {
+            self.count -= 2 * KEPT;
+        }
+        Some(knot)
+    }
+}
+
+/// The latest path, at every spacing.
+#[derive(Clone, Debug)]
+pub(super) struct Knots {
+    rings: [Ring; SPACINGS],
+}
+
+/// Knots that a millisecond completed, by spacing.
+pub(super) type Completed = [Option<Knot>; SPACINGS];
+
+impl Knots {
+    /// No path yet.
+    pub const fn new() -> Self {
+        Self {
+            rings: [
+                Ring::new(SPACINGS_MM[0]),
+                Ring::new(SPACINGS_MM[1]),
+                Ring::new(SPACINGS_MM[2]),
+            ],
+        }
+    }
+
+    /// Takes a millisecond that travelled, `places` above 0 in quarters of a µm.
+    pub fn push(&mut self, place: Place, places: i32, gauges: &[f32; GAUGES]) -> Completed {
+        let piece = Knot {
+            place,
+            travel_mm: places as f32 * (1.0 / PLACES_PER_MM as f32),
+            gauges: *gauges,
+        };
+        let mut completed = [None; SPACINGS];
+        completed[0] = self.rings[0].push(&piece);
+        if let Some(fine) = completed[0] {
+            for (ring, completed) in self.rings.iter_mut().zip(&mut completed).skip(1) {
+                *completed = ring.push(&fine);
+            }
+        }
+        completed
+    }
+
+    /// A reader of the path as it is now, from its end backwards. Good for as long as fewer than ten more
+    /// knots have come.
+    pub fn backwards(&self, spacing: usize) -> Backwards {
+        let ring = &self.rings[spacing];
+        Backwards {
+            spacing,
+            partial: if spacing == 0 {
+                None
+            } else {
+                ring.gathering.knot()
+            },
+            next: ring.count,
+            left: ring.count.min(KEPT - SPARE),
+        }
+    }
+
+    /// The next knot back of a reader.
+    pub fn next(&self, reader: &mut Backwards) -> Option<Knot> {
+        if let Some(partial) = reader.partial.take() {
+            return Some(partial);
+        }
+        reader.left = reader.left.checked_sub(1)?;
+        reader.next = reader.next.wrapping_sub(1);
+        Some(self.rings[reader.spacing].knots[reader.next % KEPT])
+    }
+}
+
+/// See [`Knots::backwards`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Backwards {
+    spacing: usize,
+    partial: Option<Knot>,
+    next: usize,
+    left: usize,
+}

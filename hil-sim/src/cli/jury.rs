@@ -1,0 +1,448 @@
+//! `hil-sim jury`.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::fs::File;
+use std::io::Write;
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::thread;
+
+use anyhow::Context;
+use clap::ValueEnum;
+use hil_sim::batch;
+use hil_sim::jury::counts::Counts;
+use hil_sim::jury::folder::{self, Entry};
+use hil_sim::jury::play::{Played, play};
+use hil_sim::jury::seeds::Seeds;
+use hil_sim::jury::stranger::{Class, Trial};
+use hil_sim::jury::table::{self, Row, Weighed};
+use hil_sim::outcome::{Judgement, Outcome};
+use hil_sim::scene::{Estimator, Scene};
+use indicatif::{ProgressBar, ProgressStyle};
+use protocol::{DisplayConfiguration, Method, SensorConfiguration};
+use serde::Serialize;
+
+use super::say::say;
+use super::way::{self, Ready};
+use super::{Elves, EngineName};
+
+/// Surfaces named as the worst.
+const WORST: usize = 8;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Seeds:
+      1 –  9999  to tune on: look at them as often as you like
+  10000 – 19999  to report from: nothing is changed for what one of them does
+Each seed is a surface, a hand and a fingertip; CONTRIBUTING.md says more.
+
+right:  valid and within 5 % of the truth
+wrong:  valid and more than 10 % off, or valid where there is no period
+silent: not valid
+felt:   the same of the λ that the display drives at, with its hold and fade
+All of them are shares of the time in motion (above 5 mm/s, v/λ within 2.5–150 Hz), from 3 λ of travel on after
+the start and after each boundary; in a folder, of all estimates from 1 s on, as a mean over its scenes.
+
+Exit status:
+  0  judged, whatever came of it
+  2  an argument, a folder or a scene cannot be used")]
+pub(super) struct Jury {
+    /// The first seed
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// How many surfaces, a seed each
+    #[arg(long, value_name = "COUNT", default_value_t = 200)]
+    surfaces: u64,
+    /// Judge the scenes of this folder instead, which has an index.json with their truths
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits", "max_age_ms"])]
+    folder: Option<PathBuf>,
+    /// What runs a folder's scenes
+    #[arg(long, value_enum, default_value_t = EngineName::Native, requires = "folder")]
+    engine: EngineName,
+    /// How λ is estimated [default: as configured on a board; in a folder, as each scene says]
+    #[arg(long, value_enum)]
+    method: Option<MethodName>,
+    /// Age of the last valid estimate at which the display fades out, in ms [default: a board's]
+    #[arg(long, value_name = "MS")]
+    max_age_ms: Option<u16>,
+    /// Print the table by what makes surfaces hard, too
+    #[arg(long)]
+    traits: bool,
+    /// Where to write everything as JSON, surface by surface
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Surfaces at a time; 0: one per core. The results are the same
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    #[command(flatten)]
+    elves: Elves,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// The default estimator
+    Spectrum,
+    /// Crossings, their spacing taken in position
+    Crossings,
+    /// The paper's count
+    Counting,
+    /// The paper's count in the window that equation (11) asks for
+    CountingAdapted,
+}
+
+/// What is written of strangers.
+#[derive(Serialize)]
+struct Strangers {
+    first_seed: u64,
+    surfaces: u64,
+    purpose: &'static str,
+    method: &'static str,
+    max_age_ms: u16,
+    intervals: &'static str,
+    classes: Vec<Row>,
+    traits: Vec<Row>,
+    trials: Vec<Judged>,
+}
+
+/// One stranger, judged.
+#[derive(Serialize)]
+struct Judged {
+    seed: u64,
+    class: &'static str,
+    traits: Vec<&'static str>,
+    said: Counts,
+    felt: Counts,
+    #[serde(skip)]
+    trial: Trial,
+}
+
+/// What is written of a folder.
+#[derive(Serialize)]
+struct Folder {
+    folder: PathBuf,
+    engine: &'static str,
+    intervals: &'static str,
+    families: Vec<Row>,
+    scenes: Vec<JudgedScene>,
+}
+
+/// One scene, judged.
+#[derive(Serialize)]
+struct JudgedScene {
+    name: String,
+    family: String,
+    method: &'static str,
+    said: Counts,
+    felt: Option<Felt>,
+}
+
+/// What the operator's finger got of a scene, as shares of the moving time.
+#[derive(Clone, Copy, Serialize)]
+struct Felt {
+    right: f64,
+    wrong: f64,
+}
+
+impl Jury {
+    pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        // Opened first: an hour is not to be lost for a folder that is not there.
+        let json = self.json.as_deref().map(create).transpose()?;
+        match &self.folder {
+            Some(folder) => self.judge_folder(folder, json)?,
+            None => self.judge_strangers(json)?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn judge_strangers(&self, json: Option<(File, &Path)>) -> anyhow::Result<()> {
+        let seeds = Seeds {
+            first: self.seed,
+            count: self.surfaces,
+        };
+        let purpose = seeds.purpose()?.name();
+        let mut sensor = SensorConfiguration::DEFAULT;
+        if let Some(method) = self.method {
+            sensor.method = method.into();
+        }
+        let mut display = DisplayConfiguration::DEFAULT;
+        if let Some(max_age_ms) = self.max_age_ms {
+            display.max_age_ms = max_age_ms;
+        }
+        let settings =
+            firmware_display::Settings::new(display, &protocol::actuators::DEFAULT_ACTUATORS)
+                .map_err(|refusal| anyhow::anyhow!("--max-age-ms: {refusal}"))?;
+        let method = Estimator {
+            method: sensor.method,
+            ..Estimator::default()
+        }
+        .method_name();
+
+        let bar = progress(self.surfaces, "surfaces");
+        let mut trials = Vec::new();
+        let work = |&seed: &u64| {
+            let trial = Trial::draw(seed);
+            (trial, play(&trial.record(), sensor, &settings))
+        };
+        let Ok(()) = batch::in_order(
+            &seeds.all(),
+            self.threads(),
+            work,
+            |_, (trial, Played { said, felt })| {
+                bar.inc(1);
+                trials.push(Judged {
+                    seed: trial.seed,
+                    class: trial.class.name(),
+                    traits: trial.traits(),
+                    said,
+                    felt,
+                    trial,
+                });
+                Ok::<_, Infallible>(())
+            },
+        );
+        bar.finish_and_clear();
+
+        let last = self.seed.saturating_add(self.surfaces - 1);
+        say!(
+            "seeds {}–{last} ({purpose}), method {method}, display holds {} ms; intervals: {}",
+            self.seed,
+            display.max_age_ms,
+            table::INTERVALS
+        );
+        let classes = by_class(&trials);
+        say!("{}", table::text("class", "surfaces", &classes));
+        let traits = by_trait(&trials);
+        if self.traits {
+            say!("\nof the surfaces with a period, those with");
+            say!("{}", table::text("trait", "surfaces", &traits));
+        }
+        say_worst(&trials);
+        write(
+            json,
+            &Strangers {
+                first_seed: self.seed,
+                surfaces: self.surfaces,
+                purpose,
+                method,
+                max_age_ms: display.max_age_ms,
+                intervals: table::INTERVALS,
+                classes,
+                traits,
+                trials,
+            },
+        )
+    }
+
+    fn judge_folder(&self, folder: &Path, json: Option<(File, &Path)>) -> anyhow::Result<()> {
+        let entries = folder::read(folder)?;
+        // All of them first: a refusal is not to come after half an hour.
+        let scenes: Vec<(Entry, Scene)> = entries
+            .into_iter()
+            .map(|entry| {
+                let mut scene = way::load(&entry.scene, self.engine)?;
+                if let Some(method) = self.method {
+                    scene.estimator.method = method.into();
+                }
+                anyhow::Ok((entry, scene))
+            })
+            .collect::<Result<_, _>>()?;
+        let ready = Ready::new(self.engine, &self.elves)?;
+        let bar = progress(scenes.len() as u64, "scenes");
+        let work = |(entry, scene): &(Entry, Scene)| judge_scene(&ready, entry, scene);
+        let mut judged = Vec::new();
+        batch::in_order(&scenes, self.threads(), work, |_, result| {
+            bar.inc(1);
+            judged.push(result?);
+            anyhow::Ok(())
+        })?;
+        bar.finish_and_clear();
+
+        let engine = match self.engine {
+            EngineName::Native => "native",
+            EngineName::Elf => "elf",
+        };
+        say!(
+            "{}, engine {engine}; intervals: {}",
+            folder.display(),
+            table::INTERVALS
+        );
+        let families = by_family(&judged);
+        say!("{}", table::text("family", "scenes", &families));
+        write(
+            json,
+            &Folder {
+                folder: folder.to_owned(),
+                engine,
+                intervals: table::INTERVALS,
+                families,
+                scenes: judged,
+            },
+        )
+    }
+
+    fn threads(&self) -> NonZero<usize> {
+        NonZero::new(self.jobs)
+            .or_else(|| thread::available_parallelism().ok())
+            .unwrap_or(NonZero::<usize>::MIN)
+    }
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Spectrum => Self::Spectrum,
+            MethodName::Crossings => Self::Crossings,
+            MethodName::Counting => Self::Counting,
+            MethodName::CountingAdapted => Self::AdaptedCounting,
+        }
+    }
+}
+
+fn judge_scene(ready: &Ready, entry: &Entry, scene: &Scene) -> anyhow::Result<JudgedScene> {
+    let context = || format!("{}", entry.scene.display());
+    let verdict = match ready {
+        Ready::Native => Judgement::of(scene, false).with_context(context)?.verdict,
+        Ready::Elf(_) => {
+            let recording = ready.run(scene).with_context(context)?;
+            Outcome::new(scene.clone(), recording).verdict
+        }
+    };
+    let said = verdict.estimates.iter().map(|estimate| {
+        let said_mm = estimate.wavelength_mm.filter(|_| estimate.valid);
+        (estimate.t_s, said_mm)
+    });
+    Ok(JudgedScene {
+        name: entry.name.clone(),
+        family: entry.family.clone(),
+        method: scene.estimator.method_name(),
+        said: entry.truth.judge(said),
+        felt: verdict.summary.felt_wrong_share.map(|wrong| Felt {
+            right: verdict.summary.felt_right_share.unwrap_or(0.0),
+            wrong,
+        }),
+    })
+}
+
+/// Each class that came up, then those with a period together, and those without.
+fn by_class(trials: &[Judged]) -> Vec<Row> {
+    let rows = |name: &str, is_in: &dyn Fn(Class) -> bool| {
+        let those = || trials.iter().filter(|judged| is_in(judged.trial.class));
+        let weighed = |counts: &dyn Fn(&Judged) -> Counts| -> Vec<Weighed> {
+            those()
+                .filter_map(|judged| Weighed::by_time(&counts(judged)))
+                .collect()
+        };
+        Row::of(
+            name,
+            &weighed(&|judged| judged.said),
+            &weighed(&|judged| judged.felt),
+        )
+    };
+    Class::PERIODIC
+        .iter()
+        .chain(&Class::PLAIN)
+        .map(|&class| rows(class.name(), &|other| other == class))
+        .chain([
+            rows("with a period", &Class::has_a_period),
+            rows("without a period", &|class| !class.has_a_period()),
+        ])
+        .filter(|row| row.surfaces > 0)
+        .collect()
+}
+
+/// Each trait, of the surfaces with a period.
+fn by_trait(trials: &[Judged]) -> Vec<Row> {
+    let mut groups: BTreeMap<&str, (Vec<Weighed>, Vec<Weighed>)> = BTreeMap::new();
+    let periodic = trials
+        .iter()
+        .filter(|judged| judged.trial.class.has_a_period());
+    for judged in periodic {
+        for name in &judged.traits {
+            let (said, felt) = groups.entry(name).or_default();
+            said.extend(Weighed::by_time(&judged.said));
+            felt.extend(Weighed::by_time(&judged.felt));
+        }
+    }
+    groups
+        .into_iter()
+        .map(|(name, (said, felt))| Row::of(name, &said, &felt))
+        .collect()
+}
+
+/// Each family in the order of the index, then all.
+fn by_family(scenes: &[JudgedScene]) -> Vec<Row> {
+    let mut names: Vec<&str> = Vec::new();
+    for scene in scenes {
+        if !names.contains(&scene.family.as_str()) {
+            names.push(&scene.family);
+        }
+    }
+    let row = |name: &str, is_in: &dyn Fn(&JudgedScene) -> bool| {
+        let those = || scenes.iter().filter(|scene| is_in(scene));
+        let said: Vec<Weighed> = those()
+            .filter_map(|scene| Weighed::alike(&scene.said))
+            .collect();
+        let felt: Vec<Weighed> = those()
+            .filter_map(|scene| scene.felt)
+            .map(|felt| Weighed {
+                weight: 1.0,
+                right: felt.right,
+                wrong: felt.wrong,
+                silent: 1.0 - felt.right - felt.wrong,
+            })
+            .collect();
+        Row::of(name, &said, &felt)
+    };
+    names
+        .iter()
+        .map(|&name| row(name, &|scene| scene.family == name))
+        .chain([row("all", &|_| true)])
+        .collect()
+}
+
+/// The surfaces with the longest time wrong: where to look.
+fn say_worst(trials: &[Judged]) {
+    let mut wrong: Vec<&Judged> = trials
+        .iter()
+        .filter(|judged| judged.said.wrong > 0)
+        .collect();
+    wrong.sort_by_key(|judged| std::cmp::Reverse(judged.said.wrong));
+    for judged in wrong.iter().take(WORST) {
+        let Counts { all, wrong, .. } = judged.said;
+        say!(
+            "  wrong {:.3} of seed {}: {}, {}",
+            f64::from(wrong) / f64::from(all),
+            judged.seed,
+            judged.class,
+            judged.traits.join(", ")
+        );
+    }
+}
+
+fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
+    let file = File::create(path).with_context(|| {
+        format!(
+            "{}: cannot be written: give a file in a folder that exists",
+            path.display()
+        )
+    })?;
+    Ok((file, path))
+}
+
+fn write(json: Option<(File, &Path)>, content: &impl Serialize) -> anyhow::Result<()> {
+    let Some((mut file, path)) = json else {
+        return Ok(());
+    };
+    let text = serde_json::to_string_pretty(content)?;
+    writeln!(file, "{text}").with_context(|| format!("{}", path.display()))
+}
+
+/// A bar on standard error; none if that is not a terminal.
+fn progress(count: u64, things: &str) -> ProgressBar {
+    let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
+    ProgressBar::new(count).with_style(
+        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+    )
+}

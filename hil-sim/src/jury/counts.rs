@@ -1,0 +1,112 @@
+//! What came of one surface, in counts.
+
+use serde::Serialize;
+
+/// An estimate this close to the truth, relative to it, is right.
+pub const RIGHT: f64 = 0.05;
+/// One further off than this is wrong. Between the two it is neither.
+pub const WRONG: f64 = 0.1;
+
+/// What an estimate is worth, or what is played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Worth {
+    /// Stood by and within [`RIGHT`].
+    Right,
+    /// Stood by and neither.
+    Near,
+    /// Stood by and more than [`WRONG`] off, or stood by where there is no period.
+    Wrong,
+    /// Not stood by.
+    Silent,
+}
+
+impl Worth {
+    /// Of `said_mm`, which is none where nothing is stood by; `truth_mm` is 0 where there is no period.
+    pub fn of(said_mm: Option<f64>, truth_mm: f64) -> Self {
+        let Some(said_mm) = said_mm else {
+            return Self::Silent;
+        };
+        // Not said_mm / truth_mm − 1: without a truth it would be no number, and no number is right.
+        let off_mm = (said_mm - truth_mm).abs();
+        if truth_mm > 0.0 && off_mm <= RIGHT * truth_mm {
+            Self::Right
+        } else if truth_mm > 0.0 && off_mm <= WRONG * truth_mm {
+            Self::Near
+        } else {
+            Self::Wrong
+        }
+    }
+}
+
+/// So many of each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// All that counted.
+    pub all: u32,
+    /// [`Worth::Right`]
+    pub right: u32,
+    /// [`Worth::Wrong`]
+    pub wrong: u32,
+    /// [`Worth::Silent`]
+    pub silent: u32,
+}
+
+impl Counts {
+    /// One more.
+    pub fn count(&mut self, worth: Worth) {
+        self.all += 1;
+        match worth {
+            Worth::Right => self.right += 1,
+            Worth::Near => {}
+            Worth::Wrong => self.wrong += 1,
+            Worth::Silent => self.silent += 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn worth_goes_by_the_distance_from_the_truth() {
+        for (said_mm, truth_mm, worth) in [
+            (Some(2.0), 2.0, Worth::Right),
+            (Some(2.09), 2.0, Worth::Right),
+            (Some(1.89), 2.0, Worth::Near),
+            (Some(2.19), 2.0, Worth::Near),
+            (Some(2.21), 2.0, Worth::Wrong),
+            (Some(1.0), 2.0, Worth::Wrong),
+            (Some(2.0), 0.0, Worth::Wrong),
+            (Some(f64::NAN), 2.0, Worth::Wrong),
+            (None, 2.0, Worth::Silent),
+            (None, 0.0, Worth::Silent),
+        ] {
+            assert_eq!(
+                Worth::of(said_mm, truth_mm),
+                worth,
+                "{said_mm:?} {truth_mm}"
+            );
+        }
+    }
+
+    #[test]
+    fn each_worth_is_counted_once_and_what_is_near_only_among_all() {
+        let mut counts = Counts::default();
+        for (worth, times) in [
+            (Worth::Right, 5),
+            (Worth::Near, 4),
+            (Worth::Wrong, 3),
+            (Worth::Silent, 2),
+        ] {
+            (0..times).for_each(|_| counts.count(worth));
+        }
+        let expected = Counts {
+            all: 14,
+            right: 5,
+            wrong: 3,
+            silent: 2,
+        };
+        assert_eq!(counts, expected);
+    }
+}
