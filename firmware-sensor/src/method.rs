@@ -41,6 +41,14 @@ impl Running {
 }
 
 impl Running {
+    /// The default estimator, if that is the one that runs.
+    pub fn spectrum(&self) -> Option<&Spectrum> {
+        match self {
+            Self::Spectrum(spectrum) => Some(spectrum),
+            _ => None,
+        }
+    }
+
     /// Whether the estimator has to wait until the start has died down in the filters.
     pub fn waits(&self) -> bool {
         !matches!(self, Self::Spectrum(_))

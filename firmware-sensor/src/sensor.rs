@@ -14,6 +14,7 @@ use crate::hum::Hum;
 use crate::method::Running;
 use crate::noise::Noise;
 use crate::slip::Slip;
+use crate::spectrum::Spectrum;
 use crate::travel::Travel;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
@@ -108,6 +109,11 @@ impl Sensor {
         self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
         self.block.clear();
+    }
+
+    /// The default estimator, if that is the one that runs.
+    pub fn spectrum(&self) -> Option<&Spectrum> {
+        self.estimator.spectrum()
     }
 
     /// The configuration in force.

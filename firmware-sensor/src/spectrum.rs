@@ -27,12 +27,9 @@ use crate::estimator::{
 };
 use crate::travel::Travel;
 
-use evidence::{LineEvidence, WaveEvidence};
+use evidence::{LineEvidence, WaveEvidence, best_of};
 use fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};
-use jerk::{
-    Jerk, SECOND_DIFFERENCE_NOISE_GAIN, SECOND_DIFFERENCE_WHITE_GAIN, STEADY_DOUBT,
-    second_difference_gain,
-};
+use jerk::{Jerk, SECOND_DIFFERENCE_NOISE_GAIN, second_difference_gain};
 use knots::Knots;
 use periodogram::{
     CANDIDATES, PER_OCTAVE, Periodogram, Spectrum as Energies, highest_peak, is_peak, sharpness,
@@ -40,7 +37,7 @@ use periodogram::{
 };
 use play::Play;
 
-mod evidence;
+pub mod evidence;
 mod fit;
 mod jerk;
 mod knots;
@@ -51,11 +48,12 @@ mod play;
 pub const SHORTEST_MM: f32 = 0.6;
 /// See [`SHORTEST_MM`].
 pub const LONGEST_MM: f32 = 8.0;
-/// The lowest and the highest frequency v/λ̂ that are stood by, in Hz: below, drift is not told from
-/// texture; above, the sensor's resonance and the anti-aliasing filter are.
-pub const LOWEST_HZ: f32 = 2.5;
+/// The lowest and the highest frequency v/λ̂ that are stood by, in Hz, 2.5 and 150 with 4 % for what v and λ̂
+/// may be off: below, drift is not told from texture; above, the sensor's resonance and the anti-aliasing
+/// filter are.
+pub const LOWEST_HZ: f32 = 2.4;
 /// See [`LOWEST_HZ`].
-pub const HIGHEST_HZ: f32 = 150.0;
+pub const HIGHEST_HZ: f32 = 156.0;
 
 /// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
 /// the encoder, so that one that dithers between counts is no travel. The force channel's noise, some
@@ -86,14 +84,18 @@ const CONVINCING: f32 = 0.8;
 const REFUSED_ESTIMATES: u8 = 20;
 /// Power at high frequencies that is not stood by without a force channel, relative to the wave's: a
 /// fingertip that sticks and slips is fast while it slips, whatever the arm does, and hops over ridges.
-const MOST_JERK: f32 = 0.02;
+const MOST_JERK: f32 = 0.025;
 /// What is left of a probability where that hints at stick and slip: a rough surface has as much power there,
 /// and λ̂ is right on most of them, but below the default level of 70 %.
 const WHERE_JERKY: f32 = 0.65;
-/// Millisecond of the ten in which an estimate's work begins, and knots that a millisecond goes through.
-const SURVEY_SLOT: u8 = 5;
+/// Millisecond of the ten before an estimate in which its work begins, those in which the line is fitted,
+/// and what is done in one of these, as a pass counts it. The wave of the moment has the milliseconds that
+/// are left.
+const SURVEY_SLOT: u8 = 4;
 /// See [`SURVEY_SLOT`].
-const KNOTS_PER_SLOT: usize = 64;
+const LINE_SLOTS: core::ops::Range<u8> = 5..8;
+/// See [`SURVEY_SLOT`].
+const WORK_OF_A_SLOT: usize = 60;
 
 /// The estimator.
 #[derive(Clone, Debug)]
@@ -120,6 +122,7 @@ pub struct Spectrum {
     wave: Wave,
     /// Estimates for which no longer period is looked for.
     refused: u8,
+    weighed: Weighed,
     /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
     known_mm: f32,
     known_share: f32,
@@ -174,6 +177,15 @@ struct Wave {
     held_waves: f32,
 }
 
+/// The suppositions of an estimate: λ̂ in mm, and the evidence for it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Weighed {
+    /// The line.
+    pub line: Option<(f32, LineEvidence)>,
+    /// The wave of the moment, where the line is another.
+    pub wave: Option<(f32, WaveEvidence)>,
+}
+
 /// A supposition with what speaks for it.
 #[derive(Clone, Copy, Debug)]
 struct Supposition {
@@ -211,9 +223,15 @@ impl Spectrum {
             line: Line::default(),
             wave: Wave::default(),
             refused: 0,
+            weighed: Weighed::default(),
             known_mm: 0.0,
             known_share: 0.0,
         }
+    }
+
+    /// What the last estimate was weighed by.
+    pub fn weighed(&self) -> &Weighed {
+        &self.weighed
     }
 
     /// Finds the peaks, and prepares the fits.
@@ -259,7 +277,7 @@ impl Spectrum {
         } else {
             line_mm
         };
-        survey.line_pass = Some(Pass::new(&self.knots, start_mm, self.lengths, usable, base));
+        survey.line_pass = Some(Pass::new(start_mm, self.lengths, usable, base));
         // The short kernel sees a new surface first.
         let newest = highest_peak(&short)
             .map(|number| vertex_mm(&short, number, false))
@@ -274,7 +292,7 @@ impl Spectrum {
             } else {
                 mm
             };
-            Pass::new(&self.knots, start_mm, 3.min(self.lengths), usable, base)
+            Pass::new(start_mm, 3.min(self.lengths), usable, base)
         });
     }
 
@@ -326,15 +344,15 @@ impl Spectrum {
             + second_difference_gain(2.0 * hz) / 10.0
             + second_difference_gain(3.0 * hz) / 9.0
             + second_difference_gain(5.0 * hz) / 25.0;
-        let usable = self.touch.usable;
-        let steady = self.jerk.steady(usable.count_ones());
-        let known: f32 = (0..GAUGES)
-            .filter(|gauge| usable >> gauge & 1 == 1)
+        let noise: f32 = (0..GAUGES)
+            .filter(|gauge| self.touch.usable >> gauge & 1 == 1)
             .map(|gauge| self.touch.noise[gauge])
             .sum();
-        let noise = known.max(steady / SECOND_DIFFERENCE_WHITE_GAIN);
-        let quiet = (STEADY_DOUBT * steady).max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
-        let power = self.jerk.power - quiet - 0.5 * noise;
+        let quiet = self
+            .jerk
+            .steady(self.touch.usable.count_ones())
+            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
+        let power = self.jerk.power - quiet - 0.25 * noise;
         power / explained.max(f32::MIN_POSITIVE) - smooth
     }
 
@@ -378,11 +396,6 @@ impl Spectrum {
         } else {
             1.0
         };
-        let inherited = if self.line.young_waves > 0.0 && share_over(1) > STRONG {
-            share_over(1)
-        } else {
-            0.0
-        };
         let evidence = LineEvidence {
             maturity: self.survey.maturity,
             travelled_waves: self.travelled_mm / line_mm,
@@ -396,6 +409,12 @@ impl Spectrum {
             spread: libm::sqrtf(self.line.variance),
             kept_shares: self.line.shares,
         };
+        self.weighed.line = Some((wavelength_mm, evidence));
+        let inherited = if self.line.young_waves > 0.0 && share_over(1) > STRONG {
+            share_over(1)
+        } else {
+            0.0
+        };
         Some(Supposition {
             wavelength_mm,
             probability: (self.line.there * evidence.probability()).max(inherited),
@@ -407,14 +426,8 @@ impl Spectrum {
     /// What is to be said of a wave that the line is not.
     fn weigh_wave(&mut self) -> Option<Supposition> {
         let found = self.survey.wave_pass.as_ref().map(|pass| pass.found);
-        let best = found.and_then(|found| {
-            let explains = |fitted: &Option<Fitted>| fitted.map_or(0.0, |fitted| fitted.share());
-            (0..3)
-                .filter(|&n| found[n].is_some())
-                .max_by(|&one, &other| explains(&found[one]).total_cmp(&explains(&found[other])))
-                .and_then(|n| Some((found[n]?, LENGTHS[n])))
-        });
-        let (Some(found), Some((best, waves))) = (found, best) else {
+        let best = found.as_ref().and_then(|found| best_of(&found[..3]));
+        let (Some(found), Some((best, _))) = (found, best) else {
             self.wave = Wave::default();
             return None;
         };
@@ -424,16 +437,8 @@ impl Spectrum {
             self.wave.held_waves = 0.0;
         }
         self.wave.mm = best.wavelength_mm;
-        let evidence = WaveEvidence {
-            share: best.share(),
-            waves,
-            held_waves: self.wave.held_waves,
-            known_share: self.known_share,
-            distance: found[0].zip(found[2]).map_or(0.3, |(short, long)| {
-                off(short.wavelength_mm, long.wavelength_mm)
-            }),
-            sigma: found[1].map_or(1.0, |fitted| fitted.sigma),
-        };
+        let evidence = WaveEvidence::of(&found, self.wave.held_waves, self.known_share)?;
+        self.weighed.wave = Some((best.wavelength_mm, evidence));
         // Where a strong line has gone, something has taken its place.
         let follows =
             self.line.there < 0.5 && self.known_share > STRONG && self.wave.held_waves > 0.0;
@@ -460,7 +465,7 @@ impl Spectrum {
             ..Line::default()
         };
         self.refused = 0;
-        self.jerk = Jerk::default();
+        self.jerk.restart();
     }
 
     /// What is said of the likelier supposition.
@@ -600,7 +605,7 @@ impl Estimator for Spectrum {
     fn push(&mut self, touch: &Touch) {
         self.touch = *touch;
         let travel = self.play.follow(touch.place);
-        self.jerk.push(touch);
+        self.jerk.push(touch, travel);
         if travel == 0 {
             self.rested = self.rested.saturating_add(1);
         } else {
@@ -613,14 +618,14 @@ impl Estimator for Spectrum {
         }
         match self.slot {
             SURVEY_SLOT => self.survey(),
-            6 => {
-                if let Some(pass) = &mut self.survey.wave_pass {
-                    pass.run(&self.knots, KNOTS_PER_SLOT);
+            slot if LINE_SLOTS.contains(&slot) => {
+                if let Some(pass) = &mut self.survey.line_pass {
+                    pass.run(&self.knots, WORK_OF_A_SLOT);
                 }
             }
-            7.. => {
-                if let Some(pass) = &mut self.survey.line_pass {
-                    pass.run(&self.knots, KNOTS_PER_SLOT);
+            slot if slot > SURVEY_SLOT => {
+                if let Some(pass) = &mut self.survey.wave_pass {
+                    pass.run(&self.knots, WORK_OF_A_SLOT);
                 }
             }
             _ => {}
@@ -632,6 +637,7 @@ impl Estimator for Spectrum {
         self.slot = 0;
         let speed_mm_s = travel.velocity_mm_s(0).abs();
         self.speed_mm_s = speed_mm_s.max(self.speed_mm_s * SPEED_KEPT);
+        self.weighed = Weighed::default();
         let line = self.weigh_line();
         let wave = self.weigh_wave();
         if let Some(wave) = &wave

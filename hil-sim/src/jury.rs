@@ -11,6 +11,7 @@
 
 pub mod counts;
 mod dice;
+pub mod evidence;
 pub mod folder;
 pub mod ground;
 pub mod hand;

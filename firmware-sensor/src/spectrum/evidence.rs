@@ -4,9 +4,12 @@
 //! weights come from a regression over surfaces drawn at random, with and without a period (the tuning
 //! seeds of `hil-sim jury`); how well the probabilities hold on others is `hil-sim chart confidence`.
 
+use super::fit::{Fitted, LENGTH_COUNT, LENGTHS};
+use super::off;
+
 /// Evidence for a line of the averaged spectrum.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct LineEvidence {
+pub struct LineEvidence {
     /// How full the average is, 0 to 1.
     pub maturity: f32,
     /// Travel since the start, or the last change of surface, in wavelengths.
@@ -33,7 +36,7 @@ pub(super) struct LineEvidence {
 
 /// Evidence for a wave of the moment that the average does not know.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct WaveEvidence {
+pub struct WaveEvidence {
     /// Largest share of the energy that the wave explains over the latest 1.5, 2 or 3 waves, and over how
     /// many that is.
     pub share: f32,
@@ -50,15 +53,18 @@ pub(super) struct WaveEvidence {
 }
 
 /// Number of weights, the constant left out.
-const LINE_CLUES: usize = 16;
+pub const LINE_CLUES: usize = 28;
 /// See [`LINE_CLUES`].
-const WAVE_CLUES: usize = 6;
+pub const WAVE_CLUES: usize = 11;
 
 const LINE: [f32; LINE_CLUES + 1] = [
-    -14.579, -4.928, 0.808, 0.965, 0.874, 0.228, 0.786, 0.550, 0.703, 2.594, 0.527, 0.549, 4.392,
-    0.417, -1.080, -0.615, 0.054,
+    -13.859, -3.498, 0.350, 2.966, -0.777, 0.413, -0.444, 0.692, 0.177, -1.051, 0.501, 0.739,
+    7.355, 0.413, -1.026, -0.513, 0.210, 3.347, 0.749, -1.212, 0.476, 0.102, -0.179, -3.210,
+    -0.001, -0.341, 2.961, 0.414, 1.373,
 ];
-const WAVE: [f32; WAVE_CLUES + 1] = [-10.811, 0.026, 0.988, 1.225, 2.583, 0.503, 1.135];
+const WAVE: [f32; WAVE_CLUES + 1] = [
+    -3.266, 0.987, 1.192, -1.002, 2.134, -0.297, -3.395, -0.670, -0.439, 0.813, 0.206, 0.628,
+];
 
 /// The logarithm of the share that is left unexplained, with its sign turned: 0 to 4.
 fn odds(share: f32) -> f32 {
@@ -66,25 +72,45 @@ fn odds(share: f32) -> f32 {
 }
 
 impl LineEvidence {
-    /// On scales on which the regression is linear.
-    fn clues(&self) -> [f32; LINE_CLUES] {
+    /// On scales on which the regression is nearly linear, with squares and products for what is not.
+    pub fn clues(&self) -> [f32; LINE_CLUES] {
+        let travelled = libm::logf(1.0 + self.travelled_waves.min(30.0));
+        let held = libm::logf(1.0 + self.held_waves.min(30.0));
+        let strength = odds(self.shares[0]);
+        let long_strength = odds(self.shares[2]);
+        let steadiness = -libm::logf(self.wander[1] + 0.005);
+        let sharp = libm::logf(self.sharpness.clamp(0.6, 20.0));
+        let firm = -libm::logf(self.spread + 0.003);
+        let agreement = self.agreement;
         [
             self.maturity,
-            libm::logf(1.0 + self.travelled_waves.min(30.0)),
-            libm::logf(1.0 + self.held_waves.min(30.0)),
-            odds(self.shares[0]),
+            travelled,
+            held,
+            strength,
             odds(self.shares[1]),
-            odds(self.shares[2]),
+            long_strength,
             -libm::logf(self.wander[0] + 0.005),
-            -libm::logf(self.wander[1] + 0.005),
-            self.agreement,
+            steadiness,
+            agreement,
             -libm::logf(self.distance.min(0.3) + 0.003),
             libm::logf(self.presence.clamp(0.05, 20.0)),
-            libm::logf(self.sharpness.clamp(0.6, 20.0)),
-            -libm::logf(self.spread + 0.003),
+            sharp,
+            firm,
             odds(self.kept_shares[0]),
             odds(self.kept_shares[1]),
             self.drop() * self.drop(),
+            strength * libm::expf(-held),
+            strength * sharp,
+            agreement * sharp,
+            held * sharp,
+            strength * strength,
+            held * held,
+            sharp * sharp,
+            firm * firm,
+            travelled * held,
+            agreement * agreement,
+            steadiness * long_strength,
+            self.maturity * sharp,
         ]
     }
 
@@ -99,16 +125,53 @@ impl LineEvidence {
     }
 }
 
+/// The fit that explains most, and over how many waves it goes.
+pub(super) fn best_of(found: &[Option<Fitted>]) -> Option<(Fitted, f32)> {
+    found
+        .iter()
+        .zip(LENGTHS)
+        .filter_map(|(fitted, waves)| Some(((*fitted)?, waves)))
+        .max_by(|(one, _), (other, _)| one.share().total_cmp(&other.share()))
+}
+
 impl WaveEvidence {
+    /// Of the fits over 1.5, 2 and 3 waves. `None` without any.
+    pub(super) fn of(
+        found: &[Option<Fitted>; LENGTH_COUNT],
+        held_waves: f32,
+        known_share: f32,
+    ) -> Option<Self> {
+        let (best, waves) = best_of(&found[..3])?;
+        Some(Self {
+            share: best.share(),
+            waves,
+            held_waves,
+            known_share,
+            distance: found[0].zip(found[2]).map_or(0.3, |(short, long)| {
+                off(short.wavelength_mm, long.wavelength_mm)
+            }),
+            sigma: found[1].map_or(1.0, |fitted| fitted.sigma),
+        })
+    }
+
     /// See [`LineEvidence::clues`].
-    fn clues(&self) -> [f32; WAVE_CLUES] {
+    pub fn clues(&self) -> [f32; WAVE_CLUES] {
+        let strength = odds(self.share);
+        let held = libm::logf(1.0 + self.held_waves.min(10.0));
+        let firm = -libm::logf(self.distance.min(0.3) + 0.003);
+        let sharp = -libm::logf(self.sigma.clamp(1e-5, 1.0));
         [
-            odds(self.share),
+            strength,
             self.waves,
-            libm::logf(1.0 + self.held_waves.min(10.0)),
+            held,
             self.known_share,
-            -libm::logf(self.distance.min(0.3) + 0.003),
-            -libm::logf(self.sigma.clamp(1e-5, 1.0)),
+            firm,
+            sharp,
+            strength * held,
+            strength * strength,
+            sharp * held,
+            firm * sharp,
+            sharp * sharp,
         ]
     }
 

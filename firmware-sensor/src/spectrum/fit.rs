@@ -24,6 +24,11 @@ const LEAST_KNOTS: u16 = 8;
 /// Pivot below which the unknowns are not told apart: the path covers too little of a wave.
 const LEAST_PIVOT: f32 = 1e-4;
 
+/// What a solution costs, in knots.
+const SOLVING: usize = 8;
+/// Knots that are summed up at a time, so that a sum is fetched and stored once for all of them.
+const ROWS: usize = 4;
+
 /// Unknowns of a gauge, and with the two derivatives of the wave by ln k.
 const LINEAR: usize = 4;
 const ALL: usize = 6;
@@ -64,7 +69,8 @@ pub(super) struct Pass {
     /// Length that is next.
     next: usize,
     usable: u8,
-    reader: Backwards,
+    /// None before it has begun.
+    reader: Option<Backwards>,
     origin: Option<Place>,
     increment: u32,
     radians_per_place: f32,
@@ -85,25 +91,30 @@ struct Sums {
     /// Σ w f s of each gauge.
     right: [[f32; ALL]; GAUGES],
     square: [f32; GAUGES],
+    /// Knots that are not in the sums yet, and how many.
+    rows: [Row; ROWS],
+    filled: usize,
+}
+
+/// A knot's part: f, w f, and what each gauge says.
+#[derive(Clone, Copy, Debug, Default)]
+struct Row {
+    terms: [f32; ALL],
+    weighted: [f32; ALL],
+    felt: [f32; GAUGES],
 }
 
 impl Pass {
-    /// A pass from the newest knot back, for the first `lengths` of [`LENGTHS`], starting at
+    /// A pass from the knot back that is the newest when it begins, for the first `lengths` of [`LENGTHS`], starting at
     /// `wavelength_mm` above 0. `base` is taken off the gauges: anything near their mean.
-    pub fn new(
-        knots: &Knots,
-        wavelength_mm: f32,
-        lengths: usize,
-        usable: u8,
-        base: [f32; GAUGES],
-    ) -> Self {
+    pub fn new(wavelength_mm: f32, lengths: usize, usable: u8, base: [f32; GAUGES]) -> Self {
         let places = wavelength_mm * PLACES_PER_MM as f32;
         Self {
             wavelength_mm,
             lengths: lengths.min(LENGTH_COUNT),
             next: 0,
             usable,
-            reader: knots.backwards(spacing_for(wavelength_mm)),
+            reader: None,
             origin: None,
             increment: (4_294_967_296.0 / f64::from(places)) as u32,
             radians_per_place: 2.0 * core::f32::consts::PI / places,
@@ -114,78 +125,89 @@ impl Pass {
         }
     }
 
-    /// Goes on through at most `knots` more. True once there is nothing left to do.
-    pub fn run(&mut self, path: &Knots, knots: usize) -> bool {
-        for _ in 0..knots {
-            if self.done {
-                break;
-            }
-            match path.next(&mut self.reader) {
+    /// Goes on for that much work: one for each knot, [`SOLVING`] for each solution.
+    pub fn run(&mut self, path: &Knots, work: usize) {
+        let reader = self
+            .reader
+            .get_or_insert_with(|| path.backwards(spacing_for(self.wavelength_mm)));
+        let mut reader = *reader;
+        let mut left = work;
+        while !self.done && left > 0 {
+            let solved = self.next;
+            match path.next(&mut reader) {
                 Some(knot) => self.take(&knot),
                 None => self.done = true,
             }
+            left = left.saturating_sub(1 + SOLVING * (self.next - solved));
         }
-        self.done
+        self.reader = Some(reader);
     }
 
     fn take(&mut self, knot: &Knot) {
         let origin = *self.origin.get_or_insert(knot.place);
         let away = knot.place.wrapping_sub(origin);
-        let [cos, sin] = phasor((away as u32).wrapping_mul(self.increment));
+        let phasor = phasor((away as u32).wrapping_mul(self.increment));
         let angle = away as f32 * self.radians_per_place;
-        let mut left = knot.travel_mm / self.wavelength_mm;
-        while self.next < self.lengths {
-            let room = LENGTHS[self.next] - self.sums.waves;
-            if left < room {
-                break;
-            }
-            // The knot straddles the end of this length.
-            self.sums.add(room, [cos, sin], angle, knot, &self.base);
-            left -= room;
+        let waves = knot.travel_mm / self.wavelength_mm;
+        self.sums.add(waves, phasor, angle, knot, &self.base);
+        // A length ends with the knot that is nearest to its end.
+        while self.next < self.lengths && self.sums.waves + 0.5 * waves >= LENGTHS[self.next] {
+            self.sums.take_in();
             self.found[self.next] =
                 self.sums
                     .solve(self.wavelength_mm, LENGTHS[self.next], self.usable);
             self.next += 1;
         }
-        if self.next == self.lengths {
-            self.done = true;
-        } else {
-            self.sums.add(left, [cos, sin], angle, knot, &self.base);
-        }
-        self.sums.knots += 1;
+        self.done = self.next == self.lengths;
     }
 }
 
 impl Sums {
-    #[inline]
-    fn add(&mut self, w: f32, [cos, sin]: [f32; 2], angle: f32, knot: &Knot, base: &[f32; GAUGES]) {
-        let tau = self.waves + 0.5 * w;
-        self.waves += w;
-        let f = [1.0, tau, cos, sin, angle * cos, angle * sin];
-        let wf = f.map(|f| w * f);
-        for (row, wf) in self
-            .normal
-            .iter_mut()
-            .zip(wf)
-            .enumerate()
-            .map(|(i, (row, wf))| (&mut row[..=i], wf))
-        {
-            for (sum, f) in row.iter_mut().zip(f) {
-                *sum += wf * f;
+    /// Takes a knot of that many waves.
+    fn add(
+        &mut self,
+        waves: f32,
+        [cos, sin]: [f32; 2],
+        angle: f32,
+        knot: &Knot,
+        base: &[f32; GAUGES],
+    ) {
+        let tau = self.waves + 0.5 * waves;
+        let terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
+        let row = &mut self.rows[self.filled];
+        row.terms = terms;
+        row.weighted = terms.map(|term| waves * term);
+        for ((felt, gauge), base) in row.felt.iter_mut().zip(knot.gauges).zip(base) {
+            *felt = gauge - base;
+        }
+        self.waves += waves;
+        self.knots += 1;
+        self.filled += 1;
+        if self.filled == ROWS {
+            self.take_in();
+        }
+    }
+
+    /// Sums up the rows that wait.
+    #[inline(never)]
+    fn take_in(&mut self) {
+        for row in &mut self.rows[self.filled..] {
+            *row = Row::default();
+        }
+        self.filled = 0;
+        for i in 0..ALL {
+            for j in 0..=i {
+                let product = |row: &Row| row.weighted[i] * row.terms[j];
+                self.normal[i][j] += self.rows.iter().map(product).sum::<f32>();
             }
         }
-        for (((right, square), value), base) in self
-            .right
-            .iter_mut()
-            .zip(&mut self.square)
-            .zip(knot.gauges)
-            .zip(base)
-        {
-            let x = value - base;
-            for (sum, wf) in right.iter_mut().zip(wf) {
-                *sum += wf * x;
+        for gauge in 0..GAUGES {
+            for i in 0..ALL {
+                let product = |row: &Row| row.weighted[i] * row.felt[gauge];
+                self.right[gauge][i] += self.rows.iter().map(product).sum::<f32>();
             }
-            *square += w * x * x;
+            let product = |row: &Row| row.weighted[0] * row.felt[gauge] * row.felt[gauge];
+            self.square[gauge] += self.rows.iter().map(product).sum::<f32>();
         }
     }
 

@@ -3,15 +3,17 @@
 use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::Touch;
+use crate::estimator::{PLACES_PER_UM, Touch};
 use crate::phasor::phasor;
 
 /// Gain in power of the second difference for white noise behind the anti-aliasing filter.
 pub(super) const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
-/// The same for noise that is white up to 500 Hz, as in a recording of one row a millisecond.
-pub(super) const SECOND_DIFFERENCE_WHITE_GAIN: f32 = 6.0;
-/// How much more than from its quiet moments steady noise may have, which are known to a fifth or so.
-pub(super) const STEADY_DOUBT: f32 = 1.2;
+/// How much more than from its quiet moments steady power may be, which is known to a fifth or so.
+const STEADY_DOUBT: f32 = 1.05;
+/// Speed from which on a millisecond counts, in places a millisecond: 5 mm/s.
+const MOVED_PLACES: f32 = 5.0 * PLACES_PER_UM as f32;
+/// Time constant of the speed, in samples.
+const SPEED_SAMPLES: f32 = 16.0;
 /// Share of the samples that are the quiet ones, the step that their bound is followed in, and its least,
 /// relative to the mean.
 const QUIET_SHARE: f32 = 0.1;
@@ -29,14 +31,19 @@ const JERK_SAMPLES: f32 = 300.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jerk {
     before: [[f32; GAUGES]; 2],
+    /// Speed lately, in places a millisecond.
+    speed: f32,
+    /// Means over the milliseconds that moved: power, and power by speed.
     pub(super) power: f32,
-    /// The power that a tenth of the samples are below.
+    by_speed: f32,
+    /// The power by speed that a tenth of them are below: roughness passes as fast as the arm is.
     quiet: f32,
     samples: u32,
 }
 
 impl Jerk {
-    pub(super) fn push(&mut self, touch: &Touch) {
+    /// Takes a millisecond's touch and its travel in places.
+    pub(super) fn push(&mut self, touch: &Touch, travel: i32) {
         let [before, older] = self.before;
         let power = gauges_of(touch.usable)
             .map(|gauge| {
@@ -45,30 +52,44 @@ impl Jerk {
             })
             .sum::<f32>();
         self.before = [touch.gauges, before];
+        self.speed += (travel.abs() as f32 - self.speed) * (1.0 / SPEED_SAMPLES);
+        if self.speed < MOVED_PLACES {
+            return;
+        }
         self.samples = self.samples.saturating_add(1);
         // The first two differences are with nothing.
-        if let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) {
-            let samples = samples as f32;
-            self.power += (power - self.power) / samples.min(JERK_SAMPLES);
-            if samples == 1.0 {
-                self.quiet = power;
-            }
-            // A quantile in steps of its own size: so many up as down once a share of the powers is below.
-            let step = (1.0 / samples).max(QUIET_STEP);
-            self.quiet *= if power > self.quiet {
-                1.0 + step * QUIET_SHARE
-            } else {
-                1.0 - step * (1.0 - QUIET_SHARE)
-            };
-            self.quiet = self.quiet.max(self.power * QUIET_LEAST);
+        let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) else {
+            return;
+        };
+        let samples = samples as f32;
+        let share = 1.0 / samples.min(JERK_SAMPLES);
+        let by_speed = power / self.speed;
+        self.power += (power - self.power) * share;
+        self.by_speed += (by_speed - self.by_speed) * share;
+        if self.quiet == 0.0 {
+            self.quiet = by_speed;
         }
+        // A quantile in steps of its own size: so many up as down once a share of the powers is below.
+        let step = (1.0 / samples).max(QUIET_STEP);
+        self.quiet *= if by_speed > self.quiet {
+            1.0 + step * QUIET_SHARE
+        } else {
+            1.0 - step * (1.0 - QUIET_SHARE)
+        };
+        self.quiet = self.quiet.max(self.by_speed * QUIET_LEAST);
     }
 
-    /// What the mean power would be if it were always as in the quiet moments, white noise in `gauges`
-    /// gauges: a fingertip that sticks and slips is quiet in between, noise is not.
+    /// Begins anew on another surface, where it is as quiet as before in between.
+    pub(super) fn restart(&mut self) {
+        (self.samples, self.power, self.by_speed) = (2, 0.0, 0.0);
+    }
+
+    /// What the mean power may be if it is always as in the quiet moments, speed for speed, with `gauges`
+    /// gauges: a fingertip that sticks and slips is quiet in between, noise and a rough surface are not.
     pub(super) fn steady(&self, gauges: u32) -> f32 {
         let gauges = (gauges as usize).clamp(1, GAUGES);
-        (self.quiet / QUIET_OF_MEAN[gauges - 1]).min(self.power)
+        let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * self.by_speed.max(f32::MIN_POSITIVE));
+        (STEADY_DOUBT * share * self.power).min(STEADY_DOUBT * self.power)
     }
 }
 

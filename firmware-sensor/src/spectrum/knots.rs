@@ -8,19 +8,20 @@ use protocol::GAUGES;
 
 use crate::estimator::{PLACES_PER_MM, Place};
 
-/// Least travel of a knot at each spacing, in mm.
-pub(super) const SPACINGS_MM: [f32; SPACINGS] = [0.1, 0.22, 0.44];
+/// Travel of a knot at each spacing, in mm.
+pub(super) const SPACINGS_MM: [f32; SPACINGS] = [0.1, 0.25, 0.5];
 /// Number of spacings.
 pub(super) const SPACINGS: usize = 3;
-/// From these wavelengths on, in mm, the next coarser spacing serves: nine knots a wave are left.
-const COARSER_FROM_MM: [f32; SPACINGS - 1] = [2.0, 4.0];
+/// From these wavelengths on, in mm, the next coarser spacing serves. That leaves 6.8 knots a wave, which
+/// keep sinc²(1/6.8) = 0.93 of what there is to know of the wavelength.
+const COARSER_FROM_MM: [f32; SPACINGS - 1] = [1.7, 3.4];
 /// Knots kept at each spacing: eight waves of the longest wavelength that it serves, of 8 mm at most,
 /// and those that come while a fit goes through them.
-const KEPT: usize = 180;
+const KEPT: usize = 145;
 /// Those that may come while a fit goes through them: one a millisecond at most, of five.
 const SPARE: usize = 10;
 
-/// The spacing that serves a wavelength: the coarsest that leaves nine knots a wave.
+/// The spacing that serves a wavelength.
 pub(super) fn spacing_for(wavelength_mm: f32) -> usize {
     COARSER_FROM_MM
         .iter()
@@ -106,7 +107,8 @@ impl Ring {
     /// The knot that `piece` completes, if it does.
     fn push(&mut self, piece: &Knot) -> Option<Knot> {
         self.gathering.add(piece);
-        if self.gathering.travel_mm < self.spacing_mm {
+        // Ends as near to its spacing as pieces allow.
+        if self.gathering.travel_mm + 0.5 * piece.travel_mm < self.spacing_mm {
             return None;
         }
         let knot = self.gathering.knot()?;

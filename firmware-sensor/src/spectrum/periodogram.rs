@@ -188,9 +188,17 @@ fn energy(sums: &[[f32; 2]; GAUGES], weight: f32, usable: u8) -> f32 {
     2.0 * sum / (weight * weight)
 }
 
-/// A candidate's wavelength in mm.
-pub(super) fn wavelength_mm(number: usize) -> f32 {
-    SHORTEST_MM * libm::exp2f(number as f32 / PER_OCTAVE as f32)
+/// A candidate's wavelength in mm, from the steps of an octave: 2^(n/6).
+pub(super) const fn wavelength_mm(number: usize) -> f32 {
+    const STEPS: [f32; PER_OCTAVE] = [
+        1.0,
+        1.122_462,
+        1.259_921,
+        core::f32::consts::SQRT_2,
+        1.587_401,
+        1.781_797,
+    ];
+    SHORTEST_MM * (1_u32 << (number / PER_OCTAVE)) as f32 * STEPS[number % PER_OCTAVE]
 }
 
 /// Whether there is a peak at candidate `number`: the ends have none.

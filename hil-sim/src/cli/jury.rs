@@ -13,6 +13,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use hil_sim::batch;
 use hil_sim::jury::counts::Counts;
+use hil_sim::jury::evidence::{self, Cases};
 use hil_sim::jury::folder::{self, Entry};
 use hil_sim::jury::play::{Played, play};
 use hil_sim::jury::seeds::Seeds;
@@ -70,6 +71,9 @@ pub(super) struct Jury {
     /// Print the table by what makes surfaces hard, too
     #[arg(long)]
     traits: bool,
+    /// Print the weights of the default estimator's evidence that these surfaces ask for, and judge nothing
+    #[arg(long, conflicts_with_all = ["folder", "method", "max_age_ms", "traits", "json"])]
+    weights: bool,
     /// Where to write everything as JSON, surface by surface
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -149,6 +153,10 @@ impl Jury {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         // Opened first: an hour is not to be lost for a folder that is not there.
         let json = self.json.as_deref().map(create).transpose()?;
+        if self.weights {
+            self.find_weights()?;
+            return Ok(ExitCode::SUCCESS);
+        }
         match &self.folder {
             Some(folder) => self.judge_folder(folder, json)?,
             None => self.judge_strangers(json)?,
@@ -156,11 +164,43 @@ impl Jury {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn judge_strangers(&self, json: Option<(File, &Path)>) -> anyhow::Result<()> {
-        let seeds = Seeds {
+    fn find_weights(&self) -> anyhow::Result<()> {
+        let seeds = self.seeds();
+        let purpose = seeds.purpose()?.name();
+        let bar = progress(self.surfaces, "surfaces");
+        let mut cases = Cases::default();
+        let Ok(()) = batch::in_order(
+            &seeds.all(),
+            self.threads(),
+            |&seed| Cases::of(&Trial::draw(seed).record()),
+            |_, of_one| {
+                bar.inc(1);
+                cases.extend(of_one);
+                Ok::<_, Infallible>(())
+            },
+        );
+        bar.finish_and_clear();
+        let last = self.seed.saturating_add(self.surfaces - 1);
+        say!("seeds {}–{last} ({purpose})", self.seed);
+        for (name, weights) in [
+            ("LINE", evidence::weights(&cases.line)),
+            ("WAVE", evidence::weights(&cases.wave)),
+        ] {
+            let weights: Vec<String> = weights.iter().map(|w| format!("{w:.3}")).collect();
+            say!("{name}: [{}]", weights.join(", "));
+        }
+        Ok(())
+    }
+
+    fn seeds(&self) -> Seeds {
+        Seeds {
             first: self.seed,
             count: self.surfaces,
-        };
+        }
+    }
+
+    fn judge_strangers(&self, json: Option<(File, &Path)>) -> anyhow::Result<()> {
+        let seeds = self.seeds();
         let purpose = seeds.purpose()?.name();
         let mut sensor = SensorConfiguration::DEFAULT;
         if let Some(method) = self.method {

@@ -39,6 +39,7 @@ fn clean(class: Class, first: Specimen) -> Trial {
             tremor: 0.0,
             tremor_hz: 10.0,
             hysteresis_mm: 0.0,
+            slider: None,
             encoder: Encoder {
                 eccentricity_um: 0.0,
                 turn_mm: 1.0,
