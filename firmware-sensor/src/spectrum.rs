@@ -91,11 +91,16 @@ const WHERE_JERKY: f32 = 0.65;
 /// Millisecond of the ten before an estimate in which its work begins, those in which the line is fitted,
 /// and what is done in one of these, as a pass counts it. The wave of the moment has the milliseconds that
 /// are left.
-const SURVEY_SLOT: u8 = 4;
+const SURVEY_SLOT: u8 = 2;
 /// See [`SURVEY_SLOT`].
-const LINE_SLOTS: core::ops::Range<u8> = 5..8;
+const LINE_SLOTS: core::ops::Range<u8> = 3..8;
 /// See [`SURVEY_SLOT`].
-const WORK_OF_A_SLOT: usize = 60;
+const WORK_OF_A_SLOT: usize = 34;
+/// Lengths that each estimate fits the line over. The longer ones change slowly: one estimate of so many has
+/// them, and those after it take them over.
+const SHORTER_LENGTHS: usize = 3;
+/// See [`SHORTER_LENGTHS`].
+const LONGER_EVERY: u8 = 3;
 
 /// The estimator.
 #[derive(Clone, Debug)]
@@ -120,6 +125,9 @@ pub struct Spectrum {
     survey: Survey,
     line: Line,
     wave: Wave,
+    /// Estimates since the line was last fitted over the longer lengths, and what was found there.
+    shorter_so_far: u8,
+    longer_fits: [Option<Fitted>; LENGTH_COUNT - SHORTER_LENGTHS],
     /// Estimates for which no longer period is looked for.
     refused: u8,
     weighed: Weighed,
@@ -222,6 +230,8 @@ impl Spectrum {
             survey: Survey::default(),
             line: Line::default(),
             wave: Wave::default(),
+            shorter_so_far: 0,
+            longer_fits: [None; LENGTH_COUNT - SHORTER_LENGTHS],
             refused: 0,
             weighed: Weighed::default(),
             known_mm: 0.0,
@@ -241,11 +251,10 @@ impl Spectrum {
         let (short, energies) = self.periodogram.energies(usable);
         self.periodogram.average(&energies, fresh_mm);
         let averaged = self.periodogram.averaged();
-        self.survey = Survey {
-            fresh_mm,
-            energies,
-            ..Survey::default()
-        };
+        // In place: the passes are large.
+        let survey = &mut self.survey;
+        (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
+        (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
         let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
         else {
             return;
@@ -277,7 +286,13 @@ impl Spectrum {
         } else {
             line_mm
         };
-        survey.line_pass = Some(Pass::new(start_mm, self.lengths, usable, base));
+        self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
+        let lengths = if self.shorter_so_far == 0 {
+            self.lengths
+        } else {
+            SHORTER_LENGTHS.min(self.lengths)
+        };
+        survey.line_pass = Some(Pass::new(start_mm, 1..lengths, usable, base));
         // The short kernel sees a new surface first.
         let newest = highest_peak(&short)
             .map(|number| vertex_mm(&short, number, false))
@@ -292,7 +307,7 @@ impl Spectrum {
             } else {
                 mm
             };
-            Pass::new(start_mm, 3.min(self.lengths), usable, base)
+            Pass::new(start_mm, 0..3.min(self.lengths), usable, base)
         });
     }
 
@@ -359,7 +374,13 @@ impl Spectrum {
     /// What is to be said of the line, where there is one.
     fn weigh_line(&mut self) -> Option<Supposition> {
         let line_mm = self.survey.line_mm?;
-        let found = self.survey.line_pass.as_ref()?.found;
+        let mut found = self.survey.line_pass.as_ref()?.found;
+        let longer = &mut found[SHORTER_LENGTHS..];
+        if self.shorter_so_far == 0 {
+            self.longer_fits.copy_from_slice(longer);
+        } else {
+            longer.copy_from_slice(&self.longer_fits);
+        }
         let near = |n: usize, share: f32| {
             found[n].filter(|fitted| off(fitted.wavelength_mm, line_mm) < share)
         };
@@ -465,6 +486,7 @@ impl Spectrum {
             ..Line::default()
         };
         self.refused = 0;
+        self.longer_fits = Default::default();
         self.jerk.restart();
     }
 

@@ -8,6 +8,8 @@
 //! With white noise the wavenumber is as good as the Cramér–Rao bound of that length allows, once the pass
 //! starts within a quarter of a cycle over the length; starting from the last estimate's result, it does.
 
+use core::ops::Range;
+
 use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
@@ -25,7 +27,7 @@ const LEAST_KNOTS: u16 = 8;
 const LEAST_PIVOT: f32 = 1e-4;
 
 /// What a solution costs, in knots.
-const SOLVING: usize = 8;
+const SOLVING: usize = 4;
 /// Knots that are summed up at a time, so that a sum is fetched and stored once for all of them.
 const ROWS: usize = 4;
 
@@ -86,9 +88,9 @@ pub(super) struct Pass {
 struct Sums {
     waves: f32,
     knots: u16,
-    /// Lower triangle of Σ w f fᵀ, f = (1, τ, cos, sin, θ cos, θ sin).
+    /// Lower triangle of Σ f fᵀ, f = (1, τ, cos, sin, θ cos, θ sin).
     normal: [[f32; ALL]; ALL],
-    /// Σ w f s of each gauge.
+    /// Σ f s of each gauge.
     right: [[f32; ALL]; GAUGES],
     square: [f32; GAUGES],
     /// Knots that are not in the sums yet, and how many.
@@ -96,23 +98,22 @@ struct Sums {
     filled: usize,
 }
 
-/// A knot's part: f, w f, and what each gauge says.
+/// A knot's part: f, and what each gauge says.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row {
     terms: [f32; ALL],
-    weighted: [f32; ALL],
     felt: [f32; GAUGES],
 }
 
 impl Pass {
-    /// A pass from the knot back that is the newest when it begins, for the first `lengths` of [`LENGTHS`], starting at
+    /// A pass from the knot back that is the newest when it begins, for those `lengths` of [`LENGTHS`], starting at
     /// `wavelength_mm` above 0. `base` is taken off the gauges: anything near their mean.
-    pub fn new(wavelength_mm: f32, lengths: usize, usable: u8, base: [f32; GAUGES]) -> Self {
+    pub fn new(wavelength_mm: f32, lengths: Range<usize>, usable: u8, base: [f32; GAUGES]) -> Self {
         let places = wavelength_mm * PLACES_PER_MM as f32;
         Self {
             wavelength_mm,
-            lengths: lengths.min(LENGTH_COUNT),
-            next: 0,
+            lengths: lengths.end.min(LENGTH_COUNT),
+            next: lengths.start,
             usable,
             reader: None,
             origin: None,
@@ -135,7 +136,7 @@ impl Pass {
         while !self.done && left > 0 {
             let solved = self.next;
             match path.next(&mut reader) {
-                Some(knot) => self.take(&knot),
+                Some(knot) => self.take(knot),
                 None => self.done = true,
             }
             left = left.saturating_sub(1 + SOLVING * (self.next - solved));
@@ -164,6 +165,7 @@ impl Pass {
 
 impl Sums {
     /// Takes a knot of that many waves.
+    #[inline]
     fn add(
         &mut self,
         waves: f32,
@@ -173,10 +175,8 @@ impl Sums {
         base: &[f32; GAUGES],
     ) {
         let tau = self.waves + 0.5 * waves;
-        let terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
-        let row = &mut self.rows[self.filled];
-        row.terms = terms;
-        row.weighted = terms.map(|term| waves * term);
+        let row = &mut self.rows[self.filled % ROWS];
+        row.terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
         for ((felt, gauge), base) in row.felt.iter_mut().zip(knot.gauges).zip(base) {
             *felt = gauge - base;
         }
@@ -191,23 +191,29 @@ impl Sums {
     /// Sums up the rows that wait.
     #[inline(never)]
     fn take_in(&mut self) {
-        for row in &mut self.rows[self.filled..] {
-            *row = Row::default();
+        while self.filled < ROWS {
+            self.rows[self.filled] = Row::default();
+            self.filled += 1;
         }
         self.filled = 0;
+        let [one, two, three, four] = &self.rows;
         for i in 0..ALL {
             for j in 0..=i {
-                let product = |row: &Row| row.weighted[i] * row.terms[j];
-                self.normal[i][j] += self.rows.iter().map(product).sum::<f32>();
+                self.normal[i][j] += one.terms[i] * one.terms[j]
+                    + two.terms[i] * two.terms[j]
+                    + three.terms[i] * three.terms[j]
+                    + four.terms[i] * four.terms[j];
             }
         }
         for gauge in 0..GAUGES {
+            let felt = [one, two, three, four].map(|row| row.felt[gauge]);
             for i in 0..ALL {
-                let product = |row: &Row| row.weighted[i] * row.felt[gauge];
-                self.right[gauge][i] += self.rows.iter().map(product).sum::<f32>();
+                self.right[gauge][i] += one.terms[i] * felt[0]
+                    + two.terms[i] * felt[1]
+                    + three.terms[i] * felt[2]
+                    + four.terms[i] * felt[3];
             }
-            let product = |row: &Row| row.weighted[0] * row.felt[gauge] * row.felt[gauge];
-            self.square[gauge] += self.rows.iter().map(product).sum::<f32>();
+            self.square[gauge] += felt.iter().map(|x| x * x).sum::<f32>();
         }
     }
 
@@ -217,51 +223,49 @@ impl Sums {
         if self.knots < LEAST_KNOTS {
             return None;
         }
-        let scale = 1.0 / self.waves;
-        // Cholesky's factor of the linear part; below it the derivatives' Schur complement.
-        let mut l = [[0.0_f32; ALL]; ALL];
-        for i in 0..ALL {
-            for j in 0..=i {
-                let mut z = self.normal[i][j] * scale;
-                let (upper, lower) = (&l[j], &l[i]);
-                for (one, other) in upper.iter().zip(lower).take(j.min(LINEAR)) {
-                    z -= one * other;
+        let scale = 1.0 / f32::from(self.knots);
+        // Elimination of the linear unknowns: their pivots, the factors below them, and the derivatives' Schur
+        // complement.
+        let mut a = self.normal.map(|row| row.map(|sum| sum * scale));
+        let mut pivots = [0.0_f32; LINEAR];
+        for j in 0..LINEAR {
+            if a[j][j] < LEAST_PIVOT {
+                return None;
+            }
+            pivots[j] = 1.0 / a[j][j];
+            for i in j + 1..ALL {
+                let factor = a[i][j] * pivots[j];
+                for k in j + 1..=i {
+                    a[i][k] -= factor * a[k][j];
                 }
-                l[i][j] = if i < LINEAR && i == j {
-                    if z < LEAST_PIVOT {
-                        return None;
-                    }
-                    libm::sqrtf(z)
-                } else if j < LINEAR {
-                    z / l[j][j]
-                } else {
-                    z
-                };
+            }
+            for row in &mut a[j + 1..] {
+                row[j] *= pivots[j];
             }
         }
         let mut fitted = Fitted::default();
         let (mut along, mut curvature, mut rest, mut count) = (0.0, 0.0, 0.0, 0_u16);
         for gauge in 0..GAUGES {
-            let mut y = [0.0_f32; ALL];
-            for i in 0..ALL {
-                let mut z = self.right[gauge][i] * scale;
-                for q in 0..i.min(LINEAR) {
-                    z -= l[i][q] * y[q];
+            let mut y = self.right[gauge].map(|sum| sum * scale);
+            for j in 0..LINEAR {
+                for i in j + 1..ALL {
+                    y[i] -= a[i][j] * y[j];
                 }
-                y[i] = if i < LINEAR { z / l[i][i] } else { z };
             }
-            let total = (self.square[gauge] * scale - y[0] * y[0] - y[1] * y[1]).max(0.0);
-            let explained = (y[2] * y[2] + y[3] * y[3]).min(total);
+            let energy = |j: usize| y[j] * y[j] * pivots[j];
+            let total = (self.square[gauge] * scale - energy(0) - energy(1)).max(0.0);
+            let explained = (energy(2) + energy(3)).min(total);
             fitted.totals[gauge] = total;
             fitted.explaineds[gauge] = explained;
             if usable >> gauge & 1 == 0 {
                 continue;
             }
-            let b = y[3] / l[3][3];
-            let a = (y[2] - l[3][2] * b) / l[2][2];
+            let sine = y[3] * pivots[3];
+            let cosine = y[2] * pivots[2] - a[3][2] * sine;
             // d/d ln k of a cos θ + b sin θ is θ (b cos θ − a sin θ).
-            along += b * y[4] - a * y[5];
-            curvature += b * b * l[4][4] - 2.0 * a * b * l[5][4] + a * a * l[5][5];
+            along += sine * y[4] - cosine * y[5];
+            curvature +=
+                sine * sine * a[4][4] - 2.0 * cosine * sine * a[5][4] + cosine * cosine * a[5][5];
             fitted.total += total;
             fitted.explained += explained;
             rest += total - explained;

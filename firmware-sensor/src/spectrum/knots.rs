@@ -167,24 +167,29 @@ impl Knots {
         let ring = &self.rings[spacing];
         Backwards {
             spacing,
-            partial: if spacing == 0 {
-                None
-            } else {
-                ring.gathering.knot()
-            },
-            next: ring.count,
+            // Half a knot counts as one.
+            partial: ring
+                .gathering
+                .knot()
+                .filter(|knot| knot.travel_mm > 0.5 * ring.spacing_mm),
+            newest: true,
+            place: ring.count % KEPT,
             left: ring.count.min(KEPT - SPARE),
         }
     }
 
     /// The next knot back of a reader.
-    pub fn next(&self, reader: &mut Backwards) -> Option<Knot> {
-        if let Some(partial) = reader.partial.take() {
-            return Some(partial);
+    #[inline]
+    pub fn next<'a>(&'a self, reader: &'a mut Backwards) -> Option<&'a Knot> {
+        if reader.newest {
+            reader.newest = false;
+            if let Some(partial) = &reader.partial {
+                return Some(partial);
+            }
         }
         reader.left = reader.left.checked_sub(1)?;
-        reader.next = reader.next.wrapping_sub(1);
-        Some(self.rings[reader.spacing].knots[reader.next % KEPT])
+        reader.place = reader.place.checked_sub(1).unwrap_or(KEPT - 1);
+        self.rings[reader.spacing].knots.get(reader.place)
     }
 }
 
@@ -192,7 +197,10 @@ impl Knots {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Backwards {
     spacing: usize,
+    /// What is not a whole knot yet, which comes first.
     partial: Option<Knot>,
-    next: usize,
+    newest: bool,
+    /// In the ring, of the knot that was last.
+    place: usize,
     left: usize,
 }

@@ -103,6 +103,7 @@ impl Periodogram {
 
     /// Energy in the usable gauges over the latest waves: behind one pole, and behind both.
     pub fn energies(&self, usable: u8) -> (Spectrum, Spectrum) {
+        let usable = &core::array::from_fn(|gauge| f32::from(usable >> gauge & 1));
         let (mut short, mut long) = ([0.0; CANDIDATES], [0.0; CANDIDATES]);
         for (i, candidate) in self.candidates.iter().enumerate() {
             short[i] = energy(&candidate.first, candidate.first_weight, usable);
@@ -175,15 +176,14 @@ impl Candidate {
     }
 }
 
-fn energy(sums: &[[f32; 2]; GAUGES], weight: f32, usable: u8) -> f32 {
+fn energy(sums: &[[f32; 2]; GAUGES], weight: f32, usable: &[f32; GAUGES]) -> f32 {
     if weight < LEAST_WEIGHT {
         return 0.0;
     }
     let sum: f32 = sums
         .iter()
-        .enumerate()
-        .filter(|&(gauge, _)| usable >> gauge & 1 == 1)
-        .map(|(_, [re, im])| re * re + im * im)
+        .zip(usable)
+        .map(|([re, im], usable)| usable * (re * re + im * im))
         .sum();
     2.0 * sum / (weight * weight)
 }
