@@ -13,7 +13,7 @@
 //! the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
 //! waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
-//! λ̂ is the period: a line at 2 λ or 3 λ that is at least a third as high as one at λ is taken for the
+//! λ̂ is the period: a line at 2 λ or 3 λ that is at least 0.4 times as high as one at λ is taken for the
 //! fundamental, if a fit over three waves finds it there. Of waves that have no common period the
 //! strongest is λ̂.
 //!
@@ -88,13 +88,10 @@ const MOST_JERK: f32 = 0.025;
 /// What is left of a probability where that hints at stick and slip: a rough surface has as much power there,
 /// and λ̂ is right on most of them, but below the default level of 70 %.
 const WHERE_JERKY: f32 = 0.65;
-/// Millisecond of the ten before an estimate in which its work begins, those in which the line is fitted,
-/// and what is done in one of these, as a pass counts it. The wave of the moment has the milliseconds that
-/// are left.
-const SURVEY_SLOT: u8 = 2;
-/// See [`SURVEY_SLOT`].
-const LINE_SLOTS: core::ops::Range<u8> = 3..8;
-/// See [`SURVEY_SLOT`].
+/// Millisecond of the ten before an estimate in which its work begins. In those after it the line is fitted,
+/// then the wave of the moment.
+const SURVEY_SLOT: u8 = 3;
+/// What is done of that in a millisecond, as a pass counts it.
 const WORK_OF_A_SLOT: usize = 34;
 /// Lengths that each estimate fits the line over. The longer ones change slowly: one estimate of so many has
 /// them, and those after it take them over.
@@ -340,7 +337,7 @@ impl Spectrum {
             for i in [peak + up, peak + up - 1, peak + up + 1] {
                 if i + 1 < CANDIDATES
                     && is_peak(averaged, i)
-                    && averaged[i] > 0.3 * averaged[peak]
+                    && averaged[i] > 0.4 * averaged[peak]
                     && energies[i] > 0.09 * energies[peak]
                     && off(vertex_mm(averaged, i, true), ratio * peak_mm) < 0.06
                 {
@@ -384,7 +381,7 @@ impl Spectrum {
         let near = |n: usize, share: f32| {
             found[n].filter(|fitted| off(fitted.wavelength_mm, line_mm) < share)
         };
-        if self.survey.longer && found[2].is_some() && near(2, 0.03).is_none() {
+        if self.survey.longer && found[2].is_some() && near(2, 0.05).is_none() {
             self.refused = REFUSED_ESTIMATES;
         }
         let share = near(1, 0.2).map_or(0.0, |fitted| fitted.share());
@@ -640,15 +637,13 @@ impl Estimator for Spectrum {
         }
         match self.slot {
             SURVEY_SLOT => self.survey(),
-            slot if LINE_SLOTS.contains(&slot) => {
-                if let Some(pass) = &mut self.survey.line_pass {
-                    pass.run(&self.knots, WORK_OF_A_SLOT);
-                }
-            }
             slot if slot > SURVEY_SLOT => {
-                if let Some(pass) = &mut self.survey.wave_pass {
-                    pass.run(&self.knots, WORK_OF_A_SLOT);
-                }
+                let survey = &mut self.survey;
+                let passes = [&mut survey.line_pass, &mut survey.wave_pass];
+                passes
+                    .into_iter()
+                    .flatten()
+                    .fold(WORK_OF_A_SLOT, |left, pass| pass.run(&self.knots, left));
             }
             _ => {}
         }

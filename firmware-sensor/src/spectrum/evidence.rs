@@ -53,17 +53,17 @@ pub struct WaveEvidence {
 }
 
 /// Number of weights, the constant left out.
-pub const LINE_CLUES: usize = 28;
+pub const LINE_CLUES: usize = 30;
 /// See [`LINE_CLUES`].
 pub const WAVE_CLUES: usize = 11;
 
 const LINE: [f32; LINE_CLUES + 1] = [
-    -13.859, -3.498, 0.350, 2.966, -0.777, 0.413, -0.444, 0.692, 0.177, -1.051, 0.501, 0.739,
-    7.355, 0.413, -1.026, -0.513, 0.210, 3.347, 0.749, -1.212, 0.476, 0.102, -0.179, -3.210,
-    -0.001, -0.341, 2.961, 0.414, 1.373,
+    -12.040, -5.806, 0.355, 2.791, -1.423, 0.464, -0.366, 0.805, 0.204, -0.580, 0.156, 0.749,
+    7.340, 0.378, -1.049, -0.312, 0.253, 3.189, 0.907, -1.552, 0.165, 0.121, -0.194, -3.063,
+    -0.003, -0.246, 2.774, 0.333, 2.247, 0.109, 0.315,
 ];
 const WAVE: [f32; WAVE_CLUES + 1] = [
-    -3.266, 0.987, 1.192, -1.002, 2.134, -0.297, -3.395, -0.670, -0.439, 0.813, 0.206, 0.628,
+    -4.021, 0.770, 1.235, -0.439, 2.604, -0.027, -3.297, -0.333, -0.406, 0.551, 0.140, 0.639,
 ];
 
 /// The logarithm of the share that is left unexplained, with its sign turned: 0 to 4.
@@ -82,6 +82,7 @@ impl LineEvidence {
         let sharp = libm::logf(self.sharpness.clamp(0.6, 20.0));
         let firm = -libm::logf(self.spread + 0.003);
         let agreement = self.agreement;
+        let close = -libm::logf(self.distance.min(0.3) + 0.003);
         [
             self.maturity,
             travelled,
@@ -92,7 +93,7 @@ impl LineEvidence {
             -libm::logf(self.wander[0] + 0.005),
             steadiness,
             agreement,
-            -libm::logf(self.distance.min(0.3) + 0.003),
+            close,
             libm::logf(self.presence.clamp(0.05, 20.0)),
             sharp,
             firm,
@@ -111,6 +112,8 @@ impl LineEvidence {
             agreement * agreement,
             steadiness * long_strength,
             self.maturity * sharp,
+            close * strength,
+            close * self.maturity,
         ]
     }
 

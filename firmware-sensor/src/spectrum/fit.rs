@@ -126,8 +126,11 @@ impl Pass {
         }
     }
 
-    /// Goes on for that much work: one for each knot, [`SOLVING`] for each solution.
-    pub fn run(&mut self, path: &Knots, work: usize) {
+    /// Goes on for that much work: one for each knot, [`SOLVING`] for each solution. What is left of it.
+    pub fn run(&mut self, path: &Knots, work: usize) -> usize {
+        if work == 0 {
+            return 0;
+        }
         let reader = self
             .reader
             .get_or_insert_with(|| path.backwards(spacing_for(self.wavelength_mm)));
@@ -142,6 +145,7 @@ impl Pass {
             left = left.saturating_sub(1 + SOLVING * (self.next - solved));
         }
         self.reader = Some(reader);
+        left
     }
 
     fn take(&mut self, knot: &Knot) {
