@@ -433,12 +433,36 @@ impl Spectrum {
         } else {
             0.0
         };
+        let common = found[2]
+            .or(found[1])
+            .is_none_or(|fitted| is_common(&fitted, self.touch.usable));
+        let probability = if common {
+            (self.line.there * evidence.probability()).max(inherited)
+        } else {
+            0.0
+        };
         Some(Supposition {
             wavelength_mm,
-            probability: (self.line.there * evidence.probability()).max(inherited),
+            probability,
             fitted: found[2].or(found[1]).or(fitted),
             new: false,
         })
+    }
+
+    /// Whether most gauges feel a strong line as they did: what else there is has befallen the others.
+    fn line_goes_on(&self) -> bool {
+        let pass = self.survey.line_pass.as_ref();
+        let Some(fitted) = pass.and_then(|pass| pass.found[2]) else {
+            return false;
+        };
+        let usable = self.touch.usable;
+        let as_before = (0..GAUGES)
+            .filter(|&gauge| usable >> gauge & 1 == 1)
+            .filter(|&gauge| {
+                fitted.explaineds[gauge] > STRONG * self.line.usual * fitted.totals[gauge]
+            })
+            .count();
+        self.line.usual > STRONG && 2 * as_before > usable.count_ones() as usize
     }
 
     /// What is to be said of a wave that the line is not.
@@ -457,6 +481,9 @@ impl Spectrum {
         self.wave.mm = best.wavelength_mm;
         let evidence = WaveEvidence::of(&found, self.wave.held_waves, self.known_share)?;
         self.weighed.wave = Some((best.wavelength_mm, evidence));
+        if !is_common(&best, self.touch.usable) {
+            return None;
+        }
         // Where a strong line has gone, something has taken its place.
         let follows =
             self.line.there < 0.5 && self.known_share > STRONG && self.wave.held_waves > 0.0;
@@ -522,6 +549,17 @@ impl Spectrum {
             jerky,
         }
     }
+}
+
+/// Whether at least two gauges have the wave, if there are two: a ridge passes under all of them, what hums or drifts
+/// in one is no surface.
+fn is_common(fitted: &Fitted, usable: u8) -> bool {
+    let least = 0.5 * fitted.share();
+    let taking_part = (0..GAUGES)
+        .filter(|&gauge| usable >> gauge & 1 == 1)
+        .filter(|&gauge| fitted.explaineds[gauge] >= least * fitted.totals[gauge])
+        .count();
+    taking_part >= 2.min(usable.count_ones() as usize)
 }
 
 /// Gauges that the wave explains less than half of, though it explains the others: all of them where λ̂ is
@@ -656,7 +694,7 @@ impl Estimator for Spectrum {
         self.speed_mm_s = speed_mm_s.max(self.speed_mm_s * SPEED_KEPT);
         self.weighed = Weighed::default();
         let line = self.weigh_line();
-        let wave = self.weigh_wave();
+        let wave = self.weigh_wave().filter(|_| !self.line_goes_on());
         if let Some(wave) = &wave
             && wave.probability > CONVINCING
             && self.wave.held_waves > 1.0
