@@ -385,11 +385,10 @@ impl Spectrum {
             self.refused = REFUSED_ESTIMATES;
         }
         let share = near(1, 0.2).map_or(0.0, |fitted| fitted.share());
-        let fitted = if share > STRONG {
-            longest_that_agrees(&found)
-        } else {
-            near(4, 0.06).or(near(3, 0.06))
-        };
+        let strong = (share > STRONG).then(|| longest_that_agrees(&found));
+        let fitted = strong
+            .flatten()
+            .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, 0.06)));
         // A weak line's fit wanders: the average knows better.
         let wavelength_mm = fitted.map_or(line_mm, |fitted| {
             let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
@@ -622,21 +621,25 @@ impl Line {
     }
 }
 
-/// The longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on.
+/// The longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on; none if the one over
+/// three waves contradicts that over two, as where the arm turns.
 fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<Fitted> {
     let shortest = found[1]?;
     let (mut low, mut high) = (0.0_f32, f32::MAX);
     let mut longest = None;
-    for fitted in found[1..].iter().map_while(|fitted| *fitted) {
+    let all = found.iter().enumerate().skip(1);
+    for (n, fitted) in all.map_while(|(n, fitted)| Some((n, (*fitted)?))) {
         let interval = (4.0 * fitted.sigma).max(0.003);
         low = low.max(fitted.wavelength_mm * (1.0 - interval));
         high = high.min(fitted.wavelength_mm * (1.0 + interval));
         if low > high || fitted.share() < STRONG * shortest.share() {
             break;
         }
-        longest = Some(fitted);
+        longest = Some((n, fitted));
     }
     longest
+        .filter(|(n, _)| *n > 1 || found[2].is_none())
+        .map(|(_, fitted)| fitted)
 }
 
 /// The moment's highest peak, or the line's where that peak is its second or third harmonic.

@@ -113,7 +113,7 @@ fn streamed_positions_and_gauges_are_of_the_same_instants_within_50_us() {
     }
 }
 
-/// Mean share of the gauges' energy that the estimator's wave leaves unexplained, over whole strokes.
+/// Mean energy that the estimator's wave does not explain of what it explains at best, over whole strokes.
 fn unexplained(late_us: f64) -> f64 {
     // 5 turns a second, so that both ways are in the kernel nearly always; 67 Hz, far from the mains.
     let stroke = Stroke {
@@ -121,13 +121,14 @@ fn unexplained(late_us: f64) -> f64 {
         length_mm: 20.0,
     };
     let outputs = feel(stroke, 1.5, late_us * 1e-6, 4.4);
-    let left: Vec<f64> = outputs
+    let explained: Vec<f64> = outputs
         .iter()
         .filter_map(|output| output.estimate)
         .skip(40)
-        .map(|estimate| 1.0 - f64::from(estimate.confidence))
+        .map(|estimate| f64::from(estimate.amplitude_lsb).powi(2))
         .collect();
-    left.iter().sum::<f64>() / left.len() as f64
+    let most = explained.iter().copied().fold(0.0, f64::max);
+    1.0 - explained.iter().sum::<f64>() / explained.len() as f64 / most
 }
 
 #[test]

@@ -24,7 +24,8 @@ const RMS_APART: f64 = 0.1;
 /// Or else, in %: both engines round places to 5 µm, each in its own way. Rounded by a deviation of 5 µm / √12 at
 /// both ends, a travel of four λ of 2.3 mm is 2.2e-4 off.
 const RMS_ROUNDED_PERCENT: f64 = 0.022;
-const DURATION_S: f64 = 4.0;
+/// Long enough for the start, one estimate sooner or later, to be a thousandth of it.
+const DURATION_S: f64 = 10.0;
 
 /// λ in mm. At [`at_47`] ten milliseconds are 0.204 of it: the estimates meet every phase of the ridges alike,
 /// whenever an engine's first one comes.

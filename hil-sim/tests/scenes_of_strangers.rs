@@ -12,7 +12,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-const SCENES: u64 = 8_000;
+const SCENES: u64 = 10_000;
 /// Scenes that are run, at most, for so long.
 const RUNS: u64 = 500;
 const RUN_S: f64 = 0.3;

@@ -6,7 +6,8 @@ use hil_sim::scene::Scene;
 use crate::running::{folder, of_each, run};
 
 #[test]
-fn a_millisecond_of_skew_doubles_the_error_and_50_microseconds_change_it_by_less_than_a_tenth() {
+fn a_millisecond_of_skew_makes_the_error_tenfold_and_50_microseconds_change_it_by_less_than_a_quarter()
+ {
     let names = ["0-us", "50-us", "1000-us"];
     let rms_percent = of_each(&names, |name| {
         let path = folder("alignment").join(format!("{name}.toml"));
@@ -18,7 +19,7 @@ fn a_millisecond_of_skew_doubles_the_error_and_50_microseconds_change_it_by_less
     let [none, little, much] = rms_percent[..] else {
         panic!("three scenes, {rms_percent:?}");
     };
-    // Measured: 0.30, 0.32 and 0.81 %.
-    assert!(much > 2.0 * none, "{rms_percent:?}");
-    assert!((little - none).abs() < 0.1 * none, "{rms_percent:?}");
+    // Measured: 0.04, 0.05 and 0.58 %.
+    assert!(much > 8.0 * none, "{rms_percent:?}");
+    assert!((little - none).abs() < 0.25 * none, "{rms_percent:?}");
 }
