@@ -43,6 +43,8 @@ mod jerk;
 mod knots;
 mod periodogram;
 mod play;
+#[cfg(test)]
+mod tests;
 
 /// The shortest and the longest wavelength that are stood by, in mm.
 pub const SHORTEST_MM: f32 = 0.6;
@@ -67,13 +69,15 @@ const SPEED_KEPT: f32 = 0.967;
 const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
 /// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
 const STRONG: f32 = 0.8;
+/// Share over three waves from which on, if it is the usual one, a wave that goes is missed.
+const KNOWN: f32 = 0.75;
 /// What a strong wave explains over three waves, relative to what it usually does, from which on it is all
 /// there, and up to which it is gone.
 const STAYS: f32 = 0.8;
 /// See [`STAYS`].
 const GONE: f32 = 0.5;
 /// What a strong wave's usual share loses in a wave that explains less.
-const FORGOTTEN: f32 = 0.02;
+const FORGOTTEN: f32 = 0.01;
 /// A supposition that moves by more than this share is another one.
 const SAME: f32 = 0.1;
 /// The line's memory in wavelengths, as the periodogram's.
@@ -407,7 +411,7 @@ impl Spectrum {
             [share_over(2), share_over(4)],
         );
         // A strong wave that explains much less than it used to is going, whatever its past says.
-        self.line.there = if self.line.usual > STRONG {
+        self.line.there = if self.line.usual > KNOWN {
             let share = share_over(2) / self.line.usual;
             ((share - GONE) / (STAYS - GONE)).clamp(0.0, 1.0)
         } else {
@@ -484,8 +488,7 @@ impl Spectrum {
             return None;
         }
         // Where a strong line has gone, something has taken its place.
-        let follows =
-            self.line.there < 0.5 && self.known_share > STRONG && self.wave.held_waves > 0.0;
+        let follows = self.line.there < 0.5 && self.wave.held_waves > 0.0;
         let least = if follows { best.share() } else { 0.0 };
         Some(Supposition {
             wavelength_mm: best.wavelength_mm,

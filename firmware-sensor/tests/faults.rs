@@ -53,11 +53,11 @@ fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_g
             0.6,
             1.0,
         ),
-        // A texture's power, of noise that lies in the scans' upper half as well.
+        // A texture's power, of noise that lies in the scans' upper half as well: thirty estimates, too.
         (
             GaugeHealth::Noisy,
             |x_mm, t_s| 1_900.0 * (1e7 * (x_mm + t_s)).sin(),
-            0.3,
+            0.4,
             2.0,
         ),
     ];

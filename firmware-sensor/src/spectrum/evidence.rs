@@ -1,8 +1,9 @@
 //! What speaks for a wavelength, and how probable that makes it.
 //!
 //! The probability that λ̂ is within 5 % of the truth is a logistic function of a few pieces of evidence. Its
-//! weights come from a regression over surfaces drawn at random, with and without a period (the tuning
-//! seeds of `hil-sim jury`); how well the probabilities hold on others is `hil-sim chart confidence`.
+//! weights come from a regression over surfaces drawn at random, with and without a period: `hil-sim jury
+//! --seed 1 --surfaces 4000 --weights` finds them anew. They depend on what is stood by, so a change asks for
+//! two or three rounds. How well the probabilities hold on other seeds is `hil-sim chart confidence`.
 
 use super::fit::{Fitted, LENGTH_COUNT, LENGTHS};
 use super::off;

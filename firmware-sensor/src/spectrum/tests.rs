@@ -1,0 +1,183 @@
+//! Each part alone, on paths whose truth is known.
+
+extern crate std;
+
+use core::f32::consts::TAU;
+use std::vec::Vec;
+
+use protocol::GAUGES;
+
+use super::fit::{LENGTH_COUNT, LENGTHS, Pass};
+use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
+use super::periodogram::{Periodogram, highest_peak, sharpness, vertex_mm, wavelength_mm};
+use crate::estimator::PLACES_PER_MM;
+
+const ALL: u8 = 0b1_1111;
+const NO_BASE: [f32; GAUGES] = [0.0; GAUGES];
+
+/// Even noise between −1 and 1, the same each time.
+struct Noise(u32);
+
+impl Noise {
+    fn even(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 8) as f32 / 8_388_608.0 - 1.0
+    }
+}
+
+/// A path of `ms` milliseconds at `mm_per_ms`, turned round every `stroke_ms`, over what `felt` says of a place in
+/// mm and a gauge.
+fn path(
+    ms: i32,
+    mm_per_ms: f32,
+    stroke_ms: i32,
+    mut felt: impl FnMut(f32, usize) -> f32,
+) -> (Knots, Periodogram) {
+    let (mut knots, mut periodogram) = (Knots::new(), Periodogram::new());
+    let places = (mm_per_ms * PLACES_PER_MM as f32) as i32;
+    let mut place = 0;
+    for step in 0..ms {
+        place += if step / stroke_ms % 2 == 0 {
+            places
+        } else {
+            -places
+        };
+        let mm = place as f32 / PLACES_PER_MM as f32;
+        let gauges = core::array::from_fn(|gauge| felt(mm, gauge));
+        periodogram.push(&knots.push(place, places, &gauges));
+    }
+    (knots, periodogram)
+}
+
+fn wave(mm: f32, gauge: usize, wavelength_mm: f32) -> f32 {
+    let phase = 0.7 * gauge as f32;
+    300.0 * libm::sinf(TAU * libm::fmodf(mm, wavelength_mm) / wavelength_mm + phase)
+}
+
+fn run(knots: &Knots, start_mm: f32) -> Pass {
+    let mut pass = Pass::new(start_mm, 0..LENGTH_COUNT, ALL, NO_BASE);
+    while pass.run(knots, 7) == 0 {}
+    pass
+}
+
+#[test]
+fn knots_are_as_long_as_their_spacing_says_and_come_newest_first() {
+    // Pieces that divide no spacing.
+    for mm_per_ms in [0.013, 0.037, 0.071] {
+        let (knots, _) = path(4_000, mm_per_ms, 1_000_000, |mm, _| mm);
+        for (spacing, nominal_mm) in SPACINGS_MM.into_iter().enumerate() {
+            let mut reader = knots.backwards(spacing);
+            let mut all: Vec<Knot> = Vec::new();
+            while let Some(knot) = knots.next(&mut reader) {
+                all.push(*knot);
+            }
+            let whole = &all[1..all.len() - 1];
+            assert!(whole.len() > 20, "{}", whole.len());
+            let mean_mm = whole.iter().map(|knot| knot.travel_mm).sum::<f32>() / whole.len() as f32;
+            // To half a piece, of which coarse ones are fine knots.
+            let piece_mm = if spacing == 0 { mm_per_ms } else { 0.142 };
+            assert!(
+                (mean_mm - nominal_mm).abs() <= 0.51 * piece_mm,
+                "{mean_mm} mm for {nominal_mm} at {mm_per_ms}"
+            );
+            for pair in whole.windows(2) {
+                assert!(pair[0].place > pair[1].place);
+                // What a knot says is the mean over it, as its place is.
+                let mm = pair[0].place as f32 / PLACES_PER_MM as f32;
+                assert!((pair[0].gauges[0] - mm).abs() < 1e-3 * (1.0 + mm));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_spacing_leaves_enough_knots_a_wave() {
+    for number in 0..super::CANDIDATES {
+        let mm = wavelength_mm(number);
+        let knots = mm / SPACINGS_MM[spacing_for(mm)];
+        assert!((5.0..=18.0).contains(&knots), "{knots} at {mm} mm");
+    }
+}
+
+#[test]
+fn a_fit_finds_the_wave_over_every_length_from_a_start_a_little_off_with_a_slope_and_round_turns() {
+    for truth_mm in [0.7_f32, 1.3, 2.1, 3.4, 7.6] {
+        for stroke_ms in [1_000_000, 700] {
+            let felt = |mm: f32, gauge: usize| wave(mm, gauge, truth_mm) + 40.0;
+            let (knots, _) = path(6_000, 0.04, stroke_ms, felt);
+            // A second pass from what the first found, as the next estimate does it.
+            let first = run(&knots, truth_mm * 1.01);
+            for (n, fitted) in first.found.into_iter().enumerate() {
+                let fitted = fitted.expect("the path is long enough");
+                let again = run(&knots, fitted.wavelength_mm).found[n].expect("as before");
+                let off = (again.wavelength_mm / truth_mm - 1.0).abs();
+                assert!(
+                    off < 1.5e-3,
+                    "{off} of {truth_mm} mm over {} waves",
+                    LENGTHS[n]
+                );
+                assert!(again.share() > 0.99, "{}", again.share());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fit_knows_how_far_off_it_is_in_white_noise() {
+    let mut noise = Noise(5);
+    let (mut squares, mut sigmas, mut count) = ([0.0_f32; LENGTH_COUNT], [0.0; LENGTH_COUNT], 0.0);
+    for _ in 0..60 {
+        let felt = |mm: f32, gauge: usize| wave(mm, gauge, 2.0) + 150.0 * noise.even();
+        let (knots, _) = path(500, 0.04, 1_000_000, felt);
+        let found = run(&knots, 2.0).found;
+        for (n, fitted) in found.into_iter().enumerate() {
+            let fitted = fitted.expect("the path is long enough");
+            squares[n] += (fitted.wavelength_mm / 2.0 - 1.0).powi(2);
+            sigmas[n] += fitted.sigma * fitted.sigma;
+        }
+        count += 1.0;
+    }
+    for n in 0..LENGTH_COUNT {
+        let ratio = (squares[n] / sigmas[n]).sqrt();
+        // 60 draws tell a deviation to 9 %; a knot's mean takes some of the wave for noise.
+        assert!(
+            (0.7..1.3).contains(&ratio),
+            "{ratio} over {} waves",
+            LENGTHS[n]
+        );
+        assert!((sigmas[n] / count).sqrt() < 0.02);
+    }
+}
+
+#[test]
+fn a_path_too_short_has_no_fit() {
+    let (knots, _) = path(60, 0.04, 1_000_000, |mm, gauge| wave(mm, gauge, 2.0));
+    assert_eq!(run(&knots, 2.0).found.iter().flatten().count(), 0);
+    // Nor has one that only trembles by a twentieth of a wave.
+    let (knots, _) = path(2_000, 0.02, 5, |mm, gauge| wave(mm, gauge, 2.0));
+    assert_eq!(run(&knots, 2.0).found.iter().flatten().count(), 0);
+}
+
+#[test]
+fn a_peak_lies_where_the_wave_is_between_candidates_and_is_sharp() {
+    for truth_mm in [0.83_f32, 1.2, 2.6, 4.4, 6.1] {
+        let (_, periodogram) = path(8_000, 0.04, 1_000_000, |mm, gauge| {
+            wave(mm, gauge, truth_mm)
+        });
+        let (_, energies) = periodogram.energies(ALL);
+        let peak = highest_peak(&energies).expect("there is a wave");
+        let off = (vertex_mm(&energies, peak, true) / truth_mm - 1.0).abs();
+        assert!(off < 0.02, "{off} of {truth_mm} mm");
+        assert!(sharpness(&energies, peak) > 2.5);
+    }
+}
+
+#[test]
+fn gauges_that_are_left_out_have_no_energy() {
+    let only_two = |mm: f32, gauge: usize| if gauge < 2 { wave(mm, gauge, 2.0) } else { 0.0 };
+    let (_, periodogram) = path(4_000, 0.04, 1_000_000, only_two);
+    let total = |usable| periodogram.energies(usable).1.iter().sum::<f32>();
+    assert!(total(0b0_0011) > 1e3);
+    assert!((total(ALL) / total(0b0_0011) - 1.0).abs() < 1e-6);
+    assert_eq!(total(0b1_1100), 0.0);
+}
