@@ -24,8 +24,10 @@ const RMS_APART: f64 = 0.1;
 /// Or else, in %: both engines round places to 5 µm, each in its own way. Rounded by a deviation of 5 µm / √12 at
 /// both ends, a travel of four λ of 2.3 mm is 2.2e-4 off.
 const RMS_ROUNDED_PERCENT: f64 = 0.022;
-/// Long enough for the start, one estimate sooner or later, to be a thousandth of it.
-const DURATION_S: f64 = 10.0;
+/// Long enough for the start, one estimate sooner or later, to be a few thousandths of it.
+const DURATION_S: f64 = 6.0;
+/// Around the turns an estimate hangs on where in a stroke it comes: many of them are needed.
+const DURATION_OF_STROKES_S: f64 = 18.0;
 
 /// λ in mm. At [`at_47`] ten milliseconds are 0.204 of it: the estimates meet every phase of the ridges alike,
 /// whenever an engine's first one comes.
@@ -44,10 +46,10 @@ fn strokes(t_s: f64) -> f64 {
 fn recordings() -> Vec<(String, Scene)> {
     let mut scenes = Vec::new();
     for rows_per_s in RECORDED_HZ {
-        for (name, arm_mm, snr_db) in [
-            ("steady", at_47 as fn(f64) -> f64, 20.0),
-            ("noisy", at_47, 3.0),
-            ("strokes", strokes, 10.0),
+        for (name, arm_mm, snr_db, duration_s) in [
+            ("steady", at_47 as fn(f64) -> f64, 20.0, DURATION_S),
+            ("noisy", at_47, 3.0, DURATION_S),
+            ("strokes", strokes, 10.0, DURATION_OF_STROKES_S),
         ] {
             for rows_early in [0.0, 0.5] {
                 let stranger = Stranger {
@@ -56,7 +58,7 @@ fn recordings() -> Vec<(String, Scene)> {
                     snr_db,
                     rows_per_s,
                     rows_early,
-                    duration_s: DURATION_S,
+                    duration_s,
                     ..Stranger::default()
                 };
                 let name = format!("engines-{name}-{rows_per_s}-hz-{rows_early}-early");

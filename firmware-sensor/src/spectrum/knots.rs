@@ -15,11 +15,20 @@ pub(super) const SPACINGS: usize = 3;
 /// From these wavelengths on, in mm, the next coarser spacing serves. That leaves 6.8 knots a wave, which
 /// keep sinc²(1/6.8) = 0.93 of what there is to know of the wavelength.
 const COARSER_FROM_MM: [f32; SPACINGS - 1] = [1.7, 3.4];
-/// Knots kept at each spacing: eight waves of the longest wavelength that it serves, of 8 mm at most,
-/// and those that come while a fit goes through them.
-const KEPT: usize = 145;
-/// Those that may come while a fit goes through them: one a millisecond at most, of five.
-const SPARE: usize = 10;
+/// Knots kept at each spacing: eight waves of the longest wavelength that it serves, at the shortest that a
+/// knot becomes, and those that come while a fit goes through them. A fine knot is two thirds of its spacing at
+/// least, where a millisecond travels so far; the others are made of fine ones.
+const KEPT: [usize; SPACINGS] = [
+    8 * 17 * 3 / 2 + SPARE,
+    8 * 14 * 5 / 4 + SPARE,
+    8 * 17 * 5 / 4 + SPARE,
+];
+/// Where each spacing's begin among all.
+const FIRST: [usize; SPACINGS] = [0, KEPT[0], KEPT[0] + KEPT[1]];
+/// All that are kept.
+const ALL_KEPT: usize = KEPT[0] + KEPT[1] + KEPT[2];
+/// Those that may come while a fit goes through them: one a millisecond at most, of seven.
+const SPARE: usize = 8;
 
 /// The spacing that serves a wavelength.
 pub(super) fn spacing_for(wavelength_mm: f32) -> usize {
@@ -74,59 +83,21 @@ impl Gathering {
     }
 }
 
-/// The latest knots at one spacing.
-#[derive(Clone, Debug)]
+/// What is known of the knots at one spacing.
+#[derive(Clone, Copy, Debug, Default)]
 struct Ring {
-    spacing_mm: f32,
     gathering: Gathering,
-    /// Knots so far; wraps.
+    /// Where the next one goes, and how many there are.
+    next: usize,
     count: usize,
-    knots: [Knot; KEPT],
-}
-
-impl Ring {
-    const fn new(spacing_mm: f32) -> Self {
-        const NONE: Knot = Knot {
-            place: 0,
-            travel_mm: 0.0,
-            gauges: [0.0; GAUGES],
-        };
-        Self {
-            spacing_mm,
-            gathering: Gathering {
-                first: 0,
-                travel_mm: 0.0,
-                moment: 0.0,
-                gauges: [0.0; GAUGES],
-            },
-            count: 0,
-            knots: [NONE; KEPT],
-        }
-    }
-
-    /// The knot that `piece` completes, if it does.
-    fn push(&mut self, piece: &Knot) -> Option<Knot> {
-        self.gathering.add(piece);
-        // Ends as near to its spacing as pieces allow.
-        if self.gathering.travel_mm + 0.5 * piece.travel_mm < self.spacing_mm {
-            return None;
-        }
-        let knot = self.gathering.knot()?;
-        self.gathering = Gathering::default();
-        self.knots[self.count % KEPT] = knot;
-        self.count = self.count.wrapping_add(1);
-        // Beyond one turn only the remainder matters; this keeps "how many are there" true for ever.
-        if self.count == 4 * KEPT {
-            self.count -= 2 * KEPT;
-        }
-        Some(knot)
-    }
 }
 
 /// The latest path, at every spacing.
 #[derive(Clone, Debug)]
 pub(super) struct Knots {
     rings: [Ring; SPACINGS],
+    /// One spacing's after the other's.
+    knots: [Knot; ALL_KEPT],
 }
 
 /// Knots that a millisecond completed, by spacing.
@@ -134,13 +105,10 @@ pub(super) type Completed = [Option<Knot>; SPACINGS];
 
 impl Knots {
     /// No path yet.
-    pub const fn new() -> Self {
+    pub fn new() -> Self {
         Self {
-            rings: [
-                Ring::new(SPACINGS_MM[0]),
-                Ring::new(SPACINGS_MM[1]),
-                Ring::new(SPACINGS_MM[2]),
-            ],
+            rings: [Ring::default(); SPACINGS],
+            knots: [Knot::default(); ALL_KEPT],
         }
     }
 
@@ -152,16 +120,32 @@ impl Knots {
             gauges: *gauges,
         };
         let mut completed = [None; SPACINGS];
-        completed[0] = self.rings[0].push(&piece);
+        completed[0] = self.gather(0, &piece);
         if let Some(fine) = completed[0] {
-            for (ring, completed) in self.rings.iter_mut().zip(&mut completed).skip(1) {
-                *completed = ring.push(&fine);
+            for (spacing, completed) in completed.iter_mut().enumerate().skip(1) {
+                *completed = self.gather(spacing, &fine);
             }
         }
         completed
     }
 
-    /// A reader of the path as it is now, from its end backwards. Good for as long as fewer than ten more
+    /// The knot that `piece` completes, if it does.
+    fn gather(&mut self, spacing: usize, piece: &Knot) -> Option<Knot> {
+        let ring = &mut self.rings[spacing];
+        ring.gathering.add(piece);
+        // Ends as near to its spacing as pieces allow.
+        if ring.gathering.travel_mm + 0.5 * piece.travel_mm < SPACINGS_MM[spacing] {
+            return None;
+        }
+        let knot = ring.gathering.knot()?;
+        ring.gathering = Gathering::default();
+        self.knots[FIRST[spacing] + ring.next] = knot;
+        ring.next = (ring.next + 1) % KEPT[spacing];
+        ring.count = (ring.count + 1).min(KEPT[spacing]);
+        Some(knot)
+    }
+
+    /// A reader of the path as it is now, from its end backwards. Good for as long as no more than [`SPARE`]
     /// knots have come.
     pub fn backwards(&self, spacing: usize) -> Backwards {
         let ring = &self.rings[spacing];
@@ -171,10 +155,10 @@ impl Knots {
             partial: ring
                 .gathering
                 .knot()
-                .filter(|knot| knot.travel_mm > 0.5 * ring.spacing_mm),
+                .filter(|knot| knot.travel_mm > 0.5 * SPACINGS_MM[spacing]),
             newest: true,
-            place: ring.count % KEPT,
-            left: ring.count.min(KEPT - SPARE),
+            place: ring.next,
+            left: ring.count.min(KEPT[spacing] - SPARE),
         }
     }
 
@@ -188,8 +172,9 @@ impl Knots {
             }
         }
         reader.left = reader.left.checked_sub(1)?;
-        reader.place = reader.place.checked_sub(1).unwrap_or(KEPT - 1);
-        self.rings[reader.spacing].knots.get(reader.place)
+        let place = reader.place.checked_sub(1);
+        reader.place = place.unwrap_or(KEPT[reader.spacing] - 1);
+        self.knots.get(FIRST[reader.spacing] + reader.place)
     }
 }
 

@@ -25,7 +25,7 @@ pub const ENOUGH_PERCENT: f64 = 0.25;
 pub const ENOUGH_SHARE: f64 = 0.25;
 /// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
 /// on single hops, and no two models of friction hop alike.
-pub const ENOUGH_BLIND_PERCENT: f64 = 2.0;
+pub const ENOUGH_BLIND_PERCENT: f64 = 2.5;
 /// The same in percent of λ of the paper's count: one impulse more or less in its window is as much and more.
 pub const ENOUGH_COUNT_PERCENT: f64 = 10.0;
 /// For so long after a border, in s, nothing is compared.
