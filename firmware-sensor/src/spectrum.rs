@@ -96,7 +96,7 @@ const WHERE_JERKY: f32 = 0.65;
 /// then the wave of the moment.
 const SURVEY_SLOT: u8 = 3;
 /// What is done of that in a millisecond, as a pass counts it.
-const WORK_OF_A_SLOT: usize = 37;
+const WORK_OF_A_SLOT: usize = 34;
 /// Lengths that each estimate fits the line over. The longer ones change slowly: one estimate of so many has
 /// them, and those after it take them over.
 const SHORTER_LENGTHS: usize = 3;

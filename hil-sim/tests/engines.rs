@@ -25,7 +25,7 @@ const RMS_APART: f64 = 0.1;
 /// both ends, a travel of four λ of 2.3 mm is 2.2e-4 off.
 const RMS_ROUNDED_PERCENT: f64 = 0.022;
 /// Long enough for the start, one estimate sooner or later, to be a few thousandths of it.
-const DURATION_S: f64 = 6.0;
+const DURATION_S: f64 = 12.0;
 /// Around the turns an estimate hangs on where in a stroke it comes: many of them are needed.
 const DURATION_OF_STROKES_S: f64 = 18.0;
 

@@ -237,13 +237,18 @@ impl Sums {
                 return None;
             }
             pivots[j] = 1.0 / a[j][j];
-            let column = a.map(|row| row[j]);
-            for (i, row) in a.iter_mut().enumerate().skip(j + 1) {
-                row[j] *= pivots[j];
-                let factor = row[j];
-                for (x, above) in row[j + 1..=i].iter_mut().zip(&column[j + 1..]) {
-                    *x -= factor * above;
+            for i in j + 1..ALL {
+                let factor = a[i][j] * pivots[j];
+                #[allow(
+                    clippy::needless_range_loop,
+                    reason = "two rows of one matrix; a slice of each is twice the instructions on the board"
+                )]
+                for k in j + 1..=i {
+                    a[i][k] -= factor * a[k][j];
                 }
+            }
+            for row in &mut a[j + 1..] {
+                row[j] *= pivots[j];
             }
         }
         let mut fitted = Fitted::default();

@@ -180,7 +180,7 @@ fn a_noisy_gauge_is_found_and_forgiven() {
 }
 
 #[test]
-#[ignore = "nothing is valid until a noisy gauge is found, and the bank doubts itself for a second after"]
+#[ignore = "nothing is valid until a noisy gauge is found, and its second costs more than a fifth of the time"]
 fn the_others_go_on_while_a_gauge_is_noisy() {
     goes_on("noisy", 0.8);
 }
