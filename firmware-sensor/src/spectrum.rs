@@ -256,11 +256,8 @@ impl Spectrum {
         let survey = &mut self.survey;
         (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
-        // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
-        // shorter one in knots that are too long for it.
-        let beyond = averaged[0].max(averaged[CANDIDATES - 1]);
-        let highest = highest_peak(&averaged).filter(|&peak| averaged[peak] >= beyond);
-        let (Some(highest), Some(momentary)) = (highest, highest_peak(&energies)) else {
+        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
+        else {
             return;
         };
         let kept = self.kept_peak(&averaged, highest);
