@@ -29,13 +29,14 @@ use crate::travel::Travel;
 
 use evidence::{LineEvidence, WaveEvidence, best_of};
 use fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};
-use jerk::{Jerk, SECOND_DIFFERENCE_NOISE_GAIN, second_difference_gain};
+use jerk::Jerk;
 use knots::Knots;
 use periodogram::{
     CANDIDATES, PER_OCTAVE, Periodogram, Spectrum as Energies, highest_peak, is_peak, sharpness,
     vertex_mm,
 };
 use play::Play;
+use trend::Trend;
 
 pub mod evidence;
 mod fit;
@@ -45,6 +46,7 @@ mod periodogram;
 mod play;
 #[cfg(test)]
 mod tests;
+mod trend;
 
 /// The shortest and the longest wavelength that are stood by, in mm.
 pub const SHORTEST_MM: f32 = 0.6;
@@ -80,18 +82,17 @@ const GONE: f32 = 0.5;
 const FORGOTTEN: f32 = 0.01;
 /// A supposition that moves by more than this share is another one.
 const SAME: f32 = 0.1;
+/// A short fit this close to the trend, in ln λ, is about the line.
+const ON_THE_TREND: f32 = 0.15;
 /// The line's memory in wavelengths, as the periodogram's.
 const MEMORY_WAVES: f32 = 8.0;
 /// Probability of a wave from which on it is the surface, once it has been there for a wavelength.
 const CONVINCING: f32 = 0.8;
 /// Estimates for which a period that a fit has refused is not looked for again.
 const REFUSED_ESTIMATES: u8 = 20;
-/// Power at high frequencies that is not stood by without a force channel, relative to the wave's: a
-/// fingertip that sticks and slips is fast while it slips, whatever the arm does, and hops over ridges.
-const MOST_JERK: f32 = 0.025;
-/// What is left of a probability where that hints at stick and slip: a rough surface has as much power there,
-/// and λ̂ is right on most of them, but below the default level of 70 %.
-const WHERE_JERKY: f32 = 0.65;
+/// What is left of a probability where the gauges hint at stick and slip, without a force channel: below the
+/// default level. A fingertip that hops over ridges makes a clean wave of another λ.
+const WHERE_JERKY: f32 = 0.55;
 /// Millisecond of the ten before an estimate in which its work begins. In those after it the line is fitted,
 /// then the wave of the moment.
 const SURVEY_SLOT: u8 = 3;
@@ -135,6 +136,7 @@ pub struct Spectrum {
     /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
     known_mm: f32,
     known_share: f32,
+    trend: Trend,
 }
 
 /// The spectra's peaks, and what fits are under way.
@@ -237,6 +239,7 @@ impl Spectrum {
             weighed: Weighed::default(),
             known_mm: 0.0,
             known_share: 0.0,
+            trend: Trend::default(),
         }
     }
 
@@ -256,8 +259,11 @@ impl Spectrum {
         let survey = &mut self.survey;
         (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
-        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
-        else {
+        // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
+        // shorter one in knots that are too long for it.
+        let beyond = averaged[0].max(averaged[CANDIDATES - 1]);
+        let highest = highest_peak(&averaged).filter(|&peak| averaged[peak] >= beyond);
+        let (Some(highest), Some(momentary)) = (highest, highest_peak(&energies)) else {
             return;
         };
         let kept = self.kept_peak(&averaged, highest);
@@ -352,26 +358,6 @@ impl Spectrum {
         None
     }
 
-    /// Power that the gauges hold at high frequencies beyond noise and what a wave with sharp edges would
-    /// make at this speed, over the wave's.
-    fn jerk_over(&self, wavelength_mm: f32, explained: f32) -> f32 {
-        let hz = self.speed_mm_s / wavelength_mm;
-        let smooth = second_difference_gain(hz)
-            + second_difference_gain(2.0 * hz) / 10.0
-            + second_difference_gain(3.0 * hz) / 9.0
-            + second_difference_gain(5.0 * hz) / 25.0;
-        let noise: f32 = (0..GAUGES)
-            .filter(|gauge| self.touch.usable >> gauge & 1 == 1)
-            .map(|gauge| self.touch.noise[gauge])
-            .sum();
-        let quiet = self
-            .jerk
-            .steady(self.touch.usable.count_ones())
-            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
-        let power = self.jerk.power - quiet - 0.25 * noise;
-        power / explained.max(f32::MIN_POSITIVE) - smooth
-    }
-
     /// What is to be said of the line, where there is one.
     fn weigh_line(&mut self) -> Option<Supposition> {
         let line_mm = self.survey.line_mm?;
@@ -393,11 +379,9 @@ impl Spectrum {
         let fitted = strong
             .flatten()
             .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, 0.06)));
-        // A weak line's fit wanders: the average knows better.
-        let wavelength_mm = fitted.map_or(line_mm, |fitted| {
-            let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
-            line_mm * libm::powf(fitted.wavelength_mm / line_mm, trust)
-        });
+        let short = self.follow_trend(&found, line_mm);
+        let fitted = fitted.or(short);
+        let wavelength_mm = self.here_mm(fitted.as_ref(), line_mm);
         self.line.fitted_mm = fitted.map_or(0.0, |fitted| fitted.wavelength_mm);
         self.line.share = if fitted.is_some() { share } else { 0.0 };
         let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
@@ -440,7 +424,7 @@ impl Spectrum {
             .or(found[1])
             .is_none_or(|fitted| is_common(&fitted, self.touch.usable));
         let probability = if common {
-            (self.line.there * evidence.probability()).max(inherited)
+            (self.line.there * self.line.there * evidence.probability()).max(inherited)
         } else {
             0.0
         };
@@ -450,6 +434,50 @@ impl Spectrum {
             fitted: found[2].or(found[1]).or(fitted),
             new: false,
         })
+    }
+
+    /// Takes what a short fit says into the trend. That fit, if it is about the line.
+    fn follow_trend(
+        &mut self,
+        found: &[Option<Fitted>; LENGTH_COUNT],
+        line_mm: f32,
+    ) -> Option<Fitted> {
+        if off(line_mm, self.line.mm) >= SAME {
+            self.trend = Trend::default();
+        }
+        let waves = self.survey.fresh_mm / line_mm;
+        self.trend.advance(self.touch.place, waves);
+        let expected = self.trend.course();
+        let plausible = |fitted: &Fitted| {
+            off(fitted.wavelength_mm, line_mm) < 0.06
+                || expected.is_some_and(|course| {
+                    let there = course.here + course.slope * self.trend.away_mm(fitted.centre);
+                    (libm::logf(fitted.wavelength_mm) - there).abs() < ON_THE_TREND
+                })
+        };
+        let of_three = found[2].filter(plausible);
+        let short = of_three.or(found[1].filter(plausible))?;
+        // A fit's variance goes with the third power of its length.
+        let weight = if of_three.is_some() { 1.0 } else { 0.3 };
+        self.trend
+            .take(short.centre, short.wavelength_mm, weight * waves);
+        Some(short)
+    }
+
+    /// λ under the fingertip, by the line's fit: a strong one's, carried on along the trend from its middle to
+    /// here; a weak one wanders, and the trend knows better.
+    fn here_mm(&self, fitted: Option<&Fitted>, line_mm: f32) -> f32 {
+        match (fitted, self.trend.course()) {
+            (Some(fitted), Some(course)) => {
+                let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
+                let carried = libm::logf(fitted.wavelength_mm)
+                    - course.slope * self.trend.away_mm(fitted.centre);
+                libm::expf(course.here + trust * (carried - course.here))
+            }
+            (Some(fitted), None) => fitted.wavelength_mm,
+            (None, Some(course)) => libm::expf(course.here),
+            (None, None) => line_mm,
+        }
     }
 
     /// Whether most gauges feel a strong line as they did: what else there is has befallen the others.
@@ -513,6 +541,7 @@ impl Spectrum {
         };
         self.refused = 0;
         self.longer_fits = Default::default();
+        self.trend = Trend::default();
         self.jerk.restart();
     }
 
@@ -523,9 +552,19 @@ impl Spectrum {
         let fitted = said.fitted.unwrap_or_default();
         let amplitude_lsb = libm::sqrtf(2.0 * fitted.explained / count);
         let hz = self.speed_mm_s / said.wavelength_mm;
+        let noise: f32 = (0..GAUGES)
+            .filter(|gauge| usable >> gauge & 1 == 1)
+            .map(|gauge| self.touch.noise[gauge])
+            .sum();
         let jerky = !self.force_channel
             && !said.new
-            && self.jerk_over(said.wavelength_mm, fitted.explained) > MOST_JERK;
+            && self.jerk.is_slip(
+                said.wavelength_mm,
+                hz,
+                fitted.explained,
+                noise,
+                usable.count_ones(),
+            );
         let in_range = (SHORTEST_MM..=LONGEST_MM).contains(&said.wavelength_mm)
             && (LOWEST_HZ..=HIGHEST_HZ).contains(&hz)
             && amplitude_lsb >= MIN_AMPLITUDE_LSB

@@ -29,8 +29,18 @@ fn rub(
     wavelength_mm: f64,
     position_mm: impl Fn(f64) -> f64,
 ) -> Vec<Output> {
+    rub_waves(sensor, duration_s, |mm| mm / wavelength_mm, position_mm)
+}
+
+/// The same on a surface with `waves_at` waves from 0 to a place in mm.
+fn rub_waves(
+    sensor: &mut Sensor,
+    duration_s: f64,
+    waves_at: impl Fn(f64) -> f64,
+    position_mm: impl Fn(f64) -> f64,
+) -> Vec<Output> {
     let scan = |number: u64| -> Scan {
-        let x = position_mm(number as f64 / f64::from(SCAN_RATE_HZ)) / wavelength_mm;
+        let x = waves_at(position_mm(number as f64 / f64::from(SCAN_RATE_HZ)));
         std::array::from_fn(|channel| {
             let swing = SWING * grating(x + 0.137 * channel as f64);
             (f64::from(MID_RAIL_CODE) + OFFSETS[channel] + swing).floor() as u16
@@ -329,4 +339,36 @@ fn a_replay_is_the_same_bit_for_bit() {
 fn the_whole_state_is_within_24_kib() {
     let bytes = size_of::<Sensor>();
     assert!(bytes <= 24 * 1_024, "{bytes} bytes");
+}
+
+#[test]
+fn a_wave_outside_the_range_is_never_stood_by() {
+    // At these speeds 0.5 mm have images within the range in knots of 0.1 and 0.25 mm; a third of 10 mm is in it.
+    for (wavelength_mm, speed_mm_s) in [(0.5, 10.9), (0.5, 28.0), (0.5, 68.1), (10.0, 70.0)] {
+        let mut sensor = Sensor::new(SensorConfiguration::DEFAULT);
+        let outputs = rub(&mut sensor, 6.0, wavelength_mm, |t_s| speed_mm_s * t_s);
+        let stood_by = estimates(&outputs).iter().filter(|one| one.valid).count();
+        assert_eq!(stood_by, 0, "{wavelength_mm} mm at {speed_mm_s} mm/s");
+    }
+}
+
+#[test]
+fn on_a_gradient_the_wavelength_is_that_under_the_fingertip() {
+    // λ = 3 mm · e^(slope · x), so 1/λ summed up to x is:
+    let waves_at = |slope: f64| move |mm: f64| (1.0 - (-slope * mm).exp()) / (3.0 * slope);
+    for slope in [0.006, -0.006] {
+        let speed_mm_s = 60.0;
+        let mut sensor = Sensor::new(SensorConfiguration::DEFAULT);
+        let outputs = rub_waves(&mut sensor, 1.4, waves_at(slope), |t_s| speed_mm_s * t_s);
+        for estimate in &estimates(&outputs)[60..] {
+            let t_s = f64::from(estimate.instant_us) * 1e-6;
+            let truth_mm = 3.0 * (slope * speed_mm_s * t_s).exp();
+            let said_mm = f64::from(estimate.wavelength_mm.unwrap());
+            assert!(estimate.valid, "slope {slope}, {t_s} s");
+            assert!(
+                (said_mm / truth_mm - 1.0).abs() < 0.012,
+                "slope {slope}, {t_s} s: {said_mm} for {truth_mm} mm"
+            );
+        }
+    }
 }

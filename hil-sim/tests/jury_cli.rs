@@ -212,7 +212,12 @@ fn arguments_that_cannot_be_used_are_refused() {
     refuses(
         &folder,
         &["--surfaces", "1", "--max-age-ms", "1"],
-        &["--max-age-ms", "20 to 5000"],
+        &["--max-age-ms", "20..=5000"],
+    );
+    refuses(
+        &folder,
+        &["--surfaces", "1", "--valid-percent", "100"],
+        &["--valid-percent", "50..=99"],
     );
     refuses(
         &folder,

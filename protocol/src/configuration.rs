@@ -57,7 +57,7 @@ impl SensorConfiguration {
         counted_gauge: 2,
         gauges: 0b11111,
         waves: 8,
-        valid_percent: 70,
+        valid_percent: 60,
         force_channel: false,
         force_mn_per_v: 1_000,
         stiffness_n_per_m: 400,

@@ -42,6 +42,8 @@ pub(super) struct Fitted {
     pub wavelength_mm: f32,
     /// Standard deviation of ln λ, if what is left is white.
     pub sigma: f32,
+    /// The place that it is about: the mean of its knots'.
+    pub centre: Place,
     /// Energy of the usable gauges around their lines, and of it what the wave explains, in ADC steps².
     pub total: f32,
     /// See `total`.
@@ -87,6 +89,8 @@ pub(super) struct Pass {
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     waves: f32,
+    /// Sum of the knots' places, from the first one's.
+    places: f32,
     knots: u16,
     /// Lower triangle of Σ f fᵀ, f = (1, τ, cos, sin, θ cos, θ sin).
     normal: [[f32; ALL]; ALL],
@@ -154,13 +158,19 @@ impl Pass {
         let phasor = phasor((away as u32).wrapping_mul(self.increment));
         let angle = away as f32 * self.radians_per_place;
         let waves = knot.travel_mm / self.wavelength_mm;
+        self.sums.places += away as f32;
         self.sums.add(waves, phasor, angle, knot, &self.base);
         // A length ends with the knot that is nearest to its end.
         while self.next < self.lengths && self.sums.waves + 0.5 * waves >= LENGTHS[self.next] {
             self.sums.take_in();
-            self.found[self.next] =
-                self.sums
-                    .solve(self.wavelength_mm, LENGTHS[self.next], self.usable);
+            let mean = self.sums.places / f32::from(self.sums.knots);
+            self.found[self.next] = self
+                .sums
+                .solve(self.wavelength_mm, LENGTHS[self.next], self.usable)
+                .map(|fitted| Fitted {
+                    centre: origin.wrapping_add(mean as i32),
+                    ..fitted
+                });
             self.next += 1;
         }
         self.done = self.next == self.lengths;

@@ -6,8 +6,16 @@ use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{PLACES_PER_UM, Touch};
 use crate::phasor::phasor;
 
-/// Gain in power of the second difference for white noise behind the anti-aliasing filter.
-pub(super) const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
+/// Gain in power of the first and of the second difference for white noise behind the anti-aliasing filter.
+const FIRST_DIFFERENCE_NOISE_GAIN: f32 = 1.83;
+/// See [`FIRST_DIFFERENCE_NOISE_GAIN`].
+const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
+/// What a contact dulls a texture by: a Gaussian of this σ in mm, 0.24 mm wide at half height.
+const CONTACT_SIGMA_MM: f32 = 0.1;
+/// Power at high frequencies, relative to the wave's, that is never more than the noise's doubt.
+const LEAST_JERK: f32 = 0.005;
+/// What is faster than this is noise: a fingertip on its spring slips for some ms. White noise is at 303 Hz.
+const SLIPS_BELOW_HZ: f32 = 350.0;
 /// How much more than from its quiet moments steady power may be, which is known to a fifth or so.
 const STEADY_DOUBT: f32 = 1.05;
 /// Speed from which on a millisecond counts, in places a millisecond: 5 mm/s.
@@ -33,9 +41,12 @@ pub(super) struct Jerk {
     before: [[f32; GAUGES]; 2],
     /// Speed lately, in places a millisecond.
     speed: f32,
-    /// Means over the milliseconds that moved: power, and power by speed.
-    pub(super) power: f32,
+    /// Means over the milliseconds that moved: the second difference's power, and that by speed.
+    power: f32,
     by_speed: f32,
+    /// The same of the first difference's power, and of the speed in places a millisecond.
+    first: f32,
+    mean_speed: f32,
     /// The power by speed that a tenth of them are below: roughness passes as fast as the arm is.
     quiet: f32,
     samples: u32,
@@ -45,12 +56,13 @@ impl Jerk {
     /// Takes a millisecond's touch and its travel in places.
     pub(super) fn push(&mut self, touch: &Touch, travel: i32) {
         let [before, older] = self.before;
-        let power = gauges_of(touch.usable)
-            .map(|gauge| {
-                let second = touch.gauges[gauge] - 2.0 * before[gauge] + older[gauge];
-                second * second
-            })
-            .sum::<f32>();
+        let (mut first, mut power) = (0.0, 0.0);
+        for gauge in gauges_of(touch.usable) {
+            let step = touch.gauges[gauge] - before[gauge];
+            let second = step - (before[gauge] - older[gauge]);
+            first += step * step;
+            power += second * second;
+        }
         self.before = [touch.gauges, before];
         self.speed += (travel.abs() as f32 - self.speed) * (1.0 / SPEED_SAMPLES);
         if self.speed < MOVED_PLACES {
@@ -66,6 +78,8 @@ impl Jerk {
         let by_speed = power / self.speed;
         self.power += (power - self.power) * share;
         self.by_speed += (by_speed - self.by_speed) * share;
+        self.first += (first - self.first) * share;
+        self.mean_speed += (self.speed - self.mean_speed) * share;
         if self.quiet == 0.0 {
             self.quiet = by_speed;
         }
@@ -81,20 +95,68 @@ impl Jerk {
 
     /// Begins anew on another surface, where it is as quiet as before in between.
     pub(super) fn restart(&mut self) {
-        (self.samples, self.power, self.by_speed) = (2, 0.0, 0.0);
+        *self = Self {
+            samples: 2,
+            power: 0.0,
+            by_speed: 0.0,
+            first: 0.0,
+            mean_speed: 0.0,
+            ..*self
+        };
+    }
+
+    /// Whether the fingertip seems to stick and slip, on a wave of that power in as many gauges, passing at
+    /// `hz` for the arm: there is power at high frequencies that neither `noise` nor the surface makes. A
+    /// fingertip that slips is fast for some ms, whatever the arm does: at the arm's speed that would be waves
+    /// finer than a contact lets through.
+    pub(super) fn is_slip(
+        &self,
+        wavelength_mm: f32,
+        hz: f32,
+        explained: f32,
+        noise: f32,
+        gauges: u32,
+    ) -> bool {
+        // What a wave with sharp edges makes, as far as the contact leaves them sharp.
+        let wave = |number: f32, share: f32| {
+            share * second_difference_gain(number * hz) * let_through(number / wavelength_mm)
+        };
+        let edges = wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04);
+        let surface = explained * edges / let_through(1.0 / wavelength_mm);
+        let second = (self.power - SECOND_DIFFERENCE_NOISE_GAIN * noise).max(0.0);
+        let first = self.first - FIRST_DIFFERENCE_NOISE_GAIN * noise;
+        // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
+        let sine = if second < 4.0 * first {
+            0.5 * libm::sqrtf(second / first)
+        } else {
+            1.0
+        };
+        let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
+        let per_mm = slip_hz * PLACES_PER_UM as f32 / self.mean_speed.max(f32::MIN_POSITIVE);
+        let quiet = self
+            .steady(gauges)
+            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
+        let left = self.power - quiet - 0.25 * noise - surface;
+        slip_hz < SLIPS_BELOW_HZ && left > explained * let_through(per_mm).max(LEAST_JERK)
     }
 
     /// What the mean power may be if it is always as in the quiet moments, speed for speed, with `gauges`
     /// gauges: a fingertip that sticks and slips is quiet in between, noise and a rough surface are not.
-    pub(super) fn steady(&self, gauges: u32) -> f32 {
+    fn steady(&self, gauges: u32) -> f32 {
         let gauges = (gauges as usize).clamp(1, GAUGES);
         let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * self.by_speed.max(f32::MIN_POSITIVE));
         (STEADY_DOUBT * share * self.power).min(STEADY_DOUBT * self.power)
     }
 }
 
+/// Share of a wave's power that a contact lets through, by its wavenumber in cycles per mm.
+fn let_through(per_mm: f32) -> f32 {
+    let radians = 2.0 * core::f32::consts::PI * CONTACT_SIGMA_MM * per_mm;
+    libm::expf(-(radians * radians).min(40.0))
+}
+
 /// Power gain of the second difference at 1 kHz, (2 sin(πf/fs))⁴, up to half the sample rate.
-pub(super) fn second_difference_gain(frequency_hz: f32) -> f32 {
+fn second_difference_gain(frequency_hz: f32) -> f32 {
     let half_turns = (frequency_hz / SAMPLE_RATE_HZ as f32).min(0.5);
     let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
     let square = 4.0 * sin * sin;

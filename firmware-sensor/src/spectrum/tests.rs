@@ -10,6 +10,7 @@ use protocol::GAUGES;
 use super::fit::{LENGTH_COUNT, LENGTHS, Pass};
 use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
 use super::periodogram::{Periodogram, highest_peak, sharpness, vertex_mm, wavelength_mm};
+use super::trend::Trend;
 use crate::estimator::PLACES_PER_MM;
 
 const ALL: u8 = 0b1_1111;
@@ -180,4 +181,35 @@ fn gauges_that_are_left_out_have_no_energy() {
     assert!(total(0b0_0011) > 1e3);
     assert!((total(ALL) / total(0b0_0011) - 1.0).abs() < 1e-6);
     assert_eq!(total(0b1_1100), 0.0);
+}
+
+/// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind.
+fn trend(mut ln_mm: impl FnMut(f32) -> f32) -> (Trend, f32) {
+    let (mut trend, mut mm) = (Trend::default(), 0.0);
+    for step in 0..300 {
+        let forth = step / 40 % 2 == 0;
+        mm += if forth { 0.5 } else { -0.5 };
+        let behind_mm = if forth { mm - 5.0 } else { mm + 5.0 };
+        let place = |mm: f32| (mm * PLACES_PER_MM as f32) as i32;
+        trend.advance(place(mm), 0.2);
+        trend.take(place(behind_mm), libm::expf(ln_mm(behind_mm)), 0.2);
+    }
+    (trend, mm)
+}
+
+#[test]
+fn the_trend_tells_the_wavelength_here() {
+    let (trend, mm) = trend(|mm| 1.0 + 0.008 * mm);
+    let course = trend.course().unwrap();
+    assert!((course.here - (1.0 + 0.008 * mm)).abs() < 1e-3, "{course:?} at {mm} mm");
+    assert!((course.slope - 0.008).abs() < 3e-4, "{course:?}");
+}
+
+#[test]
+fn the_trend_finds_no_slope_in_chance() {
+    let mut noise = Noise(7);
+    let (trend, _) = trend(|_| 1.0 + 0.03 * noise.even());
+    let course = trend.course().unwrap();
+    assert!((course.here - 1.0).abs() < 0.01, "{course:?}");
+    assert!(course.slope.abs() < 0.001, "{course:?}");
 }

@@ -57,7 +57,7 @@ pub(super) struct Jury {
     #[arg(long, value_name = "COUNT", default_value_t = 200)]
     surfaces: u64,
     /// Judge the scenes of this folder instead, which has an index.json with their truths
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits", "max_age_ms"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits"])]
     folder: Option<PathBuf>,
     /// What runs a folder's scenes
     #[arg(long, value_enum, default_value_t = EngineName::Native, requires = "folder")]
@@ -65,14 +65,17 @@ pub(super) struct Jury {
     /// How λ is estimated [default: as configured on a board; in a folder, as each scene says]
     #[arg(long, value_enum)]
     method: Option<MethodName>,
-    /// Age of the last valid estimate at which the display fades out, in ms [default: a board's]
-    #[arg(long, value_name = "MS")]
+    /// Confidence from which on an estimate is valid, in percent, 50 to 99 [default: as above]
+    #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(50..=99))]
+    valid_percent: Option<u8>,
+    /// Age of the last valid estimate at which the display fades out, in ms, 20 to 5 000 [default: as above]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(20..=5_000))]
     max_age_ms: Option<u16>,
     /// Print the table by what makes surfaces hard, too
     #[arg(long)]
     traits: bool,
     /// Print the weights of the default estimator's evidence that these surfaces ask for, and judge nothing
-    #[arg(long, conflicts_with_all = ["folder", "method", "max_age_ms", "traits", "json"])]
+    #[arg(long, conflicts_with_all = ["folder", "method", "valid_percent", "max_age_ms", "traits", "json"])]
     weights: bool,
     /// Where to write everything as JSON, surface by surface
     #[arg(long, value_name = "FILE")]
@@ -103,6 +106,7 @@ struct Strangers {
     surfaces: u64,
     purpose: &'static str,
     method: &'static str,
+    valid_percent: u8,
     max_age_ms: u16,
     intervals: &'static str,
     classes: Vec<Row>,
@@ -206,6 +210,9 @@ impl Jury {
         if let Some(method) = self.method {
             sensor.method = method.into();
         }
+        if let Some(percent) = self.valid_percent {
+            sensor.valid_percent = percent;
+        }
         let mut display = DisplayConfiguration::DEFAULT;
         if let Some(max_age_ms) = self.max_age_ms {
             display.max_age_ms = max_age_ms;
@@ -246,8 +253,9 @@ impl Jury {
 
         let last = self.seed.saturating_add(self.surfaces - 1);
         say!(
-            "seeds {}–{last} ({purpose}), method {method}, display holds {} ms; intervals: {}",
+            "seeds {}–{last} ({purpose}), method {method}, valid from {} %, display holds {} ms; intervals: {}",
             self.seed,
+            sensor.valid_percent,
             display.max_age_ms,
             table::INTERVALS
         );
@@ -266,6 +274,7 @@ impl Jury {
                 surfaces: self.surfaces,
                 purpose,
                 method,
+                valid_percent: sensor.valid_percent,
                 max_age_ms: display.max_age_ms,
                 intervals: table::INTERVALS,
                 classes,
@@ -284,6 +293,12 @@ impl Jury {
                 let mut scene = way::load(&entry.scene, self.engine)?;
                 if let Some(method) = self.method {
                     scene.estimator.method = method.into();
+                }
+                if let Some(percent) = self.valid_percent {
+                    scene.estimator.valid_percent = percent;
+                }
+                if let Some(max_age_ms) = self.max_age_ms {
+                    scene.display.configuration.max_age_ms = max_age_ms;
                 }
                 anyhow::Ok((entry, scene))
             })

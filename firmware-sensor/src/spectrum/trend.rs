@@ -1,0 +1,97 @@
+//! How λ changes along the way.
+//!
+//! A fit over a few waves is about the place in their middle: on a surface whose λ changes it lags behind the
+//! fingertip. A straight line through what the latest short fits say of ln λ, over the places that they are
+//! about, tells what λ is here. Places, not travel: after a turn the fits come by the same places again.
+
+use crate::estimator::{PLACES_PER_MM, Place};
+
+/// Travel for which a fit is remembered, in wavelengths.
+const MEMORY_WAVES: f32 = 5.0;
+/// How much of a slope is not believed, in its own variances: on a surface that has none, 84 % of the time
+/// none is said.
+const DOUBT: f32 = 2.0;
+/// Variance of ln λ that no fit is better than, (0.3 %)²: what turns and uneven ridges do to it.
+const LEAST_VARIANCE: f32 = 1e-5;
+/// Steepest slope of ln λ that a surface has, per mm.
+const STEEPEST: f32 = 0.015;
+
+/// The line, as weighted sums over the fits.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Trend {
+    /// Where x = 0; x in mm, y = ln λ.
+    here: Place,
+    weight: f32,
+    x: f32,
+    y: f32,
+    xx: f32,
+    xy: f32,
+    yy: f32,
+}
+
+/// What the trend says.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    /// ln λ here.
+    pub here: f32,
+    /// Its slope per mm.
+    pub slope: f32,
+}
+
+impl Trend {
+    /// Goes on to `here`, `waves` later.
+    pub fn advance(&mut self, here: Place, waves: f32) {
+        let moved_mm = self.away_mm(here);
+        self.here = here;
+        self.xx += moved_mm * (moved_mm * self.weight - 2.0 * self.x);
+        self.xy -= moved_mm * self.y;
+        self.x -= moved_mm * self.weight;
+        let keep = MEMORY_WAVES / (MEMORY_WAVES + waves);
+        for sum in [
+            &mut self.weight,
+            &mut self.x,
+            &mut self.y,
+            &mut self.xx,
+            &mut self.xy,
+            &mut self.yy,
+        ] {
+            *sum *= keep;
+        }
+    }
+
+    /// How far from here a place is, in mm.
+    pub fn away_mm(&self, place: Place) -> f32 {
+        place.wrapping_sub(self.here) as f32 * (1.0 / PLACES_PER_MM as f32)
+    }
+
+    /// Takes a fit about `place`, of that weight: how many waves after the last one, for one over three waves.
+    pub fn take(&mut self, place: Place, wavelength_mm: f32, weight: f32) {
+        let (x, y) = (self.away_mm(place), libm::logf(wavelength_mm));
+        self.weight += weight;
+        self.x += weight * x;
+        self.y += weight * y;
+        self.xx += weight * x * x;
+        self.xy += weight * x * y;
+        self.yy += weight * y * y;
+    }
+
+    /// The line by least squares, its slope shrunk by what may be chance. `None` before the first fit.
+    pub fn course(&self) -> Option<Course> {
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let scale = 1.0 / self.weight;
+        let (x, y) = (self.x * scale, self.y * scale);
+        let spread = (self.xx * scale - x * x).max(1e-6);
+        let common = self.xy * scale - x * y;
+        let slope = (common / spread).clamp(-STEEPEST, STEEPEST);
+        let rest = (self.yy * scale - y * y - common * common / spread).max(0.0);
+        let young = MEMORY_WAVES * scale;
+        let chance = DOUBT * young * (rest + LEAST_VARIANCE) / spread;
+        let slope = slope * (1.0 - chance / (slope * slope).max(f32::MIN_POSITIVE)).max(0.0);
+        Some(Course {
+            here: y - slope * x,
+            slope,
+        })
+    }
+}
