@@ -176,9 +176,22 @@ struct Line {
     /// 1 as long as a strong line is still there, falling to 0 as it goes.
     there: f32,
     weight: f32,
-    /// Mean and variance of ln λ over twice that memory.
+    /// Mean of ln λ here and its variance about the trend, over twice that memory.
     mean: f32,
     variance: f32,
+}
+
+/// What an estimate adds to the line.
+struct Seen {
+    fresh_mm: f32,
+    /// ln λ of the line here, and how much the trend has changed it on the way here.
+    ln_here: f32,
+    drift: f32,
+    /// See [`Survey::agree`].
+    agrees: bool,
+    /// Of the fits over three and eight waves: how far from the line, and shares.
+    wander: [f32; 2],
+    shares: [f32; 2],
 }
 
 /// The wave of the moment, from one estimate to the next.
@@ -279,19 +292,20 @@ impl Spectrum {
         survey.maturity = self.periodogram.maturity(number);
         let total: f32 = energies.iter().sum();
         survey.presence = energies[number] / (total * averaged[number]).max(f32::MIN_POSITIVE);
-        survey.agree = off(momentary_mm, line_mm) < 0.12;
+        let here_mm = self.trend.of_average(line_mm);
+        survey.agree = off(momentary_mm, here_mm) < 0.12;
 
         let base = self.periodogram.level();
         let strong = self.line.share > STRONG;
         let near = if strong { 0.2 } else { 0.06 };
-        let start_mm = if off(self.line.fitted_mm, line_mm) < near
+        let start_mm = if off(self.line.fitted_mm, here_mm) < near
             && (!strong || off(self.line.fitted_mm, momentary_mm) < 0.15)
         {
             self.line.fitted_mm
         } else if survey.agree && !survey.longer {
             momentary_mm
         } else {
-            line_mm
+            here_mm
         };
         self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
         let lengths = if self.shorter_so_far == 0 {
@@ -305,7 +319,7 @@ impl Spectrum {
             .map(|number| vertex_mm(&short, number, false))
             .filter(|&mm| {
                 let known = self.known_mm > 0.0 && off(mm, self.known_mm) > 0.25;
-                off(mm, line_mm) > 0.12 && (known || off(mm, self.wave.mm) < SAME)
+                off(mm, here_mm) > 0.12 && (known || off(mm, self.wave.mm) < SAME)
             });
         let wave_mm = newest.or((!survey.agree).then_some(momentary_mm));
         survey.wave_pass = wave_mm.map(|mm| {
@@ -368,32 +382,51 @@ impl Spectrum {
         } else {
             longer.copy_from_slice(&self.longer_fits);
         }
+        let (here_mm, drift) = self.follow_trend(&found, line_mm);
+        // What they say of λ here.
+        let middles = found.map(|fitted| fitted.map_or(0.0, |fitted| fitted.wavelength_mm));
+        for fitted in found.iter_mut().flatten() {
+            fitted.wavelength_mm = self.trend.of_fit(fitted.wavelength_mm, fitted.centre);
+        }
         let near = |n: usize, share: f32| {
-            found[n].filter(|fitted| off(fitted.wavelength_mm, line_mm) < share)
+            found[n]
+                .filter(|fitted| off(fitted.wavelength_mm, here_mm) < share)
+                .map(|_| n)
         };
         if self.survey.longer && found[2].is_some() && near(2, 0.05).is_none() {
             self.refused = REFUSED_ESTIMATES;
         }
-        let share = near(1, 0.2).map_or(0.0, |fitted| fitted.share());
+        let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
+        let share = near(1, 0.2).map_or(0.0, share_over);
         let strong = (share > STRONG).then(|| longest_that_agrees(&found));
-        let fitted = strong
+        let chosen = strong
             .flatten()
             .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, 0.06)));
-        let short = self.follow_trend(&found, line_mm);
-        let fitted = fitted.or(short);
-        let wavelength_mm = self.here_mm(fitted.as_ref(), line_mm);
-        self.line.fitted_mm = fitted.map_or(0.0, |fitted| fitted.wavelength_mm);
+        let fitted = chosen.and_then(|n| found[n]);
+        // A weak line's fit wanders: the trend knows better.
+        let wavelength_mm = match (fitted, self.trend.course()) {
+            (Some(fitted), Some(course)) => {
+                let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
+                let fit = libm::logf(fitted.wavelength_mm);
+                libm::expf(course.here + trust * (fit - course.here))
+            }
+            (Some(fitted), None) => fitted.wavelength_mm,
+            (None, Some(course)) => libm::expf(course.here),
+            (None, None) => here_mm,
+        };
+        self.line.fitted_mm = chosen.map_or(0.0, |n| middles[n]);
         self.line.share = if fitted.is_some() { share } else { 0.0 };
-        let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
         let wander =
-            |n: usize| found[n].map_or(0.15, |fitted| off(fitted.wavelength_mm, line_mm).min(0.15));
-        self.line.follow(
-            line_mm,
-            self.survey.fresh_mm,
-            self.survey.agree,
-            [wander(2), wander(4)],
-            [share_over(2), share_over(4)],
-        );
+            |n: usize| found[n].map_or(0.15, |fitted| off(fitted.wavelength_mm, here_mm).min(0.15));
+        let seen = Seen {
+            fresh_mm: self.survey.fresh_mm,
+            ln_here: libm::logf(here_mm),
+            drift,
+            agrees: self.survey.agree,
+            wander: [wander(2), wander(4)],
+            shares: [share_over(2), share_over(4)],
+        };
+        self.line.follow(line_mm, &seen);
         // A strong wave that explains much less than it used to is going, whatever its past says.
         self.line.there = if self.line.usual > KNOWN {
             let share = share_over(2) / self.line.usual;
@@ -408,7 +441,7 @@ impl Spectrum {
             shares: [share_over(1), share_over(2), share_over(4)],
             wander: self.line.squares.map(libm::sqrtf),
             agreement: self.line.agreement,
-            distance: off(wavelength_mm, line_mm),
+            distance: off(wavelength_mm, here_mm),
             presence: self.survey.presence,
             sharpness: self.survey.sharpness,
             spread: libm::sqrtf(self.line.variance),
@@ -436,48 +469,31 @@ impl Spectrum {
         })
     }
 
-    /// Takes what a short fit says into the trend. That fit, if it is about the line.
-    fn follow_trend(
-        &mut self,
-        found: &[Option<Fitted>; LENGTH_COUNT],
-        line_mm: f32,
-    ) -> Option<Fitted> {
+    /// Goes on with the trend, and takes what a short fit says into it. λ of the line here, in mm, and how
+    /// much ln λ has changed on the way here.
+    fn follow_trend(&mut self, found: &[Option<Fitted>; LENGTH_COUNT], line_mm: f32) -> (f32, f32) {
         if off(line_mm, self.line.mm) >= SAME {
             self.trend = Trend::default();
         }
         let waves = self.survey.fresh_mm / line_mm;
-        self.trend.advance(self.touch.place, waves);
+        let moved_mm = self.trend.advance(self.touch.place, waves);
+        let here_mm = self.trend.of_average(line_mm);
         let expected = self.trend.course();
         let plausible = |fitted: &Fitted| {
-            off(fitted.wavelength_mm, line_mm) < 0.06
-                || expected.is_some_and(|course| {
-                    let there = course.here + course.slope * self.trend.away_mm(fitted.centre);
-                    (libm::logf(fitted.wavelength_mm) - there).abs() < ON_THE_TREND
-                })
+            let fit_mm = self.trend.of_fit(fitted.wavelength_mm, fitted.centre);
+            off(fit_mm, here_mm) < 0.06
+                || expected
+                    .is_some_and(|course| (libm::logf(fit_mm) - course.here).abs() < ON_THE_TREND)
         };
         let of_three = found[2].filter(plausible);
-        let short = of_three.or(found[1].filter(plausible))?;
-        // A fit's variance goes with the third power of its length.
-        let weight = if of_three.is_some() { 1.0 } else { 0.3 };
-        self.trend
-            .take(short.centre, short.wavelength_mm, weight * waves);
-        Some(short)
-    }
-
-    /// λ under the fingertip, by the line's fit: a strong one's, carried on along the trend from its middle to
-    /// here; a weak one wanders, and the trend knows better.
-    fn here_mm(&self, fitted: Option<&Fitted>, line_mm: f32) -> f32 {
-        match (fitted, self.trend.course()) {
-            (Some(fitted), Some(course)) => {
-                let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
-                let carried = libm::logf(fitted.wavelength_mm)
-                    - course.slope * self.trend.away_mm(fitted.centre);
-                libm::expf(course.here + trust * (carried - course.here))
-            }
-            (Some(fitted), None) => fitted.wavelength_mm,
-            (None, Some(course)) => libm::expf(course.here),
-            (None, None) => line_mm,
+        if let Some(short) = of_three.or(found[1].filter(plausible)) {
+            // A fit's variance goes with the third power of its length.
+            let weight = if of_three.is_some() { 1.0 } else { 0.3 };
+            self.trend
+                .take(short.centre, short.wavelength_mm, weight * waves);
         }
+        let slope = self.trend.course().map_or(0.0, |course| course.slope);
+        (self.trend.of_average(line_mm), slope * moved_mm)
     }
 
     /// Whether most gauges feel a strong line as they did: what else there is has befallen the others.
@@ -626,23 +642,24 @@ fn misfits(fitted: &Fitted, usable: u8, valid: bool) -> u8 {
 }
 
 impl Line {
-    /// Goes on at `mm`, `fresh_mm` of travel later.
-    fn follow(&mut self, mm: f32, fresh_mm: f32, agrees: bool, wander: [f32; 2], shares: [f32; 2]) {
-        let waves = fresh_mm / mm;
+    /// Goes on at `mm`.
+    fn follow(&mut self, mm: f32, seen: &Seen) {
+        let waves = seen.fresh_mm / mm;
         self.young_waves -= waves;
         if off(mm, self.mm) < SAME {
             self.held_waves += waves;
         } else {
             self.held_waves = 0.0;
             self.weight = 0.0;
-            self.mean = libm::logf(mm);
+            self.mean = seen.ln_here;
             self.variance = 0.0;
             self.usual = 0.0;
             self.young_waves = 0.0;
         }
         self.mm = mm;
         let slow = waves / (2.0 * MEMORY_WAVES + waves);
-        let away = libm::logf(mm) - self.mean;
+        self.mean += seen.drift;
+        let away = seen.ln_here - self.mean;
         self.mean += slow * away;
         self.variance += slow * (away * away - self.variance);
         let follow = waves / (MEMORY_WAVES + waves);
@@ -652,20 +669,20 @@ impl Line {
         } else {
             1.0
         };
-        self.agreement += share * (f32::from(u8::from(agrees)) - self.agreement);
-        for (square, wander) in self.squares.iter_mut().zip(wander) {
+        self.agreement += share * (f32::from(u8::from(seen.agrees)) - self.agreement);
+        for (square, wander) in self.squares.iter_mut().zip(seen.wander) {
             *square += share * (wander * wander - *square);
         }
-        for (kept, now) in self.shares.iter_mut().zip(shares) {
+        for (kept, now) in self.shares.iter_mut().zip(seen.shares) {
             *kept += share * (now - *kept);
         }
         self.usual = self.shares[0].max(self.usual - FORGOTTEN * waves);
     }
 }
 
-/// The longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on; none if the one over
+/// Which is the longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on; none if the one over
 /// three waves contradicts that over two, as where the arm turns.
-fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<Fitted> {
+fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<usize> {
     let shortest = found[1]?;
     let (mut low, mut high) = (0.0_f32, f32::MAX);
     let mut longest = None;
@@ -677,11 +694,9 @@ fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<Fitted>
         if low > high || fitted.share() < STRONG * shortest.share() {
             break;
         }
-        longest = Some((n, fitted));
+        longest = Some(n);
     }
-    longest
-        .filter(|(n, _)| *n > 1 || found[2].is_none())
-        .map(|(_, fitted)| fitted)
+    longest.filter(|&n| n > 1 || found[2].is_none())
 }
 
 /// The moment's highest peak, or the line's where that peak is its second or third harmonic.

@@ -361,7 +361,7 @@ fn on_a_gradient_the_wavelength_is_that_under_the_fingertip() {
         let mut sensor = Sensor::new(SensorConfiguration::DEFAULT);
         let outputs = rub_waves(&mut sensor, 1.4, waves_at(slope), |t_s| speed_mm_s * t_s);
         for estimate in &estimates(&outputs)[60..] {
-            let t_s = f64::from(estimate.instant_us) * 1e-6;
+            let t_s = estimate.instant_us as f64 * 1e-6;
             let truth_mm = 3.0 * (slope * speed_mm_s * t_s).exp();
             let said_mm = f64::from(estimate.wavelength_mm.unwrap());
             assert!(estimate.valid, "slope {slope}, {t_s} s");

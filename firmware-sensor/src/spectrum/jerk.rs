@@ -117,12 +117,19 @@ impl Jerk {
         noise: f32,
         gauges: u32,
     ) -> bool {
+        let quiet = self
+            .steady(gauges)
+            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
+        let left = self.power - quiet - 0.25 * noise;
+        if left <= LEAST_JERK * explained {
+            return false;
+        }
         // What a wave with sharp edges makes, as far as the contact leaves them sharp.
         let wave = |number: f32, share: f32| {
             share * second_difference_gain(number * hz) * let_through(number / wavelength_mm)
         };
         let edges = wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04);
-        let surface = explained * edges / let_through(1.0 / wavelength_mm);
+        let left = left - explained * edges / let_through(1.0 / wavelength_mm);
         let second = (self.power - SECOND_DIFFERENCE_NOISE_GAIN * noise).max(0.0);
         let first = self.first - FIRST_DIFFERENCE_NOISE_GAIN * noise;
         // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
@@ -133,10 +140,6 @@ impl Jerk {
         };
         let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
         let per_mm = slip_hz * PLACES_PER_UM as f32 / self.mean_speed.max(f32::MIN_POSITIVE);
-        let quiet = self
-            .steady(gauges)
-            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
-        let left = self.power - quiet - 0.25 * noise - surface;
         slip_hz < SLIPS_BELOW_HZ && left > explained * let_through(per_mm).max(LEAST_JERK)
     }
 

@@ -18,10 +18,12 @@ const SHORTEST_MM: f32 = 0.5;
 pub(super) const PER_OCTAVE: usize = 6;
 /// Travel constant of each of the two poles, in wavelengths.
 const POLE_WAVES: f32 = 0.7;
+/// Travel that the energies lag behind by, in wavelengths: both poles'.
+pub(super) const KERNEL_WAVES: f32 = 2.0 * POLE_WAVES;
 /// Travel constant of the high-pass in front, in mm: drift and slopes are not to leak into long waves.
 const HIGH_PASS_MM: f32 = 3.0;
 /// Travel constant of the average, in wavelengths.
-const AVERAGE_WAVES: f32 = 14.0;
+pub(super) const AVERAGE_WAVES: f32 = 14.0;
 /// Weight of a pole below which it is not looked at.
 const LEAST_WEIGHT: f32 = 1e-3;
 

@@ -201,7 +201,10 @@ fn trend(mut ln_mm: impl FnMut(f32) -> f32) -> (Trend, f32) {
 fn the_trend_tells_the_wavelength_here() {
     let (trend, mm) = trend(|mm| 1.0 + 0.008 * mm);
     let course = trend.course().unwrap();
-    assert!((course.here - (1.0 + 0.008 * mm)).abs() < 1e-3, "{course:?} at {mm} mm");
+    assert!(
+        (course.here - (1.0 + 0.008 * mm)).abs() < 1e-3,
+        "{course:?} at {mm} mm"
+    );
     assert!((course.slope - 0.008).abs() < 3e-4, "{course:?}");
 }
 

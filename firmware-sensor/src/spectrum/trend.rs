@@ -4,6 +4,7 @@
 //! fingertip. A straight line through what the latest short fits say of ln λ, over the places that they are
 //! about, tells what λ is here. Places, not travel: after a turn the fits come by the same places again.
 
+use super::periodogram::{AVERAGE_WAVES, KERNEL_WAVES};
 use crate::estimator::{PLACES_PER_MM, Place};
 
 /// Travel for which a fit is remembered, in wavelengths.
@@ -16,6 +17,10 @@ const LEAST_VARIANCE: f32 = 1e-5;
 /// Steepest slope of ln λ that a surface has, per mm.
 const STEEPEST: f32 = 0.015;
 
+/// Travel constant by which the averaged spectrum's peak lags: half the average's, as the peak of what moves
+/// away exponentially is nearer to the newest than its mean.
+const PEAK_WAVES: f32 = 0.5 * AVERAGE_WAVES;
+
 /// The line, as weighted sums over the fits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Trend {
@@ -27,6 +32,10 @@ pub(super) struct Trend {
     xx: f32,
     xy: f32,
     yy: f32,
+    /// Place that the spectrum of the moment is about, and the averaged one's peak, in mm from here.
+    moment_mm: f32,
+    average_mm: f32,
+    course: Option<Course>,
 }
 
 /// What the trend says.
@@ -39,8 +48,8 @@ pub(super) struct Course {
 }
 
 impl Trend {
-    /// Goes on to `here`, `waves` later.
-    pub fn advance(&mut self, here: Place, waves: f32) {
+    /// Goes on to `here`, `waves` later. The way there, in mm.
+    pub fn advance(&mut self, here: Place, waves: f32) -> f32 {
         let moved_mm = self.away_mm(here);
         self.here = here;
         self.xx += moved_mm * (moved_mm * self.weight - 2.0 * self.x);
@@ -57,10 +66,36 @@ impl Trend {
         ] {
             *sum *= keep;
         }
+        self.moment_mm = (self.moment_mm - moved_mm) * KERNEL_WAVES / (KERNEL_WAVES + waves);
+        self.average_mm -= moved_mm;
+        let follow = waves / (PEAK_WAVES + waves);
+        self.average_mm += follow * (self.moment_mm - self.average_mm);
+        self.course = self.fit();
+        moved_mm
+    }
+
+    /// λ here, by what it is as the averaged spectrum's peak.
+    pub fn of_average(&self, wavelength_mm: f32) -> f32 {
+        self.carried(wavelength_mm, self.average_mm)
+    }
+
+    /// The same of a fit about `place`.
+    pub fn of_fit(&self, wavelength_mm: f32, place: Place) -> f32 {
+        self.carried(wavelength_mm, self.away_mm(place))
+    }
+
+    /// λ here, by what it is so far from here.
+    fn carried(&self, wavelength_mm: f32, away_mm: f32) -> f32 {
+        match self.course {
+            Some(course) if course.slope != 0.0 => {
+                wavelength_mm * libm::expf(-course.slope * away_mm)
+            }
+            _ => wavelength_mm,
+        }
     }
 
     /// How far from here a place is, in mm.
-    pub fn away_mm(&self, place: Place) -> f32 {
+    fn away_mm(&self, place: Place) -> f32 {
         place.wrapping_sub(self.here) as f32 * (1.0 / PLACES_PER_MM as f32)
     }
 
@@ -73,10 +108,16 @@ impl Trend {
         self.xx += weight * x * x;
         self.xy += weight * x * y;
         self.yy += weight * y * y;
+        self.course = self.fit();
     }
 
-    /// The line by least squares, its slope shrunk by what may be chance. `None` before the first fit.
+    /// What it says. `None` before the first fit.
     pub fn course(&self) -> Option<Course> {
+        self.course
+    }
+
+    /// The line by least squares, its slope shrunk by what may be chance.
+    fn fit(&self) -> Option<Course> {
         if self.weight <= 0.0 {
             return None;
         }
