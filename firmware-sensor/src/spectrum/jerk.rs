@@ -10,9 +10,11 @@ use crate::phasor::phasor;
 const FIRST_DIFFERENCE_NOISE_GAIN: f32 = 1.83;
 /// See [`FIRST_DIFFERENCE_NOISE_GAIN`].
 const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
+/// What of the noise's variance is not known: a tenth of what it makes of the second difference.
+const NOISE_DOUBT: f32 = 0.5;
 /// What a contact dulls a texture by: a Gaussian of this σ in mm, 0.24 mm wide at half height.
 const CONTACT_SIGMA_MM: f32 = 0.1;
-/// Power at high frequencies, relative to the wave's, that is never more than the noise's doubt.
+/// Power at high frequencies, relative to the wave's, that is never held against a surface.
 const LEAST_JERK: f32 = 0.005;
 /// What is faster than this is noise: a fingertip on its spring slips for some ms. White noise is at 303 Hz.
 const SLIPS_BELOW_HZ: f32 = 350.0;
@@ -120,7 +122,7 @@ impl Jerk {
         let quiet = self
             .steady(gauges)
             .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
-        let left = self.power - quiet - 0.25 * noise;
+        let left = self.power - quiet - NOISE_DOUBT * noise;
         if left <= LEAST_JERK * explained {
             return false;
         }
