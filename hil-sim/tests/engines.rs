@@ -6,7 +6,7 @@ use std::env;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use hil_sim::analysis::Summary;
+use hil_sim::analysis::Verdict;
 use hil_sim::elf::{self, Firmware, Firmwares};
 use hil_sim::native;
 use hil_sim::outcome::Outcome;
@@ -24,6 +24,9 @@ const RMS_APART: f64 = 0.1;
 /// Or else, in %: both engines round places to 5 µm, each in its own way. Rounded by a deviation of 5 µm / √12 at
 /// both ends, a travel of four λ of 2.3 mm is 2.2e-4 off.
 const RMS_ROUNDED_PERCENT: f64 = 0.022;
+/// Errors count from here on, as `hil-sim jury --folder` judges recordings: before it the waves are few, and one
+/// estimate sooner or later is a tenth of the RMS.
+const FROM_S: f64 = 1.0;
 /// Long enough for the start, one estimate sooner or later, to be a few thousandths of it.
 const DURATION_S: f64 = 12.0;
 /// Around the turns an estimate hangs on where in a stroke it comes: many of them are needed.
@@ -93,9 +96,32 @@ fn firmware(role: Role) -> Firmware {
     Firmware::read(&path, role).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// The valid share, and the valid estimates' RMS error in %, if there are any.
+struct Made {
+    valid_share: f64,
+    rms_percent: Option<f64>,
+}
+
+impl Made {
+    fn of(verdict: &Verdict) -> Self {
+        let squares: Vec<f64> = verdict
+            .estimates
+            .iter()
+            .filter(|estimate| estimate.valid && estimate.t_s >= FROM_S)
+            .filter_map(|estimate| Some(estimate.wavelength_mm? / estimate.truth_mm? - 1.0))
+            .map(|error| error * error)
+            .collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        Self {
+            valid_share: verdict.summary.valid_share.unwrap_or(0.0),
+            rms_percent: (!squares.is_empty()).then(|| 100.0 * mean.sqrt()),
+        }
+    }
+}
+
 /// Whether both engines say the same.
-fn agree(native: &Summary, elf: &Summary) -> bool {
-    let valid_apart = native.valid_share.unwrap_or(0.0) - elf.valid_share.unwrap_or(0.0);
+fn agree(native: &Made, elf: &Made) -> bool {
+    let valid_apart = native.valid_share - elf.valid_share;
     let rms_agree = match (native.rms_percent, elf.rms_percent) {
         (Some(native), Some(elf)) => {
             (native - elf).abs() <= (RMS_APART * native.max(elf)).max(RMS_ROUNDED_PERCENT)
@@ -120,13 +146,13 @@ fn both_engines_make_the_same_of_every_recording() {
     let mut disagreements = Vec::new();
     println!("{:40} valid: native, elf; rms %: native, elf", "");
     for (name, scene) in scenes {
-        let summary = |recording| Outcome::new(scene.clone(), recording).verdict.summary;
-        let native = summary(native::run(&scene).unwrap());
-        let elf = summary(elf::run(&scene, &firmwares).unwrap().0);
+        let made = |recording| Made::of(&Outcome::new(scene.clone(), recording).verdict);
+        let native = made(native::run(&scene).unwrap());
+        let elf = made(elf::run(&scene, &firmwares).unwrap().0);
         let line = format!(
             "{name:40} {:.3} {:.3}  {:.3} {:.3}",
-            native.valid_share.unwrap_or(f64::NAN),
-            elf.valid_share.unwrap_or(f64::NAN),
+            native.valid_share,
+            elf.valid_share,
             native.rms_percent.unwrap_or(f64::NAN),
             elf.rms_percent.unwrap_or(f64::NAN),
         );
