@@ -272,13 +272,18 @@ impl Spectrum {
         let survey = &mut self.survey;
         (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
-        // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
-        // shorter one in knots that are too long for it.
-        let beyond = averaged[0].max(averaged[CANDIDATES - 1]);
-        let highest = highest_peak(&averaged).filter(|&peak| averaged[peak] >= beyond);
-        let (Some(highest), Some(momentary)) = (highest, highest_peak(&energies)) else {
+        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
+        else {
             return;
         };
+        // What is highest at an end, now as on the average, lies beyond it: a peak is then a harmonic of a longer
+        // wave, or the image of a shorter one in knots that are too long for it.
+        let is_beyond = |spectrum: &Energies, peak: usize| {
+            spectrum[peak] < spectrum[0].max(spectrum[CANDIDATES - 1])
+        };
+        if is_beyond(&averaged, highest) {
+            return;
+        }
         let kept = self.kept_peak(&averaged, highest);
         let (number, line_mm) = self
             .longer_period(&averaged, &energies, kept)

@@ -7,7 +7,7 @@
 use protocol::GAUGES;
 
 use super::knots::{Completed, Knot, SPACINGS, spacing_for};
-use crate::estimator::PLACES_PER_MM;
+use crate::estimator::{MIN_AMPLITUDE_LSB, PLACES_PER_MM};
 use crate::phasor::phasor;
 
 /// Candidates: six an octave, so that a ratio of 2 lies on the grid, and one beyond either end.
@@ -24,6 +24,9 @@ pub(super) const KERNEL_WAVES: f32 = 2.0 * POLE_WAVES;
 const HIGH_PASS_MM: f32 = 3.0;
 /// Travel constant of the average, in wavelengths.
 pub(super) const AVERAGE_WAVES: f32 = 14.0;
+/// Energy over all candidates, in ADC steps², of the least wave that is listened to. Below it the gauges are silent, and
+/// there is nothing to average.
+const LEAST_ENERGY: f32 = 10.0 * MIN_AMPLITUDE_LSB * MIN_AMPLITUDE_LSB;
 /// Weight of a pole below which it is not looked at.
 const LEAST_WEIGHT: f32 = 1e-3;
 
@@ -117,7 +120,7 @@ impl Periodogram {
     /// Takes the energies into the average, `travel_mm` after the last time.
     pub fn average(&mut self, energies: &Spectrum, travel_mm: f32) {
         let total: f32 = energies.iter().sum();
-        if total <= 0.0 || travel_mm <= 0.0 {
+        if total < LEAST_ENERGY || travel_mm <= 0.0 {
             return;
         }
         let scale = 1.0 / total;
