@@ -417,7 +417,12 @@ fn a_piece_of_a_recording_makes_a_scene() {
         round.made
     );
     let (alike, worst) = round.agreement(KNOWN_S);
-    assert!(alike == 1.0 && worst < rounding_bound(), "{alike}, {worst}");
+    // The fits over five and eight waves are made anew by every third estimate. A scene that begins in the middle
+    // makes them at other instants of the stroke than the board did.
+    assert!(
+        alike == 1.0 && worst < 3.0 * rounding_bound(),
+        "{alike}, {worst}"
+    );
 }
 
 #[test]
