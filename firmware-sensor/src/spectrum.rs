@@ -136,6 +136,7 @@ pub struct Spectrum {
     /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
     known_mm: f32,
     known_share: f32,
+    /// How λ of the line changes along the way.
     trend: Trend,
 }
 
@@ -276,12 +277,9 @@ impl Spectrum {
         else {
             return;
         };
-        // What is highest at an end, now as on the average, lies beyond it: a peak is then a harmonic of a longer
-        // wave, or the image of a shorter one in knots that are too long for it.
-        let is_beyond = |spectrum: &Energies, peak: usize| {
-            spectrum[peak] < spectrum[0].max(spectrum[CANDIDATES - 1])
-        };
-        if is_beyond(&averaged, highest) {
+        // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
+        // shorter one in knots that are too long for it.
+        if averaged[highest] < averaged[0].max(averaged[CANDIDATES - 1]) {
             return;
         }
         let kept = self.kept_peak(&averaged, highest);
