@@ -73,7 +73,7 @@ impl Drive {
             return;
         }
         if step_s != self.decay.0 {
-            self.decay = (step_s, (-step_s / self.lag_s).exp());
+            self.decay = (step_s, libm::exp(-step_s / self.lag_s));
         }
         let behind_mm_s = self.velocity_mm_s - self.command_mm_s;
         self.position_mm +=

@@ -144,7 +144,7 @@ impl KinematicGauges {
     #[inline]
     pub fn scan(&mut self, texture: &impl Texture, t_s: f64, fingertip_mm: f64) -> [u16; GAUGES] {
         let off_hz = self.hum_off_hz;
-        let mains = |nominal_hz: f64| (TAU * ((nominal_hz + off_hz) * t_s).fract()).sin();
+        let mains = |nominal_hz: f64| libm::sin(TAU * ((nominal_hz + off_hz) * t_s).fract());
         let mut hum = 0.0;
         for (codes, nominal_hz) in self.hum_codes.into_iter().zip(MAINS_HZ) {
             if codes != 0.0 {
@@ -192,7 +192,7 @@ impl Slow {
         Self {
             drift_codes: kinematic.drift * CODES_PER_UNIT,
             drift_ahead: std::array::from_fn(|gauge| {
-                (TAU * gauge as f64 / GAUGES as f64).sin_cos()
+                libm::sincos(TAU * gauge as f64 / GAUGES as f64)
             }),
             offset_codes: OFFSET_SHARES
                 .map(|share| (share * kinematic.offset * CODES_PER_UNIT) as f32),
@@ -210,7 +210,7 @@ impl Slow {
     fn scan(&mut self, t_s: f64) -> [f32; GAUGES] {
         let mut codes = self.offset_codes;
         if self.drift_codes > 0.0 {
-            let (sine, cosine) = (TAU * DRIFT_HZ * t_s).sin_cos();
+            let (sine, cosine) = libm::sincos(TAU * DRIFT_HZ * t_s);
             for (code, (ahead_sine, ahead_cosine)) in codes.iter_mut().zip(self.drift_ahead) {
                 let drift = sine * ahead_cosine + cosine * ahead_sine;
                 *code += (self.drift_codes * drift) as f32;
@@ -228,7 +228,7 @@ impl Slow {
 /// Standard deviation of one scan's noise, 1 being the fundamental's amplitude: its power in 0 to
 /// [`SNR_BAND_HZ`] stands `snr_db` below the fundamental's ½, and it is white up to half the scan rate.
 fn noise_per_unit(snr_db: f64) -> f64 {
-    let in_band = 0.5 * 10f64.powf(-snr_db / 10.0);
+    let in_band = 0.5 * libm::pow(10.0, -snr_db / 10.0);
     (in_band * f64::from(SCAN_RATE_HZ) / 2.0 / SNR_BAND_HZ).sqrt()
 }
 

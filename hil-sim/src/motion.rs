@@ -36,7 +36,7 @@ impl Motion {
                 frequency_hz,
             } => {
                 let omega = std::f64::consts::TAU * frequency_hz;
-                amplitude_mm_s / omega * (1.0 - (omega * t_s).cos())
+                amplitude_mm_s / omega * (1.0 - libm::cos(omega * t_s))
             }
             Motion::Recorded(positions) => positions.value(positions.row(t_s, 0), 0, t_s),
             Motion::Live(hand) => hand.position_mm(t_s),
@@ -50,7 +50,7 @@ impl Motion {
             Motion::Sinusoid {
                 amplitude_mm_s,
                 frequency_hz,
-            } => amplitude_mm_s * (std::f64::consts::TAU * frequency_hz * t_s).sin(),
+            } => amplitude_mm_s * libm::sin(std::f64::consts::TAU * frequency_hz * t_s),
             Motion::Recorded(positions) => positions.slope(positions.row(t_s, 0), 0, t_s),
             Motion::Live(hand) => hand.velocity_mm_s(t_s),
         }

@@ -61,7 +61,7 @@ struct Section {
 /// Share of a load of wavelength λ that a gauge feels at [`DEPTH_MM`], the contact being wide.
 pub fn felt_share(wavelength_mm: f64) -> f64 {
     let depths = TAU * DEPTH_MM / wavelength_mm;
-    (1.0 + depths) * (-depths).exp()
+    (1.0 + depths) * libm::exp(-depths)
 }
 
 impl Patch {
@@ -187,11 +187,11 @@ fn weights(place_mm: f64, spacing_mm: f64) -> Vec<(f64, f32)> {
 fn gain(weights: &[(f64, f32)], wavenumber_per_mm: f64) -> (f64, f64) {
     let (mut real, mut imaginary) = (0.0, 0.0);
     for &(beside_mm, weight) in weights {
-        let (sine, cosine) = (wavenumber_per_mm * beside_mm).sin_cos();
+        let (sine, cosine) = libm::sincos(wavenumber_per_mm * beside_mm);
         real += f64::from(weight) * cosine;
         imaginary += f64::from(weight) * sine;
     }
-    (real.hypot(imaginary), imaginary.atan2(real))
+    (libm::hypot(real, imaginary), libm::atan2(imaginary, real))
 }
 
 #[cfg(test)]

@@ -199,7 +199,7 @@ impl Recorded {
         let reach = (4.0 * blur_mm / GRID_MM).ceil() as i64;
         let weight = |step: i64| match step {
             0 => 1.0,
-            _ => (-0.5 * (step as f64 * GRID_MM / blur_mm).powi(2)).exp(),
+            _ => libm::exp(-0.5 * (step as f64 * GRID_MM / blur_mm).powi(2)),
         };
         let total: f64 = (-reach..=reach).map(weight).sum();
         let blurred: Vec<f64> = (0..points as i64)
@@ -249,8 +249,8 @@ pub(crate) fn harmonics_at(profile: &Profile, wavelength_mm: f64, blur_mm: f64) 
     // A square wave's 1/n, its flanks drawn out over RAMP (a sinc), through the contact (a Gaussian).
     let amplitude = |n: u32| {
         let n = f64::from(n);
-        let ramp = (PI * n * RAMP).sin() / (PI * n * RAMP);
-        let blur = (-0.5 * (TAU * n * blur_mm / wavelength_mm).powi(2)).exp();
+        let ramp = libm::sin(PI * n * RAMP) / (PI * n * RAMP);
+        let blur = libm::exp(-0.5 * (TAU * n * blur_mm / wavelength_mm).powi(2));
         ramp * blur / n
     };
     [1, 3, 5, HIGHEST_HARMONIC].map(|n| match profile {
@@ -269,7 +269,7 @@ pub(crate) fn period_of(waves: &[(u32, f64, f64)]) -> Box<Period> {
         let sum: f64 = waves
             .iter()
             .filter(|wave| wave.1 != 0.0)
-            .map(|&(n, amplitude, ahead)| amplitude * (f64::from(n) * theta + ahead).sin())
+            .map(|&(n, amplitude, ahead)| amplitude * libm::sin(f64::from(n) * theta + ahead))
             .sum();
         *value = sum as f32;
     }
@@ -310,11 +310,14 @@ mod tests {
         for point in 0..points {
             let cycles = f64::from(point) / f64::from(points);
             let felt = f64::from(surface.feel(10.0 + 2.0 * cycles, advance));
-            sine += felt * (TAU * n * cycles).sin();
-            cosine += felt * (TAU * n * cycles).cos();
+            sine += felt * libm::sin(TAU * n * cycles);
+            cosine += felt * libm::cos(TAU * n * cycles);
         }
         let scale = 2.0 / f64::from(points);
-        ((sine * scale).hypot(cosine * scale), cosine.atan2(sine))
+        (
+            libm::hypot(sine * scale, cosine * scale),
+            libm::atan2(cosine, sine),
+        )
     }
 
     #[test]

@@ -326,3 +326,20 @@ fn every_line_of_the_first_scene_that_is_not_in_force_may_be() {
     let (status, _, errors) = hil_sim(&folder, &["run", "all.toml"]);
     assert_ne!(status, Some(2), "{errors}");
 }
+
+/// Scenes of each contact model, each family of faults, travelling, recorded input, a bad link: what was seen when
+/// their hashes were renewed last is what still runs, on any machine.
+#[test]
+fn the_committed_golden_hashes_hold() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    let toml = |file: &fs::DirEntry| file.path().extension().is_some_and(|end| end == "toml");
+    let count = fs::read_dir(&scenes)
+        .unwrap()
+        .flatten()
+        .filter(toml)
+        .count();
+    assert!(count > 20, "{count} files with the hashes' own");
+    let (status, output, errors) =
+        hil_sim(&scenes, &["golden", "check", "--file", "golden.toml", "."]);
+    assert_eq!(status, Some(0), "{output}{errors}");
+}

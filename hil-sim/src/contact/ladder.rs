@@ -94,7 +94,7 @@ fn swing_share(motion: &Motion, stiffness_n_per_m: f64) -> f64 {
     let spring = Spring { stiffness_n_per_m };
     let ratio = TAU * frequency_hz / spring.omega();
     let square = ratio * ratio;
-    square / (1.0 - square).hypot(2.0 * spring.damping() * ratio)
+    square / libm::hypot(1.0 - square, 2.0 * spring.damping() * ratio)
 }
 
 /// Why a point is too simple, if it is.

@@ -43,16 +43,19 @@ impl Spring {
     /// The exact solution over a time.
     pub fn over(&self, time_s: f64) -> Swing {
         let (omega, zeta) = (self.omega(), self.damping());
-        let decay = (-zeta * omega * time_s).exp();
+        let decay = libm::exp(-zeta * omega * time_s);
         // cos and sin/ω of the damped swing; cosh and sinh/ω where it creeps back.
         let square = omega * omega * (1.0 - zeta * zeta);
         let (cosine, sine) = if square > 0.0 {
             let damped = square.sqrt();
-            let (sine, cosine) = (damped * time_s).sin_cos();
+            let (sine, cosine) = libm::sincos(damped * time_s);
             (cosine, sine / damped)
         } else if square < 0.0 {
             let damped = (-square).sqrt();
-            ((damped * time_s).cosh(), (damped * time_s).sinh() / damped)
+            (
+                libm::cosh(damped * time_s),
+                libm::sinh(damped * time_s) / damped,
+            )
         } else {
             (1.0, time_s)
         };

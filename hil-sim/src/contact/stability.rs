@@ -63,14 +63,14 @@ pub fn growth<const N: usize>(integrator: Integrator, linear: &Linear<N>, step_s
         if size == 0.0 {
             return 0.0;
         }
-        logarithm += size.ln() / power;
+        logarithm += libm::log(size) / power;
         let scaled = matrix.map(|row| row.map(|cell| cell / size));
         matrix = std::array::from_fn(|row| {
             std::array::from_fn(|column| (0..N).map(|k| scaled[row][k] * scaled[k][column]).sum())
         });
         power *= 2.0;
     }
-    logarithm.exp()
+    libm::exp(logarithm)
 }
 
 /// The longest step in s at which no deviation grows; infinite if none does at [`LONGEST_S`]. Methods

@@ -67,7 +67,7 @@ impl Stribeck {
         if square > NOTHING_LEFT {
             return self.kinetic_n;
         }
-        self.kinetic_n + self.surplus_n * (-square).exp()
+        self.kinetic_n + self.surplus_n * libm::exp(-square)
     }
 }
 

@@ -36,7 +36,7 @@ impl Pink {
     /// Noise whose RMS, over all frequencies, is `rms`.
     pub fn new(rms: f64) -> Self {
         let corner_hz: [f64; POLES] = std::array::from_fn(|i| LOWEST_HZ * SPACING.powi(i as i32));
-        let keep = corner_hz.map(|hz| (-TAU * hz / f64::from(SCAN_RATE_HZ)).exp());
+        let keep = corner_hz.map(|hz| libm::exp(-TAU * hz / f64::from(SCAN_RATE_HZ)));
         let weight: [f64; POLES] = std::array::from_fn(|i| (1.0 - keep[i]) / corner_hz[i].sqrt());
         // Σ over scans of one pole's answer times another's is 1/(1 − product).
         let mut power = 0.0;

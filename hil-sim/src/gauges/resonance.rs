@@ -33,8 +33,8 @@ impl Resonance {
         // In radians per scan.
         let omega = TAU * resonance.hz / f64::from(SCAN_RATE_HZ);
         let damped = omega * (1.0 - zeta * zeta).sqrt();
-        let decay = (-zeta * omega).exp();
-        let (sine, cosine) = damped.sin_cos();
+        let decay = libm::exp(-zeta * omega);
+        let (sine, cosine) = libm::sincos(damped);
         let lead = zeta * omega / damped * sine;
         Self {
             keep: [

@@ -51,7 +51,7 @@ impl Irregular {
         let mut added = 0.0;
         if self.second_wave > 0.0 {
             let cycles = from_start_mm / (wavelength_mm * self.second_ratio);
-            added += self.second_wave * (TAU * cycles.fract()).sin();
+            added += self.second_wave * libm::sin(TAU * cycles.fract());
         }
         if let Some(grain) = &self.grain {
             added += grain.height(x_mm);
