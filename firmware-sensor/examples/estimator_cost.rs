@@ -14,17 +14,17 @@
 fn main() {}
 
 #[cfg(target_os = "none")]
-#[path = "../../hil-sim/src/chart/parts.rs"]
+#[path = "../../hil-sim/studies/src/estimators/parts.rs"]
 mod parts;
 #[cfg(target_os = "none")]
-#[path = "../../hil-sim/src/chart/rivals/mod.rs"]
+#[path = "../../hil-sim/studies/src/estimators/rivals/mod.rs"]
 #[allow(
     dead_code,
     reason = "the simulator has uses for it that a count has not"
 )]
 mod rivals;
 #[cfg(target_os = "none")]
-#[path = "../../hil-sim/src/chart/settings.rs"]
+#[path = "../../hil-sim/studies/src/estimators/settings.rs"]
 #[allow(
     dead_code,
     reason = "the simulator has uses for it that a count has not"

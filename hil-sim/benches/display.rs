@@ -5,9 +5,9 @@
 use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use hil_sim::elf::Firmware;
-use hil_sim::elf::alone::{Alone, run};
-use hil_sim::scene::Motion;
+use hil_sim_boards::Firmware;
+use hil_sim_boards::display_alone::{Alone, run};
+use hil_sim_core::scene::Motion;
 use protocol::actuators::grid;
 use protocol::{DisplayConfiguration, Mode, Role};
 

@@ -3,8 +3,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use hil_sim::native;
-use hil_sim::scene::{Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene};
+use hil_sim_core::native;
+use hil_sim_core::scene::{
+    Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene,
+};
 use protocol::Method;
 
 const VIRTUAL_S: u64 = 10;

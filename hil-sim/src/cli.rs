@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
+use hil_sim_boards::{Firmware, FirmwareError, Firmwares};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 

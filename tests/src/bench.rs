@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use hil_sim::serve::{Bench, Options};
+use hil_sim_boards::bench::{Bench, Options};
 use protocol::{Hello, MAX_FRAME, Message, Ping, Port, PortCounters, Role};
 use serialport::SerialPort;
 

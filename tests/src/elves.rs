@@ -4,7 +4,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use hil_sim::elf::{Firmware, FirmwareError, Firmwares};
+use hil_sim_boards::{Firmware, FirmwareError, Firmwares};
 use protocol::Role;
 
 /// Names another folder to take the ELFs from.

@@ -1,8 +1,8 @@
 //! Replays what a display board did with its own library, word for word.
 
 use firmware_display::{Display, Senses, Settings};
-use hil_sim::recording::{ACTUATORS, EstimateRecord, Recording};
-use hil_sim::weather::BYTE_NS;
+use hil_sim_core::link::conditions::BYTE_NS;
+use hil_sim_core::run::recording::{ACTUATORS, EstimateRecord, Recording};
 use protocol::MAX_FRAME;
 
 /// From an estimate's last byte at the UART until the output task could take it, in ns, if the line is

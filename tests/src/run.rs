@@ -3,12 +3,13 @@
 use std::convert::Infallible;
 use std::path::Path;
 
-use hil_sim::analysis::Verdict;
-use hil_sim::batch;
-use hil_sim::elf::{self, BoardFacts};
-use hil_sim::outcome::Outcome;
-use hil_sim::recording::Recording;
-use hil_sim::scene::Scene;
+use hil_sim_boards;
+use hil_sim_boards::BoardFacts;
+use hil_sim_core::judge::Verdict;
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::run::batch;
+use hil_sim_core::run::recording::Recording;
+use hil_sim_core::scene::Scene;
 
 use crate::elves;
 
@@ -32,7 +33,7 @@ impl Run {
     /// If the ELFs can't be used, or a board stops before the scene's end.
     pub fn of(scene: Scene) -> Self {
         let (recording, facts) =
-            elf::run(&scene, elves::both()).unwrap_or_else(|error| panic!("{error}"));
+            boards::run(&scene, elves::both()).unwrap_or_else(|error| panic!("{error}"));
         let Outcome {
             scene,
             recording,

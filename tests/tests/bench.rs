@@ -6,9 +6,9 @@ use std::io::{Read, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use hil_sim::fault::{Fault, Kind};
-use hil_sim::scene::{Gauges, Kinematic, Link, Motion, Scene, Series, Waveform};
-use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, ServeError};
+use hil_sim_boards::bench::{Bench, Command, Hand, Options, Pace, PortName, ServeError};
+use hil_sim_core::scene::fault::{Fault, Kind};
+use hil_sim_core::scene::{Gauges, Kinematic, Link, Motion, Scene, Series, Waveform};
 use protocol::{
     Configuration, DisplayState, Message, Role, RoleCounters, SensorConfiguration, Trip,
 };

@@ -3,7 +3,8 @@
 use std::fs::OpenOptions;
 use std::time::{Duration, Instant};
 
-use hil_sim::serve::{self, Bench, PortName};
+use hil_sim_boards::bench;
+use hil_sim_boards::bench::{Bench, PortName};
 use protocol::Role;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use hil_sim::serve::{Command as Order, PortName};
+use hil_sim_boards::bench::{Command as Order, PortName};
 use tests::bench::{Alone, bench, until};
 use tests::bridge;
 use tests::terminal::Terminal;
@@ -24,7 +24,7 @@ fn monitor(alone: &Alone) -> Command {
 
 fn steady(name: &str) -> Alone {
     bench(name, |options| {
-        options.scene = hil_sim::scene::Scene::constant(2.0, 50.0);
+        options.scene = hil_sim_core::scene::Scene::constant(2.0, 50.0);
     })
 }
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use hil_sim::scene::{Follows, Specimen};
-use hil_sim::serve::{Bench, Options, PortName};
+use hil_sim_boards::bench::{Bench, Options, PortName};
+use hil_sim_core::scene::{Follows, Specimen};
 use protocol::Role;
 use rustix::process::Signal;
 use tests::elves;

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
-use hil_sim::native;
-use hil_sim::outcome::Outcome;
-use hil_sim::recording::ScanRecord;
-use hil_sim::scene::Scene;
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::native;
+use hil_sim_core::run::recording::ScanRecord;
+use hil_sim_core::scene::Scene;
 use host_bridge::host_clock::now_us;
 use host_bridge::link::Event;
 use host_bridge::recording::reader::Reader;

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use hil_sim::elf::{Firmware, FirmwareError};
+use hil_sim_boards::{Firmware, FirmwareError};
 use protocol::{Hello, PROTOCOL_VERSION, Role};
 use tests::elves;
 

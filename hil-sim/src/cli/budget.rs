@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use hil_sim::chart::word_of_mode;
-use hil_sim::elf::alone::Alone;
-use hil_sim::elf::instructions::{self, BUDGET, Counted};
-use hil_sim::scene::Motion;
+use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::instructions;
+use hil_sim_boards::instructions::{BUDGET, Counted};
+use hil_sim_core::scene::Motion;
+use hil_sim_studies::display::word_of_mode;
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
 use super::display::Measured;

@@ -9,10 +9,10 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use hil_sim::batch;
-use hil_sim::elf::ElfError;
-use hil_sim::fault::Kind;
-use hil_sim::fault::campaign::{Plan, Shift, Tally, Trial, unmet};
+use hil_sim_boards::ElfError;
+use hil_sim_core::run::batch;
+use hil_sim_core::scene::fault::Kind;
+use hil_sim_studies::campaign::{Plan, Shift, Tally, Trial, unmet};
 
 use super::say::say;
 use super::{Elves, number, progress};

@@ -5,15 +5,16 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::Subcommand;
-use hil_sim::chart::bank;
-use hil_sim::chart::contest::{self, contestants};
-use hil_sim::chart::costs::Costs;
-use hil_sim::chart::efficiency;
-use hil_sim::chart::family;
-use hil_sim::chart::picture;
-use hil_sim::chart::result::{ContestResult, Entry};
-use hil_sim::chart::score::Score;
-use hil_sim::scene::Scene;
+use hil_sim_core::scene::Scene;
+use hil_sim_studies::estimators::bank;
+use hil_sim_studies::estimators::contest;
+use hil_sim_studies::estimators::contest::contestants;
+use hil_sim_studies::estimators::costs::Costs;
+use hil_sim_studies::estimators::efficiency;
+use hil_sim_studies::estimators::family;
+use hil_sim_studies::estimators::picture;
+use hil_sim_studies::estimators::result::{ContestResult, Entry};
+use hil_sim_studies::estimators::score::Score;
 
 use super::say::say;
 use super::{confidence, display, models, number, progress};

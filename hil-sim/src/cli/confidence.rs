@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim::chart::confidence::{BINS, GOAL, Reliability, picture, strangers};
-use hil_sim::jury::seeds::REPORTING;
+use hil_sim_studies::estimators::confidence::{BINS, GOAL, Reliability, picture, strangers};
+use hil_sim_studies::jury::seeds::REPORTING;
 use protocol::SensorConfiguration;
 
 use super::chart::{create_folder, write};

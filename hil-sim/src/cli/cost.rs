@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use hil_sim::elf::cost::measure;
+use hil_sim_boards::cost::measure;
 
 use super::Cost;
 use super::say::say;

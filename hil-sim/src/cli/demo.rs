@@ -4,11 +4,12 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use firmware_sensor::counting::predicted_mean_mm;
-use hil_sim::elf::{self, Firmwares};
-use hil_sim::outcome::Outcome;
-use hil_sim::paper::table_1::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
-use hil_sim::report::html;
-use hil_sim::scene::Scene;
+use hil_sim_boards;
+use hil_sim_boards::Firmwares;
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::scene::Scene;
+use hil_sim_studies::output::report::html;
+use hil_sim_studies::paper::published::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
 
 use super::say::say;
 use super::{Demo, number};
@@ -46,7 +47,10 @@ impl Demo {
                 outcomes.push(outcome);
             }
         }
-        let chapters: Vec<_> = outcomes.iter().map(Outcome::chapter).collect();
+        let chapters: Vec<_> = outcomes
+            .iter()
+            .map(hil_sim_studies::output::report::Chapter::of)
+            .collect();
         let folder = self.report.parent().unwrap_or(std::path::Path::new("."));
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         std::fs::write(&self.report, html(&chapters)?)
@@ -64,7 +68,7 @@ impl Demo {
 fn rub(wavelength_mm: f64, speed_mm_s: f64, firmwares: &Firmwares) -> anyhow::Result<Outcome> {
     let mut scene = Scene::constant(wavelength_mm, speed_mm_s);
     scene.duration_s = DURATION_S;
-    let (recording, _) = elf::run(&scene, firmwares)?;
+    let (recording, _) = hil_sim_boards::run(&scene, firmwares)?;
     Ok(Outcome::new(scene, recording))
 }
 

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim::chart::purity::{self, Extent};
-use hil_sim::chart::{delay, stop, timing, word_of_mode};
-use hil_sim::elf::{Firmware, FirmwareError};
+use hil_sim_boards::{Firmware, FirmwareError};
+use hil_sim_studies::display::purity;
+use hil_sim_studies::display::purity::Extent;
+use hil_sim_studies::display::{delay, stop, timing, word_of_mode};
 use protocol::Role;
 
 use super::chart::{create_folder, write};

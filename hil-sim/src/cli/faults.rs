@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::process::ExitCode;
 
 use super::say::say;
-use hil_sim::fault::catalogue::{Lasts, Needs, Row, rows};
+use hil_sim_core::scene::fault::catalogue::{Lasts, Needs, Row, rows};
 
 /// Prints the list.
 pub(super) fn execute() -> anyhow::Result<ExitCode> {

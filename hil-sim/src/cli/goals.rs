@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim::analysis::Summary;
-use hil_sim::batch::on_all_cores;
-use hil_sim::chart::family::{self, Family};
-use hil_sim::elf::{self, Firmwares};
-use hil_sim::outcome::{Judgement, Outcome};
-use hil_sim::scene::Scene;
+use hil_sim_boards;
+use hil_sim_boards::Firmwares;
+use hil_sim_core::judge::Summary;
+use hil_sim_core::judge::outcome::{Judgement, Outcome};
+use hil_sim_core::run::batch::on_all_cores;
+use hil_sim_core::scene::Scene;
+use hil_sim_studies::estimators::family;
+use hil_sim_studies::estimators::family::Family;
 
 use super::say::say;
 use super::{Elves, EngineName, number, progress};
@@ -76,7 +78,7 @@ fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<J
         let judgement = match firmwares {
             None => Judgement::of(scene, false)?,
             Some(firmwares) => {
-                let (recording, _) = elf::run(scene, firmwares)?;
+                let (recording, _) = hil_sim_boards::run(scene, firmwares)?;
                 Outcome::new((*scene).clone(), recording).judgement(false)
             }
         };

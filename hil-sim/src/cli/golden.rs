@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::bail;
-use hil_sim::annotation::Annotation;
-use hil_sim::batch;
-use hil_sim::golden::{Golden, Standing, complaint};
-use hil_sim::scene::SceneError;
+use hil_sim_core::run::batch;
+use hil_sim_core::scene::SceneError;
+use hil_sim_studies::output::annotation::Annotation;
+use hil_sim_studies::output::golden::{Golden, Standing, complaint};
 
 use super::runs;
 use super::say::say;

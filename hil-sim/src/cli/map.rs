@@ -7,8 +7,9 @@ use std::thread;
 
 use super::say::{self, say};
 use super::way::tell_notes;
-use hil_sim::map::survey::whole_methods;
-use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing, words};
+use hil_sim_studies::map::shard::Shard;
+use hil_sim_studies::map::survey::whole_methods;
+use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, standing, words};
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Debug, clap::Args)]
@@ -144,7 +145,7 @@ fn list(maps: &[Map]) {
     say!("| map | cells | along x | along y | in all cells |");
     say!("| --- | ---: | --- | --- | --- |");
     for map in maps {
-        let axis = |axis: &hil_sim::map::axis::Axis| {
+        let axis = |axis: &hil_sim_studies::map::axis::Axis| {
             format!(
                 "{}: {} steps, {}",
                 axis.label,

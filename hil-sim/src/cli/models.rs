@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim::chart::{models, stability};
-use hil_sim::scene::Rung;
+use hil_sim_core::scene::Rung;
+use hil_sim_studies::contact::{models, stability};
 
 use super::chart::{create_folder, write};
 use super::runs;

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use hil_sim::paper::{plan, report};
-use hil_sim::people::bench::Job;
-use hil_sim::people::study::Plan;
+use hil_sim_studies::paper::{plan, report};
+use hil_sim_studies::psychophysics::bench::Job;
+use hil_sim_studies::psychophysics::study::Plan;
 
 use super::people::bench;
 use super::say::say;

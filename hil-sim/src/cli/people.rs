@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use hil_sim::people::bench::Bench;
-use hil_sim::people::study::{self, Friction, Plan, Study};
-use hil_sim::people::{record, tables};
+use hil_sim_studies::psychophysics::bench::Bench;
+use hil_sim_studies::psychophysics::study;
+use hil_sim_studies::psychophysics::study::{Friction, Plan, Study};
+use hil_sim_studies::psychophysics::{record, tables};
 
 use super::say::{self, say};
 use super::{Elves, EngineName, runs};

@@ -6,17 +6,19 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
-use hil_sim::annotation::Annotation;
-use hil_sim::batch;
-use hil_sim::expectation::key_of;
-use hil_sim::golden::{Golden, Standing, complaint};
-use hil_sim::json::JsonList;
-use hil_sim::junit::{self, Case, Fate};
-use hil_sim::map::shard::Shard;
-use hil_sim::outcome::{Judgement, Outcome};
-use hil_sim::recording::Engine;
-use hil_sim::report::html;
-use hil_sim::scene::{SceneError, line_of};
+use hil_sim_core::judge::expectation::key_of;
+use hil_sim_core::judge::outcome::{Judgement, Outcome};
+use hil_sim_core::run::batch;
+use hil_sim_core::run::recording::Engine;
+use hil_sim_core::scene::SceneError;
+use hil_sim_core::scene_file::line::line_of;
+use hil_sim_studies::map::shard::Shard;
+use hil_sim_studies::output::annotation::Annotation;
+use hil_sim_studies::output::golden::{Golden, Standing, complaint};
+use hil_sim_studies::output::json::JsonList;
+use hil_sim_studies::output::junit;
+use hil_sim_studies::output::junit::{Case, Fate};
+use hil_sim_studies::output::report::html;
 
 use super::number;
 use super::say::say;
@@ -122,7 +124,11 @@ impl Run {
                 .with_context(|| format!("{}", path.display()))?;
         }
         if let Some((mut file, path)) = report {
-            let chapters: Vec<_> = books.outcomes.iter().map(Outcome::chapter).collect();
+            let chapters: Vec<_> = books
+                .outcomes
+                .iter()
+                .map(hil_sim_studies::output::report::Chapter::of)
+                .collect();
             let page = html(&chapters)?;
             file.write_all(page.as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
@@ -198,8 +204,11 @@ impl Books<'_> {
         }
         self.met &= is_met;
         if let Some((file, path, list)) = &mut self.json {
-            list.write(&judgement.result(scene), file)
-                .with_context(|| format!("{}", path.display()))?;
+            list.write(
+                &hil_sim_studies::output::json::SceneResult::of(&judgement, scene),
+                file,
+            )
+            .with_context(|| format!("{}", path.display()))?;
         }
         self.outcomes.extend(outcome);
         let fate = Fate::Ran {

@@ -9,8 +9,8 @@ use std::process::ExitCode;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use hil_sim::scene::{Motion, Scene};
-use hil_sim::serve::{Bench, Command, Hand, Options, Pace, PortName, Standing};
+use hil_sim_boards::bench::{Bench, Command, Hand, Options, Pace, PortName, Standing};
+use hil_sim_core::scene::{Motion, Scene};
 
 use super::way::tell_notes;
 use super::{Elves, number};
@@ -48,7 +48,7 @@ pub(super) struct Serve {
     /// and fro. By default a hand swings at 0.83 Hz and up to 70 mm/s over specimens of 2 and 3 mm
     scene: Option<PathBuf>,
     /// Where the ports are to be found
-    #[arg(long, value_name = "DIR", default_value = hil_sim::serve::DEFAULT_DIR)]
+    #[arg(long, value_name = "DIR", default_value = hil_sim_boards::bench::DEFAULT_DIR)]
     dir: PathBuf,
     /// Virtual seconds in a second, 0.01 to 100, or max: as fast as the ports are read, and nothing is lost
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = pace)]

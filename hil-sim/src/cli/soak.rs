@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hil_sim::elf::soak::{self, SHORTEST_S};
+use hil_sim_boards::soak;
+use hil_sim_boards::soak::SHORTEST_S;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Elves;

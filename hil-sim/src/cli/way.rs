@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use std::thread;
 
 use clap::ValueEnum;
-use hil_sim::annotation::Annotation;
-use hil_sim::elf::Firmwares;
-use hil_sim::recording::{Engine, Recording};
-use hil_sim::scene::{Scene, SceneError, line_of};
-use hil_sim::{elf, native};
+use hil_sim_boards::Firmwares;
+use hil_sim_core::native;
+use hil_sim_core::run::recording::{Engine, Recording};
+use hil_sim_core::scene::{Scene, SceneError};
+use hil_sim_core::scene_file::line::line_of;
+use hil_sim_studies::output::annotation::Annotation;
 
 use super::say::say;
 use super::{Elves, EngineName};
@@ -69,7 +70,7 @@ impl Ready {
     pub fn run(&self, scene: &Scene) -> anyhow::Result<Recording> {
         Ok(match self {
             Self::Native => native::run(scene)?,
-            Self::Elf(firmwares) => elf::run(scene, firmwares)?.0,
+            Self::Elf(firmwares) => hil_sim_boards::run(scene, firmwares)?.0,
         })
     }
 
@@ -77,7 +78,7 @@ impl Ready {
     pub fn hash(&self, scene: &Scene) -> anyhow::Result<u64> {
         Ok(match self {
             Self::Native => native::run_before(scene, &mut ())?.hash,
-            Self::Elf(firmwares) => elf::run(scene, firmwares)?.0.hash,
+            Self::Elf(firmwares) => hil_sim_boards::run(scene, firmwares)?.0.hash,
         })
     }
 }

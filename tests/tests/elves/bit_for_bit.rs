@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use hil_sim::scene::Scene;
+use hil_sim_core::scene::Scene;
 use protocol::SensorConfiguration;
 use tests::history;
 use tests::run::{Run, scene};

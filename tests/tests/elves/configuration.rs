@@ -1,6 +1,7 @@
 //! What a scene says of the boards reaches their own configurations, as a whole or not at all.
 
-use hil_sim::elf::{self, ElfError};
+use hil_sim_boards;
+use hil_sim_boards::ElfError;
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, Mode, SensorConfiguration,
     UpdateRate, actuators,
@@ -85,7 +86,7 @@ fn no_gauge_takes_part_that_the_scene_leaves_out() {
 fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
     let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
     scene.estimator.waves = 9;
-    let error = elf::run(&scene, elves::both()).unwrap_err();
+    let error = boards::run(&scene, elves::both()).unwrap_err();
     assert!(
         matches!(
             error,
@@ -107,17 +108,17 @@ fn a_scene_too_short_for_the_board_to_answer_is_no_result() {
          [estimator]\nmethod = \"counting\"\n",
     );
     scene.duration_s = 0.001;
-    let error = elf::run(&scene, elves::both()).unwrap_err();
+    let error = boards::run(&scene, elves::both()).unwrap_err();
     assert!(error.to_string().contains("longer duration_s"), "{error}");
 }
 
 /// A scene that asks the display board for what `change` makes of its default, and what came of it.
-fn display_asked(change: impl FnOnce(&mut hil_sim::scene::Display)) -> Result<(), String> {
+fn display_asked(change: impl FnOnce(&mut hil_sim_core::scene::Display)) -> Result<(), String> {
     let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
     change(&mut scene.display);
     scene.display.configuration.actuators = actuators::hash(&scene.display.actuators);
     let wanted = Configuration::Display(scene.display.configuration);
-    let answer = elf::run(&scene, elves::both()).map(|(_, facts)| {
+    let answer = boards::run(&scene, elves::both()).map(|(_, facts)| {
         let report = facts.display_told.expect("it is not the default").report;
         let taken = ConfigurationReport {
             refused: None,
@@ -152,7 +153,7 @@ fn every_setting_of_a_scene_becomes_the_display_boards_and_is_acknowledged_with_
 
 #[test]
 fn the_display_board_refuses_what_is_out_of_range_by_name_and_range() {
-    type Change = fn(&mut hil_sim::scene::Display);
+    type Change = fn(&mut hil_sim_core::scene::Display);
     let cases: [(Change, &str); 3] = [
         (
             |display| display.configuration.amplitude_mv = 5_001,

@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, LazyLock, Mutex};
 
-use hil_sim::elf::{self, Terminal, Terminals};
-use hil_sim::recording::Recording;
+use hil_sim_boards;
+use hil_sim_boards::{Terminal, Terminals};
+use hil_sim_core::run::recording::Recording;
 use protocol::{
     DisplayState, Hello, MAX_FRAME, Message, Peer, Ping, Port, PortCounters, Role, RoleCounters,
     Trip,
@@ -158,7 +159,7 @@ fn watch(toml: &str, at_sensor: &[(u64, Act)], at_display: &[(u64, Act)]) -> Wat
         display: Some(display),
     };
     let (recording, _) =
-        elf::run_at(&scene, elves::both(), terminals).unwrap_or_else(|error| panic!("{error}"));
+        boards::run_at(&scene, elves::both(), terminals).unwrap_or_else(|error| panic!("{error}"));
     let seen = |seen: Arc<Mutex<Seen>>| seen.lock().unwrap().clone();
     Watched {
         recording,

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use hil_sim::elf::cost::{Taken, measure_example};
-use hil_sim::elf::instructions::BUDGET;
+use hil_sim_boards::cost::{Taken, measure_example};
+use hil_sim_boards::instructions::BUDGET;
 use tests::elves;
 
 /// What a board has in a millisecond.

@@ -4,9 +4,9 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use hil_sim::fault::{Fault, Kind};
-use hil_sim::native;
-use hil_sim::scene::Scene;
+use hil_sim_core::native;
+use hil_sim_core::scene::Scene;
+use hil_sim_core::scene::fault::{Fault, Kind};
 use tests::run::{Run, scene};
 
 /// Threads that do nothing but keep the cores from the boards.

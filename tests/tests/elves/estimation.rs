@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use hil_sim::expectation;
-use hil_sim::outcome::Judgement;
-use hil_sim::scene::{Expect, Scene};
+use hil_sim_core::judge::expectation;
+use hil_sim_core::judge::outcome::Judgement;
+use hil_sim_core::scene::{Expect, Scene};
 use tests::run::{Run, runs_of};
 use tests::sensing::share_explained;
 

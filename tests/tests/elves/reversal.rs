@@ -6,9 +6,10 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use firmware_display::balance::{TIME_CONSTANT_S, WORKING_S};
-use hil_sim::elf::alone::{self, Alone};
-use hil_sim::recording::{ACTUATORS, Recording, WORD_V, volts};
-use hil_sim::scene::Scene;
+use hil_sim_boards::display_alone;
+use hil_sim_boards::display_alone::Alone;
+use hil_sim_core::run::recording::{ACTUATORS, Recording, WORD_V, volts};
+use hil_sim_core::scene::Scene;
 use tests::elves;
 use tests::run::{Run, scene, scene_in};
 
@@ -78,7 +79,9 @@ fn far_and_back() -> &'static Recording {
     static RUN: LazyLock<Recording> = LazyLock::new(|| {
         let scene = back_and_slower(FAR_S, 4.5);
         let alone = Alone::new(scene.motion, 2.0, scene.duration_s);
-        alone::run(alone, &elves::both().display).unwrap().recording
+        display_alone::run(alone, &elves::both().display)
+            .unwrap()
+            .recording
     });
     &RUN
 }

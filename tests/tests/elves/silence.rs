@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use firmware_display::ZERO_VOLT;
-use hil_sim::recording::{OutputRecord, volts};
+use hil_sim_core::run::recording::{OutputRecord, volts};
 use protocol::{DisplayConfiguration, RoleCounters};
 use tests::run::{Run, scene, scene_in};
 

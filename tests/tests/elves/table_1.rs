@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use firmware_sensor::counting::predicted_mean_mm;
-use hil_sim::scene::{Estimator, Scene};
+use hil_sim_core::scene::{Estimator, Scene};
 use protocol::Method;
 use tests::run::{Run, runs_of};
 

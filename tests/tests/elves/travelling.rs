@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use hil_sim::recording::{ACTUATORS, OutputRecord, volts};
+use hil_sim_core::run::recording::{ACTUATORS, OutputRecord, volts};
 use tests::run::{Run, scene};
 
 const SPEED_MM_S: f64 = 50.0;

@@ -4,7 +4,7 @@ use std::io::{self, BufRead, IsTerminal};
 use std::sync::mpsc::Sender;
 use std::thread;
 
-use hil_sim::serve::{Bench, Command, PortName};
+use hil_sim_boards::bench::{Bench, Command, PortName};
 use protocol::Role;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::{disable_raw_mode, enable_raw_mode};

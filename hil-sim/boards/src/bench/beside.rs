@@ -1,0 +1,346 @@
+//! What stands beside each board of a bench: its ports, and the hands that reset and stop it.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use protocol::receiver::{Event, Receiver};
+use protocol::{Estimate, Message, Role};
+use rigless::emulator::Host;
+
+use super::pace::Pacer;
+use super::socket::Socket;
+use super::{Command, PortName, lock};
+use crate::ElfError;
+use crate::console::ConsoleHost;
+use crate::display::DisplayPins;
+use crate::lockstep::{Between, QUANTUM_NS, Witness};
+use crate::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
+use crate::rtt::Channel;
+use crate::sensor::SensorPins;
+use crate::watched::Watched;
+use crate::wire::TimedByte;
+use hil_sim_core::run::recording::{ACTUATORS, volts};
+use hil_sim_core::scene::Scene;
+
+/// When a board has to have answered that it is set up.
+const ANSWERS_NS: u64 = 5_000_000_000;
+/// How long a reader is waited for at a time.
+const WAITS: Duration = Duration::from_millis(20);
+
+/// What the display's converters put out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outputs {
+    /// Each actuator's voltage, in V.
+    pub volts: [f64; ACTUATORS],
+    /// Whether CLR is low, which holds all of them at 0 V.
+    pub is_clear: bool,
+}
+
+impl Outputs {
+    /// Whether nothing is felt: every voltage is 0 V.
+    pub fn are_silent(&self) -> bool {
+        self.volts.iter().all(|&volts| volts == 0.0)
+    }
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self {
+            volts: [0.0; ACTUATORS],
+            is_clear: true,
+        }
+    }
+}
+
+/// What the sensor board makes of what it touches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensed {
+    /// What it said last to its peer; none if it has not said anything yet.
+    pub estimate: Option<Estimate>,
+    /// The true wavelength under the fingertip, in mm.
+    pub wavelength_mm: f64,
+}
+
+/// What a bench and its boards' threads share.
+#[derive(Debug)]
+pub struct Shared {
+    pub sockets: [Socket; PortName::ALL.len()],
+    /// Whether the boards are not joined.
+    pub is_apart: bool,
+    /// Whether a port's reader is waited for.
+    pub waits: bool,
+    pub now_ns: AtomicU64,
+    /// How far the wall clock is ahead.
+    pub behind_us: AtomicU64,
+    /// When both boards stop.
+    pub end_ns: AtomicU64,
+    /// Whether they are to stop before.
+    pub stops: AtomicBool,
+    pub sensed: Mutex<Sensed>,
+    pub outputs: Mutex<Outputs>,
+    pub orders: Mutex<VecDeque<(Role, Command)>>,
+}
+
+impl Shared {
+    pub fn socket(&self, name: PortName) -> &Socket {
+        &self.sockets[name as usize]
+    }
+
+    pub fn now_s(&self) -> f64 {
+        self.now_ns.load(Ordering::Relaxed) as f64 * 1e-9
+    }
+
+    /// Has something done to the board of `role`.
+    pub fn order(&self, role: Role, command: Command) {
+        lock(&self.orders).push_back((role, command));
+    }
+
+    fn next_order(&self, role: Role) -> Option<Command> {
+        let mut orders = lock(&self.orders);
+        let place = orders.iter().position(|&(whose, _)| whose == role)?;
+        orders.remove(place).map(|(_, command)| command)
+    }
+
+    /// Whether anybody has a port open, now.
+    pub fn has_clients(&self) -> bool {
+        self.sockets.iter().any(|socket| {
+            socket.carry(self.now_ns.load(Ordering::Relaxed), &[], 0);
+            socket.has_client()
+        })
+    }
+
+    /// Hands on and takes what goes through a port of a board.
+    fn carry(&self, name: PortName, now_ns: u64, sent: &[TimedByte], taken: usize) -> Vec<u8> {
+        let socket = self.socket(name);
+        let mut heard = socket.carry(now_ns, sent, taken);
+        while self.waits && !self.stops.load(Ordering::Relaxed) && socket.is_behind(WAITS) {
+            heard.extend(socket.carry(now_ns, &[], taken + heard.len()));
+        }
+        heard
+    }
+}
+
+/// What differs between the two boards' pins.
+pub trait Shown: Watched {
+    /// Shows what the pins have come to since the last call, and forgets it.
+    fn show(board: &mut Nucleo<Self>, shared: &Shared)
+    where
+        Self: Sized;
+
+    /// The emergency stop is pressed, or released.
+    fn press_stop(_board: &mut Nucleo<Self>, _at_ns: u64, _pressed: bool)
+    where
+        Self: Sized,
+    {
+    }
+}
+
+impl Shown for SensorPins {
+    fn show(board: &mut Nucleo<Self>, shared: &Shared) {
+        let (pins, _) = board.pins();
+        pins.scans.clear();
+        lock(&shared.sensed).wavelength_mm = pins.wavelength_mm();
+    }
+}
+
+impl Shown for DisplayPins {
+    fn show(board: &mut Nucleo<Self>, shared: &Shared) {
+        let last = Self::take_records(board).outputs.pop();
+        let mut outputs = lock(&shared.outputs);
+        outputs.is_clear = board.pins().0.is_clear();
+        if let Some(last) = last {
+            outputs.volts = last.words.map(volts);
+        }
+    }
+
+    fn press_stop(board: &mut Nucleo<Self>, at_ns: u64, pressed: bool) {
+        let (pins, part) = board.pins();
+        pins.set_stop_button(part, at_ns, pressed);
+    }
+}
+
+/// Beside one board.
+pub struct Beside {
+    role: Role,
+    shared: Arc<Shared>,
+    /// The host that sets the board up before anybody else has its console.
+    setup: Option<ConsoleHost>,
+    /// Told once the board is set up.
+    ready: Option<Sender<Result<(), ElfError>>>,
+    rtt: Option<Channel>,
+    logged: Vec<TimedByte>,
+    /// What the board says to its peer.
+    said: Receiver,
+    /// Said since the last exchange.
+    sent: Vec<TimedByte>,
+    /// Whether the scene breaks the boards.
+    is_broken: bool,
+    /// The wall clock, beside the one board that the other waits for.
+    pacer: Option<Pacer>,
+}
+
+impl Beside {
+    /// Beside the board of `role` in `scene`, which runs `elf`.
+    pub fn new(
+        scene: &Scene,
+        role: Role,
+        elf: &[u8],
+        shared: Arc<Shared>,
+        ready: Sender<Result<(), ElfError>>,
+        pacer: Option<Pacer>,
+    ) -> Self {
+        Self {
+            role,
+            shared,
+            setup: ConsoleHost::of_scene(scene, role),
+            ready: Some(ready),
+            rtt: Channel::find(elf),
+            logged: Vec::new(),
+            said: Receiver::new(),
+            sent: Vec::new(),
+            is_broken: !scene.faults.is_empty(),
+            pacer,
+        }
+    }
+
+    fn ports(&self) -> [PortName; 3] {
+        match self.role {
+            Role::Display => [
+                PortName::DisplayConsole,
+                PortName::DisplayLink,
+                PortName::DisplayRtt,
+            ],
+            _ => [
+                PortName::SensorConsole,
+                PortName::SensorLink,
+                PortName::SensorRtt,
+            ],
+        }
+    }
+
+    /// Goes on with setting the board up; true once that is done.
+    fn set_up<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
+        if let Some(host) = &mut self.setup {
+            host.serve(board, now_ns);
+            let reason = match host.told {
+                None if now_ns < ANSWERS_NS => return false,
+                None => Some("it has not answered for 5 s".to_owned()),
+                Some(told) => told.report.refused.map(|refusal| refusal.to_string()),
+            };
+            self.setup = None;
+            if let Some(reason) = reason
+                && let Some(ready) = self.ready.take()
+            {
+                let board = self.role.name();
+                let _ = ready.send(Err(ElfError::Configuration { board, reason }));
+            }
+        }
+        if let Some(ready) = self.ready.take() {
+            let _ = ready.send(Ok(()));
+        }
+        true
+    }
+
+    /// Lets a port's bytes go both ways.
+    fn carry<P: Watched>(
+        &self,
+        board: &mut Nucleo<P>,
+        (uart, name): (usize, PortName),
+        (now_ns, is_on): (u64, bool),
+        sent: &[TimedByte],
+    ) {
+        let waiting = board.wire(uart).waiting();
+        let heard = self.shared.carry(name, now_ns, sent, waiting);
+        // A board without power hears nothing.
+        for byte in heard.into_iter().filter(|_| is_on) {
+            board.wire(uart).hear(now_ns, byte);
+        }
+    }
+}
+
+impl<P: Shown> Witness<P> for Beside {
+    fn begin(&mut self, now_ns: u64) {
+        let Some(pacer) = &mut self.pacer else { return };
+        let behind = pacer.wait(now_ns);
+        self.shared
+            .behind_us
+            .store(behind.as_micros() as u64, Ordering::Relaxed);
+        self.shared.now_ns.store(now_ns, Ordering::Relaxed);
+        // The other board, which has not begun its next quantum, is told too.
+        if self.shared.stops.load(Ordering::Relaxed) {
+            self.shared
+                .end_ns
+                .fetch_min(now_ns + QUANTUM_NS, Ordering::Relaxed);
+        }
+    }
+
+    fn sent(&mut self, _board: &mut Nucleo<P>, sent: &[TimedByte]) {
+        if self.role == Role::Sensor {
+            for &(_, byte) in sent {
+                self.said.receive(&[byte], |event| {
+                    if let Event::Message(Message::Estimate(estimate)) = event {
+                        lock(&self.shared.sensed).estimate = Some(estimate);
+                    }
+                });
+            }
+        }
+        if self.shared.is_apart {
+            self.sent.extend_from_slice(sent);
+        }
+    }
+
+    fn is_joined(&self, _now_ns: u64) -> bool {
+        !self.shared.is_apart
+    }
+
+    fn heard(&mut self, _due_ns: u64, _byte: u8) {}
+
+    fn attend(&mut self, between: Between<'_, P>) {
+        let Between {
+            session,
+            host,
+            stop,
+            now_ns,
+            is_on,
+        } = between;
+        let board = session.board_mut();
+        P::show(board, &self.shared);
+        if self.set_up(board, now_ns) {
+            let moment = (now_ns, is_on);
+            let [console, link, rtt] = self.ports();
+            let sent = board.wire(CONSOLE_UART).take_sent();
+            self.carry(board, (CONSOLE_UART, console), moment, &sent);
+            if self.shared.is_apart {
+                let sent = std::mem::take(&mut self.sent);
+                self.carry(board, (PEER_UART, link), moment, &sent);
+            }
+            let logged = std::mem::take(&mut self.logged);
+            self.shared.carry(rtt, now_ns, &logged, 0);
+        }
+        // A firmware that has gone astray is not kept running; one that is broken on purpose is.
+        if !self.is_broken && !session.unmapped().is_empty() {
+            self.shared.stops.store(true, Ordering::Relaxed);
+        }
+        while let Some(order) = self.shared.next_order(self.role) {
+            match order {
+                Command::Reset(_) => session.reset_by_pin(stop.at, stop.instruction_count, host),
+                Command::Stop => P::press_stop(session.board_mut(), stop.at.0, true),
+                Command::Release => P::press_stop(session.board_mut(), stop.at.0, false),
+                _ => {}
+            }
+        }
+    }
+
+    fn log(&mut self, now_ns: u64, host: &mut dyn Host) {
+        let bytes = self.rtt.map(|rtt| rtt.take(host)).unwrap_or_default();
+        self.logged
+            .extend(bytes.into_iter().map(|byte| (now_ns, byte)));
+    }
+
+    fn is_over(&self, now_ns: u64) -> bool {
+        now_ns >= self.shared.end_ns.load(Ordering::Relaxed)
+    }
+}

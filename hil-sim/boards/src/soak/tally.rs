@@ -1,0 +1,500 @@
+//! What is counted on the wires and pins of a long run, and what the boards' own counters must say to it.
+
+use protocol::receiver::{Event, Receiver};
+use protocol::{
+    DisplayState, Message, PortCounters, ResetCause, RoleCounters, Safety, SensorCounters, Status,
+};
+
+use super::super::display::DisplayRecords;
+use super::super::wire::TimedByte;
+use super::{Left, Soaked};
+use hil_sim_core::run::recording::{ACTUATORS, TickRecord, volts};
+
+/// The voltages rest with the hand: so long after its last count at the latest.
+const RESTS_WITHIN_NS: u64 = 20_000_000;
+/// The sensor looks at what it has heard so often.
+const SAMPLE_NS: u64 = 1_000_000;
+/// The largest change of a channel at an edge, in V: 8 V/ms for half a ms, and a word's rounding.
+const LARGEST_STEP_V: f64 = 4.001;
+/// Between a status' making and its last byte the ticks go on: its 200 bytes, and what waits before it.
+const TICKS_ON_THE_WIRE: u64 = 40;
+/// Frames that may be lost at the end without any frame after them to show it: those on their way when
+/// the link falls silent, and a burst of losses.
+const UNSEEN_AT_THE_END: u64 = 120;
+
+/// A condition, and whether it held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Check {
+    /// What must be.
+    pub what: String,
+    /// What was seen.
+    pub seen: String,
+    /// Whether it was so.
+    pub holds: bool,
+}
+
+/// What a board said and heard.
+#[derive(Default)]
+pub(super) struct Side {
+    said: Receiver,
+    /// A receiver beside the board's own, on the very bytes that reach it.
+    heard: Receiver,
+    said_estimates: u64,
+    said_motions: u64,
+    heard_valid: u64,
+    heard_estimates: u64,
+    heard_motions: u64,
+    /// Samples of the sensor in which a motion came, and the last of them.
+    motion_samples: u64,
+    motion_sample: u64,
+    statuses: u64,
+    last: Option<Status>,
+    /// The frames said before the last status.
+    before_last: u64,
+    /// Statuses whose count of sent frames is not that of the wire.
+    miscounted_frames: u64,
+    /// Statuses whose count of ticks is not that of the timer.
+    miscounted_ticks: u64,
+    /// Loads and updates at the first status of a display.
+    first_updates: Option<(u64, u32)>,
+    uptime_fell: u64,
+    holds: u64,
+    trips: u64,
+}
+
+/// What a display's outputs did.
+#[derive(Default)]
+pub(super) struct Outputs {
+    ticks: u64,
+    loads: u64,
+    changes: u64,
+    clears: u64,
+    dac_frame_errors: u64,
+    skewed: u64,
+    words: Option<[u16; ACTUATORS]>,
+    largest_step_v: f64,
+    /// What the encoder counted last, and since when it has.
+    still: Option<(u16, u64)>,
+    standing: u64,
+}
+
+impl Outputs {
+    /// Takes what was recorded since the last call, and the loads that a chip has counted so far.
+    pub(super) fn take(&mut self, records: DisplayRecords, loads: u64) {
+        self.loads = loads;
+        self.clears += u64::from(records.clears);
+        self.dac_frame_errors = records.dac_frame_errors;
+        for output in &records.outputs {
+            self.skewed += u64::from(output.skew_ns > 0);
+            let before = self.words.unwrap_or([0x8000; ACTUATORS]);
+            for (from, to) in before.iter().zip(&output.words) {
+                self.largest_step_v = self.largest_step_v.max((volts(*to) - volts(*from)).abs());
+            }
+            self.changes += u64::from(before != output.words);
+            self.words = Some(output.words);
+        }
+        for tick in &records.ticks {
+            self.ticks += 1;
+            self.watch_rest(tick);
+        }
+    }
+
+    /// Counts ticks at which a voltage stands though the hand's encoder has for long enough.
+    fn watch_rest(&mut self, tick: &TickRecord) {
+        let since_ns = match self.still {
+            Some((encoder, since_ns)) if encoder == tick.encoder => since_ns,
+            _ => tick.at_ns,
+        };
+        self.still = Some((tick.encoder, since_ns));
+        let silent = self.words.is_none_or(|words| words == [0x8000; ACTUATORS]);
+        if tick.at_ns - since_ns > RESTS_WITHIN_NS && !silent {
+            self.standing += 1;
+        }
+    }
+}
+
+/// Frames that ended, of every sort.
+fn ended(counters: &PortCounters) -> u64 {
+    [
+        counters.received,
+        counters.corrupt,
+        counters.overlong,
+        counters.late,
+        counters.duplicated,
+        counters.malformed,
+        counters.foreign,
+        counters.unheralded,
+    ]
+    .into_iter()
+    .map(u64::from)
+    .sum()
+}
+
+impl Side {
+    /// The board put these on the wire.
+    pub(super) fn sent(&mut self, bytes: &[TimedByte], outputs: &Outputs) {
+        for &(_, byte) in bytes {
+            let mut message = None;
+            self.said.receive(&[byte], |event| {
+                if let Event::Message(said) = event {
+                    message = Some(said);
+                }
+            });
+            match message {
+                Some(Message::Estimate(_)) => self.said_estimates += 1,
+                Some(Message::Motion(_)) => self.said_motions += 1,
+                Some(Message::Status(status)) => self.take_status(status, outputs),
+                Some(Message::Safety(change)) => self.take_safety(change),
+                _ => {}
+            }
+        }
+    }
+
+    fn take_status(&mut self, status: Status, outputs: &Outputs) {
+        self.statuses += 1;
+        self.before_last = ended(&self.said.counters()) - 1;
+        self.miscounted_frames += u64::from(u64::from(status.peer.sent) != self.before_last);
+        if let RoleCounters::Display(counters) = status.role {
+            let since = outputs.ticks.wrapping_sub(counters.ticks.into());
+            self.miscounted_ticks += u64::from(since > TICKS_ON_THE_WIRE);
+            self.first_updates
+                .get_or_insert((outputs.loads, counters.updates));
+        }
+        let fell = self
+            .last
+            .is_some_and(|last| status.uptime_us <= last.uptime_us);
+        self.uptime_fell += u64::from(fell);
+        self.last = Some(status);
+    }
+
+    fn take_safety(&mut self, change: Safety) {
+        match change.state {
+            DisplayState::Fading(_) => self.holds += 1,
+            DisplayState::Stopped(_) => self.trips += 1,
+            DisplayState::Boot | DisplayState::Ready | DisplayState::Driving => {}
+        }
+    }
+
+    /// This byte reaches the board.
+    pub(super) fn arrived(&mut self, at_ns: u64, byte: u8) {
+        let mut moved = false;
+        self.heard.receive(&[byte], |event| match event {
+            Event::Message(Message::Estimate(estimate)) => {
+                self.heard_estimates += 1;
+                self.heard_valid += u64::from(estimate.valid);
+            }
+            Event::Message(Message::Motion(_)) => moved = true,
+            _ => {}
+        });
+        if moved {
+            self.heard_motions += 1;
+            let sample = at_ns / SAMPLE_NS;
+            self.motion_samples += u64::from(sample != self.motion_sample);
+            self.motion_sample = sample;
+        }
+    }
+
+    pub(super) fn last_status(&self) -> Option<Status> {
+        self.last
+    }
+}
+
+/// Collects checks.
+#[derive(Default)]
+struct Checks(Vec<Check>);
+
+impl Checks {
+    fn equal(&mut self, what: String, seen: u64, due: u64) {
+        self.0.push(Check {
+            what,
+            seen: format!("{seen}, due {due}"),
+            holds: seen == due,
+        });
+    }
+
+    fn none(&mut self, what: String, seen: u64) {
+        self.0.push(Check {
+            what,
+            seen: seen.to_string(),
+            holds: seen == 0,
+        });
+    }
+
+    fn within(&mut self, what: String, seen: u64, (low, high): (u64, u64)) {
+        self.0.push(Check {
+            what,
+            seen: format!("{seen}, due {low} to {high}"),
+            holds: (low..=high).contains(&seen),
+        });
+    }
+}
+
+/// Holds both boards' last counters against what was seen.
+pub(super) fn judge(sensor: Left, display: Left, crossed: u64) -> Soaked {
+    let mut checks = Checks::default();
+    for (board, peer) in [(&sensor, &display), (&display, &sensor)] {
+        of_board(&mut checks, board);
+        of_link(&mut checks, board, peer);
+    }
+    if let Some(RoleCounters::Sensor(counters)) = sensor.status().map(|status| status.role) {
+        of_sensor(&mut checks, &sensor, &counters);
+    }
+    of_display(&mut checks, &display);
+    let (said, outputs) = (&display.side, &display.outputs);
+    let counts = vec![
+        ("boundaries that the hand went over", crossed),
+        ("ticks of the display", outputs.ticks),
+        ("LDAC edges", outputs.loads),
+        ("changes of the outputs", outputs.changes),
+        ("estimates sent", sensor.side.said_estimates),
+        ("of them heard", said.heard_estimates),
+        ("of those valid", said.heard_valid),
+        ("motions sent", said.said_motions),
+        ("of them heard", sensor.side.heard_motions),
+        (
+            "frames lost on the way to the display",
+            said.heard.counters().lost.into(),
+        ),
+        ("frames corrupt there", said.heard.counters().corrupt.into()),
+        ("frames late there", said.heard.counters().late.into()),
+        ("times that the stimulus was held", said.holds),
+    ];
+    Soaked {
+        checks: checks.0,
+        counts,
+    }
+}
+
+fn of_board(checks: &mut Checks, board: &Left) {
+    let name = board.name;
+    let side = &board.side;
+    checks.none(
+        format!("{name}: panics in its log"),
+        board.panics.len() as u64,
+    );
+    checks.none(format!("{name}: resets"), board.resets as u64);
+    checks.none(format!("{name}: times its uptime fell"), side.uptime_fell);
+    checks.none(
+        format!("{name}: configurations without an answer"),
+        u64::from(!board.told),
+    );
+    checks.none(
+        format!("{name}: statuses missing"),
+        u64::from(side.statuses < 2),
+    );
+    let Some(status) = side.last_status() else {
+        return;
+    };
+    checks.none(
+        format!("{name}: watchdog resets"),
+        u64::from(status.watchdog_resets) + u64::from(status.reset == ResetCause::Watchdog),
+    );
+    checks.none(
+        format!("{name}: statuses whose sent frames are not the wire's"),
+        side.miscounted_frames,
+    );
+    for (port, counters) in [("peer", status.peer), ("console", status.console)] {
+        checks.none(
+            format!("{name}, {port}: frames dropped"),
+            counters.dropped.into(),
+        );
+        checks.none(
+            format!("{name}, {port}: overruns"),
+            counters.overruns.into(),
+        );
+        checks.none(
+            format!("{name}, {port}: line errors"),
+            counters.line_errors.into(),
+        );
+    }
+}
+
+/// `board`'s receiving counters against a receiver on the same bytes, and against what `peer` sent.
+fn of_link(checks: &mut Checks, board: &Left, peer: &Left) {
+    let Some(status) = board.status() else { return };
+    let (name, twin) = (board.name, board.side.heard.counters());
+    for (what, seen, due) in [
+        ("received", status.peer.received, twin.received),
+        ("lost", status.peer.lost, twin.lost),
+        ("corrupt", status.peer.corrupt, twin.corrupt),
+        ("overlong", status.peer.overlong, twin.overlong),
+        ("late", status.peer.late, twin.late),
+        ("duplicated", status.peer.duplicated, twin.duplicated),
+        ("malformed", status.peer.malformed, twin.malformed),
+        ("foreign", status.peer.foreign, twin.foreign),
+        ("unheralded", status.peer.unheralded, twin.unheralded),
+    ] {
+        checks.equal(format!("{name}: frames {what}"), seen.into(), due.into());
+    }
+    // What was sent came, came late, or left a gap; after silence nothing more shows a gap. Two statuses
+    // and all other frames of the quiet end are among those.
+    let sent = peer.side.before_last;
+    let [received, late, lost, unheralded] =
+        [twin.received, twin.late, twin.lost, twin.unheralded].map(u64::from);
+    let quiet = peer.side.said_in_quiet();
+    let accounted = received + late + lost + unheralded;
+    checks.within(
+        format!("{name}: of the peer's frames received, late, lost or unheralded"),
+        accounted,
+        (sent.saturating_sub(quiet + UNSEEN_AT_THE_END), sent),
+    );
+}
+
+impl Side {
+    /// The most frames that a board says in the quiet end: 500 motions and 100 estimates a second.
+    fn said_in_quiet(&self) -> u64 {
+        let rate_hz = if self.said_motions > 0 { 500 } else { 100 };
+        (super::QUIET_S * rate_hz as f64) as u64
+    }
+}
+
+fn of_sensor(checks: &mut Checks, sensor: &Left, counters: &SensorCounters) {
+    checks.none(
+        "sensor: deadline misses".to_owned(),
+        counters.deadline_misses.into(),
+    );
+    checks.none(
+        "sensor: ADC overruns".to_owned(),
+        counters.adc_overruns.into(),
+    );
+    checks.none(
+        "sensor: DMA overruns".to_owned(),
+        counters.dma_overruns.into(),
+    );
+    // Those before the peer has greeted are counted and not sent.
+    let said = sensor.side.said_estimates;
+    checks.within(
+        "sensor: estimates counted".to_owned(),
+        counters.estimates.into(),
+        (said.saturating_sub(110), said + 110),
+    );
+    // The latest of those that come within a sample is used; of a burst without a gap, which DMA hands on
+    // at its end, the latest of all.
+    let samples = sensor.side.motion_samples;
+    checks.within(
+        "sensor: motions that reached the drive".to_owned(),
+        counters.motions.into(),
+        (samples / 2, sensor.side.heard_motions),
+    );
+}
+
+fn of_display(checks: &mut Checks, display: &Left) {
+    let (side, outputs) = (&display.side, &display.outputs);
+    checks.none(
+        "display: statuses whose ticks are not the timer's".to_owned(),
+        side.miscounted_ticks,
+    );
+    checks.none(
+        "display: edges at which channels did not change together".to_owned(),
+        outputs.skewed,
+    );
+    checks.none(
+        "display: frames that a converter did not understand".to_owned(),
+        outputs.dac_frame_errors,
+    );
+    checks.none("display: times that CLR fell".to_owned(), outputs.clears);
+    checks.none("display: trips".to_owned(), side.trips);
+    checks.none(
+        "display: ticks with a voltage though the hand rests".to_owned(),
+        outputs.standing,
+    );
+    checks.0.push(Check {
+        what: "display: largest step of a channel, V".to_owned(),
+        seen: format!("{:.3}, at most {LARGEST_STEP_V}", outputs.largest_step_v),
+        holds: outputs.largest_step_v <= LARGEST_STEP_V,
+    });
+    let Some(RoleCounters::Display(counters)) = display.status().map(|status| status.role) else {
+        return;
+    };
+    for (what, count) in [
+        ("missed updates", counters.deadline_misses),
+        ("SPI errors", counters.spi_errors),
+        ("converter faults", counters.converter_faults),
+        ("CLR seen fallen", counters.clears),
+        ("encoder jumps", counters.encoder_jumps),
+        ("motions without room", counters.unheard),
+        ("estimates called a flood", counters.flooded),
+        (
+            "stopped at the end",
+            u32::from(matches!(counters.state, DisplayState::Stopped(_))),
+        ),
+    ] {
+        checks.none(format!("display: {what}"), count.into());
+    }
+    if let Some((loads, updates)) = side.first_updates {
+        checks.equal(
+            "display: LDAC edges for its updates".to_owned(),
+            outputs.loads - loads,
+            u64::from(counters.updates - updates),
+        );
+    }
+    // Two that come within a tick are one to the stimulus: the later.
+    let used = u64::from(counters.estimates)
+        + u64::from(counters.refused_estimates)
+        + u64::from(counters.implausible);
+    let valid = side.heard_valid;
+    checks.within(
+        "display: valid estimates followed, refused or implausible".to_owned(),
+        used,
+        (valid - valid / 20, side.heard_estimates),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hil_sim_core::run::recording::OutputRecord;
+
+    fn records(at_ms: u64, encoder: u16, word: u16) -> DisplayRecords {
+        let mut words = [0x8000; ACTUATORS];
+        words[9] = word;
+        DisplayRecords {
+            ticks: vec![TickRecord {
+                at_ns: at_ms * 1_000_000,
+                encoder,
+                position_mm: 0.0,
+            }],
+            outputs: vec![OutputRecord {
+                at_ns: at_ms * 1_000_000,
+                words,
+                skew_ns: 0,
+            }],
+            ..DisplayRecords::default()
+        }
+    }
+
+    #[test]
+    fn a_voltage_that_stands_while_the_hand_rests_is_counted_and_one_in_motion_is_not() {
+        let mut outputs = Outputs::default();
+        for ms in 0..100 {
+            outputs.take(records(ms, ms as u16, 0x9000), ms);
+        }
+        assert_eq!(outputs.standing, 0);
+        // The encoder stands from 99 ms on: silent in time, then not.
+        for ms in 100..200 {
+            let word = if (115..160).contains(&ms) {
+                0x8000
+            } else {
+                0x9000
+            };
+            outputs.take(records(ms, 99, word), ms);
+        }
+        assert_eq!(outputs.standing, 40);
+        assert_eq!((outputs.ticks, outputs.loads), (200, 199));
+        assert!((outputs.largest_step_v - 0.625).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_frame_that_ends_is_counted_once() {
+        let counters = PortCounters {
+            sent: 1_000,
+            received: 10,
+            lost: 500,
+            corrupt: 3,
+            late: 2,
+            unheralded: 1,
+            ..PortCounters::default()
+        };
+        assert_eq!(ended(&counters), 16);
+    }
+}

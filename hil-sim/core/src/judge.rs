@@ -1,0 +1,146 @@
+//! Judging a run: what the estimates and the actuators did, in numbers.
+
+pub mod actuators;
+mod channels;
+mod cycles;
+pub mod edges;
+pub mod estimates;
+pub mod event;
+pub mod expectation;
+pub mod fault;
+pub mod felt;
+pub mod mean;
+mod middle;
+pub mod outcome;
+pub mod phase;
+mod phase_error;
+pub mod reaction;
+pub mod spectrum;
+mod stimulus;
+#[cfg(test)]
+pub(crate) mod synthetic;
+pub mod track;
+pub mod truth;
+mod voltage;
+pub mod words;
+
+use protocol::Estimate;
+
+use crate::judge::truth::Truth;
+use crate::run::observer::{Onlooker, retell};
+use crate::run::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
+
+pub use actuators::{Actuators, Held};
+pub use estimates::{JudgedEstimate, Summary};
+use felt::Waves;
+
+/// A recording, judged against its truth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// Every estimate beside the truth, in the order they were made.
+    pub estimates: Vec<JudgedEstimate>,
+    /// The estimates as a whole.
+    pub summary: Summary,
+    /// What the actuators did.
+    pub actuators: Actuators,
+}
+
+/// Judges a recording. What a recording is too short or too empty to tell is none, never NaN.
+pub fn judge(truth: &Truth, recording: &Recording) -> Verdict {
+    let mut judge = Judge::new(truth);
+    retell(recording, &mut judge);
+    judge.finish()
+}
+
+/// Judges a run as it goes on, the same as [`judge`] does once it is recorded. It keeps the estimates, a few
+/// numbers for each cycle of the stimulus, and no more of the rest than the hand takes for a cycle.
+pub struct Judge<'a> {
+    estimates: estimates::Judge<'a>,
+    actuators: actuators::Judge,
+    felt: felt::Judge,
+}
+
+impl<'a> Judge<'a> {
+    /// Before the run.
+    pub fn new(truth: &Truth<'a>) -> Self {
+        Self {
+            estimates: estimates::Judge::new(truth),
+            actuators: actuators::Judge::new(truth),
+            felt: felt::Judge::default(),
+        }
+    }
+
+    /// The run, judged.
+    pub fn finish(self) -> Verdict {
+        let (estimates, summary) = self.estimates.finish();
+        let felt = self.felt.finish();
+        Verdict {
+            estimates,
+            summary: Summary {
+                felt_right_share: felt.right_share,
+                felt_wrong_share: felt.wrong_share,
+                ..summary
+            },
+            actuators: self.actuators.finish(),
+        }
+    }
+
+    /// How much is held of what is not the estimates.
+    pub fn held(&self) -> Held {
+        let held = self.actuators.held();
+        Held {
+            points: held.points + self.estimates.held(),
+            ..held
+        }
+    }
+}
+
+impl Onlooker for Judge<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.estimates.scan(scan);
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.estimates.made(made_ns, estimate);
+        self.actuators.made(made_ns, estimate);
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.actuators.tick(tick);
+        let waves = Waves {
+            in_force_per_mm: self.actuators.in_force_per_mm(),
+            under_mm: self.estimates.under_mm(),
+        };
+        self.felt.tick(tick, waves);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.actuators.output(output);
+        self.felt.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.estimates.received(number, received_ns);
+        self.actuators.received(number, received_ns);
+    }
+}
+
+/// An instant of a recording in s.
+pub fn seconds(at_ns: u64) -> f64 {
+    at_ns as f64 / 1e9
+}
+
+/// None instead of a number that is not finite: JSON has no NaN.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// The mean of the values; none if there are none.
+fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    finite(sum / count as f64)
+}

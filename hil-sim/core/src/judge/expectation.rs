@@ -1,0 +1,179 @@
+//! A scene's `[expect]` against what was measured.
+
+use crate::judge::Verdict;
+use crate::scene::Expect;
+
+/// A line for each expectation that the verdict does not meet, its key first ([`key_of`]). What could not be measured meets none.
+pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
+    let (summary, actuators) = (&verdict.summary, &verdict.actuators);
+    let frequency_percent = match (actuators.frequency_hz, actuators.truth_hz) {
+        (Some(measured), Some(truth)) if truth > 0.0 => Some(100.0 * (measured - truth) / truth),
+        _ => None,
+    };
+    let most = |bound: f64| -bound..=bound;
+    let checks = [
+        (
+            "wavelength_rms_percent",
+            expect.wavelength_rms_percent.map(most),
+            summary.rms_percent,
+        ),
+        (
+            "wavelength_bias_percent",
+            expect.wavelength_bias_percent.map(most),
+            summary.bias_percent,
+        ),
+        (
+            "mean_mm",
+            expect
+                .mean_mm
+                .map(|mean| mean - expect.mean_tolerance_mm..=mean + expect.mean_tolerance_mm),
+            summary.mean_mm,
+        ),
+        (
+            "valid_share_min",
+            expect.valid_share_min.map(|least| least..=1.0),
+            summary.valid_share,
+        ),
+        (
+            "wrong_share_max",
+            expect.wrong_share_max.map(|most| 0.0..=most),
+            summary.wrong_share,
+        ),
+        (
+            "felt_right_share_min",
+            expect.felt_right_share_min.map(|least| least..=1.0),
+            summary.felt_right_share,
+        ),
+        (
+            "felt_wrong_share_max",
+            expect.felt_wrong_share_max.map(|most| 0.0..=most),
+            summary.felt_wrong_share,
+        ),
+        (
+            "settling_ms",
+            expect.settling_ms.map(most),
+            summary.settling_ms,
+        ),
+        (
+            "latency_ms",
+            expect.latency_ms.map(most),
+            summary.latency_ms,
+        ),
+        (
+            "frequency_percent",
+            expect.frequency_percent.map(most),
+            frequency_percent,
+        ),
+        (
+            "phase_rms_cycles",
+            expect.phase_rms_cycles.map(most),
+            actuators.phase_error_rms_cycles,
+        ),
+    ];
+    let mut lines = Vec::new();
+    for (key, wanted, measured) in checks {
+        let Some(wanted) = wanted else { continue };
+        let (low, high) = (wanted.start(), wanted.end());
+        match measured {
+            Some(measured) if wanted.contains(&measured) => {}
+            Some(measured) => {
+                lines.push(format!(
+                    "{key}: {measured:.4} is not within {low:.4} and {high:.4}"
+                ));
+            }
+            None => lines.push(format!("{key}: nothing could be measured")),
+        }
+    }
+    lines
+}
+
+/// The key in `[expect]` that a line of [`unmet`]'s is about.
+pub fn key_of(line: &str) -> &str {
+    line.split(':').next().unwrap_or(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict() -> Verdict {
+        let mut verdict = Verdict {
+            estimates: Vec::new(),
+            summary: Default::default(),
+            actuators: Default::default(),
+        };
+        verdict.summary.rms_percent = Some(2.0);
+        verdict.summary.bias_percent = Some(-1.5);
+        verdict.summary.mean_mm = Some(2.02);
+        verdict.summary.valid_share = Some(0.9);
+        verdict.summary.wrong_share = Some(0.002);
+        verdict.summary.felt_right_share = Some(0.85);
+        verdict.summary.felt_wrong_share = Some(0.01);
+        verdict.actuators.frequency_hz = Some(25.1);
+        verdict.actuators.truth_hz = Some(25.0);
+        verdict
+    }
+
+    fn expect(change: impl Fn(&mut Expect)) -> Vec<String> {
+        let mut expect = Expect {
+            mean_tolerance_mm: 0.03,
+            ..Expect::default()
+        };
+        change(&mut expect);
+        unmet(&expect, &verdict())
+    }
+
+    #[test]
+    fn a_scene_that_expects_nothing_is_content() {
+        assert!(expect(|_| {}).is_empty());
+    }
+
+    #[test]
+    fn bounds_that_hold_are_silent() {
+        let unmet = expect(|e| {
+            e.wavelength_rms_percent = Some(2.0);
+            e.wavelength_bias_percent = Some(1.5);
+            e.mean_mm = Some(2.0);
+            e.valid_share_min = Some(0.9);
+            e.wrong_share_max = Some(0.002);
+            e.felt_right_share_min = Some(0.85);
+            e.felt_wrong_share_max = Some(0.01);
+            e.frequency_percent = Some(0.5);
+        });
+        assert!(unmet.is_empty(), "{unmet:?}");
+    }
+
+    #[test]
+    fn each_bound_that_does_not_hold_has_its_line() {
+        let unmet = expect(|e| {
+            e.wavelength_rms_percent = Some(1.9);
+            e.wavelength_bias_percent = Some(1.4);
+            e.mean_mm = Some(2.06);
+            e.valid_share_min = Some(0.91);
+            e.wrong_share_max = Some(0.001);
+            e.felt_right_share_min = Some(0.86);
+            e.felt_wrong_share_max = Some(0.009);
+            e.frequency_percent = Some(0.3);
+        });
+        let keys: Vec<&str> = unmet.iter().map(|line| key_of(line)).collect();
+        assert_eq!(
+            keys,
+            [
+                "wavelength_rms_percent",
+                "wavelength_bias_percent",
+                "mean_mm",
+                "valid_share_min",
+                "wrong_share_max",
+                "felt_right_share_min",
+                "felt_wrong_share_max",
+                "frequency_percent"
+            ]
+        );
+    }
+
+    #[test]
+    fn what_could_not_be_measured_is_not_met() {
+        let unmet = expect(|e| e.settling_ms = Some(500.0));
+        assert_eq!(unmet, ["settling_ms: nothing could be measured"]);
+    }
+}

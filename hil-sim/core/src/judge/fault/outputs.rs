@@ -1,0 +1,163 @@
+//! What the outputs did about a fault.
+
+use firmware_display::ZERO_VOLT;
+
+use crate::run::recording::{ACTUATORS, OutputRecord};
+use crate::scene::fault::{Class, Fault};
+
+/// Longest time in ns that an output may stand at one voltage that is not 0: as long as any fault's
+/// outputs have to be at 0 V.
+const STANDING_NS: u64 = 20_000_000;
+/// How long before a fault an output has to have been driven for the stimulus to be called on: half a
+/// cycle of 25 Hz passes 0 V once.
+const DRIVEN_NS: u64 = 20_000_000;
+/// All outputs at 0 V for so long, in ns, is no wave's passing: ten ticks.
+const SILENCE_NS: u64 = 5_000_000;
+
+/// What the outputs did about a fault, from what held when it began on.
+#[derive(Clone, Debug)]
+pub(super) struct Outputs {
+    from_ns: u64,
+    /// The end of what they have to be at 0 V for.
+    rest_ns: u64,
+    until_ns: u64,
+    /// When all have to be at 0 V, if they have to be.
+    late_ns: Option<u64>,
+    was_driving: bool,
+    safe_ns: Option<u64>,
+    /// What they hold; none before the first change.
+    words: Option<[u16; ACTUATORS]>,
+    /// Since when each is at one voltage, in ns.
+    since_ns: [u64; ACTUATORS],
+    /// Which were not at 0 V when they had to be, or stood at another voltage.
+    stuck: [bool; ACTUATORS],
+    /// Since when all are at 0 V, in ns.
+    silent_ns: Option<u64>,
+    /// Whether they were at 0 V for longer than a wave that passes it.
+    answered: bool,
+    drives_again: bool,
+}
+
+/// The same, in short.
+pub(super) struct Answer {
+    /// Whether the stimulus was on when the fault began.
+    pub was_driving: bool,
+    /// From when on all outputs stayed at 0 V for the rest of the fault, in ns since the scene's start.
+    pub safe_ns: Option<u64>,
+    /// Outputs that were not at 0 V when they had to be, or stood at another voltage.
+    pub stuck: usize,
+    /// Whether any was driven after the fault had been answered by 0 V.
+    pub drives_again: bool,
+}
+
+impl Outputs {
+    pub fn new(fault: &Fault, until_ns: u64) -> Self {
+        let from_ns = fault.begins_ns();
+        let rest_ns = match fault.kind.row().class {
+            // What is over stays answered.
+            Class::Stops => until_ns,
+            _ => fault.ends_ns().unwrap_or(until_ns).min(until_ns),
+        };
+        let is_dangerous = fault.kind.row().safe_within_ms.is_some();
+        let late_ns = from_ns + STANDING_NS;
+        Self {
+            from_ns,
+            rest_ns,
+            until_ns,
+            late_ns: (is_dangerous && late_ns < rest_ns).then_some(late_ns),
+            was_driving: false,
+            safe_ns: Some(from_ns),
+            words: None,
+            since_ns: [from_ns; ACTUATORS],
+            stuck: [false; ACTUATORS],
+            silent_ns: None,
+            answered: false,
+            drives_again: false,
+        }
+    }
+
+    /// The outputs have changed.
+    pub fn add(&mut self, output: &OutputRecord) {
+        let at_ns = output.at_ns;
+        let is_silent = output.words.iter().all(|&word| word == ZERO_VOLT);
+        if at_ns > self.from_ns {
+            self.change(at_ns, &output.words, is_silent);
+            return;
+        }
+        if at_ns < self.from_ns {
+            let is_held = at_ns <= self.from_ns.saturating_sub(DRIVEN_NS);
+            self.was_driving = !is_silent || (self.was_driving && !is_held);
+        }
+        self.words = Some(output.words);
+        self.safe_ns = is_silent.then_some(self.from_ns);
+        self.silent_ns = self.safe_ns;
+    }
+
+    /// They have changed after the fault had begun.
+    fn change(&mut self, at_ns: u64, words: &[u16; ACTUATORS], is_silent: bool) {
+        if self.late_ns.is_some_and(|late_ns| at_ns > late_ns) {
+            self.look_late();
+        }
+        if at_ns >= self.until_ns {
+            return;
+        }
+        if at_ns < self.rest_ns {
+            self.safe_ns = match self.safe_ns {
+                _ if !is_silent => None,
+                None => Some(at_ns),
+                safe_ns => safe_ns,
+            };
+        }
+        self.answered |= self
+            .silent_ns
+            .is_some_and(|since_ns| at_ns - since_ns >= SILENCE_NS);
+        self.drives_again |= self.answered && !is_silent;
+        self.silent_ns = is_silent.then_some(at_ns);
+        let Some(before) = self.words.replace(*words) else {
+            self.since_ns = [at_ns; ACTUATORS];
+            return;
+        };
+        for actuator in 0..ACTUATORS {
+            if before[actuator] != words[actuator] {
+                self.stand(actuator, before[actuator], at_ns);
+                self.since_ns[actuator] = at_ns;
+            }
+        }
+    }
+
+    /// An output has been at this word until now.
+    fn stand(&mut self, actuator: usize, word: u16, until_ns: u64) {
+        let stood_ns = until_ns.saturating_sub(self.since_ns[actuator]);
+        self.stuck[actuator] |= word != ZERO_VOLT && stood_ns > STANDING_NS;
+    }
+
+    /// Now all have to be at 0 V.
+    fn look_late(&mut self) {
+        self.late_ns = None;
+        if let Some(words) = &self.words {
+            for (stuck, &word) in self.stuck.iter_mut().zip(words) {
+                *stuck |= word != ZERO_VOLT;
+            }
+        }
+    }
+
+    pub fn finish(mut self) -> Answer {
+        if self.late_ns.is_some() {
+            self.look_late();
+        }
+        for (actuator, word) in self
+            .words
+            .unwrap_or([ZERO_VOLT; ACTUATORS])
+            .into_iter()
+            .enumerate()
+        {
+            self.stand(actuator, word, self.until_ns);
+        }
+        Answer {
+            was_driving: self.was_driving,
+            safe_ns: self.safe_ns,
+            stuck: self.stuck.iter().filter(|&&stuck| stuck).count(),
+            drives_again: self.drives_again,
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! A scene that was run, judged.
+
+use protocol::{Estimate, Role};
+
+use crate::judge;
+use crate::judge::Verdict;
+use crate::judge::event::{Event, Events, events};
+use crate::judge::expectation;
+use crate::judge::fault;
+use crate::judge::fault::{Finding, judge};
+use crate::judge::truth::Truth;
+use crate::native;
+use crate::plant::surface::Surface;
+use crate::run::listener::Said;
+use crate::run::observer::Onlooker;
+use crate::run::recording::{OutputRecord, Ran, Recording, ScanRecord, TickRecord};
+use crate::run::signs::Reset;
+use crate::scene::{Scene, SceneError};
+
+/// A run and what came of it.
+pub struct Outcome {
+    /// What was run.
+    pub scene: Scene,
+    /// What the run left behind.
+    pub recording: Recording,
+    /// The recording, judged.
+    pub verdict: Verdict,
+    /// A line for each expectation of the scene that was not met.
+    pub unmet: Vec<String>,
+    /// What became of the scene's faults, in their order.
+    pub findings: Vec<Finding>,
+    wavelength_mm: Box<dyn Fn(f64) -> f64 + Send>,
+}
+
+impl Outcome {
+    /// Judges the recording of a scene.
+    pub fn new(scene: Scene, recording: Recording) -> Self {
+        let surface = Surface::new(&scene.surface, 0.0);
+        let wavelength_mm = Box::new(move |x_mm| surface.wavelength_mm(x_mm));
+        let verdict = judge::judge(&truth(&scene, &*wavelength_mm), &recording);
+        let unmet = expectation::unmet(&scene.expect, &verdict);
+        let findings = judge(&scene.faults, &recording);
+        Self {
+            scene,
+            recording,
+            verdict,
+            unmet,
+            findings,
+            wavelength_mm,
+        }
+    }
+
+    /// What the scene knows.
+    pub fn truth(&self) -> Truth<'_> {
+        truth(&self.scene, &*self.wavelength_mm)
+    }
+
+    /// The same without the recording; events on demand.
+    pub fn judgement(&self, with_events: bool) -> Judgement {
+        Judgement {
+            ran: self.recording.ran(),
+            verdict: self.verdict.clone(),
+            unmet: self.unmet.clone(),
+            findings: self.findings.clone(),
+            events: if with_events {
+                events(&self.scene, &self.recording)
+            } else {
+                Vec::new()
+            },
+        }
+    }
+}
+
+/// What came of a run, of which nothing else need be left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// What is known of the run.
+    pub ran: Ran,
+    /// The run, judged.
+    pub verdict: Verdict,
+    /// A line for each expectation of the scene that was not met.
+    pub unmet: Vec<String>,
+    /// What became of the scene's faults, in their order.
+    pub findings: Vec<Finding>,
+    /// What happened, and when, if it was asked for.
+    pub events: Vec<Event>,
+}
+
+impl Judgement {
+    /// Runs a scene on the native engine and judges it meanwhile, to the same ends as [`Outcome::new`]. Events
+    /// take the contact model to be led through the scene once more.
+    ///
+    /// # Errors
+    /// If the scene cannot be run.
+    pub fn of(scene: &Scene, with_events: bool) -> Result<Self, SceneError> {
+        let surface = Surface::new(&scene.surface, 0.0);
+        let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
+        let mut judges = Judges {
+            run: judge::Judge::new(&truth(scene, &wavelength_mm)),
+            faults: fault::Judge::new(&scene.faults, scene.duration_s),
+            events: with_events.then(|| Events::new(scene)),
+        };
+        let ran = native::run_before(scene, &mut judges)?;
+        let verdict = judges.run.finish();
+        Ok(Self {
+            ran,
+            unmet: expectation::unmet(&scene.expect, &verdict),
+            verdict,
+            findings: judges.faults.finish(),
+            events: judges.events.map(Events::finish).unwrap_or_default(),
+        })
+    }
+}
+
+/// All who judge a run.
+struct Judges<'a> {
+    run: judge::Judge<'a>,
+    faults: fault::Judge,
+    events: Option<Events<'a>>,
+}
+
+impl Onlooker for Judges<'_> {
+    fn scan(&mut self, scan: &ScanRecord) {
+        self.run.scan(scan);
+        if let Some(events) = &mut self.events {
+            events.scan(scan);
+        }
+    }
+
+    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.run.made(made_ns, estimate);
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        self.run.tick(tick);
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.run.output(output);
+        self.faults.output(output);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        self.run.received(number, received_ns);
+    }
+
+    fn said(&mut self, role: Role, said: &Said) {
+        self.faults.said(role, said);
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        self.faults.reset(reset);
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        self.faults.cleared(at_ns);
+    }
+}
+
+fn truth<'a>(scene: &'a Scene, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Truth<'a> {
+    Truth {
+        sensor: scene.sensor_configuration(),
+        display: scene.display_configuration(),
+        actuators: *scene.display.actuators,
+        ..Truth::new(&scene.name, scene.estimator.method_name(), wavelength_mm)
+    }
+}

@@ -1,0 +1,372 @@
+//! The phase that the stimulus should have: true travel times the wavenumber in force.
+
+use std::collections::VecDeque;
+
+use firmware_display::ZERO_VOLT;
+use firmware_display::pace::per_tick;
+use firmware_display::plausibility::{Plausibility, Verdict};
+use protocol::{DisplayConfiguration, Estimate};
+
+use crate::judge::seconds;
+use crate::judge::truth::Truth;
+use crate::run::observer::Onlooker;
+use crate::run::recording::{OutputRecord, TickRecord};
+
+/// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
+const TICKS_KEPT: usize = 8;
+/// Estimates kept for their arrival: 40 s, twice what the longest delay and jitter of a scene may come to.
+const ESTIMATES_KEPT: usize = 4_096;
+
+/// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
+/// in which each estimate that the display trusts (its own [`Plausibility`] says which) takes
+/// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
+/// heard. 0 until there is one.
+///
+/// An estimate is followed from the second tick after its arrival on, for the whole travel since the
+/// first: the board hears what has come once a tick's words are on their way.
+#[derive(Clone, Debug)]
+pub struct DuePhase {
+    /// Of the reference actuator, in mm.
+    place_mm: f64,
+    followed: Followed,
+    ticks: VecDeque<Due>,
+    before_mm: Option<f64>,
+    cycles: f64,
+    travelled: f64,
+    shortest_mm: Option<f64>,
+    made: Made,
+    /// What has arrived and was not followed yet, with its arrival in ns.
+    arrived: VecDeque<(u64, Estimate)>,
+    last_tick_ns: Option<u64>,
+    /// Whether the last two outputs were other than 0 V. A wave crosses 0 V; silence stays there.
+    loud: [bool; 2],
+    /// The same at the last tick.
+    heard: bool,
+}
+
+/// The phase due at an instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Due {
+    /// When, in s.
+    pub t_s: f64,
+    /// The phase at the reference actuator, in cycles: signed, not wrapped.
+    pub cycles: f64,
+    /// The cycles gone through so far, forwards and backwards alike: never falls.
+    pub travelled_cycles: f64,
+    /// The last tick by then, in s, and the cycles gone through by that: they go straight from tick to tick.
+    pub tick: (f64, f64),
+}
+
+impl DuePhase {
+    /// Before the first tick.
+    pub fn new(truth: &Truth) -> Self {
+        Self {
+            place_mm: truth.reference_place_mm(),
+            followed: Followed::new(truth.display),
+            ticks: VecDeque::with_capacity(TICKS_KEPT + 1),
+            before_mm: None,
+            cycles: 0.0,
+            travelled: 0.0,
+            shortest_mm: None,
+            made: Made::default(),
+            arrived: VecDeque::new(),
+            last_tick_ns: None,
+            loud: [false; 2],
+            heard: false,
+        }
+    }
+
+    /// The phase due at the last tick; none before the first.
+    pub fn last(&self) -> Option<Due> {
+        self.ticks.back().copied()
+    }
+
+    /// The phase due at an instant among the last few ticks, in a straight line between two of them; level
+    /// after the last, and 0 if there is none.
+    pub fn at(&self, t_s: f64) -> Due {
+        let after = self.ticks.partition_point(|tick| tick.t_s <= t_s);
+        let before = after
+            .checked_sub(1)
+            .and_then(|before| self.ticks.get(before));
+        let (cycles, travelled_cycles) = match (before, self.ticks.get(after)) {
+            (Some(from), Some(to)) => {
+                let straight = |from_value: f64, to_value: f64| {
+                    from_value + (to_value - from_value) * (t_s - from.t_s) / (to.t_s - from.t_s)
+                };
+                (
+                    straight(from.cycles, to.cycles),
+                    straight(from.travelled_cycles, to.travelled_cycles),
+                )
+            }
+            (Some(end), None) | (None, Some(end)) => (end.cycles, end.travelled_cycles),
+            (None, None) => (0.0, 0.0),
+        };
+        Due {
+            t_s,
+            cycles,
+            travelled_cycles,
+            tick: before.map_or((t_s, travelled_cycles), |tick| tick.tick),
+        }
+    }
+
+    /// The wavenumber in force over the last tick's travel, in cycles per mm; 0 before there is any.
+    pub fn in_force_per_mm(&self) -> f64 {
+        self.followed.per_mm
+    }
+
+    /// The shortest λ̂ that has been in force, in mm.
+    pub fn shortest_mm(&self) -> Option<f64> {
+        self.shortest_mm
+    }
+}
+
+impl Onlooker for DuePhase {
+    fn made(&mut self, _made_ns: u64, estimate: &Estimate) {
+        self.made.add(*estimate);
+    }
+
+    fn received(&mut self, number: usize, received_ns: u64) {
+        let Some(estimate) = self.made.take(number) else {
+            return;
+        };
+        if self
+            .last_tick_ns
+            .is_some_and(|tick_ns| received_ns <= tick_ns)
+        {
+            self.followed.hear(&estimate, self.heard);
+        } else {
+            self.arrived.push_back((received_ns, estimate));
+        }
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        let is_loud = output.words.iter().any(|&word| word != ZERO_VOLT);
+        self.loud = [self.loud[1], is_loud];
+    }
+
+    fn tick(&mut self, tick: &TickRecord) {
+        let travel_mm = tick.position_mm - self.before_mm.unwrap_or(tick.position_mm);
+        self.before_mm = Some(tick.position_mm);
+        let per_mm = self.followed.tick();
+        self.cycles += travel_mm * per_mm;
+        self.travelled += travel_mm.abs() * per_mm;
+        if per_mm > 0.0 {
+            let shortest_mm = self.shortest_mm.unwrap_or(f64::INFINITY);
+            self.shortest_mm = Some(shortest_mm.min(1.0 / per_mm));
+        }
+        let t_s = seconds(tick.at_ns);
+        self.ticks.push_back(Due {
+            t_s,
+            cycles: self.cycles + self.place_mm * per_mm,
+            travelled_cycles: self.travelled,
+            tick: (t_s, self.travelled),
+        });
+        if self.ticks.len() > TICKS_KEPT {
+            self.ticks.pop_front();
+        }
+        self.last_tick_ns = Some(tick.at_ns);
+        self.heard = self.loud.contains(&true);
+        while let Some((_, estimate)) = self
+            .arrived
+            .pop_front_if(|&mut (received_ns, _)| received_ns <= tick.at_ns)
+        {
+            self.followed.hear(&estimate, self.heard);
+        }
+    }
+}
+
+/// The last estimates made that have not arrived yet.
+#[derive(Clone, Debug, Default)]
+struct Made {
+    kept: VecDeque<Option<Estimate>>,
+    /// The number of the first one kept.
+    first: usize,
+}
+
+impl Made {
+    fn add(&mut self, estimate: Estimate) {
+        self.kept.push_back(Some(estimate));
+        if self.kept.len() > ESTIMATES_KEPT {
+            self.kept.pop_front();
+            self.first += 1;
+        }
+    }
+
+    /// The one that was made after `number` others, once.
+    fn take(&mut self, number: usize) -> Option<Estimate> {
+        self.kept.get_mut(number.checked_sub(self.first)?)?.take()
+    }
+}
+
+/// The wavenumber that a display follows.
+#[derive(Clone, Debug)]
+struct Followed {
+    configuration: DisplayConfiguration,
+    plausibility: Plausibility,
+    /// In cycles per mm.
+    per_mm: f64,
+    target_per_mm: f64,
+    ticks_left: u32,
+}
+
+impl Followed {
+    fn new(configuration: DisplayConfiguration) -> Self {
+        Self {
+            configuration,
+            plausibility: Plausibility::new(),
+            per_mm: 0.0,
+            target_per_mm: 0.0,
+            ticks_left: 0,
+        }
+    }
+
+    /// An estimate has come, while something was `heard` or nothing.
+    fn hear(&mut self, estimate: &Estimate, heard: bool) {
+        let DisplayConfiguration {
+            max_age_ms,
+            glide_ms,
+            update_rate,
+            ..
+        } = self.configuration;
+        if let Verdict::Trusted(wavelength) = self.plausibility.judge(estimate, max_age_ms) {
+            let target_per_mm = 1.0 / f64::from(wavelength.mm());
+            if target_per_mm != self.target_per_mm {
+                self.target_per_mm = target_per_mm;
+                let glide_ms = if heard { u32::from(glide_ms) } else { 0 };
+                self.ticks_left = glide_ms * (update_rate.hz() / 1_000);
+            }
+        }
+    }
+
+    /// The wavenumber of a tick's travel.
+    fn tick(&mut self) -> f64 {
+        // Whether the hand rests matters to what the sensor says of the arm, not to λ.
+        self.plausibility
+            .elapse(per_tick(self.configuration.update_rate), false);
+        let left = f64::from(self.ticks_left.max(1));
+        self.per_mm += (self.target_per_mm - self.per_mm) / left;
+        self.ticks_left = self.ticks_left.saturating_sub(1);
+        self.per_mm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::synthetic::Run;
+    use crate::run::observer::retell;
+    use crate::run::recording::Recording;
+
+    /// Asks for the phase at an instant as soon as it can be told.
+    struct Asking {
+        due: DuePhase,
+        t_s: f64,
+        answer: Option<Due>,
+    }
+
+    impl Onlooker for Asking {
+        fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+            self.due.made(made_ns, estimate);
+        }
+
+        fn tick(&mut self, tick: &TickRecord) {
+            self.due.tick(tick);
+            if seconds(tick.at_ns) > self.t_s && self.answer.is_none() {
+                self.answer = Some(self.due.at(self.t_s));
+            }
+        }
+
+        fn output(&mut self, output: &OutputRecord) {
+            self.due.output(output);
+        }
+
+        fn received(&mut self, number: usize, received_ns: u64) {
+            self.due.received(number, received_ns);
+        }
+    }
+
+    /// The phase due at `t_s` over a surface of 2 mm, and the shortest λ̂ in force until the end.
+    fn due_at(t_s: f64, recording: &Recording) -> (Due, f64) {
+        let surface = |_| 2.0;
+        let mut asking = Asking {
+            due: DuePhase::new(&Truth::new("", "", &surface)),
+            t_s,
+            answer: None,
+        };
+        retell(recording, &mut asking);
+        let due = asking.answer.expect("the recording goes on after that");
+        (due, asking.due.shortest_mm().expect("some λ̂ is in force"))
+    }
+
+    #[test]
+    fn the_due_phase_is_travel_over_the_wavelength_in_force_to_which_it_glides() {
+        // 2 mm, then 2.5 mm from 1 s on, at 50 mm/s: 25 and 20 cycles a second.
+        let run = Run {
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
+            ..Run::steady(50.0, 2.0)
+        };
+        let (due, shortest_mm) = due_at(1.9, &run.record());
+        // The first estimate arrives at 11 ms, that of 1 s at 1.001 s: each is used for the travel after
+        // that tick. Half of the change comes on the way, for a
+        // glide of 40 ticks, of which the last has it in whole.
+        let glided_s = 1.001 + 0.5 * (0.020 - 0.0005);
+        let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
+        assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
+        assert!((shortest_mm - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_jump_is_in_force_once_the_next_estimate_confirms_it() {
+        let jump = |to: f32, for_s: f64| Run {
+            estimate: Box::new(move |t_s| {
+                let jumped = (0.9999..0.9999 + for_s).contains(&t_s);
+                (if jumped { to } else { 2.0 }, true)
+            }),
+            ..Run::steady(50.0, 2.0)
+        };
+        let cycles = |run: Run| due_at(1.9, &run.record()).0.cycles;
+        let (steady, once, twice) = (
+            cycles(Run::steady(50.0, 2.0)),
+            cycles(jump(5.0, 0.009)),
+            cycles(jump(5.0, 0.95)),
+        );
+        assert_eq!(once, steady);
+        // From 1.011 s on, half of the glide later.
+        let late_s = 1.9 - 1.011 - 0.5 * (0.020 - 0.0005);
+        let expected = steady - late_s * 15.0;
+        assert!((twice - expected).abs() < 1e-6, "{twice} {expected}");
+    }
+
+    #[test]
+    fn a_reversed_stroke_takes_the_phase_back_and_goes_on_travelling() {
+        let (due, _) = due_at(1.0, &Run::swinging(50.0, 1.0, 2.0).record());
+        // Two strokes of 2 · 50 / 2π mm each a second, less the little before the first estimate.
+        let stroke_cycles = 100.0 / std::f64::consts::TAU / 2.0;
+        assert!(due.cycles.abs() < 0.01, "{due:?}");
+        assert!((due.travelled_cycles - 2.0 * stroke_cycles).abs() < 0.01);
+    }
+
+    #[test]
+    fn an_estimate_overtaken_by_a_newer_one_is_not_in_force() {
+        let late = |wavelength_mm: f32| {
+            let mut recording = Run::steady(50.0, 2.0).record();
+            recording.estimates[30].received_ns = Some(500_000_000);
+            recording.estimates[30].estimate.wavelength_mm = Some(wavelength_mm);
+            due_at(1.9, &recording).0
+        };
+        assert_eq!(late(2.2), late(2.0));
+    }
+
+    #[test]
+    fn what_arrives_twice_is_heard_once() {
+        let recording = Run::steady(50.0, 2.0).record();
+        let surface = |_| 2.0;
+        let mut due = DuePhase::new(&Truth::new("", "", &surface));
+        due.made(0, &recording.estimates[0].estimate);
+        due.received(0, 1_000);
+        due.received(0, 2_000);
+        assert_eq!(due.arrived.len(), 1);
+        due.received(1, 2_000);
+        assert_eq!(due.arrived.len(), 1);
+    }
+}

@@ -1,0 +1,140 @@
+//! How far the stimulus is from its due phase, cycle by cycle.
+
+use std::f64::consts::TAU;
+
+use crate::judge::mean;
+use crate::judge::phase::Due;
+
+/// Root mean square of a window's voltage, over the highest voltage, from which on the stimulus
+/// counts as at full amplitude: a full sine has 0.71, one that fades in over half the window 0.58.
+const FULL: f64 = 0.65;
+/// Points that a window needs for its two unknowns to be worth anything.
+const ENOUGH_POINTS: usize = 5;
+
+/// The stimulus' phase errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseError {
+    /// Root mean square, in cycles.
+    pub rms_cycles: f64,
+    /// Mean, in cycles: above 0 where the stimulus is ahead.
+    pub mean_cycles: f64,
+}
+
+/// Demodulates a voltage by its due phase φ: least squares of a sin 2πφ + b cos 2πφ over
+/// each cycle of travel, forwards or backwards; the phase error is atan2(b, a)/2π.
+#[derive(Clone, Debug, Default)]
+pub struct Demodulator {
+    /// The last point and its voltage, whose weight is not known before the next one, and the cycles travelled
+    /// at the point before it.
+    last: Option<(Due, f64)>,
+    before_cycles: f64,
+    window: Window,
+    demodulated: Vec<Demodulated>,
+}
+
+/// A window's sums, each point weighted with the cycles travelled for which it stands: half of the way to each
+/// neighbour.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    /// Cycles travelled before it, a whole number.
+    number: f64,
+    points: usize,
+    ss: f64,
+    sc: f64,
+    cc: f64,
+    sv: f64,
+    cv: f64,
+    vv: f64,
+}
+
+/// A window's phase error, and what decides whether it counts.
+#[derive(Clone, Copy, Debug)]
+struct Demodulated {
+    error_cycles: f64,
+    /// Of the squared voltage, in V²·cycles.
+    square: f64,
+    /// Of the weights, in cycles.
+    whole: f64,
+}
+
+impl Demodulator {
+    /// The voltage at the next point, in V.
+    pub fn add(&mut self, due: Due, volts: f64) {
+        self.weigh(due.travelled_cycles);
+        self.last = Some((due, volts));
+    }
+
+    /// The errors of the windows at full amplitude, of a voltage of which `peak_v` is the highest; none if the
+    /// stimulus never was at full amplitude for a cycle.
+    pub fn finish(mut self, peak_v: f64) -> Option<PhaseError> {
+        if let Some((last, _)) = self.last {
+            self.weigh(last.travelled_cycles);
+        }
+        self.demodulated.extend(self.window.demodulated());
+        let full_v = FULL * peak_v;
+        let full = |window: &&Demodulated| window.square >= full_v * full_v * window.whole;
+        let errors = || {
+            let windows = self.demodulated.iter().filter(full);
+            windows.map(|window| window.error_cycles)
+        };
+        Some(PhaseError {
+            rms_cycles: mean(errors().map(|error| error * error))?.sqrt(),
+            mean_cycles: mean(errors())?,
+        })
+    }
+
+    /// How many windows are held.
+    pub fn held(&self) -> usize {
+        self.demodulated.len()
+    }
+
+    /// Enters the last point, now that the cycles travelled at the next one are known.
+    fn weigh(&mut self, next_cycles: f64) {
+        let Some((due, volts)) = self.last else {
+            self.before_cycles = next_cycles;
+            return;
+        };
+        let number = due.travelled_cycles.floor();
+        if number != self.window.number {
+            self.demodulated.extend(self.window.demodulated());
+            self.window = Window {
+                number,
+                ..Window::default()
+            };
+        }
+        let weight = 0.5 * (next_cycles - self.before_cycles);
+        self.window.add(due.cycles, volts, weight);
+        self.before_cycles = due.travelled_cycles;
+    }
+}
+
+impl Window {
+    fn add(&mut self, due_cycles: f64, volts: f64, weight: f64) {
+        let (s, c) = (TAU * due_cycles).sin_cos();
+        self.points += 1;
+        self.ss += weight * s * s;
+        self.sc += weight * s * c;
+        self.cc += weight * c * c;
+        self.sv += weight * s * volts;
+        self.cv += weight * c * volts;
+        self.vv += weight * volts * volts;
+    }
+
+    /// The phase of the voltage relative to its due phase.
+    fn demodulated(&self) -> Option<Demodulated> {
+        // sin² + cos² = 1: this is the sum of the weights.
+        let whole = self.ss + self.cc;
+        let determinant = self.ss * self.cc - self.sc * self.sc;
+        // A window in which the phase hardly moved does not tell a from b.
+        if self.points < ENOUGH_POINTS || determinant <= 1e-3 * whole * whole {
+            return None;
+        }
+        let a = (self.sv * self.cc - self.cv * self.sc) / determinant;
+        let b = (self.cv * self.ss - self.sv * self.sc) / determinant;
+        Some(Demodulated {
+            error_cycles: b.atan2(a) / TAU,
+            square: self.vv,
+            whole,
+        })
+    }
+}

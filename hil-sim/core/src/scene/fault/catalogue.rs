@@ -1,0 +1,168 @@
+//! The table of faults: what each kind is, how it is done, and what is expected of the boards.
+
+mod table;
+
+pub use table::rows;
+
+use super::Kind;
+
+/// A kind of fault.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Which.
+    pub kind: Kind,
+    /// Its name in scenes.
+    pub name: &'static str,
+    /// What breaks, for a person.
+    pub meaning: &'static str,
+    /// What the simulator does, and where.
+    pub injected: &'static str,
+    /// How long it lasts.
+    pub lasts: Lasts,
+    /// The keys that it takes beside `at_s`, `kind` and `for_s`.
+    pub keys: &'static [Key],
+    /// Where it can be done.
+    pub needs: Needs,
+    /// Time in ms in which all outputs have to be at 0 V; none if it can't put out a wrong voltage.
+    pub safe_within_ms: Option<f64>,
+    /// Whether a board has to say so, or its hardware to show it.
+    pub is_to_be_seen: bool,
+    /// What the display is to do.
+    pub class: Class,
+    /// Resets of the display board that may come of it.
+    pub resets: usize,
+    /// What is expected, for a person.
+    pub expected: &'static str,
+    /// How long a campaign looks on after it has begun, in s.
+    pub watch_s: f64,
+}
+
+/// How long a fault lasts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lasts {
+    /// It happens, and takes no `for_s`.
+    Once,
+    /// So long in s, unless `for_s` says otherwise.
+    For(f64),
+    /// To the end, unless `for_s` says otherwise.
+    ForGood,
+}
+
+/// Where a fault can be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Needs {
+    /// In both engines.
+    Nothing,
+    /// On emulated boards.
+    Boards,
+}
+
+/// What the display is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Class {
+    /// 0 V for good: until its power goes.
+    Stops,
+    /// 0 V until what is wrong is over, then it may drive again.
+    Fades,
+    /// It drives on: nothing wrong can come of it.
+    Holds,
+    /// The sensor board's: the display holds, or fades if it lasts.
+    Sensor,
+}
+
+/// A number that a kind takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Its name in scenes.
+    pub name: &'static str,
+    /// What it is, with its unit.
+    pub meaning: &'static str,
+    /// Its value if it is not given.
+    pub default: f64,
+    /// Its lowest value.
+    pub low: f64,
+    /// Its highest value.
+    pub high: f64,
+    /// Whether it is a whole number.
+    pub whole: bool,
+    /// Between which values a campaign draws it; if none, it leaves it at its default.
+    pub drawn: Option<(f64, f64)>,
+}
+
+impl Lasts {
+    /// `for_s` where the scene gives none.
+    pub const fn default_s(self) -> Option<f64> {
+        match self {
+            Self::For(s) => Some(s),
+            Self::Once | Self::ForGood => None,
+        }
+    }
+}
+
+impl Class {
+    /// Its name in the list and in the campaign's table.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stops => "stops",
+            Self::Fades => "fades",
+            Self::Holds => "holds",
+            Self::Sensor => "sensor",
+        }
+    }
+
+    /// Whether the display may drive again before its power has gone.
+    pub const fn may_drive_again(self) -> bool {
+        !matches!(self, Self::Stops)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::scene::fault::MOST_KEYS;
+
+    #[test]
+    fn every_kind_has_one_row_and_a_kebab_case_name() {
+        let kinds: HashSet<Kind> = rows().iter().map(|row| row.kind).collect();
+        let names: HashSet<&str> = rows().iter().map(|row| row.name).collect();
+        assert_eq!((kinds.len(), names.len()), (rows().len(), rows().len()));
+        // Clock drift is declared last.
+        assert_eq!(rows().len(), Kind::ClockDrift as usize + 1);
+        for row in rows() {
+            let kebab = |byte: u8| byte.is_ascii_lowercase() || byte == b'-';
+            assert!(row.name.bytes().all(kebab), "{}", row.name);
+            assert_eq!(Kind::from_name(row.name), Some(row.kind));
+        }
+    }
+
+    #[test]
+    fn defaults_are_within_their_ranges_and_what_is_drawn_too() {
+        for row in rows() {
+            assert!(row.keys.len() <= MOST_KEYS);
+            for key in row.keys {
+                let allowed = key.low..=key.high;
+                let (low, high) = key.drawn.unwrap_or((key.default, key.default));
+                assert!(
+                    [key.default, low, high].iter().all(|v| allowed.contains(v)),
+                    "{} {}",
+                    row.name,
+                    key.name
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_can_put_out_a_wrong_voltage_is_to_be_seen_and_leads_to_zero() {
+        for row in rows() {
+            if row.safe_within_ms.is_some() {
+                assert!(row.is_to_be_seen, "{}", row.name);
+                let ends = matches!(row.class, Class::Stops | Class::Fades);
+                assert!(ends, "{}", row.name);
+            }
+            assert!(row.watch_s >= row.lasts.default_s().unwrap_or(0.0));
+        }
+    }
+}

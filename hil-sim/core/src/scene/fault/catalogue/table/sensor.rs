@@ -1,0 +1,132 @@
+//! The sensor board.
+
+use super::{BASE, PAST_STALE_S, PAST_STATUS_S, STALE_S};
+use crate::scene::fault::Kind;
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row};
+
+const GAUGE: Key = Key {
+    name: "gauge",
+    meaning: "the gauge, 0 to 4",
+    default: 2.0,
+    low: 0.0,
+    high: 4.0,
+    whole: true,
+    drawn: Some((0.0, 4.0)),
+};
+
+pub(super) static ROWS: [Row; 9] = [
+    Row {
+        kind: Kind::SensorBrownOut,
+        name: "sensor-brown-out",
+        meaning: "the sensor board's supply dips",
+        injected: "as brown-out, of the sensor board",
+        lasts: Lasts::For(0.02),
+        class: Class::Sensor,
+        expected: "the sensor greets anew; the display drives on, or fades until it hears from it",
+        watch_s: PAST_STATUS_S,
+        ..BASE
+    },
+    Row {
+        kind: Kind::SensorHang,
+        name: "sensor-hang",
+        meaning: "the sensor's processor hangs",
+        injected: "the sampling task's entry leads to an endless loop with interrupts disabled",
+        class: Class::Sensor,
+        expected: "the watchdog restarts the sensor; the display fades out after max_age_ms, and drives \
+                   again",
+        watch_s: 1.4,
+        ..BASE
+    },
+    Row {
+        kind: Kind::SensorPanic,
+        name: "sensor-panic",
+        meaning: "the sensor's firmware panics",
+        injected: "the sampling task's entry leads to core's panic for an index out of bounds",
+        class: Class::Sensor,
+        expected: "as sensor-hang",
+        watch_s: 1.4,
+        ..BASE
+    },
+    Row {
+        kind: Kind::GaugeOpen,
+        name: "gauge-open",
+        meaning: "a wire of a gauge's bridge breaks",
+        injected: "the gauge's ADC pin goes to 3.3 V",
+        lasts: Lasts::For(STALE_S),
+        keys: &[GAUGE],
+        needs: Needs::Nothing,
+        class: Class::Sensor,
+        expected: "the gauge is called saturated or stuck and left out; the display drives on",
+        watch_s: PAST_STALE_S,
+        ..BASE
+    },
+    Row {
+        kind: Kind::GaugeShort,
+        name: "gauge-short",
+        meaning: "a gauge's bridge is shorted",
+        injected: "the gauge's ADC pin stays at mid-rail",
+        lasts: Lasts::For(STALE_S),
+        keys: &[GAUGE],
+        needs: Needs::Nothing,
+        class: Class::Sensor,
+        expected: "the gauge is called dead and left out; the display drives on",
+        watch_s: PAST_STALE_S,
+        ..BASE
+    },
+    Row {
+        kind: Kind::AdcStuck,
+        name: "adc-stuck",
+        meaning: "the converter gives the same codes for ever",
+        injected: "all six ADC pins stay at their last voltage",
+        lasts: Lasts::For(STALE_S),
+        needs: Needs::Nothing,
+        class: Class::Sensor,
+        expected: "no valid estimate; the display fades out when the last one is too old",
+        watch_s: PAST_STALE_S,
+        ..BASE
+    },
+    Row {
+        kind: Kind::AdcStopped,
+        name: "adc-stopped",
+        meaning: "the converter no longer converts",
+        injected: "ADC3_CR2's ADON is cleared",
+        lasts: Lasts::ForGood,
+        class: Class::Sensor,
+        expected: "the watchdog restarts the sensor; the display fades out, and drives again",
+        watch_s: 1.4,
+        ..BASE
+    },
+    Row {
+        kind: Kind::UartOverrun,
+        name: "uart-overrun",
+        meaning: "nobody takes the bytes that the sensor hears",
+        injected: "DMA1's clock is taken away (RCC_AHB1ENR, DMA1EN), and given back",
+        lasts: Lasts::For(0.02),
+        class: Class::Sensor,
+        expected: "overruns, line errors or corrupt frames counted; the sensor hears and talks again",
+        watch_s: PAST_STATUS_S,
+        ..BASE
+    },
+    Row {
+        kind: Kind::ClockDrift,
+        name: "clock-drift",
+        meaning: "the sensor's quartz is off",
+        injected: "the sensor board's clock runs faster by so much, from at_s on",
+        lasts: Lasts::ForGood,
+        keys: &[Key {
+            name: "ppm",
+            meaning: "in parts per million, −1000 to 1000",
+            default: 200.0,
+            low: -1_000.0,
+            high: 1_000.0,
+            whole: false,
+            drawn: Some((-200.0, 200.0)),
+        }],
+        needs: Needs::Nothing,
+        is_to_be_seen: false,
+        class: Class::Holds,
+        expected: "nothing: the display goes by its own clock",
+        watch_s: 0.5,
+        ..BASE
+    },
+];

@@ -1,0 +1,88 @@
+//! The kinds of faults.
+
+use super::catalogue;
+use super::catalogue::Row;
+
+/// What breaks; [`Kind::row`] says how, and what is expected then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the catalogue's rows say what each of them is")]
+pub enum Kind {
+    Nothing,
+    PowerCycle,
+    // The link.
+    LinkDown,
+    LinkGarbage,
+    LinkCorrupt,
+    LinkFlood,
+    LinkReplay,
+    LinkLate,
+    WireStuckLow,
+    // What the sensor says.
+    EstimateOutOfRange,
+    EstimateNan,
+    EstimateJumping,
+    EstimateContradictory,
+    SensorSilent,
+    // The operator's hand and commands.
+    HandEncoderDead,
+    HandEncoderJump,
+    EmergencyStop,
+    StopFromConsole,
+    StopFromPeer,
+    WrongConfiguration,
+    ConsoleFlood,
+    // The converters and the way to them.
+    DacIgnoresWords,
+    DacPowerLost,
+    DacAlarm,
+    LdacStuck,
+    ClearStuckLow,
+    SpiStall,
+    DmaStall,
+    // The display board's processor.
+    TickStopped,
+    OutputTaskStall,
+    ThreadStall,
+    BoardHang,
+    Panic,
+    HardFault,
+    StackOverflow,
+    MemoryChanged,
+    BrownOut,
+    // The sensor board.
+    SensorBrownOut,
+    SensorHang,
+    SensorPanic,
+    GaugeOpen,
+    GaugeShort,
+    AdcStuck,
+    AdcStopped,
+    UartOverrun,
+    ClockDrift,
+}
+
+impl Kind {
+    /// All of them, in the order of the catalogue.
+    pub fn all() -> impl Iterator<Item = Self> {
+        catalogue::rows().iter().map(|row| row.kind)
+    }
+
+    /// What there is to know of it.
+    pub fn row(self) -> &'static Row {
+        catalogue::rows()
+            .iter()
+            .find(|row| row.kind == self)
+            .expect("a test looks for every kind's row")
+    }
+
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// The kind of a name in scenes.
+    pub fn from_name(name: &str) -> Option<Self> {
+        let row = catalogue::rows().iter().find(|row| row.name == name)?;
+        Some(row.kind)
+    }
+}

@@ -1,0 +1,32 @@
+//! Scene files: TOML, CSV, WAV and MCAP in, a checked [`Scene`](crate::scene::Scene) out.
+
+pub mod bounds;
+pub mod contact;
+pub mod csv_rows;
+pub mod display;
+pub mod fault;
+pub mod line;
+pub mod read;
+pub mod recorded;
+pub mod series;
+pub mod table;
+#[cfg(test)]
+pub mod tests;
+
+use std::path::Path;
+
+use crate::scene::{Scene, SceneError};
+
+impl Scene {
+    /// Reads and checks a scene and every file it names.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text =
+            std::fs::read_to_string(path).map_err(|error| SceneError::unreadable(path, &error))?;
+        read::read(path, &text)
+    }
+
+    /// As [`Scene::load`], from text that is said to stand at `path`.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
+        read::read(path, text)
+    }
+}

@@ -1,0 +1,100 @@
+//! `[display]` of a scene file, its description of the actuators included.
+
+use protocol::actuators::{self, ACTUATORS, Actuator, FURTHEST_UM, UNITY_GAIN};
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
+
+use super::series::series;
+use super::table::Table;
+use crate::scene::{Display, SceneError};
+
+/// Columns of a description of the actuators.
+const HEADER: &str = "actuator,x_um,y_um,gain,phase_turns,inverted";
+
+pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
+    let defaults = DisplayConfiguration::DEFAULT;
+    let mode = table.choice(
+        "mode",
+        &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
+    )?;
+    let update_rate = match table.whole("update_rate_hz", 2_000, 4_000)? {
+        None | Some(2_000) => UpdateRate::Hz2000,
+        Some(4_000) => UpdateRate::Hz4000,
+        Some(_) => return Err(table.refuse("update_rate_hz", "is no rate: give 2000 or 4000")),
+    };
+    let mut whole = |key, default: u16, low: u16, high: u16| {
+        let value = table.whole(key, low.into(), high.into())?;
+        Ok::<_, SceneError>(value.map_or(default, |value| value as u16))
+    };
+    // The ranges are the board's own.
+    let configuration = DisplayConfiguration {
+        mode,
+        update_rate,
+        max_age_ms: whole("max_age_ms", defaults.max_age_ms, 20, 5_000)?,
+        fade_in_ms: whole("fade_in_ms", defaults.fade_in_ms, 1, 1_000)?,
+        fade_out_ms: whole("fade_out_ms", defaults.fade_out_ms, 1, 1_000)?,
+        glide_ms: whole("glide_ms", defaults.glide_ms, 0, 500)?,
+        amplitude_mv: whole("amplitude_mv", defaults.amplitude_mv, 0, 5_000)?,
+        reference_lsb: whole("reference_lsb", defaults.reference_lsb, 0, 2_000)?,
+        full_drive_s: whole("full_drive_s", defaults.full_drive_s, 10, 3_600)?,
+        actuators: defaults.actuators,
+    };
+    let described = if table.contains("file") {
+        described(&mut table)?
+    } else {
+        let pitch_um = table.whole("pitch_um", 100, 4_000)?;
+        actuators::grid(pitch_um.map_or(actuators::DEFAULT_PITCH_UM, |um| um as u16))
+    };
+    table.finish("")?;
+    let mut display = Display::with_actuators(described);
+    display.configuration = DisplayConfiguration {
+        actuators: display.configuration.actuators,
+        ..configuration
+    };
+    Ok(display)
+}
+
+/// The actuators of a CSV file: one row each, in their order.
+fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError> {
+    let furthest_um = f64::from(FURTHEST_UM);
+    let rows = series(table, &[HEADER], |before, row| {
+        let expected = before.map_or(0.0, |before| before[0] + 1.0);
+        let whole = |value: f64| value.fract() == 0.0 && value.abs() <= furthest_um;
+        let place = || {
+            format!("is no place: give whole numbers of µm from −{furthest_um} to {furthest_um}")
+        };
+        if row[0] != expected {
+            return Err((0, format!("is not the next actuator: give {expected}")));
+        }
+        if let Some(column) = (1..=2).find(|&column| !whole(row[column])) {
+            return Err((column, place()));
+        }
+        if !(0.0..=1.0).contains(&row[3]) {
+            return Err((3, "is no gain: give a number from 0 to 1".to_owned()));
+        }
+        if !(0.0..1.0).contains(&row[4]) {
+            let message = "is no phase: give turns, from 0 to below 1";
+            return Err((4, message.to_owned()));
+        }
+        if row[5] != 0.0 && row[5] != 1.0 {
+            return Err((5, "is neither: give 1 if inverted, else 0".to_owned()));
+        }
+        Ok(())
+    })?;
+    if rows.at.len() != ACTUATORS {
+        let message = format!(
+            "describes {} actuators: give all {ACTUATORS}",
+            rows.at.len()
+        );
+        return Err(table.refuse("file", message));
+    }
+    Ok(std::array::from_fn(|index| {
+        let row = &rows.values[index * rows.width..][..rows.width];
+        Actuator {
+            x_um: row[0] as i16,
+            y_um: row[1] as i16,
+            gain_q15: (row[2] * f64::from(UNITY_GAIN)).round() as u16,
+            phase: (row[3] * 65_536.0).round() as u32 as u16,
+            inverted: row[4] == 1.0,
+        }
+    }))
+}

@@ -1,0 +1,304 @@
+//! `kind = "recorded"` and `profile = "recorded"`: CSV, WAV and MCAP, at whatever rate they are.
+//!
+//! ```text
+//! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series, waveform
+//! ```
+
+mod raster;
+mod resampler;
+mod source;
+mod tape;
+#[cfg(test)]
+mod tests;
+mod topic;
+mod wav;
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use protocol::GAUGES;
+
+use super::bounds::{FILE_INSTANT, OFFSET_V, PLACE, RATE, SCALE, SPACING};
+use super::table::{Column, Table};
+use crate::plant::gauges::{MID_RAIL_VOLTS, SCAN_RATE_HZ};
+use crate::plant::surface::GRID_MM;
+use crate::scene::SceneError;
+use crate::scene::Series;
+use crate::scene::Waveform;
+
+use raster::{Even, Raster};
+use source::{Format, Source, Words};
+use tape::{Check, Conversion};
+
+/// Where our own recordings have the gauges, and the arm's place with them.
+const GAUGE_TOPIC: &str = "/sensor/gauges";
+/// Their time.
+const GAUGE_TIME: (&str, f64) = ("instant_us", 1e-6);
+const GAUGE_FIELDS: [&str; GAUGES + 1] = ["g0_v", "g1_v", "g2_v", "g3_v", "g4_v", "tangential_v"];
+const ARM_FIELD: &str = "position_um";
+const MM_PER_UM: f64 = 1e-3;
+
+/// Gauges that are recorded less often than this, in Hz, miss a part of the paper's band of 5–100 Hz.
+const SLOWEST_HZ: f64 = 200.0;
+/// Rows that come this often need not be evenly spaced, in s, with a little slack for times written in
+/// decimals.
+const DENSE_S: f64 = 1.001e-3;
+/// A step that is so many times the first one is a gap.
+const GAP: f64 = 1.6;
+/// What is kept before the scene's start and after its end, in s, for the resampler to look at.
+const AROUND_S: f64 = 3.0;
+const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+const PIN_VOLTS: std::ops::RangeInclusive<f64> = -0.3..=4.0;
+
+const TIME: Words = Words {
+    column: "time",
+    scale: "time_s_per_unit",
+    every: "rate_hz",
+    every_bounds: &RATE,
+    default: "t_s",
+};
+const LENGTH: Words = Words {
+    column: "place",
+    scale: "place_mm_per_unit",
+    every: "mm_per_sample",
+    every_bounds: &SPACING,
+    default: "x_mm",
+};
+
+/// Whether rows lie on straight lines, as between rows of a table, or are samples of something band-limited;
+/// none if nothing is said of it.
+fn on_lines(table: &mut Table<'_>) -> Result<Option<bool>, SceneError> {
+    let words = [("band-limited", false), ("lines", true)];
+    let lines = table.choice("interpolation", &words)?;
+    Ok(table.contains("interpolation").then_some(lines))
+}
+
+/// The voltages of `[gauges]`: five columns or six, band-limited and laid on the native engine's instants unless they
+/// lie on lines. `tangential` is the key of that name.
+pub(super) fn gauges(
+    table: &mut Table<'_>,
+    duration_s: f64,
+    tangential: Option<bool>,
+) -> Result<Arc<Waveform>, SceneError> {
+    let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
+    let source = Source::of(table, &TIME, &headers)?;
+    let start_s = table.number("start_s", &FILE_INSTANT)?.unwrap_or(0.0);
+    let scale = table.number("volts_per_unit", &SCALE)?;
+    let offset_v = table.number("offset_v", &OFFSET_V)?;
+    let lines = on_lines(table)?;
+    let is_own = source.is_plain() || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
+    let conversion = Conversion {
+        shift: -start_s,
+        scale: scale.unwrap_or(1.0),
+        offset: offset_v.unwrap_or(if is_own { 0.0 } else { MID_RAIL_VOLTS }),
+    };
+    let as_it_is = conversion.scale == 1.0 && conversion.offset == 0.0;
+    let first_step_s = Cell::new(None);
+    let check: Check<'_> = &|before, row| {
+        let beyond = |&column: &usize| !PIN_VOLTS.contains(&row[column]);
+        if let Some(column) = (1..row.len()).find(beyond) {
+            let message = if as_it_is {
+                "is no voltage that an ADC pin bears: give −0.3 to 4.0 V".to_owned()
+            } else {
+                format!(
+                    "makes {:.3} V, which no ADC pin bears: give volts_per_unit and offset_v that keep it within −0.3 to 4.0 V",
+                    row[column]
+                )
+            };
+            return Err((column, message));
+        }
+        let Some(before) = before else { return Ok(()) };
+        let step_s = row[0] - before[0];
+        let first_s = first_step_s.get().unwrap_or(step_s);
+        first_step_s.set(Some(first_s));
+        if step_s <= DENSE_S {
+            return Ok(());
+        }
+        if lines == Some(true) {
+            let message = "comes more than 1 ms after the row before: give 1 kHz or more with interpolation = \"lines\"";
+            return Err((0, message.to_owned()));
+        }
+        if step_s > 1.001 / SLOWEST_HZ {
+            let message =
+                "comes more than 5 ms after the row before: give 200 Hz or more, without gaps";
+            return Err((0, message.to_owned()));
+        }
+        if step_s > GAP * first_s {
+            let message = format!(
+                "comes {:.3} ms after the row before, the second {:.3} ms after the first: rows that are more than 1 ms apart must come evenly: fill the gap or start behind it",
+                1e3 * step_s,
+                1e3 * first_s
+            );
+            return Err((0, message));
+        }
+        Ok(())
+    };
+    let columns = match (&source.format, &source.channels) {
+        (_, Some(channels)) if channels.len() == GAUGES || channels.len() == GAUGES + 1 => {
+            channels.clone()
+        }
+        (_, Some(channels)) => {
+            let message = format!(
+                "names {} channels: name one for each of the five gauges, the same several times if need be, and perhaps a sixth, the tangential force",
+                channels.len()
+            );
+            return Err(table.refuse("channels", message));
+        }
+        (Format::Wav(wav), None) => match wav.channels() {
+            1 => vec![Column::Numbered(0); GAUGES],
+            count @ (5 | 6) => (0..count).map(Column::Numbered).collect(),
+            count => {
+                let message = format!(
+                    "is missing: the file has {count} channels: say which are the five gauges', such as [0, 1, 0, 1, 0]"
+                );
+                return Err(table.refuse("channels", message));
+            }
+        },
+        (Format::Mcap, None) if source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC) => {
+            let count = GAUGES + usize::from(tangential == Some(true));
+            GAUGE_FIELDS[..count]
+                .iter()
+                .map(|name| Column::Named(name))
+                .collect()
+        }
+        (Format::Mcap, None) => {
+            return Err(table.refuse(
+                "channels",
+                "is missing: name the messages' fields for the five gauges",
+            ));
+        }
+        (Format::Csv(..), None) => Vec::new(),
+    };
+    let window = (-AROUND_S, duration_s + AROUND_S);
+    let own_time = (GAUGE_TOPIC, GAUGE_TIME);
+    let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
+    covers_time(table, extent, duration_s)?;
+    let per_unit = f64::from(SCAN_RATE_HZ);
+    if lines == Some(true) {
+        return Ok(Arc::new(Waveform::on_lines(rows)));
+    }
+    let adc = Raster {
+        per_unit,
+        through_zero: true,
+    };
+    let laid = laid(table, rows, adc)?;
+    // Written times are rounded: the raster knows better.
+    let first = (laid.at[0] * per_unit).round() / per_unit;
+    Ok(Arc::new(Waveform::band_limited(laid, first, per_unit)))
+}
+
+/// The positions of `[motion]`, one column.
+pub(super) fn motion(
+    table: &mut Table<'_>,
+    duration_s: f64,
+    headers: &[&str],
+    check: Check<'_>,
+) -> Result<Arc<Series>, SceneError> {
+    let source = Source::of(table, &TIME, headers)?;
+    let start_s = table.number("start_s", &FILE_INSTANT)?.unwrap_or(0.0);
+    let scale = table.number("mm_per_unit", &SCALE)?;
+    let offset_mm = table.number("offset_mm", &PLACE)?;
+    let own = source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
+    let named_by_us = own && source.channels.is_none();
+    let columns = single(table, &source, named_by_us.then_some(ARM_FIELD))?;
+    let conversion = Conversion {
+        shift: -start_s,
+        scale: scale.unwrap_or(if named_by_us { MM_PER_UM } else { 1.0 }),
+        offset: offset_mm.unwrap_or(0.0),
+    };
+    let is_plain = source.is_plain();
+    let own_time = (GAUGE_TOPIC, GAUGE_TIME);
+    let (rows, extent) = source.read(table, columns, own_time, EVERYWHERE, conversion, check)?;
+    covers_time(table, extent, duration_s)?;
+    let per_unit = f64::from(SCAN_RATE_HZ);
+    if is_plain || !is_denser(&rows, per_unit) {
+        return Ok(Arc::new(rows));
+    }
+    let adc = Raster {
+        per_unit,
+        through_zero: true,
+    };
+    laid(table, rows, adc).map(Arc::new)
+}
+
+/// The heights of `[surface]`, one column.
+pub(super) fn profile(table: &mut Table<'_>) -> Result<Arc<Series>, SceneError> {
+    let source = Source::of(table, &LENGTH, &["x_mm,height"])?;
+    let shift_mm = table.number("shift_mm", &PLACE)?.unwrap_or(0.0);
+    let lines = on_lines(table)?;
+    let columns = single(table, &source, None)?;
+    let conversion = Conversion {
+        shift: shift_mm,
+        scale: 1.0,
+        offset: 0.0,
+    };
+    let nothing_else: Check<'_> = &|_, _| Ok(());
+    let own = ("", ("", 1.0));
+    let (rows, _) = source.read(table, columns, own, EVERYWHERE, conversion, nothing_else)?;
+    // Coarser heights are points of a surface, not samples of a wave: straight lines make no ripples of an edge.
+    if lines == Some(true) || !is_denser(&rows, GRID_MM.recip()) {
+        return Ok(Arc::new(rows));
+    }
+    let grid = Raster {
+        per_unit: GRID_MM.recip(),
+        through_zero: false,
+    };
+    laid(table, rows, grid).map(Arc::new)
+}
+
+/// The one column of a section that needs one.
+fn single<'t>(
+    table: &Table<'t>,
+    source: &Source<'t>,
+    own: Option<&'static str>,
+) -> Result<Vec<Column<'t>>, SceneError> {
+    match (&source.channels, &source.format, own) {
+        (Some(channels), ..) if channels.len() == 1 => Ok(channels.clone()),
+        (Some(channels), ..) => {
+            let message = format!("names {} channels: name one", channels.len());
+            Err(table.refuse("channels", message))
+        }
+        (None, Format::Csv(..), _) => Ok(Vec::new()),
+        (None, Format::Wav(wav), _) if wav.channels() == 1 => Ok(vec![Column::Numbered(0)]),
+        (None, Format::Mcap, Some(own)) => Ok(vec![Column::Named(own)]),
+        (None, ..) => Err(table.refuse(
+            "channels",
+            "is missing: the file has several: name one, such as [0] or [\"height\"]",
+        )),
+    }
+}
+
+/// Whether rows lie closer to each other than the points of a raster.
+fn is_denser(rows: &Series, per_unit: f64) -> bool {
+    let (first, last) = rows.extent();
+    (rows.at.len() - 1) as f64 > 1.01 * (last - first) * per_unit
+}
+
+fn laid(table: &Table<'_>, rows: Series, raster: Raster) -> Result<Series, SceneError> {
+    let step = Even::of(&rows.at).map_or(f64::NAN, |even| even.step);
+    match raster.lay(rows) {
+        Some(series) => Ok(series),
+        None => {
+            let message = format!(
+                "samples that are {step} apart cannot be brought to {} in one: resample the file",
+                raster.per_unit
+            );
+            Err(table.refuse("file", message))
+        }
+    }
+}
+
+fn covers_time(
+    table: &Table<'_>,
+    (first, last): (f64, f64),
+    duration_s: f64,
+) -> Result<(), SceneError> {
+    // The last scan is one scan before the end.
+    if first <= 0.0 && last >= duration_s - 1.0 / f64::from(SCAN_RATE_HZ) {
+        return Ok(());
+    }
+    let message = format!(
+        "lasts from {first} to {last} s, the scene from 0 to {duration_s} s: give a longer file, a shorter duration_s, or start_s"
+    );
+    Err(table.refuse("file", message))
+}

@@ -1,0 +1,390 @@
+//! What a section says of the file that it names, and the file's rows.
+
+use std::fs;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::super::bounds::{Bounds, SCALE};
+use super::super::csv_rows::CsvRows;
+use super::super::table::{Column, Table};
+use super::tape::{Check, Conversion, Tape};
+use super::topic;
+use super::topic::When;
+use super::wav::Wav;
+use crate::scene::SceneError;
+use crate::scene::Series;
+
+/// The keys that say where rows lie, and the column that does if none of them is given.
+pub struct Words {
+    /// Names a column.
+    pub column: &'static str,
+    /// In s or mm a unit of that column.
+    pub scale: &'static str,
+    /// Says that the rows are evenly spaced, and how.
+    pub every: &'static str,
+    pub every_bounds: &'static Bounds,
+    pub default: &'static str,
+}
+
+/// A file's format, and what of it is open.
+pub enum Format {
+    /// The whole file.
+    Csv(Vec<u8>),
+    Wav(Wav),
+    Mcap,
+}
+
+/// What a section says of its file.
+pub struct Source<'t> {
+    pub format: Format,
+    pub channels: Option<Vec<Column<'t>>>,
+    path: PathBuf,
+    words: &'static Words,
+    headers: Vec<String>,
+    topic: Option<&'t str>,
+    column: Option<Column<'t>>,
+    per_unit: Option<f64>,
+    /// From row to row, in s or mm.
+    every: Option<f64>,
+}
+
+impl<'t> Source<'t> {
+    /// Reads the keys, and looks at the file. `headers` are the first lines that a CSV file may have if nothing
+    /// is said of its columns.
+    pub fn of(
+        table: &mut Table<'t>,
+        words: &'static Words,
+        headers: &[&str],
+    ) -> Result<Self, SceneError> {
+        let Some(name) = table.text("file")? else {
+            let message = format!(
+                "is missing: give a CSV file with the columns {}, or a WAV or MCAP file",
+                headers[0]
+            );
+            return Err(table.refuse("file", message));
+        };
+        let path = table.source().beside(name);
+        let format = format(table, &path)?;
+        let source = Self {
+            channels: table.columns("channels")?,
+            topic: table.text("topic")?,
+            column: table.column(words.column)?,
+            per_unit: table.number(words.scale, &SCALE)?,
+            every: table.number(words.every, words.every_bounds)?.map(|every| {
+                if words.every == "rate_hz" {
+                    every.recip()
+                } else {
+                    every
+                }
+            }),
+            headers: headers.iter().map(|&header| header.to_owned()).collect(),
+            format,
+            path,
+            words,
+        };
+        source.check(table)?;
+        Ok(source)
+    }
+
+    /// Refuses keys that do not go with the file or with each other.
+    fn check(&self, table: &Table<'_>) -> Result<(), SceneError> {
+        let words = self.words;
+        let is_wav = matches!(self.format, Format::Wav(_));
+        if self.topic.is_some() && !matches!(self.format, Format::Mcap) {
+            return Err(table.refuse("topic", "the file is no MCAP: take it out"));
+        }
+        if is_wav {
+            let given = [words.column, words.scale].into_iter();
+            // A WAV file knows its samples' times, but not their places.
+            let given = given.chain((words.every == "rate_hz").then_some(words.every));
+            for key in given {
+                if table.contains(key) {
+                    return Err(table.refuse(key, "a WAV file has none but its own: take it out"));
+                }
+            }
+            if words.every != "rate_hz" && self.every.is_none() {
+                let message =
+                    "is missing: say how far apart the WAV file's samples lie on the surface";
+                return Err(table.refuse(words.every, message));
+            }
+        }
+        if self.per_unit.is_some() && self.column.is_none() {
+            let message = format!("is no column's: give {} too", words.column);
+            return Err(table.refuse(words.scale, message));
+        }
+        if self.every.is_some() && self.column.is_some() {
+            let message = format!("there is {} already: give one of the two", words.column);
+            return Err(table.refuse(words.every, message));
+        }
+        Ok(())
+    }
+
+    /// Whether it is a CSV file whose columns are the scene's own.
+    pub fn is_plain(&self) -> bool {
+        matches!(self.format, Format::Csv(_))
+            && self.channels.is_none()
+            && self.column.is_none()
+            && self.every.is_none()
+    }
+
+    /// The topic, `default` if none is named; none if the file is no MCAP.
+    pub fn topic_or(&self, default: &'t str) -> Option<&'t str> {
+        matches!(self.format, Format::Mcap).then(|| self.topic.unwrap_or(default))
+    }
+
+    /// The rows of `columns` within `window`, two or more, and the first and last time or place of all. On the
+    /// topic of `own` time is in the field that `own` names, if the section does not say otherwise.
+    pub fn read(
+        self,
+        table: &Table<'_>,
+        columns: Vec<Column<'t>>,
+        own: (&'static str, (&'static str, f64)),
+        window: (f64, f64),
+        conversion: Conversion,
+        check: Check<'_>,
+    ) -> Result<(Series, (f64, f64)), SceneError> {
+        let is_plain = self.is_plain();
+        let mut distinct: Vec<Column<'t>> = Vec::new();
+        for &column in &columns {
+            if !distinct.contains(&column) {
+                distinct.push(column);
+            }
+        }
+        let place = |column: &Column<'t>| distinct.iter().position(|other| other == column);
+        let spread: Vec<usize> = columns.iter().filter_map(place).collect();
+        let file = self.path.display().to_string();
+        let tape = |width| Tape::new(width, window, conversion);
+        let tape = match self.format {
+            Format::Csv(ref bytes) if is_plain => {
+                let rows = CsvRows::open(&self.path, bytes)?;
+                self.plain(rows, &tape, check)?
+            }
+            Format::Csv(ref bytes) => {
+                let rows = CsvRows::open(&self.path, bytes)?;
+                self.chosen(table, rows, &distinct, &tape, check)?
+            }
+            Format::Wav(wav) => {
+                let numbers = numbers(table, &distinct, wav.channels())?;
+                let step = self.every.unwrap_or_else(|| wav.rate_hz().recip());
+                let rate_hz = wav.rate_hz();
+                let mut tape = tape(numbers.len());
+                wav.each(&numbers, |t_s, row| {
+                    // As many steps as samples: times in s would be rounded.
+                    tape.take((t_s * rate_hz).round() * step, row, check)
+                })?;
+                tape
+            }
+            Format::Mcap => {
+                let fields = names(table, &distinct)?;
+                let Some(topic) = self.topic.or((!own.0.is_empty()).then_some(own.0)) else {
+                    let message = "is missing: name the topic whose messages are to be read";
+                    return Err(table.refuse("topic", message));
+                };
+                let when = match (self.column, self.every) {
+                    (Some(Column::Named(field)), _) => {
+                        When::Field(field, self.per_unit.unwrap_or(1.0))
+                    }
+                    (Some(Column::Numbered(_)), _) => {
+                        let message = "is a number: messages have fields with names";
+                        return Err(table.refuse(self.words.column, message));
+                    }
+                    (None, Some(every)) => When::Every(every),
+                    (None, None) if topic == own.0 => When::Field(own.1.0, own.1.1),
+                    (None, None) if self.words.every == "rate_hz" => When::Logged,
+                    (None, None) => {
+                        let message = format!(
+                            "is missing: name the field with the place in mm, or give {}",
+                            self.words.every
+                        );
+                        return Err(table.refuse(self.words.column, message));
+                    }
+                };
+                let is_place = self.words.every != "rate_hz";
+                let mut tape = tape(fields.len());
+                topic::each(&self.path, topic, &fields, (when, is_place), |at, row| {
+                    tape.take(at, row, check)
+                })?;
+                tape
+            }
+        };
+        let extent = tape.extent();
+        let rows = tape.into_rows();
+        match extent {
+            Some(extent) if rows.at.len() >= 2 => {
+                let rows = if is_plain {
+                    rows
+                } else {
+                    spread_out(rows, &spread)
+                };
+                Ok((rows, extent))
+            }
+            // There are rows, but the scene is elsewhere: the section says so.
+            Some(extent) if extent.0 < extent.1 => Ok((Series::empty(1), extent)),
+            _ => Err(SceneError {
+                file,
+                line: None,
+                key: String::new(),
+                message: format!("{} row(s) of numbers: give two or more", rows.at.len()),
+            }),
+        }
+    }
+
+    /// A CSV file whose columns are the scene's own.
+    fn plain(
+        &self,
+        rows: CsvRows<'_>,
+        tape: &dyn Fn(usize) -> Tape,
+        check: Check<'_>,
+    ) -> Result<Tape, SceneError> {
+        let header = rows.first().join(",");
+        if !self.headers.contains(&header) {
+            let message = format!(
+                "the first line is {header:?}: it must be {}, or name other columns by channels and {} in the scene",
+                self.headers.join(" or "),
+                self.words.column
+            );
+            return Err(rows.refuse(Some(1), message));
+        }
+        let columns: Vec<usize> = (0..rows.first().len()).collect();
+        let mut tape = tape(columns.len() - 1);
+        rows.each(&columns, false, |row| tape.take(row[0], &row[1..], check))?;
+        Ok(tape)
+    }
+
+    /// A CSV file of whatever columns.
+    fn chosen(
+        &self,
+        table: &Table<'_>,
+        rows: CsvRows<'_>,
+        channels: &[Column<'_>],
+        tape: &dyn Fn(usize) -> Tape,
+        check: Check<'_>,
+    ) -> Result<Tape, SceneError> {
+        if channels.is_empty() {
+            let message = "is missing: name the CSV file's columns, such as [\"ax\"] or [1]";
+            return Err(table.refuse("channels", message));
+        }
+        let find = |key: &'static str, column: Column<'_>| {
+            let found = match column {
+                Column::Numbered(number) => (number < rows.first().len()).then_some(number),
+                Column::Named(name) => rows.first().iter().position(|cell| cell == name),
+            };
+            found.ok_or_else(|| {
+                let message = if rows.is_bare() {
+                    format!(
+                        "{column} is no column: the file's first line holds numbers, so give numbers from 0 to {}",
+                        rows.first().len() - 1
+                    )
+                } else {
+                    format!("{column} is no column: there are {}", rows.first().join(", "))
+                };
+                table.refuse(key, message)
+            })
+        };
+        let mut columns = Vec::with_capacity(channels.len() + 1);
+        match (self.column, self.every) {
+            (Some(column), _) => columns.push(find(self.words.column, column)?),
+            (None, Some(_)) => {}
+            (None, None) => {
+                let default = rows
+                    .first()
+                    .iter()
+                    .position(|cell| cell == self.words.default);
+                columns.push(default.ok_or_else(|| {
+                    let message = format!(
+                        "is missing: name the column, or give {} if the rows are evenly spaced",
+                        self.words.every
+                    );
+                    table.refuse(self.words.column, message)
+                })?);
+            }
+        }
+        let has_place = columns.len();
+        for &channel in channels {
+            columns.push(find("channels", channel)?);
+        }
+        let bare = rows.is_bare();
+        let mut tape = tape(channels.len());
+        let mut count = 0.0;
+        rows.each(&columns, bare, |row| {
+            let at = match (has_place, self.every) {
+                (0, Some(every)) => count * every,
+                _ => row[0] * self.per_unit.unwrap_or(1.0),
+            };
+            count += 1.0;
+            // Without a column of places, the first column is the first channel.
+            let columns_from = |(column, message): (usize, String)| {
+                ((column + has_place).saturating_sub(1), message)
+            };
+            tape.take(at, &row[has_place..], check)
+                .map_err(columns_from)
+        })?;
+        Ok(tape)
+    }
+}
+
+/// What the file is, by its first bytes; CSV is read as a whole.
+fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
+    let refuse = |error: std::io::Error| {
+        let message = format!(
+            "{} cannot be read: {error}: names are relative to the scene's own folder",
+            path.display()
+        );
+        table.refuse("file", message)
+    };
+    let mut first = Vec::new();
+    fs::File::open(path)
+        .and_then(|file| file.take(8).read_to_end(&mut first))
+        .map_err(refuse)?;
+    if first.starts_with(b"RIFF") {
+        Wav::open(path).map(Format::Wav)
+    } else if first.starts_with(b"\x89MCAP") {
+        Ok(Format::Mcap)
+    } else {
+        fs::read(path).map(Format::Csv).map_err(refuse)
+    }
+}
+
+fn numbers(
+    table: &Table<'_>,
+    columns: &[Column<'_>],
+    channels: usize,
+) -> Result<Vec<usize>, SceneError> {
+    let number = |column: &Column<'_>| match *column {
+        Column::Numbered(number) if number < channels => Ok(number),
+        column => {
+            let message = format!(
+                "{column} is no channel of the WAV file: give numbers from 0 to {}",
+                channels - 1
+            );
+            Err(table.refuse("channels", message))
+        }
+    };
+    columns.iter().map(number).collect()
+}
+
+fn names<'t>(table: &Table<'_>, columns: &[Column<'t>]) -> Result<Vec<&'t str>, SceneError> {
+    let name = |column: &Column<'t>| match *column {
+        Column::Named(name) => Ok(name),
+        Column::Numbered(number) => {
+            let message =
+                format!("{number} is a number: name the messages' fields, such as [\"g0_v\"]");
+            Err(table.refuse("channels", message))
+        }
+    };
+    columns.iter().map(name).collect()
+}
+
+/// The same rows, each column as often as it is wanted.
+fn spread_out(rows: Series, spread: &[usize]) -> Series {
+    let values = rows
+        .values
+        .chunks_exact(rows.width)
+        .flat_map(|row| spread.iter().map(|&column| row[column]))
+        .collect();
+    Series {
+        at: rows.at,
+        values,
+        width: spread.len(),
+    }
+}

@@ -1,0 +1,419 @@
+//! Takes a TOML table apart, key by key, so that every refusal can say its file, line and key.
+
+use std::path::{Path, PathBuf};
+
+use protocol::GAUGES;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::bounds::Bounds;
+use crate::scene::{Note, SceneError};
+
+/// The scene's text and where it came from.
+pub(super) struct Source<'t> {
+    path: &'t Path,
+    text: &'t str,
+}
+
+/// A table of the scene, or its absence; it remembers which keys it was asked for.
+pub(super) struct Table<'t> {
+    source: &'t Source<'t>,
+    path: String,
+    offset: usize,
+    entries: Option<&'t DeTable<'t>>,
+    asked: Vec<&'static str>,
+    /// Keys that earlier versions asked for.
+    retired: Vec<&'static str>,
+}
+
+type Value<'t> = Spanned<DeValue<'t>>;
+
+/// A column of a file: by its name or by its number, from 0 on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Column<'t> {
+    Named(&'t str),
+    Numbered(usize),
+}
+
+impl std::fmt::Display for Column<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Named(name) => write!(formatter, "{name:?}"),
+            Self::Numbered(number) => write!(formatter, "{number}"),
+        }
+    }
+}
+
+impl<'t> Source<'t> {
+    pub fn new(path: &'t Path, text: &'t str) -> Self {
+        Self { path, text }
+    }
+
+    pub fn parse(&self) -> Result<DeTable<'t>, SceneError> {
+        match DeTable::parse(self.text) {
+            Ok(table) => Ok(table.into_inner()),
+            Err(error) => {
+                let offset = error.span().map_or(0, |span| span.start);
+                Err(self.error(offset, "", format!("{}: mend the TOML", error.message())))
+            }
+        }
+    }
+
+    pub fn error(&self, offset: usize, key: &str, message: String) -> SceneError {
+        let before = &self.text.as_bytes()[..offset.min(self.text.len())];
+        SceneError {
+            file: self.path.display().to_string(),
+            line: Some(1 + before.iter().filter(|&&byte| byte == b'\n').count()),
+            key: key.to_owned(),
+            message,
+        }
+    }
+
+    /// The path of a file that the scene names: relative to the scene's own.
+    pub fn beside(&self, name: &str) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(name)
+    }
+}
+
+impl<'t> Table<'t> {
+    /// The document itself.
+    pub fn root(source: &'t Source<'t>, entries: &'t DeTable<'t>) -> Self {
+        Self {
+            source,
+            path: String::new(),
+            offset: 0,
+            entries: Some(entries),
+            asked: Vec::new(),
+            retired: Vec::new(),
+        }
+    }
+
+    /// A refusal of `key`, at its own line or, if it is absent, at its table's.
+    pub fn refuse(&self, key: &str, message: impl Into<String>) -> SceneError {
+        let offset = match self.entries.and_then(|entries| entries.get(key)) {
+            Some(value) => value.span().start,
+            None => self.offset,
+        };
+        self.source
+            .error(offset, &self.path_of(key), message.into())
+    }
+
+    /// A word about `key`, which is no reason to refuse the scene.
+    pub fn note(&self, key: &str, message: &str) -> Note {
+        let SceneError {
+            file,
+            line,
+            key,
+            message,
+        } = self.refuse(key, message);
+        Note {
+            file,
+            line,
+            key,
+            message,
+        }
+    }
+
+    /// Whether there is `key`, which earlier versions asked for. Whatever it holds is let pass.
+    pub fn retired(&mut self, key: &'static str) -> bool {
+        self.retired.push(key);
+        self.contains(key)
+    }
+
+    pub fn contains(&self, key: &str) -> bool {
+        self.entries
+            .is_some_and(|entries| entries.contains_key(key))
+    }
+
+    pub fn source(&self) -> &'t Source<'t> {
+        self.source
+    }
+
+    /// A section. If it is absent, all its keys are.
+    pub fn table(&mut self, key: &'static str) -> Result<Table<'t>, SceneError> {
+        match self.get(key) {
+            None => Ok(Table {
+                source: self.source,
+                path: self.path_of(key),
+                offset: self.offset,
+                entries: None,
+                asked: Vec::new(),
+                retired: Vec::new(),
+            }),
+            Some(value) => self.table_in(value, self.path_of(key)),
+        }
+    }
+
+    /// The tables of an array; none if the key is absent.
+    pub fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'t>>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(Vec::new());
+        };
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(value, key, "an array of tables"));
+        };
+        let mut tables = Vec::with_capacity(items.len());
+        for (index, item) in items.iter().enumerate() {
+            tables.push(self.table_in(item, format!("{}[{index}]", self.path_of(key)))?);
+        }
+        Ok(tables)
+    }
+
+    pub fn number(
+        &mut self,
+        key: &'static str,
+        bounds: &Bounds,
+    ) -> Result<Option<f64>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        let number = match value.get_ref() {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
+                .ok()
+                .map(|n| n as f64),
+            _ => return Err(self.wrong_type(value, key, "a number")),
+        };
+        let written = &self.source.text[value.span()];
+        match number {
+            Some(number) if number.is_finite() && (bounds.allows)(number) => Ok(Some(number)),
+            _ => Err(self.refuse(
+                key,
+                format!("{written} is not {}: give {}", bounds.what, bounds.give),
+            )),
+        }
+    }
+
+    /// A number that may not be absent.
+    pub fn needed_number(&mut self, key: &'static str, bounds: &Bounds) -> Result<f64, SceneError> {
+        self.number(key, bounds)?
+            .ok_or_else(|| self.refuse(key, format!("is missing: give {}", bounds.give)))
+    }
+
+    /// A number from `low` to `high`; only a whole one if `whole`.
+    pub fn between(
+        &mut self,
+        key: &'static str,
+        low: f64,
+        high: f64,
+        whole: bool,
+    ) -> Result<Option<f64>, SceneError> {
+        const ANY: Bounds = Bounds {
+            what: "a number",
+            give: "a number",
+            allows: |_| true,
+        };
+        let Some(number) = self.number(key, &ANY)? else {
+            return Ok(None);
+        };
+        if (low..=high).contains(&number) && (!whole || number.fract() == 0.0) {
+            return Ok(Some(number));
+        }
+        let kind = if whole { "whole number" } else { "number" };
+        let message = format!("{number} is out of range: give a {kind} from {low} to {high}");
+        Err(self.refuse(key, message))
+    }
+
+    /// A whole number from `low` to `high`.
+    pub fn whole(
+        &mut self,
+        key: &'static str,
+        low: u64,
+        high: u64,
+    ) -> Result<Option<u64>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        let give = format!("give a whole number from {low} to {high}");
+        let DeValue::Integer(integer) = value.get_ref() else {
+            return Err(self.wrong_type(value, key, "a whole number"));
+        };
+        match u64::from_str_radix(integer.as_str(), integer.radix()) {
+            Ok(number) if (low..=high).contains(&number) => Ok(Some(number)),
+            _ => Err(self.refuse(key, format!("{integer} is out of range: {give}"))),
+        }
+    }
+
+    pub fn text(&mut self, key: &'static str) -> Result<Option<&'t str>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        match value.get_ref() {
+            DeValue::String(text) => Ok(Some(text)),
+            _ => Err(self.wrong_type(value, key, "a text in quotes")),
+        }
+    }
+
+    pub fn boolean(&mut self, key: &'static str) -> Result<Option<bool>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        match value.get_ref() {
+            DeValue::Boolean(boolean) => Ok(Some(*boolean)),
+            _ => Err(self.wrong_type(value, key, "true or false")),
+        }
+    }
+
+    /// One of the words in `built`, the first if the key is absent.
+    pub fn choice<T: Copy>(
+        &mut self,
+        key: &'static str,
+        built: &[(&str, T)],
+    ) -> Result<T, SceneError> {
+        let Some(word) = self.text(key)? else {
+            return Ok(built[0].1);
+        };
+        if let Some((_, choice)) = built.iter().find(|(name, _)| *name == word) {
+            return Ok(*choice);
+        }
+        let names: Vec<String> = built
+            .iter()
+            .map(|(name, _)| format!("\"{name}\""))
+            .collect();
+        let give = names.join(" or ");
+        Err(self.refuse(key, format!("\"{word}\" is unknown: give {give}")))
+    }
+
+    /// A list of gauge numbers, none of them twice.
+    pub fn gauges(&mut self, key: &'static str) -> Result<[bool; GAUGES], SceneError> {
+        let mut chosen = [false; GAUGES];
+        let Some(value) = self.get(key) else {
+            return Ok(chosen);
+        };
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(value, key, "a list of gauge numbers, such as [0, 3]"));
+        };
+        for (index, item) in items.iter().enumerate() {
+            let refuse = |what: &str| {
+                let written = &self.source.text[item.span()];
+                let path = format!("{}[{index}]", self.path_of(key));
+                self.source
+                    .error(item.span().start, &path, format!("{written} {what}"))
+            };
+            let DeValue::Integer(integer) = item.get_ref() else {
+                return Err(refuse("is no gauge number: give whole numbers from 0 to 4"));
+            };
+            let gauge = usize::from_str_radix(integer.as_str(), integer.radix()).ok();
+            match gauge.and_then(|gauge| chosen.get_mut(gauge)) {
+                None => return Err(refuse("is not a gauge: the gauges are 0 to 4")),
+                Some(true) => return Err(refuse("is named twice: name each gauge once")),
+                Some(place) => *place = true,
+            }
+        }
+        Ok(chosen)
+    }
+
+    /// A column's name or number.
+    pub fn column(&mut self, key: &'static str) -> Result<Option<Column<'t>>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        match column_of(value) {
+            Some(column) => Ok(Some(column)),
+            None => Err(self.wrong_type(value, key, "a column's name in quotes, or its number")),
+        }
+    }
+
+    /// A list of columns' names or numbers; the same may be there several times.
+    pub fn columns(&mut self, key: &'static str) -> Result<Option<Vec<Column<'t>>>, SceneError> {
+        let Some(value) = self.get(key) else {
+            return Ok(None);
+        };
+        let DeValue::Array(items) = value.get_ref() else {
+            return Err(self.wrong_type(value, key, "a list of columns' names or numbers"));
+        };
+        let columns = items.iter().enumerate().map(|(index, item)| {
+            column_of(item).ok_or_else(|| {
+                let written = &self.source.text[item.span()];
+                let path = format!("{}[{index}]", self.path_of(key));
+                let message = format!(
+                    "{written} is no column: give its name in quotes, or its number, from 0 on"
+                );
+                self.source.error(item.span().start, &path, message)
+            })
+        });
+        columns.collect::<Result<Vec<_>, _>>().map(Some)
+    }
+
+    /// Refuses every key that nobody asked for. `with` says what decided which keys there are, or is empty.
+    pub fn finish(self, with: &str) -> Result<(), SceneError> {
+        let unknown = self
+            .entries
+            .into_iter()
+            .flatten()
+            .filter(|(key, _)| {
+                let key = key.get_ref().as_ref();
+                !self.asked.contains(&key) && !self.retired.contains(&key)
+            })
+            .min_by_key(|(key, _)| key.span().start);
+        let Some((key, _)) = unknown else {
+            return Ok(());
+        };
+        let known = self.asked.join(", ");
+        let message =
+            format!("no such key here{with}: take it out, or mend its spelling; there are {known}");
+        Err(self
+            .source
+            .error(key.span().start, &self.path_of(key.get_ref()), message))
+    }
+
+    fn get(&mut self, key: &'static str) -> Option<&'t Value<'t>> {
+        self.asked.push(key);
+        self.entries.and_then(|entries| entries.get(key))
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{}.{key}", self.path)
+        }
+    }
+
+    fn table_in(&self, value: &'t Value<'t>, path: String) -> Result<Table<'t>, SceneError> {
+        let offset = value.span().start;
+        match value.get_ref() {
+            DeValue::Table(entries) => Ok(Table {
+                source: self.source,
+                path,
+                offset,
+                entries: Some(entries),
+                asked: Vec::new(),
+                retired: Vec::new(),
+            }),
+            other => {
+                let message = format!("holds {}: give a table", kind_of(other));
+                Err(self.source.error(offset, &path, message))
+            }
+        }
+    }
+
+    fn wrong_type(&self, value: &Value<'_>, key: &str, wanted: &str) -> SceneError {
+        self.refuse(
+            key,
+            format!("holds {}: give {wanted}", kind_of(value.get_ref())),
+        )
+    }
+}
+
+fn column_of<'t>(value: &'t Value<'t>) -> Option<Column<'t>> {
+    match value.get_ref() {
+        DeValue::String(name) => Some(Column::Named(name)),
+        DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix())
+            .ok()
+            .map(Column::Numbered),
+        _ => None,
+    }
+}
+
+fn kind_of(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "a list",
+        DeValue::Table(_) => "a table",
+    }
+}

@@ -1,0 +1,197 @@
+//! The CSV files that a scene names.
+
+use std::fs;
+use std::path::PathBuf;
+
+use super::SURFACE;
+use crate::scene::{Scene, SceneError};
+
+/// A folder of its own for a test's CSV files, removed at the end.
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    pub(super) fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("hil-sim-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    /// Loads a scene with `section`, whose CSV file `data.csv` holds `csv`.
+    pub(super) fn load(&self, section: &str, csv: &str) -> Result<Scene, SceneError> {
+        fs::write(self.0.join("data.csv"), csv).unwrap();
+        let scene = self.0.join("x.toml");
+        fs::write(&scene, format!("{SURFACE}{section}")).unwrap();
+        Scene::load(&scene)
+    }
+
+    /// The refusal, without the folder's name.
+    fn refusal(&self, section: &str, csv: &str) -> String {
+        let error = self.load(section, csv).unwrap_err().to_string();
+        error.replace(
+            &format!("{}{}", self.0.display(), std::path::MAIN_SEPARATOR),
+            "",
+        )
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+#[test]
+fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
+    const MOTION: &str = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("motion");
+    let scene = folder
+        .load(MOTION, "t_s, x_mm\n0, 0\n1, 50\n3, 25\n")
+        .unwrap();
+    assert_eq!(scene.motion.position_mm(0.5), 25.0);
+    assert_eq!(scene.motion.velocity_mm_s(2.0), -12.5);
+    for (csv, want) in [
+        (
+            "t_s,x_mm\n0,0\n1,fast\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"fast\" is no number",
+        ),
+        (
+            "t_s,x_mm\n0,0\n1,NaN\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"NaN\" is not finite",
+        ),
+        (
+            "t_s,x_mm\n0,0\n\n1,\n3,1\n",
+            "data.csv:4: column 2 (x_mm): \"\" is no number",
+        ),
+        (
+            "t_s,x_mm\n0,0\n2,0\n2,1\n",
+            "data.csv:4: column 1 (t_s): \"2\" does not increase, after 2",
+        ),
+        (
+            "t_s,x_mm\n0,0\n1\n",
+            "data.csv:3: 1 cells where the first line has 2",
+        ),
+        (
+            "t_s,x_mm\n0,0\n",
+            "data.csv: 1 row(s) of numbers: give two or more",
+        ),
+        ("t_s,x_mm\n", "data.csv: 0 row(s) of numbers"),
+        (
+            "",
+            "data.csv:1: the first line is \"\": it must be t_s,x_mm",
+        ),
+        (
+            "t,x\n0,0\n3,1\n",
+            "data.csv:1: the first line is \"t,x\": it must be t_s,x_mm",
+        ),
+        ("0,0\n3,1\n", "data.csv:1: the first line is \"0,0\""),
+        (
+            "t_s,x_mm\n0,0\n0.001,2\n3,1\n",
+            "data.csv:3: column 2 (x_mm): \"2\" is 2000 mm/s from the row before",
+        ),
+        (
+            "t_s,x_mm\n0,0\n2,50\n",
+            "x.toml:5: motion.file: lasts from 0 to 2 s, the scene from 0 to 3 s",
+        ),
+    ] {
+        let refusal = folder.refusal(MOTION, csv);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+}
+
+#[test]
+fn recorded_gauges_are_played_and_refused_below_200_hz() {
+    const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("gauges");
+    let rows: String = (0..=3000)
+        .map(|ms| format!("{},0,0.825,1.65,2.475,3.3\n", f64::from(ms) / 1000.0))
+        .collect();
+    let scene = folder
+        .load(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{rows}"))
+        .unwrap();
+    let mut world = crate::plant::world::World::new(&scene).unwrap();
+    assert_eq!(world.codes(1.00025, 0.0), [0, 1024, 2048, 3072, 4095, 2048]);
+    for (csv, want) in [
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.01,1,1,1,1,1\n",
+            "data.csv:3: column 1 (t_s): \"0.01\" comes more than 5 ms",
+        ),
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,12\n",
+            "data.csv:2: column 6 (g4): \"12\" is no voltage",
+        ),
+        (
+            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.001,1,1,1,1,1\n",
+            "x.toml:5: gauges.file: lasts from 0 to 0.001 s",
+        ),
+    ] {
+        let refusal = folder.refusal(GAUGES, csv);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+    let both = folder.refusal(
+        &format!("{GAUGES}snr_db = 20"),
+        &format!("t_s,g0,g1,g2,g3,g4\n{rows}"),
+    );
+    assert!(
+        both.starts_with("x.toml:6: gauges.snr_db: no such key here with kind = \"recorded\""),
+        "{both}"
+    );
+}
+
+#[test]
+fn a_recorded_force_is_played_unless_it_is_taken_out() {
+    const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("force");
+    let rows = |force: &str| -> String {
+        (0..=3000)
+            .map(|ms| format!("{},0,1,1,1,1{force}\n", f64::from(ms) / 1000.0))
+            .collect()
+    };
+    let with = format!("t_s,g0,g1,g2,g3,g4,tangential\n{}", rows(",2.475"));
+    let without = format!("t_s,g0,g1,g2,g3,g4\n{}", rows(""));
+    for (keys, csv, present, code) in [
+        ("", &with, true, 3072),
+        ("tangential = true", &with, true, 3072),
+        ("tangential = false", &with, false, 2048),
+        ("", &without, false, 2048),
+        ("tangential = false", &without, false, 2048),
+    ] {
+        let keys = format!("{GAUGES}{keys}\ntangential_n_per_v = 2\nstiffness_n_per_m = 500\n");
+        let scene = folder.load(&keys, csv).unwrap();
+        let force = scene.force;
+        assert_eq!(
+            (force.present, force.n_per_v, force.stiffness_n_per_m),
+            (present, 2.0, 500.0)
+        );
+        let mut world = crate::plant::world::World::new(&scene).unwrap();
+        assert_eq!(world.codes(1.0, 0.0)[5], code);
+    }
+    let refusal = folder.refusal(&format!("{GAUGES}tangential = true"), &without);
+    assert!(
+        refusal.starts_with("x.toml:6: gauges.tangential: true, but the file has no column"),
+        "{refusal}"
+    );
+    let refusal = folder.refusal(&format!("{GAUGES}[contact]\nfriction = \"mild\""), &with);
+    assert!(
+        refusal.contains("does not apply to recorded gauges"),
+        "{refusal}"
+    );
+}
+
+#[test]
+fn a_recorded_profile_must_cover_the_travel() {
+    let folder = Folder::new("profile");
+    let profile = "profile = \"recorded\"\nfile = \"data.csv\"\n";
+    let heights = |to: i32| {
+        let rows: String = (-40..=to)
+            .map(|x| format!("{},{}\n", f64::from(x) / 10.0, f64::from(x % 20)))
+            .collect();
+        format!("x_mm,height\n{rows}")
+    };
+    // 3 s at 50 mm/s, and the outermost gauges 3 mm further.
+    folder.load(profile, &heights(1530)).unwrap();
+    let refusal = folder.refusal(profile, &heights(1500));
+    assert!(
+        refusal.contains("the gauges come from -3.000 to 153.000 mm"),
+        "{refusal}"
+    );
+}

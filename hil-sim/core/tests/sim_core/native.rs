@@ -1,0 +1,100 @@
+//! The native engine as a whole, through the committed scenes.
+
+use std::path::{Path, PathBuf};
+
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::native;
+use hil_sim_core::scene::{Gauges, Kinematic, Scene};
+
+/// All but the `estimation` scenes, which have a test of their own.
+fn scenes() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
+    let mut found = Vec::new();
+    let mut folders = vec![folder];
+    while let Some(folder) = folders.pop() {
+        for entry in folder.read_dir().unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() && !path.ends_with("estimation") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "toml") {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn every_committed_scene_is_as_it_expects() {
+    let scenes = scenes();
+    assert!(scenes.len() >= 18, "{scenes:?}");
+    let mut failures = Vec::new();
+    for path in scenes {
+        let scene = Scene::load(&path).unwrap();
+        let recording = native::run(&scene).unwrap();
+        let outcome = Outcome::new(scene, recording);
+        if !outcome.unmet.is_empty() {
+            failures.push(format!("{}: {:?}", path.display(), outcome.unmet));
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn the_same_scene_and_seed_gives_the_same_hash_and_another_seed_another() {
+    for path in scenes() {
+        let mut scene = Scene {
+            duration_s: 1.0,
+            ..Scene::load(&path).unwrap()
+        };
+        scene.gauges = Gauges::Kinematic(Kinematic {
+            snr_db: Some(20.0),
+            ..Kinematic::default()
+        });
+        let first = native::run(&scene).unwrap();
+        let again = native::run(&scene).unwrap();
+        assert_eq!(first.hash, again.hash);
+        assert_eq!(first.scans, again.scans);
+        assert_eq!(first.outputs, again.outputs);
+        scene.seed += 1;
+        assert_ne!(native::run(&scene).unwrap().hash, first.hash);
+    }
+}
+
+#[test]
+fn a_run_records_every_scan_tick_and_estimate_at_its_instant() {
+    let recording = native::run(&Scene::constant(2.0, 50.0)).unwrap();
+    assert_eq!(recording.scans.len(), 12_000);
+    assert_eq!(recording.ticks.len(), 6_000);
+    assert_eq!(recording.estimates.len(), 300);
+    for (index, scan) in recording.scans.iter().enumerate() {
+        assert_eq!(scan.at_ns, index as u64 * 250_000);
+    }
+    for (index, estimate) in recording.estimates.iter().enumerate() {
+        assert_eq!(estimate.estimate.sequence as usize, index);
+        // Its last sample ends with the fourth scan of the tenth millisecond.
+        assert_eq!(estimate.made_ns, index as u64 * 10_000_000 + 9_750_000);
+    }
+    // All arrive, but the last, which is still on the wire, and the last of the scene.
+    let arrived = recording
+        .estimates
+        .iter()
+        .filter(|e| e.received_ns.is_some())
+        .count();
+    assert!(arrived >= 299, "{arrived}");
+}
+
+#[test]
+fn a_link_that_is_down_leaves_the_display_at_zero_volt() {
+    let mut scene = Scene::constant(2.0, 50.0);
+    scene.link.loss = 1.0;
+    let recording = native::run(&scene).unwrap();
+    assert!(recording.outputs.is_empty());
+    assert!(
+        recording
+            .estimates
+            .iter()
+            .all(|estimate| estimate.received_ns.is_none())
+    );
+}

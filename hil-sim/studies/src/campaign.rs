@@ -1,0 +1,253 @@
+//! Every kind of fault at random instants, on the two ELFs, counted.
+//!
+//! Many faults share a run, for its translation takes seconds: each has a window of its own. After one
+//! that stops the display for good, the display and its converters lose their power and all that they
+//! hold; after any other, a second passes in which the boards recover and tell their counters.
+//!
+//! ```text
+//! boots, drives ── fault ── looked on ─┬─ power ── boots, drives ──┬─ fault ── …
+//!                                      └─ recovers, tells counters ┘
+//! ```
+
+mod tally;
+
+pub use tally::{Tally, unmet};
+
+use protocol::{DisplayConfiguration, Mode};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use hil_sim_boards;
+use hil_sim_boards::{ElfError, Firmwares};
+use hil_sim_core::judge::fault::{Finding, finding};
+use hil_sim_core::scene::fault::catalogue::{Class, Lasts};
+use hil_sim_core::scene::fault::{Fault, Kind, nanoseconds};
+use hil_sim_core::scene::{Display, Motion, Scene};
+
+/// From power on until the stimulus can be driving, in s: of both boards, and of the display alone.
+const STARTS_S: f64 = 0.3;
+const RESTARTS_S: f64 = 0.15;
+/// The boards tell their counters once a second; what has just been tried is not to be in those that tell
+/// of the next.
+const TELLS_S: f64 = 1.05;
+/// An instant is drawn from so long: room for a hand that swings to be in motion.
+const DRAWN_S: f64 = 0.6;
+/// How long a hand that swings has been fast when a fault comes, in s, and how fast, of 1.
+const IN_MOTION_S: f64 = 0.25;
+const IN_MOTION: f64 = 0.5;
+/// Runs are about so long, in s: the translation of the firmware at their start is then a small part.
+const RUN_S: f64 = 60.0;
+const WAVELENGTH_MM: f64 = 2.0;
+/// The paper's hand (section V): 70 mm/s at most, 0.83 Hz.
+const SWINGING: Motion = Motion::Sinusoid {
+    amplitude_mm_s: 70.0,
+    frequency_hz: 0.83,
+};
+const STEADY: Motion = Motion::Constant { speed_mm_s: 50.0 };
+
+/// What is to be tried.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Which kinds.
+    pub kinds: Vec<Kind>,
+    /// How many times each.
+    pub instants: usize,
+    /// Decides the instants, and what the kinds leave to chance.
+    pub seed: u64,
+}
+
+/// A run of many windows.
+#[derive(Clone, Debug)]
+pub struct Shift {
+    /// What is run.
+    pub scene: Scene,
+    /// Which of the scene's faults are tried, and until when, in s; the others are the power between.
+    pub tried: Vec<(usize, f64)>,
+}
+
+/// A fault that was tried.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// How the hand moved.
+    pub motion: &'static str,
+    /// How the actuators shared the stimulus.
+    pub mode: &'static str,
+    /// The run's name.
+    pub scene: String,
+    /// What became of it.
+    pub finding: Finding,
+}
+
+impl Plan {
+    /// The runs that try everything, a kind's instants spread evenly over moving and swinging hands,
+    /// uniform and travelling.
+    pub fn shifts(&self) -> Vec<Shift> {
+        let variants = [
+            (STEADY, Mode::Uniform),
+            (SWINGING, Mode::Travelling),
+            (STEADY, Mode::Travelling),
+            (SWINGING, Mode::Uniform),
+        ];
+        let mut draws = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let mut shifts = Vec::new();
+        for (variant, (motion, mode)) in variants.into_iter().enumerate() {
+            let mut open: Option<Shift> = None;
+            for (place, &kind) in self.kinds.iter().enumerate() {
+                let turns = (0..self.instants).filter(|turn| (turn + place) % 4 == variant);
+                for _ in turns {
+                    let shift =
+                        open.get_or_insert_with(|| self.shift(shifts.len(), motion.clone(), mode));
+                    shift.add(kind, &mut draws);
+                    if shift.scene.duration_s >= RUN_S {
+                        shifts.extend(open.take());
+                    }
+                }
+            }
+            shifts.extend(open);
+        }
+        shifts
+    }
+
+    fn shift(&self, number: usize, motion: Motion, mode: Mode) -> Shift {
+        let configuration = DisplayConfiguration {
+            mode,
+            ..DisplayConfiguration::DEFAULT
+        };
+        Shift {
+            scene: Scene {
+                name: format!("campaign-{number}"),
+                seed: self.seed.wrapping_add(number as u64),
+                duration_s: 0.0,
+                motion,
+                display: Display {
+                    configuration,
+                    ..Display::default()
+                },
+                ..Scene::constant(WAVELENGTH_MM, 50.0)
+            },
+            tried: Vec::new(),
+        }
+    }
+}
+
+impl Shift {
+    /// A window for a fault of `kind` at the end.
+    fn add(&mut self, kind: Kind, draws: &mut Xoshiro256PlusPlus) {
+        let scene = &mut self.scene;
+        let before = self
+            .tried
+            .last()
+            .map(|&(index, _)| scene.faults[index].kind);
+        let from_s = scene.duration_s
+            + match before {
+                None => STARTS_S,
+                Some(before) if before.row().class == Class::Stops => {
+                    let mut power = Fault::new(Kind::PowerCycle, scene.duration_s);
+                    power.values[0] = 0.0;
+                    scene.faults.push(power);
+                    RESTARTS_S
+                }
+                Some(_) => TELLS_S,
+            };
+        let mut at_s;
+        loop {
+            // Whole microseconds, that a scene's file can say it as it is.
+            let after_s: f64 = draws.random_range(0.0..DRAWN_S);
+            at_s = ((from_s + after_s) * 1e6).round() * 1e-6;
+            let is_fast = |t_s| match scene.motion {
+                Motion::Sinusoid { amplitude_mm_s, .. } => {
+                    scene.motion.velocity_mm_s(t_s).abs() > IN_MOTION * amplitude_mm_s
+                }
+                _ => true,
+            };
+            if is_fast(at_s) && is_fast(at_s - IN_MOTION_S) {
+                break;
+            }
+        }
+        let mut fault = Fault::new(kind, at_s);
+        for (value, key) in fault.values.iter_mut().zip(kind.row().keys) {
+            if let Some((low, high)) = key.drawn {
+                let drawn: f64 = draws.random_range(low..=high);
+                *value = if key.whole { drawn.round() } else { drawn };
+            }
+        }
+        let row = kind.row();
+        scene.duration_s = ((at_s + row.watch_s) * 1e3).ceil() * 1e-3;
+        if row.lasts == Lasts::ForGood && row.class != Class::Stops {
+            fault.for_s = Some(row.watch_s);
+        }
+        self.tried.push((scene.faults.len(), scene.duration_s));
+        scene.faults.push(fault);
+    }
+
+    /// Runs it.
+    ///
+    /// # Errors
+    /// If the boards can't be run.
+    pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
+        let (recording, _) = hil_sim_boards::run(&self.scene, firmwares)?;
+        let tried = self.tried.iter().map(|&(index, until_s)| {
+            finding(&self.scene.faults[index], nanoseconds(until_s), &recording)
+        });
+        Ok(tried
+            .map(|finding| Trial {
+                motion: match self.scene.motion {
+                    Motion::Constant { .. } => "constant",
+                    _ => "sinusoid",
+                },
+                mode: match self.scene.display.configuration.mode {
+                    Mode::Uniform => "uniform",
+                    Mode::Travelling => "travelling",
+                },
+                scene: self.scene.name.clone(),
+                finding,
+            })
+            .collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    fn plan() -> Plan {
+        Plan {
+            kinds: Kind::all().collect(),
+            instants: 6,
+            seed: 3,
+        }
+    }
+
+    #[test]
+    fn every_kind_is_tried_so_many_times_in_a_window_of_its_own() {
+        let mut tried: HashMap<Kind, usize> = HashMap::new();
+        for shift in plan().shifts() {
+            let faults = &shift.scene.faults;
+            for &(index, until_s) in &shift.tried {
+                let fault = &faults[index];
+                *tried.entry(fault.kind).or_default() += 1;
+                assert!(until_s >= fault.at_s + fault.kind.row().watch_s - 1e-9);
+                let next = faults.get(index + 1);
+                assert!(next.map_or(shift.scene.duration_s, |next| next.at_s) >= until_s);
+                // What stops for good is ended by nothing but power.
+                if fault.kind.row().class == Class::Stops {
+                    assert!(next.is_none_or(|next| next.kind == Kind::PowerCycle));
+                }
+            }
+        }
+        assert_eq!(tried.len(), Kind::all().count());
+        assert!(tried.values().all(|&times| times == 6));
+    }
+
+    #[test]
+    fn the_seed_decides_the_instants() {
+        let faults = |plan: Plan| -> Vec<Fault> {
+            let shifts = plan.shifts().into_iter();
+            shifts.flat_map(|shift| shift.scene.faults).collect()
+        };
+        assert_eq!(faults(plan()), faults(plan()));
+        assert_ne!(faults(plan()), faults(Plan { seed: 4, ..plan() }));
+    }
+}

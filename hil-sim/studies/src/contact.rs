@@ -1,0 +1,4 @@
+//! What the contact models are worth.
+
+pub mod models;
+pub mod stability;

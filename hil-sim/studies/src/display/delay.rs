@@ -1,0 +1,263 @@
+//! The paper's claim, as a chart: how far the stimulus is from the motion that it belongs to, over the
+//! link's one-way delay d.
+//!
+//! Ours is measured on the display's ELF: λ crosses the link, the stimulus is made of the hand's own
+//! motion. Beside it stands a stimulus that is relayed, as in the systems of the paper's introduction:
+//! "tactile information sensed by the tactile sensors was sequentially transferred to the display side".
+//! There the arm follows the hand's motion d late, its finger feels sin 2π x(t − d)/λ, and the display
+//! plays that another d later:
+//!
+//! relayed(t) = sin 2π x(t − 2d)/λ, where sin 2π x(t)/λ is due: off by (x(t) − x(t − 2d))/λ cycles.
+//!
+//! It has no other fault: no loss, no jitter, no buffer, no sampling, an arm without lag, a display
+//! without a tick. A real one is worse.
+
+pub mod picture;
+
+use protocol::DisplayConfiguration;
+
+use super::timing::{STROKE, WAVELENGTH_MM};
+use hil_sim_boards::display_alone;
+use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::{ElfError, Firmware};
+use hil_sim_core::judge::actuators;
+use hil_sim_core::judge::edges::edges;
+use hil_sim_core::judge::truth::Truth;
+use hil_sim_core::run::batch::on_all_cores;
+use hil_sim_core::run::recording::volts;
+use hil_sim_core::scene::{Link, Motion};
+
+/// The delays, in ms.
+const DELAYS_MS: [f64; 8] = [0.0, 10.0, 20.0, 50.0, 100.0, 200.0, 350.0, 500.0];
+/// The delay whose voltages are drawn, in ms.
+pub const SHOWN_MS: f64 = 100.0;
+/// What of it is drawn, in s: about a reversal of the hand.
+const SHOWN_S: std::ops::Range<f64> = 5.2..5.75;
+/// The amplitude of both, in V.
+const AMPLITUDE_V: f64 = 5.0;
+
+/// A delay, and what came of it.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What became of the estimates on their way.
+    pub link: Link,
+    /// Root mean square of our phase error about its mean, in cycles, cycle by cycle.
+    pub ours_cycles: Option<f64>,
+    /// From a movement of the hand to our output, median, in ms.
+    pub ours_ms: Option<f64>,
+    /// From a tick to its edge, in ms: what of it is not the wait for the tick.
+    pub edge_ms: Option<f64>,
+    /// Root mean square of the relayed stimulus' phase error, in cycles, not wrapped.
+    pub relayed_cycles: f64,
+    /// How late the relayed stimulus is, in ms.
+    pub relayed_ms: f64,
+    /// The phase that our stimulus happened to begin with, in cycles ahead of x/λ.
+    pub begins_cycles: f64,
+    /// Our voltage in V over s, of the delay that is drawn.
+    pub drawn: Vec<(f64, f64)>,
+}
+
+/// Measures all rows, on all cores. `done` is told after each of [`runs`].
+///
+/// # Errors
+/// If the ELF can't be run.
+pub fn measure(
+    firmware: &Firmware,
+    quick: bool,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Row>, ElfError> {
+    let links = links(quick);
+    on_all_cores(&links, |&link| {
+        let row = row(firmware, link, quick);
+        done();
+        row
+    })
+}
+
+/// How many runs [`measure`] makes.
+pub fn runs(quick: bool) -> u64 {
+    links(quick).len() as u64
+}
+
+fn links(quick: bool) -> Vec<Link> {
+    let late = |delay_ms: f64| Link {
+        delay_ms,
+        ..Link::default()
+    };
+    let bad = |delay_ms: f64| Link {
+        delay_ms,
+        jitter_ms: 50.0,
+        loss: 0.2,
+        ..Link::default()
+    };
+    if quick {
+        return vec![late(SHOWN_MS)];
+    }
+    DELAYS_MS
+        .into_iter()
+        .flat_map(|delay_ms| [late(delay_ms), bad(delay_ms)])
+        .collect()
+}
+
+fn row(firmware: &Firmware, link: Link, quick: bool) -> Result<Row, ElfError> {
+    let duration_s = if quick { 2.0 } else { 8.0 };
+    let run = display_alone::run(
+        Alone {
+            link,
+            ..Alone::new(STROKE, WAVELENGTH_MM, duration_s)
+        },
+        firmware,
+    )?;
+    let surface = |_| WAVELENGTH_MM;
+    let mut truth = Truth::new("delay", "", &surface);
+    truth.display = DisplayConfiguration::DEFAULT;
+    let recording = &run.recording;
+    let judged = actuators::judge(&truth, recording);
+    let delay_s = link.delay_ms * 1e-3;
+    let voltages: Vec<(f64, f64)> = recording
+        .outputs
+        .iter()
+        .map(|output| {
+            (
+                output.at_ns as f64 * 1e-9,
+                volts(output.words[truth.reference_actuator]),
+            )
+        })
+        .collect();
+    Ok(Row {
+        link,
+        ours_cycles: about_mean(
+            judged.phase_error_rms_cycles,
+            judged.phase_error_mean_cycles,
+        ),
+        ours_ms: judged.hand_to_output.map(|reaction| reaction.p50_ms),
+        edge_ms: edges(&recording.ticks, &recording.outputs, 0)
+            .map(|edges| edges.after.p50_us * 1e-3),
+        relayed_cycles: relayed_cycles(&STROKE, WAVELENGTH_MM, delay_s, duration_s),
+        relayed_ms: 2.0 * link.delay_ms,
+        begins_cycles: begins_cycles(&voltages),
+        drawn: if link.delay_ms == SHOWN_MS && link.loss == 0.0 {
+            voltages
+                .into_iter()
+                .filter(|(t_s, _)| SHOWN_S.contains(t_s))
+                .collect()
+        } else {
+            Vec::new()
+        },
+    })
+}
+
+/// Root mean square about the mean. Which phase the stimulus has when it begins is nobody's choice: the
+/// first estimate comes in the middle of a stroke. Being late is not in the mean, since it changes its
+/// sign with every stroke.
+fn about_mean(rms: Option<f64>, mean: Option<f64>) -> Option<f64> {
+    let (rms, mean) = (rms?, mean?);
+    Some((rms * rms - mean * mean).max(0.0).sqrt())
+}
+
+/// The phase error of a relayed stimulus, in cycles: root mean square over the time after its first
+/// round trip.
+fn relayed_cycles(hand: &Motion, wavelength_mm: f64, delay_s: f64, duration_s: f64) -> f64 {
+    const STEP_S: f64 = 0.5e-3;
+    let trip_s = 2.0 * delay_s;
+    let steps = ((duration_s - trip_s) / STEP_S).floor().max(1.0) as u32;
+    let sum: f64 = (0..steps)
+        .map(|step| trip_s + f64::from(step) * STEP_S)
+        .map(|t_s| (hand.position_mm(t_s) - hand.position_mm(t_s - trip_s)) / wavelength_mm)
+        .map(|error| error * error)
+        .sum();
+    (sum / f64::from(steps)).sqrt()
+}
+
+/// How much a voltage (s, V) is ahead of sin 2π x/λ on the whole, in cycles.
+fn begins_cycles(voltages: &[(f64, f64)]) -> f64 {
+    let (mut along, mut across) = (0.0, 0.0);
+    for (t_s, volts) in voltages {
+        let turns = STROKE.position_mm(*t_s) / WAVELENGTH_MM;
+        let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+        along += volts * sin;
+        across += volts * cos;
+    }
+    across.atan2(along) / std::f64::consts::TAU
+}
+
+/// A stimulus by the hand's position `late_s` ago that began with such a phase, in V.
+fn stimulus_v(t_s: f64, late_s: f64, begins_cycles: f64) -> f64 {
+    let turns = STROKE.position_mm((t_s - late_s).max(0.0)) / WAVELENGTH_MM + begins_cycles;
+    AMPLITUDE_V * (std::f64::consts::TAU * turns).sin()
+}
+
+/// The rows as CSV.
+///
+/// # Errors
+/// None in practice: it is written to memory.
+pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record([
+        "delay_ms",
+        "jitter_ms",
+        "loss",
+        "ours_rms_cycles",
+        "ours_hand_to_output_p50_ms",
+        "ours_edge_after_tick_ms",
+        "relayed_rms_cycles",
+        "relayed_late_ms",
+    ])?;
+    let field = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.5}"));
+    for row in rows {
+        // The relayed stimulus is modelled with the delay alone.
+        let relayed = (row.link.loss == 0.0).then_some(row);
+        table.write_record([
+            row.link.delay_ms.to_string(),
+            row.link.jitter_ms.to_string(),
+            row.link.loss.to_string(),
+            field(row.ours_cycles),
+            field(row.ours_ms),
+            field(row.edge_ms),
+            field(relayed.map(|row| row.relayed_cycles)),
+            field(relayed.map(|row| row.relayed_ms)),
+        ])?;
+    }
+    super::finish_csv(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_relayed_sine_is_off_by_the_chord_of_its_round_trip() {
+        // x(t) − x(t − 2d) = 2 X sin ωd · sin ω(t − d), X = α/ω: √2 X sin ωd / λ over whole strokes.
+        let omega = std::f64::consts::TAU * 0.83;
+        for delay_s in [0.01, 0.1, 0.3] {
+            let due = 2f64.sqrt() * 70.0 / omega * f64::sin(omega * delay_s) / 2.0;
+            let whole_strokes_s = 2.0 * delay_s + 6.0 / 0.83;
+            let cycles = relayed_cycles(&STROKE, 2.0, delay_s, whole_strokes_s);
+            assert!((cycles / due - 1.0).abs() < 1e-3, "{cycles} {due}");
+        }
+        assert_eq!(relayed_cycles(&STROKE, 2.0, 0.0, 4.0), 0.0);
+    }
+
+    #[test]
+    fn a_constant_phase_is_no_error() {
+        assert_eq!(about_mean(Some(0.05), Some(-0.05)), Some(0.0));
+        let spread = about_mean(Some(0.05), Some(0.03)).unwrap();
+        assert!((spread - 0.04).abs() < 1e-12);
+        assert_eq!(about_mean(None, None), None);
+    }
+
+    #[test]
+    fn the_stimulus_due_is_the_one_that_is_not_late() {
+        assert_eq!(stimulus_v(0.0, 0.0, 0.0), 0.0);
+        assert_eq!(stimulus_v(3.25, 0.25, 0.1), stimulus_v(3.0, 0.0, 0.1));
+    }
+
+    #[test]
+    fn the_phase_that_a_stimulus_began_with_is_found() {
+        let voltages: Vec<_> = (0..8_000)
+            .map(|tick| f64::from(tick) * 0.5e-3)
+            .map(|t_s| (t_s, stimulus_v(t_s, 0.0, 0.2)))
+            .collect();
+        assert!((begins_cycles(&voltages) - 0.2).abs() < 0.01);
+    }
+}

@@ -1,0 +1,538 @@
+//! How pure the stimulus is at the converters: spurs from 0 to 1 kHz and the mean of every channel, from
+//! the LDAC edges of the display's ELF.
+//!
+//! A hand at a steady speed over a steady λ asks for a sine of v/λ. Where it moves by whole counts of its
+//! encoder a tick, the encoder adds nothing and what is not the sine is the display's own; the same
+//! stimuli at speeds between whole counts show what the encoder's steps add.
+
+pub mod picture;
+mod stretch;
+
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
+
+use hil_sim_boards::display_alone;
+use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::{ElfError, Firmware};
+use hil_sim_core::judge::mean::{Held, about_a_second_s};
+use hil_sim_core::judge::spectrum::{Line, Spectrum, spectra};
+use hil_sim_core::plant::motion::MM_PER_COUNT;
+use hil_sim_core::run::batch::on_all_cores;
+use hil_sim_core::run::recording::{ACTUATORS, Recording, volts};
+use stretch::{Course, Stretch};
+
+/// The highest a spur may be, in dB over the stimulus.
+pub const GOAL_DBC: f64 = -80.0;
+/// The farthest from 0 V that a channel's mean may be, in mV.
+pub const GOAL_MEAN_MV: f64 = 5.0;
+/// Spurs are looked for from 0 Hz to this.
+const HIGHEST_HZ: f64 = 1_000.0;
+/// The stimuli, in Hz.
+const FREQUENCIES_HZ: [f64; 12] = [
+    5.0, 7.3, 10.4, 14.2, 20.6, 28.7, 40.0, 57.4, 80.6, 113.3, 160.7, 200.0,
+];
+/// The wavelength that a stimulus' is kept near to, in mm.
+const USUAL_MM: f64 = 1.5;
+/// Counts a tick between whole ones: the golden section, which no small fraction comes near to.
+const BETWEEN: f64 = 0.381_966;
+/// From a stretch's beginning to where it is looked at, in s: what fades, glides and settles has done so.
+const SETTLING_S: f64 = 2.5;
+/// For how long it is looked at, in s.
+const LOOK_S: f64 = 2.2;
+/// Over what a spectrum is taken, in s: 0.5 Hz a bin.
+const SPECTRUM_S: f64 = 2.0;
+/// The frequency whose spectra are drawn, in Hz.
+pub const SHOWN_HZ: f64 = 40.0;
+
+/// How the hand moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hand {
+    /// At a steady speed, by whole counts a tick.
+    Whole,
+    /// At a steady speed between whole counts a tick.
+    Between,
+    /// To and fro, v = peak · sin 2π f t.
+    Stroke {
+        /// Highest speed, in mm/s.
+        peak_mm_s: f64,
+        /// Strokes a second.
+        frequency_hz: f64,
+    },
+}
+
+/// A stimulus, and what came of it.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Updates per second.
+    pub rate_hz: u32,
+    /// How the actuators share the stimulus.
+    pub mode: Mode,
+    /// How the hand moved.
+    pub hand: Hand,
+    /// Its speed in mm/s; the highest of strokes.
+    pub speed_mm_s: f64,
+    /// λ in mm.
+    pub wavelength_mm: f64,
+    /// v/λ in Hz, of a steady speed.
+    pub frequency_hz: Option<f64>,
+    /// Ticks in which a steady hand did not move by the usual counts: 0 for whole ones.
+    pub uneven_ticks: usize,
+    /// Amplitude of the stimulus' own line, in V, the lowest of the channels.
+    pub stimulus_v: Option<f64>,
+    /// The highest spur over its channel's stimulus, in dB, and its frequency, at worst over the channels.
+    pub spur: Option<(f64, f64)>,
+    /// The farthest mean of any channel over whole cycles of about a second, in mV: cycles of a steady
+    /// stimulus, or of the hand.
+    pub whole_mean_mv: f64,
+    /// The same over exactly a second, wherever it begins.
+    pub second_mean_mv: f64,
+    /// The spectrum of the channel with the highest spur, for [`SHOWN_HZ`].
+    pub spectrum: Option<Spectrum>,
+}
+
+/// What is run: everything, or a little of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Every stimulus.
+    Whole,
+    /// Two stimuli and a stroke at 2 kHz.
+    Quick,
+}
+
+/// One run of the ELF.
+struct Plan {
+    rate: UpdateRate,
+    mode: Mode,
+    hands: Vec<Hand>,
+}
+
+/// Measures all rows, on all cores. `done` is told after each of [`runs`].
+///
+/// # Errors
+/// If the ELF can't be run.
+pub fn measure(
+    firmware: &Firmware,
+    extent: Extent,
+    done: impl Fn() + Sync,
+) -> Result<Vec<Row>, ElfError> {
+    let plans = plans(extent);
+    let rows = on_all_cores(&plans, |plan| {
+        let rows = run(plan, firmware, extent);
+        done();
+        rows
+    })?;
+    Ok(rows.into_iter().flatten().collect())
+}
+
+/// How many runs [`measure`] makes.
+pub fn runs(extent: Extent) -> u64 {
+    plans(extent).len() as u64
+}
+
+fn plans(extent: Extent) -> Vec<Plan> {
+    let strokes = [(70.0, 0.83), (30.0, 0.5), (100.0, 1.5)];
+    // A hand that trembles about a place: 0.5 mm, 0.3 mm and 0.1 mm either way.
+    let wobbles = [(10.0, 3.2), (15.0, 7.7), (6.0, 9.5)];
+    let stroke = |(peak_mm_s, frequency_hz): (f64, f64)| Hand::Stroke {
+        peak_mm_s,
+        frequency_hz,
+    };
+    let (rates, modes): (&[UpdateRate], &[Mode]) = match extent {
+        Extent::Whole => (
+            &[UpdateRate::Hz2000, UpdateRate::Hz4000],
+            &[Mode::Uniform, Mode::Travelling],
+        ),
+        Extent::Quick => (&[UpdateRate::Hz2000], &[Mode::Travelling]),
+    };
+    let mut plans = Vec::new();
+    for &rate in rates {
+        for &mode in modes {
+            let groups = match extent {
+                Extent::Whole => vec![
+                    vec![Hand::Whole],
+                    vec![Hand::Between],
+                    strokes.into_iter().chain(wobbles).map(stroke).collect(),
+                ],
+                Extent::Quick => vec![vec![Hand::Whole, stroke(strokes[0])]],
+            };
+            plans.extend(groups.into_iter().map(|hands| Plan { rate, mode, hands }));
+        }
+    }
+    plans
+}
+
+fn run(plan: &Plan, firmware: &Firmware, extent: Extent) -> Result<Vec<Row>, ElfError> {
+    let frequencies: &[f64] = match extent {
+        Extent::Whole => &FREQUENCIES_HZ,
+        // The second comes with what the first has left behind.
+        Extent::Quick => &[10.4, SHOWN_HZ],
+    };
+    let mut stretches = Vec::new();
+    for &hand in &plan.hands {
+        match hand {
+            Hand::Stroke { .. } => stretches.push(Stretch {
+                hand,
+                speed_mm_s: 0.0,
+                wavelength_mm: 2.0,
+                lasts_s: SETTLING_S + 2.0 * LOOK_S,
+            }),
+            Hand::Whole | Hand::Between => {
+                stretches.extend(frequencies.iter().map(|&f| steady(plan.rate, hand, f)));
+            }
+        }
+    }
+    let course = Course::new(stretches);
+    let alone = Alone {
+        configuration: DisplayConfiguration {
+            mode: plan.mode,
+            update_rate: plan.rate,
+            ..DisplayConfiguration::DEFAULT
+        },
+        surface: course.surface(),
+        ..Alone::new(course.hand(), 2.0, course.ends_s() + 0.01)
+    };
+    let recording = display_alone::run(alone, firmware)?.recording;
+    Ok(course
+        .stretches()
+        .map(|(from_s, stretch)| {
+            let looked_at = (from_s + SETTLING_S, from_s + stretch.lasts_s);
+            row(plan, stretch, &recording, looked_at)
+        })
+        .collect())
+}
+
+/// The steady stretch that makes a stimulus of `frequency_hz` at a usual λ.
+fn steady(rate: UpdateRate, hand: Hand, frequency_hz: f64) -> Stretch {
+    let count_a_tick_mm_s = MM_PER_COUNT * f64::from(rate.hz());
+    let counts = (frequency_hz * USUAL_MM / count_a_tick_mm_s)
+        .round()
+        .max(1.0);
+    let counts = counts + if hand == Hand::Between { BETWEEN } else { 0.0 };
+    let speed_mm_s = counts * count_a_tick_mm_s;
+    Stretch {
+        hand,
+        speed_mm_s,
+        wavelength_mm: speed_mm_s / frequency_hz,
+        lasts_s: SETTLING_S + LOOK_S,
+    }
+}
+
+fn row(plan: &Plan, stretch: &Stretch, recording: &Recording, (from_s, to_s): (f64, f64)) -> Row {
+    // One edge before what is looked at, so that there is a voltage to begin with.
+    let outputs = &recording.outputs;
+    let first = outputs
+        .partition_point(|output| output.at_ns as f64 * 1e-9 <= from_s)
+        .saturating_sub(1);
+    let last = outputs.partition_point(|output| output.at_ns as f64 * 1e-9 < to_s);
+    let outputs = outputs.get(first..last).unwrap_or_default();
+    let edges_s: Vec<f64> = outputs.iter().map(|o| o.at_ns as f64 * 1e-9).collect();
+    let channels = distinct(outputs.iter().map(|output| &output.words));
+    let from_s = edges_s
+        .first()
+        .map_or(from_s, |&first_s| from_s.max(first_s));
+
+    let (frequency_hz, cycles_s) = match stretch.hand {
+        Hand::Stroke { frequency_hz, .. } => (None, about_a_second_s(frequency_hz)),
+        Hand::Whole | Hand::Between => {
+            let frequency_hz = stretch.speed_mm_s / stretch.wavelength_mm;
+            (Some(frequency_hz), about_a_second_s(frequency_hz))
+        }
+    };
+    let farthest_mv = |window_s: f64| {
+        let means = channels.iter().filter_map(|channel| {
+            (!edges_s.is_empty())
+                .then(|| Held::new(&edges_s, channel).farthest_mean((from_s, to_s), window_s))
+                .flatten()
+        });
+        1e3 * means.fold(0.0, |worst, mean| mean.abs().max(worst))
+    };
+    let mut row = Row {
+        rate_hz: plan.rate.hz(),
+        mode: plan.mode,
+        hand: stretch.hand,
+        speed_mm_s: stretch.peak_mm_s(),
+        wavelength_mm: stretch.wavelength_mm,
+        frequency_hz,
+        uneven_ticks: uneven_ticks(recording, (from_s, to_s)),
+        stimulus_v: None,
+        spur: None,
+        whole_mean_mv: farthest_mv(cycles_s),
+        second_mean_mv: farthest_mv(1.0),
+        spectrum: None,
+    };
+    if let Some(frequency_hz) = frequency_hz
+        && edges_s.len() > 1
+    {
+        let seen = spectra(
+            &edges_s,
+            &channels,
+            (from_s, from_s + SPECTRUM_S),
+            HIGHEST_HZ,
+        );
+        for spectrum in seen {
+            let (Some(line), Some(spur)) = (
+                spectrum.line(frequency_hz),
+                spectrum.worst_spur(frequency_hz),
+            ) else {
+                continue;
+            };
+            let dbc = over_db(spur, line);
+            row.stimulus_v = Some(
+                row.stimulus_v
+                    .map_or(line.amplitude_v, |least: f64| least.min(line.amplitude_v)),
+            );
+            if row.spur.is_none_or(|(worst, _)| dbc > worst) {
+                row.spur = Some((dbc, spur.frequency_hz));
+                row.spectrum = (frequency_hz.round() == SHOWN_HZ).then_some(spectrum);
+            }
+        }
+    }
+    row
+}
+
+fn over_db(spur: Line, line: Line) -> f64 {
+    20.0 * (spur.amplitude_v / line.amplitude_v).log10()
+}
+
+/// The channels that differ from one another, in V.
+fn distinct<'a>(words: impl Iterator<Item = &'a [u16; ACTUATORS]> + Clone) -> Vec<Vec<f64>> {
+    let mut channels: Vec<Vec<u16>> = Vec::new();
+    for actuator in 0..ACTUATORS {
+        let channel: Vec<u16> = words.clone().map(|words| words[actuator]).collect();
+        if !channels.contains(&channel) {
+            channels.push(channel);
+        }
+    }
+    channels
+        .into_iter()
+        .map(|channel| channel.into_iter().map(volts).collect())
+        .collect()
+}
+
+/// Ticks in which the hand's encoder went on by other than its commonest counts.
+fn uneven_ticks(recording: &Recording, (from_s, to_s): (f64, f64)) -> usize {
+    let within: Vec<u16> = recording
+        .ticks
+        .iter()
+        .filter(|tick| (from_s..to_s).contains(&(tick.at_ns as f64 * 1e-9)))
+        .map(|tick| tick.encoder)
+        .collect();
+    let mut counts: Vec<u16> = within
+        .windows(2)
+        .map(|pair| pair[1].wrapping_sub(pair[0]))
+        .collect();
+    counts.sort_unstable();
+    let commonest = counts
+        .chunk_by(|one, other| one == other)
+        .map(<[u16]>::len)
+        .max();
+    counts.len() - commonest.unwrap_or(0)
+}
+
+/// Whether a row meets what is asked of it: whole counts the spurs, everything the mean.
+pub fn is_met(row: &Row) -> bool {
+    let pure = row.hand != Hand::Whole || row.spur.is_some_and(|(dbc, _)| dbc <= GOAL_DBC);
+    pure && row.whole_mean_mv <= GOAL_MEAN_MV
+}
+
+/// The word for how the hand moved.
+pub const fn word_of(hand: Hand) -> &'static str {
+    match hand {
+        Hand::Whole => "whole counts",
+        Hand::Between => "between counts",
+        Hand::Stroke { .. } => "strokes",
+    }
+}
+
+/// The rows as CSV.
+///
+/// # Errors
+/// None in practice: it is written to memory.
+pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record([
+        "rate_hz",
+        "mode",
+        "hand",
+        "hand_hz",
+        "speed_mm_s",
+        "wavelength_mm",
+        "frequency_hz",
+        "uneven_ticks",
+        "stimulus_v",
+        "spur_dbc",
+        "spur_hz",
+        "whole_cycles_mean_mv",
+        "any_second_mean_mv",
+    ])?;
+    let field = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
+    for row in rows {
+        let hand_hz = match row.hand {
+            Hand::Stroke { frequency_hz, .. } => Some(frequency_hz),
+            Hand::Whole | Hand::Between => None,
+        };
+        table.write_record([
+            row.rate_hz.to_string(),
+            super::word_of_mode(row.mode).to_owned(),
+            word_of(row.hand).to_owned(),
+            field(hand_hz),
+            format!("{:.4}", row.speed_mm_s),
+            format!("{:.4}", row.wavelength_mm),
+            field(row.frequency_hz),
+            row.uneven_ticks.to_string(),
+            field(row.stimulus_v),
+            field(row.spur.map(|spur| spur.0)),
+            field(row.spur.map(|spur| spur.1)),
+            format!("{:.4}", row.whole_mean_mv),
+            format!("{:.4}", row.second_mean_mv),
+        ])?;
+    }
+    super::finish_csv(table)
+}
+
+/// The spectra that are drawn, as CSV: dB over the stimulus.
+///
+/// # Errors
+/// None in practice: it is written to memory.
+pub fn spectra_csv(rows: &[Row]) -> Result<String, csv::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["rate_hz", "mode", "hand", "frequency_hz", "level_dbc"])?;
+    for row in rows {
+        for (frequency_hz, dbc) in levels_dbc(row) {
+            table.write_record([
+                row.rate_hz.to_string(),
+                super::word_of_mode(row.mode).to_owned(),
+                word_of(row.hand).to_owned(),
+                format!("{frequency_hz}"),
+                format!("{dbc:.2}"),
+            ])?;
+        }
+    }
+    super::finish_csv(table)
+}
+
+/// A row's spectrum: Hz, and dB over the stimulus.
+fn levels_dbc(row: &Row) -> Vec<(f64, f64)> {
+    let (Some(spectrum), Some(frequency_hz)) = (&row.spectrum, row.frequency_hz) else {
+        return Vec::new();
+    };
+    let stimulus_v = spectrum
+        .line(frequency_hz)
+        .map_or(1.0, |line| line.amplitude_v);
+    (0..)
+        .zip(&spectrum.amplitudes_v)
+        .map(|(bin, amplitude_v)| {
+            let dbc = 20.0 * (amplitude_v / stimulus_v).max(1e-9).log10();
+            (f64::from(bin) * spectrum.bin_hz, dbc)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hil_sim_core::run::recording::{Engine, OutputRecord, TickRecord};
+    use hil_sim_core::run::signs::Signs;
+
+    const RATE: UpdateRate = UpdateRate::Hz2000;
+
+    fn plan() -> Plan {
+        Plan {
+            rate: RATE,
+            mode: Mode::Uniform,
+            hands: vec![Hand::Whole],
+        }
+    }
+
+    /// What a display that rounds sines to words, and adds `offset_v` to channel 3, makes of a stretch.
+    fn ideal(stretch: &Stretch, offset_v: f64) -> Recording {
+        let ticks: Vec<TickRecord> = (0..10_000u64)
+            .map(|tick| {
+                let position_mm = stretch.speed_mm_s * tick as f64 / 2_000.0 + 0.002;
+                TickRecord {
+                    at_ns: tick * 500_000,
+                    encoder: hil_sim_core::plant::motion::encoder(position_mm),
+                    position_mm,
+                }
+            })
+            .collect();
+        let outputs = ticks
+            .iter()
+            .map(|tick| {
+                let travel_mm = (tick.position_mm / MM_PER_COUNT).floor() * MM_PER_COUNT;
+                let turns = travel_mm / stretch.wavelength_mm;
+                let sine = 5.0 * (std::f64::consts::TAU * turns).sin();
+                let word = |v: f64| {
+                    (v / hil_sim_core::run::recording::WORD_V + 32_768.0)
+                        .round()
+                        .clamp(1.0, 65_535.0) as u16
+                };
+                OutputRecord {
+                    at_ns: tick.at_ns,
+                    words: std::array::from_fn(|channel| {
+                        word(if channel == 3 { sine + offset_v } else { sine })
+                    }),
+                    skew_ns: 0,
+                }
+            })
+            .collect();
+        Recording {
+            engine: Engine::Native,
+            duration_s: 5.0,
+            warm_up_s: 0.0,
+            wall_s: 1.0,
+            hash: 0,
+            signs: Signs::default(),
+            scans: Vec::new(),
+            ticks,
+            estimates: Vec::new(),
+            outputs,
+            sensor_status: None,
+            display_status: None,
+            log: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_ideal_display_with_whole_counts_is_as_pure_as_sixteen_bits_allow() {
+        let stretch = steady(RATE, Hand::Whole, 40.0);
+        let row = row(&plan(), &stretch, &ideal(&stretch, 0.0), (2.5, 4.7));
+        assert_eq!(row.uneven_ticks, 0);
+        // Rounding of a step q has a power of q²/12 in all, against A²/2 of the sine: −98 dB.
+        let (dbc, _) = row.spur.unwrap();
+        assert!(dbc < -98.0, "{row:?}");
+        assert!((row.stimulus_v.unwrap() - 5.0).abs() < 0.01);
+        assert!(row.whole_mean_mv < 0.1, "{}", row.whole_mean_mv);
+    }
+
+    #[test]
+    fn an_ideal_display_between_counts_shows_the_encoder_s_steps() {
+        let stretch = steady(RATE, Hand::Between, 40.0);
+        let row = row(&plan(), &stretch, &ideal(&stretch, 0.0), (2.5, 4.7));
+        assert!(row.uneven_ticks > 1_000);
+        // The phase is rounded down to a count: a saw of 2π · 5 µm / λ, whose first line is 1/π of its
+        // height, half of it on either side of the stimulus, 0.382 · 2 kHz away. The hold lets
+        // sinc(π f / 2 kHz) of the lower one through.
+        let saw_rad = std::f64::consts::TAU * MM_PER_COUNT / stretch.wavelength_mm;
+        let side_hz = BETWEEN * 2_000.0 - 40.0;
+        let held = std::f64::consts::PI * side_hz / 2_000.0;
+        let due_dbc = 20.0 * (saw_rad / std::f64::consts::TAU * held.sin() / held).log10();
+        let (dbc, frequency_hz) = row.spur.unwrap();
+        assert!(
+            (frequency_hz - side_hz).abs() < 0.1,
+            "{frequency_hz} {side_hz}"
+        );
+        assert!((dbc - due_dbc).abs() < 0.1, "{dbc} {due_dbc}");
+    }
+
+    #[test]
+    fn the_worst_of_the_channels_is_the_one_that_is_told() {
+        let stretch = steady(RATE, Hand::Whole, 20.0);
+        let row = row(&plan(), &stretch, &ideal(&stretch, -0.006), (2.5, 4.7));
+        assert!(
+            (row.whole_mean_mv - 6.0).abs() < 0.2,
+            "{}",
+            row.whole_mean_mv
+        );
+        assert!(!is_met(&row));
+    }
+}

@@ -1,0 +1,11 @@
+//! What is measured over many runs: estimators, display, contact models, the paper, people, faults.
+
+pub mod campaign;
+pub mod contact;
+pub mod display;
+pub mod estimators;
+pub mod jury;
+pub mod map;
+pub mod output;
+pub mod paper;
+pub mod psychophysics;

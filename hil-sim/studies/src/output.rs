@@ -1,0 +1,8 @@
+//! What is written of runs: JSON, JUnit, annotations, golden hashes, the HTML report, plots.
+
+pub mod annotation;
+pub mod golden;
+pub mod json;
+pub mod junit;
+pub mod plot;
+pub mod report;

@@ -1,0 +1,343 @@
+//! Golden hashes: what scenes' runs were when somebody looked at them last, in a TOML file that is kept
+//! beside the scenes.
+//!
+//! ```toml
+//! ["fig7.toml"]
+//! elf = "0123456789abcdef"
+//! native = "fedcba9876543210"
+//! ```
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hil_sim_core::run::recording::Engine;
+use hil_sim_core::scene_file::line::line_of;
+
+/// The file's first lines.
+const HEADER: &str = "\
+# Golden hashes: of every link byte and DAC word of a run, with its instant. A changed hash is a changed run.
+# Look at what changed and why; if it is meant: hil-sim golden renew --file THIS_FILE SCENES...
+
+";
+
+/// Why golden hashes cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum GoldenError {
+    /// The file cannot be read.
+    #[error(
+        "{0}: cannot be read: {source}: make it with hil-sim golden renew --file {0} SCENES...",
+        path.display()
+    )]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file holds something else.
+    #[error("{}:{line}: {what}: mend it, or make it anew with hil-sim golden renew", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {source}: give a file in a folder that exists", path.display())]
+    NotWritten {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A scene's file is nowhere.
+    #[error("{}: cannot be found: {source}: give the name of a scene", path.display())]
+    NoScene {
+        /// The scene's file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+}
+
+/// What a run has to do with the golden hash of its scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// It is the same.
+    Same,
+    /// There is none.
+    Missing,
+    /// It is another: the golden one, and the line where it stands.
+    Other(String, Option<usize>),
+}
+
+/// A file of golden hashes.
+#[derive(Clone, Debug)]
+pub struct Golden {
+    path: PathBuf,
+    /// The file's folder, as the system calls it.
+    folder: PathBuf,
+    text: String,
+    /// By scene and engine.
+    hashes: BTreeMap<String, BTreeMap<String, String>>,
+}
+
+impl Golden {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// If it cannot be read, or is no such file.
+    pub fn read(path: &Path) -> Result<Self, GoldenError> {
+        let text = fs::read_to_string(path).map_err(|source| GoldenError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        let foreign = |at: usize, what: String| GoldenError::Foreign {
+            path: path.to_owned(),
+            line: 1 + text.as_bytes()[..at.min(text.len())]
+                .iter()
+                .filter(|&&byte| byte == b'\n')
+                .count(),
+            what,
+        };
+        let hashes: BTreeMap<String, BTreeMap<String, String>> =
+            toml::from_str(&text).map_err(|error| {
+                foreign(
+                    error.span().map_or(0, |span| span.start),
+                    error.message().to_owned(),
+                )
+            })?;
+        for (scene, engines) in &hashes {
+            for (engine, hash) in engines {
+                let is_hash = hash.len() == 16 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
+                let is_engine = [Engine::Native, Engine::Elf]
+                    .iter()
+                    .any(|known| known.name() == engine);
+                if !is_hash || !is_engine {
+                    let line = line_of(&text, &[scene, engine]).unwrap_or(1);
+                    return Err(GoldenError::Foreign {
+                        path: path.to_owned(),
+                        line,
+                        what: format!("{engine} = {hash:?} is no hash of native or elf"),
+                    });
+                }
+            }
+        }
+        Self::with(path, text, hashes)
+    }
+
+    /// Reads a file, or begins one if there is none.
+    ///
+    /// # Errors
+    /// As [`Golden::read`], and if its folder does not exist.
+    pub fn open(path: &Path) -> Result<Self, GoldenError> {
+        match Self::read(path) {
+            Err(GoldenError::Unreadable { source, .. })
+                if source.kind() == std::io::ErrorKind::NotFound =>
+            {
+                Self::with(path, String::new(), BTreeMap::new())
+            }
+            read => read,
+        }
+    }
+
+    fn with(
+        path: &Path,
+        text: String,
+        hashes: BTreeMap<String, BTreeMap<String, String>>,
+    ) -> Result<Self, GoldenError> {
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let folder = folder
+            .canonicalize()
+            .map_err(|source| GoldenError::NotWritten {
+                path: path.to_owned(),
+                source,
+            })?;
+        Ok(Self {
+            path: path.to_owned(),
+            folder,
+            text,
+            hashes,
+        })
+    }
+
+    /// The file's name, as it was given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What a scene is called in the file: its place from the file's folder, with `/`.
+    ///
+    /// # Errors
+    /// If there is no such scene.
+    pub fn name(&self, scene: &Path) -> Result<String, GoldenError> {
+        let scene = scene
+            .canonicalize()
+            .map_err(|source| GoldenError::NoScene {
+                path: scene.to_owned(),
+                source,
+            })?;
+        let same = self
+            .folder
+            .components()
+            .zip(scene.components())
+            .take_while(|(one, other)| one == other)
+            .count();
+        let up = self.folder.components().skip(same).map(|_| "..".to_owned());
+        let down = scene
+            .components()
+            .skip(same)
+            .map(|part| part.as_os_str().to_string_lossy().into_owned());
+        Ok(up.chain(down).collect::<Vec<_>>().join("/"))
+    }
+
+    /// What a run's hash has to do with the golden one of the scene of that name.
+    pub fn standing(&self, name: &str, engine: Engine, hash: u64) -> Standing {
+        match self.hash(name, engine) {
+            None => Standing::Missing,
+            Some(golden) if *golden == format!("{hash:016x}") => Standing::Same,
+            Some(golden) => {
+                let line = line_of(&self.text, &[name, engine.name()]);
+                Standing::Other(golden.clone(), line)
+            }
+        }
+    }
+
+    /// Takes a hash as the golden one, and gives the one before.
+    pub fn renew(&mut self, name: &str, engine: Engine, hash: u64) -> Option<String> {
+        self.hashes
+            .entry(name.to_owned())
+            .or_default()
+            .insert(engine.name().to_owned(), format!("{hash:016x}"))
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// If the system does not.
+    pub fn write(&self) -> Result<(), GoldenError> {
+        let mut text = HEADER.to_owned();
+        for (scene, engines) in &self.hashes {
+            text += &format!("[{}]\n", toml::Value::String(scene.clone()));
+            for (engine, hash) in engines {
+                text += &format!("{engine} = \"{hash}\"\n");
+            }
+            text.push('\n');
+        }
+        fs::write(&self.path, text.trim_end().to_owned() + "\n").map_err(|source| {
+            GoldenError::NotWritten {
+                path: self.path.clone(),
+                source,
+            }
+        })
+    }
+
+    fn hash(&self, name: &str, engine: Engine) -> Option<&String> {
+        self.hashes.get(name)?.get(engine.name())
+    }
+}
+
+/// What to say of a run whose hash is not the golden one; none if it is.
+pub fn complaint(standing: &Standing, hash: u64, golden: &Golden, name: &str) -> Option<String> {
+    let path = golden.path().display();
+    match standing {
+        Standing::Same => None,
+        Standing::Missing => Some(format!(
+            "golden: {path} has no hash of {name}: look at the run, then hil-sim golden renew"
+        )),
+        Standing::Other(golden, _) => Some(format!(
+            "golden: {hash:016x} is not {golden} of {path}: the run has changed: look at what and why, and if it is meant, hil-sim golden renew"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(test: &str) -> PathBuf {
+        let path =
+            std::env::temp_dir().join(format!("hil-sim-golden-{}-{test}", std::process::id()));
+        fs::create_dir_all(path.join("sub")).unwrap();
+        path
+    }
+
+    #[test]
+    fn what_was_renewed_is_the_same_again_wherever_one_stands() {
+        let folder = folder("renew");
+        let scene = folder.join("sub/a \"b\".toml");
+        fs::write(&scene, "").unwrap();
+        let path = folder.join("golden.toml");
+        let mut golden = Golden::open(&path).unwrap();
+        let name = golden.name(&scene).unwrap();
+        assert_eq!(name, "sub/a \"b\".toml");
+        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Missing);
+        assert_eq!(golden.renew(&name, Engine::Native, 7), None);
+        golden.write().unwrap();
+
+        let mut golden = Golden::read(&path).unwrap();
+        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Same);
+        assert_eq!(golden.standing(&name, Engine::Elf, 7), Standing::Missing);
+        let other = golden.standing(&name, Engine::Native, 8);
+        assert_eq!(
+            other,
+            Standing::Other("0000000000000007".to_owned(), Some(5))
+        );
+        let complaint = complaint(&other, 8, &golden, &name).unwrap();
+        assert!(
+            complaint.contains("0000000000000008 is not 0000000000000007"),
+            "{complaint}"
+        );
+        golden.renew(&name, Engine::Elf, 9);
+        golden.write().unwrap();
+        let golden = Golden::read(&path).unwrap();
+        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Same);
+        assert_eq!(golden.standing(&name, Engine::Elf, 9), Standing::Same);
+
+        // From another folder the scene has another name.
+        let elsewhere = Golden::open(&folder.join("sub/golden.toml")).unwrap();
+        assert_eq!(
+            elsewhere.name(&folder.join("golden.toml")).unwrap(),
+            "../golden.toml"
+        );
+        assert_eq!(elsewhere.name(&scene).unwrap(), "a \"b\".toml");
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn what_is_no_such_file_is_refused_with_its_line() {
+        let folder = folder("foreign");
+        let path = folder.join("golden.toml");
+        for (text, want) in [
+            ("[\"a.toml\"]\nnative = 7\n", "golden.toml:2: "),
+            (
+                "[\"a.toml\"]\n\nnative = \"7\"\n",
+                "golden.toml:3: native = \"7\" is no hash",
+            ),
+            (
+                "[\"a.toml\"]\nsteam = \"0123456789abcdef\"\n",
+                "golden.toml:2: steam",
+            ),
+            ("[\n", "golden.toml:1: "),
+        ] {
+            fs::write(&path, text).unwrap();
+            let refusal = Golden::read(&path).unwrap_err().to_string();
+            assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+        }
+        let missing = Golden::read(&folder.join("none.toml"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            missing.contains("make it with hil-sim golden renew"),
+            "{missing}"
+        );
+        assert!(Golden::open(&folder.join("no/golden.toml")).is_err());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,242 @@
+//! A run for a person to look at: one HTML file that needs nothing else.
+
+pub(crate) mod crossings;
+mod faults;
+mod figure;
+mod plots;
+mod senses;
+mod tables;
+mod thin;
+
+use std::fmt::Write;
+
+use thiserror::Error;
+
+use crate::output::json::ContactResult;
+use crate::output::report::figure::Figure;
+use hil_sim_core::judge::Verdict;
+use hil_sim_core::judge::fault::Finding;
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::judge::truth::Truth;
+use hil_sim_core::run::recording::Recording;
+
+/// One scene's part of the report.
+#[derive(Clone)]
+pub struct Chapter<'a> {
+    /// What the scene knows.
+    pub truth: Truth<'a>,
+    /// What the run left behind.
+    pub recording: &'a Recording,
+    /// The recording, judged.
+    pub verdict: &'a Verdict,
+    /// A line for each expectation of the scene that was not met.
+    pub unmet: &'a [String],
+    /// What became of the scene's faults, in their order.
+    pub findings: &'a [Finding],
+    /// The contact model and why it was taken; none with recorded gauges.
+    pub contact: Option<String>,
+}
+
+impl<'a> Chapter<'a> {
+    /// The part of a judged run.
+    pub fn of(outcome: &'a Outcome) -> Self {
+        Self {
+            truth: outcome.truth(),
+            recording: &outcome.recording,
+            verdict: &outcome.verdict,
+            unmet: &outcome.unmet,
+            findings: &outcome.findings,
+            contact: ContactResult::of(&outcome.scene).map(|contact| contact.sentence()),
+        }
+    }
+}
+
+/// The report could not be made.
+#[derive(Debug, Error)]
+#[error("scene {scene}: a plot could not be drawn: {reason}")]
+pub struct ReportError {
+    /// The scene's name.
+    pub scene: String,
+    /// What the drawing library says.
+    pub reason: String,
+}
+
+/// The report on these scenes, as one HTML page with its style and its plots within.
+///
+/// # Errors
+/// If a plot cannot be drawn, which no recording should bring about.
+pub fn html(chapters: &[Chapter]) -> Result<String, ReportError> {
+    let mut page = format!(
+        "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n\
+         <meta name=viewport content=\"width=device-width, initial-scale=1\">\n\
+         <title>Ridgelink: simulated runs</title>\n<style>\n{}{}</style>\n\
+         <h1>Ridgelink: simulated runs</h1>\n{}",
+        crate::output::plot::palette::style_rules(),
+        include_str!("report/style.css"),
+        tables::index(chapters),
+    );
+    for (at, chapter) in chapters.iter().enumerate() {
+        let figures = plots::figures(chapter).map_err(|reason| ReportError {
+            scene: chapter.truth.name.into(),
+            reason,
+        })?;
+        write_chapter(&mut page, at, chapter, &figures);
+    }
+    Ok(page)
+}
+
+fn write_chapter(page: &mut String, at: usize, chapter: &Chapter, figures: &[Figure]) {
+    let Chapter {
+        truth, recording, ..
+    } = chapter;
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        page,
+        "<section class=scene id=scene-{at}>\n<h2>{}</h2>\n\
+         <p class=soft>engine {}, method {}, {} s, hash {:016x}</p>",
+        escape(truth.name),
+        recording.engine.name(),
+        escape(truth.method),
+        recording.duration_s,
+        recording.hash,
+    );
+    if let Some(contact) = &chapter.contact {
+        let _ = writeln!(page, "<p class=soft>{}</p>", escape(contact));
+    }
+    for line in chapter.unmet {
+        let _ = writeln!(page, "<p class=unmet>Not as expected: {}</p>", escape(line));
+    }
+    *page += &tables::summary(chapter);
+    for figure in figures {
+        write_figure(page, figure);
+    }
+    *page += &faults::table(chapter.findings);
+    *page += &tables::counters(chapter);
+    *page += &tables::log(chapter);
+    *page += "</section>\n";
+}
+
+fn write_figure(page: &mut String, figure: &Figure) {
+    let _ = writeln!(
+        page,
+        "<figure><figcaption>{}</figcaption>",
+        escape(&figure.title)
+    );
+    if !figure.legend.is_empty() {
+        *page += "<ul class=legend>";
+        for (colour, text) in &figure.legend {
+            let _ = write!(
+                page,
+                "<li><i style=\"background:var(--{})\"></i>{}</li>",
+                colour.name,
+                escape(text)
+            );
+        }
+        *page += "</ul>\n";
+    }
+    let title = escape(&figure.title);
+    let svg = figure.svg.replacen(
+        "<svg ",
+        &format!("<svg role=img aria-label=\"{title}\" "),
+        1,
+    );
+    let _ = writeln!(
+        page,
+        "<div class=wide>{svg}</div>\n<p>{}</p></figure>",
+        escape(&figure.note)
+    );
+}
+
+/// Text as HTML shows it.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::Mode;
+
+    use super::*;
+    use hil_sim_core::judge::judge;
+    use hil_sim_core::judge::synthetic::Run;
+
+    fn page(run: &Run, name: &str, mode: Mode, log: &[&str]) -> String {
+        let mut truth = Truth::new(name, "counting", &*run.surface_mm);
+        truth.display.mode = mode;
+        let mut recording = run.record();
+        recording.log = log
+            .iter()
+            .map(|&line| (1, "sensor", line.to_owned()))
+            .collect();
+        let verdict = judge(&truth, &recording);
+        let unmet = ["rms_percent 3 > 1".to_owned()];
+        html(&[Chapter {
+            truth,
+            recording: &recording,
+            verdict: &verdict,
+            unmet: &unmet,
+            findings: &[],
+            contact: None,
+        }])
+        .unwrap()
+    }
+
+    #[test]
+    fn a_scene_has_five_plots_and_its_numbers() {
+        let page = page(&Run::steady(50.0, 2.0), "steady", Mode::Uniform, &[]);
+        assert_eq!(page.matches("<svg ").count(), 5);
+        assert_eq!(page.matches("</svg>").count(), 5);
+        assert!(page.contains("href=\"#scene-0\"") && page.contains("id=scene-0"));
+        assert!(page.contains("rms_percent 3 &gt; 1"));
+        assert!(!page.contains("NaN"));
+    }
+
+    #[test]
+    fn the_page_asks_the_network_for_nothing() {
+        let page = page(&Run::steady(50.0, 2.0), "steady", Mode::Travelling, &[]);
+        let svg_namespace = "xmlns=\"http://www.w3.org/2000/svg\"";
+        let page = page.replace(svg_namespace, "");
+        for needle in [
+            "http:", "https:", "url(", "@import", "<script", "<link", "<img",
+        ] {
+            assert!(!page.contains(needle), "{needle}");
+        }
+    }
+
+    #[test]
+    fn names_and_log_lines_cannot_break_the_page() {
+        let page = page(
+            &Run::steady(50.0, 2.0),
+            "<b>&\"",
+            Mode::Uniform,
+            &["</pre><script>"],
+        );
+        assert!(page.contains("&lt;b&gt;&amp;&quot;"));
+        assert!(page.contains("&lt;/pre&gt;&lt;script&gt;"));
+        assert!(!page.contains("<script>"));
+    }
+
+    #[test]
+    fn a_minutes_scene_stays_below_a_megabyte() {
+        let run = Run {
+            duration_s: 60.0,
+            ..Run::swinging(70.0, 0.83, 2.0)
+        };
+        let log = ["a line of the log that is about as long as one is"; 5_000];
+        let page = page(&run, "long", Mode::Travelling, &log);
+        assert!(page.len() < 1_000_000, "{}", page.len());
+        assert!(page.contains("200 of 5000 lines"));
+    }
+
+    #[test]
+    fn an_empty_recording_is_reported_without_a_panic() {
+        let run = Run {
+            duration_s: 0.0,
+            ..Run::steady(50.0, 2.0)
+        };
+        assert!(!page(&run, "nothing", Mode::Uniform, &[]).contains("NaN"));
+    }
+}

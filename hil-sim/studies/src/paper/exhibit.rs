@@ -1,0 +1,193 @@
+//! A figure or a table, ours beside the paper's.
+
+use std::fmt::Write;
+
+use crate::output::plot::chart::{Axis, Mark, draw_at};
+use crate::output::plot::palette::Colour;
+use crate::output::report::escape;
+use crate::paper::PaperError;
+
+/// Width of a chart for a page, and of one for a phone, in its own units: text is of one size in both.
+const BROAD: u32 = 2_000;
+const NARROW: u32 = 1_050;
+
+/// A figure or a table.
+#[derive(Clone, Debug)]
+pub struct Exhibit {
+    /// Its place on the page: "fig-5".
+    pub id: &'static str,
+    /// Its heading.
+    pub title: String,
+    /// What the paper says of it, and gives.
+    pub paper: String,
+    /// Two sentences: what is seen, and where ours differs.
+    pub seen: String,
+    /// What is shown.
+    pub parts: Vec<Part>,
+    /// Its CSVs: names and texts.
+    pub csvs: Vec<(String, String)>,
+    /// CSVs of the experiments with people that belong to it.
+    pub shared: &'static [&'static str],
+}
+
+/// Something shown.
+#[derive(Clone, Debug)]
+pub enum Part {
+    /// A chart.
+    Chart {
+        /// What it is of.
+        caption: String,
+        /// What each colour means.
+        legend: Vec<(Colour, String)>,
+        /// As wide as a page.
+        broad: String,
+        /// As wide as a phone.
+        narrow: String,
+    },
+    /// A table.
+    Table {
+        /// What it is of.
+        caption: String,
+        /// Its heads.
+        heads: Vec<String>,
+        /// Its rows, the first cell of each its head.
+        rows: Vec<Vec<String>>,
+    },
+}
+
+impl Part {
+    /// Draws a chart.
+    ///
+    /// # Errors
+    /// If it cannot be drawn.
+    pub(super) fn chart(
+        exhibit: &'static str,
+        caption: impl Into<String>,
+        legend: &[(Colour, &str)],
+        (height, x, y): (u32, &Axis, &Axis),
+        marks: &[Mark],
+    ) -> Result<Self, PaperError> {
+        let drawn = |width| {
+            draw_at((width, height), x, y, marks)
+                .map_err(|reason| PaperError::Chart { exhibit, reason })
+        };
+        Ok(Self::Chart {
+            caption: caption.into(),
+            legend: legend
+                .iter()
+                .map(|&(colour, text)| (colour, text.to_owned()))
+                .collect(),
+            broad: drawn(BROAD)?,
+            narrow: drawn(NARROW)?,
+        })
+    }
+
+    fn write(&self, page: &mut String) {
+        match self {
+            Part::Chart {
+                caption,
+                legend,
+                broad,
+                narrow,
+            } => {
+                let caption = escape(caption);
+                let _ = writeln!(page, "<h3>{caption}</h3>");
+                if !legend.is_empty() {
+                    *page += "<ul class=legend>";
+                    for (colour, text) in legend {
+                        let (name, text) = (colour.name, escape(text));
+                        let _ = write!(
+                            page,
+                            "<li><i style=\"background:var(--{name})\"></i>{text}</li>"
+                        );
+                    }
+                    *page += "</ul>\n";
+                }
+                for (class, svg) in [("broad", broad), ("narrow", narrow)] {
+                    let named = format!("<svg role=\"img\" aria-label=\"{caption}\" ");
+                    let svg = svg.replacen("<svg ", &named, 1);
+                    let _ = writeln!(page, "<div class={class}>{svg}</div>");
+                }
+            }
+            Part::Table {
+                caption,
+                heads,
+                rows,
+            } => {
+                let _ = write!(
+                    page,
+                    "<div class=wide><table><caption>{}</caption><thead><tr>",
+                    escape(caption)
+                );
+                for head in heads {
+                    let _ = write!(page, "<th scope=col>{}</th>", escape(head));
+                }
+                *page += "</tr></thead>\n<tbody>";
+                for row in rows {
+                    *page += "<tr>";
+                    for (at, cell) in row.iter().enumerate() {
+                        let cell = escape(cell);
+                        let _ = match at {
+                            0 => write!(page, "<th scope=row>{cell}</th>"),
+                            _ => write!(page, "<td>{cell}</td>"),
+                        };
+                    }
+                    *page += "</tr>\n";
+                }
+                *page += "</tbody></table></div>\n";
+            }
+        }
+    }
+}
+
+impl Exhibit {
+    /// Writes it on a page whose CSVs lie in `folder`.
+    pub(super) fn write(&self, page: &mut String, folder: &str) {
+        let Self {
+            id,
+            title,
+            paper,
+            seen,
+            ..
+        } = self;
+        let _ = writeln!(
+            page,
+            "<section class=exhibit id={id}>\n<h2>{}</h2>\n<p class=soft>{}</p>\n<p>{}</p>",
+            escape(title),
+            escape(paper),
+            escape(seen),
+        );
+        *page += "<div class=card>\n";
+        for part in &self.parts {
+            part.write(page);
+        }
+        *page += "</div>\n<p class=soft>Numbers:";
+        let own = self.csvs.iter().map(|(name, _)| name.as_str());
+        for name in own.chain(self.shared.iter().copied()) {
+            let _ = write!(page, " <a href=\"{0}/{name}\">{name}</a>", escape(folder));
+        }
+        *page += "</p>\n</section>\n";
+    }
+}
+
+/// A number with so many decimals, or a dash.
+pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("–".into(), |value| {
+        format!("{value:.decimals$}").replace('-', "−")
+    })
+}
+
+/// A CSV's text from its header and rows.
+pub(super) fn csv_text<R: serde::Serialize>(
+    header: &[&str],
+    rows: impl IntoIterator<Item = R>,
+) -> Result<String, PaperError> {
+    let mut table = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(Vec::new());
+    table.write_record(header)?;
+    for row in rows {
+        table.serialize(row)?;
+    }
+    Ok(crate::display::finish_csv(table)?)
+}

@@ -1,0 +1,202 @@
+//! What is run, and where it is found afterwards.
+
+use protocol::Method;
+
+use crate::paper::published::{CELLS_MM, SPEEDS_MM_S};
+use crate::psychophysics::bench::Job;
+use crate::psychophysics::hand;
+use crate::psychophysics::study;
+use crate::psychophysics::study::{Plan, SNR_DB};
+use hil_sim_core::judge::JudgedEstimate;
+use hil_sim_core::judge::estimates::judge;
+use hil_sim_core::judge::truth::Truth;
+use hil_sim_core::run::recording::Recording;
+use hil_sim_core::scene::{Estimator, Gauges, Kinematic, Motion, Scene, Specimen};
+
+/// The paper's two seconds of estimates, and what filters and boards need before, in s.
+pub const CELL_S: f64 = 2.3;
+/// What the two seconds leave out at the beginning, in s.
+pub const SETTLED_S: f64 = 0.3;
+/// λ and v of the seven points that Fig. 6 has beside Table I's: the paper does not say which it took; these
+/// fill the gaps between Table I's frequencies.
+pub const FURTHER: [(f64, f64); 7] = [
+    (1.0, 40.0),
+    (1.0, 45.0),
+    (1.0, 55.0),
+    (1.0, 60.0),
+    (1.0, 65.0),
+    (2.0, 40.0),
+    (2.0, 56.0),
+];
+/// Fig. 5: the window in ms, λ, the hand's peak and its frequency.
+pub const FIG_5_WINDOW_MS: u16 = 200;
+/// Fig. 5: λ in mm.
+pub const FIG_5_MM: f64 = 2.0;
+/// Fig. 5: α in mm/s.
+pub const FIG_5_PEAK_MM_S: f64 = 100.0;
+/// Fig. 5: fᵥ in Hz.
+pub const FIG_5_HAND_HZ: f64 = 1.0;
+/// Fig. 7: λ in mm. Its hand is [`hand::PEAK_MM_S`] and [`hand::FREQUENCY_HZ`].
+pub const FIG_7_MM: f64 = 2.0;
+/// Fig. 8: where the specimens meet, in mm.
+pub const FIG_8_BOUNDARY_MM: f64 = 60.0;
+/// Fig. 8: the speed in mm/s, which the paper does not give: the highest of Table I's. (At 50 mm/s a window
+/// holds exactly two crossings of 4 mm, and a count does not roam.)
+pub const FIG_8_SPEED_MM_S: f64 = 70.0;
+/// Fig. 8: the specimens, in mm.
+pub const FIG_8_MM: [f64; 2] = [1.0, 4.0];
+
+/// λ and v of Table I's cells and Fig. 6's further points.
+pub fn cells() -> impl Iterator<Item = (f64, f64)> {
+    let table_1 = SPEEDS_MM_S
+        .into_iter()
+        .flat_map(|speed| CELLS_MM.map(|mm| (mm, speed)));
+    table_1.chain(FURTHER)
+}
+
+/// All jobs: those of the experiments with people, then the rest.
+pub fn jobs(plan: &Plan) -> Vec<Job> {
+    let seed = plan.seed;
+    let mut jobs = study::jobs(plan);
+    jobs.extend([fig_7(seed), fig_5(seed), fig_8(seed)].map(Job::pair));
+    jobs.extend(cells().map(|(mm, speed_mm_s)| {
+        Job::pair(Scene {
+            seed,
+            duration_s: CELL_S,
+            ..Scene::constant(mm, speed_mm_s)
+        })
+    }));
+    jobs
+}
+
+fn noisy() -> Gauges {
+    Gauges::Kinematic(Kinematic {
+        snr_db: Some(SNR_DB),
+        ..Kinematic::default()
+    })
+}
+
+fn fig_5(seed: u64) -> Scene {
+    Scene {
+        name: "paper-fig-5".into(),
+        seed,
+        duration_s: 2.5,
+        motion: Motion::Sinusoid {
+            amplitude_mm_s: FIG_5_PEAK_MM_S,
+            frequency_hz: FIG_5_HAND_HZ,
+        },
+        estimator: Estimator {
+            method: Method::Counting,
+            window_ms: FIG_5_WINDOW_MS,
+            ..Estimator::default()
+        },
+        ..Scene::constant(FIG_5_MM, FIG_5_PEAK_MM_S)
+    }
+}
+
+fn fig_7(seed: u64) -> Scene {
+    Scene {
+        name: "paper-fig-7".into(),
+        seed,
+        duration_s: 3.0 / hand::FREQUENCY_HZ,
+        motion: Motion::Sinusoid {
+            amplitude_mm_s: hand::PEAK_MM_S,
+            frequency_hz: hand::FREQUENCY_HZ,
+        },
+        gauges: noisy(),
+        ..Scene::constant(FIG_7_MM, hand::PEAK_MM_S)
+    }
+}
+
+fn fig_8(seed: u64) -> Scene {
+    let mut scene = Scene {
+        name: "paper-fig-8".into(),
+        seed,
+        duration_s: 1.7,
+        gauges: noisy(),
+        ..Scene::constant(FIG_8_MM[0], FIG_8_SPEED_MM_S)
+    };
+    scene.surface.specimens = vec![
+        Specimen {
+            wavelength_mm: FIG_8_MM[0],
+            length_mm: FIG_8_BOUNDARY_MM,
+        },
+        Specimen {
+            wavelength_mm: FIG_8_MM[1],
+            length_mm: f64::INFINITY,
+        },
+    ];
+    scene
+}
+
+/// A constant speed over one specimen.
+#[derive(Clone, Copy)]
+pub struct Cell<'a> {
+    /// λ in mm.
+    pub wavelength_mm: f64,
+    /// v in mm/s.
+    pub speed_mm_s: f64,
+    /// The run.
+    pub recording: &'a Recording,
+}
+
+/// What the jobs left.
+pub struct Runs<'a> {
+    /// The experiments with people.
+    pub people: &'a [Recording],
+    /// Fig. 7.
+    pub fig_7: &'a Recording,
+    /// Fig. 5.
+    pub fig_5: &'a Recording,
+    /// Fig. 8.
+    pub fig_8: &'a Recording,
+    /// Table I's cells, speed by speed, then Fig. 6's further points.
+    pub cells: Vec<Cell<'a>>,
+}
+
+impl<'a> Runs<'a> {
+    /// Sorts what [`jobs`] left.
+    ///
+    /// # Panics
+    /// If there are fewer recordings than jobs.
+    pub fn new(plan: &Plan, recordings: &'a [Recording]) -> Self {
+        let (people, rest) = recordings.split_at(study::jobs(plan).len());
+        let [fig_7, fig_5, fig_8, rest @ ..] = rest else {
+            panic!("a recording for each job");
+        };
+        let cells = cells()
+            .zip(rest)
+            .map(|((wavelength_mm, speed_mm_s), recording)| Cell {
+                wavelength_mm,
+                speed_mm_s,
+                recording,
+            });
+        Self {
+            people,
+            fig_7,
+            fig_5,
+            fig_8,
+            cells: cells.collect(),
+        }
+    }
+}
+
+impl Cell<'_> {
+    /// v/λ in Hz.
+    pub fn frequency_hz(&self) -> f64 {
+        self.speed_mm_s / self.wavelength_mm
+    }
+
+    /// The estimates of its last two seconds, beside the truth.
+    pub fn estimates(&self) -> Vec<JudgedEstimate> {
+        let wavelength_mm = self.wavelength_mm;
+        let mut estimates = estimates(self.recording, &|_| wavelength_mm);
+        estimates.retain(|estimate| estimate.t_s >= SETTLED_S);
+        estimates
+    }
+}
+
+/// A run's estimates beside the truth.
+pub fn estimates(recording: &Recording, wavelength_mm: &dyn Fn(f64) -> f64) -> Vec<JudgedEstimate> {
+    judge(&Truth::new("paper", "", wavelength_mm), recording).0
+}

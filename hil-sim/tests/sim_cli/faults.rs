@@ -1,0 +1,147 @@
+//! Faults in scenes, on the native engine: what is expected of a kind comes of it, with no board that
+//! could break.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use hil_sim_core::judge::fault::judge;
+use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::native;
+use hil_sim_core::scene::Scene;
+use hil_sim_core::scene::fault::catalogue::{Class, Needs};
+use hil_sim_core::scene::fault::{Fault, Kind};
+
+/// The estimator is sure by then.
+const AT_S: f64 = 1.0;
+
+fn scene(fault: Fault) -> Scene {
+    let watch_s = fault.kind.row().watch_s;
+    Scene {
+        duration_s: AT_S + watch_s.max(1.2),
+        faults: vec![fault],
+        ..Scene::constant(2.0, 50.0)
+    }
+}
+
+#[test]
+fn what_needs_no_board_comes_out_as_the_table_says() {
+    let mut unmet = Vec::new();
+    let kinds = Kind::all().filter(|kind| kind.row().needs == Needs::Nothing);
+    for kind in kinds {
+        let scene = scene(Fault::new(kind, AT_S));
+        let recording = native::run(&scene).unwrap();
+        let finding = judge(&scene.faults, &recording).remove(0);
+        assert!(finding.was_driving, "{kind:?}");
+        if !finding.unmet().is_empty() {
+            unmet.push(format!(
+                "{}: {:?}, {finding:?}",
+                kind.name(),
+                finding.unmet()
+            ));
+        }
+        // What fades for good in the scene has faded; what holds has held.
+        if kind.row().class == Class::Holds {
+            assert_eq!(finding.safe_ns, None, "{kind:?}");
+        }
+    }
+    assert!(unmet.is_empty(), "{unmet:#?}");
+}
+
+#[test]
+fn what_breaks_a_board_is_refused_with_the_key_and_the_engine_that_can() {
+    let kinds = Kind::all().filter(|kind| kind.row().needs == Needs::Boards);
+    for kind in kinds {
+        let refusal = native::run(&scene(Fault::new(kind, AT_S))).unwrap_err();
+        let refusal = refusal.to_string();
+        assert!(refusal.contains("fault[0].kind: "), "{refusal}");
+        assert!(refusal.contains(kind.name()), "{refusal}");
+        assert!(refusal.contains("give --engine elf"), "{refusal}");
+    }
+}
+
+#[test]
+fn a_drifting_sensor_clock_shows_in_its_estimates_and_changes_nothing_else() {
+    let mut drift = Fault::new(Kind::ClockDrift, 0.0);
+    drift.values[0] = 200.0;
+    let scene = scene(drift);
+    let recording = native::run(&scene).unwrap();
+    let last = recording.estimates.last().unwrap();
+    let ahead_ns = last.estimate.instant_us as f64 * 1e3 - last.made_ns as f64;
+    // Whole µs.
+    let due_ns = last.made_ns as f64 * 200e-6;
+    assert!((ahead_ns - due_ns).abs() < 1_001.0, "{ahead_ns} {due_ns}");
+    assert!(last.estimate.valid);
+}
+
+#[test]
+fn the_json_lists_every_fault_in_the_order_of_the_scene() {
+    let text = r#"
+        duration_s = 2.0
+        [surface]
+        specimens = [{ wavelength_mm = 2.0 }]
+        [[fault]]
+        at_s = 1.6
+        kind = "hand-encoder-jump"
+        [[fault]]
+        at_s = 0.5
+        kind = "nothing"
+    "#;
+    let scene = Scene::parse(Path::new("x.toml"), text).unwrap();
+    let recording = native::run(&scene).unwrap();
+    let outcome = Outcome::new(scene, recording);
+    let judgement = outcome.judgement(true);
+    let json = serde_json::to_value(judgement.result(&outcome.scene)).unwrap();
+    let faults = json["faults"].as_array().unwrap();
+    assert_eq!(faults.len(), 2);
+    assert_eq!(faults[0]["kind"], "hand-encoder-jump");
+    assert_eq!(faults[0]["at_s"], 1.6);
+    // One tick, half a millisecond, and the tick that the jump fell into.
+    assert!(
+        faults[0]["safe_ms"].as_f64().unwrap() <= 1.0,
+        "{}",
+        faults[0]
+    );
+    assert!(
+        faults[0]["detected_ms"].as_f64().unwrap() <= 1.0,
+        "{}",
+        faults[0]
+    );
+    assert_eq!(faults[1]["kind"], "nothing");
+}
+
+fn hil_sim(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn the_list_tells_of_every_kind_and_every_key() {
+    let output = hil_sim(&["faults"]);
+    assert_eq!(output.status.code(), Some(0));
+    let list = String::from_utf8(output.stdout).unwrap();
+    for kind in Kind::all() {
+        let row = kind.row();
+        let entry = list.split(&format!("\n{}: ", row.name)).nth(1);
+        let entry = entry.or_else(|| list.strip_prefix(&format!("{}: ", row.name)));
+        let entry = entry.unwrap_or_else(|| panic!("{} is not in the list", row.name));
+        let entry = entry.split("\n\n").next().unwrap();
+        assert!(entry.contains(row.meaning) && entry.contains(row.injected));
+        assert!(entry.contains(row.expected));
+        for key in row.keys {
+            assert!(
+                entry.contains(&format!("(default {})", key.default)),
+                "{entry}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_campaign_of_an_unknown_kind_is_refused() {
+    let output = hil_sim(&["campaign", "--kinds", "panic,gremlin"]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(errors.contains("gremlin: no such kind"), "{errors}");
+}

@@ -1,0 +1,175 @@
+//! `hil-sim run` as a person or a script meets it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use hil_sim_core::scene::Estimator;
+
+const SOUND: &str = "duration_s = 0.5\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+
+/// A folder of the test's own, empty.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
+    fs::remove_dir_all(&folder).ok();
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Runs `hil-sim` in `folder`.
+fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
+    let folder = folder("as-expected");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    let output = hil_sim(
+        &folder,
+        &["run", "a.toml", "--json", "o.json", "--report", "o.html"],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    assert_eq!(json[0]["name"], "a");
+    assert_eq!(json[0]["engine"], "native");
+    assert_eq!(json[0]["method"], Estimator::default().method_name());
+    assert_eq!(json[0]["estimates"].as_array().unwrap().len(), 50);
+    assert!(
+        fs::read_to_string(folder.join("o.html"))
+            .unwrap()
+            .starts_with("<!doctype html>")
+    );
+}
+
+#[test]
+fn a_scene_of_the_banks_runs_with_its_successor_and_standard_error_says_so_once() {
+    let folder = folder("successor");
+    let text = format!("{SOUND}[estimator]\nmethod = \"bank\"\n");
+    fs::write(folder.join("a.toml"), text).unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "o.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert_eq!(
+        errors(&output),
+        "a.toml:5: estimator.method: method = \"bank\" is now \"spectrum\", its successor\n"
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    assert_eq!(json[0]["method"], "spectrum");
+    // What is felt is in the summary, and in the line that is printed.
+    let right = json[0]["summary"]["felt_right_share"].as_f64().unwrap();
+    assert!((0.5..=1.0).contains(&right), "{right}");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("felt right  felt wrong"), "{said}");
+    assert!(said.contains(&format!("  {right:.2}  ")), "{said}");
+}
+
+#[test]
+fn an_expectation_that_fails_exits_1_and_json_is_written_all_the_same() {
+    let folder = folder("not-as-expected");
+    fs::write(
+        folder.join("a.toml"),
+        format!("{SOUND}[expect]\nmean_mm = 3.0\n"),
+    )
+    .unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "o.json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", errors(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("not as expected: mean_mm: "));
+    assert!(
+        fs::read_to_string(folder.join("o.json"))
+            .unwrap()
+            .starts_with('[')
+    );
+}
+
+#[test]
+fn a_scene_that_cannot_be_used_exits_2_before_anything_runs() {
+    let folder = folder("unusable");
+    fs::write(folder.join("good.toml"), SOUND).unwrap();
+    fs::write(folder.join("bad.toml"), "duration_s = 0\n").unwrap();
+    fs::write(folder.join("worse.toml"), "x = 1\n").unwrap();
+    let output = hil_sim(
+        &folder,
+        &[
+            "run",
+            "good.toml",
+            "bad.toml",
+            "worse.toml",
+            "--json",
+            "o.json",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty());
+    let errors = errors(&output);
+    let lines: Vec<&str> = errors.lines().collect();
+    assert_eq!(lines.len(), 2, "{errors}");
+    assert!(
+        lines[0].starts_with("bad.toml:1: duration_s: 0 is not a duration"),
+        "{errors}"
+    );
+    assert!(
+        lines[1].starts_with("worse.toml:1: surface.specimens: there are none"),
+        "{errors}"
+    );
+    assert!(!folder.join("o.json").exists());
+}
+
+#[test]
+fn an_output_that_cannot_be_written_exits_2_before_anything_runs() {
+    let folder = folder("unwritable");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    let output = hil_sim(
+        &folder,
+        &["run", "a.toml", "--json", "no-such-folder/o.json"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stdout.is_empty());
+    assert!(errors(&output).starts_with("no-such-folder/o.json: cannot be written"));
+}
+
+#[test]
+fn no_scene_and_unknown_engines_exit_2() {
+    let folder = folder("usage");
+    for arguments in [
+        &["run"][..],
+        &["run", "a.toml", "--engine", "steam"],
+        &["fly"],
+    ] {
+        assert_eq!(
+            hil_sim(&folder, arguments).status.code(),
+            Some(2),
+            "{arguments:?}"
+        );
+    }
+}
+
+#[test]
+fn a_reader_that_goes_away_changes_neither_files_nor_exit_status() {
+    let folder = folder("unread");
+    let scene = format!("{SOUND}[expect]\nmean_mm = 3.0\n");
+    fs::write(folder.join("a.toml"), scene).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args(["run", "a.toml", "--json", "o.json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", errors(&output));
+    assert_eq!(errors(&output), "");
+    let json: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    assert_eq!(json[0]["name"], "a");
+}
