@@ -24,7 +24,7 @@ use crate::{ACTUATORS, ZERO_VOLT};
 /// and follows the hand by the last trusted λ, whatever the link does. When that λ is older than
 /// [`max_age_ms`](DisplayConfiguration::max_age_ms), or there is another reason not to drive, the
 /// stimulus fades out; it fades in again when the reason is gone. What no link and no hand can make good
-/// stops it until the reset button or power: see [`crate::supervisor`] and `docs/safety.md`. Time is
+/// stops it until the reset button or power: see [`crate::supervisor`] and `docs/src/explanation/safety.md`. Time is
 /// counted in ticks alone: the same calls give the same words.
 #[derive(Clone, Debug)]
 pub struct Display {

@@ -8,7 +8,8 @@ use core::f32::consts::PI;
 use protocol::SensorConfiguration;
 
 use crate::SAMPLE_RATE_HZ;
-use crate::counting::{CountedGauge, MAX_WINDOW_MS};
+use crate::amplitude::MAX_WINDOW_MS;
+use crate::counting::CountedGauge;
 use crate::estimator::{Estimator, Finding, Touch};
 use crate::stroke::Stroke;
 use crate::travel::Travel;

@@ -1,6 +1,7 @@
 //! How strong the band-passed signal was over the window.
 
-use crate::counting::MAX_WINDOW_MS;
+/// The longest window that a configuration can ask for, in ms.
+pub const MAX_WINDOW_MS: usize = 200;
 
 /// The last samples of a band-passed gauge.
 #[derive(Clone, Debug)]

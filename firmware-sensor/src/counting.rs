@@ -9,15 +9,13 @@
 
 use protocol::{GAUGES, Range, SensorConfiguration};
 
-use crate::amplitude::Amplitude;
+use crate::amplitude::{Amplitude, MAX_WINDOW_MS};
 use crate::crossing::Crossing;
-use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, Touch};
-use crate::travel::Travel;
+use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
+use crate::travel::{MIN_SPEED_MM_S, Travel};
 
 /// The window A that the paper arrives at, in ms.
 pub const PAPERS_WINDOW_MS: usize = 80;
-/// The longest window that a configuration can ask for, in ms.
-pub const MAX_WINDOW_MS: usize = 200;
 
 /// The impulses of the last 256 ms.
 #[derive(Clone, Debug, Default)]

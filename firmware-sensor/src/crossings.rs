@@ -19,12 +19,11 @@ use core::f32::consts::PI;
 
 use protocol::{GAUGES, SensorConfiguration};
 
-use crate::estimator::{
-    Estimator, Finding, MIN_AMPLITUDE_LSB, MIN_SPEED_MM_S, PLACES_PER_MM, Place, Touch,
-};
+use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
 use crate::hum::Pickup;
 use crate::landmarks::{LONGEST, Landmarks, MARKS};
 use crate::travel::Travel;
+use crate::travel::{MIN_SPEED_MM_S, PLACES_PER_MM, Place};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
 /// Travel over which the mean is taken that the signal is to cross, in places: a few of the longest

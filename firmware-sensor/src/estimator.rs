@@ -5,19 +5,8 @@
 use protocol::GAUGES;
 
 use crate::hum::Pickup;
-use crate::travel::Travel;
+use crate::travel::{Place, Travel};
 
-/// A place along x in quarters of a µm, which wraps freely: only differences mean anything, and phases,
-/// which wrap too.
-pub type Place = i32;
-/// [`Place`] units in a µm.
-pub const PLACES_PER_UM: i32 = 4;
-/// [`Place`] units in a mm.
-pub const PLACES_PER_MM: i32 = 1_000 * PLACES_PER_UM;
-
-/// Below this speed, in mm/s, there is nothing to estimate: fingertip and surface stick (Okamoto et al.
-/// 2009, section III-C), and 5 µm counts make more than a tenth of it.
-pub const MIN_SPEED_MM_S: f32 = 2.0;
 /// Below this amplitude of a gauge behind the band-pass, in ADC steps, there is nothing to estimate from:
 /// a gauge that falls silent leaves a band-pass that rings on, and crosses zero, for seconds. It is ten
 /// times what the ADC's rounding alone amounts to in the band, √2 · √(1/12) · √(95 Hz / 2 000 Hz).

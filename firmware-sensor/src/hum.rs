@@ -21,7 +21,7 @@
 
 use protocol::GAUGES;
 
-use crate::estimator::MIN_SPEED_MM_S;
+use crate::travel::MIN_SPEED_MM_S;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 use common::{Amplitudes, power};
 use follower::{DIFFERENCE_SAMPLES, Follower, MAINS, Moment, RESTED_ESTIMATES};

@@ -12,7 +12,7 @@
 //! hysteresis do: then a crossing of the same direction of travel is the neighbour's, and the first one
 //! after a reversal has the same slope along the surface as the last, so it is the same mark.
 
-use crate::estimator::Place;
+use crate::travel::Place;
 
 /// Marks kept: four half waves.
 pub const MARKS: usize = 5;

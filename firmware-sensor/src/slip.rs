@@ -2,14 +2,14 @@
 //!
 //! The fingertip is a spring of stiffness k between the arm and its contact with the surface. The force
 //! channel measures the spring, so the contact lags behind the arm by F/k, and *that* position is what
-//! the texture is a function of. It repairs what stick and slip do to λ: see the README.
+//! the texture is a function of. It repairs what stick and slip do to λ: see `docs/src/explanation/estimation.md`.
 //!
 //! If k is not known it is found where the contact sticks: there ΔF/Δx is k, elsewhere it is less.
 
 use protocol::{Contact, SensorConfiguration};
 
-use crate::estimator::{PLACES_PER_UM, Place};
 use crate::travel::Travel;
+use crate::travel::{PLACES_PER_UM, Place};
 
 /// Volts of an ADC step.
 const VOLTS_PER_LSB: f32 = 3.3 / 4_096.0;

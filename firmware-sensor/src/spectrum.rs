@@ -22,10 +22,9 @@
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{
-    Estimator, Finding, MIN_AMPLITUDE_LSB, PLACES_PER_MM, PLACES_PER_UM, Touch,
-};
+use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
 use crate::travel::Travel;
+use crate::travel::{PLACES_PER_MM, PLACES_PER_UM};
 
 use evidence::{LineEvidence, WaveEvidence, best_of};
 use fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};

@@ -5,7 +5,7 @@
 //! is taken for as long as it has been, once it is longer than the last one.
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{PLACES_PER_UM, Place};
+use crate::travel::{PLACES_PER_UM, Place};
 
 /// What the paper assigns to fv, in Hz: taken for the first half stroke after a rest.
 const PAPERS_STROKES_HZ: f32 = 1.0;

@@ -1,7 +1,19 @@
 //! Where the arm is and was: the encoder's 16-bit counter without its wraps, and velocities from it.
 
-use crate::estimator::{PLACES_PER_UM, Place};
-use crate::{MICROMETRES_PER_COUNT, SAMPLE_RATE_HZ, counting, decimate};
+use crate::amplitude::MAX_WINDOW_MS;
+use crate::{MICROMETRES_PER_COUNT, SAMPLE_RATE_HZ, decimate};
+
+/// A place along x in quarters of a µm, which wraps freely: only differences mean anything, and phases,
+/// which wrap too.
+pub type Place = i32;
+/// [`Place`] units in a µm.
+pub const PLACES_PER_UM: i32 = 4;
+/// [`Place`] units in a mm.
+pub const PLACES_PER_MM: i32 = 1_000 * PLACES_PER_UM;
+
+/// Below this speed, in mm/s, there is nothing to estimate: fingertip and surface stick (Okamoto et al.
+/// 2009, section III-C), and 5 µm counts make more than a tenth of it.
+pub const MIN_SPEED_MM_S: f32 = 2.0;
 
 /// What the band-pass adds to [`decimate::DELAY_MS`], in ms: its group delay lies between 2.6 and 5.3 ms
 /// for all frequencies from 20 to 100 Hz.
@@ -16,7 +28,7 @@ const HALF_SPAN_MS: usize = ALIGNMENT_MS;
 
 /// Milliseconds of positions kept: a power of two, so that indices wrap freely.
 const HISTORY_MS: usize = 256;
-const _: () = assert!(ALIGNMENT_MS + counting::MAX_WINDOW_MS + HALF_SPAN_MS < HISTORY_MS);
+const _: () = assert!(ALIGNMENT_MS + MAX_WINDOW_MS + HALF_SPAN_MS < HISTORY_MS);
 
 /// The arm's positions of the last 256 ms.
 #[derive(Clone, Debug)]

@@ -16,6 +16,7 @@ mod cost;
 mod demo;
 mod display;
 mod faults;
+mod files;
 mod goals;
 mod golden;
 mod init;

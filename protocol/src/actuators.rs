@@ -7,8 +7,8 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use crate::configuration::{Refusal, Setting};
-use crate::frame::CRC_32;
+use crate::checksum::CRC_32;
+use crate::refusal::{Refusal, Setting};
 
 /// Actuators on the fingertip (Okamoto et al. 2009, section IV).
 pub const ACTUATORS: usize = 50;

@@ -4,7 +4,8 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::actuators::{self, DEFAULT_ACTUATORS};
-use crate::frame::{CRC_32, MAX_PAYLOAD};
+use crate::checksum::CRC_32;
+use crate::refusal::{Refusal, Setting};
 
 /// How λ is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -163,8 +164,8 @@ pub enum Configuration {
 impl Configuration {
     /// Names a configuration: the CRC-32 over its postcard bytes.
     pub fn hash(&self) -> u32 {
-        let mut bytes = [0; MAX_PAYLOAD];
-        // No payload is longer, so nothing is cut off.
+        let mut bytes = [0; size_of::<Self>() * 2];
+        // Postcard takes less than twice what memory does, so nothing is cut off.
         let bytes = postcard::to_slice(self, &mut bytes).unwrap_or_default();
         CRC_32.checksum(bytes)
     }
@@ -180,97 +181,6 @@ pub struct ConfigurationReport {
     pub hash: u32,
     /// The configuration in force.
     pub configuration: Configuration,
-}
-
-/// Why a configuration was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct Refusal {
-    /// The setting.
-    pub setting: Setting,
-    /// The actuator it is of; 0 for other settings.
-    pub index: u8,
-    /// The lowest value that would be taken.
-    pub low: i64,
-    /// The highest value that would be taken.
-    pub high: i64,
-}
-
-impl core::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let Self {
-            setting,
-            index,
-            low,
-            high,
-        } = self;
-        match setting {
-            Setting::Role => write!(f, "the configuration is for the other board"),
-            Setting::Actuators => write!(
-                f,
-                "Actuators names neither the description in force nor the one that was sent, {low:#010x}"
-            ),
-            Setting::ActuatorsFirst => {
-                write!(
-                    f,
-                    "no block of actuators begins at {index}: give a multiple of ten up to {high}"
-                )
-            }
-            Setting::ActuatorX | Setting::ActuatorY | Setting::ActuatorGain => {
-                write!(
-                    f,
-                    "{setting:?} of actuator {index} is out of range: give {low} to {high}"
-                )
-            }
-            _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
-        }
-    }
-}
-
-/// A setting that was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Setting {
-    /// The configuration is for the other board.
-    Role,
-    /// [`SensorConfiguration::window_ms`]
-    WindowMs,
-    /// [`SensorConfiguration::counted_gauge`]
-    CountedGauge,
-    /// [`SensorConfiguration::gauges`]
-    Gauges,
-    /// [`SensorConfiguration::waves`]
-    Waves,
-    /// [`SensorConfiguration::valid_percent`]
-    ValidPercent,
-    /// [`SensorConfiguration::force_mn_per_v`]
-    ForceScale,
-    /// [`SensorConfiguration::stiffness_n_per_m`]
-    Stiffness,
-    /// [`SensorConfiguration::arm_full_scale_um_s`]
-    ArmFullScale,
-    /// [`DisplayConfiguration::max_age_ms`]
-    MaxAgeMs,
-    /// [`DisplayConfiguration::fade_in_ms`]
-    FadeInMs,
-    /// [`DisplayConfiguration::fade_out_ms`]
-    FadeOutMs,
-    /// [`DisplayConfiguration::glide_ms`]
-    GlideMs,
-    /// [`DisplayConfiguration::amplitude_mv`]
-    AmplitudeMv,
-    /// [`DisplayConfiguration::reference_lsb`]
-    ReferenceLsb,
-    /// [`DisplayConfiguration::full_drive_s`]
-    FullDriveS,
-    /// [`DisplayConfiguration::actuators`]: neither the description in force nor the one sent.
-    Actuators,
-    /// [`crate::Actuators::first`]
-    ActuatorsFirst,
-    /// [`crate::Actuator::x_um`]
-    ActuatorX,
-    /// [`crate::Actuator::y_um`]
-    ActuatorY,
-    /// [`crate::Actuator::gain_q15`]
-    ActuatorGain,
 }
 
 impl SensorConfiguration {

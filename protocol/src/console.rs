@@ -13,6 +13,7 @@
 use crate::Hello;
 use crate::frame::MAX_FRAME;
 use crate::port::Port;
+use crate::receiver::{LINE_END, is_typed};
 
 /// How long nobody may be heard until the port speaks text again, in µs: five pings of a program.
 pub const SILENCE_US: u64 = 5_000_000;
@@ -20,8 +21,6 @@ pub const SILENCE_US: u64 = 5_000_000;
 const QUIET_US: u64 = 50_000;
 /// Most characters of a line.
 pub const LINE_BYTES: usize = 208;
-/// Ends a line on a terminal.
-pub(crate) const LINE_END: &[u8] = b"\r\n";
 /// Ends a line for a decoder.
 const FRAME_END: &[u8] = &[0];
 
@@ -103,11 +102,4 @@ fn key(typed: &[u8]) -> Option<Key> {
             .iter()
             .all(|byte| matches!(byte, b'!' | b'\r' | b'\n'));
     Some(if is_stop { Key::Stop } else { Key::Other })
-}
-
-/// Whether a person can have typed these.
-pub(crate) fn is_typed(bytes: &[u8]) -> bool {
-    bytes
-        .iter()
-        .all(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\n'))
 }

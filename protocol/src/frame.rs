@@ -13,10 +13,10 @@
 //! then the 35 bytes of [`Hello::to_bytes`](crate::Hello::to_bytes). By these, any two versions can
 //! count each other's frames and say that they differ.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use postcard_schema::Schema;
 use postcard_schema::schema::{DataModelType, DataModelVariant, NamedType};
 
+use crate::checksum::CRC_32;
 use crate::message::Message;
 
 /// Bytes of the sequence number in front of the payload.
@@ -29,8 +29,6 @@ pub const MAX_PAYLOAD: usize = max_encoded(Message::SCHEMA);
 
 /// Longest frame of this version, in bytes, its closing 0x00 included.
 pub const MAX_FRAME: usize = cobs::max_encoding_length(SEQUENCE + MAX_PAYLOAD + CRC) + 1;
-
-pub(crate) const CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a frame could not be taken apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,6 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use crate::message::{PROTOCOL_VERSION, SCHEMA_HASH};
-
 /// First bytes of every [`Hello`], on the wire and in an ELF's `.ridgelink` section.
 pub const MAGIC: [u8; 4] = *b"RDGL";
 /// Length of a [`Hello`] in bytes, postcard-encoded: every field is made of single bytes.
@@ -56,9 +54,9 @@ impl Role {
 pub struct Hello {
     /// [`MAGIC`].
     pub magic: [u8; 4],
-    /// [`PROTOCOL_VERSION`], little-endian.
+    /// [`crate::PROTOCOL_VERSION`], little-endian.
     pub protocol: [u8; 2],
-    /// [`SCHEMA_HASH`], little-endian.
+    /// [`crate::SCHEMA_HASH`], little-endian.
     pub schema: [u8; 8],
     /// [`Role::byte`].
     pub role: u8,
@@ -71,26 +69,6 @@ pub struct Hello {
 }
 
 impl Hello {
-    /// A Hello of this build. `chip` is cut to 16 bytes.
-    pub const fn new(role: Role, chip: &str, version: [u8; 3]) -> Self {
-        let mut name = [0; 16];
-        let bytes = chip.as_bytes();
-        let mut at = 0;
-        while at < bytes.len() && at < name.len() {
-            name[at] = bytes[at];
-            at += 1;
-        }
-        Self {
-            magic: MAGIC,
-            protocol: PROTOCOL_VERSION.to_le_bytes(),
-            schema: SCHEMA_HASH.to_le_bytes(),
-            role: role.byte(),
-            chip: name,
-            version,
-            asks: 0,
-        }
-    }
-
     /// The same Hello, asking for an answer or not.
     pub const fn asking(mut self, asks: bool) -> Self {
         self.asks = asks as u8;
@@ -151,10 +129,5 @@ impl Hello {
             .position(|&b| b == 0)
             .unwrap_or(self.chip.len());
         core::str::from_utf8(&self.chip[..end]).unwrap_or("?")
-    }
-
-    /// Whether this build can read what the speaker says next.
-    pub const fn is_compatible(&self) -> bool {
-        self.protocol_version() == PROTOCOL_VERSION && self.schema_hash() == SCHEMA_HASH
     }
 }

@@ -5,6 +5,7 @@
 #![no_std]
 
 pub mod actuators;
+mod checksum;
 pub mod clock;
 pub mod configuration;
 pub mod console;
@@ -15,6 +16,7 @@ pub mod line;
 pub mod message;
 pub mod port;
 pub mod receiver;
+mod refusal;
 pub mod safety;
 pub mod sender;
 mod sequence;
@@ -25,8 +27,8 @@ pub use actuators::{
 };
 pub use clock::ClockOffset;
 pub use configuration::{
-    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, Refusal,
-    SensorConfiguration, Setting, UpdateRate,
+    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, SensorConfiguration,
+    UpdateRate,
 };
 pub use console::{Console, Key, Line};
 pub use frame::MAX_FRAME;
@@ -38,6 +40,7 @@ pub use message::{
 };
 pub use port::Port;
 pub use receiver::{Event, Peer, Receiver};
+pub use refusal::{Refusal, Setting};
 pub use safety::{DisplayState, Hold, Safety, Trip};
 pub use sender::Sender;
 pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};

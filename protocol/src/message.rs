@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::actuators::Actuators;
 use crate::configuration::{Configuration, ConfigurationReport};
-use crate::hello::Hello;
+use crate::hello::{Hello, MAGIC, Role};
 use crate::safety::Safety;
 use crate::status::Status;
 
@@ -232,4 +232,31 @@ pub enum StopReason {
 pub struct Stop {
     /// Why.
     pub reason: StopReason,
+}
+
+impl Hello {
+    /// A Hello of this build. `chip` is cut to 16 bytes.
+    pub const fn new(role: Role, chip: &str, version: [u8; 3]) -> Self {
+        let mut name = [0; 16];
+        let bytes = chip.as_bytes();
+        let mut at = 0;
+        while at < bytes.len() && at < name.len() {
+            name[at] = bytes[at];
+            at += 1;
+        }
+        Self {
+            magic: MAGIC,
+            protocol: PROTOCOL_VERSION.to_le_bytes(),
+            schema: SCHEMA_HASH.to_le_bytes(),
+            role: role.byte(),
+            chip: name,
+            version,
+            asks: 0,
+        }
+    }
+
+    /// Whether this build can read what the speaker says next.
+    pub const fn is_compatible(&self) -> bool {
+        self.protocol_version() == PROTOCOL_VERSION && self.schema_hash() == SCHEMA_HASH
+    }
 }

@@ -5,10 +5,9 @@
 
 use heapless::Deque;
 
-use crate::console::is_typed;
 use crate::frame::MAX_FRAME;
 use crate::message::{Message, Ping, Pong};
-use crate::receiver::{Event, Peer, Receiver};
+use crate::receiver::{Event, Peer, Receiver, is_typed};
 use crate::sender::Sender;
 use crate::{Hello, PortCounters};
 

@@ -1,11 +1,20 @@
 //! Bytes in, messages out: nothing on the line can put it out of step, and everything is counted.
 
-use crate::console::LINE_END;
 use crate::frame::{self, MAX_FRAME};
 use crate::hello::Hello;
 use crate::message::Message;
 use crate::sequence::{Arrival, Sequences};
 use crate::status::PortCounters;
+
+/// Ends a line on a terminal.
+pub(crate) const LINE_END: &[u8] = b"\r\n";
+
+/// Whether a person can have typed these.
+pub(crate) fn is_typed(bytes: &[u8]) -> bool {
+    bytes
+        .iter()
+        .all(|byte| matches!(byte, b' '..=b'~' | b'\r' | b'\n'))
+}
 
 /// What a receiver has to tell its owner.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,6 @@
 use std::convert::Infallible;
 use std::path::Path;
 
-use hil_sim_boards;
 use hil_sim_boards::BoardFacts;
 use hil_sim_core::judge::Verdict;
 use hil_sim_core::judge::outcome::Outcome;
@@ -33,7 +32,7 @@ impl Run {
     /// If the ELFs can't be used, or a board stops before the scene's end.
     pub fn of(scene: Scene) -> Self {
         let (recording, facts) =
-            boards::run(&scene, elves::both()).unwrap_or_else(|error| panic!("{error}"));
+            hil_sim_boards::run(&scene, elves::both()).unwrap_or_else(|error| panic!("{error}"));
         let Outcome {
             scene,
             recording,

@@ -118,7 +118,7 @@ fn boards_that_are_well_are_told_so(bench: &Bench) {
 
 fn an_emergency_stop_is_named(bench: &Bench) {
     bench
-        .command(serve::Command::Stop)
+        .command(bench::Command::Stop)
         .expect("the bench stands");
     let document = document(&look(bench, 1.2));
     let (findings, _) = findings(&document);
@@ -152,7 +152,7 @@ fn a_board_that_restarts_is_noticed(bench: &Bench) {
     let doctor = start(bench);
     pass(bench, 0.7);
     bench
-        .command(serve::Command::Reset(Role::Sensor))
+        .command(bench::Command::Reset(Role::Sensor))
         .expect("the bench stands");
     pass(bench, 1.5);
     let document = document(&end(doctor));

@@ -5,6 +5,7 @@ mod any_events;
 mod estimates;
 mod link;
 mod rig;
+mod stimulus;
 mod strokes;
 mod supervisor;
 mod zero_volt;

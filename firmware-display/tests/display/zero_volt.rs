@@ -1,5 +1,5 @@
 //! How long it takes from each fault to 0 V on all channels: the numbers of the table of hazards in
-//! docs/safety.md.
+//! docs/src/explanation/safety.md.
 
 use firmware_display::{ConverterFault, Display, Output, Readback, Transfer};
 use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, StopReason, Trip, UpdateRate};

@@ -13,8 +13,8 @@ use core::ops::Range;
 use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
-use crate::estimator::{PLACES_PER_MM, Place};
 use crate::phasor::phasor;
+use crate::travel::{PLACES_PER_MM, Place};
 
 /// The lengths that a pass is solved at, in waves.
 pub(super) const LENGTHS: [f32; LENGTH_COUNT] = [1.5, 2.0, 3.0, 5.0, 8.0];

@@ -3,8 +3,9 @@
 use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
-use crate::estimator::{PLACES_PER_UM, Touch};
+use crate::estimator::Touch;
 use crate::phasor::phasor;
+use crate::travel::PLACES_PER_UM;
 
 /// Gain in power of the first and of the second difference for white noise behind the anti-aliasing filter.
 const FIRST_DIFFERENCE_NOISE_GAIN: f32 = 1.83;

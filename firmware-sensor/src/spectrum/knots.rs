@@ -6,7 +6,7 @@
 
 use protocol::GAUGES;
 
-use crate::estimator::{PLACES_PER_MM, Place};
+use crate::travel::{PLACES_PER_MM, Place};
 
 /// Travel of a knot at each spacing, in mm.
 pub(super) const SPACINGS_MM: [f32; SPACINGS] = [0.1, 0.25, 0.5];

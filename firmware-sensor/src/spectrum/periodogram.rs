@@ -7,8 +7,9 @@
 use protocol::GAUGES;
 
 use super::knots::{Completed, Knot, SPACINGS, spacing_for};
-use crate::estimator::{MIN_AMPLITUDE_LSB, PLACES_PER_MM};
+use crate::estimator::MIN_AMPLITUDE_LSB;
 use crate::phasor::phasor;
+use crate::travel::PLACES_PER_MM;
 
 /// Candidates: six an octave, so that a ratio of 2 lies on the grid, and one beyond either end.
 pub(super) const CANDIDATES: usize = 26;

@@ -1,6 +1,6 @@
 //! A follower with play, so that an encoder that dithers between counts is no travel.
 
-use crate::estimator::Place;
+use crate::travel::Place;
 
 /// A follower with play: moves only once the place has moved more than the play's half width.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use super::fit::{LENGTH_COUNT, LENGTHS, Pass};
 use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
 use super::periodogram::{Periodogram, highest_peak, sharpness, vertex_mm, wavelength_mm};
 use super::trend::Trend;
-use crate::estimator::PLACES_PER_MM;
+use crate::travel::PLACES_PER_MM;
 
 const ALL: u8 = 0b1_1111;
 const NO_BASE: [f32; GAUGES] = [0.0; GAUGES];

@@ -5,7 +5,7 @@
 //! about, tells what λ is here. Places, not travel: after a turn the fits come by the same places again.
 
 use super::periodogram::{AVERAGE_WAVES, KERNEL_WAVES};
-use crate::estimator::{PLACES_PER_MM, Place};
+use crate::travel::{PLACES_PER_MM, Place};
 
 /// Travel for which a fit is remembered, in wavelengths.
 const MEMORY_WAVES: f32 = 5.0;

@@ -17,8 +17,7 @@ mod phase_error;
 pub mod reaction;
 pub mod spectrum;
 mod stimulus;
-#[cfg(test)]
-pub(crate) mod synthetic;
+pub mod synthetic;
 pub mod track;
 pub mod truth;
 mod voltage;

@@ -129,7 +129,7 @@ pub enum Profile {
     Sine,
     /// A grating with ridges as wide as its grooves and ramps of 0.1 λ.
     Trapezoid,
-    /// Measured heights over x, in any unit, from CSV, WAV or MCAP: see `docs/recordings.md`. The specimens are
+    /// Measured heights over x, in any unit, from CSV, WAV or MCAP: see `docs/src/how-to/recordings.md`. The specimens are
     /// then only the truth to judge against.
     Recorded(Arc<Series>),
 }
@@ -280,7 +280,7 @@ pub enum Gauges {
     /// Computed: each gauge feels the texture under its own place. See [`crate::plant::gauges`].
     Kinematic(Kinematic),
     /// Voltages at the pins, five columns or six with the tangential force, from CSV, WAV or MCAP: see
-    /// `docs/recordings.md`.
+    /// `docs/src/how-to/recordings.md`.
     Recorded(Arc<Waveform>),
 }
 

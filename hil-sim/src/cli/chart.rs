@@ -16,6 +16,7 @@ use hil_sim_studies::estimators::picture;
 use hil_sim_studies::estimators::result::{ContestResult, Entry};
 use hil_sim_studies::estimators::score::Score;
 
+use super::files::{create_folder, write};
 use super::say::say;
 use super::{confidence, display, models, number, progress};
 
@@ -179,19 +180,4 @@ impl Bound {
         )?;
         Ok(ExitCode::from(u8::from(!efficiency::meets_goals(&rows))))
     }
-}
-
-pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| {
-        format!(
-            "{}: can't be made: give another with --out",
-            folder.display()
-        )
-    })
-}
-
-pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
-    say!("{}", path.display());
-    Ok(())
 }

@@ -7,7 +7,7 @@ use hil_sim_studies::estimators::confidence::{BINS, GOAL, Reliability, picture, 
 use hil_sim_studies::jury::seeds::REPORTING;
 use protocol::SensorConfiguration;
 
-use super::chart::{create_folder, write};
+use super::files::{create_folder, write};
 use super::say::say;
 use super::{number, progress};
 

@@ -9,7 +9,7 @@ use hil_sim_studies::display::purity::Extent;
 use hil_sim_studies::display::{delay, stop, timing, word_of_mode};
 use protocol::Role;
 
-use super::chart::{create_folder, write};
+use super::files::{create_folder, write};
 use super::say::say;
 use super::{number, runs};
 

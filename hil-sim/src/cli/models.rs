@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use hil_sim_core::scene::Rung;
 use hil_sim_studies::contact::{models, stability};
 
-use super::chart::{create_folder, write};
+use super::files::{create_folder, write};
 use super::runs;
 use super::say::say;
 

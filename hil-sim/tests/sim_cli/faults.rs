@@ -90,7 +90,11 @@ fn the_json_lists_every_fault_in_the_order_of_the_scene() {
     let recording = native::run(&scene).unwrap();
     let outcome = Outcome::new(scene, recording);
     let judgement = outcome.judgement(true);
-    let json = serde_json::to_value(judgement.result(&outcome.scene)).unwrap();
+    let json = serde_json::to_value(hil_sim_studies::output::json::SceneResult::of(
+        &judgement,
+        &outcome.scene,
+    ))
+    .unwrap();
     let faults = json["faults"].as_array().unwrap();
     assert_eq!(faults.len(), 2);
     assert_eq!(faults[0]["kind"], "hand-encoder-jump");

@@ -1,6 +1,5 @@
 //! What a scene says of the boards reaches their own configurations, as a whole or not at all.
 
-use hil_sim_boards;
 use hil_sim_boards::ElfError;
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, Mode, SensorConfiguration,
@@ -86,7 +85,7 @@ fn no_gauge_takes_part_that_the_scene_leaves_out() {
 fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
     let mut scene = scene("duration_s = 0.2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
     scene.estimator.waves = 9;
-    let error = boards::run(&scene, elves::both()).unwrap_err();
+    let error = hil_sim_boards::run(&scene, elves::both()).unwrap_err();
     assert!(
         matches!(
             error,
@@ -108,7 +107,7 @@ fn a_scene_too_short_for_the_board_to_answer_is_no_result() {
          [estimator]\nmethod = \"counting\"\n",
     );
     scene.duration_s = 0.001;
-    let error = boards::run(&scene, elves::both()).unwrap_err();
+    let error = hil_sim_boards::run(&scene, elves::both()).unwrap_err();
     assert!(error.to_string().contains("longer duration_s"), "{error}");
 }
 
@@ -118,7 +117,7 @@ fn display_asked(change: impl FnOnce(&mut hil_sim_core::scene::Display)) -> Resu
     change(&mut scene.display);
     scene.display.configuration.actuators = actuators::hash(&scene.display.actuators);
     let wanted = Configuration::Display(scene.display.configuration);
-    let answer = boards::run(&scene, elves::both()).map(|(_, facts)| {
+    let answer = hil_sim_boards::run(&scene, elves::both()).map(|(_, facts)| {
         let report = facts.display_told.expect("it is not the default").report;
         let taken = ConfigurationReport {
             refused: None,

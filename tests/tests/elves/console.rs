@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, LazyLock, Mutex};
 
-use hil_sim_boards;
 use hil_sim_boards::{Terminal, Terminals};
 use hil_sim_core::run::recording::Recording;
 use protocol::{
@@ -158,8 +157,8 @@ fn watch(toml: &str, at_sensor: &[(u64, Act)], at_display: &[(u64, Act)]) -> Wat
         sensor: Some(sensor),
         display: Some(display),
     };
-    let (recording, _) =
-        boards::run_at(&scene, elves::both(), terminals).unwrap_or_else(|error| panic!("{error}"));
+    let (recording, _) = hil_sim_boards::run_at(&scene, elves::both(), terminals)
+        .unwrap_or_else(|error| panic!("{error}"));
     let seen = |seen: Arc<Mutex<Seen>>| seen.lock().unwrap().clone();
     Watched {
         recording,

@@ -2,7 +2,6 @@
 
 use std::thread;
 
-use hil_sim_boards;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_studies::campaign::{Plan, Tally, Trial, unmet};
@@ -81,7 +80,7 @@ fn power_goes_at_the_very_instant_and_the_board_comes_back() {
         faults: vec![brown_out],
         ..Scene::constant(2.0, 50.0)
     };
-    let (recording, facts) = boards::run(&scene, elves::both()).unwrap();
+    let (recording, facts) = hil_sim_boards::run(&scene, elves::both()).unwrap();
     let signs = &recording.signs;
     assert_eq!(facts.resets, 1);
     assert_eq!(signs.resets[0].role, Role::Display);

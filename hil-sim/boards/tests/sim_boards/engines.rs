@@ -6,7 +6,6 @@ use std::env;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use hil_sim_boards;
 use hil_sim_boards::{Firmware, Firmwares};
 use hil_sim_core::judge::Verdict;
 use hil_sim_core::judge::outcome::Outcome;
@@ -149,7 +148,7 @@ fn both_engines_make_the_same_of_every_recording() {
     for (name, scene) in scenes {
         let made = |recording| Made::of(&Outcome::new(scene.clone(), recording).verdict);
         let native = made(native::run(&scene).unwrap());
-        let elf = made(boards::run(&scene, &firmwares).unwrap().0);
+        let elf = made(hil_sim_boards::run(&scene, &firmwares).unwrap().0);
         let line = format!(
             "{name:40} {:.3} {:.3}  {:.3} {:.3}",
             native.valid_share,

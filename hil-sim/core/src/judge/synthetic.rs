@@ -1,4 +1,5 @@
-//! Recordings of a made-up run whose answers are known: a pair of boards without fault, a sine surface.
+//! Recordings of a made-up run whose answers are known, for the tests of whatever reads recordings: a pair of
+//! boards without fault, a sine surface.
 
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
@@ -8,10 +9,13 @@ use crate::run::recording::{
 };
 use crate::run::signs::Signs;
 
+/// From one output tick to the next, in s.
 pub const TICK_S: f64 = 500e-6;
 /// The default time in which 1/λ̂ glides, in s.
 const GLIDE_S: f64 = 0.02;
+/// From one scan to the next, in s.
 pub const SCAN_S: f64 = 250e-6;
+/// From one estimate to the next, in s.
 pub const ESTIMATE_S: f64 = 10e-3;
 /// One gauge is left out.
 const HEALTH: [GaugeHealth; GAUGES] = [
@@ -25,6 +29,7 @@ const FADE_IN_S: f64 = 20e-3;
 
 /// A run to be made up. Every closure takes s since the start, [`Run::surface_mm`] takes mm.
 pub struct Run {
+    /// How long, in s.
     pub duration_s: f64,
     /// Where hand and arm both are, in mm.
     pub position_mm: Box<dyn Fn(f64) -> f64>,
@@ -223,6 +228,7 @@ fn instants(step_s: f64, end_s: f64) -> impl Iterator<Item = f64> {
     (0..(end_s / step_s).round() as u32).map(move |i| f64::from(i) * step_s)
 }
 
+/// An instant in s as ns.
 pub fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round() as u64
 }

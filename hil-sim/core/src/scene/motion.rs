@@ -20,7 +20,7 @@ pub enum Motion {
         /// In Hz, above 0, to 20.
         frequency_hz: f64,
     },
-    /// Measured positions, straight lines between them, from CSV, WAV or MCAP: see `docs/recordings.md`.
+    /// Measured positions, straight lines between them, from CSV, WAV or MCAP: see `docs/src/how-to/recordings.md`.
     Recorded(Arc<Series>),
     /// Moved while the scene runs. No file has it.
     Live(Arc<dyn LiveHand>),

@@ -1,7 +1,5 @@
 //! A fingertip that feels whatever it is told to, on a sensor that goes on from one rub to the next.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use std::f64::consts::TAU;
 
 use firmware_sensor::{

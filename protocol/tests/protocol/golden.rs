@@ -3,9 +3,9 @@
 //! Boards in the field speak these bytes. Whoever changes one of them, or [`protocol::SCHEMA_HASH`],
 //! raises [`protocol::PROTOCOL_VERSION`].
 
-mod messages;
-
-use messages::{CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples};
+use crate::messages::{
+    CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples,
+};
 use protocol::{
     Event, HELLO_LENGTH, Hello, Hold, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver, Trip,
 };

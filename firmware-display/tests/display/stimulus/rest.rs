@@ -2,7 +2,7 @@
 
 use protocol::Mode;
 
-use crate::rig::{MODES, RATES, Rig};
+use crate::stimulus::rig::{MODES, RATES, Rig};
 
 /// What the last count may be followed by before all is at 0 V, in ms.
 const GONE_MS: f64 = 19.0;
@@ -55,7 +55,7 @@ fn a_hand_at_rest_sends_nothing_and_a_new_wavelength_is_not_felt() {
         rig.rub(38, 0);
         for tick in 0..1_000 {
             rig.follow(1.0 + f64::from(tick) * 0.01);
-            assert!(!rig.stimulus.tick(0, crate::rig::FULL));
+            assert!(!rig.stimulus.tick(0, crate::stimulus::rig::FULL));
         }
         assert!(rig.is_silent());
     }
@@ -84,7 +84,7 @@ fn the_whole_is_there_again_six_milliseconds_after_setting_out_with_the_phase_of
                     continue;
                 }
                 for (volt, twin) in volts.iter().zip(twins) {
-                    let balances = 2.0 * 5.0 * 400.0 * crate::rig::corner_hz() / rig.hz();
+                    let balances = 2.0 * 5.0 * 400.0 * crate::stimulus::rig::corner_hz() / rig.hz();
                     assert!((volt - twin).abs() <= balances, "{tick}: {volt} {twin}");
                 }
             }
@@ -104,10 +104,10 @@ fn silence_is_0_v_at_once_and_what_follows_begins_softly() {
         rig.gain = 0;
         rig.rub(100, 7);
         assert!(rig.is_silent());
-        rig.gain = crate::rig::FULL;
+        rig.gain = crate::stimulus::rig::FULL;
         let volts = rig.rub(1, 7);
         // The smoothstep's first of 12.
         let part: f64 = (1.0_f64 / 12.0).powi(2) * 3.0;
-        assert!(crate::rig::largest(&volts[0]) <= 5.0 * part);
+        assert!(crate::stimulus::rig::largest(&volts[0]) <= 5.0 * part);
     }
 }

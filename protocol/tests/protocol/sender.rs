@@ -1,8 +1,6 @@
 //! The handshake, as the sender keeps it.
 
-mod messages;
-
-use messages::{events, hello};
+use crate::messages::{events, hello};
 use protocol::{Event, Hello, MAX_FRAME, Message, Ping, Receiver, Sender, frame};
 
 const PING: Message = Message::Ping(Ping { sent_us: 1 });
@@ -179,10 +177,10 @@ fn an_end_that_was_flashed_with_another_version_is_told_and_recognised() {
     converse(&mut a, &mut b, 0, 1_000);
     let heard = a.heard.len();
     // The other version's handshake is this one's: that is what never changes.
-    let foreign = messages::foreign_hello();
+    let foreign = crate::messages::foreign_hello();
     let mut told = 0;
     for (sequence, now_ms) in (1_000..3_500).step_by(1_000).enumerate() {
-        a.hear(&messages::numbered(
+        a.hear(&crate::messages::numbered(
             sequence as u16,
             &Message::Hello(foreign),
         ));

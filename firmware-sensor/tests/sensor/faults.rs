@@ -1,9 +1,7 @@
 //! What becomes of the estimates of the whole [`firmware_sensor::Sensor`] as gauges fail and recover,
 //! mains hum comes in, and settings change on the way.
 
-mod felt;
-
-use felt::{Bench, CODES, texture, valid_and_worst};
+use crate::felt::{Bench, CODES, texture, valid_and_worst};
 use protocol::{GAUGES, GaugeHealth, Method, SensorConfiguration};
 use std::f64::consts::TAU;
 

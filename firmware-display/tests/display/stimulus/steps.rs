@@ -7,7 +7,7 @@ use firmware_display::stimulus::MOST_V_PER_MS;
 use protocol::actuators::{DEFAULT_ACTUATORS, grid};
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::rig::{FULL, MODES, OFF_V, RATES, Rig, Volts, trimmed};
+use crate::stimulus::rig::{FULL, MODES, OFF_V, RATES, Rig, Volts, trimmed};
 
 /// The most that a channel changes by in a tick at full amplitude.
 struct Natural {
@@ -292,7 +292,7 @@ fn a_surface_of_another_amplitude_makes_none_beyond_the_levels() {
             let mut volts = Vec::new();
             for amplitude_lsb in [100.0, 5.0, 60.0, 0.0, 1e6] {
                 rig.stimulus
-                    .follow(crate::rig::wavelength(2.0), amplitude_lsb);
+                    .follow(crate::stimulus::rig::wavelength(2.0), amplitude_lsb);
                 volts.extend(rig.rub(211, 9));
             }
             let natural = Natural {

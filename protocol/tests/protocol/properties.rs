@@ -1,8 +1,6 @@
 //! What holds for every message, every corruption and every cut.
 
-mod messages;
-
-use messages::{
+use crate::messages::{
     content, events, frame_of, greeted_receiver, hello, message, numbered, open_sender,
 };
 use proptest::prelude::*;

@@ -3,10 +3,8 @@
 //!
 //! `cargo test -p firmware-sensor --test methods -- --ignored --nocapture` prints a table of them all.
 
-mod rubbing;
-
+use crate::rubbing::{CODES_PER_UNIT, GAINS, Judgement, Motion, Rub, with};
 use protocol::Method;
-use rubbing::{CODES_PER_UNIT, GAINS, Judgement, Motion, Rub, with};
 
 const WAVELENGTHS_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// The paper's Fig. 7.

@@ -1,8 +1,8 @@
 //! The console's two ways to speak, and how it goes from one to the other.
 
-mod messages;
-
-use messages::{content, events, foreign_hello, greeted_receiver, message, numbered, samples};
+use crate::messages::{
+    content, events, foreign_hello, greeted_receiver, message, numbered, samples,
+};
 use proptest::prelude::*;
 use protocol::console::SILENCE_US;
 use protocol::{
@@ -230,7 +230,7 @@ fn not_even_one_typed_right_before_it() {
             let mut console = console();
             let bytes = [
                 typed.as_bytes(),
-                &numbered(sequence, &Message::Hello(messages::hello())),
+                &numbered(sequence, &Message::Hello(crate::messages::hello())),
             ]
             .concat();
             console.port().receive(1_000, &bytes, |_| {});
@@ -332,9 +332,9 @@ proptest! {
         let mut received = 0;
         for (sequence, (message, line)) in (0..).zip(&pieces) {
             // After text a frame wants a Hello before it.
-            bytes.extend(numbered(2 * sequence, &Message::Hello(messages::hello())));
+            bytes.extend(numbered(2 * sequence, &Message::Hello(crate::messages::hello())));
             bytes.extend(numbered(2 * sequence + 1, message));
-            out.push(Event::Greeted(messages::hello()));
+            out.push(Event::Greeted(crate::messages::hello()));
             out.push(match message {
                 Message::Hello(hello) => Event::Greeted(*hello),
                 message => Event::Message(message.clone()),
@@ -366,7 +366,7 @@ proptest! {
         let before = events(&mut receiver, &bytes);
         prop_assert!(before.is_empty() || before == [Event::Text]);
         let frames = [
-            numbered(0, &Message::Hello(messages::hello())),
+            numbered(0, &Message::Hello(crate::messages::hello())),
             numbered(1, &next),
         ].concat();
         let received = events(&mut receiver, &frames);

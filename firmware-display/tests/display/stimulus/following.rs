@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use firmware_display::balance::TIME_CONSTANT_S;
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::rig::{MODES, OFF_V, RATES, Rig, corner_hz, largest, trimmed};
+use crate::stimulus::rig::{MODES, OFF_V, RATES, Rig, corner_hz, largest, trimmed};
 
 #[test]
 fn each_actuator_follows_the_sine_of_travel_and_place_over_wavelength() {

@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_2_PI, TAU};
 use firmware_display::balance::TIME_CONSTANT_S;
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::rig::{MODES, RATES, Rig, Volts, trimmed};
+use crate::stimulus::rig::{MODES, RATES, Rig, Volts, trimmed};
 
 /// −80 dBc.
 const SPUR: f64 = 1e-4 * FRAC_2_PI;

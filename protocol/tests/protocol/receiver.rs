@@ -1,8 +1,6 @@
 //! What the receiver makes of good, bad and missing frames, and how it counts them.
 
-mod messages;
-
-use messages::{
+use crate::messages::{
     events, foreign_hello, greeted_receiver, hello, longest_like, numbered, raw_frame, samples,
 };
 use protocol::{Event, MAX_FRAME, Message, Peer, Ping, PortCounters, Receiver};

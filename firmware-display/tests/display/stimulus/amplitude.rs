@@ -6,7 +6,7 @@ use firmware_display::stimulus::MOST_V_PER_MS;
 use protocol::actuators::DEFAULT_ACTUATORS;
 use protocol::{DisplayConfiguration, Mode};
 
-use crate::rig::{MODES, OFF_V, RATES, Rig, corner_hz, largest};
+use crate::stimulus::rig::{MODES, OFF_V, RATES, Rig, corner_hz, largest};
 
 fn peak(rig: &mut Rig, counts: i16, wavelength_mm: f64) -> f64 {
     rig.follow(wavelength_mm);
@@ -47,7 +47,7 @@ fn a_weaker_surface_is_played_weaker_if_asked_to() {
     ] {
         let mut rig = Rig::with(configuration, DEFAULT_ACTUATORS);
         rig.stimulus
-            .follow(crate::rig::wavelength(2.0), amplitude_lsb);
+            .follow(crate::stimulus::rig::wavelength(2.0), amplitude_lsb);
         rig.rub(4_000, 7);
         let volts = rig.rub(400, 7);
         let peak = volts.iter().map(largest).fold(0.0, f64::max);

@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use firmware_display::balance::{MARGIN, MOST_S};
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use crate::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, largest, means, trimmed};
+use crate::stimulus::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, largest, means, trimmed};
 
 /// The most that may stand.
 const MOST_V: f64 = 0.005;

@@ -1,0 +1,95 @@
+//! What a board refuses of a configuration, and why.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Why a configuration was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Refusal {
+    /// The setting.
+    pub setting: Setting,
+    /// The actuator it is of; 0 for other settings.
+    pub index: u8,
+    /// The lowest value that would be taken.
+    pub low: i64,
+    /// The highest value that would be taken.
+    pub high: i64,
+}
+
+impl core::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self {
+            setting,
+            index,
+            low,
+            high,
+        } = self;
+        match setting {
+            Setting::Role => write!(f, "the configuration is for the other board"),
+            Setting::Actuators => write!(
+                f,
+                "Actuators names neither the description in force nor the one that was sent, {low:#010x}"
+            ),
+            Setting::ActuatorsFirst => {
+                write!(
+                    f,
+                    "no block of actuators begins at {index}: give a multiple of ten up to {high}"
+                )
+            }
+            Setting::ActuatorX | Setting::ActuatorY | Setting::ActuatorGain => {
+                write!(
+                    f,
+                    "{setting:?} of actuator {index} is out of range: give {low} to {high}"
+                )
+            }
+            _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
+        }
+    }
+}
+
+/// A setting that was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Setting {
+    /// The configuration is for the other board.
+    Role,
+    /// [`crate::SensorConfiguration::window_ms`]
+    WindowMs,
+    /// [`crate::SensorConfiguration::counted_gauge`]
+    CountedGauge,
+    /// [`crate::SensorConfiguration::gauges`]
+    Gauges,
+    /// [`crate::SensorConfiguration::waves`]
+    Waves,
+    /// [`crate::SensorConfiguration::valid_percent`]
+    ValidPercent,
+    /// [`crate::SensorConfiguration::force_mn_per_v`]
+    ForceScale,
+    /// [`crate::SensorConfiguration::stiffness_n_per_m`]
+    Stiffness,
+    /// [`crate::SensorConfiguration::arm_full_scale_um_s`]
+    ArmFullScale,
+    /// [`crate::DisplayConfiguration::max_age_ms`]
+    MaxAgeMs,
+    /// [`crate::DisplayConfiguration::fade_in_ms`]
+    FadeInMs,
+    /// [`crate::DisplayConfiguration::fade_out_ms`]
+    FadeOutMs,
+    /// [`crate::DisplayConfiguration::glide_ms`]
+    GlideMs,
+    /// [`crate::DisplayConfiguration::amplitude_mv`]
+    AmplitudeMv,
+    /// [`crate::DisplayConfiguration::reference_lsb`]
+    ReferenceLsb,
+    /// [`crate::DisplayConfiguration::full_drive_s`]
+    FullDriveS,
+    /// [`crate::DisplayConfiguration::actuators`]: neither the description in force nor the one sent.
+    Actuators,
+    /// [`crate::Actuators::first`]
+    ActuatorsFirst,
+    /// [`crate::Actuator::x_um`]
+    ActuatorX,
+    /// [`crate::Actuator::y_um`]
+    ActuatorY,
+    /// [`crate::Actuator::gain_q15`]
+    ActuatorGain,
+}

@@ -1,0 +1,11 @@
+//! The wire: messages, frames, receiver, handshake, clock offset.
+
+mod clock;
+mod configuration;
+mod console;
+mod golden;
+mod messages;
+mod port;
+mod properties;
+mod receiver;
+mod sender;

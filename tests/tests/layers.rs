@@ -1,0 +1,216 @@
+//! The simulator's layers: imports run downwards only, and no two files import each other in a circle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The layers of each crate, the lowest first; a crate may import any crate before it (Cargo holds that).
+const LAYERS: [(&str, &[&str]); 3] = [
+    (
+        "hil-sim/core",
+        &[
+            "scene",
+            "plant",
+            "link",
+            "run",
+            "scene_file",
+            "native",
+            "judge",
+        ],
+    ),
+    ("hil-sim/boards", &[]),
+    ("hil-sim/studies", &["output"]),
+];
+
+/// A module's place in its crate: `["scene_file", "read"]`.
+type Module = Vec<String>;
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            files(&path, found);
+        } else if path.extension().is_some_and(|end| end == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The source without comments and without its tests.
+fn code(text: &str) -> String {
+    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    text[..end]
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or_default())
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// Every path of the crate itself that `code`, which stands in `module`, names.
+fn named(code: &str, module: &[String]) -> Vec<Module> {
+    let mut paths = Vec::new();
+    for root in ["crate", "super"] {
+        for (at, _) in code.match_indices(root) {
+            let before = code[..at].chars().next_back();
+            if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
+                continue;
+            }
+            let mut base = if root == "crate" {
+                Vec::new()
+            } else {
+                module[..module.len().saturating_sub(1)].to_vec()
+            };
+            let mut rest = &code[at + root.len()..];
+            while let Some(next) = rest.strip_prefix("::super") {
+                base.pop();
+                rest = next;
+            }
+            while let Some(next) = rest.strip_prefix("::") {
+                let end = next
+                    .find(|c: char| !(c.is_alphanumeric() || c == '_'))
+                    .unwrap_or(next.len());
+                if end == 0 {
+                    // A group: each of its names may be a module.
+                    let group = next.strip_prefix('{').and_then(|all| all.split(';').next());
+                    for name in group
+                        .unwrap_or_default()
+                        .split(|c: char| !c.is_alphanumeric() && c != '_')
+                    {
+                        paths.push([base.clone(), vec![name.to_owned()]].concat());
+                    }
+                    break;
+                }
+                base.push(next[..end].to_owned());
+                rest = &next[end..];
+            }
+            paths.push(base);
+        }
+    }
+    paths
+}
+
+/// Which modules each module of a crate imports; what is above a module in its own path is left out.
+fn imports(folder: &Path) -> BTreeMap<Module, BTreeSet<Module>> {
+    let mut found = Vec::new();
+    files(folder, &mut found);
+    let modules: BTreeMap<Module, PathBuf> = found
+        .into_iter()
+        .map(|path| {
+            let place = path.strip_prefix(folder).unwrap().with_extension("");
+            let mut module: Module = place
+                .iter()
+                .map(|part| part.to_string_lossy().into_owned())
+                .collect();
+            if module.last().is_some_and(|last| last == "mod") || module == ["lib"] {
+                module.pop();
+            }
+            (module, path)
+        })
+        .filter(|(module, _)| !module.iter().any(|part| part == "tests"))
+        .collect();
+    modules
+        .iter()
+        .map(|(module, path)| {
+            let text = code(&fs::read_to_string(path).unwrap());
+            let targets = named(&text, module)
+                .into_iter()
+                .filter_map(|mut path| {
+                    while !path.is_empty() && !modules.contains_key(&path) {
+                        path.pop();
+                    }
+                    (!path.is_empty() && !module.starts_with(&path)).then_some(path)
+                })
+                .collect();
+            (module.clone(), targets)
+        })
+        .collect()
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn upwards(graph: &BTreeMap<Module, BTreeSet<Module>>, layers: &[&str]) -> Vec<String> {
+    // What no list names lies above all that one does.
+    let rank = |module: &Module| {
+        let top = module.first().map(String::as_str).unwrap_or_default();
+        layers
+            .iter()
+            .position(|layer| *layer == top)
+            .unwrap_or(layers.len())
+    };
+    let mut wrong = Vec::new();
+    for (module, targets) in graph.iter().filter(|(module, _)| !module.is_empty()) {
+        for target in targets.iter().filter(|target| rank(module) < rank(target)) {
+            wrong.push(format!(
+                "{} imports {}",
+                module.join("::"),
+                target.join("::")
+            ));
+        }
+    }
+    wrong
+}
+
+/// Modules that reach themselves by imports, the crate's root apart: it only lists the others.
+fn circles(graph: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
+    graph
+        .keys()
+        .filter(|module| !module.is_empty())
+        .filter(|start| {
+            let mut seen = BTreeSet::new();
+            let mut next: Vec<&Module> = graph[*start].iter().collect();
+            while let Some(module) = next.pop() {
+                if module == *start {
+                    return true;
+                }
+                if seen.insert(module) {
+                    next.extend(graph.get(module).into_iter().flatten());
+                }
+            }
+            false
+        })
+        .map(|module| module.join("::"))
+        .collect()
+}
+
+#[test]
+fn no_layer_imports_one_above_it() {
+    for (folder, layers) in LAYERS {
+        let graph = imports(&workspace().join(folder).join("src"));
+        assert!(graph.len() > 20, "{folder}: {} modules", graph.len());
+        let wrong = upwards(&graph, layers);
+        assert!(wrong.is_empty(), "{folder}: {wrong:#?}");
+    }
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    for (folder, _) in LAYERS {
+        let found = circles(&imports(&workspace().join(folder).join("src")));
+        assert!(found.is_empty(), "{folder}: {found:#?}");
+    }
+}
+
+#[test]
+fn an_import_upwards_and_a_circle_are_seen() {
+    let module = |name: &str| vec![name.to_owned()];
+    let text =
+        code("use super::plant::Contact;\n// use crate::run;\nuse crate::{link, run::Kept};");
+    let paths = named(&text, &module("scene"));
+    for name in ["plant", "link", "run"] {
+        assert!(
+            paths.iter().any(|path| path[0] == name),
+            "{name}: {paths:?}"
+        );
+    }
+    let graph = BTreeMap::from([
+        (module("scene"), BTreeSet::from([module("plant")])),
+        (module("plant"), BTreeSet::from([module("scene")])),
+    ]);
+    assert_eq!(
+        upwards(&graph, &["scene", "plant"]),
+        ["scene imports plant"]
+    );
+    assert_eq!(circles(&graph), ["plant", "scene"]);
+}
