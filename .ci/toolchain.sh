@@ -6,9 +6,11 @@
 # - Debian, where rustup can fetch nothing: rustc, cargo and the library's sources from Debian's
 #   packages, core built from them for the boards.
 #
-# Afterwards: host_cargo CARGO_ARGUMENTS… for the host, board_cargo CARGO_ARGUMENTS… for the boards.
+# Afterwards: host_cargo CARGO_ARGUMENTS… for the host, board_cargo CARGO_ARGUMENTS… for the boards,
+# bare_cargo CARGO_ARGUMENTS… for the cores that they name with --target.
 
 target=thumbv7em-none-eabihf
+another_target=thumbv8m.main-none-eabihf   # which the libs are linked for as well, where it can be had
 oldest_minor=95        # the oldest Rust 1.x seen to build everything here
 emulator_minor=98      # what the emulator's manifest asks for; older ones need to be told to go on
 
@@ -19,7 +21,7 @@ as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
 rust_minor() { "${1:-rustc}" --version 2>/dev/null | sed -n 's/^rustc 1\.\([0-9]*\)\..*/\1/p'; }
 new_enough() { [ "$(rust_minor "$1")" -ge "$oldest_minor" ] 2>/dev/null; }
 has_target() {
-    libraries=$(rustc --print target-libdir --target "$target" 2>/dev/null) && ls "$libraries"/libcore-*.rlib >/dev/null 2>&1
+    libraries=$(rustc --print target-libdir --target "$1" 2>/dev/null) && ls "$libraries"/libcore-*.rlib >/dev/null 2>&1
 }
 
 # A C linker is all that host builds need besides Rust.
@@ -32,10 +34,13 @@ need_linker() {
 
 ordinary_world() {
     command -v rustc >/dev/null 2>&1 && command -v cargo >/dev/null 2>&1 && new_enough rustc || return 1
-    has_target && return
+    add_target "$target"
+}
+add_target() {
+    has_target "$1" && return
     command -v rustup >/dev/null 2>&1 || return 1
-    say "ridgelink: adding the boards' target to rustup's toolchain"
-    rustup target add "$target" >&2 && has_target
+    say "ridgelink: adding $1 to rustup's toolchain"
+    rustup target add "$1" >&2 && has_target "$1"
 }
 
 debian_packages="rustc-web cargo-web rust-web-src rust-web-clippy rustfmt-web lld-19"
@@ -90,14 +95,18 @@ host_cargo() {
     cargo_of "$subcommand" --locked $ignore_version "$@"
 }
 
+bare_cargo() {
+    if [ "$world" = debian ]; then
+        RUSTC_BOOTSTRAP=1 CARGO_UNSTABLE_BUILD_STD=core host_cargo "$@"
+    else
+        host_cargo "$@"
+    fi
+}
+
 board_cargo() {
     subcommand=$1
     shift
-    if [ "$world" = debian ]; then
-        RUSTC_BOOTSTRAP=1 CARGO_UNSTABLE_BUILD_STD=core host_cargo "$subcommand" --target "$target" "$@"
-    else
-        host_cargo "$subcommand" --target "$target" "$@"
-    fi
+    bare_cargo "$subcommand" --target "$target" "$@"
 }
 
 build_firmwares() {
@@ -107,4 +116,23 @@ build_firmwares() {
 # What hil-sim cost and hil-sim chart estimators count the instructions of.
 build_cost_examples() {
     board_cargo build --release -p firmware-sensor --example filter_cost --example estimator_cost
+}
+
+# The libs without a HAL: in a program for no board of ours, linked for the boards' core and for another one.
+link_plain_board() {
+    manifest=tests/plain-board/Cargo.toml
+    tree=$(cargo_of tree --locked --manifest-path $manifest --target all --edges normal,build --prefix none)
+    intruders=$(printf '%s\n' "$tree" | sed -nE '/^cortex-m-rt/d; s/^((cortex-m|defmt|embassy|nucleo|stm32)[^ ]*) .*/\1/p' | sort -u)
+    # shellcheck disable=SC2086
+    [ -z "$intruders" ] || fail "a program of the libs alone gets what only the boards need:" $intruders
+    set -- --target "$target"
+    # Debian's library is built from source for any core.
+    if [ "$world" = debian ] || add_target "$another_target"; then
+        set -- "$@" --target "$another_target"
+    else
+        say "ridgelink: $another_target is not to be had here: the libs are linked for $target alone"
+    fi
+    # RUSTFLAGS take the place of the boards' linker scripts, which cargo finds in .cargo/config.toml.
+    RUSTFLAGS= bare_cargo build --manifest-path $manifest \
+        --target-dir "${CARGO_TARGET_DIR:-target}/plain-board" "$@"
 }

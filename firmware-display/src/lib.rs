@@ -8,6 +8,13 @@
 //!
 //! Pure: no hardware, no clock (time is counted in ticks), no allocation, no panic. What the board
 //! runs, a host can replay word for word.
+//!
+//! It needs `core` and no HAL. The package's default feature `board` is for its bin alone, which is the
+//! Nucleo-F429ZI's program; other programs leave it out, as `tests/plain-board` does:
+//!
+//! ```toml
+//! firmware-display = { path = "…", default-features = false }
+//! ```
 #![no_std]
 
 #[cfg(test)]

@@ -10,6 +10,13 @@
 //! ```
 //!
 //! [`Sensor::step`] is the whole of it, once per millisecond.
+//!
+//! It needs `core` and no HAL. The package's default feature `board` is for its bin alone, which is the
+//! Nucleo-F429ZI's program; other programs leave it out, as `tests/plain-board` does:
+//!
+//! ```toml
+//! firmware-sensor = { path = "…", default-features = false }
+//! ```
 #![no_std]
 
 pub mod adapted;
