@@ -27,7 +27,6 @@ pub mod efficiency;
 pub mod family;
 pub mod fourier;
 pub mod models;
-mod panel;
 pub mod parts;
 pub mod picture;
 pub mod pitch;
@@ -47,12 +46,4 @@ pub const fn word_of_mode(mode: protocol::Mode) -> &'static str {
         protocol::Mode::Uniform => "uniform",
         protocol::Mode::Travelling => "travelling",
     }
-}
-
-/// The text of a finished table.
-pub(crate) fn finish_csv(table: csv::Writer<Vec<u8>>) -> Result<String, csv::Error> {
-    let bytes = table
-        .into_inner()
-        .map_err(|error| csv::Error::from(error.into_error()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }

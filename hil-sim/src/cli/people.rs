@@ -10,7 +10,7 @@ use hil_sim::people::study::{self, Friction, Plan, Study};
 use hil_sim::people::{record, tables};
 
 use super::say::{self, say};
-use super::{Elves, EngineName, runs};
+use super::{Elves, EngineName, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct People {
@@ -68,7 +68,7 @@ impl People {
             ..Plan::default()
         };
         let jobs = study::jobs(&plan);
-        let progress = runs(jobs.len() as u64);
+        let progress = progress(jobs.len() as u64, "runs");
         let recordings = bench.run(&jobs, |_| progress.inc(1))?;
         progress.finish_and_clear();
         let study = Study::new(plan, &recordings)?;

@@ -123,7 +123,7 @@ impl Run {
         }
         if let Some((mut file, path)) = report {
             let chapters: Vec<_> = books.outcomes.iter().map(Outcome::chapter).collect();
-            let page = html(&chapters)?;
+            let page = html(&chapters);
             file.write_all(page.as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
             say!("report: {}", path.display());
