@@ -10,6 +10,7 @@ use super::say::{self, say};
 use super::way::tell_notes;
 use hil_sim::map::survey::whole_methods;
 use hil_sim::map::{METHODS, Map, Plan, Survey, catalogue, find, shard::Shard, standing, words};
+use hil_sim::study::Table;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Maps {
@@ -130,8 +131,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
 }
 
 fn list(maps: &[Map]) {
-    say!("| map | cells | along x | along y | in all cells |");
-    say!("| --- | ---: | --- | --- | --- |");
+    let mut table = Table::new(&["map", "cells:", "along x", "along y", "in all cells"]);
     for map in maps {
         let axis = |axis: &hil_sim::map::axis::Axis| {
             format!(
@@ -141,15 +141,15 @@ fn list(maps: &[Map]) {
                 axis.places()
             )
         };
-        say!(
-            "| {} | {} | {} | {} | {} |",
-            map.name,
-            map.len(),
+        table.row([
+            map.name.to_owned(),
+            map.len().to_string(),
             axis(&map.x),
             axis(&map.y),
-            map.conditions
-        );
+            map.conditions.to_owned(),
+        ]);
     }
+    say!("{table}");
 }
 
 fn print_scene(maps: &[Map], place: &str, methods: &[String]) -> anyhow::Result<()> {
