@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim_boards::{Firmware, FirmwareError, Firmwares};
+use hil_sim_studies::study::number;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
 
@@ -186,23 +187,9 @@ impl Arguments {
     }
 }
 
-/// A number with so many decimals, or a dash.
-fn number(number: Option<f64>, decimals: usize) -> String {
-    number.map_or("–".to_owned(), |number| format!("{number:.decimals$}"))
-}
-
-/// A bar for `scenes`, on standard error; none if that is not a terminal.
-fn progress(scenes: u64) -> ProgressBar {
-    ProgressBar::new(scenes).with_style(
-        ProgressStyle::with_template("{bar:40} {pos} of {len} scenes, {eta} to go")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    )
-}
-
-/// The same for runs of the emulated boards.
-fn runs(runs: u64) -> ProgressBar {
-    ProgressBar::new(runs).with_style(
-        ProgressStyle::with_template("{bar:40} {pos} of {len} runs, {eta} to go")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    )
+/// A bar for so many things, on standard error; none if that is not a terminal.
+fn progress(count: u64, things: &str) -> ProgressBar {
+    let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
+    let style = ProgressStyle::with_template(&template);
+    ProgressBar::new(count).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

@@ -60,7 +60,7 @@ impl Campaign {
 
         let shifts = plan.shifts();
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
-        let bar = progress(shifts.len() as u64);
+        let bar = progress(shifts.len() as u64, "scenes");
         let started = Instant::now();
         let mut trials = Vec::new();
         let jobs = NonZero::new(self.jobs).unwrap_or(NonZero::<usize>::MIN);

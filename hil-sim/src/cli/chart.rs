@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
 use clap::Subcommand;
 use hil_sim_core::scene::Scene;
 use hil_sim_studies::estimators::bank;
@@ -12,13 +11,13 @@ use hil_sim_studies::estimators::contest::contestants;
 use hil_sim_studies::estimators::costs::Costs;
 use hil_sim_studies::estimators::efficiency;
 use hil_sim_studies::estimators::family;
-use hil_sim_studies::estimators::picture;
 use hil_sim_studies::estimators::result::{ContestResult, Entry};
 use hil_sim_studies::estimators::score::Score;
+use hil_sim_studies::study::Study;
 
 use super::files::{create_folder, write};
 use super::say::say;
-use super::{confidence, display, models, number, progress};
+use super::{confidence, display, models, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -108,7 +107,7 @@ impl Estimators {
         let contestants = contestants();
 
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
-        let progress = progress(scenes.len() as u64);
+        let progress = progress(scenes.len() as u64, "scenes");
         let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.inc(1))?;
         progress.finish_and_clear();
 
@@ -134,50 +133,28 @@ impl Estimators {
         });
         entries.extend(running);
         let result = ContestResult { families, entries };
-        write(&self.out.join("estimators.csv"), &result.csv()?)?;
-        write(&self.out.join("estimators.svg"), &picture::draw(&result))?;
-        Ok(ExitCode::SUCCESS)
+        keep(&result, &self.out)
     }
 }
 
 impl Bound {
     fn execute(self) -> anyhow::Result<ExitCode> {
         create_folder(&self.out)?;
-        let progress = progress(efficiency::SCENES);
+        let progress = progress(efficiency::SCENES, "scenes");
         let rows = efficiency::measure(|| progress.inc(1))?;
         progress.finish_and_clear();
-        say!(
-            "| profile | v/λ, Hz | five gauges: rms % | bound % | ratio, mean | worst | one gauge: ratio, mean | worst |"
-        );
-        say!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
-        let (one, five) = rows.split_at(rows.len() / 2);
-        for (one, five) in one.iter().zip(five) {
-            say!(
-                "| {} | {} | {} | {:.3} | {} | {} | {} | {} |",
-                five.profile,
-                five.frequency_hz,
-                number(five.rms_percent(), 3),
-                five.bound_percent(),
-                number(five.mean_ratio(), 3),
-                number(five.worst_ratio(), 3),
-                number(one.mean_ratio(), 3),
-                number(one.worst_ratio(), 3),
-            );
-        }
-        let all = |gauges| efficiency::standing(&rows, gauges).unzip();
-        let ((mean, worst), (one_mean, one_worst)) = (all(5), all(1));
-        say!(
-            "| all | | | | {} | {} | {} | {} |",
-            number(mean, 3),
-            number(worst, 3),
-            number(one_mean, 3),
-            number(one_worst, 3),
-        );
-        write(&self.out.join("bound.csv"), &efficiency::csv(&rows)?)?;
-        write(
-            &self.out.join("bound.svg"),
-            &efficiency::picture::draw(&rows),
-        )?;
-        Ok(ExitCode::from(u8::from(!efficiency::meets_goals(&rows))))
+        keep(&rows[..], &self.out)
     }
+}
+
+/// Prints a study's table and writes its files. Exit status 1 if it misses a goal.
+pub(super) fn keep<S: Study + ?Sized>(study: &S, out: &Path) -> anyhow::Result<ExitCode> {
+    if let Some(table) = study.table() {
+        say!("{table}");
+    }
+    for (kind, text) in study.csvs()? {
+        write(&out.join(format!("{}{kind}.csv", S::NAME)), &text)?;
+    }
+    write(&out.join(format!("{}.svg", S::NAME)), &study.picture())?;
+    Ok(ExitCode::from(u8::from(!study.is_met())))
 }

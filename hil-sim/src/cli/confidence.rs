@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim_studies::estimators::confidence::{BINS, GOAL, Reliability, picture, strangers};
+use hil_sim_studies::estimators::confidence::{BINS, GOAL, Reliability, strangers};
 use hil_sim_studies::jury::seeds::REPORTING;
+use hil_sim_studies::study::Table;
 use protocol::SensorConfiguration;
 
-use super::files::{create_folder, write};
+use super::chart::keep;
+use super::files::create_folder;
 use super::say::say;
 use super::{number, progress};
 
@@ -31,38 +33,38 @@ impl Confidence {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         create_folder(&self.out)?;
         let seeds: Vec<u64> = (self.seed..self.seed.saturating_add(self.surfaces)).collect();
-        let progress = progress(seeds.len() as u64);
+        let progress = progress(seeds.len() as u64, "surfaces");
         let configuration = SensorConfiguration::DEFAULT;
         let tallies = strangers::ask(&seeds, configuration, || progress.inc(1));
         progress.finish_and_clear();
         let reliability = Reliability::of(&tallies);
         tell(&reliability);
-        write(&self.out.join("confidence.csv"), &reliability.csv()?)?;
-        write(
-            &self.out.join("confidence.svg"),
-            &picture::draw(&reliability, configuration.valid_percent),
-        )?;
-        Ok(ExitCode::from(u8::from(!reliability.meets_goal())))
+        keep(&reliability, &self.out)
     }
 }
 
 fn tell(reliability: &Reliability) {
-    say!("| confidence | estimates | mean confidence | within 5 % | 95 % interval |");
-    say!("| --- | ---: | ---: | ---: | --- |");
+    let mut bins = Table::new(&[
+        "confidence",
+        "estimates:",
+        "mean confidence:",
+        "within 5 %:",
+        "95 % interval",
+    ]);
     for (index, bar) in reliability.bars.iter().enumerate() {
         let (confidence, share) = bar.bin.means().unzip();
-        say!(
-            "| {:.1}–{:.1} | {} | {} | {} | {} |",
-            index as f64 / BINS as f64,
-            (index + 1) as f64 / BINS as f64,
-            bar.bin.estimates,
+        let end = |index: usize| index as f64 / BINS as f64;
+        bins.row([
+            format!("{:.1}–{:.1}", end(index), end(index + 1)),
+            bar.bin.estimates.to_string(),
             number(confidence, 3),
             number(share, 3),
             bar.interval.map_or("–".to_owned(), |interval| {
                 format!("{:.3}–{:.3}", interval.low, interval.high)
             }),
-        );
+        ]);
     }
+    say!("{bins}");
     let interval = reliability
         .error_interval
         .map_or(String::new(), |interval| {
@@ -73,28 +75,31 @@ fn tell(reliability: &Reliability) {
         reliability.surfaces,
         number(reliability.error, 3),
     );
-    say!("| stood by from | right | wrong | silent | without a period: stood by |");
-    say!("| ---: | ---: | ---: | ---: | ---: |");
+    let mut levels = Table::new(&[
+        "stood by from:",
+        "right:",
+        "wrong:",
+        "silent:",
+        "without a period: stood by:",
+    ]);
     for level in TOLD.map(|level| &reliability.levels[level]) {
-        say!(
-            "| {} % | {:.3} | {:.4} | {:.3} | {:.4} |",
-            level.percent,
-            level.right,
-            level.wrong,
-            level.silent,
-            level.plain,
-        );
+        levels.row([
+            format!("{} %", level.percent),
+            number(level.right, 3),
+            number(level.wrong, 4),
+            number(level.silent, 3),
+            number(level.plain, 4),
+        ]);
     }
-    say!("\n| class | estimates | mean confidence | within 5 % |");
-    say!("| --- | ---: | ---: | ---: |");
+    let mut classes = Table::new(&["class", "estimates:", "mean confidence:", "within 5 %:"]);
     for (class, bin) in &reliability.classes {
         let (confidence, share) = bin.means().unzip();
-        say!(
-            "| {class} | {} | {} | {} |",
-            bin.estimates,
+        classes.row([
+            (*class).to_owned(),
+            bin.estimates.to_string(),
             number(confidence, 3),
             number(share, 3),
-        );
+        ]);
     }
-    say!("");
+    say!("{levels}\n\n{classes}\n");
 }

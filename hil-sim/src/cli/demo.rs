@@ -53,7 +53,7 @@ impl Demo {
             .collect();
         let folder = self.report.parent().unwrap_or(std::path::Path::new("."));
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        std::fs::write(&self.report, html(&chapters)?)
+        std::fs::write(&self.report, html(&chapters))
             .with_context(|| self.report.display().to_string())?;
         say!("\n{}", verdict(as_predicted));
         say!("Plots of every cell: {}", self.report.display());

@@ -73,7 +73,7 @@ impl Goals {
 
 /// Runs the scenes, on all cores: an emulated pair keeps two of them half busy.
 fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<Judged>> {
-    let bar = progress(scenes.len() as u64);
+    let bar = progress(scenes.len() as u64, "scenes");
     let judged = on_all_cores(scenes, |scene| {
         let judgement = match firmwares {
             None => Judgement::of(scene, false)?,

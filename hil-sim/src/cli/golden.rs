@@ -10,7 +10,7 @@ use hil_sim_core::scene::SceneError;
 use hil_sim_studies::output::annotation::Annotation;
 use hil_sim_studies::output::golden::{Golden, Standing, complaint};
 
-use super::runs;
+use super::progress;
 use super::say::say;
 use super::scene_files::scene_files;
 use super::way::{Loaded, Way};
@@ -157,7 +157,7 @@ impl What {
     fn run(&self, scenes: &[Loaded], repeat: u32) -> anyhow::Result<Vec<Seen>> {
         let ready = self.way.ready()?;
         let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();
-        let bar = runs(inputs.len() as u64);
+        let bar = progress(inputs.len() as u64, "runs");
         let mut seen = vec![Seen::default(); scenes.len()];
         let work = |&index: &usize| ready.hash(&scenes[index].scene);
         batch::in_order(&inputs, self.way.threads(), work, |at, hash| {

@@ -24,13 +24,12 @@ use hil_sim_studies::jury::seeds::Seeds;
 use hil_sim_studies::jury::stranger::{Class, Trial};
 use hil_sim_studies::jury::table;
 use hil_sim_studies::jury::table::{Row, Weighed};
-use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{DisplayConfiguration, Method, SensorConfiguration};
 use serde::Serialize;
 
 use super::say::say;
 use super::way::{self, Ready};
-use super::{Elves, EngineName};
+use super::{Elves, EngineName, progress};
 
 /// Surfaces named as the worst.
 const WORST: usize = 8;
@@ -495,12 +494,4 @@ fn write(json: Option<(File, &Path)>, content: &impl Serialize) -> anyhow::Resul
     };
     let text = serde_json::to_string_pretty(content)?;
     writeln!(file, "{text}").with_context(|| format!("{}", path.display()))
-}
-
-/// A bar on standard error; none if that is not a terminal.
-fn progress(count: u64, things: &str) -> ProgressBar {
-    let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
-    ProgressBar::new(count).with_style(
-        ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-    )
 }

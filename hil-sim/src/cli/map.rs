@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::thread;
 
+use super::progress;
 use super::say::{self, say};
 use super::way::tell_notes;
 use hil_sim_studies::map::shard::Shard;
 use hil_sim_studies::map::survey::whole_methods;
 use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, standing, words};
-use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Maps {
@@ -114,7 +114,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
     if merge {
         survey.complete()?;
     }
-    let bar = progress(map.name, survey.missing());
+    let bar = progress(survey.missing() as u64, &format!("runs of {}", map.name));
     survey.run(|| bar.inc(1))?;
     bar.finish_and_clear();
     let (files, rows) = survey.finish()?;
@@ -128,17 +128,6 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
         .map(|method| standing::line(map, method, &rows))
         .collect();
     Ok((lines, words::text(map, &methods, &rows)))
-}
-
-/// A bar on stderr; none if that is no terminal.
-fn progress(name: &'static str, runs: usize) -> ProgressBar {
-    let bar = ProgressBar::new(runs as u64);
-    let template = "{msg:20} {bar:40} {pos}/{len} runs, {elapsed} so far, {eta} to go";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar.set_message(name);
-    bar
 }
 
 fn list(maps: &[Map]) {

@@ -11,7 +11,7 @@ use hil_sim_studies::psychophysics::study::{Friction, Plan, Study};
 use hil_sim_studies::psychophysics::{record, tables};
 
 use super::say::{self, say};
-use super::{Elves, EngineName, runs};
+use super::{Elves, EngineName, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct People {
@@ -69,7 +69,7 @@ impl People {
             ..Plan::default()
         };
         let jobs = study::jobs(&plan);
-        let progress = runs(jobs.len() as u64);
+        let progress = progress(jobs.len() as u64, "runs");
         let recordings = bench.run(&jobs, |_| progress.inc(1))?;
         progress.finish_and_clear();
         let study = Study::new(plan, &recordings)?;

@@ -18,7 +18,7 @@ use hil_sim_studies::output::golden::{Golden, Standing, complaint};
 use hil_sim_studies::output::json::JsonList;
 use hil_sim_studies::output::junit;
 use hil_sim_studies::output::junit::{Case, Fate};
-use hil_sim_studies::output::report::html;
+use hil_sim_studies::output::report::{Chapter, html};
 
 use super::number;
 use super::say::say;
@@ -124,12 +124,8 @@ impl Run {
                 .with_context(|| format!("{}", path.display()))?;
         }
         if let Some((mut file, path)) = report {
-            let chapters: Vec<_> = books
-                .outcomes
-                .iter()
-                .map(hil_sim_studies::output::report::Chapter::of)
-                .collect();
-            let page = html(&chapters)?;
+            let chapters: Vec<_> = books.outcomes.iter().map(Chapter::of).collect();
+            let page = html(&chapters);
             file.write_all(page.as_bytes())
                 .with_context(|| format!("{}", path.display()))?;
             say!("report: {}", path.display());

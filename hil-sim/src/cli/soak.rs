@@ -5,10 +5,9 @@ use std::time::Instant;
 
 use hil_sim_boards::soak;
 use hil_sim_boards::soak::SHORTEST_S;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::Elves;
 use super::say::say;
+use super::{Elves, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Soak {
@@ -35,10 +34,7 @@ impl Soak {
             SHORTEST_S / 60.0
         );
         let firmwares = self.elves.read()?;
-        let bar = ProgressBar::new(duration_s.ceil() as u64).with_style(
-            ProgressStyle::with_template("{bar:40} {pos} of {len} virtual s, {eta} to go")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
+        let bar = progress(duration_s.ceil() as u64, "virtual s");
         let begun = Instant::now();
         let told = bar.clone();
         let soaked = soak::run(

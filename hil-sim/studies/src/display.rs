@@ -29,11 +29,3 @@ pub const fn word_of_mode(mode: protocol::Mode) -> &'static str {
         protocol::Mode::Travelling => "travelling",
     }
 }
-
-/// The text of a finished table.
-pub(crate) fn finish_csv(table: csv::Writer<Vec<u8>>) -> Result<String, csv::Error> {
-    let bytes = table
-        .into_inner()
-        .map_err(|error| csv::Error::from(error.into_error()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
-}

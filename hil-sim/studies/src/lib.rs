@@ -9,3 +9,4 @@ pub mod map;
 pub mod output;
 pub mod paper;
 pub mod psychophysics;
+pub mod study;

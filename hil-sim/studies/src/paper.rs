@@ -48,14 +48,6 @@ pub enum PaperError {
         /// What is not there.
         missing: &'static str,
     },
-    /// A chart could not be drawn.
-    #[error("{exhibit}: a chart could not be drawn: {reason}")]
-    Chart {
-        /// Of what.
-        exhibit: &'static str,
-        /// What the drawing library says.
-        reason: String,
-    },
     /// A CSV could not be written.
     #[error("a CSV could not be made: {0}")]
     Csv(#[from] csv::Error),

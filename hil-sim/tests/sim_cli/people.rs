@@ -23,7 +23,7 @@ fn the_tables_say_what_they_do_not_show_and_where_the_paper_errs() {
     let said = text(&output.stdout);
     for say in [
         "proves nothing on people",
-        "0.0000  0.5461  1.0923  1.4491",
+        "0.0000   0.5461   1.0923  1.4491",
         "χ² = 8.72, 3 degrees of freedom, critical 7.81, p = 0.033: Case V is rejected",
     ] {
         assert!(said.contains(say), "{say}: {said}");

@@ -12,7 +12,9 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use protocol::GAUGES;
+use serde::Serialize;
 
+use crate::study::{Short, Study, Table, csv_text, number};
 use hil_sim_core::plant::contact::{Contact, EVENT_STEP_S};
 use hil_sim_core::plant::gauges::{SCAN_RATE_HZ, Texture};
 use hil_sim_core::plant::patch::Patch;
@@ -242,37 +244,53 @@ fn error_percent(case: &Case, felt: &[Felt], reference: &[Felt]) -> Option<f64> 
     percent.is_finite().then_some(percent)
 }
 
-/// The rows as CSV.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "case",
-        "rung",
-        "integrator",
-        "step_us",
-        "pace",
-        "error_percent",
-    ])?;
-    for row in rows {
-        let Entrant {
-            rung,
-            integrator,
-            step_us,
-        } = row.entrant;
-        table.write_record([
-            row.case.to_owned(),
-            rung.name().to_owned(),
-            integrator.map_or("exact", Integrator::name).to_owned(),
-            step_us.map_or(String::new(), |us| us.to_string()),
-            format!("{:.3e}", row.pace),
-            row.error_percent
-                .map_or("diverges".to_owned(), |percent| format!("{percent:.3e}")),
-        ])?;
+#[derive(Serialize)]
+struct Record {
+    case: &'static str,
+    rung: &'static str,
+    integrator: &'static str,
+    step_us: Option<Short>,
+    pace: String,
+    error_percent: String,
+}
+
+impl Study for [Row] {
+    const NAME: &'static str = "models";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&["case", "rung", "virtual s per s:", "error, %:"]);
+        for row in self.iter().filter(|row| row.entrant.integrator.is_none()) {
+            table.row([
+                row.case.to_owned(),
+                row.entrant.rung.name().to_owned(),
+                number(row.pace, 0),
+                match (row.entrant.rung, row.error_percent) {
+                    (Rung::Reference, _) => "–".to_owned(),
+                    (_, Some(percent)) => format!("{percent:.2e}"),
+                    (_, None) => "diverges".to_owned(),
+                },
+            ]);
+        }
+        Some(table)
     }
-    crate::display::finish_csv(table)
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.iter().map(|row| Record {
+            case: row.case,
+            rung: row.entrant.rung.name(),
+            integrator: row.entrant.integrator.map_or("exact", Integrator::name),
+            step_us: row.entrant.step_us.map(Short),
+            pace: format!("{:.3e}", row.pace),
+            error_percent: row
+                .error_percent
+                .map_or("diverges".to_owned(), |percent| format!("{percent:.3e}")),
+        });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
 }
 
 #[cfg(test)]

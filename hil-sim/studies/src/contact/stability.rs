@@ -6,6 +6,9 @@
 
 pub mod picture;
 
+use serde::Serialize;
+
+use crate::study::{Fixed, Study, csv_text};
 use hil_sim_core::plant::contact::{Bristles, MASS_KG, Spring, Stribeck, stability};
 use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::scene::Friction;
@@ -247,39 +250,44 @@ fn swing(integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome
     }
 }
 
-/// The maps as CSV.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(maps: &[Map]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "test",
-        "integrator",
-        "stiffness_n_per_m",
-        "step_us",
-        "allowed_us",
-        "outcome",
-    ])?;
-    for map in maps {
-        let test = match map.test {
-            Test::Clinging => "clinging",
-            Test::Swinging => "swinging",
-        };
-        for row in &map.rows {
-            for (step_s, outcome) in &row.cells {
-                table.write_record([
-                    test,
-                    map.integrator.name(),
-                    &format!("{:.4e}", row.stiffness_n_per_m),
-                    &format!("{:.4}", step_s * 1e6),
-                    &format!("{:.4}", row.allowed_s * 1e6),
-                    outcome.name(),
-                ])?;
-            }
-        }
+/// A cell of a map.
+#[derive(Serialize)]
+struct Record {
+    test: &'static str,
+    integrator: &'static str,
+    stiffness_n_per_m: String,
+    step_us: Fixed<4>,
+    allowed_us: Fixed<4>,
+    outcome: &'static str,
+}
+
+impl Study for [Map] {
+    const NAME: &'static str = "stability";
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let rows = self
+            .iter()
+            .flat_map(|map| map.rows.iter().map(move |row| (map, row)));
+        let records = rows.flat_map(|(map, row)| {
+            let record = |(step_s, outcome): &(f64, Outcome)| Record {
+                test: match map.test {
+                    Test::Clinging => "clinging",
+                    Test::Swinging => "swinging",
+                },
+                integrator: map.integrator.name(),
+                stiffness_n_per_m: format!("{:.4e}", row.stiffness_n_per_m),
+                step_us: (step_s * 1e6).into(),
+                allowed_us: (row.allowed_s * 1e6).into(),
+                outcome: outcome.name(),
+            };
+            row.cells.iter().map(record).collect::<Vec<_>>()
+        });
+        Ok(vec![("", csv_text(records)?)])
     }
-    crate::display::finish_csv(table)
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
 }
 
 #[cfg(test)]

@@ -15,8 +15,10 @@
 pub mod picture;
 
 use protocol::DisplayConfiguration;
+use serde::Serialize;
 
 use super::timing::{STROKE, WAVELENGTH_MM};
+use crate::study::{Fixed, Short, Study, Table, csv_text, number};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::Alone;
 use hil_sim_boards::{ElfError, Firmware};
@@ -187,38 +189,74 @@ fn stimulus_v(t_s: f64, late_s: f64, begins_cycles: f64) -> f64 {
     AMPLITUDE_V * (std::f64::consts::TAU * turns).sin()
 }
 
-/// The rows as CSV.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "delay_ms",
-        "jitter_ms",
-        "loss",
-        "ours_rms_cycles",
-        "ours_hand_to_output_p50_ms",
-        "ours_edge_after_tick_ms",
-        "relayed_rms_cycles",
-        "relayed_late_ms",
-    ])?;
-    let field = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.5}"));
-    for row in rows {
-        // The relayed stimulus is modelled with the delay alone.
-        let relayed = (row.link.loss == 0.0).then_some(row);
-        table.write_record([
-            row.link.delay_ms.to_string(),
-            row.link.jitter_ms.to_string(),
-            row.link.loss.to_string(),
-            field(row.ours_cycles),
-            field(row.ours_ms),
-            field(row.edge_ms),
-            field(relayed.map(|row| row.relayed_cycles)),
-            field(relayed.map(|row| row.relayed_ms)),
-        ])?;
+#[derive(Serialize)]
+struct Record {
+    delay_ms: Short,
+    jitter_ms: Short,
+    loss: Short,
+    ours_rms_cycles: Fixed<5>,
+    ours_hand_to_output_p50_ms: Fixed<5>,
+    ours_edge_after_tick_ms: Fixed<5>,
+    relayed_rms_cycles: Fixed<5>,
+    relayed_late_ms: Fixed<5>,
+}
+
+impl Row {
+    /// Cycles and ms of the relayed stimulus, which is modelled with the delay alone.
+    fn relayed(&self) -> (Option<f64>, Option<f64>) {
+        let modelled = (self.link.loss == 0.0).then_some((self.relayed_cycles, self.relayed_ms));
+        modelled.unzip()
     }
-    super::finish_csv(table)
+}
+
+impl Study for [Row] {
+    const NAME: &'static str = "delay";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "delay, ms:",
+            "jitter, ms:",
+            "loss, %:",
+            "ours: phase error RMS, cycles:",
+            "hand to output p50, ms:",
+            "relayed: phase error RMS, cycles:",
+            "late, ms:",
+        ]);
+        for row in self {
+            let (cycles, ms) = row.relayed();
+            table.row([
+                row.link.delay_ms.to_string(),
+                row.link.jitter_ms.to_string(),
+                number(100.0 * row.link.loss, 0),
+                number(row.ours_cycles, 4),
+                number(row.ours_ms, 3),
+                number(cycles, 3),
+                number(ms, 0),
+            ]);
+        }
+        Some(table)
+    }
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.iter().map(|row| {
+            let (relayed_cycles, relayed_ms) = row.relayed();
+            Record {
+                delay_ms: Short(row.link.delay_ms),
+                jitter_ms: Short(row.link.jitter_ms),
+                loss: Short(row.link.loss),
+                ours_rms_cycles: row.ours_cycles.into(),
+                ours_hand_to_output_p50_ms: row.ours_ms.into(),
+                ours_edge_after_tick_ms: row.edge_ms.into(),
+                relayed_rms_cycles: relayed_cycles.into(),
+                relayed_late_ms: relayed_ms.into(),
+            }
+        });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
 }
 
 #[cfg(test)]

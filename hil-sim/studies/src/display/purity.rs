@@ -9,7 +9,9 @@ pub mod picture;
 mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use serde::Serialize;
 
+use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::Alone;
 use hil_sim_boards::{ElfError, Firmware};
@@ -343,71 +345,111 @@ pub const fn word_of(hand: Hand) -> &'static str {
     }
 }
 
-/// The rows as CSV.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "rate_hz",
-        "mode",
-        "hand",
-        "hand_hz",
-        "speed_mm_s",
-        "wavelength_mm",
-        "frequency_hz",
-        "uneven_ticks",
-        "stimulus_v",
-        "spur_dbc",
-        "spur_hz",
-        "whole_cycles_mean_mv",
-        "any_second_mean_mv",
-    ])?;
-    let field = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
-    for row in rows {
-        let hand_hz = match row.hand {
-            Hand::Stroke { frequency_hz, .. } => Some(frequency_hz),
-            Hand::Whole | Hand::Between => None,
-        };
-        table.write_record([
-            row.rate_hz.to_string(),
-            super::word_of_mode(row.mode).to_owned(),
-            word_of(row.hand).to_owned(),
-            field(hand_hz),
-            format!("{:.4}", row.speed_mm_s),
-            format!("{:.4}", row.wavelength_mm),
-            field(row.frequency_hz),
-            row.uneven_ticks.to_string(),
-            field(row.stimulus_v),
-            field(row.spur.map(|spur| spur.0)),
-            field(row.spur.map(|spur| spur.1)),
-            format!("{:.4}", row.whole_mean_mv),
-            format!("{:.4}", row.second_mean_mv),
-        ])?;
-    }
-    super::finish_csv(table)
+#[derive(Serialize)]
+struct Record {
+    rate_hz: u32,
+    mode: &'static str,
+    hand: &'static str,
+    hand_hz: Fixed<4>,
+    speed_mm_s: Fixed<4>,
+    wavelength_mm: Fixed<4>,
+    frequency_hz: Fixed<4>,
+    uneven_ticks: usize,
+    stimulus_v: Fixed<4>,
+    spur_dbc: Fixed<4>,
+    spur_hz: Fixed<4>,
+    whole_cycles_mean_mv: Fixed<4>,
+    any_second_mean_mv: Fixed<4>,
 }
 
-/// The spectra that are drawn, as CSV: dB over the stimulus.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn spectra_csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(["rate_hz", "mode", "hand", "frequency_hz", "level_dbc"])?;
-    for row in rows {
-        for (frequency_hz, dbc) in levels_dbc(row) {
-            table.write_record([
+/// A line of a spectrum that is drawn: dB over the stimulus.
+#[derive(Serialize)]
+struct SpectralLine {
+    rate_hz: u32,
+    mode: &'static str,
+    hand: &'static str,
+    frequency_hz: Short,
+    level_dbc: Fixed<2>,
+}
+
+impl Study for [Row] {
+    const NAME: &'static str = "purity";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "rate, Hz:",
+            "mode",
+            "hand",
+            "mm/s:",
+            "λ, mm:",
+            "stimulus, Hz:",
+            "V:",
+            "worst spur, dBc:",
+            "at, Hz:",
+            "mean over whole cycles, mV:",
+            "over any second, mV:",
+        ]);
+        for row in self {
+            let cells = [
                 row.rate_hz.to_string(),
                 super::word_of_mode(row.mode).to_owned(),
                 word_of(row.hand).to_owned(),
-                format!("{frequency_hz}"),
-                format!("{dbc:.2}"),
-            ])?;
+                number(row.speed_mm_s, 1),
+                number(row.wavelength_mm, 2),
+                number(row.frequency_hz, 0),
+                number(row.stimulus_v, 3),
+                number(row.spur.map(|spur| spur.0), 1),
+                number(row.spur.map(|spur| spur.1), 1),
+                number(row.whole_mean_mv, 2),
+                number(row.second_mean_mv, 1),
+            ];
+            table.row_with(cells, remark(is_met(row)));
         }
+        Some(table)
     }
-    super::finish_csv(table)
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.iter().map(|row| Record {
+            rate_hz: row.rate_hz,
+            mode: super::word_of_mode(row.mode),
+            hand: word_of(row.hand),
+            hand_hz: match row.hand {
+                Hand::Stroke { frequency_hz, .. } => frequency_hz.into(),
+                Hand::Whole | Hand::Between => Fixed::default(),
+            },
+            speed_mm_s: row.speed_mm_s.into(),
+            wavelength_mm: row.wavelength_mm.into(),
+            frequency_hz: row.frequency_hz.into(),
+            uneven_ticks: row.uneven_ticks,
+            stimulus_v: row.stimulus_v.into(),
+            spur_dbc: row.spur.map(|spur| spur.0).into(),
+            spur_hz: row.spur.map(|spur| spur.1).into(),
+            whole_cycles_mean_mv: row.whole_mean_mv.into(),
+            any_second_mean_mv: row.second_mean_mv.into(),
+        });
+        let lines = self.iter().flat_map(|row| {
+            let levels = levels_dbc(row).into_iter();
+            levels.map(|(frequency_hz, dbc)| SpectralLine {
+                rate_hz: row.rate_hz,
+                mode: super::word_of_mode(row.mode),
+                hand: word_of(row.hand),
+                frequency_hz: Short(frequency_hz),
+                level_dbc: dbc.into(),
+            })
+        });
+        Ok(vec![
+            ("", csv_text(records)?),
+            ("-spectra", csv_text(lines)?),
+        ])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
+
+    fn is_met(&self) -> bool {
+        self.iter().all(is_met)
+    }
 }
 
 /// A row's spectrum: Hz, and dB over the stimulus.

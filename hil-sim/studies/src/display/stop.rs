@@ -9,7 +9,9 @@ pub mod picture;
 use std::sync::Arc;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use serde::Serialize;
 
+use crate::study::{Fixed, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::{Alone, AloneRun};
 use hil_sim_boards::{ElfError, Firmware};
@@ -234,30 +236,72 @@ pub fn is_met(stop: &Stop) -> bool {
     stop.all_ms.is_some_and(|ms| ms <= GOAL_MS)
 }
 
-/// The first stop's course as CSV: both lines, time by time.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(stops: &[Stop]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(["rate_hz", "mode", "what", "from_last_count_ms", "value"])?;
-    for stop in stops {
-        for (what, points) in [("speed_mm_s", &stop.speeds), ("voltage_v", &stop.voltages)] {
-            for (t_s, value) in points {
-                if !picture::SHOWN_S.contains(t_s) {
-                    continue;
-                }
-                table.write_record([
-                    stop.rate_hz.to_string(),
-                    super::word_of_mode(stop.mode).to_owned(),
-                    what.to_owned(),
-                    format!("{:.4}", t_s * 1e3),
-                    format!("{value:.5}"),
-                ])?;
-            }
+/// A point of a stop's course.
+#[derive(Serialize)]
+struct Record {
+    rate_hz: u32,
+    mode: &'static str,
+    what: &'static str,
+    from_last_count_ms: Fixed<4>,
+    value: Fixed<5>,
+}
+
+impl Study for [Stop] {
+    const NAME: &'static str = "stop";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "rate, Hz:",
+            "mode",
+            "crest, V:",
+            "last count to 0 V, ms:",
+            "the last channel's, ms:",
+            "first count to voltage, ms:",
+            "largest step, V:",
+            "of the wave itself, V:",
+        ]);
+        for stop in self {
+            let cells = [
+                stop.rate_hz.to_string(),
+                super::word_of_mode(stop.mode).to_owned(),
+                number(stop.crest_v, 2),
+                number(stop.watched_ms, 2),
+                number(stop.all_ms, 2),
+                number(stop.starts_ms, 2),
+                number(stop.largest_step_v, 3),
+                number(stop.natural_step_v, 3),
+            ];
+            table.row_with(cells, remark(is_met(stop)));
         }
+        Some(table)
     }
-    super::finish_csv(table)
+
+    /// Both lines of what is drawn, time by time.
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.iter().flat_map(|stop| {
+            let speeds = stop.speeds.iter().map(|point| ("speed_mm_s", point));
+            let voltages = stop.voltages.iter().map(|point| ("voltage_v", point));
+            let shown = speeds
+                .chain(voltages)
+                .filter(|(_, (t_s, _))| picture::SHOWN_S.contains(t_s));
+            shown.map(|(what, (t_s, value))| Record {
+                rate_hz: stop.rate_hz,
+                mode: super::word_of_mode(stop.mode),
+                what,
+                from_last_count_ms: (t_s * 1e3).into(),
+                value: (*value).into(),
+            })
+        });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
+
+    fn is_met(&self) -> bool {
+        self.iter().all(is_met)
+    }
 }
 
 #[cfg(test)]

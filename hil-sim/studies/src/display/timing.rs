@@ -4,7 +4,9 @@
 pub mod picture;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use serde::Serialize;
 
+use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::Alone;
 use hil_sim_boards::{ElfError, Firmware};
@@ -141,50 +143,94 @@ pub fn is_met(row: &Row) -> bool {
     row.rate_hz != 2_000 || row.reaction.p99_ms <= GOAL_MS
 }
 
-/// The rows as CSV.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "rate_hz",
-        "delay_ms",
-        "jitter_ms",
-        "loss",
-        "edges",
-        "edge_after_tick_p50_us",
-        "jitter_p50_us",
-        "jitter_p99_us",
-        "jitter_max_us",
-        "skew_us",
-        "hand_to_output_p50_ms",
-        "hand_to_output_p99_ms",
-        "hand_to_output_max_ms",
-        "estimates_sent",
-        "estimates_arrived",
-        "deadline_misses",
-    ])?;
-    for row in rows {
-        let edges = &row.edges;
-        table.write_record([
-            row.rate_hz.to_string(),
-            row.link.delay_ms.to_string(),
-            row.link.jitter_ms.to_string(),
-            row.link.loss.to_string(),
-            edges.after_us.len().to_string(),
-            format!("{:.3}", edges.after.p50_us),
-            format!("{:.3}", edges.jitter.p50_us),
-            format!("{:.3}", edges.jitter.p99_us),
-            format!("{:.3}", edges.jitter.max_us),
-            format!("{:.3}", edges.skew_us),
-            format!("{:.4}", row.reaction.p50_ms),
-            format!("{:.4}", row.reaction.p99_ms),
-            format!("{:.4}", row.reaction.max_ms),
-            row.estimates.0.to_string(),
-            row.estimates.1.to_string(),
-            row.deadline_misses.to_string(),
-        ])?;
+#[derive(Serialize)]
+struct Record {
+    rate_hz: u32,
+    delay_ms: Short,
+    jitter_ms: Short,
+    loss: Short,
+    edges: usize,
+    edge_after_tick_p50_us: Fixed<3>,
+    jitter_p50_us: Fixed<3>,
+    jitter_p99_us: Fixed<3>,
+    jitter_max_us: Fixed<3>,
+    skew_us: Fixed<3>,
+    hand_to_output_p50_ms: Fixed<4>,
+    hand_to_output_p99_ms: Fixed<4>,
+    hand_to_output_max_ms: Fixed<4>,
+    estimates_sent: usize,
+    estimates_arrived: usize,
+    deadline_misses: u32,
+}
+
+impl Study for [Row] {
+    const NAME: &'static str = "timing";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "rate, Hz:",
+            "delay, ms:",
+            "jitter, ms:",
+            "loss, %:",
+            "LDAC after tick, µs:",
+            "its jitter p50, µs:",
+            "p99:",
+            "longest:",
+            "skew, µs:",
+            "hand to output p50, ms:",
+            "p99:",
+            "longest:",
+            "estimates arrived:",
+        ]);
+        for row in self {
+            let (edges, reaction) = (&row.edges, &row.reaction);
+            let cells = [
+                row.rate_hz.to_string(),
+                row.link.delay_ms.to_string(),
+                row.link.jitter_ms.to_string(),
+                number(100.0 * row.link.loss, 0),
+                number(edges.after.p50_us, 2),
+                number(edges.jitter.p50_us, 3),
+                number(edges.jitter.p99_us, 3),
+                number(edges.jitter.max_us, 3),
+                number(edges.skew_us, 3),
+                number(reaction.p50_ms, 3),
+                number(reaction.p99_ms, 3),
+                number(reaction.max_ms, 3),
+                format!("{} of {}", row.estimates.1, row.estimates.0),
+            ];
+            table.row_with(cells, remark(is_met(row)));
+        }
+        Some(table)
     }
-    super::finish_csv(table)
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.iter().map(|row| Record {
+            rate_hz: row.rate_hz,
+            delay_ms: Short(row.link.delay_ms),
+            jitter_ms: Short(row.link.jitter_ms),
+            loss: Short(row.link.loss),
+            edges: row.edges.after_us.len(),
+            edge_after_tick_p50_us: row.edges.after.p50_us.into(),
+            jitter_p50_us: row.edges.jitter.p50_us.into(),
+            jitter_p99_us: row.edges.jitter.p99_us.into(),
+            jitter_max_us: row.edges.jitter.max_us.into(),
+            skew_us: row.edges.skew_us.into(),
+            hand_to_output_p50_ms: row.reaction.p50_ms.into(),
+            hand_to_output_p99_ms: row.reaction.p99_ms.into(),
+            hand_to_output_max_ms: row.reaction.max_ms.into(),
+            estimates_sent: row.estimates.0,
+            estimates_arrived: row.estimates.1,
+            deadline_misses: row.deadline_misses,
+        });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
+
+    fn is_met(&self) -> bool {
+        self.iter().all(is_met)
+    }
 }

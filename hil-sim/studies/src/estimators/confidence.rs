@@ -8,10 +8,13 @@
 pub mod picture;
 pub mod strangers;
 
+use protocol::SensorConfiguration;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
 
 use crate::psychophysics::interval::{Interval, middle};
+use crate::study::{Fixed, Study, csv_text};
 
 /// Relative error within which an estimate is right.
 pub const RIGHT: f64 = 0.05;
@@ -187,60 +190,75 @@ impl Reliability {
     pub fn meets_goal(&self) -> bool {
         self.error.is_some_and(|error| error <= GOAL)
     }
+}
 
-    /// The bins, then the levels, then the classes, as CSV.
-    ///
-    /// # Errors
-    /// None in practice: it is written to memory.
-    pub fn csv(&self) -> Result<String, csv::Error> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        let number = |value: f64| format!("{value:.5}");
-        table.write_record([
-            "what",
-            "of",
-            "estimates",
-            "confidence",
-            "right",
-            "low",
-            "high",
-            "wrong",
-            "silent",
-            "plain",
-        ])?;
-        let row = |what: &str, of: String, bin: &Bin, interval: Option<Interval>| {
-            let means = bin.means();
-            let ends = interval.map(|interval| (interval.low, interval.high));
-            [
-                what.to_owned(),
-                of,
-                bin.estimates.to_string(),
-                means.map_or(String::new(), |means| number(means.0)),
-                means.map_or(String::new(), |means| number(means.1)),
-                ends.map_or(String::new(), |ends| number(ends.0)),
-                ends.map_or(String::new(), |ends| number(ends.1)),
-                String::new(),
-                String::new(),
-                String::new(),
-            ]
-        };
-        for (index, bar) in self.bars.iter().enumerate() {
+/// A bin, a level or a class.
+#[derive(Default, Serialize)]
+struct Record {
+    what: &'static str,
+    of: String,
+    estimates: Option<u32>,
+    confidence: Fixed<5>,
+    right: Fixed<5>,
+    low: Fixed<5>,
+    high: Fixed<5>,
+    wrong: Fixed<5>,
+    silent: Fixed<5>,
+    plain: Fixed<5>,
+}
+
+impl Record {
+    fn of_bin(what: &'static str, of: String, bin: &Bin, interval: Option<Interval>) -> Self {
+        let (confidence, right) = bin.means().unzip();
+        let ends = interval.map(|interval| (interval.low, interval.high));
+        let (low, high) = ends.unzip();
+        Self {
+            what,
+            of,
+            estimates: Some(bin.estimates),
+            confidence: confidence.into(),
+            right: right.into(),
+            low: low.into(),
+            high: high.into(),
+            ..Self::default()
+        }
+    }
+
+    fn of_level(level: &Level) -> Self {
+        Self {
+            what: "level",
+            of: level.percent.to_string(),
+            right: level.right.into(),
+            wrong: level.wrong.into(),
+            silent: level.silent.into(),
+            plain: level.plain.into(),
+            ..Self::default()
+        }
+    }
+}
+
+impl Study for Reliability {
+    const NAME: &'static str = "confidence";
+
+    /// The bins, then the levels, then the classes.
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let bins = self.bars.iter().enumerate().map(|(index, bar)| {
             let from = format!("{:.1}", index as f64 / BINS as f64);
-            table.write_record(row("bin", from, &bar.bin, bar.interval))?;
-        }
-        for level in &self.levels {
-            let mut fields: [String; 10] = Default::default();
-            fields[0] = "level".to_owned();
-            fields[1] = level.percent.to_string();
-            fields[4] = number(level.right);
-            fields[7] = number(level.wrong);
-            fields[8] = number(level.silent);
-            fields[9] = number(level.plain);
-            table.write_record(fields)?;
-        }
-        for (class, bin) in &self.classes {
-            table.write_record(row("class", (*class).to_owned(), bin, None))?;
-        }
-        crate::display::finish_csv(table)
+            Record::of_bin("bin", from, &bar.bin, bar.interval)
+        });
+        let levels = self.levels.iter().map(Record::of_level);
+        let classes = self.classes.iter();
+        let classes =
+            classes.map(|(class, bin)| Record::of_bin("class", (*class).to_owned(), bin, None));
+        Ok(vec![("", csv_text(bins.chain(levels).chain(classes))?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self, SensorConfiguration::DEFAULT.valid_percent)
+    }
+
+    fn is_met(&self) -> bool {
+        self.meets_goal()
     }
 }
 
@@ -388,7 +406,7 @@ mod tests {
         assert_eq!(silent.error, None);
         assert!(!silent.meets_goal());
         // The columns, the bins, the levels and a class.
-        let csv = silent.csv().unwrap();
+        let csv = &silent.csvs().unwrap()[0].1;
         assert_eq!(csv.lines().count(), 1 + BINS + LEVELS + 1);
     }
 }

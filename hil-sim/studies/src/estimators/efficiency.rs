@@ -7,6 +7,9 @@
 
 pub mod picture;
 
+use serde::Serialize;
+
+use crate::study::{Fixed, Short, Study, Table, csv_text, number};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Profile, Scene, SceneError};
 
 use super::bound::{Tone, WAVES, window_mm};
@@ -218,46 +221,86 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// The rows as CSV: a line for each cell, with its row's mean and worst ratio.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv(rows: &[Row]) -> Result<String, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
-        "profile",
-        "gauges",
-        "frequency_hz",
-        "wavelength_mm",
-        "duration_s",
-        "rms_percent",
-        "bias_percent",
-        "valid_share",
-        "bound_percent",
-        "ratio",
-        "ratio_mean",
-        "ratio_worst",
-    ])?;
-    let field = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
-    for row in rows {
-        for cell in &row.cells {
-            table.write_record([
-                row.profile.to_owned(),
-                row.gauges.to_string(),
-                row.frequency_hz.to_string(),
-                cell.wavelength_mm.to_string(),
-                format!("{:.0}", cell.duration_s),
-                field(cell.rms_percent),
-                field(cell.bias_percent),
-                field(Some(cell.valid_share)),
-                field(Some(cell.bound_percent)),
-                field(cell.ratio()),
-                field(row.mean_ratio()),
-                field(row.worst_ratio()),
-            ])?;
+/// A cell, with its row's mean and worst ratio.
+#[derive(Serialize)]
+struct Record {
+    profile: &'static str,
+    gauges: usize,
+    frequency_hz: Short,
+    wavelength_mm: Short,
+    duration_s: Fixed<0>,
+    rms_percent: Fixed<4>,
+    bias_percent: Fixed<4>,
+    valid_share: Fixed<4>,
+    bound_percent: Fixed<4>,
+    ratio: Fixed<4>,
+    ratio_mean: Fixed<4>,
+    ratio_worst: Fixed<4>,
+}
+
+impl Study for [Row] {
+    const NAME: &'static str = "bound";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "profile",
+            "v/λ, Hz:",
+            "five gauges: rms %:",
+            "bound %:",
+            "ratio, mean:",
+            "worst:",
+            "one gauge: ratio, mean:",
+            "worst:",
+        ]);
+        let (one, five) = self.split_at(self.len() / 2);
+        for (one, five) in one.iter().zip(five) {
+            table.row([
+                five.profile.to_owned(),
+                five.frequency_hz.to_string(),
+                number(five.rms_percent(), 3),
+                number(five.bound_percent(), 3),
+                number(five.mean_ratio(), 3),
+                number(five.worst_ratio(), 3),
+                number(one.mean_ratio(), 3),
+                number(one.worst_ratio(), 3),
+            ]);
         }
+        let ((mean, worst), (one_mean, one_worst)) =
+            (standing(self, 5).unzip(), standing(self, 1).unzip());
+        let all = [mean, worst, one_mean, one_worst].map(|ratio| number(ratio, 3));
+        let nothing = [String::new(), String::new(), String::new()];
+        table.row(["all".to_owned()].into_iter().chain(nothing).chain(all));
+        Some(table)
     }
-    crate::display::finish_csv(table)
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let cells = self
+            .iter()
+            .flat_map(|row| row.cells.iter().map(move |cell| (row, cell)));
+        let records = cells.map(|(row, cell)| Record {
+            profile: row.profile,
+            gauges: row.gauges,
+            frequency_hz: Short(row.frequency_hz),
+            wavelength_mm: Short(cell.wavelength_mm),
+            duration_s: cell.duration_s.into(),
+            rms_percent: cell.rms_percent.into(),
+            bias_percent: cell.bias_percent.into(),
+            valid_share: cell.valid_share.into(),
+            bound_percent: cell.bound_percent.into(),
+            ratio: cell.ratio().into(),
+            ratio_mean: row.mean_ratio().into(),
+            ratio_worst: row.worst_ratio().into(),
+        });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
+
+    fn is_met(&self) -> bool {
+        meets_goals(self)
+    }
 }
 
 #[cfg(test)]

@@ -1,119 +1,161 @@
 //! The picture of a contest: a panel for each family, error over instructions, both axes logarithmic.
 
-use std::fmt::Write;
-
 use super::bank;
 use super::family::Family;
 use super::result::{ContestResult, Entry, WINDOWS, Window};
-use crate::output::plot::panel::{
-    AROUND, COLUMNS, Look, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes,
-    goal, line, look, mark, page, text,
-};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::font::{Anchor, Font};
+use crate::output::plot::mark::Mark;
+use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
+use crate::output::plot::palette::{BLACK, BLUE, GREEN, GREY, INK, OCHRE, PURPLE, SOFT, VERMILION};
+use crate::output::plot::panel::Panel;
+use crate::output::plot::svg::{Point, Shape, Stroke, Symbol};
 
-/// Above the panels, for the legend.
-const HEAD: f64 = 136.0;
-
-/// Okabe and Ito's colours, which the colour-blind tell apart; no two methods share shape and colour.
-const LOOKS: [Look; 13] = [
-    look("spectrum", "#0072B2", Shape::Circle),
-    look("crossings", "#D55E00", Shape::Square),
-    look("counting", "#000000", Shape::Up),
-    // At the end of the legend's first line, where there is room for it.
-    look(bank::METHOD, "#8a939c", Shape::Circle),
-    look("adapted count", "#000000", Shape::Down),
-    look("Goertzel", "#009E73", Shape::Diamond),
-    look("FFT", "#009E73", Shape::Square),
-    look("harmonic NLS", "#009E73", Shape::Up),
-    look("AR(2)", "#CC79A7", Shape::Up),
-    look("PLL", "#CC79A7", Shape::Down),
-    look("Pei–Tseng notch", "#CC79A7", Shape::Diamond),
-    look("YIN", "#B58900", Shape::Circle),
-    look("McLeod", "#B58900", Shape::Diamond),
+/// What methods look like: no two share shape and colour.
+const LOOKS: [(&str, Symbol); 13] = [
+    ("spectrum", Symbol::new(BLUE, Shape::Circle)),
+    ("crossings", Symbol::new(VERMILION, Shape::Square)),
+    ("counting", Symbol::new(BLACK, Shape::Up)),
+    (bank::METHOD, Symbol::new(GREY, Shape::Circle)),
+    ("adapted count", Symbol::new(BLACK, Shape::Down)),
+    ("Goertzel", Symbol::new(GREEN, Shape::Diamond)),
+    ("FFT", Symbol::new(GREEN, Shape::Square)),
+    ("harmonic NLS", Symbol::new(GREEN, Shape::Up)),
+    ("AR(2)", Symbol::new(PURPLE, Shape::Up)),
+    ("PLL", Symbol::new(PURPLE, Shape::Down)),
+    ("Pei–Tseng notch", Symbol::new(PURPLE, Shape::Diamond)),
+    ("YIN", Symbol::new(OCHRE, Shape::Circle)),
+    ("McLeod", Symbol::new(OCHRE, Shape::Diamond)),
 ];
+/// The most that the default estimator may cost, in instructions a ms: 5 % of 168 MHz.
+const BUDGET: f64 = 8_000.0;
+const BUDGET_LINE: Stroke = Stroke::new(SOFT, 1.2).dashed("1 3");
+const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
+/// Words beside marks.
+const ASIDE: Font = Font::new(10.0);
 
 /// Draws it.
 pub fn draw(result: &ContestResult) -> String {
-    let panels = result.families.len() + 1;
-    let rows = panels.div_ceil(COLUMNS);
-    let height = HEAD + rows as f64 * PANEL_HEIGHT + MARGIN;
-    let mut svg = page(height);
-    legend(&mut svg);
-    let cost = Scale::decades(700.0, 60_000.0, "instructions a ms");
-    let error = Scale::decades(0.01, 300.0, "");
-    let settling = Scale::even(0.0, 400.0, 100.0, "");
-    for index in 0..panels {
-        let (column, row) = (index % COLUMNS, index / COLUMNS);
-        let left = MARGIN + column as f64 * PANEL_WIDTH + AROUND[0];
-        let top = HEAD + row as f64 * PANEL_HEIGHT + AROUND[1];
-        let boundary = result
-            .families
-            .iter()
-            .position(|family| family.folder == "boundary");
-        match result.families.get(index) {
-            Some(family) if Some(index) == boundary => {
-                let panel = Panel {
-                    left,
-                    top,
-                    x: &cost,
-                    y: &settling,
-                };
-                let title = format!("{}: settled within 10 %, ms", family.title);
-                axes(&mut svg, &panel, &title);
-                budget(&mut svg, &panel);
-                for goal_ms in goals_ms(family) {
-                    goal(&mut svg, &panel, goal_ms, &format!("goal {goal_ms} ms"));
-                }
-                marks(
-                    &mut svg,
-                    &panel,
-                    result,
-                    |entry| Some((entry.cost?.mean, entry.scores[index].settling_ms?)),
-                    index,
-                );
-            }
-            Some(family) => {
-                let panel = Panel {
-                    left,
-                    top,
-                    x: &cost,
-                    y: &error,
-                };
-                axes(&mut svg, &panel, &format!("{}: RMS error, %", family.title));
-                budget(&mut svg, &panel);
-                bounds(&mut svg, &panel, family);
-                if let Some(percent) = family.goal_percent() {
-                    goal(&mut svg, &panel, percent, &format!("goal {percent} %"));
-                }
-                marks(
-                    &mut svg,
-                    &panel,
-                    result,
-                    |entry| Some((entry.cost?.mean, entry.scores[index].rms_percent?)),
-                    index,
-                );
-            }
-            None => {
-                let time = Scale::even(0.0, 400.0, 100.0, "ms to settle after the boundary");
-                let panel = Panel {
-                    left,
-                    top,
-                    x: &time,
-                    y: &error,
-                };
-                axes(&mut svg, &panel, "Table I, 20 dB: RMS error, %");
-                if let Some(boundary) = boundary {
-                    let place = |entry: &Entry| {
-                        let settling_ms = entry.scores[boundary].settling_ms?;
-                        Some((settling_ms, entry.scores[0].rms_percent?))
-                    };
-                    marks(&mut svg, &panel, result, place, 0);
-                    travels(&mut svg, &panel, result, place);
-                }
-            }
-        }
-    }
-    svg.push_str("</svg>\n");
-    svg
+    let mut page = Page::default();
+    page.note(
+        "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated Cortex-M4F. \
+         Ring: default; hollow: cost estimated; faint: valid share below ½. Bound: Cramér–Rao’s over 8 λ, 80 ms \
+         and 160 ms.",
+    );
+    let methods = LOOKS.map(|(name, symbol)| (Key::Symbol(symbol.hollow(estimated(name))), name));
+    let mut legend = methods.to_vec();
+    legend.extend([
+        (
+            Key::Line(knob_line("waves", BLUE)),
+            "spectrum: fits of 2–8 λ",
+        ),
+        (Key::Line(knob_line("gauges", BLUE)), "1, 3, 5 gauges"),
+        (Key::Line(BOUND), "bound"),
+        (Key::Line(BUDGET_LINE), "5 % of the M4F"),
+    ]);
+    page.legend(&legend);
+    let families = result.families.iter().enumerate();
+    let mut panels: Vec<Panel> = families
+        .map(|(index, family)| match family.folder {
+            BOUNDARY => settling(result, index, family),
+            _ => errors(result, index, family),
+        })
+        .collect();
+    panels.push(against_settling(result));
+    page.panels(3, &[PANEL_HEIGHT], &panels);
+    page.finish()
+}
+
+/// The family whose settling time counts.
+const BOUNDARY: &str = "boundary";
+
+fn cost_axis() -> Axis {
+    Axis::decades(700.0, 60_000.0, "instructions a ms")
+}
+
+fn error_axis() -> Axis {
+    Axis::decades(0.01, 300.0, "")
+}
+
+fn budget() -> Mark {
+    Mark::Upright(BUDGET_LINE, BUDGET, String::new())
+}
+
+/// How long each takes to settle, over its cost.
+fn settling(result: &ContestResult, index: usize, family: &Family) -> Panel {
+    let title = format!("{}: settled within 10 %, ms", family.title);
+    let goals = goals_ms(family);
+    let goals = goals
+        .iter()
+        .map(|ms| Mark::Level(*ms, format!("goal {ms} ms")));
+    let settling_ms = Axis::even(0.0, 400.0, 100.0, "");
+    Panel::new(title, &cost_axis(), &settling_ms)
+        .with([budget()])
+        .with(goals)
+        .with(marks(result, index, &settling_ms, |entry| {
+            Some((entry.cost?.mean, entry.scores[index].settling_ms?))
+        }))
+}
+
+/// Each one's error over its cost.
+fn errors(result: &ContestResult, index: usize, family: &Family) -> Panel {
+    let cost = cost_axis();
+    let bounds = WINDOWS.into_iter().filter_map(|window| {
+        let percent = window.bound_percent(family)?;
+        let words = match window {
+            Window::Waves(waves) => format!("bound, {waves} λ"),
+            Window::Ms(ms) => format!("bound, {ms} ms"),
+        };
+        let ends = [(cost.low, percent), (cost.high, percent)];
+        let font = ASIDE.at(Anchor::End);
+        Some([
+            Mark::Line(BOUND, ends.to_vec()),
+            Mark::Words(font, ends[1], (-2.0, -3.0), words),
+        ])
+    });
+    let goal = family
+        .goal_percent()
+        .map(|percent| Mark::Level(percent, format!("goal {percent} %")));
+    Panel::new(
+        format!("{}: RMS error, %", family.title),
+        &cost,
+        &error_axis(),
+    )
+    .with([budget()])
+    .with(bounds.flatten())
+    .with(goal)
+    .with(marks(result, index, &error_axis(), |entry| {
+        Some((entry.cost?.mean, entry.scores[index].rms_percent?))
+    }))
+}
+
+/// The first family's error over the time to settle, the fits' lengths beside their marks.
+fn against_settling(result: &ContestResult) -> Panel {
+    let time = Axis::even(0.0, 400.0, 100.0, "ms to settle after the boundary");
+    let panel = Panel::new("Table I, 20 dB: RMS error, %", &time, &error_axis());
+    let mut families = result.families.iter();
+    let Some(boundary) = families.position(|family| family.folder == BOUNDARY) else {
+        return panel;
+    };
+    let place = |entry: &Entry| {
+        let settling_ms = entry.scores[boundary].settling_ms?;
+        // What takes longer than the panel shows is left out.
+        (settling_ms <= time.high).then_some((settling_ms, entry.scores[0].rms_percent?))
+    };
+    let fits = result.entries.iter().filter(|entry| entry.knob == "waves");
+    let lengths = fits.filter_map(|entry| {
+        let words = format!("{} λ", entry.value);
+        Some(Mark::Words(
+            ASIDE.at(Anchor::Middle),
+            place(entry)?,
+            (0.0, 19.0),
+            words,
+        ))
+    });
+    let lengths: Vec<Mark> = lengths.collect();
+    panel
+        .with(marks(result, 0, &error_axis(), place))
+        .with(lengths)
 }
 
 fn goals_ms(family: &Family) -> Vec<f64> {
@@ -127,195 +169,108 @@ fn goals_ms(family: &Family) -> Vec<f64> {
     goals
 }
 
-fn legend(svg: &mut String) {
-    for (index, look) in LOOKS.iter().enumerate() {
-        let x = MARGIN + 14.0 + (index % 4) as f64 * 235.0;
-        let y = 20.0 + (index / 4) as f64 * 20.0;
-        mark(svg, (x, y - 4.0), look, estimated(look.method), 1.0);
-        text(svg, x + 11.0, y, "font-size=\"13\"", look.method);
-    }
-    let y = 106.0;
-    let mut x = MARGIN + 8.0;
-    for (dash, words) in [
-        (knob_dash("waves"), "spectrum: fits of 2–8 λ"),
-        (knob_dash("gauges"), "1, 3, 5 gauges"),
-    ] {
-        let style = format!("stroke=\"#0072B2\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"");
-        line(svg, (x, y - 4.0), (x + 26.0, y - 4.0), &style);
-        text(svg, x + 31.0, y, "font-size=\"12\"", words);
-        x += 210.0;
-    }
-    text(
-        svg,
-        x,
-        y,
-        "font-size=\"12\"",
-        "ring: default; hollow: cost estimated; faint: valid share below ½",
-    );
-    text(
-        svg,
-        MARGIN + 8.0,
-        126.0,
-        &format!("font-size=\"12\" fill=\"{SOFT}\""),
-        "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated \
-         Cortex-M4F. Dashed: Cramér–Rao bound over 8 λ, 80 ms and 160 ms.",
-    );
-}
-
-/// The most that the default estimator may cost, in instructions a ms: 5 % of 168 MHz.
-const BUDGET: f64 = 8_000.0;
-
-fn budget(svg: &mut String, panel: &Panel<'_>) {
-    let (x, bottom) = panel.at(BUDGET, panel.y.low);
-    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"1 3\"");
-    line(svg, (x, panel.top), (x, bottom), &style);
-    let style = format!("font-size=\"10\" fill=\"{SOFT}\"");
-    text(svg, x + 3.0, panel.top + 9.0, &style, "5 % of the M4F");
-}
-
-fn bounds(svg: &mut String, panel: &Panel<'_>, family: &Family) {
-    for window in WINDOWS {
-        let Some(percent) = window.bound_percent(family) else {
-            continue;
-        };
-        let (left, y) = panel.at(panel.x.low, percent);
-        let right = left + Panel::WIDE;
-        let words = match window {
-            Window::Waves(waves) => format!("bound, {waves} λ"),
-            Window::Ms(ms) => format!("bound, {ms} ms"),
-        };
-        line(
-            svg,
-            (left, y),
-            (right, y),
-            "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
-        );
-        text(
-            svg,
-            right - 2.0,
-            y - 3.0,
-            "text-anchor=\"end\" font-size=\"10\"",
-            &words,
-        );
-    }
-}
-
 /// Lines along the knobs, then every mark; `family` is whose valid share makes one faint.
 fn marks(
-    svg: &mut String,
-    panel: &Panel<'_>,
     result: &ContestResult,
-    place: impl Fn(&Entry) -> Option<(f64, f64)>,
     family: usize,
-) {
-    let at = |entry: &Entry| {
-        let (x, y) = place(entry)?;
-        // What takes longer than a panel shows is left out; an error beyond its edge stands at it.
-        let shown = (panel.x.logarithmic || x <= panel.x.high)
-            && (panel.y.logarithmic || y <= panel.y.high);
-        shown.then(|| panel.at(x, y))
-    };
+    y: &Axis,
+    place: impl Fn(&Entry) -> Option<Point>,
+) -> Vec<Mark> {
+    // A time beyond an even axis is left out; an error beyond its edge stands at it.
+    let at = |entry: &Entry| place(entry).filter(|point| y.logarithmic || point.1 <= y.high);
+    let mut marks = Vec::new();
     for pair in result.entries.windows(2) {
         let [from, to] = [&pair[0], &pair[1]];
         if (from.method, from.knob) != (to.method, to.knob) {
             continue;
         }
-        if let (Some(start), Some(end), Some(look)) = (at(from), at(to), look_of(from.method)) {
-            let dash = knob_dash(from.knob);
-            let style = format!(
-                "stroke=\"{}\" stroke-width=\"1.3\" stroke-dasharray=\"{dash}\" opacity=\"0.8\"",
-                look.colour
-            );
-            line(svg, start, end, &style);
+        if let (Some(start), Some(end), Some(look)) = (at(from), at(to), look(from.method)) {
+            marks.push(Mark::Line(
+                knob_line(from.knob, look.colour),
+                vec![start, end],
+            ));
         }
     }
     for entry in &result.entries {
-        let (Some(point), Some(look)) = (at(entry), look_of(entry.method)) else {
+        let (Some(point), Some(look)) = (at(entry), look(entry.method)) else {
             continue;
         };
         if entry.is_default() {
-            ring(svg, point, look);
+            marks.push(Mark::Ring(Stroke::new(look.colour, 1.5), point));
         }
+        let share = entry.scores[family].valid_share;
+        let faded = share.filter(|share| *share < 0.5).map_or(1.0, |_| 0.3);
         let hollow = entry.cost.is_some_and(|cost| cost.worst.is_none());
-        let rarely = entry.scores[family]
-            .valid_share
-            .is_some_and(|share| share < 0.5);
-        mark(svg, point, look, hollow, if rarely { 0.3 } else { 1.0 });
+        marks.push(Mark::symbol(look.hollow(hollow).faded(faded), point));
         if entry.method == "counting" && entry.value == 80 {
             // Below if there is no room above.
-            let aside = if point.1 < panel.top + 10.0 {
-                14.0
-            } else {
-                -5.0
-            };
-            let style = "font-size=\"10\" font-style=\"italic\"";
-            text(
-                svg,
-                point.0 + 6.0,
-                point.1 + aside,
-                style,
-                "the paper’s count",
-            );
+            let aside = if y.place(point.1) > 0.93 { 14.0 } else { -5.0 };
+            let words = "the paper’s count".to_owned();
+            marks.push(Mark::Words(ASIDE.italic(), point, (6.0, aside), words));
         }
     }
+    marks
 }
 
-/// The fits' lengths beside their marks.
-fn travels(
-    svg: &mut String,
-    panel: &Panel<'_>,
-    result: &ContestResult,
-    place: impl Fn(&Entry) -> Option<(f64, f64)>,
-) {
-    for entry in &result.entries {
-        if entry.knob == "waves"
-            && let Some((x, y)) = place(entry)
-            && x <= panel.x.high
-        {
-            let (x, y) = panel.at(x, y);
-            let style = "text-anchor=\"middle\" font-size=\"10\"";
-            text(svg, x, y + 19.0, style, &format!("{} λ", entry.value));
-        }
-    }
-}
-
-/// Around the default setting's mark.
-fn ring(svg: &mut String, (x, y): (f64, f64), look: &Look) {
-    let _ = writeln!(
-        svg,
-        "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>",
-        look.colour
-    );
-}
-
-fn look_of(method: &str) -> Option<&'static Look> {
-    LOOKS.iter().find(|look| look.method == method)
+fn look(method: &str) -> Option<Symbol> {
+    let found = LOOKS.iter().find(|look| look.0 == method);
+    found.map(|look| look.1)
 }
 
 fn estimated(method: &str) -> bool {
     matches!(method, "YIN" | "McLeod")
 }
 
-fn knob_dash(knob: &str) -> &'static str {
-    match knob {
+fn knob_line(knob: &str, colour: crate::output::plot::palette::Colour) -> Stroke {
+    Stroke::new(colour, 1.3).dashed(match knob {
         "candidates" => "1.5 2.5",
         "gauges" => "6 3",
-        _ => "none",
-    }
+        _ => "",
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimators::contest::contestants;
+    use crate::estimators::costs::Cost;
+    use crate::estimators::score::Score;
 
     #[test]
     fn every_method_of_the_contest_has_a_look() {
-        for contestant in crate::estimators::contest::contestants() {
+        for contestant in contestants() {
             assert!(
-                look_of(contestant.method()).is_some(),
+                look(contestant.method()).is_some(),
                 "{}",
                 contestant.method()
             );
         }
+    }
+
+    #[test]
+    fn the_texts_stay_within_the_picture() {
+        let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/estimation");
+        let families = crate::estimators::family::load(scenes.as_ref()).unwrap();
+        let score = Score {
+            rms_percent: Some(0.5),
+            settling_ms: Some(120.0),
+            ..Score::default()
+        };
+        let entries = contestants().into_iter().map(|contestant| Entry {
+            method: contestant.method(),
+            knob: contestant.knob(),
+            value: contestant.value(),
+            setting: contestant.setting(),
+            cost: Some(Cost {
+                mean: 5_000.0,
+                worst: None,
+            }),
+            scores: vec![score.clone(); families.len()],
+        });
+        let entries = entries.collect();
+        crate::output::plot::fits::assert_fits(
+            "estimators",
+            &draw(&ContestResult { families, entries }),
+        );
     }
 }

@@ -1,12 +1,14 @@
 //! The contest's result, and its CSV.
 
 use protocol::SensorConfiguration;
+use serde::Serialize;
 
 use super::bound::{WAVES, window_mm};
 use super::costs::Cost;
 use super::family::Family;
 use super::score::Score;
 use super::settings::Setting;
+use crate::study::{Fixed, Study, csv_text};
 
 /// A contestant's row.
 #[derive(Clone, Debug)]
@@ -67,99 +69,89 @@ impl Window {
     }
 }
 
-impl ContestResult {
-    /// A line for each contestant and family, and for each bound. Empty fields were not to be had.
-    ///
-    /// # Errors
-    /// None in practice: it is written to memory.
-    pub fn csv(&self) -> Result<String, csv::Error> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        table.write_record([
-            "family",
-            "method",
-            "knob",
-            "value",
-            "instructions_per_ms",
-            "worst_ms_instructions",
-            "cost",
-            "rms_percent",
-            "worst_rms_percent",
-            "worst_scene",
-            "valid_share",
-            "wrong_share",
-            "settling_ms",
-            "longest_settling_ms",
-        ])?;
-        for (index, family) in self.families.iter().enumerate() {
-            for entry in &self.entries {
-                let score = &entry.scores[index];
-                let cost = entry.cost;
-                table.write_record([
-                    family.folder.to_owned(),
-                    entry.method.to_owned(),
-                    entry.knob.to_owned(),
-                    if entry.knob.is_empty() {
-                        String::new()
-                    } else {
-                        entry.value.to_string()
-                    },
-                    field(cost.map(|cost| cost.mean), 0),
-                    field(cost.and_then(|cost| cost.worst), 0),
-                    match cost {
-                        None => "",
-                        Some(Cost { worst: None, .. }) => "estimated",
-                        Some(_) => "counted",
-                    }
-                    .to_owned(),
-                    field(score.rms_percent, 4),
-                    field(score.worst.as_ref().map(|worst| worst.0), 4),
-                    score
-                        .worst
-                        .as_ref()
-                        .map_or(String::new(), |worst| worst.1.clone()),
-                    field(score.valid_share, 4),
-                    field(score.wrong_share, 5),
-                    field(score.settling_ms, 1),
-                    field(score.longest_settling_ms, 1),
-                ])?;
-            }
-            for window in WINDOWS {
-                let Some(bound) = window.bound_percent(family) else {
-                    continue;
-                };
-                let (knob, value) = match window {
-                    Window::Waves(waves) => ("waves", waves.to_string()),
-                    Window::Ms(ms) => ("window_ms", ms.to_string()),
-                };
-                let bound = field(Some(bound), 4);
-                let empty = "";
-                table.write_record([
-                    family.folder,
-                    "Cramér–Rao",
-                    knob,
-                    &value,
-                    empty,
-                    empty,
-                    empty,
-                    &bound,
-                    empty,
-                    empty,
-                    empty,
-                    empty,
-                    empty,
-                    empty,
-                ])?;
-            }
+/// A contestant's score in a family, or the bound on it. Empty fields were not to be had.
+#[derive(Default, Serialize)]
+struct Record<'a> {
+    family: &'a str,
+    method: &'a str,
+    knob: &'a str,
+    value: Option<u16>,
+    instructions_per_ms: Fixed<0>,
+    worst_ms_instructions: Fixed<0>,
+    cost: &'a str,
+    rms_percent: Fixed<4>,
+    worst_rms_percent: Fixed<4>,
+    worst_scene: &'a str,
+    valid_share: Fixed<4>,
+    wrong_share: Fixed<5>,
+    settling_ms: Fixed<1>,
+    longest_settling_ms: Fixed<1>,
+}
+
+impl<'a> Record<'a> {
+    fn of(family: &Family, entry: &'a Entry, score: &'a Score) -> Self {
+        let cost = entry.cost;
+        let worst = score.worst.as_ref();
+        Self {
+            family: family.folder,
+            method: entry.method,
+            knob: entry.knob,
+            value: (!entry.knob.is_empty()).then_some(entry.value),
+            instructions_per_ms: cost.map(|cost| cost.mean).into(),
+            worst_ms_instructions: cost.and_then(|cost| cost.worst).into(),
+            cost: match cost {
+                None => "",
+                Some(Cost { worst: None, .. }) => "estimated",
+                Some(_) => "counted",
+            },
+            rms_percent: score.rms_percent.into(),
+            worst_rms_percent: worst.map(|worst| worst.0).into(),
+            worst_scene: worst.map_or("", |worst| &worst.1),
+            valid_share: score.valid_share.into(),
+            wrong_share: score.wrong_share.into(),
+            settling_ms: score.settling_ms.into(),
+            longest_settling_ms: score.longest_settling_ms.into(),
         }
-        let bytes = table
-            .into_inner()
-            .map_err(|error| csv::Error::from(error.into_error()))?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    fn of_bound(family: &Family, window: Window) -> Option<Self> {
+        let (knob, value) = match window {
+            Window::Waves(waves) => ("waves", waves.into()),
+            Window::Ms(ms) => ("window_ms", ms),
+        };
+        Some(Self {
+            family: family.folder,
+            method: "Cramér–Rao",
+            knob,
+            value: Some(value),
+            rms_percent: window.bound_percent(family)?.into(),
+            ..Self::default()
+        })
     }
 }
 
-fn field(value: Option<f64>, decimals: usize) -> String {
-    value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+impl Study for ContestResult {
+    const NAME: &'static str = "estimators";
+
+    /// A line for each contestant and family, and for each bound.
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self
+            .families
+            .iter()
+            .enumerate()
+            .flat_map(|(index, family)| {
+                let entries = self.entries.iter();
+                let scored =
+                    entries.map(move |entry| Record::of(family, entry, &entry.scores[index]));
+                let bounds = WINDOWS.into_iter();
+                scored.chain(bounds.filter_map(|window| Record::of_bound(family, window)))
+            });
+        Ok(vec![("", csv_text(records)?)])
+    }
+
+    fn picture(&self) -> String {
+        super::picture::draw(self)
+    }
 }
 
 #[cfg(test)]
@@ -214,7 +206,7 @@ mod tests {
                 entry("YIN", "", None),
             ],
         };
-        let csv = result.csv().unwrap();
+        let csv = &result.csvs().unwrap()[0].1;
         let lines: Vec<&str> = csv.lines().skip(1).collect();
         assert_eq!(lines.len(), 4 + WINDOWS.len());
         assert_eq!(

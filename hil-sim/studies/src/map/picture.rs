@@ -1,27 +1,24 @@
-//! A map's picture: for each method a row of heat maps, one for each quantity, as SVG text.
+//! A map's picture: for each method a row of heat maps, one for each quantity.
 
-use std::fmt::Write;
-
-use super::axis::{Axis, Scale};
+use super::axis::{Axis as MapAxis, Scale};
 use super::journal::Rows;
 use super::measurement::Measurement;
 use super::ramp::{LEVELS, Ramp, level};
 use super::{DURATION_S, Map};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::{Cells, Mark};
+use crate::output::plot::page::{Key, Page};
+use crate::output::plot::palette::{INK, PAPER};
+use crate::output::plot::panel::Panel;
+use crate::output::plot::svg::{HATCH, Stroke};
 
-/// As wide as a README shows a picture.
-const WIDTH: f64 = 1_000.0;
-const RIGHT: f64 = 14.0;
-const GAP: f64 = 26.0;
-/// Top edge of the first row's name.
-const TOP: f64 = 126.0;
-/// Room for a row's name above its panels.
-const NAME: f64 = 22.0;
-const BELOW_ROW: f64 = 14.0;
 const PANEL_HEIGHT: f64 = 190.0;
 /// A named axis needs room for its words.
 const NAMED_STEP: f64 = 13.0;
-const INK: &str = "#242930";
-const FAINT: &str = "#5c6570";
+/// Height of the bar that shows a quantity's colours.
+const BAR_HEIGHT: f64 = 11.0;
+/// Around cells that are above a quantity's line: white below dark, to be seen on every colour.
+const BORDER: [Stroke; 2] = [Stroke::new(PAPER, 2.8), Stroke::new(INK, 1.2)];
 
 /// Something shown of every cell.
 struct Quantity {
@@ -80,262 +77,137 @@ fn decades_above(least: f64, value: f64) -> f64 {
     (value / least).log10() / 3.0
 }
 
-/// Where the panels are.
-struct Layout {
-    left: f64,
-    width: f64,
-    height: f64,
-}
-
-impl Layout {
-    fn new(map: &Map) -> Self {
-        let named = map.y.scale == Scale::Named;
-        let left = if named { 176.0 } else { 62.0 };
-        Self {
-            left,
-            width: (WIDTH - left - RIGHT - 2.0 * GAP) / QUANTITIES.len() as f64,
-            height: if named {
-                NAMED_STEP * map.y.steps.len() as f64
-            } else {
-                PANEL_HEIGHT
-            },
-        }
-    }
-
-    fn x(&self, column: usize) -> f64 {
-        self.left + column as f64 * (self.width + GAP)
-    }
-
-    fn y(&self, row: usize) -> f64 {
-        TOP + NAME + row as f64 * (self.height + NAME + BELOW_ROW)
-    }
-}
-
 /// Draws these methods' rows of a map; each must have every cell.
 pub fn draw(map: &Map, methods: &[&str], rows: &Rows) -> String {
-    let layout = Layout::new(map);
-    let bottom = layout.y(methods.len()) - NAME - BELOW_ROW;
-    let height = bottom + 84.0;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
-         font-family=\"sans-serif\" font-size=\"12\" fill=\"{INK}\">\n\
-         <defs><pattern id=\"silent\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
-         <rect width=\"6\" height=\"6\" fill=\"#d4d7db\"/><rect width=\"1.5\" height=\"6\" fill=\"#9aa1a9\"/></pattern></defs>\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    );
-    text(
-        &mut svg,
-        (14.0, 28.0),
-        "start",
-        "font-size=\"19\" font-weight=\"bold\"",
-        map.title,
-    );
-    let conditions = format!(
-        "{}; {DURATION_S:.0} s a cell, native engine",
-        map.conditions
-    );
-    text(
-        &mut svg,
-        (14.0, 49.0),
-        "start",
-        &format!("font-size=\"13\" fill=\"{FAINT}\""),
-        &conditions,
-    );
-    for (column, quantity) in QUANTITIES.iter().enumerate() {
-        colour_bar(&mut svg, quantity, layout.x(column), layout.width);
-    }
+    let mut page = Page::default();
+    page.title(map.title);
+    let conditions = map.conditions;
+    page.note(&format!(
+        "{conditions}; {DURATION_S:.0} s a cell, native engine"
+    ));
+    let (x, y) = (axis(&map.x), axis(&map.y));
+    let mut panels: Vec<Panel> = QUANTITIES.iter().map(colour_bar).collect();
     for (row, method) in methods.iter().enumerate() {
-        let top = layout.y(row);
-        text(
-            &mut svg,
-            (layout.left, top - 7.0),
-            "start",
-            "font-size=\"14\" font-weight=\"bold\"",
-            method,
-        );
-        y_axis(&mut svg, &map.y, &layout, top);
         for (column, quantity) in QUANTITIES.iter().enumerate() {
             let values: Vec<Option<f64>> = (0..map.len())
                 .map(|cell| (quantity.value)(&rows.get(&((*method).to_owned(), cell))?.measurement))
                 .collect();
-            let place = (layout.x(column), top);
-            panel(&mut svg, map, quantity, &values, place, &layout);
-            let last = row + 1 == methods.len();
-            x_axis(
-                &mut svg,
-                &map.x,
-                place.0,
-                layout.width,
-                top + layout.height,
-                last,
-            );
+            // Neighbours share words: methods and y stand on the left, x below.
+            let is_last = row + 1 == methods.len();
+            let x = if is_last { x.clone() } else { x.wordless() };
+            let panel = match column {
+                0 => Panel::new(*method, &x, &y),
+                _ => Panel::new("", &x, &y.wordless()),
+            };
+            panels.push(panel.with(marks(map, quantity, &values)));
         }
     }
-    legend(&mut svg, layout.left, bottom + 62.0);
-    svg + "</svg>\n"
+    let high = match map.y.scale {
+        Scale::Named => NAMED_STEP * map.y.steps.len() as f64,
+        Scale::Linear | Scale::Log => PANEL_HEIGHT,
+    };
+    page.panels(QUANTITIES.len(), &[BAR_HEIGHT, high], &panels);
+    page.legend(&[
+        (
+            Key::Fill(HATCH.to_owned()),
+            "nothing to show: never valid, or no faster than 5 mm/s",
+        ),
+        (Key::Fill(PAPER.light.to_owned()), "none wrong"),
+        (
+            Key::Line(Stroke::new(INK, 1.6)),
+            "10 % of error; 0.1 % wrong, the most allowed",
+        ),
+    ]);
+    page.finish()
 }
 
-fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, style: &str, text: &str) {
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" {style}>{text}</text>"
-    );
+/// A map's axis: its steps are 1 apart, each in the middle of its cells. Named steps begin at the upper end.
+fn axis(of: &MapAxis) -> Axis {
+    let ticks = of.ticks().into_iter();
+    let ticks = ticks.filter_map(|(value, label)| Some((of.along(value)?, label)));
+    let end = of.steps.len() as f64 - 0.5;
+    if of.scale != Scale::Named {
+        return Axis::named(of.label, -0.5..end, ticks.collect());
+    }
+    let label = if of.groups.is_empty() { of.label } else { "" };
+    let mut first = 0;
+    let groups = of.groups.iter().map(|(name, count)| {
+        first += count;
+        (first as f64 - 0.5 * *count as f64 - 0.5, name.clone())
+    });
+    Axis {
+        groups: groups.collect(),
+        ..Axis::named(label, end..-0.5, ticks.collect())
+    }
 }
 
-fn stroke(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &str) {
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" {style}/>",
-        from.0, from.1, to.0, to.1
-    );
+/// The fills of cells: a ramp's, and white for what is nothing at all.
+fn fills(ramp: Ramp) -> Vec<String> {
+    let levels = (0..LEVELS).map(|level| ramp.colour(level));
+    levels.chain([PAPER.light.to_owned()]).collect()
 }
 
 /// The quantity's name, its colours and their values.
-fn colour_bar(svg: &mut String, quantity: &Quantity, left: f64, width: f64) {
-    let (top, height) = (90.0, 11.0);
-    text(
-        svg,
-        (left, top - 9.0),
-        "start",
-        "font-size=\"13\"",
-        quantity.title,
+fn colour_bar(quantity: &Quantity) -> Panel {
+    let ticks = quantity.ticks.iter();
+    let ticks = ticks.map(|(value, label)| ((quantity.share)(*value), (*label).to_owned()));
+    let (x, y) = (
+        Axis::named("", 0.0..1.0, ticks.collect()),
+        Axis::named("", 0.0..1.0, vec![]),
     );
-    let step = width / LEVELS as f64;
-    for level in 0..LEVELS {
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{:.2}\" y=\"{top}\" width=\"{:.2}\" height=\"{height}\" fill=\"{}\"/>",
-            left + level as f64 * step,
-            // Overlapping, so that no background shines through.
-            if level + 1 < LEVELS { step + 0.5 } else { step },
-            quantity.ramp.colour(level)
-        );
-    }
-    let last = quantity.ticks.len() - 1;
-    for (index, (value, label)) in quantity.ticks.iter().enumerate() {
-        let x = left + (quantity.share)(*value) * width;
-        let anchor = match index {
-            0 => "start",
-            _ if index == last => "end",
-            _ => "middle",
-        };
-        text(
-            svg,
-            (x, top + height + 14.0),
-            anchor,
-            &format!("fill=\"{FAINT}\""),
-            label,
-        );
-        if quantity.line == Some(*value) {
-            let ends = ((x, top - 3.0), (x, top + height + 3.0));
-            stroke(svg, ends.0, ends.1, "stroke=\"#ffffff\" stroke-width=\"4\"");
-            stroke(
-                svg,
-                ends.0,
-                ends.1,
-                &format!("stroke=\"{INK}\" stroke-width=\"1.6\""),
-            );
-        }
-    }
+    let colours = Mark::Cells(Cells {
+        columns: LEVELS,
+        cells: (0..LEVELS).map(Some).collect(),
+        fills: fills(quantity.ramp),
+    });
+    let line = quantity.line.into_iter().flat_map(|value| {
+        let share = (quantity.share)(value);
+        BORDER.map(|stroke| Mark::Upright(stroke, share, String::new()))
+    });
+    Panel::new(quantity.title, &x, &y)
+        .with([colours])
+        .with(line)
 }
 
 /// The cells of one method and quantity.
-fn panel(
-    svg: &mut String,
-    map: &Map,
-    quantity: &Quantity,
-    values: &[Option<f64>],
-    (left, top): (f64, f64),
-    layout: &Layout,
-) {
+fn marks(map: &Map, quantity: &Quantity, values: &[Option<f64>]) -> Vec<Mark> {
     let (columns, rows) = (map.x.steps.len(), map.y.steps.len());
-    let (wide, high) = (layout.width / columns as f64, layout.height / rows as f64);
-    let _ = writeln!(
-        svg,
-        "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"url(#silent)\"/>",
-        layout.width, layout.height
-    );
-    // The panel's own rows count from its upper edge.
-    let shown = |column: usize, line: usize| {
-        let row = match map.y.scale {
-            Scale::Named => line,
-            Scale::Linear | Scale::Log => rows - 1 - line,
-        };
-        values[map.cell(column, row)]
+    let shown = |column: usize, row: usize| values[map.cell(column, row)];
+    let from_below = |line: usize| match map.y.scale {
+        Scale::Named => rows - 1 - line,
+        Scale::Linear | Scale::Log => line,
     };
-    // One path for each colour, its cells joined along x: the file stays small.
-    let mut paths = vec![String::new(); LEVELS + 1];
-    for line in 0..rows {
-        let mut column = 0;
-        while column < columns {
-            let colour = |column| shown(column, line).map(|value| shade(quantity, value));
-            let from = column;
-            while column < columns && colour(column) == colour(from) {
-                column += 1;
-            }
-            if let Some(colour) = colour(from) {
-                let length = column - from;
-                let _ = write!(paths[colour], "M{from} {line}h{length}v1h-{length}z");
-            }
-        }
-    }
-    let _ = writeln!(
-        svg,
-        "<g transform=\"translate({left:.2} {top:.2}) scale({wide:.5} {high:.5})\" shape-rendering=\"crispEdges\">"
-    );
-    for (colour, path) in paths
-        .iter()
-        .enumerate()
-        .filter(|(_, path)| !path.is_empty())
-    {
-        let fill = match colour {
-            NOTHING => "#ffffff".to_owned(),
-            colour => quantity.ramp.colour(colour),
-        };
-        let _ = writeln!(svg, "<path fill=\"{fill}\" d=\"{path}\"/>");
-    }
-    svg.push_str("</g>\n");
+    let places = (0..rows).flat_map(|line| (0..columns).map(move |column| (column, line)));
+    let fill_of = |value| shade(quantity, value);
+    let mut marks = vec![Mark::Cells(Cells {
+        columns,
+        cells: places
+            .map(|(column, line)| shown(column, from_below(line)).map(fill_of))
+            .collect(),
+        fills: fills(quantity.ramp),
+    })];
     if let Some(limit) = quantity.line {
-        let border = border(columns, rows, |column, line| {
-            shown(column, line).map(|value| value > limit)
-        });
-        for style in [
-            "stroke=\"#ffffff\" stroke-width=\"2.6\"",
-            "stroke=\"#242930\" stroke-width=\"1.2\"",
-        ] {
-            let mut path = String::new();
-            for &((x0, y0), (x1, y1)) in &border {
-                let at = |x: usize, y: usize| (left + x as f64 * wide, top + y as f64 * high);
-                let (from, to) = (at(x0, y0), at(x1, y1));
-                let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", from.0, from.1, to.0, to.1);
-            }
-            let _ = writeln!(
-                svg,
-                "<path fill=\"none\" stroke-linecap=\"square\" {style} d=\"{path}\"/>"
-            );
-        }
+        let above = |column, row| shown(column, row).map(|value| value > limit);
+        let corner = |(column, row): (usize, usize)| (column as f64 - 0.5, row as f64 - 0.5);
+        let edges: Vec<_> = border(columns, rows, above)
+            .into_iter()
+            .map(|(from, to)| (corner(from), corner(to)))
+            .collect();
+        marks.extend(BORDER.map(|stroke| Mark::Segments(stroke, edges.clone())));
     }
-    let mut line = 0;
+    let mut first = 0;
     for (_, steps) in &map.y.groups {
-        line += steps;
-        if line < rows {
-            let y = top + line as f64 * high;
-            stroke(
-                svg,
-                (left, y),
-                (left + layout.width, y),
-                "stroke=\"#ffffff\" stroke-width=\"3\"",
-            );
+        let between = first as f64 - 0.5;
+        let ends = vec![(-0.5, between), (columns as f64 - 0.5, between)];
+        if first > 0 {
+            marks.push(Mark::Line(Stroke::new(PAPER, 3.0), ends));
         }
+        first += steps;
     }
-    let _ = writeln!(
-        svg,
-        "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"none\" stroke=\"{INK}\" stroke-width=\"0.8\"/>",
-        layout.width, layout.height
-    );
+    marks
 }
 
-/// The colour of what is nothing at all, behind the ramp's levels.
+/// The fill of what is nothing at all, behind the ramp's levels.
 const NOTHING: usize = LEVELS;
 
 fn shade(quantity: &Quantity, value: f64) -> usize {
@@ -368,112 +240,6 @@ fn border(columns: usize, rows: usize, above: impl Fn(usize, usize) -> Option<bo
     edges
 }
 
-fn x_axis(svg: &mut String, axis: &Axis, left: f64, width: f64, y: f64, labelled: bool) {
-    for (value, label) in axis.ticks() {
-        let Some(along) = axis.along(value) else {
-            continue;
-        };
-        let x = left + (along + 0.5) / axis.steps.len() as f64 * width;
-        stroke(svg, (x, y), (x, y + 4.0), &format!("stroke=\"{INK}\""));
-        if labelled {
-            text(svg, (x, y + 17.0), "middle", "", &label);
-        }
-    }
-    if labelled {
-        text(
-            svg,
-            (left + width / 2.0, y + 35.0),
-            "middle",
-            "",
-            axis.label,
-        );
-    }
-}
-
-fn y_axis(svg: &mut String, axis: &Axis, layout: &Layout, top: f64) {
-    let (left, steps) = (layout.left, axis.steps.len() as f64);
-    for (value, label) in axis.ticks() {
-        let Some(along) = axis.along(value) else {
-            continue;
-        };
-        let up = (along + 0.5) / steps;
-        let (y, size) = match axis.scale {
-            Scale::Named => (top + up * layout.height, 10),
-            Scale::Linear | Scale::Log => (top + (1.0 - up) * layout.height, 12),
-        };
-        stroke(
-            svg,
-            (left - 4.0, y),
-            (left, y),
-            &format!("stroke=\"{INK}\""),
-        );
-        text(
-            svg,
-            (left - 7.0, y + 4.0),
-            "end",
-            &format!("font-size=\"{size}\""),
-            &label,
-        );
-    }
-    let mut line = 0;
-    for (name, count) in &axis.groups {
-        let middle = (line as f64 + *count as f64 / 2.0) / steps;
-        text(
-            svg,
-            (left - 52.0, top + middle * layout.height + 4.0),
-            "end",
-            "",
-            name,
-        );
-        line += count;
-    }
-    if axis.groups.is_empty() {
-        let (x, y) = (18.0, top + layout.height / 2.0);
-        let _ = writeln!(
-            svg,
-            "<text transform=\"translate({x} {y:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-            axis.label
-        );
-    }
-}
-
-fn legend(svg: &mut String, left: f64, y: f64) {
-    let mut x = left;
-    let box_at = |svg: &mut String, x: f64, fill: &str| {
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"20\" height=\"12\" fill=\"{fill}\" stroke=\"{INK}\" stroke-width=\"0.6\"/>",
-            y - 10.0
-        );
-    };
-    box_at(svg, x, "url(#silent)");
-    text(
-        svg,
-        (x + 26.0, y),
-        "start",
-        "",
-        "nothing to show: never valid, or no faster than 5 mm/s",
-    );
-    x += 360.0;
-    box_at(svg, x, "#ffffff");
-    text(svg, (x + 26.0, y), "start", "", "none wrong");
-    x += 120.0;
-    let ends = ((x, y - 4.0), (x + 20.0, y - 4.0));
-    stroke(
-        svg,
-        ends.0,
-        ends.1,
-        &format!("stroke=\"{INK}\" stroke-width=\"1.6\""),
-    );
-    text(
-        svg,
-        (x + 26.0, y),
-        "start",
-        "",
-        "10 % of error; 0.1 % wrong, the most allowed",
-    );
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -502,5 +268,15 @@ mod tests {
         // No error at all and no valid time at all are ends of their ramps.
         assert_eq!(shade(&QUANTITIES[0], 0.0), 0);
         assert_eq!(shade(&QUANTITIES[1], 0.0), 0);
+    }
+
+    #[test]
+    fn the_texts_of_every_map_stay_within_its_picture() {
+        for map in crate::map::catalogue() {
+            crate::output::plot::fits::assert_fits(
+                map.name,
+                &draw(&map, &crate::map::METHODS, &Rows::new()),
+            );
+        }
     }
 }

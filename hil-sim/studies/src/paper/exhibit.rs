@@ -2,14 +2,16 @@
 
 use std::fmt::Write;
 
-use crate::output::plot::chart::{Axis, Mark, draw_at};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
+use crate::output::plot::page::{WIDTH, chart};
 use crate::output::plot::palette::Colour;
+use crate::output::plot::panel::Panel;
 use crate::output::report::escape;
-use crate::paper::PaperError;
+use crate::psychophysics::tables::Table;
 
-/// Width of a chart for a page, and of one for a phone, in its own units: text is of one size in both.
-const BROAD: u32 = 2_000;
-const NARROW: u32 = 1_050;
+/// Width of a chart for a phone: text is of one size in it and in one for a page.
+const NARROW: f64 = 525.0;
 
 /// A figure or a table.
 #[derive(Clone, Debug)]
@@ -55,31 +57,34 @@ pub enum Part {
     },
 }
 
+impl From<Table> for Part {
+    fn from(table: Table) -> Self {
+        Self::Table {
+            caption: table.caption.to_owned(),
+            heads: table.heads,
+            rows: table.rows,
+        }
+    }
+}
+
 impl Part {
     /// Draws a chart.
-    ///
-    /// # Errors
-    /// If it cannot be drawn.
     pub(super) fn chart(
-        exhibit: &'static str,
         caption: impl Into<String>,
         legend: &[(Colour, &str)],
-        (height, x, y): (u32, &Axis, &Axis),
-        marks: &[Mark],
-    ) -> Result<Self, PaperError> {
-        let drawn = |width| {
-            draw_at((width, height), x, y, marks)
-                .map_err(|reason| PaperError::Chart { exhibit, reason })
-        };
-        Ok(Self::Chart {
+        (height, x, y): (f64, &Axis, &Axis),
+        marks: impl IntoIterator<Item = Mark>,
+    ) -> Self {
+        let panel = Panel::new("", x, y).with(marks);
+        Self::Chart {
             caption: caption.into(),
             legend: legend
                 .iter()
                 .map(|&(colour, text)| (colour, text.to_owned()))
                 .collect(),
-            broad: drawn(BROAD)?,
-            narrow: drawn(NARROW)?,
-        })
+            broad: chart(WIDTH, height, &panel),
+            narrow: chart(NARROW, height, &panel),
+        }
     }
 
     fn write(&self, page: &mut String) {
@@ -175,19 +180,4 @@ pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("–".into(), |value| {
         format!("{value:.decimals$}").replace('-', "−")
     })
-}
-
-/// A CSV's text from its header and rows.
-pub(super) fn csv_text<R: serde::Serialize>(
-    header: &[&str],
-    rows: impl IntoIterator<Item = R>,
-) -> Result<String, PaperError> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
-    table.write_record(header)?;
-    for row in rows {
-        table.serialize(row)?;
-    }
-    Ok(crate::display::finish_csv(table)?)
 }

@@ -1,11 +1,13 @@
 //! Fig. 4: a gauge behind the band-pass, and the impulses of its crossings.
 
-use crate::output::plot::chart::{Axis, Mark};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, REFUSED};
 use crate::output::report::crossings::banded;
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text};
+use crate::paper::exhibit::{Exhibit, Part};
 use crate::paper::plan::Runs;
+use crate::study::csv_text_under;
 
 const EXHIBIT: &str = "Fig. 4";
 /// The cell of Table I that is shown, λ in mm and v in mm/s, and the time, in s.
@@ -44,11 +46,11 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
         .map(|sample| sample.1.abs())
         .fold(1.0, f64::max)
         * 1.1;
-    let x = Axis::new("time in s", SHOWN_S);
-    let y = Axis::new("signal in ADC steps", -1.4 * peak..peak);
+    let x = Axis::round("time in s", SHOWN_S);
+    let y = Axis::round("signal in ADC steps", -1.4 * peak..peak);
     let marks = [
-        Mark::Strokes(REFUSED, impulses.clone(), -1.35 * peak..-1.1 * peak),
-        Mark::Line(FIRST, samples.clone()),
+        Mark::strokes(REFUSED, &impulses, -1.35 * peak..-1.1 * peak),
+        Mark::line(FIRST, samples.clone()),
     ];
     let legend = [
         (FIRST, "gauge 2, 5–100 Hz"),
@@ -76,15 +78,9 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
         ),
         csvs: vec![(
             "fig-4.csv".into(),
-            csv_text(&["t_s", "signal_lsb", "impulse"], rows)?,
+            csv_text_under(&["t_s", "signal_lsb", "impulse"], rows)?,
         )],
-        parts: vec![Part::chart(
-            EXHIBIT,
-            caption,
-            &legend,
-            (600, &x, &y),
-            &marks,
-        )?],
+        parts: vec![Part::chart(caption, &legend, (300.0, &x, &y), marks)],
         shared: &[],
     })
 }

@@ -1,13 +1,15 @@
 //! Fig. 5: a sinusoidal hand in the theory of equation (8), and the boards' count of it.
 
-use crate::output::plot::chart::{Axis, Mark};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, QUIET, REFUSED, SECOND, SHADE};
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text};
+use crate::paper::exhibit::{Exhibit, Part};
 use crate::paper::plan::{
     FIG_5_HAND_HZ, FIG_5_MM, FIG_5_PEAK_MM_S, FIG_5_WINDOW_MS, Runs, estimates,
 };
 use crate::paper::theory::Rub;
+use crate::study::csv_text_under;
 use hil_sim_core::judge::JudgedEstimate;
 
 const EXHIBIT: &str = "Fig. 5";
@@ -44,7 +46,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
     let mean_error_mm = in_t1.iter().map(|mm| mm - FIG_5_MM).sum::<f64>() / in_t1.len() as f64;
     let t1_percent = 100.0 * in_t1.len() as f64 / counted.len() as f64;
 
-    let x = Axis::new("time in s", SHOWN_S);
+    let x = Axis::round("time in s", SHOWN_S);
     let points = ((SHOWN_S.end - SHOWN_S.start) / POINT_S) as u32;
     let line = |value: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
         (0..=points)
@@ -56,15 +58,14 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
     let half_s = 0.5 * RUB.window_s;
     let top_hz = 1.1 * RUB.peak_mm_s / RUB.wavelength_mm;
     let velocity = Part::chart(
-        EXHIBIT,
         "rubbing velocity",
         &[(FIRST, "v(t)"), (SHADE, "range T2")],
-        (380, &x, &Axis::new("v in mm/s", -110.0..110.0)),
-        &[
+        (190.0, &x, &Axis::round("v in mm/s", -110.0..110.0)),
+        [
             shade(),
-            Mark::Line(FIRST, line(&|t_s| RUB.velocity_mm_s(t_s))),
+            Mark::line(FIRST, line(&|t_s| RUB.velocity_mm_s(t_s))),
         ],
-    )?;
+    );
     let counted_hz: Vec<(f64, f64)> = counted
         .iter()
         .filter_map(|e| {
@@ -74,21 +75,20 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
         })
         .collect();
     let frequency = Part::chart(
-        EXHIBIT,
         "vibratory frequency",
         &[
             (SECOND, "true f(t − A/2)"),
             (FIRST, "fe(t), equation (8)"),
             (REFUSED, "fe counted by the board"),
         ],
-        (500, &x, &Axis::new("frequency in Hz", 0.0..top_hz)),
-        &[
+        (250.0, &x, &Axis::round("frequency in Hz", 0.0..top_hz)),
+        [
             shade(),
-            Mark::Line(SECOND, line(&|t_s| RUB.frequency_hz(t_s - half_s))),
-            Mark::Line(FIRST, line(&|t_s| RUB.estimated_hz(t_s))),
-            Mark::Discs(REFUSED, counted_hz),
+            Mark::line(SECOND, line(&|t_s| RUB.frequency_hz(t_s - half_s))),
+            Mark::line(FIRST, line(&|t_s| RUB.estimated_hz(t_s))),
+            Mark::discs(REFUSED, counted_hz),
         ],
-    )?;
+    );
     let dots = |t1: bool| -> Vec<(f64, f64)> {
         counted
             .iter()
@@ -97,7 +97,6 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             .collect()
     };
     let wavelength = Part::chart(
-        EXHIBIT,
         "estimated wavelength",
         &[
             (SECOND, "λ"),
@@ -105,18 +104,18 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             (REFUSED, "λe of the board in T1"),
             (QUIET, "in T2"),
         ],
-        (500, &x, &Axis::new("wavelength in mm", 0.0..3.0)),
-        &[
+        (250.0, &x, &Axis::round("wavelength in mm", 0.0..3.0)),
+        [
             shade(),
-            Mark::Line(
+            Mark::line(
                 SECOND,
                 vec![(SHOWN_S.start, FIG_5_MM), (SHOWN_S.end, FIG_5_MM)],
             ),
-            Mark::Line(FIRST, line(&|t_s| RUB.estimated_mm(t_s).min(3.0))),
-            Mark::Discs(QUIET, dots(false)),
-            Mark::Discs(REFUSED, dots(true)),
+            Mark::line(FIRST, line(&|t_s| RUB.estimated_mm(t_s).min(3.0))),
+            Mark::discs(QUIET, dots(false)),
+            Mark::discs(REFUSED, dots(true)),
         ],
-    )?;
+    );
     let rows = counted.iter().map(|e| {
         let truth = (RUB.velocity_mm_s(e.t_s), RUB.frequency_hz(e.t_s - half_s));
         let theory = (RUB.estimated_hz(e.t_s), RUB.estimated_mm(e.t_s));
@@ -145,7 +144,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
              without steps.",
             RUB.approximation_mm(),
         ),
-        csvs: vec![("fig-5.csv".into(), csv_text(&header, rows)?)],
+        csvs: vec![("fig-5.csv".into(), csv_text_under(&header, rows)?)],
         parts: vec![velocity, frequency, wavelength],
         shared: &[],
     })

@@ -1,12 +1,14 @@
 //! Fig. 6: accuracy over the vibratory frequency.
 
-use crate::output::plot::chart::{Axis, Mark};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, INK, QUIET, REFUSED, SECOND};
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text};
+use crate::paper::exhibit::{Exhibit, Part};
 use crate::paper::plan::Runs;
 use crate::paper::published::PAPER_MM;
 use crate::paper::table_1::{measured, predicted_mm};
+use crate::study::csv_text_under;
 
 const EXHIBIT: &str = "Fig. 6";
 
@@ -35,10 +37,9 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             .map(|p| 100.0 * (p.1 - 1.0).abs())
             .fold(0.0, f64::max)
     };
-    let x = Axis::new("vibratory frequency v/λ in Hz", 0.0..75.0);
-    let y = Axis::new("accuracy λe/λ", 0.85..1.2);
+    let x = Axis::round("vibratory frequency v/λ in Hz", 0.0..75.0);
+    let y = Axis::round("accuracy λe/λ", 0.85..1.2);
     let chart = Part::chart(
-        EXHIBIT,
         "ratio of the estimated to the true wavelength",
         &[
             (REFUSED, "our count"),
@@ -46,15 +47,15 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             (FIRST, "the default estimator"),
             (SECOND, "the paper's Table I"),
         ],
-        (620, &x, &y),
-        &[
-            Mark::Line(INK, vec![(0.0, 1.0), (75.0, 1.0)]),
-            Mark::Discs(QUIET, predicted),
-            Mark::Discs(SECOND, paper.clone()),
-            Mark::Discs(REFUSED, counted.clone()),
-            Mark::Discs(FIRST, default.clone()),
+        (310.0, &x, &y),
+        [
+            Mark::line(INK, vec![(0.0, 1.0), (75.0, 1.0)]),
+            Mark::discs(QUIET, predicted),
+            Mark::discs(SECOND, paper.clone()),
+            Mark::discs(REFUSED, counted.clone()),
+            Mark::discs(FIRST, default.clone()),
         ],
-    )?;
+    );
     let header = [
         "speed_mm_s",
         "wavelength_mm",
@@ -79,7 +80,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             spread(&paper, 65.0, 75.0),
             spread(&default, 0.0, 75.0),
         ),
-        csvs: vec![("fig-6.csv".into(), csv_text(&header, rows)?)],
+        csvs: vec![("fig-6.csv".into(), csv_text_under(&header, rows)?)],
         parts: vec![chart],
         shared: &[],
     })

@@ -2,13 +2,15 @@
 
 use protocol::Range;
 
-use crate::output::plot::chart::{Axis, Mark};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, QUIET, REFUSED, SECOND};
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text};
+use crate::paper::exhibit::{Exhibit, Part};
 use crate::paper::plan::{FIG_7_MM, Runs, estimates};
 use crate::paper::theory::{Rub, WINDOW_S};
 use crate::psychophysics::hand::{FREQUENCY_HZ, PEAK_MM_S};
+use crate::study::csv_text_under;
 use hil_sim_core::judge::JudgedEstimate;
 
 const EXHIBIT: &str = "Fig. 7";
@@ -44,7 +46,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
     let valid_percent = 100.0 * default.len() as f64 / estimates.len() as f64;
     let default_rms = rms_percent(default, "valid estimate")?;
 
-    let x = Axis::new("time in s", 0.0..end_s);
+    let x = Axis::round("time in s", 0.0..end_s);
     let velocity: Vec<(f64, f64)> = (0..=(end_s * 200.0) as u32)
         .map(|point| f64::from(point) / 200.0)
         .map(|t_s| (t_s, HAND.velocity_mm_s(t_s)))
@@ -62,14 +64,12 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
         .collect();
     let parts = vec![
         Part::chart(
-            EXHIBIT,
             "rubbing velocity",
             &[(FIRST, "v = 70 sin(2π 0.83 t) mm/s")],
-            (380, &x, &Axis::new("v in mm/s", -80.0..80.0)),
-            &[Mark::Line(FIRST, velocity)],
-        )?,
+            (190.0, &x, &Axis::round("v in mm/s", -80.0..80.0)),
+            [Mark::line(FIRST, velocity)],
+        ),
         Part::chart(
-            EXHIBIT,
             "estimated wavelength (what lies above is drawn at the upper edge)",
             &[
                 (SECOND, "λ = 2 mm"),
@@ -77,14 +77,14 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
                 (QUIET, "count, T2"),
                 (FIRST, "the default estimator, valid"),
             ],
-            (560, &x, &Axis::new("wavelength in mm", 0.0..TOP_MM)),
-            &[
-                Mark::Discs(QUIET, counts(Range::T2)),
-                Mark::Discs(REFUSED, counts(Range::T1)),
-                Mark::Dots(FIRST, valid),
-                Mark::Line(SECOND, vec![(0.0, FIG_7_MM), (end_s, FIG_7_MM)]),
+            (280.0, &x, &Axis::round("wavelength in mm", 0.0..TOP_MM)),
+            [
+                Mark::discs(QUIET, counts(Range::T2)),
+                Mark::discs(REFUSED, counts(Range::T1)),
+                Mark::dots(FIRST, valid),
+                Mark::line(SECOND, vec![(0.0, FIG_7_MM), (end_s, FIG_7_MM)]),
             ],
-        )?,
+        ),
     ];
     let rows = estimates.iter().map(|e| {
         let range = match e.range {
@@ -113,7 +113,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
              the paper blames but crossings lost at low speed; the default estimator is off by {default_rms:.2} % rms \
              and valid for {valid_percent:.0} % of the time."
         ),
-        csvs: vec![("fig-7.csv".into(), csv_text(&header, rows)?)],
+        csvs: vec![("fig-7.csv".into(), csv_text_under(&header, rows)?)],
         parts,
         shared: &[],
     })

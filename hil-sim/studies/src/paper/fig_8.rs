@@ -1,12 +1,14 @@
 //! Fig. 8: from one specimen onto another.
 
-use crate::output::plot::chart::{Axis, Mark};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, INK, REFUSED, SECOND};
 use crate::output::report::crossings::banded;
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text, number};
+use crate::paper::exhibit::{Exhibit, Part, number};
 use crate::paper::plan::{FIG_8_BOUNDARY_MM, FIG_8_MM, FIG_8_SPEED_MM_S, Runs, estimates};
 use crate::paper::theory::WINDOW_S;
+use crate::study::csv_text_under;
 use hil_sim_core::judge::JudgedEstimate;
 
 const EXHIBIT: &str = "Fig. 8";
@@ -66,7 +68,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
         (low.min(value.1), high.max(value.1))
     });
 
-    let x = Axis::new("time in s", SHOWN_S);
+    let x = Axis::round("time in s", SHOWN_S);
     let edge = |points: &[(f64, f64)]| -> Vec<(f64, f64)> {
         points
             .iter()
@@ -81,20 +83,18 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
     ];
     let parts = vec![
         Part::chart(
-            EXHIBIT,
             "sensory output",
             &[
                 (FIRST, "gauge 2, 5–100 Hz"),
                 (INK, "B: the fingertip's middle is at the boundary"),
             ],
-            (440, &x, &Axis::new("signal in ADC steps", -peak..peak)),
-            &[
-                Mark::Thin(FIRST, signal.clone()),
-                Mark::Strokes(INK, vec![BOUNDARY_S], -peak..peak),
+            (220.0, &x, &Axis::round("signal in ADC steps", -peak..peak)),
+            [
+                Mark::thin(FIRST, signal.clone()),
+                Mark::strokes(INK, &[BOUNDARY_S], -peak..peak),
             ],
-        )?,
+        ),
         Part::chart(
-            EXHIBIT,
             "estimated wavelength",
             &[
                 (SECOND, "true λ"),
@@ -102,14 +102,14 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
                 (FIRST, "the default estimator, valid"),
                 (INK, "B, and a window later"),
             ],
-            (560, &x, &Axis::new("wavelength in mm", 0.0..TOP_MM)),
-            &[
-                Mark::Strokes(INK, vec![BOUNDARY_S, full_s], 0.0..TOP_MM),
-                Mark::Line(SECOND, truth),
-                Mark::Discs(REFUSED, edge(&counted)),
-                Mark::Discs(FIRST, edge(&default)),
+            (280.0, &x, &Axis::round("wavelength in mm", 0.0..TOP_MM)),
+            [
+                Mark::strokes(INK, &[BOUNDARY_S, full_s], 0.0..TOP_MM),
+                Mark::line(SECOND, truth),
+                Mark::discs(REFUSED, edge(&counted)),
+                Mark::discs(FIRST, edge(&default)),
             ],
-        )?,
+        ),
     ];
     let rows = estimates.iter().map(|e| {
         let default_mm = e.wavelength_mm.filter(|_| e.valid);
@@ -132,10 +132,10 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             1e3 * LAST_GAUGE_MM / FIG_8_SPEED_MM_S,
         ),
         csvs: vec![
-            ("fig-8.csv".into(), csv_text(&header, rows)?),
+            ("fig-8.csv".into(), csv_text_under(&header, rows)?),
             (
                 "fig-8-signal.csv".into(),
-                csv_text(&["t_s", "signal_lsb"], &signal)?,
+                csv_text_under(&["t_s", "signal_lsb"], &signal)?,
             ),
         ],
         parts,

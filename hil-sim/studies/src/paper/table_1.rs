@@ -3,10 +3,11 @@
 use firmware_sensor::counting::predicted_mean_mm;
 
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part, csv_text, number};
+use crate::paper::exhibit::{Exhibit, Part, number};
 use crate::paper::plan::{Cell, Runs};
 use crate::paper::published::PAPER_MM;
 use crate::paper::theory::WINDOW_S;
+use crate::study::csv_text_under;
 use hil_sim_core::judge::JudgedEstimate;
 
 /// What a cell came to.
@@ -109,7 +110,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
              and 50 mm/s, and the default estimator is off by at most {worst_default:.2} % at any instant's rms.",
             100.0 * paper_off,
         ),
-        csvs: vec![("table-1.csv".into(), csv_text(&header, csv)?)],
+        csvs: vec![("table-1.csv".into(), csv_text_under(&header, csv)?)],
         parts: vec![Part::Table {
             caption: "Mean λe in mm, and error per instant".into(),
             heads: heads.map(str::to_owned).to_vec(),

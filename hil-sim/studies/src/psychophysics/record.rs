@@ -1,15 +1,14 @@
 //! A study as files: JSON, and a CSV for each table.
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::display::finish_csv;
 use crate::psychophysics::DISCLAIMER;
 use crate::psychophysics::interval::{Interval, guessing, wilson};
-use crate::psychophysics::mosteller::Test;
 use crate::psychophysics::published::{SAMPLES_MM, TABLE_3, TABLE_4};
 use crate::psychophysics::recount::Recount;
-use crate::psychophysics::study::{Column, Compared, Stimulus, Study};
+use crate::psychophysics::study::{Column, Compared, Study};
+use crate::psychophysics::tables;
+use crate::study::csv_text_under;
 
 /// The study as JSON, with what it does not show.
 ///
@@ -56,28 +55,12 @@ pub fn csvs(study: &Study) -> Result<Vec<(&'static str, String)>, csv::Error> {
     ])
 }
 
-type Table = csv::Writer<Vec<u8>>;
-
-fn with_header(header: &[&str]) -> Result<Table, csv::Error> {
-    // Rows have no header of their own: theirs is written here.
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
-    table.write_record(header)?;
-    Ok(table)
-}
-
-/// A row's cells: what is none stays empty.
-fn write(table: &mut Table, row: impl Serialize) -> Result<(), csv::Error> {
-    table.serialize(row)
-}
-
 fn ends(interval: Option<Interval>) -> (Option<f64>, Option<f64>) {
     (interval.map(|i| i.low), interval.map(|i| i.high))
 }
 
 fn table_2(columns: &[Column]) -> Result<String, csv::Error> {
-    let mut table = with_header(&[
+    let header = [
         "standard_mm",
         "quantity",
         "paper_mm",
@@ -86,22 +69,19 @@ fn table_2(columns: &[Column]) -> Result<String, csv::Error> {
         "high_mm",
         "mean_mm",
         "clean_mean_mm",
-    ])?;
-    for column in columns {
-        for line in column.lines() {
+    ];
+    let rows = columns.iter().flat_map(|column| {
+        column.lines().map(|line| {
             let [paper, once, mean, clean] = line.each_mm;
             let of = (column.paper.standard_mm, line.name);
-            write(
-                &mut table,
-                (of, paper, once, ends(line.interval), mean, clean),
-            )?;
-        }
-    }
-    finish_csv(table)
+            (of, paper, once, ends(line.interval), mean, clean)
+        })
+    });
+    csv_text_under(&header, rows)
 }
 
 fn table_3(methods: &[Compared]) -> Result<String, csv::Error> {
-    let mut table = with_header(&[
+    let header = [
         "method",
         "shorter_mm",
         "longer_mm",
@@ -112,30 +92,24 @@ fn table_3(methods: &[Compared]) -> Result<String, csv::Error> {
         "wilson_high",
         "guessing_p",
         "long_run_share",
-    ])?;
-    let mut row = |method: &str, pair: &crate::psychophysics::pair::Pair, long_run: Option<f64>| {
+    ];
+    let paper = TABLE_3.iter().map(|pair| ("paper", pair, None));
+    let ours = methods.iter().flat_map(|compared| {
+        let pairs = compared.once.iter().zip(&compared.long_run);
+        pairs.map(|(pair, long_run)| (compared.method, pair, Some(long_run.share())))
+    });
+    let rows = paper.chain(ours).map(|(method, pair, long_run)| {
         let samples = (SAMPLES_MM[pair.shorter], SAMPLES_MM[pair.longer]);
         let interval = ends(Some(wilson(pair.correct, pair.trials)));
         let by_chance = guessing(pair.correct as u32, pair.trials as u32);
         let counts = (pair.correct, pair.trials, pair.share());
-        write(
-            &mut table,
-            (method, samples, counts, interval, by_chance, long_run),
-        )
-    };
-    for pair in &TABLE_3 {
-        row("paper", pair, None)?;
-    }
-    for compared in methods {
-        for (pair, long_run) in compared.once.iter().zip(&compared.long_run) {
-            row(compared.method, pair, Some(long_run.share()))?;
-        }
-    }
-    finish_csv(table)
+        (method, samples, counts, interval, by_chance, long_run)
+    });
+    csv_text_under(&header, rows)
 }
 
 fn table_4(study: &Study) -> Result<String, csv::Error> {
-    let mut table = with_header(&[
+    let header = [
         "method",
         "wavelength_mm",
         "printed_score",
@@ -143,104 +117,63 @@ fn table_4(study: &Study) -> Result<String, csv::Error> {
         "low",
         "high",
         "long_run_score",
-    ])?;
-    let none: Option<f64> = None;
-    for (sample, wavelength_mm) in SAMPLES_MM.into_iter().enumerate() {
-        let recount = &study.recount;
-        let row = (
-            "paper",
-            wavelength_mm,
-            TABLE_4[sample],
-            recount.scale.scores[sample],
-            ends(recount.intervals[sample]),
-            none,
-        );
-        write(&mut table, row)?;
-    }
-    for compared in &study.methods {
-        for (sample, wavelength_mm) in SAMPLES_MM.into_iter().enumerate() {
-            let row = (
-                compared.method,
-                wavelength_mm,
-                none,
-                compared.scores.as_ref().map(|scores| scores[sample]),
-                ends(compared.score_intervals[sample]),
-                compared.long_run_scores.get(sample),
-            );
-            write(&mut table, row)?;
-        }
-    }
-    finish_csv(table)
+    ];
+    let Recount {
+        scale, intervals, ..
+    } = &study.recount;
+    let samples = || SAMPLES_MM.into_iter().enumerate();
+    let paper = samples().map(|(sample, wavelength_mm)| {
+        let (printed, score) = (Some(TABLE_4[sample]), Some(scale.scores[sample]));
+        let of = ("paper", wavelength_mm, printed);
+        (of, score, ends(intervals[sample]), None)
+    });
+    let ours = study.methods.iter().flat_map(|compared| {
+        samples().map(|(sample, wavelength_mm)| {
+            let score = compared.scores.as_ref().map(|scores| scores[sample]);
+            let of = (compared.method, wavelength_mm, None);
+            let long_run = compared.long_run_scores.get(sample).copied();
+            (of, score, ends(compared.score_intervals[sample]), long_run)
+        })
+    });
+    csv_text_under(&header, paper.chain(ours))
 }
 
 fn mosteller(study: &Study) -> Result<String, csv::Error> {
-    let mut table = with_header(&["of", "chi_square", "freedom", "critical", "p", "rejected"])?;
-    let Recount {
-        half_an_answer,
-        left_out,
-        as_it_is,
-        simulated,
-        ..
-    } = study.recount;
-    let mut tests: Vec<(String, Test)> = vec![
-        ("paper, cell of 1.00 as 0.95".into(), half_an_answer),
-        ("paper, the same by simulation".into(), simulated),
-        ("paper, cell of 1.00 left out".into(), left_out),
-        ("paper, cell of 1.00 as it is".into(), as_it_is),
-    ];
-    for compared in &study.methods {
-        tests.extend(
-            compared
-                .test
-                .map(|test| (format!("{}, once", compared.method), test)),
-        );
-        let long_run = compared.long_run_test;
-        tests.extend(long_run.map(|test| (format!("{}, long run", compared.method), test)));
-    }
-    for (of, test) in tests {
-        write(&mut table, (of, test, test.rejects()))?;
-    }
-    finish_csv(table)
-}
-
-/// Every stimulus with who made it.
-fn stimuli(study: &Study) -> impl Iterator<Item = (&'static str, &Stimulus)> {
-    let given = study.given.iter().map(|stimulus| ("given", stimulus));
-    given.chain(study.methods.iter().flat_map(|compared| {
-        let samples = compared.samples.iter();
-        samples.map(|stimulus| (compared.method, stimulus))
-    }))
+    let header = ["of", "chi_square", "freedom", "critical", "p", "rejected"];
+    let tests = tables::tests(study);
+    let rows = tests
+        .into_iter()
+        .map(|(of, test)| (of, test, test.rejects()));
+    csv_text_under(&header, rows)
 }
 
 fn felt(study: &Study) -> Result<String, csv::Error> {
-    let mut table = with_header(&[
+    let header = [
         "method",
         "wavelength_mm",
         "waves",
         "presented_mean_mm",
         "error_rms_percent",
         "scatter_rms_percent",
-    ])?;
-    for (method, stimulus) in stimuli(study) {
-        write(&mut table, (method, stimulus))?;
-    }
-    finish_csv(table)
+    ];
+    csv_text_under(&header, study.stimuli())
 }
 
 fn waves(study: &Study) -> Result<String, csv::Error> {
-    let mut table = with_header(&[
+    let header = [
         "method",
         "wavelength_mm",
         "stroke",
         "from_s",
         "to_s",
         "presented_mm",
-    ])?;
-    for (method, stimulus) in stimuli(study) {
-        for wave in stimulus.felt().waves() {
+    ];
+    let rows = study.stimuli().flat_map(|(method, stimulus)| {
+        let waves = stimulus.felt().waves().iter();
+        waves.map(move |wave| {
             let (of, span) = ((method, stimulus.wavelength_mm), (wave.from_s, wave.to_s));
-            write(&mut table, (of, wave.stroke, span, wave.wavelength_mm))?;
-        }
-    }
-    finish_csv(table)
+            (of, wave.stroke, span, wave.wavelength_mm)
+        })
+    });
+    csv_text_under(&header, rows)
 }

@@ -314,6 +314,15 @@ impl Stimulus {
 }
 
 impl Study {
+    /// Every stimulus with who made it.
+    pub fn stimuli(&self) -> impl Iterator<Item = (&'static str, &Stimulus)> {
+        let given = self.given.iter().map(|stimulus| ("given", stimulus));
+        given.chain(self.methods.iter().flat_map(|compared| {
+            let samples = compared.samples.iter();
+            samples.map(|stimulus| (compared.method, stimulus))
+        }))
+    }
+
     /// The contender of a name.
     pub fn contender(&self, name: &str) -> Option<&Compared> {
         self.methods.iter().find(|compared| compared.method == name)

@@ -1,109 +1,79 @@
 //! The picture: how the edges are spread about their median, and hand to output over the link's delay.
 
 use super::{GOAL_MS, Row};
-use crate::output::plot::panel::{
-    AROUND, Look, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes, goal, look,
-    mark, page, polyline, text,
-};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
+use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
+use crate::output::plot::palette::{BLUE, INK, VERMILION};
+use crate::output::plot::panel::Panel;
+use crate::output::plot::svg::{Shape, Stroke, Symbol};
 
-const HEAD: f64 = 32.0;
 /// Bars of the histogram.
 const BARS: usize = 80;
 /// The jitter that is shown on either side, in µs, at least.
 const SIDE_US: f64 = 0.5;
+/// The least share of edges that is shown, in percent.
+const LEAST_PERCENT: f64 = 0.01;
 
-fn look_of(rate_hz: u32) -> Look {
+fn look(rate_hz: u32) -> Symbol {
     if rate_hz == 2_000 {
-        look("2 kHz", "#0072B2", Shape::Circle)
+        Symbol::new(BLUE, Shape::Circle).faded(0.85)
     } else {
-        look("4 kHz", "#D55E00", Shape::Square)
+        Symbol::new(VERMILION, Shape::Square).faded(0.85)
     }
 }
 
 /// Draws it.
 pub fn draw(rows: &[Row]) -> String {
-    let mut svg = page(HEAD + PANEL_HEIGHT + MARGIN);
-    text(
-        &mut svg,
-        MARGIN + 8.0,
-        20.0,
-        &format!("font-size=\"12\" fill=\"{SOFT}\""),
-        "From the LDAC edges of the display’s ELF, fifty distinct channels, the hand at up to 70 mm/s. \
-         Circles: 2 kHz; squares: 4 kHz; hollow: 20 % loss and 50 ms jitter on the link.",
+    let mut page = Page::default();
+    page.note(
+        "From the LDAC edges of the display’s ELF, fifty distinct channels, the hand at up to 70 mm/s.",
     );
-    let at = |column: usize| {
+    let hollow = Symbol::new(INK, Shape::Circle).hollow(true);
+    page.legend(&[
+        (Key::Symbol(look(2_000)), "2 kHz"),
+        (Key::Symbol(look(4_000)), "4 kHz"),
         (
-            MARGIN + column as f64 * PANEL_WIDTH + AROUND[0],
-            HEAD + AROUND[1],
-        )
+            Key::Symbol(hollow),
+            "hollow: 20 % loss and 50 ms jitter on the link",
+        ),
+    ]);
+    let x = Axis::even(0.0, 500.0, 100.0, "the link’s one-way delay, ms");
+    let longest = rows.iter().map(|row| row.reaction.max_ms);
+    let highest = longest.fold(1.0, f64::max);
+    let step = if highest > 2.0 { 1.0 } else { 0.2 };
+    let y = Axis::even(0.0, (highest / step).ceil() * step, step, "");
+    let over_delay = |row: &Row, ms: f64| {
+        let symbol = look(row.rate_hz).hollow(row.link.loss > 0.0);
+        Mark::symbol(symbol, (row.link.delay_ms, ms))
     };
-    histogram(&mut svg, at(0), rows);
-    type Value = fn(&Row) -> f64;
-    let panels: [(&str, Value); 2] = [
-        ("hand to output, p99, ms", |row| row.reaction.p99_ms),
-        ("hand to output, p50 and longest, ms", |row| {
-            row.reaction.max_ms
-        }),
-    ];
-    for (column, (title, value)) in (1..).zip(panels) {
-        let (left, top) = at(column);
-        let x = Scale::even(0.0, 500.0, 100.0, "the link’s one-way delay, ms");
-        let highest = rows
-            .iter()
-            .map(|row| row.reaction.max_ms)
-            .fold(1.0, f64::max);
-        let step = if highest > 2.0 { 1.0 } else { 0.2 };
-        let y = Scale::even(0.0, (highest / step).ceil() * step, step, "");
-        let panel = Panel {
-            left,
-            top,
-            x: &x,
-            y: &y,
-        };
-        axes(&mut svg, &panel, title);
-        if column == 1 {
-            goal(
-                &mut svg,
-                &panel,
-                GOAL_MS,
-                &format!("goal at 2 kHz: {GOAL_MS} ms"),
-            );
-        }
-        for row in rows {
-            let hollow = row.link.loss > 0.0;
-            let look = look_of(row.rate_hz);
-            let mut values = vec![value(row)];
-            if column == 2 {
-                values.push(row.reaction.p50_ms);
-            }
-            for value in values {
-                mark(
-                    &mut svg,
-                    panel.at(row.link.delay_ms, value),
-                    &look,
-                    hollow,
-                    0.85,
-                );
-            }
-        }
-    }
-    svg.push_str("</svg>\n");
-    svg
+    let p99 = rows.iter().map(|row| over_delay(row, row.reaction.p99_ms));
+    let ends = rows
+        .iter()
+        .flat_map(|row| [row.reaction.max_ms, row.reaction.p50_ms].map(|ms| over_delay(row, ms)));
+    page.panels(
+        3,
+        &[PANEL_HEIGHT],
+        &[
+            histogram(rows),
+            Panel::new("hand to output, p99, ms", &x, &y)
+                .with([Mark::Level(GOAL_MS, format!("goal at 2 kHz: {GOAL_MS} ms"))])
+                .with(p99),
+            Panel::new("hand to output, p50 and longest, ms", &x, &y).with(ends),
+        ],
+    );
+    page.finish()
 }
 
 /// Shares of the edges over their distance from the median one, the fair link's of each rate.
-fn histogram(svg: &mut String, (left, top): (f64, f64), rows: &[Row]) {
-    let shown: Vec<&Row> = [2_000, 4_000]
-        .iter()
-        .filter_map(|&rate_hz| {
-            rows.iter()
-                .find(|row| row.rate_hz == rate_hz && row.link.delay_ms == 0.0)
-        })
-        .collect();
-    let farthest = shown
-        .iter()
-        .map(|row| row.edges.jitter.max_us)
-        .fold(SIDE_US, f64::max);
+fn histogram(rows: &[Row]) -> Panel {
+    let of_rate = |rate_hz| {
+        let mut of_rate = rows.iter().filter(move |row| row.rate_hz == rate_hz);
+        of_rate.find(|row| row.link.delay_ms == 0.0)
+    };
+    let shown: Vec<&Row> = [2_000, 4_000].into_iter().filter_map(of_rate).collect();
+    let jitter = shown.iter().map(|row| row.edges.jitter.max_us);
+    let farthest = jitter.fold(SIDE_US, f64::max);
     let (side, step) = [
         (0.5, 0.25),
         (1.0, 0.5),
@@ -115,35 +85,59 @@ fn histogram(svg: &mut String, (left, top): (f64, f64), rows: &[Row]) {
     .into_iter()
     .find(|(side, _)| *side >= farthest)
     .unwrap_or((farthest.ceil(), farthest.ceil() / 2.0));
-    let x = Scale::even(-side, side, step, "LDAC edge, µs from the median one");
-    let y = Scale::decades(0.01, 100.0, "");
-    let panel = Panel {
-        left,
-        top,
-        x: &x,
-        y: &y,
-    };
-    axes(svg, &panel, "share of edges, %");
-    for row in shown {
+    let x = Axis::even(-side, side, step, "LDAC edge, µs from the median one");
+    let y = Axis::decades(LEAST_PERCENT, 100.0, "");
+    let lines = shown.into_iter().map(|row| {
         let edges = &row.edges;
         let mut bars = [0usize; BARS];
         for after_us in &edges.after_us {
             let place = (after_us - edges.after.p50_us + side) / (2.0 * side);
             bars[((place * BARS as f64) as usize).min(BARS - 1)] += 1;
         }
-        let mut points = Vec::new();
-        for (bar, &count) in bars.iter().enumerate() {
+        let steps = bars.into_iter().enumerate().flat_map(|(bar, count)| {
             let share = 100.0 * count as f64 / edges.after_us.len() as f64;
-            for end in [bar, bar + 1] {
+            [bar, bar + 1].map(|end| {
                 let from_median = 2.0 * side * end as f64 / BARS as f64 - side;
-                points.push(panel.at(from_median, share.max(0.01)));
-            }
+                (from_median, share.max(LEAST_PERCENT))
+            })
+        });
+        Mark::Line(Stroke::new(look(row.rate_hz).colour, 1.3), steps.collect())
+    });
+    Panel::new("share of edges, %", &x, &y).with(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hil_sim_core::judge::edges::{Edges, Spread};
+    use hil_sim_core::judge::reaction::Reaction;
+    use hil_sim_core::scene::Link;
+
+    #[test]
+    fn the_texts_stay_within_the_picture() {
+        let row = |rate_hz, delay_ms, max_ms| Row {
+            rate_hz,
+            link: Link {
+                delay_ms,
+                ..Link::default()
+            },
+            edges: Edges {
+                after_us: vec![40.0, 40.5, 41.0],
+                after: Spread::of(vec![40.0, 40.5, 41.0]).unwrap(),
+                jitter: Spread::of(vec![0.0, 0.5, 0.5]).unwrap(),
+                skew_us: 0.0,
+            },
+            reaction: Reaction {
+                p50_ms: 0.3,
+                p99_ms: 0.6,
+                max_ms,
+            },
+            estimates: (100, 80),
+            deadline_misses: 0,
+        };
+        for max_ms in [0.9, 12.0] {
+            let rows = [row(2_000, 0.0, max_ms), row(4_000, 500.0, max_ms)];
+            crate::output::plot::fits::assert_fits("timing", &draw(&rows));
         }
-        let look = look_of(row.rate_hz);
-        polyline(
-            svg,
-            &points,
-            &format!("stroke=\"{}\" stroke-width=\"1.3\"", look.colour),
-        );
     }
 }

@@ -1,23 +1,28 @@
 //! The picture: the reliability diagram, and what a level of confidence gives and costs.
 
 use super::{BINS, Level, Reliability};
-use crate::output::plot::panel::{
-    AROUND, INK, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes, goal, line,
-    look, mark, page, polyline, text,
-};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::font::{Anchor, Font};
+use crate::output::plot::mark::Mark;
+use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
+use crate::output::plot::palette::{BLUE, GREEN, GREY, SOFT, VERMILION};
+use crate::output::plot::panel::Panel;
+use crate::output::plot::svg::{Shape, Stroke, Symbol};
 
-const RIGHT: &str = "#009E73";
-const WRONG: &str = "#D55E00";
-const SILENT: &str = "#8a939c";
-const PLAIN: &str = "#0072B2";
-const HEAD: f64 = 52.0;
+const SHARE: Symbol = Symbol::new(BLUE, Shape::Circle);
+const RIGHT: Stroke = Stroke::new(GREEN, 2.0);
+const SILENT: Stroke = Stroke::new(GREY, 2.0);
+const WRONG: Stroke = Stroke::new(VERMILION, 2.0);
+const PLAIN: Stroke = Stroke::new(BLUE, 2.0);
+const DEFAULT: Stroke = Stroke::new(SOFT, 1.2).dashed("1 3");
 /// What may be wrong of a surface with a period, and stood by on one without.
 const GOALS: [(f64, &str); 2] = [(0.2, "0.2 %"), (0.1, "0.1 %")];
+/// The least share of estimates that is shown as wrong, in percent.
+const LEAST_PERCENT: f64 = 0.01;
 
 /// Draws it, with a line at the level in percent that is the default.
 pub fn draw(reliability: &Reliability, default: u8) -> String {
-    let mut svg = page(HEAD + PANEL_HEIGHT + MARGIN);
-    let soft = format!("font-size=\"12\" fill=\"{SOFT}\"");
+    let mut page = Page::default();
     let error = reliability
         .error
         .map_or("–".to_owned(), |error| format!("{error:.3}"));
@@ -26,158 +31,75 @@ pub fn draw(reliability: &Reliability, default: u8) -> String {
         .map_or(String::new(), |interval| {
             format!(" ({:.3}–{:.3})", interval.low, interval.high)
         });
-    text(
-        &mut svg,
-        MARGIN + 8.0,
-        20.0,
-        "font-size=\"13\"",
-        &format!(
-            "{} surfaces drawn by strangers; expected calibration error {error}{interval}, goal 0.05",
-            reliability.surfaces
-        ),
-    );
-    text(
-        &mut svg,
-        MARGIN + 8.0,
-        38.0,
-        &soft,
-        "Bars: 95 %, surfaces drawn anew. Numbers below: a bin’s share of the estimates, %. Dotted: the default level.",
-    );
-    let share = Scale::even(0.0, 1.0, 0.2, "");
-    let percent = Scale::decades(0.01, 100.0, "confidence from which on λ is stood by");
-    let said = Scale::even(0.0, 1.0, 0.2, "confidence");
-    let level = Scale::even(0.0, 1.0, 0.2, "confidence from which on λ is stood by");
-    let panel = |column: usize| {
-        (
-            MARGIN + column as f64 * PANEL_WIDTH + AROUND[0],
-            HEAD + AROUND[1],
-        )
+    page.title(&format!(
+        "{} surfaces drawn by strangers; expected calibration error {error}{interval}, goal 0.05",
+        reliability.surfaces
+    ));
+    page.note("Bars: 95 %, surfaces drawn anew. Numbers below: a bin’s share of the estimates, %.");
+    page.legend(&[
+        (Key::Line(RIGHT), "within 5 %"),
+        (Key::Line(SILENT), "silent"),
+        (Key::Line(WRONG), "with a period: more than 10 % off"),
+        (Key::Line(PLAIN), "without a period: any λ"),
+        (Key::Line(DEFAULT), "the default level"),
+    ]);
+    let share = Axis::even(0.0, 1.0, 0.2, "");
+    let percent = Axis::decades(LEAST_PERCENT, 100.0, "");
+    let said = Axis::even(0.0, 1.0, 0.2, "confidence");
+    let level = Axis::even(0.0, 1.0, 0.2, "confidence from which on λ is stood by");
+    let default = || Mark::Upright(DEFAULT, f64::from(default) / 100.0, String::new());
+    let curve = |stroke, value: fn(&Level) -> f64| {
+        let points = reliability
+            .levels
+            .iter()
+            .map(|level| (f64::from(level.percent) / 100.0, value(level)));
+        Mark::Line(stroke, points.collect())
     };
-
-    let (left, top) = panel(0);
-    let diagram = Panel {
-        left,
-        top,
-        x: &said,
-        y: &share,
-    };
-    axes(&mut svg, &diagram, "share within 5 % of the truth");
-    bars(&mut svg, &diagram, reliability);
-
-    let (left, top) = panel(1);
-    let right = Panel {
-        left,
-        top,
-        x: &level,
-        y: &share,
-    };
-    axes(&mut svg, &right, "with a period: share of estimates");
-    dotted(&mut svg, &right, default);
-    curve(&mut svg, &right, reliability, RIGHT, |level| level.right);
-    curve(&mut svg, &right, reliability, SILENT, |level| level.silent);
-    key(&mut svg, &right, 0.52, RIGHT, "within 5 %");
-    key(&mut svg, &right, 0.44, SILENT, "silent");
-
-    let (left, top) = panel(2);
-    let wrong = Panel {
-        left,
-        top,
-        x: &level,
-        y: &percent,
-    };
-    axes(&mut svg, &wrong, "stood by and wrong, %");
-    for (value, words) in GOALS {
-        goal(&mut svg, &wrong, value, words);
-    }
-    dotted(&mut svg, &wrong, default);
-    curve(&mut svg, &wrong, reliability, WRONG, |level| {
-        100.0 * level.wrong
-    });
-    curve(&mut svg, &wrong, reliability, PLAIN, |level| {
-        100.0 * level.plain
-    });
-    key(
-        &mut svg,
-        &wrong,
-        0.14,
-        WRONG,
-        "with a period: more than 10 % off",
-    );
-    key(&mut svg, &wrong, 0.06, PLAIN, "without a period: any λ");
-    svg.push_str("</svg>\n");
-    svg
+    let panels = [
+        Panel::new("share within 5 % of the truth", &said, &share).with(bars(reliability)),
+        Panel::new("with a period: share of estimates", &level, &share).with([
+            default(),
+            curve(RIGHT, |level| level.right),
+            curve(SILENT, |level| level.silent),
+        ]),
+        Panel::new("stood by and wrong, %", &level, &percent)
+            .with(GOALS.map(|(value, words)| Mark::Level(value, words.to_owned())))
+            .with([
+                default(),
+                // Nothing stands at the lower edge of a logarithmic axis.
+                curve(WRONG, |level| (100.0 * level.wrong).max(LEAST_PERCENT)),
+                curve(PLAIN, |level| (100.0 * level.plain).max(LEAST_PERCENT)),
+            ]),
+    ];
+    page.panels(3, &[PANEL_HEIGHT], &panels);
+    page.finish()
 }
 
-fn bars(svg: &mut String, panel: &Panel<'_>, reliability: &Reliability) {
-    let diagonal = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"");
-    line(svg, panel.at(0.0, 0.0), panel.at(1.0, 1.0), &diagonal);
-    let all: f64 = reliability
-        .bars
-        .iter()
-        .map(|bar| f64::from(bar.bin.estimates))
-        .sum();
-    let look = look("", PLAIN, Shape::Circle);
+fn bars(reliability: &Reliability) -> Vec<Mark> {
+    let diagonal = Stroke::new(SOFT, 1.2).dashed("6 4");
+    let mut marks = vec![Mark::Line(diagonal, vec![(0.0, 0.0), (1.0, 1.0)])];
+    let estimates = reliability.bars.iter().map(|bar| bar.bin.estimates);
+    let all: f64 = estimates.map(f64::from).sum();
     for (index, bar) in reliability.bars.iter().enumerate() {
         let Some((confidence, share)) = bar.bin.means() else {
             continue;
         };
         if let Some(interval) = bar.interval {
-            let style = format!("stroke=\"{PLAIN}\" stroke-width=\"1.5\"");
-            let ends = [interval.low, interval.high].map(|end| panel.at(confidence, end));
-            line(svg, ends[0], ends[1], &style);
+            let ends = ((confidence, interval.low), (confidence, interval.high));
+            marks.push(Mark::Segments(Stroke::new(BLUE, 1.5), vec![ends]));
         }
-        mark(svg, panel.at(confidence, share), &look, false, 1.0);
-        let (x, y) = panel.at((index as f64 + 0.5) / BINS as f64, 0.0);
+        marks.push(Mark::symbol(SHARE, (confidence, share)));
         let part = 100.0 * f64::from(bar.bin.estimates) / all;
         let words = if part < 9.95 {
             format!("{part:.1}")
         } else {
             format!("{part:.0}")
         };
-        let style = format!("text-anchor=\"middle\" font-size=\"9\" fill=\"{INK}\"");
-        text(svg, x, y - 3.0, &style, &words);
+        let middle = ((index as f64 + 0.5) / BINS as f64, 0.0);
+        let font = Font::new(9.0).at(Anchor::Middle);
+        marks.push(Mark::Words(font, middle, (0.0, -3.0), words));
     }
-}
-
-fn curve(
-    svg: &mut String,
-    panel: &Panel<'_>,
-    reliability: &Reliability,
-    colour: &str,
-    value: impl Fn(&Level) -> f64,
-) {
-    let points: Vec<(f64, f64)> = reliability
-        .levels
-        .iter()
-        .map(|level| {
-            // Nothing stands at the lower edge of a logarithmic axis.
-            let value = value(level).max(if panel.y.logarithmic {
-                panel.y.low
-            } else {
-                0.0
-            });
-            panel.at(f64::from(level.percent) / 100.0, value)
-        })
-        .collect();
-    polyline(
-        svg,
-        &points,
-        &format!("stroke=\"{colour}\" stroke-width=\"2\""),
-    );
-}
-
-fn dotted(svg: &mut String, panel: &Panel<'_>, default: u8) {
-    let (x, bottom) = panel.at(f64::from(default) / 100.0, panel.y.low);
-    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\" stroke-dasharray=\"1 3\"");
-    line(svg, (x, panel.top), (x, bottom), &style);
-}
-
-/// What a colour is, a share of the panel's height up.
-fn key(svg: &mut String, panel: &Panel<'_>, up: f64, colour: &str, words: &str) {
-    let (x, y) = (panel.left + 10.0, panel.top + Panel::HIGH * (1.0 - up));
-    let style = format!("stroke=\"{colour}\" stroke-width=\"2\"");
-    line(svg, (x, y - 4.0), (x + 18.0, y - 4.0), &style);
-    text(svg, x + 23.0, y, "font-size=\"10\"", words);
+    marks
 }
 
 #[cfg(test)]
@@ -194,6 +116,6 @@ mod tests {
         }
         let svg = draw(&Reliability::of(&[tally]), 90);
         assert_eq!(svg.matches("<circle").count(), 3);
-        assert!(roxmltree::Document::parse(&svg).is_ok());
+        crate::output::plot::fits::assert_fits("confidence", &svg);
     }
 }

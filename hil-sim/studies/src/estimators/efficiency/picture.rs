@@ -1,85 +1,85 @@
 //! The picture: error over bound, and both, over frequency.
 
 use super::{Cell, MEAN_GOAL, Row, WORST_GOAL};
-use crate::output::plot::panel::{
-    AROUND, MARGIN, PANEL_HEIGHT, PANEL_WIDTH, Panel, SOFT, Scale, Shape, axes, goal, line, look,
-    mark, page, text,
-};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
+use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
+use crate::output::plot::palette::{BLUE, INK, VERMILION};
+use crate::output::plot::panel::Panel;
+use crate::output::plot::svg::{Shape, Stroke, Symbol};
+
+/// The profiles, their looks and what a legend calls them.
+const PROFILES: [(&str, Symbol, &str); 2] = [
+    ("sine", Symbol::new(BLUE, Shape::Circle), "sines"),
+    (
+        "trapezoid",
+        Symbol::new(VERMILION, Shape::Square),
+        "trapezoids",
+    ),
+];
+const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 
 /// The estimator's error over the Cramér–Rao bound, over frequency.
 pub fn draw(rows: &[Row]) -> String {
-    let height = 32.0 + PANEL_HEIGHT + MARGIN;
-    let mut svg = page(height);
-    text(
-        &mut svg,
-        MARGIN + 8.0,
-        20.0,
-        &format!("font-size=\"11\" fill=\"{SOFT}\""),
+    let mut page = Page::default();
+    page.note(
         "The default estimator’s RMS error over the Cramér–Rao bound for the 8 λ that it fits; steady \
-         speed, 20 dB, a minute or more a mark. Circles: sines; squares: trapezoids.",
+         speed, 20 dB, a minute or more a mark.",
     );
-    let frequency = Scale::decades(4.0, 125.0, "v/λ, Hz");
-    let error = Scale::decades(0.005, 0.2, "");
-    let ratio = Scale::even(0.8, 2.0, 0.2, "");
-    let looks = [
-        ("sine", look("sine", "#0072B2", Shape::Circle)),
-        ("trapezoid", look("trapezoid", "#D55E00", Shape::Square)),
+    let profiles = PROFILES.map(|(_, symbol, words)| (Key::Symbol(symbol), words));
+    page.legend(&[&profiles[..], &[(Key::Line(BOUND), "the bound")]].concat());
+    let frequency = Axis::decades(4.0, 125.0, "v/λ, Hz");
+    let error = Axis::decades(0.005, 0.2, "");
+    let ratio = Axis::even(0.8, 2.0, 0.2, "");
+    let of = |gauges| move |row: &&Row| row.gauges == gauges;
+    let symbols = |gauges: usize, value: fn(&Cell) -> Option<f64>| {
+        PROFILES.map(|(profile, symbol, _)| {
+            let shown = rows.iter().filter(of(gauges));
+            let points = shown.filter(|row| row.profile == profile).flat_map(|row| {
+                let values = row.cells.iter().filter_map(value);
+                values.map(|value| (row.frequency_hz, value))
+            });
+            Mark::Symbols(symbol, points.collect())
+        })
+    };
+    let sines = rows
+        .iter()
+        .filter(of(5))
+        .filter(|row| row.profile == "sine");
+    let bound = sines.map(|row| (row.frequency_hz, row.bound_percent()));
+    let goals = [("mean", MEAN_GOAL), ("worst", WORST_GOAL)]
+        .map(|(of, goal)| Mark::Level(goal, format!("{of} {goal:.2}")));
+    let panels = [
+        Panel::new("one gauge: error over bound", &frequency, &ratio).with(symbols(1, Cell::ratio)),
+        Panel::new("five gauges: error over bound", &frequency, &ratio)
+            .with(goals)
+            .with(symbols(5, Cell::ratio)),
+        Panel::new("five gauges: RMS error, %", &frequency, &error)
+            .with([Mark::Line(BOUND, bound.collect())])
+            .with(symbols(5, |cell| cell.rms_percent)),
     ];
-    type Value = fn(&Cell) -> Option<f64>;
-    let panels: [(&str, usize, &Scale, Value); 3] = [
-        ("one gauge: error over bound", 1, &ratio, Cell::ratio),
-        ("five gauges: error over bound", 5, &ratio, Cell::ratio),
-        ("five gauges: RMS error, %", 5, &error, |cell| {
-            cell.rms_percent
-        }),
-    ];
-    for (column, (title, gauges, y, value)) in panels.into_iter().enumerate() {
-        let left = MARGIN + column as f64 * PANEL_WIDTH + AROUND[0];
-        let panel = Panel {
-            left,
-            top: 32.0 + AROUND[1],
-            x: &frequency,
-            y,
-        };
-        axes(&mut svg, &panel, title);
-        let shown = |profile| {
-            rows.iter()
-                .filter(move |row| row.gauges == gauges && row.profile == profile)
-        };
-        if y.logarithmic {
-            for bound in shown("sine").collect::<Vec<_>>().windows(2) {
-                let [from, to] =
-                    [bound[0], bound[1]].map(|row| panel.at(row.frequency_hz, row.bound_percent()));
-                line(
-                    &mut svg,
-                    from,
-                    to,
-                    "stroke=\"#444444\" stroke-width=\"1.2\" stroke-dasharray=\"6 4\"",
-                );
-            }
-        } else if gauges == 5 {
-            goal(&mut svg, &panel, MEAN_GOAL, &format!("mean {MEAN_GOAL:.2}"));
-            goal(
-                &mut svg,
-                &panel,
-                WORST_GOAL,
-                &format!("worst {WORST_GOAL:.2}"),
-            );
-        }
-        for (profile, look) in &looks {
-            for row in shown(profile) {
-                for value in row.cells.iter().filter_map(value) {
-                    mark(
-                        &mut svg,
-                        panel.at(row.frequency_hz, value),
-                        look,
-                        false,
-                        1.0,
-                    );
-                }
-            }
-        }
+    page.panels(3, &[PANEL_HEIGHT], &panels);
+    page.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[test]
+    fn the_texts_stay_within_the_picture() {
+        let rows = [("sine", 1), ("sine", 5), ("trapezoid", 5)].map(|(profile, gauges)| Row {
+            profile,
+            gauges,
+            frequency_hz: 20.0,
+            cells: vec![Cell {
+                wavelength_mm: 1.0,
+                duration_s: 60.0,
+                rms_percent: Some(0.06),
+                bias_percent: None,
+                valid_share: 1.0,
+                bound_percent: 0.05,
+            }],
+        });
+        crate::output::plot::fits::assert_fits("bound", &draw(&rows));
     }
-    svg.push_str("</svg>\n");
-    svg
 }

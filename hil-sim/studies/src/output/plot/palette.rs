@@ -1,77 +1,116 @@
-//! The report's colours, each for light and for dark surroundings.
+//! The colours of reports and pictures. A report's are for light and for dark surroundings; a picture stands on
+//! a ground of its own.
 
 use std::fmt::Write;
-
-use plotters::style::RGBColor;
 
 /// A colour by its role: drawn as `light`, shown as `dark` where the reader prefers that.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour {
     /// The style sheet's variable.
     pub name: &'static str,
-    light: (u8, u8, u8),
-    dark: (u8, u8, u8),
+    /// As drawn, `#rrggbb`.
+    pub light: &'static str,
+    dark: &'static str,
 }
 
+impl Colour {
+    /// A colour of pictures, which have no dark surroundings.
+    const fn of_pictures(light: &'static str) -> Self {
+        Self {
+            name: "",
+            light,
+            dark: light,
+        }
+    }
+}
+
+/// What things are drawn on.
+pub const PAPER: Colour = Colour {
+    name: "card",
+    light: "#ffffff",
+    dark: "#1c2026",
+};
+/// What is said beside the data.
+pub const SOFT: Colour = Colour {
+    name: "soft",
+    light: "#59636e",
+    dark: "#9aa4af",
+};
 /// Text and axes.
 pub const INK: Colour = Colour {
     name: "ink",
-    light: (0x24, 0x29, 0x30),
-    dark: (0xdd, 0xe1, 0xe6),
+    light: "#242930",
+    dark: "#dde1e6",
 };
 /// Grid lines.
 pub const GRID: Colour = Colour {
     name: "grid",
-    light: (0xe3, 0xe6, 0xea),
-    dark: (0x33, 0x39, 0x41),
+    light: "#e3e6ea",
+    dark: "#333941",
 };
 /// The main thing measured.
 pub const FIRST: Colour = Colour {
     name: "first",
-    light: (0x1f, 0x6f, 0xc9),
-    dark: (0x62, 0xa8, 0xf5),
+    light: "#1f6fc9",
+    dark: "#62a8f5",
 };
 /// The truth, or the second thing.
 pub const SECOND: Colour = Colour {
     name: "second",
-    light: (0x15, 0x84, 0x66),
-    dark: (0x43, 0xc5, 0x9c),
+    light: "#158466",
+    dark: "#43c59c",
 };
 /// What is not to be used.
 pub const REFUSED: Colour = Colour {
     name: "refused",
-    light: (0xc8, 0x4a, 0x1f),
-    dark: (0xf2, 0x8c, 0x5a),
+    light: "#c84a1f",
+    dark: "#f28c5a",
 };
 /// What stands beside the main thing, for comparison.
 pub const QUIET: Colour = Colour {
     name: "quiet",
-    light: (0x98, 0xa1, 0xab),
-    dark: (0x76, 0x80, 0x8b),
+    light: "#98a1ab",
+    dark: "#76808b",
 };
 /// A stretch of time set off from the rest.
 pub const SHADE: Colour = Colour {
     name: "shade",
-    light: (0xf5, 0xe6, 0xbe),
-    dark: (0x4a, 0x40, 0x22),
+    light: "#f5e6be",
+    dark: "#4a4022",
 };
 
-const ALL: [Colour; 7] = [INK, GRID, FIRST, SECOND, REFUSED, QUIET, SHADE];
+const THEMED: [Colour; 9] = [PAPER, SOFT, INK, GRID, FIRST, SECOND, REFUSED, QUIET, SHADE];
 
-impl Colour {
-    /// The colour as plots are drawn in.
-    pub fn drawn(self) -> RGBColor {
-        let (red, green, blue) = self.light;
-        RGBColor(red, green, blue)
-    }
-}
+// Okabe and Ito's colours, which the colour-blind tell apart, for what a picture compares.
+/// Blue.
+pub const BLUE: Colour = Colour::of_pictures("#0072b2");
+/// Vermilion.
+pub const VERMILION: Colour = Colour::of_pictures("#d55e00");
+/// Green.
+pub const GREEN: Colour = Colour::of_pictures("#009e73");
+/// Purple.
+pub const PURPLE: Colour = Colour::of_pictures("#cc79a7");
+/// Orange.
+pub const ORANGE: Colour = Colour::of_pictures("#e69f00");
+/// Light blue.
+pub const SKY: Colour = Colour::of_pictures("#56b4e9");
+/// Black.
+pub const BLACK: Colour = Colour::of_pictures("#000000");
+// Where eight are not enough.
+/// Violet.
+pub const VIOLET: Colour = Colour::of_pictures("#8250df");
+/// Dark yellow.
+pub const OCHRE: Colour = Colour::of_pictures("#b58900");
+/// Brown.
+pub const BROWN: Colour = Colour::of_pictures("#b35900");
+/// Grey, for what is no longer or says nothing.
+pub const GREY: Colour = Colour::of_pictures("#8a939c");
 
 /// The style rules that give every colour its variable, and a plot's drawn colours theirs.
 pub fn style_rules() -> String {
-    let hex = |(red, green, blue): (u8, u8, u8)| format!("#{red:02X}{green:02X}{blue:02X}");
-    let variables = |choose: fn(&Colour) -> (u8, u8, u8)| {
-        ALL.iter().fold(String::new(), |mut rules, colour| {
-            let _ = write!(rules, "--{}:{};", colour.name, hex(choose(colour)));
+    let variables = |choose: fn(&Colour) -> &'static str| {
+        THEMED.iter().fold(String::new(), |mut rules, colour| {
+            let _ = write!(rules, "--{}:{};", colour.name, choose(colour));
             rules
         })
     };
@@ -80,10 +119,9 @@ pub fn style_rules() -> String {
         variables(|colour| colour.light),
         variables(|colour| colour.dark),
     );
-    for colour in ALL {
-        let (drawn, name) = (hex(colour.light), colour.name);
-        let _ = writeln!(rules, "svg [fill=\"{drawn}\"]{{fill:var(--{name})}}");
-        let _ = writeln!(rules, "svg [stroke=\"{drawn}\"]{{stroke:var(--{name})}}");
+    for Colour { name, light, .. } in THEMED {
+        let _ = writeln!(rules, "svg [fill=\"{light}\"]{{fill:var(--{name})}}");
+        let _ = writeln!(rules, "svg [stroke=\"{light}\"]{{stroke:var(--{name})}}");
     }
     rules
 }

@@ -1,256 +1,397 @@
-//! A panel of a picture: axes, even or logarithmic, and marks on them, as SVG text.
-//!
-//! By hand, since its coordinates are fractions of a pixel and its marks of five shapes, full or hollow: the
-//! report's charts know neither.
+//! A panel: a title, two axes, and marks between them.
 
 use std::fmt::Write;
 
-pub(crate) const WIDTH: f64 = 1_000.0;
-pub(crate) const COLUMNS: usize = 3;
-pub(crate) const MARGIN: f64 = 8.0;
-pub(crate) const PANEL_HEIGHT: f64 = 236.0;
-pub(crate) const PANEL_WIDTH: f64 = (WIDTH - 2.0 * MARGIN) / COLUMNS as f64;
-/// Around a panel's axes: left, top, right, below.
-pub(crate) const AROUND: [f64; 4] = [40.0, 24.0, 8.0, 34.0];
-pub(crate) const INK: &str = "#24292f";
-pub(crate) const FAINT: &str = "#d9dde2";
-pub(crate) const SOFT: &str = "#6a737d";
+use super::axis::Axis;
+use super::font::{Anchor, Font};
+use super::mark::{Cells, Mark};
+use super::svg::{Frame, HATCH, Point, Stroke, Svg};
+use crate::output::plot::palette::{Colour, GRID, INK, SOFT};
 
-/// What a method looks like.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Look {
-    pub(crate) method: &'static str,
-    pub(crate) colour: &'static str,
-    pub(crate) shape: Shape,
+/// How far to the left of its frame a title begins, and a label of x may.
+const OUTDENT: f64 = 8.0;
+
+/// A panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// What is shown, above it; nothing if a heading says it.
+    pub title: String,
+    /// From left to right.
+    pub x: Axis,
+    /// From the bottom up.
+    pub y: Axis,
+    /// In the order in which they are drawn.
+    pub marks: Vec<Mark>,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Shape {
-    Circle,
-    Square,
-    Up,
-    Down,
-    Diamond,
+/// The room that a panel's words take around its axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Room {
+    /// For the words of y.
+    pub left: f64,
+    /// For the title.
+    pub above: f64,
+    /// For what a label of x reaches beyond it.
+    pub right: f64,
+    /// For the words of x.
+    pub below: f64,
 }
 
-pub(crate) const fn look(method: &'static str, colour: &'static str, shape: Shape) -> Look {
-    Look {
-        method,
-        colour,
-        shape,
+impl Room {
+    /// What is enough for both.
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            left: self.left.max(other.left),
+            above: self.above.max(other.above),
+            right: self.right.max(other.right),
+            below: self.below.max(other.below),
+        }
     }
 }
 
-/// An axis.
-pub(crate) struct Scale {
-    pub(crate) low: f64,
-    pub(crate) high: f64,
-    pub(crate) logarithmic: bool,
-    pub(crate) ticks: Vec<(f64, String)>,
-    pub(crate) label: String,
-}
-
-impl Scale {
-    pub(crate) fn decades(low: f64, high: f64, label: &str) -> Self {
-        // Where there is room, 2 and 5 are labelled too.
-        let steps: &[f64] = if high / low < 1e3 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
-        let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
-        let ticks = decades
-            .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
-            .filter(|tick| (low..=high * 1.001).contains(tick))
-            .map(|tick| (tick, short(tick)))
-            .collect();
+impl Panel {
+    /// An empty one.
+    pub fn new(title: impl Into<String>, x: &Axis, y: &Axis) -> Self {
         Self {
-            low,
-            high,
-            logarithmic: true,
-            ticks,
-            label: label.to_owned(),
+            title: title.into(),
+            x: x.clone(),
+            y: y.clone(),
+            marks: Vec::new(),
         }
     }
 
-    pub(crate) fn even(low: f64, high: f64, step: f64, label: &str) -> Self {
-        let count = ((high - low) / step + 1e-9).floor() as u32;
-        Self {
-            low,
-            high,
-            logarithmic: false,
-            ticks: (0..=count)
-                // To a billionth: a sum of tenths is not to show what binary makes of them.
-                .map(|index| ((low + f64::from(index) * step) * 1e9).round() / 1e9)
-                .map(|tick| (tick, short(tick)))
-                .collect(),
-            label: label.to_owned(),
+    /// The same with more marks.
+    pub fn with(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
+        self.marks.extend(marks);
+        self
+    }
+
+    /// The room that its words of a size need around a frame of a width; the width matters only above and below.
+    pub fn room(&self, size: f64, wide: f64) -> Room {
+        let upwards = if self.y.label.is_empty() {
+            0.0
+        } else {
+            1.6 * size
+        };
+        let labelled = self.x.ticks.iter().any(|tick| !tick.1.is_empty());
+        let x_lines = f64::from(u8::from(labelled)) + self.x_label(size, wide).len() as f64;
+        Room {
+            left: self.labels(size) + 0.8 * size + widest(&self.y.groups, size) + upwards,
+            above: 1.3 * title_font(size).size * self.titled(size, wide).len() as f64 + 0.7 * size,
+            // At most half of a label stands out, if it stands at the end.
+            right: 0.5 * widest(&self.x.ticks, size) + 0.2 * size,
+            below: 1.25 * size * x_lines + 0.5 * size,
         }
     }
 
-    /// Where a value is on it, 0 to 1; what lies beyond is put at the end.
-    pub(crate) fn place(&self, value: f64) -> f64 {
-        let share = if self.logarithmic {
-            (value / self.low).ln() / (self.high / self.low).ln()
-        } else {
-            (value - self.low) / (self.high - self.low)
+    /// The room for labels of y, and what sets them off from names of several.
+    fn labels(&self, size: f64) -> f64 {
+        let gap = if self.y.groups.is_empty() { 0.0 } else { size };
+        widest(&self.y.ticks, size) + gap
+    }
+
+    fn titled(&self, size: f64, wide: f64) -> Vec<String> {
+        title_font(size).wrap(&self.title, wide + OUTDENT)
+    }
+
+    fn x_label(&self, size: f64, wide: f64) -> Vec<String> {
+        Font::new(size).wrap(&self.x.label, wide + 2.0 * OUTDENT)
+    }
+
+    /// Draws it with its axes in a frame, words of a size around them in a room.
+    pub fn draw(&self, svg: &mut Svg, frame: &Frame, room: &Room, size: f64) {
+        let on_page = OnPage {
+            panel: self,
+            frame,
+            size,
         };
-        share.clamp(0.0, 1.0)
+        let mut baseline = frame.top - 0.7 * size;
+        for line in self.titled(size, frame.wide).iter().rev() {
+            svg.text((frame.left - OUTDENT, baseline), &title_font(size), line);
+            baseline -= 1.3 * title_font(size).size;
+        }
+        let in_cells = self.marks.iter().any(|mark| matches!(mark, Mark::Cells(_)));
+        for mark in &self.marks {
+            if let Mark::Shade(..) = mark {
+                on_page.mark(svg, mark);
+            }
+        }
+        if !in_cells {
+            on_page.grid(svg);
+        }
+        for mark in &self.marks {
+            if !matches!(mark, Mark::Shade(..)) {
+                on_page.mark(svg, mark);
+            }
+        }
+        on_page.axes(svg, room, in_cells);
     }
 }
 
-pub(crate) fn short(value: f64) -> String {
-    if value >= 1_000.0 {
-        format!("{}k", value / 1_000.0)
-    } else {
-        format!("{value}")
+fn widest(labels: &[(f64, String)], size: f64) -> f64 {
+    let font = Font::new(size);
+    let widths = labels.iter().map(|label| font.width(&label.1));
+    widths.fold(0.0, f64::max)
+}
+
+fn title_font(size: f64) -> Font {
+    Font::new(size + 1.0).bold()
+}
+
+/// A panel in its place.
+struct OnPage<'a> {
+    panel: &'a Panel,
+    frame: &'a Frame,
+    size: f64,
+}
+
+impl OnPage<'_> {
+    fn x(&self, value: f64) -> f64 {
+        self.frame.left + self.frame.wide * self.panel.x.place(value)
     }
-}
 
-/// A panel's axes on the page.
-pub(crate) struct Panel<'a> {
-    pub(crate) left: f64,
-    pub(crate) top: f64,
-    pub(crate) x: &'a Scale,
-    pub(crate) y: &'a Scale,
-}
-
-impl Panel<'_> {
-    pub(crate) const WIDE: f64 = PANEL_WIDTH - AROUND[0] - AROUND[2];
-    pub(crate) const HIGH: f64 = PANEL_HEIGHT - AROUND[1] - AROUND[3];
-
-    pub(crate) fn at(&self, x: f64, y: f64) -> (f64, f64) {
-        (
-            self.left + Self::WIDE * self.x.place(x),
-            self.top + Self::HIGH * (1.0 - self.y.place(y)),
-        )
+    fn y(&self, value: f64) -> f64 {
+        self.frame.top + self.frame.high * (1.0 - self.panel.y.place(value))
     }
-}
 
-/// The beginning of a page.
-pub(crate) fn page(height: f64) -> String {
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" \
-         viewBox=\"0 0 {WIDTH} {height}\" font-family=\"sans-serif\" font-size=\"11\" fill=\"{INK}\">\n\
-         <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    )
-}
-
-pub(crate) fn text(svg: &mut String, x: f64, y: f64, style: &str, words: &str) {
-    // A white edge keeps it legible over lines.
-    let _ = writeln!(
-        svg,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" stroke=\"#ffffff\" stroke-width=\"3\" \
-         paint-order=\"stroke\" {style}>{words}</text>"
-    );
-}
-
-pub(crate) fn line(svg: &mut String, from: (f64, f64), to: (f64, f64), style: &str) {
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" fill=\"none\" {style}/>",
-        from.0, from.1, to.0, to.1
-    );
-}
-
-/// A line through points on the page.
-pub(crate) fn polyline(svg: &mut String, points: &[(f64, f64)], style: &str) {
-    let mut path = String::new();
-    for (index, (x, y)) in points.iter().enumerate() {
-        let _ = write!(path, "{}{x:.1} {y:.1}", if index == 0 { 'M' } else { 'L' });
+    fn at(&self, (x, y): Point) -> Point {
+        (self.x(x), self.y(y))
     }
-    let _ = writeln!(
-        svg,
-        "<path d=\"{path}\" fill=\"none\" stroke-linejoin=\"round\" {style}/>"
-    );
-}
 
-pub(crate) fn axes(svg: &mut String, panel: &Panel<'_>, title: &str) {
-    let (left, top) = (panel.left, panel.top);
-    let (right, bottom) = (left + Panel::WIDE, top + Panel::HIGH);
-    text(
-        svg,
-        left - 30.0,
-        top - 9.0,
-        "font-size=\"13\" font-weight=\"600\"",
-        title,
-    );
-    for (value, label) in &panel.x.ticks {
-        let (x, _) = panel.at(*value, panel.y.low);
-        line(svg, (x, top), (x, bottom), &format!("stroke=\"{FAINT}\""));
-        text(svg, x, bottom + 14.0, "text-anchor=\"middle\"", label);
+    fn points(&self, points: &[Point]) -> Vec<Point> {
+        points.iter().map(|&point| self.at(point)).collect()
     }
-    for (value, label) in &panel.y.ticks {
-        let (_, y) = panel.at(panel.x.low, *value);
-        line(svg, (left, y), (right, y), &format!("stroke=\"{FAINT}\""));
-        text(svg, left - 5.0, y + 4.0, "text-anchor=\"end\"", label);
+
+    fn grid(&self, svg: &mut Svg) {
+        let Frame { left, top, .. } = *self.frame;
+        let (right, bottom) = (self.frame.right(), self.frame.bottom());
+        let upright = self.panel.x.ticks.iter().map(|tick| self.x(tick.0));
+        let across = self.panel.y.ticks.iter().map(|tick| self.y(tick.0));
+        let lines = upright
+            .map(|x| ((x, top), (x, bottom)))
+            .chain(across.map(|y| ((left, y), (right, y))));
+        svg.segments(&Stroke::new(GRID, 1.0), lines);
     }
-    let style = format!("text-anchor=\"middle\" fill=\"{SOFT}\"");
-    text(
-        svg,
-        (left + right) / 2.0,
-        bottom + 27.0,
-        &style,
-        &panel.x.label,
-    );
-    let _ = writeln!(
-        svg,
-        "<path d=\"M{left:.1} {top:.1}V{bottom:.1}H{right:.1}\" fill=\"none\" stroke=\"{SOFT}\"/>"
-    );
-}
 
-pub(crate) fn goal(svg: &mut String, panel: &Panel<'_>, value: f64, words: &str) {
-    let (left, y) = panel.at(panel.x.low, value);
-    let style = format!("stroke=\"{SOFT}\" stroke-width=\"1.2\"");
-    line(svg, (left, y), (left + Panel::WIDE, y), &style);
-    text(
-        svg,
-        left + 3.0,
-        y - 3.0,
-        &format!("font-size=\"10\" fill=\"{SOFT}\""),
-        words,
-    );
-}
-
-pub(crate) fn mark(svg: &mut String, (x, y): (f64, f64), look: &Look, hollow: bool, opacity: f64) {
-    let shape = match look.shape {
-        Shape::Circle => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\""),
-        Shape::Square => polygon(x, y, &[(-3.6, -3.6), (3.6, -3.6), (3.6, 3.6), (-3.6, 3.6)]),
-        Shape::Up => polygon(x, y, &[(0.0, -5.0), (4.6, 3.4), (-4.6, 3.4)]),
-        Shape::Down => polygon(x, y, &[(0.0, 5.0), (4.6, -3.4), (-4.6, -3.4)]),
-        Shape::Diamond => polygon(x, y, &[(0.0, -5.2), (5.2, 0.0), (0.0, 5.2), (-5.2, 0.0)]),
-    };
-    let (fill, stroke) = if hollow {
-        ("#ffffff", look.colour)
-    } else {
-        (look.colour, "#ffffff")
-    };
-    let width = if hollow { 1.8 } else { 0.8 };
-    let _ = writeln!(
-        svg,
-        "{shape} fill=\"{fill}\" stroke=\"{stroke}\" stroke-width=\"{width}\" opacity=\"{opacity}\"/>"
-    );
-}
-
-pub(crate) fn polygon(x: f64, y: f64, corners: &[(f64, f64)]) -> String {
-    let mut points = String::new();
-    for (across, down) in corners {
-        let _ = write!(points, "{:.1},{:.1} ", x + across, y + down);
+    fn axes(&self, svg: &mut Svg, room: &Room, in_cells: bool) {
+        let Frame {
+            left,
+            top,
+            wide,
+            high,
+        } = *self.frame;
+        let (right, bottom, size) = (self.frame.right(), self.frame.bottom(), self.size);
+        let Panel { x, y, .. } = self.panel;
+        let font = Font::new(size);
+        if in_cells {
+            // Cells hide a grid: ticks stand outside.
+            let corners = [
+                (left, top),
+                (left, bottom),
+                (right, bottom),
+                (right, top),
+                (left, top),
+            ];
+            svg.line(&Stroke::new(INK, 0.8), &corners);
+            let below = x.ticks.iter().map(|tick| self.x(tick.0));
+            let beside = y.ticks.iter().map(|tick| self.y(tick.0));
+            let ticks = below
+                .map(|x| ((x, bottom), (x, bottom + 4.0)))
+                .chain(beside.map(|y| ((left - 4.0, y), (left, y))));
+            svg.segments(&Stroke::new(INK, 1.0), ticks);
+        } else {
+            let corners = [(left, top), (left, bottom), (right, bottom)];
+            svg.line(&Stroke::new(SOFT, 1.0), &corners);
+        }
+        for (value, label) in &x.ticks {
+            let place = (self.x(*value), bottom + 1.3 * size);
+            svg.text(place, &font.at(Anchor::Middle), label);
+        }
+        let beside = left - 0.6 * size;
+        let labels = y.ticks.iter().map(|tick| (beside, tick));
+        let groups = y
+            .groups
+            .iter()
+            .map(|group| (beside - self.panel.labels(size), group));
+        for (right, (value, label)) in labels.chain(groups) {
+            let place = (right, self.y(*value) + 0.36 * size);
+            svg.text(place, &font.at(Anchor::End), label);
+        }
+        let centred = font.soft().at(Anchor::Middle);
+        let lines = self.panel.x_label(size, wide);
+        let first = bottom + room.below - 0.5 * size - 1.25 * size * (lines.len() as f64 - 1.0);
+        for (index, line) in lines.iter().enumerate() {
+            let baseline = first + 1.25 * size * index as f64;
+            svg.text((left + 0.5 * wide, baseline), &centred, line);
+        }
+        let beside = (left - room.left + size, top + 0.5 * high);
+        svg.text_upwards(beside, &centred, &y.label);
     }
-    format!("<polygon points=\"{}\"", points.trim_end())
+
+    fn mark(&self, svg: &mut Svg, mark: &Mark) {
+        match mark {
+            Mark::Line(stroke, points) => svg.line(stroke, &self.points(points)),
+            Mark::Segments(stroke, segments) => {
+                let segments = segments
+                    .iter()
+                    .map(|&(from, to)| (self.at(from), self.at(to)));
+                svg.segments(stroke, segments);
+            }
+            Mark::Dots(stroke, points) => svg.dots(stroke, self.points(points)),
+            Mark::Symbols(symbol, points) => {
+                for point in self.points(points) {
+                    svg.symbol(point, symbol);
+                }
+            }
+            Mark::Ring(stroke, point) => svg.ring(self.at(*point), stroke),
+            Mark::Bars(colour, bars) => self.bars(svg, *colour, bars.iter().cloned()),
+            Mark::Shade(colour, stretches) => {
+                let height = self.panel.y.low..self.panel.y.high;
+                let bars = stretches
+                    .iter()
+                    .map(|stretch| (stretch.clone(), height.clone()));
+                self.bars(svg, *colour, bars);
+            }
+            Mark::Cells(cells) => self.cells(svg, cells),
+            Mark::Level(value, words) => {
+                let (left, y) = (self.frame.left, self.y(*value));
+                let ends = ((left, y), (self.frame.right(), y));
+                svg.segments(&Stroke::new(SOFT, 1.2), [ends]);
+                let font = Font::new(self.size - 1.0).soft();
+                // Below where there is no room above.
+                let above = y - self.frame.top > 1.2 * font.size;
+                let baseline = if above { y - 3.0 } else { y + font.size };
+                self.words(svg, &font, (left + 3.0, baseline), words);
+            }
+            Mark::Upright(stroke, value, words) => {
+                let (x, top) = (self.x(*value), self.frame.top);
+                svg.segments(stroke, [((x, top), (x, self.frame.bottom()))]);
+                let font = Font::new(self.size - 1.0).soft();
+                self.words(svg, &font, (x + 3.0, top + font.size), words);
+            }
+            Mark::Words(font, point, (right, down), words) => {
+                let (x, y) = self.at(*point);
+                self.words(svg, font, (x + right, y + down), words);
+            }
+        }
+    }
+
+    /// Words that stay within the panel.
+    fn words(&self, svg: &mut Svg, font: &Font, (x, baseline): Point, words: &str) {
+        let width = font.width(words);
+        let before = font.anchor.share_before() * width;
+        let first = (x - before)
+            .min(self.frame.right() - 2.0 - width)
+            .max(self.frame.left + 2.0);
+        svg.text_over((first + before, baseline), font, words);
+    }
+
+    fn bars(
+        &self,
+        svg: &mut Svg,
+        colour: Colour,
+        bars: impl Iterator<Item = (std::ops::Range<f64>, std::ops::Range<f64>)>,
+    ) {
+        let frames = bars.map(|(across, up)| {
+            let ((left, bottom), (right, top)) = (
+                self.at((across.start, up.start)),
+                self.at((across.end, up.end)),
+            );
+            Frame {
+                left,
+                top,
+                wide: right - left,
+                high: bottom - top,
+            }
+        });
+        svg.rectangles(colour.light, frames);
+    }
+
+    /// One path for each fill, its cells joined along x: the file stays small.
+    fn cells(&self, svg: &mut Svg, cells: &Cells) {
+        let Frame {
+            left, wide, high, ..
+        } = *self.frame;
+        if cells.cells.iter().any(Option::is_none) {
+            svg.rectangles(HATCH, [*self.frame]);
+        }
+        let rows = cells.cells.len() / cells.columns;
+        let mut paths = vec![String::new(); cells.fills.len()];
+        for (row, of_row) in cells.cells.chunks(cells.columns).enumerate() {
+            let mut column = 0;
+            for alike in of_row.chunk_by(|one, next| one == next) {
+                if let Some(path) = alike[0].and_then(|fill| paths.get_mut(fill)) {
+                    let (line, length) = (rows - 1 - row, alike.len());
+                    // Writing to a String cannot fail.
+                    let _ = write!(path, "M{column} {line}h{length}v1h-{length}z");
+                }
+                column += alike.len();
+            }
+        }
+        let (across, down) = (wide / cells.columns as f64, high / rows as f64);
+        let scaled = format!(
+            "transform=\"translate({left:.2} {:.2}) scale({across:.5} {down:.5})\" shape-rendering=\"crispEdges\"",
+            self.frame.top
+        );
+        svg.group(&scaled, |svg| {
+            for (path, fill) in paths.iter().zip(&cells.fills) {
+                if !path.is_empty() {
+                    svg.path(path, &format!("fill=\"{fill}\""));
+                }
+            }
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::plot::palette::FIRST;
+
+    fn drawn(panel: &Panel) -> String {
+        let frame = Frame {
+            left: 50.0,
+            top: 30.0,
+            wide: 200.0,
+            high: 100.0,
+        };
+        let mut svg = Svg::default();
+        panel.draw(&mut svg, &frame, &panel.room(11.0, 260.0), 11.0);
+        svg.finish(300.0, 160.0, None)
+    }
 
     #[test]
-    fn a_scale_puts_its_ends_and_what_lies_beyond_at_0_and_1() {
-        let scale = Scale::decades(0.1, 1_000.0, "");
-        assert_eq!(scale.place(0.1), 0.0);
-        assert_eq!(scale.place(1e9), 1.0);
-        assert!((scale.place(1.0) - 0.25).abs() < 1e-12);
-        let ticks: Vec<&str> = scale.ticks.iter().map(|tick| &*tick.1).collect();
-        assert_eq!(ticks, ["0.1", "1", "10", "100", "1k"]);
+    fn a_mark_stands_at_its_values() {
+        let (x, y) = (
+            Axis::even(0.0, 10.0, 5.0, ""),
+            Axis::decades(1.0, 100.0, ""),
+        );
+        let panel = Panel::new("", &x, &y).with([Mark::line(FIRST, vec![(0.0, 1.0), (5.0, 10.0)])]);
+        assert!(drawn(&panel).contains("M50.0 130.0L150.0 80.0"));
+    }
+
+    #[test]
+    fn cells_alike_are_one_shape_and_those_without_a_fill_are_hatched() {
+        let axis = Axis::even(0.0, 1.0, 1.0, "");
+        let cells = Cells {
+            columns: 3,
+            cells: vec![Some(0), Some(0), None, Some(1), Some(0), Some(0)],
+            fills: vec!["#111111".into(), "#222222".into()],
+        };
+        let svg = drawn(&Panel::new("", &axis, &axis).with([Mark::Cells(cells)]));
+        // The first row is the lowest.
+        assert!(svg.contains("M0 1h2v1h-2zM1 0h2v1h-2z") && svg.contains("M0 0h1v1h-1z"));
+        assert!(svg.contains("<pattern") && svg.contains("fill=\"url(#hatch)\""));
+    }
+
+    #[test]
+    fn words_at_an_edge_stay_within_the_panel() {
+        let axis = Axis::even(0.0, 1.0, 1.0, "");
+        let font = Font::new(10.0);
+        let words = "a few words";
+        let mark = Mark::Words(font, (1.0, 0.5), (5.0, 0.0), words.into());
+        let left = 250.0 - 2.0 - font.width(words);
+        let svg = drawn(&Panel::new("", &axis, &axis).with([mark]));
+        assert!(svg.contains(&format!("x=\"{left:.1}\"")), "{svg}");
     }
 }

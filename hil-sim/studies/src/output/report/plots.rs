@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use protocol::{Contact, GAUGES, Mode};
 
-use crate::output::plot::chart::{Axis, Mark, draw};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, QUIET, REFUSED, SECOND, SHADE};
 use crate::output::report::Chapter;
 use crate::output::report::crossings::banded;
-use crate::output::report::figure::Figure;
+use crate::output::report::figure::{Figure, draw};
 use crate::output::report::senses;
 use crate::output::report::senses::stretches;
 use crate::output::report::thin::{DOTS, LINE_POINTS, stride, thin};
@@ -33,21 +34,21 @@ const HELD_S: f64 = 0.049;
 const APART_MM: f64 = 0.1;
 
 /// All charts of a run, in order.
-pub fn figures(chapter: &Chapter) -> Result<Vec<Figure>, String> {
+pub fn figures(chapter: &Chapter) -> Vec<Figure> {
     let Chapter {
         truth, recording, ..
     } = chapter;
-    Ok(vec![
-        signal(truth, recording)?,
-        wavelength(chapter)?,
-        senses::figure(chapter)?,
-        velocity(truth, recording)?,
-        voltages(truth, recording)?,
-    ])
+    vec![
+        signal(truth, recording),
+        wavelength(chapter),
+        senses::figure(chapter),
+        velocity(truth, recording),
+        voltages(truth, recording),
+    ]
 }
 
 /// The band-passed signal of the counted gauge and its impulses (Okamoto et al. 2009, Fig. 4).
-fn signal(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
+fn signal(truth: &Truth, recording: &Recording) -> Figure {
     let window = middle(recording.duration_s, SIGNAL_S);
     let gauge = usize::from(truth.sensor.counted_gauge).min(GAUGES - 1);
     let banded = banded(&recording.scans, gauge, window.end);
@@ -56,7 +57,7 @@ fn signal(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
         .into_iter()
         .filter(|sample| window.contains(&sample.0))
         .collect();
-    let impulses = banded
+    let impulses: Vec<f64> = banded
         .impulses
         .into_iter()
         .filter(|t_s| window.contains(t_s))
@@ -66,28 +67,28 @@ fn signal(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
         .map(|sample| sample.1.abs())
         .fold(1.0, f64::max)
         * 1.1;
-    let marks = [
-        Mark::Strokes(REFUSED, impulses, -1.35 * peak..-1.1 * peak),
-        Mark::Line(FIRST, samples),
+    let marks = vec![
+        Mark::strokes(REFUSED, &impulses, -1.35 * peak..-1.1 * peak),
+        Mark::line(FIRST, samples),
     ];
-    Ok(Figure {
+    Figure {
         title: format!("Gauge {gauge} behind the band-pass"),
         legend: vec![
             (FIRST, "signal, 5–100 Hz"),
             (REFUSED, "impulse at each zero crossing"),
         ],
         svg: draw(
-            620,
-            &Axis::new("time in s", window),
-            &Axis::new("signal in ADC steps", -1.4 * peak..peak),
-            &marks,
-        )?,
+            310.0,
+            &Axis::round("time in s", window),
+            &Axis::round("signal in ADC steps", -1.4 * peak..peak),
+            marks,
+        ),
         note: "The sensor's own filters, run over the recorded codes.".into(),
-    })
+    }
 }
 
 /// λ̂ against the truth.
-fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
+fn wavelength(chapter: &Chapter) -> Figure {
     let Chapter {
         truth,
         recording,
@@ -114,13 +115,13 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
     // Guesses at a near standstill can be huge: they stay at the upper edge.
     let shown_mm = (1.1 * largest(valid).max(largest(count))).min(2.0 * true_mm);
     let top_mm = (1.25 * true_mm).max(shown_mm);
-    let y = Axis::new("wavelength λ in mm", 0.0..top_mm);
+    let y = Axis::round("wavelength λ in mm", 0.0..top_mm);
     let dots = |valid: bool| {
         let points: Vec<_> = verdict
             .estimates
             .iter()
             .filter(|estimate| estimate.valid == valid)
-            .filter_map(|e| Some((e.t_s, e.wavelength_mm?.min(y.range.end))))
+            .filter_map(|e| Some((e.t_s, e.wavelength_mm?.min(y.high))))
             .collect();
         thin(&points, DOTS)
     };
@@ -147,24 +148,24 @@ fn wavelength(chapter: &Chapter) -> Result<Figure, String> {
     }
     if truth.counts_beside() {
         legend.push((QUIET, "the paper's count beside it, A = 80 ms, in T1"));
-        let lines = counted(&verdict.estimates, y.range.end);
-        marks.extend(lines.into_iter().map(|line| Mark::Thin(QUIET, line)));
+        let lines = counted(&verdict.estimates, y.high);
+        marks.extend(lines.into_iter().map(|line| Mark::thin(QUIET, line)));
     }
     marks.extend([
-        Mark::Dots(REFUSED, dots(false)),
-        Mark::Dots(FIRST, dots(true)),
-        Mark::Line(SECOND, with_steps(&truths)),
+        Mark::dots(REFUSED, dots(false)),
+        Mark::dots(FIRST, dots(true)),
+        Mark::line(SECOND, with_steps(&truths)),
     ]);
     let mut note = String::from("What lies above the chart is drawn at its upper edge.");
     if nth > 1 {
         note += " Of many estimates only some are drawn.";
     }
-    Ok(Figure {
+    Figure {
         title: "Wavelength, estimated and true".into(),
         legend,
-        svg: draw(620, &whole(recording), &y, &marks)?,
+        svg: draw(310.0, &whole(recording), &y, marks),
         note,
-    })
+    }
 }
 
 /// The paper's count as lines that break where it has nothing to say or is in T2.
@@ -188,7 +189,7 @@ fn speaks(estimate: &JudgedEstimate) -> bool {
 }
 
 /// The hand's velocity, and the arm's where it is another; the paper's range T2 shaded.
-fn velocity(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
+fn velocity(truth: &Truth, recording: &Recording) -> Figure {
     let hand = Track::of_hand(recording);
     let arm = Track::of_arm(recording);
     let velocities = |track: &Track| -> Vec<(f64, f64)> {
@@ -216,25 +217,25 @@ fn velocity(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
     });
     if apart {
         legend.insert(1, (SECOND, "arm"));
-        marks.push(Mark::Line(SECOND, of_arm));
+        marks.push(Mark::line(SECOND, of_arm));
     }
-    marks.push(Mark::Line(FIRST, of_hand));
+    marks.push(Mark::line(FIRST, of_hand));
     let margin = 0.1 * (high - low).max(1.0);
-    Ok(Figure {
+    Figure {
         title: "Rubbing velocity".into(),
         legend,
         svg: draw(
-            500,
+            250.0,
             &whole(recording),
-            &Axis::new("velocity v in mm/s", low - margin..high + margin),
-            &marks,
-        )?,
+            &Axis::round("velocity v in mm/s", low - margin..high + margin),
+            marks,
+        ),
         note: format!("The window A is {:.0} ms.", 1e3 * truth.window_s()),
-    })
+    }
 }
 
 /// Some actuators' voltages, one above the other.
-fn voltages(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
+fn voltages(truth: &Truth, recording: &Recording) -> Figure {
     let shown: &[usize] = match truth.display.mode {
         Mode::Uniform => &UNIFORM,
         Mode::Travelling => &TRAVELLING,
@@ -246,7 +247,7 @@ fn voltages(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
         .enumerate()
         .map(|(lane, &actuator)| {
             let colour = if lane % 2 == 0 { FIRST } else { SECOND };
-            Mark::Line(colour, held(recording, actuator, &window, zero_v(lane)))
+            Mark::line(colour, held(recording, actuator, &window, zero_v(lane)))
         })
         .collect();
     let labels = shown
@@ -261,25 +262,23 @@ fn voltages(truth: &Truth, recording: &Recording) -> Result<Figure, String> {
             ]
         })
         .collect();
-    let y = Axis {
-        named: Some(labels),
-        ..Axis::new("actuator: voltage in V", zero_v(shown.len() - 1) - 5.5..5.5)
-    };
-    let height = 150 + 200 * shown.len() as u32;
-    Ok(Figure {
+    let range = zero_v(shown.len() - 1) - 5.5..5.5;
+    let y = Axis::named("actuator: voltage in V", range, labels);
+    let height = 75.0 + 100.0 * shown.len() as f64;
+    Figure {
         title: match truth.display.mode {
             Mode::Uniform => "Voltages of three actuators, all in phase".into(),
             Mode::Travelling => "Voltages along the middle row, a travelling pattern".into(),
         },
         legend: Vec::new(),
-        svg: draw(height, &Axis::new("time in s", window), &y, &marks)?,
+        svg: draw(height, &Axis::round("time in s", window), &y, marks),
         note: "Held from one LDAC edge to the next, as the DACs hold it.".into(),
-    })
+    }
 }
 
 /// The time of the whole run.
 fn whole(recording: &Recording) -> Axis {
-    Axis::new("time in s", 0.0..recording.duration_s)
+    Axis::round("time in s", 0.0..recording.duration_s)
 }
 
 /// `length_s` from the middle of a run, or all of it.

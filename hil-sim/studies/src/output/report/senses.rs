@@ -5,10 +5,11 @@ use std::ops::Range;
 
 use protocol::{Contact, GAUGES, GaugeHealth};
 
-use crate::output::plot::chart::{Axis, Mark, draw};
+use crate::output::plot::axis::Axis;
+use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{Colour, FIRST, QUIET, REFUSED, SECOND, SHADE};
 use crate::output::report::Chapter;
-use crate::output::report::figure::Figure;
+use crate::output::report::figure::{Figure, draw};
 use crate::output::report::thin::{DOTS, stride};
 use hil_sim_core::judge::JudgedEstimate;
 
@@ -30,7 +31,7 @@ const OF_GAUGES: [(Colour, &str); 3] = [
 ];
 
 /// The strips: the contact above, the gauges below.
-pub fn figure(chapter: &Chapter) -> Result<Figure, String> {
+pub fn figure(chapter: &Chapter) -> Figure {
     let estimates = &chapter.verdict.estimates;
     let mut labels = vec![(GAUGES as f64, "contact".to_owned())];
     let contact = stretches(estimates, |e| of_contact(e.contact));
@@ -47,13 +48,10 @@ pub fn figure(chapter: &Chapter) -> Result<Figure, String> {
         filled.push((look, bars.collect()));
     }
     labels.extend((0..GAUGES).map(|gauge| (lane(gauge), format!("gauge {gauge}"))));
-    let y = Axis {
-        named: Some(labels),
-        ..Axis::new("", -0.5..GAUGES as f64 + 0.5)
-    };
+    let y = Axis::named("", -0.5..GAUGES as f64 + 0.5, labels);
     filled.retain(|(_, bars)| !bars.is_empty());
     let legend = filled.iter().map(|(look, _)| *look).collect();
-    let marks: Vec<Mark> = filled
+    let marks = filled
         .into_iter()
         .map(|((colour, _), bars)| Mark::Bars(colour, bars))
         .collect();
@@ -63,17 +61,17 @@ pub fn figure(chapter: &Chapter) -> Result<Figure, String> {
         // Writing to a String cannot fail.
         let _ = write!(note, " Of {nth} estimates the one that says most is drawn.");
     }
-    Ok(Figure {
+    Figure {
         title: "Contact and gauges, by the sensor's word".into(),
         legend,
         svg: draw(
-            420,
-            &Axis::new("time in s", 0.0..chapter.recording.duration_s),
+            210.0,
+            &Axis::round("time in s", 0.0..chapter.recording.duration_s),
             &y,
-            &marks,
-        )?,
+            marks,
+        ),
         note,
-    })
+    }
 }
 
 /// The height of a gauge's strip: the first on top.
