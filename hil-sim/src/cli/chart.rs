@@ -1,6 +1,6 @@
 //! `hil-sim chart`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Subcommand;
@@ -13,10 +13,8 @@ use hil_sim_studies::estimators::efficiency;
 use hil_sim_studies::estimators::family;
 use hil_sim_studies::estimators::result::{ContestResult, Entry};
 use hil_sim_studies::estimators::score::Score;
-use hil_sim_studies::study::Study;
 
-use super::files::{create_folder, write};
-use super::say::say;
+use super::files::{create_folder, keep};
 use super::{confidence, display, models, progress};
 
 #[derive(Debug, clap::Args)]
@@ -145,16 +143,4 @@ impl Bound {
         progress.finish_and_clear();
         keep(&rows[..], &self.out)
     }
-}
-
-/// Prints a study's table and writes its files. Exit status 1 if it misses a goal.
-pub(super) fn keep<S: Study + ?Sized>(study: &S, out: &Path) -> anyhow::Result<ExitCode> {
-    if let Some(table) = study.table() {
-        say!("{table}");
-    }
-    for (kind, text) in study.csvs()? {
-        write(&out.join(format!("{}{kind}.csv", S::NAME)), &text)?;
-    }
-    write(&out.join(format!("{}.svg", S::NAME)), &study.picture())?;
-    Ok(ExitCode::from(u8::from(!study.is_met())))
 }

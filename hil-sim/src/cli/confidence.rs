@@ -8,8 +8,7 @@ use hil_sim_studies::jury::seeds::REPORTING;
 use hil_sim_studies::study::Table;
 use protocol::SensorConfiguration;
 
-use super::chart::keep;
-use super::files::create_folder;
+use super::files::{create_folder, keep};
 use super::say::say;
 use super::{number, progress};
 

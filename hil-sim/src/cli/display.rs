@@ -9,8 +9,7 @@ use hil_sim_studies::display::purity::Extent;
 use hil_sim_studies::display::{delay, stop, timing};
 use protocol::Role;
 
-use super::chart::keep;
-use super::files::create_folder;
+use super::files::{create_folder, keep};
 use super::progress;
 
 /// The display's ELF, and where to write what it does.

@@ -1,8 +1,10 @@
 //! Files that commands write.
 
 use std::path::Path;
+use std::process::ExitCode;
 
 use anyhow::Context;
+use hil_sim_studies::study::Study;
 
 use super::say::say;
 
@@ -19,4 +21,16 @@ pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
     std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
     say!("{}", path.display());
     Ok(())
+}
+
+/// Prints a study's table and writes its files. Exit status 1 if it misses a goal.
+pub(super) fn keep<S: Study + ?Sized>(study: &S, out: &Path) -> anyhow::Result<ExitCode> {
+    if let Some(table) = study.table() {
+        say!("{table}");
+    }
+    for (kind, text) in study.csvs()? {
+        write(&out.join(format!("{}{kind}.csv", S::NAME)), &text)?;
+    }
+    write(&out.join(format!("{}.svg", S::NAME)), &study.picture())?;
+    Ok(ExitCode::from(u8::from(!study.is_met())))
 }

@@ -5,8 +5,7 @@ use std::process::ExitCode;
 
 use hil_sim_studies::contact::{models, stability};
 
-use super::chart::keep;
-use super::files::create_folder;
+use super::files::{create_folder, keep};
 use super::progress;
 
 #[derive(Debug, clap::Args)]

@@ -10,6 +10,7 @@ use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{BLACK, BLUE, GREEN, GREY, INK, OCHRE, PURPLE, SOFT, VERMILION};
 use crate::output::plot::panel::Panel;
 use crate::output::plot::svg::{Point, Shape, Stroke, Symbol};
+use crate::study::Study;
 
 /// What methods look like: no two share shape and colour.
 const LOOKS: [(&str, Symbol); 13] = [
@@ -227,6 +228,18 @@ fn knob_line(knob: &str, colour: crate::output::plot::palette::Colour) -> Stroke
         "gauges" => "6 3",
         _ => "",
     })
+}
+
+impl Study for ContestResult {
+    const NAME: &'static str = "estimators";
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        Ok(vec![("", self.csv()?)])
+    }
+
+    fn picture(&self) -> String {
+        draw(self)
+    }
 }
 
 #[cfg(test)]

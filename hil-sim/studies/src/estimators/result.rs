@@ -8,7 +8,7 @@ use super::costs::Cost;
 use super::family::Family;
 use super::score::Score;
 use super::settings::Setting;
-use crate::study::{Fixed, Study, csv_text};
+use crate::study::{Fixed, csv_text};
 
 /// A contestant's row.
 #[derive(Clone, Debug)]
@@ -130,11 +130,12 @@ impl<'a> Record<'a> {
     }
 }
 
-impl Study for ContestResult {
-    const NAME: &'static str = "estimators";
-
+impl ContestResult {
     /// A line for each contestant and family, and for each bound.
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+    ///
+    /// # Errors
+    /// If a line cannot be written, which nothing should bring about.
+    pub fn csv(&self) -> Result<String, csv::Error> {
         let records = self
             .families
             .iter()
@@ -146,11 +147,7 @@ impl Study for ContestResult {
                 let bounds = WINDOWS.into_iter();
                 scored.chain(bounds.filter_map(|window| Record::of_bound(family, window)))
             });
-        Ok(vec![("", csv_text(records)?)])
-    }
-
-    fn picture(&self) -> String {
-        super::picture::draw(self)
+        csv_text(records)
     }
 }
 
@@ -206,7 +203,7 @@ mod tests {
                 entry("YIN", "", None),
             ],
         };
-        let csv = &result.csvs().unwrap()[0].1;
+        let csv = &result.csv().unwrap();
         let lines: Vec<&str> = csv.lines().skip(1).collect();
         assert_eq!(lines.len(), 4 + WINDOWS.len());
         assert_eq!(

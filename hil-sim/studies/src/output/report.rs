@@ -10,6 +10,7 @@ mod thin;
 
 use std::fmt::Write;
 
+use crate::output::escape::escape;
 use crate::output::json::ContactResult;
 use crate::output::report::figure::Figure;
 use hil_sim_core::judge::Verdict;
@@ -126,14 +127,6 @@ fn write_figure(page: &mut String, figure: &Figure) {
         "<div class=wide>{svg}</div>\n<p>{}</p></figure>",
         escape(&figure.note)
     );
-}
-
-/// Text as HTML shows it.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
+use crate::output::escape::escape;
 use crate::output::plot::axis::Axis;
 use crate::output::plot::mark::Mark;
 use crate::output::plot::page::{WIDTH, chart};
 use crate::output::plot::palette::Colour;
 use crate::output::plot::panel::Panel;
-use crate::output::report::escape;
 use crate::psychophysics::tables::Table;
 
 /// Width of a chart for a phone: text is of one size in it and in one for a page.

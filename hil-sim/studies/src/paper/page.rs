@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::output::escape::escape;
 use crate::output::plot::palette::style_rules;
-use crate::output::report::escape;
 use crate::paper::Exhibit;
 use crate::psychophysics::DISCLAIMER;
 use crate::psychophysics::study::Study;

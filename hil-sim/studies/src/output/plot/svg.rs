@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::font::Font;
+use crate::output::escape::escape;
 use crate::output::plot::palette::{Colour, PAPER};
-use crate::output::report::escape;
 
 /// A point of a picture: right and down from its upper left corner.
 pub type Point = (f64, f64);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::escape;
+use crate::output::escape::escape;
 use hil_sim_core::judge::fault::Finding;
 
 /// A line for each fault; nothing if there are none.

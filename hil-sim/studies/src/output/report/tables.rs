@@ -6,7 +6,8 @@ use protocol::{GAUGES, GaugeHealth, RoleCounters, Status};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::output::report::{Chapter, escape};
+use crate::output::escape::escape;
+use crate::output::report::Chapter;
 use hil_sim_core::judge::{JudgedEstimate, words};
 
 /// Log lines shown, at most.
