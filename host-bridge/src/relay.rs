@@ -28,4 +28,5 @@ pub mod reach;
 pub mod report;
 pub mod site;
 pub mod stops;
+pub mod transport;
 pub mod wire;

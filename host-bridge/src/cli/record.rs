@@ -16,9 +16,9 @@ use host_bridge::recording::{PART, Progress, Recorder, Settings};
 use host_bridge::state::State;
 use protocol::{Message, Role};
 use serde::Serialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output;
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -110,10 +110,7 @@ impl Record {
         let bench = self.boards.find()?;
         let part = Duration::try_from_secs_f64(self.split * 60.0);
         let part = part.map_err(|_| anyhow::anyhow!("--split: give minutes, 0 or more"))?;
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let recorder = Arc::new(Recorder::start(Settings {
             mcap: self.file.clone(),
             csv: self.csv.clone(),

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::ValueHint;
+use host_bridge::clock::SystemClock;
 use host_bridge::host_clock::now_us;
 use host_bridge::link::{Event, Link};
 use host_bridge::monitor::{self, Options, Source};
@@ -19,9 +20,9 @@ use host_bridge::replay::scene;
 use host_bridge::replay::stand_in::StandIn;
 use host_bridge::replay::{Pace, Played, SPEEDS, play};
 use protocol::Role;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::output;
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -159,22 +160,25 @@ impl Replay {
 
     /// Plays it into a monitor, which shows its end until a key ends it.
     fn watch(&self, recording: Reader) -> anyhow::Result<ExitCode> {
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::OF_A_TERMINAL, Again::IsIgnored)?;
         let pace = self.pace();
         let (events, told) = channel();
         let their_end = Arc::clone(&ended);
         let player = thread::spawn(move || {
-            play(recording, &pace, &their_end, |role, mut event| {
-                // Read ahead of its time.
-                if let Event::Heard { at_us, .. } = &mut event {
-                    *at_us = now_us();
-                }
-                // A monitor that has ended listens no more.
-                let _ = events.send((role, event));
-            })
+            play(
+                &SystemClock,
+                recording,
+                &pace,
+                &their_end,
+                |role, mut event| {
+                    // Read ahead of its time.
+                    if let Event::Heard { at_us, .. } = &mut event {
+                        *at_us = now_us();
+                    }
+                    // A monitor that has ended listens no more.
+                    let _ = events.send((role, event));
+                },
+            )
         });
         let source = Source {
             events: told,
@@ -199,10 +203,7 @@ impl Replay {
 
     fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let place = bench.seat(role).map(host_bridge::bench::Seat::place);
         let (states, turned) = channel();
         let link = Link::open(role, place.unwrap_or_default(), move |event| {
@@ -235,7 +236,7 @@ impl Replay {
         let pace = self.pace();
         let mut peer = StandIn::new(role, self.speed);
         let (mut said, mut unsaid) = (0_u64, 0_u64);
-        let played = play(recording, &pace, &ended, |from, event| {
+        let played = play(&SystemClock, recording, &pace, &ended, |from, event| {
             if let Some(message) = peer.say(from, &event, now_us()) {
                 match link.post(&message) {
                     Ok(()) => said += 1,
