@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
 use std::time::Duration;
@@ -23,7 +24,10 @@ pub const ESTIMATE_US: u64 = 10_000;
 
 /// Lines that a program says, as they come.
 #[derive(Clone, Default)]
-struct Lines(Arc<Mutex<Vec<String>>>);
+struct Lines {
+    said: Arc<Mutex<Vec<String>>>,
+    ended: Arc<AtomicBool>,
+}
 
 impl Lines {
     fn of(pipe: Option<impl Read + Send + 'static>) -> Self {
@@ -34,13 +38,19 @@ impl Lines {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
                     written.all().push(line);
                 }
+                written.ended.store(true, Ordering::Release);
             });
         }
         lines
     }
 
     fn all(&self) -> MutexGuard<'_, Vec<String>> {
-        locked(&self.0)
+        locked(&self.said)
+    }
+
+    /// Whether nothing more comes.
+    fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Acquire)
     }
 }
 
@@ -127,13 +137,7 @@ impl Relay {
         });
         assert!(ended, "not ended after {limit:?}: {}", self.words());
         // Its pipes are read to the end when nothing more comes.
-        let mut printed = 0;
-        wait_until(Duration::from_millis(200), || {
-            let now = self.stdout.all().len();
-            let same = now == printed && now > 0;
-            printed = now;
-            same
-        });
+        wait_until(limit, || self.stdout.is_ended() && self.stderr.is_ended());
         let status = status.expect("it has ended");
         (status, self.lines(), self.words())
     }

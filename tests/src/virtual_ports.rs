@@ -123,8 +123,6 @@ impl Ports for VirtualPorts {
             let port = port.to_owned();
             return Err(State::Busy { port });
         }
-        // What a host before has not read is gone.
-        cable.to_host.clear();
         let _ = cable.to_board.write(&[0]);
         Ok(Opened {
             input: Box::new(HostInput {

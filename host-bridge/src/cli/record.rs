@@ -47,7 +47,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// How often the progress is told.
 const TOLD: Duration = Duration::from_secs(1);
 /// How long the sensor board may take to confirm that it is as it was.
-const RESTORED: Duration = Duration::from_secs(1);
+const RESTORED: Duration = Duration::from_secs(3);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.

@@ -18,7 +18,7 @@ use crate::recording::gauge_stream::GaugeStream;
 const LINES_US: u64 = 200_000;
 
 /// How long the sensor board may take to confirm at the end that it is as it was.
-const RESTORED: Duration = Duration::from_secs(1);
+const RESTORED: Duration = Duration::from_secs(3);
 /// How often it is told meanwhile.
 const AGAIN: Duration = Duration::from_millis(50);
 
