@@ -9,7 +9,7 @@
 //! channel for each board and kind of message: [`row::CHANNELS`].
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -17,6 +17,7 @@ use protocol::{PortCounters, Role};
 
 use crate::host_clock::now_us;
 use crate::link::Event;
+use crate::lock::locked;
 
 mod books;
 mod csv_folder;
@@ -36,7 +37,7 @@ pub use ledger::{Entry, Tally};
 
 use books::Books;
 use ledger::Ledger;
-use queue::{Queue, Taken};
+use queue::{Input, Output, PATIENCE, Taken, queue};
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);
@@ -89,18 +90,10 @@ type Writer = JoinHandle<Result<Progress, RecordingError>>;
 
 /// A recording under way. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
 pub struct Recorder {
-    shared: Arc<Shared>,
+    /// Boxed, so that an empty queue takes little memory.
+    notes: Input<Box<Note>>,
+    progress: Arc<Mutex<Progress>>,
     writer: Mutex<Option<Writer>>,
-}
-
-struct Shared {
-    queue: Queue<Note>,
-    progress: Mutex<Progress>,
-}
-
-/// A mutex whose data are sound at every moment, whoever died holding it.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Recorder {
@@ -110,17 +103,17 @@ impl Recorder {
     /// If there are such files already, or they can't be made.
     pub fn start(settings: Settings) -> Result<Self, RecordingError> {
         let books = Books::open(settings)?;
-        let shared = Arc::new(Shared {
-            queue: Queue::default(),
-            progress: Mutex::default(),
-        });
+        let (notes, waiting) = queue(PATIENCE);
+        let progress = Arc::<Mutex<Progress>>::default();
         let desk = Desk {
-            shared: Arc::clone(&shared),
+            waiting,
+            progress: Arc::clone(&progress),
             books,
             ledger: Ledger::default(),
         };
         Ok(Self {
-            shared,
+            notes,
+            progress,
             writer: Mutex::new(Some(thread::spawn(|| desk.run()))),
         })
     }
@@ -133,9 +126,8 @@ impl Recorder {
             Event::Restarted | Event::Turned(_) => now_us(),
         };
         let event = event.clone();
-        self.shared
-            .queue
-            .put(role, Note::Event { role, at_us, event });
+        let note = Note::Event { role, at_us, event };
+        self.notes.put(role, Box::new(note));
     }
 
     /// Takes what this end of the line to the board of `role` has counted.
@@ -146,12 +138,12 @@ impl Recorder {
             at_us,
             counters,
         };
-        self.shared.queue.put(role, note);
+        self.notes.put(role, Box::new(note));
     }
 
     /// How it stands.
     pub fn progress(&self) -> Progress {
-        *locked(&self.shared.progress)
+        *locked(&self.progress)
     }
 
     /// Writes what still waits, ends the files as they should end, and says what is in them. The second call
@@ -160,7 +152,7 @@ impl Recorder {
     /// # Errors
     /// If they could not be written to the end. What was safe before is.
     pub fn stop(&self) -> Result<Progress, RecordingError> {
-        self.shared.queue.close();
+        self.notes.close();
         match locked(&self.writer).take() {
             None => Ok(self.progress()),
             Some(writer) => writer.join().map_err(|_| RecordingError::Died)?,
@@ -176,7 +168,8 @@ impl Drop for Recorder {
 
 /// Where the writing is done, on a thread of its own.
 struct Desk {
-    shared: Arc<Shared>,
+    waiting: Output<Box<Note>>,
+    progress: Arc<Mutex<Progress>>,
     books: Books,
     ledger: Ledger,
 }
@@ -185,22 +178,17 @@ impl Desk {
     fn run(mut self) -> Result<Progress, RecordingError> {
         match self.write_all() {
             Ok(()) => {
-                let Self {
-                    shared,
-                    books,
-                    ledger,
-                } = self;
-                let safe_bytes = books
+                let safe_bytes = self
+                    .books
                     .finish()
-                    .inspect_err(|_| locked(&shared.progress).failed = true)?;
-                let mut progress = locked(&shared.progress);
-                *progress = all_safe(ledger.tally(), safe_bytes);
+                    .inspect_err(|_| locked(&self.progress).failed = true)?;
+                let mut progress = locked(&self.progress);
+                *progress = all_safe(self.ledger.tally(), safe_bytes);
                 Ok(*progress)
             }
             Err(error) => {
-                self.shared.queue.abandon();
                 self.books.abandon();
-                locked(&self.shared.progress).failed = true;
+                locked(&self.progress).failed = true;
                 Err(error)
             }
         }
@@ -211,21 +199,25 @@ impl Desk {
         let mut due = Instant::now() + SYNC;
         loop {
             let Self {
-                shared,
+                waiting,
+                progress,
                 books,
                 ledger,
             } = self;
-            match shared.queue.take(due) {
-                Taken::Item(Note::Event { role, at_us, event }) => {
-                    ledger.enter(role, &event, at_us, |entry| books.write(&entry))?;
-                }
-                Taken::Item(Note::Counters {
-                    role,
-                    at_us,
-                    counters,
-                }) => {
-                    ledger.enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
-                }
+            match waiting.take(due) {
+                Taken::Item(note) => match *note {
+                    Note::Event { role, at_us, event } => {
+                        ledger.enter(role, &event, at_us, |entry| books.write(&entry))?;
+                    }
+                    Note::Counters {
+                        role,
+                        at_us,
+                        counters,
+                    } => {
+                        ledger
+                            .enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
+                    }
+                },
                 Taken::Refused(role, missing) => {
                     ledger.enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
                 }
@@ -234,7 +226,7 @@ impl Desk {
             }
             if Instant::now() >= due {
                 books.sync()?;
-                *locked(&shared.progress) = all_safe(ledger.tally(), books.safe_bytes());
+                *locked(progress) = all_safe(ledger.tally(), books.safe_bytes());
                 due = Instant::now() + SYNC;
             }
         }

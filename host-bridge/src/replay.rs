@@ -3,7 +3,7 @@
 //! ```text
 //! recording ─> events ─> pace ─┬─> a monitor, as from the boards' links
 //!                              └─> stand-in ─> a board, as from its peer
-//! recording ─> scene: TOML and CSV for the simulator
+//! recording ─> scene: TOML for the simulator, which reads the recording itself
 //! ```
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,6 @@ use crate::link::Event;
 use crate::recording::reader::{ReadError, Reader};
 
 mod events;
-mod pins;
 pub mod scene;
 pub mod stand_in;
 

@@ -328,7 +328,7 @@ fn round(test: &str, toml: &str, from_s: f64, to_s: Option<f64>) -> Round {
     };
     let recording = Reader::open(&path).expect("a recording");
     let made = scene::write(recording, &settings).unwrap_or_else(|error| panic!("{error}"));
-    let again = Scene::load(&made.files[0]).unwrap_or_else(|error| panic!("{error}"));
+    let again = Scene::load(&made.path).unwrap_or_else(|error| panic!("{error}"));
     let run = native::run(&again).expect("a scene that loaded runs");
     Round {
         recorded,

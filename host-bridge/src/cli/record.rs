@@ -46,8 +46,6 @@ was said to be safe is.";
 const LOOK: Duration = Duration::from_millis(50);
 /// How often the progress is told.
 const TOLD: Duration = Duration::from_secs(1);
-/// How long the sensor board may take to confirm that it is as it was.
-const RESTORED: Duration = Duration::from_secs(3);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
@@ -325,23 +323,12 @@ impl Session<'_> {
         ));
     }
 
-    /// Gives the sensor board its quiet back, and waits until it says so.
+    /// Gives the sensor board its quiet back if it was taken.
     fn restore(&mut self) {
-        let Some(message) = self.stream.restoration() else {
-            return;
-        };
-        let end = Instant::now() + RESTORED;
-        let mut said = self.post(Role::Sensor, &message);
-        while said && !self.stream.is_quiet() && Instant::now() < end {
-            match self.told.recv_timeout(LOOK) {
-                Ok((role, event)) => self.stream.on_event(role, &event),
-                Err(RecvTimeoutError::Timeout) => {
-                    said = self.post(Role::Sensor, &message);
-                }
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
-        }
-        if !self.stream.is_quiet() {
+        let mut links = self.links.iter();
+        let sensor = links.find(|(role, _)| *role == Role::Sensor);
+        let sensor = sensor.map(|(_, link)| link);
+        if !self.stream.restore(&self.told, sensor, |_, _| {}) {
             self.screen.tell(
                 "sensor: could not be told to stop streaming its gauges: it does until it is configured or restarted",
             );

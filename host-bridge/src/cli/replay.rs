@@ -30,9 +30,9 @@ Plays a recording back: into a monitor, into a board in place of its peer, or in
 
 A display board is told the recorded estimates, a sensor board the recorded motions, each at its time: take \
 the board's peer off, or it will hear two of them. Numbers and instants are made fresh, as of a peer that has \
-just started; a hand or an arm that is played faster moves faster. A scene holds the recorded voltages, as \
-they were at the ADC's pins, and the recorded motion of the arm, which stands for the hand's, too: \
-`hil-sim run` of it makes the estimates that were recorded. A recording that was cut off is played as far as \
+just started; a hand or an arm that is played faster moves faster. A scene names the recording, \
+of which the simulator reads the voltages, as they were at the ADC's pins, and the motion of the arm, which \
+stands for the hand's, too: `hil-sim run` of it makes the estimates that were recorded. A recording that was cut off is played as far as \
 it goes.";
 
 /// How it is used.
@@ -74,7 +74,7 @@ pub struct Replay {
     /// For a scene: it expects the recorded λ and share of valid estimates
     #[arg(long)]
     expect: bool,
-    /// For a scene: writes over files that are there already
+    /// For a scene: writes over a file that is there already
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -146,10 +146,10 @@ impl Replay {
         };
         let made = scene::write(recording, &settings)
             .with_context(|| format!("{}: no scene", self.file.display()))?;
-        let [scene, gauges, motion] = made.files.each_ref().map(|file| file.display());
+        let scene = made.path.display();
         let (valid, all) = made.estimates;
         output::print(&format!(
-            "{scene}, {gauges}, {motion}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
+            "{scene}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
              run it: hil-sim run {scene}",
             made.duration_s,
             made.wavelength_mm,

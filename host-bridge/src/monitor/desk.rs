@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::Role;
 
@@ -16,11 +16,6 @@ use crate::recording::gauge_stream::GaugeStream;
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
-
-/// How long the sensor board may take to confirm at the end that it is as it was.
-const RESTORED: Duration = Duration::from_secs(3);
-/// How often it is told meanwhile.
-const AGAIN: Duration = Duration::from_millis(50);
 
 /// Where a monitor hears from.
 pub struct Source {
@@ -198,26 +193,24 @@ impl Desk {
         }
     }
 
-    /// Gives the sensor board its quiet back if a recording took it, and waits until it says so. Whether it
-    /// is as it was.
+    /// Gives the sensor board its quiet back if a recording took it. Whether it is as it was.
     fn restore(&mut self) -> bool {
-        let Some(message) = self.stream.restoration() else {
-            return true;
-        };
-        let end = Instant::now() + RESTORED;
-        let tell = |desk: &Self| {
-            desk.link(Role::Sensor)
-                .is_some_and(|link| link.post(&message).is_ok())
-        };
-        let mut said = tell(self);
-        while said && !self.stream.is_quiet() && Instant::now() < end {
-            match self.source.events.recv_timeout(AGAIN) {
-                Ok((role, event)) => self.on(role, event),
-                Err(RecvTimeoutError::Timeout) => said = tell(self),
-                Err(RecvTimeoutError::Disconnected) => break,
+        let Self {
+            dashboard,
+            source,
+            keeping,
+            stream,
+            ..
+        } = self;
+        let mut links = source.links.iter();
+        let sensor = links.find(|(role, _)| *role == Role::Sensor);
+        let sensor = sensor.map(|(_, link)| link);
+        stream.restore(&source.events, sensor, |role, event| {
+            if let Some(keeping) = keeping {
+                keeping.keep(role, &event);
             }
-        }
-        self.stream.is_quiet()
+            dashboard.on(now_us(), role, event);
+        })
     }
 
     fn end_keeping(&mut self) {
