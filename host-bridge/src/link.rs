@@ -13,8 +13,8 @@ use std::time::Duration;
 use protocol::{ClockOffset, Hello, Message, Peer, Ping, PortCounters, Role};
 
 use crate::clock::{Notify, micros};
-use crate::hearing::{Hearing, Verdict};
 use crate::line::Line;
+use crate::line_monitor::{LineMonitor, Verdict};
 use crate::lock::locked;
 use crate::place::Place;
 use crate::restart::BoardClock;
@@ -47,7 +47,7 @@ pub enum Event {
     /// The board has started anew since it was heard last: its clock and counters begin again.
     Restarted,
     /// The link stands differently.
-    Turned(State),
+    StateChanged(State),
 }
 
 /// Why something was not said.
@@ -150,13 +150,13 @@ impl Link {
     }
 
     /// A way to say things that can be handed to other threads; it does not keep the link open.
-    pub fn voice(&self) -> Voice {
-        Voice {
+    pub fn sender(&self) -> LinkSender {
+        LinkSender {
             shared: Arc::clone(&self.shared),
         }
     }
 
-    /// Says `message` now. See [`Voice::post`].
+    /// Says `message` now. See [`LinkSender::post`].
     ///
     /// # Errors
     /// If nobody is there, or the line is stuck.
@@ -199,11 +199,11 @@ impl Drop for Link {
 
 /// Says things to a board, from any thread.
 #[derive(Clone)]
-pub struct Voice {
+pub struct LinkSender {
     shared: Arc<Shared>,
 }
 
-impl Voice {
+impl LinkSender {
     /// Says `message` now: it is with the system when this returns.
     ///
     /// # Errors
@@ -265,7 +265,7 @@ impl<F: FnMut(Event)> Reader<F> {
                     found = state;
                 }
             }
-            self.turn(found);
+            self.set_state(found);
             self.shared.rest();
         }
     }
@@ -274,7 +274,8 @@ impl<F: FnMut(Event)> Reader<F> {
     /// how it stood then. Where there is a choice, only a board that was found is told of.
     fn converse(&mut self, path: &Path, opened: Opened, choosy: bool) -> State {
         let Opened { mut input, output } = opened;
-        let mut hearing = Hearing::new(self.shared.now_us(), self.search.patience_us(path));
+        let mut line_monitor =
+            LineMonitor::new(self.shared.now_us(), self.search.patience_us(path));
         locked(&self.shared.clock).clear();
         *locked(&self.shared.line) = Some(Line::new(output));
         let mut bytes = vec![0; READ_BYTES];
@@ -288,7 +289,13 @@ impl<F: FnMut(Event)> Reader<F> {
                 Err(_) => break,
             };
             let at_us = self.shared.now_us();
-            let state = self.hear(path, &mut hearing, &bytes[..count], at_us, &mut messages);
+            let state = self.hear(
+                path,
+                &mut line_monitor,
+                &bytes[..count],
+                at_us,
+                &mut messages,
+            );
             match &state {
                 State::Known { .. } => self.search.remember(path, true),
                 State::Opened { .. } => {}
@@ -300,11 +307,11 @@ impl<F: FnMut(Event)> Reader<F> {
             }
             let is_known = state.is_known();
             if !choosy || is_known {
-                self.turn(state);
+                self.set_state(state);
             }
             // What another board says is nobody's business here.
             for message in messages.drain(..).filter(|_| is_known) {
-                self.pass(&mut hearing, at_us, message);
+                self.pass(&mut line_monitor, at_us, message);
             }
         }
         let line = locked(&self.shared.line).take();
@@ -315,7 +322,7 @@ impl<F: FnMut(Event)> Reader<F> {
         let end = end.unwrap_or_else(|| self.absent());
         let told_of = !choosy || self.told.as_ref().is_some_and(State::is_known);
         if told_of && !self.shared.is_ended() {
-            self.turn(end.clone());
+            self.set_state(end.clone());
         }
         end
     }
@@ -324,7 +331,7 @@ impl<F: FnMut(Event)> Reader<F> {
     fn hear(
         &self,
         path: &Path,
-        hearing: &mut Hearing,
+        line_monitor: &mut LineMonitor,
         bytes: &[u8],
         at_us: u64,
         messages: &mut Vec<Message>,
@@ -333,15 +340,15 @@ impl<F: FnMut(Event)> Reader<F> {
         let Some(line) = line.as_mut() else {
             return self.absent();
         };
-        hearing.hear(at_us, bytes);
+        line_monitor.hear(at_us, bytes);
         line.port
             .receive(at_us, bytes, |message| messages.push(message));
         let peer = line.port.peer();
-        hearing.understand(at_us, &line.counters());
-        let state = self.state(path, hearing.judge(at_us, peer));
+        line_monitor.understand(at_us, &line.counters());
+        let state = self.state(path, line_monitor.judge(at_us, peer));
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
-        if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {
+        if matches!(peer, Peer::Known(_)) && line_monitor.ping_due(at_us) {
             line.port.post(&Message::Ping(Ping { sent_us: at_us }));
         }
         // What a stuck line refuses is counted, and said again when it is due again.
@@ -380,10 +387,10 @@ impl<F: FnMut(Event)> Reader<F> {
         }
     }
 
-    fn pass(&mut self, hearing: &mut Hearing, at_us: u64, message: Message) {
+    fn pass(&mut self, line_monitor: &mut LineMonitor, at_us: u64, message: Message) {
         if self.clock.is_restart(&message) {
             locked(&self.shared.clock).clear();
-            hearing.forget_ping();
+            line_monitor.forget_ping();
             (self.tell)(Event::Restarted);
         }
         if let Message::Pong(pong) = &message {
@@ -393,13 +400,13 @@ impl<F: FnMut(Event)> Reader<F> {
     }
 
     /// Tells of a state that differs from the last one.
-    fn turn(&mut self, state: State) {
+    fn set_state(&mut self, state: State) {
         if self.told.as_ref() == Some(&state) {
             return;
         }
         *locked(&self.shared.state) = state.clone();
         self.told = Some(state.clone());
-        (self.tell)(Event::Turned(state));
+        (self.tell)(Event::StateChanged(state));
     }
 }
 

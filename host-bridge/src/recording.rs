@@ -1,7 +1,7 @@
 //! Recordings: everything that both boards say, and what their links do, in MCAP and CSV.
 //!
 //! ```text
-//! link ─> queue ─> ledger: rows, times, gaps ─> books: MCAP files, CSV folder ─> safe on disk, once a second
+//! link ─> queue ─> row builder: times, gaps ─> files: MCAP files, CSV folder ─> safe on disk, once a second
 //! MCAP ─> reader: rows ─> replay
 //! ```
 //!
@@ -19,25 +19,25 @@ use crate::host_clock::now_us;
 use crate::link::Event;
 use crate::lock::locked;
 
-mod books;
 mod csv_folder;
 mod error;
+mod files;
 pub mod gauge_stream;
 mod json_schema;
-mod ledger;
 mod mcap_file;
-mod paper;
 mod queue;
 pub mod reader;
 pub mod row;
+mod row_builder;
+mod sink;
 
-pub use books::part_path;
 pub use error::RecordingError;
-pub use ledger::{Entry, Tally};
+pub use files::part_path;
+pub use row_builder::{Entry, Tally};
 
-use books::Books;
-use ledger::Ledger;
+use files::RecordingFiles;
 use queue::{Input, Output, PATIENCE, Taken, queue};
+use row_builder::RowBuilder;
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);
@@ -102,19 +102,19 @@ impl Recorder {
     /// # Errors
     /// If there are such files already, or they can't be made.
     pub fn start(settings: Settings) -> Result<Self, RecordingError> {
-        let books = Books::open(settings)?;
+        let files = RecordingFiles::open(settings)?;
         let (notes, waiting) = queue(PATIENCE);
         let progress = Arc::<Mutex<Progress>>::default();
-        let desk = Desk {
+        let writer_thread = WriterThread {
             waiting,
             progress: Arc::clone(&progress),
-            books,
-            ledger: Ledger::default(),
+            files,
+            row_builder: RowBuilder::default(),
         };
         Ok(Self {
             notes,
             progress,
-            writer: Mutex::new(Some(thread::spawn(|| desk.run()))),
+            writer: Mutex::new(Some(thread::spawn(|| writer_thread.run()))),
         })
     }
 
@@ -123,7 +123,7 @@ impl Recorder {
     pub fn on_event(&self, role: Role, event: &Event) {
         let at_us = match event {
             Event::Heard { at_us, .. } => *at_us,
-            Event::Restarted | Event::Turned(_) => now_us(),
+            Event::Restarted | Event::StateChanged(_) => now_us(),
         };
         let event = event.clone();
         let note = Note::Event { role, at_us, event };
@@ -167,27 +167,27 @@ impl Drop for Recorder {
 }
 
 /// Where the writing is done, on a thread of its own.
-struct Desk {
+struct WriterThread {
     waiting: Output<Box<Note>>,
     progress: Arc<Mutex<Progress>>,
-    books: Books,
-    ledger: Ledger,
+    files: RecordingFiles,
+    row_builder: RowBuilder,
 }
 
-impl Desk {
+impl WriterThread {
     fn run(mut self) -> Result<Progress, RecordingError> {
         match self.write_all() {
             Ok(()) => {
                 let safe_bytes = self
-                    .books
+                    .files
                     .finish()
                     .inspect_err(|_| locked(&self.progress).failed = true)?;
                 let mut progress = locked(&self.progress);
-                *progress = all_safe(self.ledger.tally(), safe_bytes);
+                *progress = all_safe(self.row_builder.tally(), safe_bytes);
                 Ok(*progress)
             }
             Err(error) => {
-                self.books.abandon();
+                self.files.abandon();
                 locked(&self.progress).failed = true;
                 Err(error)
             }
@@ -201,32 +201,33 @@ impl Desk {
             let Self {
                 waiting,
                 progress,
-                books,
-                ledger,
+                files,
+                row_builder,
             } = self;
             match waiting.take(due) {
                 Taken::Item(note) => match *note {
                     Note::Event { role, at_us, event } => {
-                        ledger.enter(role, &event, at_us, |entry| books.write(&entry))?;
+                        row_builder.enter(role, &event, at_us, |entry| files.write(&entry))?;
                     }
                     Note::Counters {
                         role,
                         at_us,
                         counters,
                     } => {
-                        ledger
-                            .enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
+                        row_builder
+                            .enter_counters(role, counters, at_us, |entry| files.write(&entry))?;
                     }
                 },
                 Taken::Refused(role, missing) => {
-                    ledger.enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
+                    row_builder
+                        .enter_unwritten(role, missing, now_us(), |entry| files.write(&entry))?;
                 }
                 Taken::Nothing => {}
                 Taken::Closed => return Ok(()),
             }
             if Instant::now() >= due {
-                books.sync()?;
-                *locked(progress) = all_safe(ledger.tally(), books.safe_bytes());
+                files.sync()?;
+                *locked(progress) = all_safe(row_builder.tally(), files.safe_bytes());
                 due = Instant::now() + SYNC;
             }
         }

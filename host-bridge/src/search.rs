@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::hearing::PATIENCE_US;
+use crate::line_monitor::PATIENCE_US;
 use crate::place::Place;
 use crate::system::Ports;
 

@@ -49,7 +49,7 @@ impl Watched {
         let mut found = None;
         let mut turns = || {
             found = self.told.try_iter().find_map(|event| match event {
-                Event::Turned(state) if wanted(&state) => Some(state),
+                Event::StateChanged(state) if wanted(&state) => Some(state),
                 _ => None,
             });
             found.is_some()

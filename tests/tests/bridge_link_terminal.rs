@@ -31,7 +31,7 @@ fn link_to(role: Role, place: Place) -> (Link, Receiver<Event>) {
 fn turned(told: &Receiver<Event>, wanted: impl Fn(&State) -> bool) -> State {
     loop {
         match told.recv_timeout(LIMIT).expect("the link turns") {
-            Event::Turned(state) if wanted(&state) => return state,
+            Event::StateChanged(state) if wanted(&state) => return state,
             _ => {}
         }
     }

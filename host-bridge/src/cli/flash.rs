@@ -11,7 +11,7 @@ use host_bridge::bench::Seat;
 use host_bridge::flash::console;
 use host_bridge::flash::firmware::{self, Firmware};
 use host_bridge::flash::plan::{Plan, Summary};
-use host_bridge::flash::probes::{self, Attached, Selector, Undecided, Wish};
+use host_bridge::flash::probes::{self, Attached, ProbeRequest, Selector, Undecided};
 use host_bridge::flash::programmer::{Programmer, Progress};
 use host_bridge::flash::trouble::Trouble;
 use host_bridge::place::{self, Place};
@@ -156,8 +156,8 @@ impl Flash {
         let role = plan.firmware.role;
         let system = System::default();
         let links = place::st_links();
-        let wish = Wish::new(self.probe.clone(), seat, other, &links);
-        let probe = self.choose(&wish, role)?;
+        let request = ProbeRequest::new(self.probe.clone(), seat, other, &links);
+        let probe = self.choose(&request, role)?;
         let console = console::place(&seat.place(), probe.serial(), &links)?;
         // Where any console will do, what is heard first need not be this board's.
         if !self.no_hello && console != Place::Anywhere {
@@ -230,9 +230,9 @@ impl Flash {
     }
 
     /// The probe that is meant; asks if that is not clear and somebody is there to be asked.
-    fn choose(&self, wish: &Wish, role: Role) -> anyhow::Result<Attached> {
+    fn choose(&self, request: &ProbeRequest, role: Role) -> anyhow::Result<Attached> {
         let found = probes::attached();
-        let several = match probes::choose(&found, wish) {
+        let several = match probes::choose(&found, request) {
             Ok(probe) => return Ok(probe),
             Err(Undecided::Several { found }) => found,
             Err(other) => return Err(other.into()),

@@ -266,8 +266,8 @@ impl Session<'_> {
         match self.told.recv_timeout(wait) {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                if let Event::Turned(state) = &event {
-                    self.turn(role, state);
+                if let Event::StateChanged(state) = &event {
+                    self.on_state(role, state);
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
@@ -279,7 +279,7 @@ impl Session<'_> {
     }
 
     /// Tells how the way to a board stands now.
-    fn turn(&mut self, role: Role, state: &State) {
+    fn on_state(&mut self, role: Role, state: &State) {
         if state.is_known() {
             self.absent.retain(|absent| *absent != role);
         }

@@ -207,7 +207,7 @@ impl Replay {
         let place = bench.seat(role).map(host_bridge::bench::Seat::place);
         let (states, turned) = channel();
         let link = Link::open(role, place.unwrap_or_default(), move |event| {
-            if let Event::Turned(state) = event {
+            if let Event::StateChanged(state) = event {
                 // Nobody waits for it once the board is there.
                 let _ = states.send(state);
             }

@@ -23,7 +23,7 @@ const SETTLING_US: u64 = 5_000_000;
 /// other's port have exchanged them within a look or two; in µs.
 const EXCHANGE_US: u64 = 600_000;
 /// Between two looks at whether all are settled, in µs.
-const TURN_US: u64 = 50_000;
+const LOOK_US: u64 = 50_000;
 /// Between two pings: often enough to see a clock drift within seconds; in µs.
 const PING_EVERY_US: u64 = 100_000;
 
@@ -44,7 +44,7 @@ pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) 
     let probes = probes::attached().iter().map(ProbeFacts::from).collect();
     let settled_us = now_us() + SETTLING_US;
     while watches.iter().any(|watch| !watch.is_settled()) && now_us() < settled_us && goes_on() {
-        hear(&mut watches, &told, now_us() + TURN_US);
+        hear(&mut watches, &told, now_us() + LOOK_US);
     }
     let began_us = now_us();
     let end_us = began_us.saturating_add(micros(span));
@@ -142,7 +142,7 @@ impl Watch {
 
     fn note(&mut self, event: Event) {
         match event {
-            Event::Turned(state) => {
+            Event::StateChanged(state) => {
                 self.named_us = (!matches!(state, State::Opened { .. })).then(|| self.now_us());
                 if let State::Known { hello, .. }
                 | State::Foreign { hello, .. }

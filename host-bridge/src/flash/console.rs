@@ -18,7 +18,7 @@ pub const PATIENCE: Duration = Duration::from_secs(10);
 /// How long a look may take: what a link needs to be sure of silence, and some.
 const LOOK: Duration = Duration::from_millis(2_500);
 /// How often a wait looks up whether it was called off.
-const TURN: Duration = Duration::from_millis(100);
+const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// Where the console of the board of `seat` is, behind a probe of serial number `probe`.
 ///
@@ -83,8 +83,10 @@ pub fn look(system: &System, role: Role, place: Place) -> State {
     let end_us = system.clock.now_us().saturating_add(micros(LOOK));
     loop {
         match told.recv_until(end_us) {
-            Some(Event::Turned(State::Opened { .. }) | Event::Heard { .. } | Event::Restarted) => {}
-            Some(Event::Turned(state)) => return state,
+            Some(
+                Event::StateChanged(State::Opened { .. }) | Event::Heard { .. } | Event::Restarted,
+            ) => {}
+            Some(Event::StateChanged(state)) => return state,
             None => return link.state(),
         }
     }
@@ -167,11 +169,13 @@ pub fn wait(
             return Err(NoHello::CalledOff);
         }
         let now_us = system.clock.now_us();
-        match told.recv_until(end_us.min(now_us.saturating_add(micros(TURN)))) {
-            Some(Event::Turned(State::Known { hello, .. })) if hello.version == wanted.version => {
+        match told.recv_until(end_us.min(now_us.saturating_add(micros(LOOK_AGAIN)))) {
+            Some(Event::StateChanged(State::Known { hello, .. }))
+                if hello.version == wanted.version =>
+            {
                 return Ok(hello);
             }
-            Some(Event::Turned(State::Known { hello, .. })) => other = Some(hello),
+            Some(Event::StateChanged(State::Known { hello, .. })) => other = Some(hello),
             Some(_) | None => {}
         }
         if now_us >= end_us {

@@ -79,8 +79,8 @@ impl GaugeStream {
             Role::Sensor | Role::Host => &mut self.sensor,
         };
         match event {
-            Event::Turned(state) if state.is_known() => interview.begin(),
-            Event::Turned(_) => interview.stage = Stage::Done,
+            Event::StateChanged(state) if state.is_known() => interview.begin(),
+            Event::StateChanged(_) => interview.stage = Stage::Done,
             Event::Restarted => interview.begin(),
             Event::Heard {
                 message: Message::Configuration(report),

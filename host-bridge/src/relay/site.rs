@@ -20,7 +20,7 @@ use std::time::Duration;
 use protocol::{Hello, Message, Ping, Pong, Role, Stop};
 
 use crate::clock::{Notify, micros};
-use crate::link::{self, Event, Link, NotSent, Voice};
+use crate::link::{self, Event, Link, LinkSender, NotSent};
 use crate::lock::locked;
 use crate::place::Place;
 use crate::relay::envelope::{Content, Envelope, is_carried};
@@ -70,7 +70,7 @@ pub struct Site {
 /// What the threads share.
 struct Shared {
     role: Role,
-    far: Role,
+    other_role: Role,
     name: Name,
     session: u64,
     network: Arc<dyn Transport>,
@@ -126,14 +126,14 @@ impl Site {
             system,
         } = settings;
         let clock = Arc::clone(&system.clock);
-        let far = opposite(role).ok_or_else(|| NetworkError::Engine {
+        let other_role = opposite(role).ok_or_else(|| NetworkError::Engine {
             reason: "a host has no board to be carried".to_owned(),
         })?;
         let (notices, told) = mpsc::channel();
         let session = random_number();
         let shared = Arc::new(Shared {
             role,
-            far,
+            other_role,
             name,
             session,
             network,
@@ -141,7 +141,7 @@ impl Site {
             system: system.clone(),
             wire: OnceLock::new(),
             outward: Mutex::new(Outward::new(bridge_hello(role), session)),
-            inward: Mutex::new(Inward::new(far, session, max_age)),
+            inward: Mutex::new(Inward::new(other_role, session, max_age)),
             outbox: Outbox::new(clock.notify()),
             stops: Mutex::new(Stops::default()),
             told_rival: AtomicBool::new(false),
@@ -159,13 +159,13 @@ impl Site {
         let link = Link::open_on(&system, role, place, move |event| match event {
             Event::Heard { at_us, message } => carrier.carry(at_us, message),
             // What comes of it is told within two seconds.
-            Event::Turned(State::Opened { .. }) => {}
-            Event::Turned(state) => carrier.tell(Notice::Board(state)),
+            Event::StateChanged(State::Opened { .. }) => {}
+            Event::StateChanged(state) => carrier.tell(Notice::Board(state)),
             // Its numbers tell as much, and sooner.
             Event::Restarted => {}
         });
-        let (voice, writing) = (link.voice(), Arc::clone(&shared));
-        let writer = clock.spawn(Box::new(move || writing.write(&voice)));
+        let (sender, writing) = (link.sender(), Arc::clone(&shared));
+        let writer = clock.spawn(Box::new(move || writing.write(&sender)));
         let keeping = Arc::clone(&shared);
         let keeper = clock.spawn(Box::new(move || Keeper::new(keeping).run()));
         let site = Self {
@@ -197,7 +197,7 @@ impl Site {
             site: shared.role.name(),
             uptime_s: (shared.now_us() - shared.started_us) as f64 / 1e6,
             board: self.link.state().word(),
-            far: inward.far().state().word(),
+            far: inward.remote().state().word(),
             round_trip_us,
             incoming: inward.counts(),
             outgoing,
@@ -260,7 +260,7 @@ impl Shared {
             }
         };
         let subscriptions = vec![
-            subscription(self.name.keys(self.far), Self::hear),
+            subscription(self.name.keys(self.other_role), Self::hear),
             subscription(
                 self.name.key(Role::Host, Channel::Stop),
                 Self::hear_operator,
@@ -335,12 +335,12 @@ impl Shared {
             }
             Heard::Stop(id, stop) => {
                 drop(inward);
-                self.on_stop(self.far, id, stop);
+                self.on_stop(self.other_role, id, stop);
             }
             Heard::Stopped(id, trip) => {
                 drop(inward);
                 if locked(&self.stops).on_outcome(id) {
-                    self.tell(Notice::StopHeard(self.far, trip));
+                    self.tell(Notice::StopHeard(self.other_role, trip));
                 }
             }
         }
@@ -384,13 +384,13 @@ impl Shared {
     }
 
     /// Says to the board what is due, until the bridge ends.
-    fn write(&self, voice: &Voice) {
+    fn write(&self, sender: &LinkSender) {
         loop {
             match self.outbox.take(self.now_us().saturating_add(micros(IDLE))) {
                 Due::Closed => return,
                 Due::Nothing => {}
                 Due::Stop(id, stop) => {
-                    if self.tell_board(voice, id, stop).is_err() {
+                    if self.tell_board(sender, id, stop).is_err() {
                         self.outbox.stop(id, stop);
                         self.pause(STOP_AGAIN);
                     }
@@ -398,7 +398,7 @@ impl Shared {
                 Due::Message(waiting) if self.now_us() > waiting.until_us => {
                     locked(&self.inward).on_stale();
                 }
-                Due::Message(waiting) => match voice.post(&waiting.message) {
+                Due::Message(waiting) => match sender.post(&waiting.message) {
                     Ok(()) => locked(&self.inward).on_passed(&waiting, self.now_us()),
                     Err(NotSent::NotKnown) => locked(&self.inward).on_boardless(),
                     // A newer one is on its way, and may find the line free.
@@ -409,11 +409,11 @@ impl Shared {
     }
 
     /// Says Stop to the board. A display's answers by its state; a sensor's has nothing to stop.
-    fn tell_board(&self, voice: &Voice, id: u64, stop: Stop) -> Result<(), NotSent> {
+    fn tell_board(&self, sender: &LinkSender, id: u64, stop: Stop) -> Result<(), NotSent> {
         // The lock keeps an answer that is quicker than this thread from being heard before.
         let mut stops = locked(&self.stops);
         let told_us = self.now_us();
-        voice.post(&Message::Stop(stop))?;
+        sender.post(&Message::Stop(stop))?;
         let is_first = stops.tell(id, told_us);
         let is_over = self.role != Role::Display;
         if is_over {

@@ -18,11 +18,11 @@ use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::GaugeRow;
 
 mod document;
+mod excerpt;
 mod expectation;
-mod tape;
 
+use excerpt::Excerpt;
 use expectation::Expectation;
-use tape::Tape;
 
 /// The longest scene, in s.
 const LONGEST_S: f64 = 600.0;
@@ -152,9 +152,9 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
     }
     let recording_path = recording.path().to_owned();
     let to_s = settings.to_s.unwrap_or(f64::INFINITY);
-    let tape = Tape::take(recording, settings.from_s, to_s)?;
-    let count = tape.samples.len();
-    let layout = Layout::of(&tape.samples).ok_or(SceneError::NoSamples {
+    let excerpt = Excerpt::take(recording, settings.from_s, to_s)?;
+    let count = excerpt.samples.len();
+    let layout = Layout::of(&excerpt.samples).ok_or(SceneError::NoSamples {
         path: recording_path.clone(),
         count,
     })?;
@@ -163,7 +163,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
             duration_s: layout.duration_s,
         });
     }
-    let within: Vec<Estimate> = tape
+    let within: Vec<Estimate> = excerpt
         .estimates
         .iter()
         .filter(|estimate| layout.holds(estimate.instant_us))
@@ -181,11 +181,11 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
     let piece = Piece {
         recording: &recording_path,
         logged_s: (settings.from_s, settings.to_s),
-        start_s: layout.start_s(&tape.samples),
-        offset_mm: HALF_COUNT_MM - tape.samples[layout.first].position_um as f64 / 1_000.0,
+        start_s: layout.start_s(&excerpt.samples),
+        offset_mm: HALF_COUNT_MM - excerpt.samples[layout.first].position_um as f64 / 1_000.0,
         duration_s: layout.duration_s,
     };
-    let toml = document::toml(&path, &piece, &tape, wavelength_mm, expected.as_ref())?;
+    let toml = document::toml(&path, &piece, &excerpt, wavelength_mm, expected.as_ref())?;
     fs::write(&path, toml).map_err(|source| SceneError::NotWritten {
         path: path.clone(),
         source,
@@ -196,7 +196,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         wavelength_mm,
         begin_us: layout.begin_us,
         estimates: (valid.len(), within.len()),
-        cut: tape.cut,
+        cut: excerpt.cut,
     })
 }
 

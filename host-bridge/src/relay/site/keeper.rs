@@ -19,7 +19,7 @@ const KNOCK_US: u64 = 100_000;
 /// Between two repetitions of a Stop that nobody has heard or that the board has not obeyed, in µs.
 const STOP_US: u64 = 100_000;
 /// How long nobody is heard before it is found out why, in µs.
-const PUZZLED_US: u64 = 3_000_000;
+const UNHEARD_US: u64 = 3_000_000;
 /// Between two such looks, in µs.
 const LOOK_AGAIN_US: u64 = 10_000_000;
 
@@ -94,14 +94,14 @@ impl Keeper {
     /// Finds out why nobody is heard, in a thread of its own: it takes a while.
     fn look(&mut self, at_us: u64) {
         if matches!(
-            locked(&self.shared.inward).far().state().word(),
+            locked(&self.shared.inward).remote().state().word(),
             "known" | "foreign"
         ) {
             self.heard_us = at_us;
             locked(&self.found).clear();
         }
-        let is_puzzled = at_us.saturating_sub(self.heard_us) > PUZZLED_US;
-        if !is_puzzled || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
+        let is_unheard = at_us.saturating_sub(self.heard_us) > UNHEARD_US;
+        if !is_unheard || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
             return;
         }
         self.looked_us = Some(at_us);
@@ -129,10 +129,10 @@ impl Shared {
     fn diagnose(&self) -> Vec<Notice> {
         let endpoints = self.network.endpoints();
         if endpoints.is_empty() {
-            return vec![Notice::Unvisited(self.far)];
+            return vec![Notice::Unvisited(self.other_role)];
         }
         if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
-            return vec![Notice::Alone(self.far)];
+            return vec![Notice::Alone(self.other_role)];
         }
         let reach = |endpoint: &Endpoint| Notice::Unreached {
             endpoint: endpoint.clone(),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
 
+use super::excerpt::Excerpt;
 use super::expectation::Expectation;
-use super::tape::Tape;
 use super::{Piece, SceneError};
 
 /// The longest name that a scene may have.
@@ -16,7 +16,7 @@ const NAME: usize = 64;
 pub fn toml(
     path: &Path,
     piece: &Piece<'_>,
-    tape: &Tape,
+    excerpt: &Excerpt,
     wavelength_mm: f64,
     expected: Option<&Expectation>,
 ) -> Result<String, SceneError> {
@@ -43,12 +43,12 @@ pub fn toml(
     line(lines, "[gauges]");
     recorded(lines, path, piece);
     line(lines, "filtered = true");
-    if let Some(sensor) = &tape.sensor {
+    if let Some(sensor) = &excerpt.sensor {
         force(lines, sensor)?;
         line(lines, "");
         estimator(lines, sensor);
     }
-    if let Some(display) = &tape.display {
+    if let Some(display) = &excerpt.display {
         line(lines, "");
         self::display(lines, display);
     }
