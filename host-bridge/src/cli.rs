@@ -16,6 +16,7 @@ mod output;
 mod record;
 mod relay;
 mod replay;
+mod signals;
 
 /// Ridgelink's bridge: flashes, watches, records and replays the boards, and carries their link over
 /// networks.

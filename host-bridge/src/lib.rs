@@ -7,12 +7,14 @@
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
 pub mod bench;
+pub mod clock;
 pub mod doctor;
 pub mod flash;
-mod hearing;
 pub mod host_clock;
 mod line;
+mod line_monitor;
 pub mod link;
+pub mod lock;
 pub mod monitor;
 pub mod place;
 pub mod recording;
@@ -20,4 +22,6 @@ pub mod relay;
 pub mod replay;
 mod restart;
 mod search;
+mod serial;
 pub mod state;
+pub mod system;

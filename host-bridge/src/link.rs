@@ -3,22 +3,24 @@
 //! A thread of its own reads the line and runs the protocol's own [`protocol::Port`]; who wants to say
 //! something writes it himself, at once. A board that is unplugged is looked for every [`RETRY`].
 
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use protocol::{ClockOffset, Hello, Message, Peer, Ping, PortCounters, Role};
 
-use crate::hearing::{Hearing, Verdict};
-use crate::host_clock::now_us;
-use crate::line::{self, Ear, Line};
+use crate::clock::{Notify, micros};
+use crate::line::Line;
+use crate::line_monitor::{LineMonitor, Verdict};
+use crate::lock::locked;
 use crate::place::Place;
 use crate::restart::BoardClock;
 use crate::search::{Candidates, Search};
 use crate::state::State;
+use crate::system::{Opened, System};
 
 /// Speed of a console, 8N1.
 pub const BAUD: u32 = 921_600;
@@ -37,7 +39,7 @@ const READ_BYTES: usize = 4_096;
 pub enum Event {
     /// The board has said something.
     Heard {
-        /// When its last byte was read, in µs of [`now_us`].
+        /// When its last byte was read, in µs of the link's clock.
         at_us: u64,
         /// What it said.
         message: Message,
@@ -45,7 +47,7 @@ pub enum Event {
     /// The board has started anew since it was heard last: its clock and counters begin again.
     Restarted,
     /// The link stands differently.
-    Turned(State),
+    StateChanged(State),
 }
 
 /// Why something was not said.
@@ -62,7 +64,7 @@ pub enum NotSent {
 /// What the two clocks of a link are to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clocks {
-    /// The board's clock minus [`now_us`], in µs.
+    /// The board's clock minus the link's, in µs.
     pub offset_us: i64,
     /// The shortest round trip of late, in µs: twice the bound of the offset's error.
     pub round_trip_us: u64,
@@ -83,13 +85,9 @@ struct Shared {
     /// Of the line before, while there is none.
     counters: Mutex<PortCounters>,
     ended: AtomicBool,
+    system: System,
     /// Wakes a reader that waits to try again.
-    woken: (Mutex<()>, Condvar),
-}
-
-/// A mutex whose data are sound at every moment, whoever died holding it.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    woken: Arc<dyn Notify>,
 }
 
 /// How a host introduces itself.
@@ -111,6 +109,16 @@ impl Link {
     /// link's thread with everything that happens; it may [`Link::post`], and it holds up the reading for
     /// as long as it takes.
     pub fn open(role: Role, place: Place, tell: impl FnMut(Event) + Send + 'static) -> Self {
+        Self::open_on(&System::default(), role, place, tell)
+    }
+
+    /// The same among the ports of `system`, by its clock.
+    pub fn open_on(
+        system: &System,
+        role: Role,
+        place: Place,
+        tell: impl FnMut(Event) + Send + 'static,
+    ) -> Self {
         let wanted = match &place {
             Place::Anywhere => format!("an ST-LINK with the {} board", role.name()),
             named => named.to_string(),
@@ -124,7 +132,8 @@ impl Link {
             clock: Mutex::new(ClockOffset::new()),
             counters: Mutex::new(PortCounters::new()),
             ended: AtomicBool::new(false),
-            woken: (Mutex::new(()), Condvar::new()),
+            woken: system.clock.notify(),
+            system: system.clone(),
         });
         let reader = Reader {
             shared: Arc::clone(&shared),
@@ -136,18 +145,18 @@ impl Link {
         };
         Self {
             shared,
-            reader: Some(thread::spawn(|| reader.run())),
+            reader: Some(system.clock.spawn(Box::new(|| reader.run()))),
         }
     }
 
     /// A way to say things that can be handed to other threads; it does not keep the link open.
-    pub fn voice(&self) -> Voice {
-        Voice {
+    pub fn sender(&self) -> LinkSender {
+        LinkSender {
             shared: Arc::clone(&self.shared),
         }
     }
 
-    /// Says `message` now. See [`Voice::post`].
+    /// Says `message` now. See [`LinkSender::post`].
     ///
     /// # Errors
     /// If nobody is there, or the line is stuck.
@@ -181,24 +190,20 @@ impl Link {
 impl Drop for Link {
     fn drop(&mut self) {
         self.shared.ended.store(true, Ordering::Release);
-        // Under the lock, so that a reader that is about to wait does not miss it.
-        let guard = locked(&self.shared.woken.0);
-        self.shared.woken.1.notify_all();
-        drop(guard);
+        self.shared.woken.notify();
         if let Some(reader) = self.reader.take() {
-            // A reader that panicked has said so on standard error.
-            let _ = reader.join();
+            self.shared.system.clock.join(reader);
         }
     }
 }
 
 /// Says things to a board, from any thread.
 #[derive(Clone)]
-pub struct Voice {
+pub struct LinkSender {
     shared: Arc<Shared>,
 }
 
-impl Voice {
+impl LinkSender {
     /// Says `message` now: it is with the system when this returns.
     ///
     /// # Errors
@@ -220,13 +225,14 @@ impl Shared {
         self.ended.load(Ordering::Acquire)
     }
 
+    fn now_us(&self) -> u64 {
+        self.system.clock.now_us()
+    }
+
     /// Waits for [`RETRY`], or until the link ends.
     fn rest(&self) {
-        let (mutex, woken) = &self.woken;
-        let guard = locked(mutex);
-        if !self.is_ended() {
-            let _ = woken.wait_timeout(guard, RETRY);
-        }
+        self.woken
+            .wait_until(self.now_us().saturating_add(micros(RETRY)));
     }
 }
 
@@ -245,11 +251,11 @@ struct Reader<F> {
 impl<F: FnMut(Event)> Reader<F> {
     fn run(mut self) {
         while !self.shared.is_ended() {
-            let Candidates { ports, choosy } = self.search.candidates(line::is_held);
+            let Candidates { ports, choosy } = self.search.candidates(&*self.shared.system.ports);
             let mut found = self.absent();
             for port in ports {
-                let state = match line::open(&port) {
-                    Ok((ear, line)) => self.converse(&port, ear, line, choosy),
+                let state = match self.shared.system.ports.open(&port) {
+                    Ok(opened) => self.converse(&port, opened, choosy),
                     Err(state) => state,
                 };
                 if self.shared.is_ended() {
@@ -259,29 +265,37 @@ impl<F: FnMut(Event)> Reader<F> {
                     found = state;
                 }
             }
-            self.turn(found);
+            self.set_state(found);
             self.shared.rest();
         }
     }
 
     /// Talks until the line is lost, or leads nowhere that was wanted although there is a choice; returns
     /// how it stood then. Where there is a choice, only a board that was found is told of.
-    fn converse(&mut self, path: &Path, mut ear: Ear, line: Line, choosy: bool) -> State {
-        let mut hearing = Hearing::new(now_us(), self.search.patience_us(path));
+    fn converse(&mut self, path: &Path, opened: Opened, choosy: bool) -> State {
+        let Opened { mut input, output } = opened;
+        let mut line_monitor =
+            LineMonitor::new(self.shared.now_us(), self.search.patience_us(path));
         locked(&self.shared.clock).clear();
-        *locked(&self.shared.line) = Some(line);
+        *locked(&self.shared.line) = Some(Line::new(output));
         let mut bytes = vec![0; READ_BYTES];
         let mut messages = Vec::new();
         let mut end = None;
         while !self.shared.is_ended() && end.is_none() {
-            let count = match ear.tty.read(&mut bytes) {
+            let count = match input.read(&mut bytes) {
                 Ok(0) => break,
                 Ok(count) => count,
                 Err(error) if is_pause(&error) => 0,
                 Err(_) => break,
             };
-            let at_us = now_us();
-            let state = self.hear(path, &mut hearing, &bytes[..count], at_us, &mut messages);
+            let at_us = self.shared.now_us();
+            let state = self.hear(
+                path,
+                &mut line_monitor,
+                &bytes[..count],
+                at_us,
+                &mut messages,
+            );
             match &state {
                 State::Known { .. } => self.search.remember(path, true),
                 State::Opened { .. } => {}
@@ -293,22 +307,22 @@ impl<F: FnMut(Event)> Reader<F> {
             }
             let is_known = state.is_known();
             if !choosy || is_known {
-                self.turn(state);
+                self.set_state(state);
             }
             // What another board says is nobody's business here.
             for message in messages.drain(..).filter(|_| is_known) {
-                self.pass(&mut hearing, at_us, message);
+                self.pass(&mut line_monitor, at_us, message);
             }
         }
         let line = locked(&self.shared.line).take();
         if let Some(line) = line {
             *locked(&self.shared.counters) = line.counters();
-            ear.close(line.is_stuck());
+            input.close(line.is_stuck());
         }
         let end = end.unwrap_or_else(|| self.absent());
         let told_of = !choosy || self.told.as_ref().is_some_and(State::is_known);
         if told_of && !self.shared.is_ended() {
-            self.turn(end.clone());
+            self.set_state(end.clone());
         }
         end
     }
@@ -317,7 +331,7 @@ impl<F: FnMut(Event)> Reader<F> {
     fn hear(
         &self,
         path: &Path,
-        hearing: &mut Hearing,
+        line_monitor: &mut LineMonitor,
         bytes: &[u8],
         at_us: u64,
         messages: &mut Vec<Message>,
@@ -326,15 +340,15 @@ impl<F: FnMut(Event)> Reader<F> {
         let Some(line) = line.as_mut() else {
             return self.absent();
         };
-        hearing.hear(at_us, bytes);
+        line_monitor.hear(at_us, bytes);
         line.port
             .receive(at_us, bytes, |message| messages.push(message));
         let peer = line.port.peer();
-        hearing.understand(at_us, &line.counters());
-        let state = self.state(path, hearing.judge(at_us, peer));
+        line_monitor.understand(at_us, &line.counters());
+        let state = self.state(path, line_monitor.judge(at_us, peer));
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
-        if matches!(peer, Peer::Known(_)) && hearing.ping_due(at_us) {
+        if matches!(peer, Peer::Known(_)) && line_monitor.ping_due(at_us) {
             line.port.post(&Message::Ping(Ping { sent_us: at_us }));
         }
         // What a stuck line refuses is counted, and said again when it is due again.
@@ -373,10 +387,10 @@ impl<F: FnMut(Event)> Reader<F> {
         }
     }
 
-    fn pass(&mut self, hearing: &mut Hearing, at_us: u64, message: Message) {
+    fn pass(&mut self, line_monitor: &mut LineMonitor, at_us: u64, message: Message) {
         if self.clock.is_restart(&message) {
             locked(&self.shared.clock).clear();
-            hearing.forget_ping();
+            line_monitor.forget_ping();
             (self.tell)(Event::Restarted);
         }
         if let Message::Pong(pong) = &message {
@@ -386,13 +400,13 @@ impl<F: FnMut(Event)> Reader<F> {
     }
 
     /// Tells of a state that differs from the last one.
-    fn turn(&mut self, state: State) {
+    fn set_state(&mut self, state: State) {
         if self.told.as_ref() == Some(&state) {
             return;
         }
         *locked(&self.shared.state) = state.clone();
         self.told = Some(state.clone());
-        (self.tell)(Event::Turned(state));
+        (self.tell)(Event::StateChanged(state));
     }
 }
 

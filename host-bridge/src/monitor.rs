@@ -10,18 +10,18 @@
 
 pub mod board;
 pub mod dashboard;
-pub mod desk;
 pub mod draw;
 pub mod fingertip;
 pub mod firmware_log;
 pub mod form;
-pub mod happening;
-pub mod keeping;
 pub mod keys;
 pub mod line;
+pub mod live_recording;
+pub mod log_entry;
 pub mod orders;
 pub mod plain;
 pub mod screen;
+pub mod session;
 pub mod settings;
 pub mod theme;
 pub mod trace;
@@ -34,11 +34,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-pub use desk::Source;
+pub use session::Source;
 
 use crate::recording::RecordingError;
-use desk::Desk;
 use plain::Format;
+use session::Session;
 
 /// How the boards are watched.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,7 @@ pub enum MonitorError {
 /// # Errors
 /// If standard output takes no more, unless nobody reads it any more, or if a recording can't be written.
 pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result<(), MonitorError> {
-    let desk = Desk::new(source, options.folder.clone());
+    let session = Session::new(source, options.folder.clone());
     let format = match options.plain {
         None if io::stdout().is_terminal() => None,
         None => Some(Format::default()),
@@ -76,7 +76,7 @@ pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result
     match format {
         Some(format) => {
             plain::run(
-                desk,
+                session,
                 &format,
                 options.limit,
                 ended,
@@ -84,6 +84,6 @@ pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result
             )?;
             Ok(())
         }
-        None => screen::run(desk, options.limit, ended),
+        None => screen::run(session, options.limit, ended),
     }
 }

@@ -1,7 +1,7 @@
 //! Recordings: everything that both boards say, and what their links do, in MCAP and CSV.
 //!
 //! ```text
-//! link ─> queue ─> ledger: rows, times, gaps ─> books: MCAP files, CSV folder ─> safe on disk, once a second
+//! link ─> queue ─> row builder: times, gaps ─> files: MCAP files, CSV folder ─> safe on disk, once a second
 //! MCAP ─> reader: rows ─> replay
 //! ```
 //!
@@ -9,7 +9,7 @@
 //! channel for each board and kind of message: [`row::CHANNELS`].
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -17,26 +17,27 @@ use protocol::{PortCounters, Role};
 
 use crate::host_clock::now_us;
 use crate::link::Event;
+use crate::lock::locked;
 
-mod books;
 mod csv_folder;
 mod error;
+mod files;
 pub mod gauge_stream;
 mod json_schema;
-mod ledger;
 mod mcap_file;
-mod paper;
 mod queue;
 pub mod reader;
 pub mod row;
+mod row_builder;
+mod sink;
 
-pub use books::part_path;
 pub use error::RecordingError;
-pub use ledger::{Entry, Tally};
+pub use files::part_path;
+pub use row_builder::{Entry, Tally};
 
-use books::Books;
-use ledger::Ledger;
-use queue::{Queue, Taken};
+use files::RecordingFiles;
+use queue::{Input, Output, PATIENCE, Taken, queue};
+use row_builder::RowBuilder;
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);
@@ -89,18 +90,10 @@ type Writer = JoinHandle<Result<Progress, RecordingError>>;
 
 /// A recording under way. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
 pub struct Recorder {
-    shared: Arc<Shared>,
+    /// Boxed, so that an empty queue takes little memory.
+    notes: Input<Box<Note>>,
+    progress: Arc<Mutex<Progress>>,
     writer: Mutex<Option<Writer>>,
-}
-
-struct Shared {
-    queue: Queue<Note>,
-    progress: Mutex<Progress>,
-}
-
-/// A mutex whose data are sound at every moment, whoever died holding it.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Recorder {
@@ -109,19 +102,19 @@ impl Recorder {
     /// # Errors
     /// If there are such files already, or they can't be made.
     pub fn start(settings: Settings) -> Result<Self, RecordingError> {
-        let books = Books::open(settings)?;
-        let shared = Arc::new(Shared {
-            queue: Queue::default(),
-            progress: Mutex::default(),
-        });
-        let desk = Desk {
-            shared: Arc::clone(&shared),
-            books,
-            ledger: Ledger::default(),
+        let files = RecordingFiles::open(settings)?;
+        let (notes, waiting) = queue(PATIENCE);
+        let progress = Arc::<Mutex<Progress>>::default();
+        let writer_thread = WriterThread {
+            waiting,
+            progress: Arc::clone(&progress),
+            files,
+            row_builder: RowBuilder::default(),
         };
         Ok(Self {
-            shared,
-            writer: Mutex::new(Some(thread::spawn(|| desk.run()))),
+            notes,
+            progress,
+            writer: Mutex::new(Some(thread::spawn(|| writer_thread.run()))),
         })
     }
 
@@ -130,12 +123,11 @@ impl Recorder {
     pub fn on_event(&self, role: Role, event: &Event) {
         let at_us = match event {
             Event::Heard { at_us, .. } => *at_us,
-            Event::Restarted | Event::Turned(_) => now_us(),
+            Event::Restarted | Event::StateChanged(_) => now_us(),
         };
         let event = event.clone();
-        self.shared
-            .queue
-            .put(role, Note::Event { role, at_us, event });
+        let note = Note::Event { role, at_us, event };
+        self.notes.put(role, Box::new(note));
     }
 
     /// Takes what this end of the line to the board of `role` has counted.
@@ -146,12 +138,12 @@ impl Recorder {
             at_us,
             counters,
         };
-        self.shared.queue.put(role, note);
+        self.notes.put(role, Box::new(note));
     }
 
     /// How it stands.
     pub fn progress(&self) -> Progress {
-        *locked(&self.shared.progress)
+        *locked(&self.progress)
     }
 
     /// Writes what still waits, ends the files as they should end, and says what is in them. The second call
@@ -160,7 +152,7 @@ impl Recorder {
     /// # Errors
     /// If they could not be written to the end. What was safe before is.
     pub fn stop(&self) -> Result<Progress, RecordingError> {
-        self.shared.queue.close();
+        self.notes.close();
         match locked(&self.writer).take() {
             None => Ok(self.progress()),
             Some(writer) => writer.join().map_err(|_| RecordingError::Died)?,
@@ -175,32 +167,28 @@ impl Drop for Recorder {
 }
 
 /// Where the writing is done, on a thread of its own.
-struct Desk {
-    shared: Arc<Shared>,
-    books: Books,
-    ledger: Ledger,
+struct WriterThread {
+    waiting: Output<Box<Note>>,
+    progress: Arc<Mutex<Progress>>,
+    files: RecordingFiles,
+    row_builder: RowBuilder,
 }
 
-impl Desk {
+impl WriterThread {
     fn run(mut self) -> Result<Progress, RecordingError> {
         match self.write_all() {
             Ok(()) => {
-                let Self {
-                    shared,
-                    books,
-                    ledger,
-                } = self;
-                let safe_bytes = books
+                let safe_bytes = self
+                    .files
                     .finish()
-                    .inspect_err(|_| locked(&shared.progress).failed = true)?;
-                let mut progress = locked(&shared.progress);
-                *progress = all_safe(ledger.tally(), safe_bytes);
+                    .inspect_err(|_| locked(&self.progress).failed = true)?;
+                let mut progress = locked(&self.progress);
+                *progress = all_safe(self.row_builder.tally(), safe_bytes);
                 Ok(*progress)
             }
             Err(error) => {
-                self.shared.queue.abandon();
-                self.books.abandon();
-                locked(&self.shared.progress).failed = true;
+                self.files.abandon();
+                locked(&self.progress).failed = true;
                 Err(error)
             }
         }
@@ -211,30 +199,35 @@ impl Desk {
         let mut due = Instant::now() + SYNC;
         loop {
             let Self {
-                shared,
-                books,
-                ledger,
+                waiting,
+                progress,
+                files,
+                row_builder,
             } = self;
-            match shared.queue.take(due) {
-                Taken::Item(Note::Event { role, at_us, event }) => {
-                    ledger.enter(role, &event, at_us, |entry| books.write(&entry))?;
-                }
-                Taken::Item(Note::Counters {
-                    role,
-                    at_us,
-                    counters,
-                }) => {
-                    ledger.enter_counters(role, counters, at_us, |entry| books.write(&entry))?;
-                }
+            match waiting.take(due) {
+                Taken::Item(note) => match *note {
+                    Note::Event { role, at_us, event } => {
+                        row_builder.enter(role, &event, at_us, |entry| files.write(&entry))?;
+                    }
+                    Note::Counters {
+                        role,
+                        at_us,
+                        counters,
+                    } => {
+                        row_builder
+                            .enter_counters(role, counters, at_us, |entry| files.write(&entry))?;
+                    }
+                },
                 Taken::Refused(role, missing) => {
-                    ledger.enter_unwritten(role, missing, now_us(), |entry| books.write(&entry))?;
+                    row_builder
+                        .enter_unwritten(role, missing, now_us(), |entry| files.write(&entry))?;
                 }
                 Taken::Nothing => {}
                 Taken::Closed => return Ok(()),
             }
             if Instant::now() >= due {
-                books.sync()?;
-                *locked(&shared.progress) = all_safe(ledger.tally(), books.safe_bytes());
+                files.sync()?;
+                *locked(progress) = all_safe(row_builder.tally(), files.safe_bytes());
                 due = Instant::now() + SYNC;
             }
         }

@@ -3,20 +3,19 @@
 //! ```text
 //! recording ─> events ─> pace ─┬─> a monitor, as from the boards' links
 //!                              └─> stand-in ─> a board, as from its peer
-//! recording ─> scene: TOML and CSV for the simulator
+//! recording ─> scene: TOML for the simulator, which reads the recording itself
 //! ```
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::Role;
 
+use crate::clock::{Clock, micros};
 use crate::link::Event;
 use crate::recording::reader::{ReadError, Reader};
 
 mod events;
-mod pins;
 pub mod scene;
 pub mod stand_in;
 
@@ -61,13 +60,14 @@ pub struct Played {
     pub cut: bool,
 }
 
-/// Tells the events of a recording, each at its time, until its end or until `ended`.
+/// Tells the events of a recording, each at its time by `clock`, until its end or until `ended`.
 ///
 /// What was known before `pace.from_s` of the links and the configurations is told first.
 ///
 /// # Errors
 /// If the recording can't be read to the end; what was read before has been told.
 pub fn play(
+    clock: &dyn Clock,
     recording: Reader,
     pace: &Pace,
     ended: &AtomicBool,
@@ -75,17 +75,19 @@ pub fn play(
 ) -> Result<Played, ReadError> {
     let mut events = Events::new(recording);
     let mut played = Played::default();
-    let mut started: Option<(Instant, f64)> = None;
+    let mut started: Option<(u64, f64)> = None;
     while let Some((at_s, role, event)) = events.next_from(pace.from_s)? {
         if pace.to_s.is_some_and(|to_s| at_s > to_s) {
             break;
         }
-        let (start, start_s) = *started.get_or_insert((Instant::now(), at_s.max(pace.from_s)));
-        let due = start + Duration::from_secs_f64((at_s - start_s).max(0.0) / pace.speed);
-        if !wait_until(due, ended) {
+        let (start_us, start_s) = *started.get_or_insert((clock.now_us(), at_s.max(pace.from_s)));
+        let after = Duration::from_secs_f64((at_s - start_s).max(0.0) / pace.speed);
+        let due_us = start_us.saturating_add(micros(after));
+        if !wait_until(clock, due_us, ended) {
             break;
         }
-        played.latest = played.latest.max(due.elapsed());
+        let late = Duration::from_micros(clock.now_us().saturating_sub(due_us));
+        played.latest = played.latest.max(late);
         played.recorded_s = (at_s - start_s).max(played.recorded_s);
         played.events += 1;
         tell(role, event);
@@ -95,15 +97,16 @@ pub fn play(
 }
 
 /// Waits; false if it is to end before.
-fn wait_until(due: Instant, ended: &AtomicBool) -> bool {
+fn wait_until(clock: &dyn Clock, due_us: u64, ended: &AtomicBool) -> bool {
+    let notify = clock.notify();
     loop {
+        let now_us = clock.now_us();
         if ended.load(Ordering::Relaxed) {
             return false;
         }
-        let left = due.saturating_duration_since(Instant::now());
-        if left.is_zero() {
+        if now_us >= due_us {
             return true;
         }
-        thread::sleep(left.min(LOOK));
+        notify.wait_until(due_us.min(now_us.saturating_add(micros(LOOK))));
     }
 }

@@ -3,8 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::hearing::PATIENCE_US;
+use crate::line_monitor::PATIENCE_US;
 use crate::place::Place;
+use crate::system::Ports;
 
 /// How long a port that led nowhere before may take to answer, in µs: a board that runs answers within
 /// milliseconds.
@@ -27,13 +28,13 @@ impl Search {
     }
 
     /// The ports to try, in order: those that led nowhere before come last. Of ports to choose from, those
-    /// that `is_held` by another link of this program are left out.
-    pub fn candidates(&mut self, is_held: impl Fn(&Path) -> bool) -> Candidates {
-        let mut ports = self.place.candidates();
+    /// that this program has open are left out.
+    pub fn candidates(&mut self, system: &dyn Ports) -> Candidates {
+        let mut ports = system.candidates(&self.place);
         self.elsewhere.retain(|port| ports.contains(port));
         let choosy = self.is_choosy() || ports.len() > 1;
         if choosy {
-            ports.retain(|port| !is_held(port));
+            ports.retain(|port| !system.is_open(port));
             ports.sort_by_key(|port| self.elsewhere.contains(port));
         }
         Candidates { ports, choosy }
@@ -72,36 +73,55 @@ pub struct Candidates {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state::State;
+    use crate::system::Opened;
 
-    /// Ports that exist wherever tests run, and are no terminals.
+    /// Ports of which this program has one open.
+    struct Held(Option<&'static str>);
+
+    impl Ports for Held {
+        fn candidates(&self, place: &Place) -> Vec<PathBuf> {
+            match place {
+                Place::Among(ports) => ports.clone(),
+                Place::Port(port) => vec![port.clone()],
+                Place::Usb(_) | Place::Anywhere => Vec::new(),
+            }
+        }
+
+        fn is_open(&self, port: &Path) -> bool {
+            self.0.is_some_and(|held| port == Path::new(held))
+        }
+
+        fn open(&self, port: &Path) -> Result<Opened, State> {
+            let port = port.to_owned();
+            Err(State::Busy { port })
+        }
+    }
+
     fn ports() -> Vec<PathBuf> {
-        ["/dev/null", "/dev/zero", "/dev/full"]
-            .map(PathBuf::from)
-            .into()
+        ["/a", "/b", "/c"].map(PathBuf::from).into()
     }
 
     #[test]
     fn a_port_that_led_nowhere_is_tried_last_and_shortly() {
         let mut search = Search::new(Place::Among(ports()));
-        let [null, zero, full] = ["/dev/null", "/dev/zero", "/dev/full"].map(Path::new);
-        search.remember(null, false);
-        assert_eq!(search.candidates(|_| false).ports, [zero, full, null]);
-        assert_eq!(search.patience_us(null), SECOND_LOOK_US);
-        assert_eq!(search.patience_us(zero), PATIENCE_US);
-        search.remember(null, true);
-        assert_eq!(search.candidates(|_| false).ports, ports());
+        let [a, b, c] = ["/a", "/b", "/c"].map(Path::new);
+        search.remember(a, false);
+        assert_eq!(search.candidates(&Held(None)).ports, [b, c, a]);
+        assert_eq!(search.patience_us(a), SECOND_LOOK_US);
+        assert_eq!(search.patience_us(b), PATIENCE_US);
+        search.remember(a, true);
+        assert_eq!(search.candidates(&Held(None)).ports, ports());
     }
 
     #[test]
     fn a_port_of_another_link_is_left_out_where_there_is_a_choice() {
-        let mut search = Search::new(Place::Among(ports()));
-        let held = |port: &Path| port == Path::new("/dev/null");
-        let Candidates { ports, choosy } = search.candidates(held);
+        let held = Held(Some("/a"));
+        let Candidates { ports, choosy } = Search::new(Place::Among(ports())).candidates(&held);
         assert!(choosy);
-        assert_eq!(ports, [Path::new("/dev/zero"), Path::new("/dev/full")]);
-        let Candidates { ports, choosy } =
-            Search::new(Place::Port("/dev/null".into())).candidates(held);
+        assert_eq!(ports, [Path::new("/b"), Path::new("/c")]);
+        let Candidates { ports, choosy } = Search::new(Place::Port("/a".into())).candidates(&held);
         assert!(!choosy);
-        assert_eq!(ports, [Path::new("/dev/null")]);
+        assert_eq!(ports, [Path::new("/a")]);
     }
 }

@@ -4,7 +4,7 @@ use firmware_display::{Display, Senses, Settings, ZERO_VOLT};
 use host_bridge::link::Event;
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::fingertip::Fingertip;
-use host_bridge::monitor::happening::What;
+use host_bridge::monitor::log_entry::LogEvent;
 use host_bridge::monitor::orders::Outcome;
 use host_bridge::monitor::settings::{self, Kind};
 use host_bridge::monitor::trace::{Trace, column_us};
@@ -27,7 +27,7 @@ fn connected() -> Dashboard {
             port: "/dev/tty".into(),
             hello: Hello::new(role, "stm32f429zi", [0, 1, 0]),
         };
-        dashboard.on(0, role, Event::Turned(state));
+        dashboard.on(0, role, Event::StateChanged(state));
     }
     dashboard
 }
@@ -179,7 +179,7 @@ fn a_stop_waits_for_a_display_that_is_away() {
     let absent = State::Absent {
         place: "/dev/tty".to_owned(),
     };
-    dashboard.on(0, Role::Display, Event::Turned(absent));
+    dashboard.on(0, Role::Display, Event::StateChanged(absent));
     dashboard.stop();
     dashboard.take_outbox(Role::Display);
     dashboard.elapse(60_000_000);
@@ -188,7 +188,7 @@ fn a_stop_waits_for_a_display_that_is_away() {
         port: "/dev/tty".into(),
         hello: Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
     };
-    dashboard.on(60_000_001, Role::Display, Event::Turned(known));
+    dashboard.on(60_000_001, Role::Display, Event::StateChanged(known));
     dashboard.elapse(60_000_002);
     assert!(dashboard.take_outbox(Role::Display).contains(&STOP));
 }
@@ -196,7 +196,7 @@ fn a_stop_waits_for_a_display_that_is_away() {
 #[test]
 fn each_change_of_the_supervisor_happens_once() {
     let mut dashboard = connected();
-    dashboard.take_happenings();
+    dashboard.take_log_entries();
     for state in [
         DisplayState::Ready,
         DisplayState::Driving,
@@ -209,17 +209,17 @@ fn each_change_of_the_supervisor_happens_once() {
         });
         dashboard.on(5, Role::Display, Event::Heard { at_us: 5, message });
     }
-    let told: Vec<What> = dashboard
-        .take_happenings()
+    let told: Vec<LogEvent> = dashboard
+        .take_log_entries()
         .into_iter()
-        .map(|happening| happening.what)
+        .map(|log_entry| log_entry.what)
         .collect();
     assert_eq!(
         told,
         [
-            What::Safety(DisplayState::Ready),
-            What::Safety(DisplayState::Driving),
-            What::Safety(DisplayState::Ready),
+            LogEvent::Safety(DisplayState::Ready),
+            LogEvent::Safety(DisplayState::Driving),
+            LogEvent::Safety(DisplayState::Ready),
         ]
     );
 }

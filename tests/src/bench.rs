@@ -13,8 +13,8 @@ use crate::elves;
 
 /// The boards' baud rate.
 pub const BAUD: u32 = 921_600;
-/// What is waited for comes long before.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Only what hangs takes so long.
+const PATIENCE: Duration = Duration::from_secs(300);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(1);
 /// How long a port is listened to at a time.
@@ -55,14 +55,14 @@ pub fn bench(name: &str, change: impl FnOnce(&mut Options)) -> Alone {
 /// Waits until `wanted` gives something.
 ///
 /// # Panics
-/// If it does not in a minute; `what` says what is missing.
+/// If it does not in five minutes; `what` says what is missing.
 pub fn until<T>(what: &str, mut wanted: impl FnMut() -> Option<T>) -> T {
     let begun = Instant::now();
     loop {
         if let Some(found) = wanted() {
             return found;
         }
-        assert!(begun.elapsed() < PATIENCE, "{what}: not in a minute");
+        assert!(begun.elapsed() < PATIENCE, "{what}: not in five minutes");
         // Whoever looks without a pause takes from the boards the time in which it happens.
         std::thread::park_timeout(LOOK);
     }
@@ -160,7 +160,7 @@ impl Client {
     /// Waits for a message of which `wanted` makes something.
     ///
     /// # Panics
-    /// If it does not come in a minute, or the port is gone; `what` says what is missing.
+    /// If it does not come in five minutes, or the port is gone; `what` says what is missing.
     pub fn hear<T>(&mut self, what: &str, mut wanted: impl FnMut(Message) -> Option<T>) -> T {
         until(what, || {
             let mut found = None;
@@ -173,7 +173,7 @@ impl Client {
     /// Waits until the port is gone.
     ///
     /// # Panics
-    /// If it stays for a minute.
+    /// If it stays for five minutes.
     pub fn hang_up(mut self) {
         until("the port to be gone", || self.listen(|_| {}).err());
     }

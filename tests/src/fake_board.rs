@@ -1,11 +1,11 @@
-//! A board that is not there: the protocol's own port behind a pseudo-terminal, with whatever a test
-//! wants said. For the bridge's tests that need no firmware.
+//! A board that is not there: the protocol's own port behind a pseudo-terminal or a line in memory, with
+//! whatever a test wants said. For the bridge's tests that need no firmware.
 
+use std::any::Any;
 use std::io::{self, ErrorKind, Read, Write};
-use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,12 @@ use protocol::{
     DisplayState, Hello, MAX_FRAME, Message, Port, Role, Safety, Stop, StopReason, Trip,
 };
 
+use host_bridge::clock::{Clock, SystemClock};
+use host_bridge::lock::locked;
+
 use crate::pty::Near;
+use crate::virtual_clock;
+use crate::virtual_ports::VirtualBench;
 
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
@@ -34,14 +39,15 @@ enum Order {
 /// to be said.
 pub type Script = Box<dyn FnMut(u64) -> Vec<Message> + Send>;
 
-/// A board on a pseudo-terminal. Dropping it pulls the cable.
+/// A board on a line. Dropping it pulls the cable.
 pub struct FakeBoard {
     path: PathBuf,
     orders: Sender<Order>,
     heard: Arc<Mutex<Vec<Message>>>,
+    clock: Arc<dyn Clock>,
     line: Option<JoinHandle<()>>,
-    /// Keeps the pseudo-terminal alive while nobody has it open.
-    kept: Option<OwnedFd>,
+    /// Keeps the line alive while nobody has it open.
+    kept: Option<Box<dyn Any + Send>>,
 }
 
 impl FakeBoard {
@@ -58,17 +64,57 @@ impl FakeBoard {
     /// A board that introduces itself with `hello` and says by itself what `script` has it say.
     pub fn acting(hello: Hello, script: Script) -> Self {
         let (master, kept, path) = Near::pair(LOOK).expect("the system has pseudo-terminals");
+        Self::at(
+            master,
+            Box::new(kept),
+            path,
+            Arc::new(SystemClock),
+            hello,
+            script,
+        )
+    }
+
+    /// The same on a line of `bench`, by its clock.
+    pub fn acting_on(bench: &VirtualBench, hello: Hello, script: Script) -> Self {
+        let (path, end) = bench.cable();
+        let clock = Arc::new(bench.clock.clone());
+        let plug = Box::new(end.plug());
+        Self::at(end, plug, path, clock, hello, script)
+    }
+
+    /// A board of `role` and of this build on a line of `bench`.
+    pub fn on(bench: &VirtualBench, role: Role) -> Self {
+        let hello = Hello::new(role, "stm32f429zi", [0, 1, 0]);
+        Self::acting_on(bench, hello, Box::new(|_| Vec::new()))
+    }
+
+    fn at(
+        end: impl Read + Write + Send + 'static,
+        kept: Box<dyn Any + Send>,
+        path: PathBuf,
+        clock: Arc<dyn Clock>,
+        hello: Hello,
+        script: Script,
+    ) -> Self {
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
-        let ears = Arc::clone(&heard);
-        let line = thread::spawn(move || run(master, hello, script, &given, &ears));
+        let (hears, own) = (Arc::clone(&heard), Arc::clone(&clock));
+        let line = clock.spawn(Box::new(move || {
+            run(end, &*own, hello, script, &given, &hears);
+        }));
         Self {
             path,
             orders,
             heard,
+            clock,
             line: Some(line),
             kept: Some(kept),
         }
+    }
+
+    /// The clock that it goes by.
+    pub fn clock(&self) -> &dyn Clock {
+        &*self.clock
     }
 
     /// The port to open.
@@ -114,7 +160,7 @@ impl FakeBoard {
 
     /// What the board has heard so far; the list is emptied.
     pub fn take_heard(&self) -> Vec<Message> {
-        std::mem::take(&mut self.heard.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut locked(&self.heard))
     }
 }
 
@@ -124,19 +170,21 @@ impl Drop for FakeBoard {
         // A write that waits for a reader who will not come ends with this.
         self.kept = None;
         if let Some(line) = self.line.take() {
-            let _ = line.join();
+            self.clock.join(line);
         }
     }
 }
 
 fn run(
-    mut master: Near,
+    mut master: impl Read + Write,
+    clock: &dyn Clock,
     hello: Hello,
     mut script: Script,
     given: &Receiver<Order>,
     heard: &Mutex<Vec<Message>>,
 ) {
-    let mut started = Instant::now();
+    let mut started_us = clock.now_us();
+    let pause = clock.notify();
     let mut port = Port::new(hello);
     let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
     let mut obeys = hello.role == Role::Display.byte();
@@ -144,7 +192,7 @@ fn run(
     let mut out = [0; MAX_FRAME];
     loop {
         let count = if is_deaf {
-            thread::park_timeout(LOOK);
+            pause.wait_until(clock.now_us() + 1_000);
             0
         } else {
             match master.read(&mut bytes) {
@@ -153,16 +201,13 @@ fn run(
                 Err(_) => return,
             }
         };
-        let now_us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        let now_us = clock.now_us() - started_us;
         let mut stop = None;
         port.receive(now_us, &bytes[..count], |message| {
             if let Message::Stop(Stop { reason }) = message {
                 stop = Some(reason);
             }
-            heard
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(message);
+            locked(heard).push(message);
         });
         let answer = stop.filter(|_| obeys).map(|reason| stopped(now_us, reason));
         let mut said = script(now_us).into_iter().chain(answer);
@@ -188,7 +233,7 @@ fn run(
                 Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {
                     port = Port::new(hello);
-                    started = Instant::now();
+                    started_us = clock.now_us();
                 }
                 Ok(Order::End) => return,
                 Err(_) => break,
@@ -208,7 +253,7 @@ fn stopped(instant_us: u64, reason: StopReason) -> Message {
 }
 
 /// Writes all of it; false if it found no room, in spite of all patience.
-fn write(master: &mut Near, mut bytes: &[u8], is_patient: bool) -> bool {
+fn write(master: &mut impl Write, mut bytes: &[u8], is_patient: bool) -> bool {
     if !is_patient {
         return master.write_all(bytes).is_ok();
     }
@@ -224,6 +269,11 @@ fn write(master: &mut Near, mut bytes: &[u8], is_patient: bool) -> bool {
 
 fn is_pause(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock)
+}
+
+/// Waits by the clock of `board` until `holds`, for at most `limit`; whether it did.
+pub fn wait_by(board: &FakeBoard, limit: Duration, holds: impl FnMut() -> bool) -> bool {
+    virtual_clock::wait_until(board.clock(), limit, holds)
 }
 
 /// Waits until `holds`, for at most `limit`; whether it did.

@@ -16,4 +16,8 @@ pub mod sensing;
 pub mod swift_board;
 pub mod terminal;
 pub mod utterance;
+pub mod virtual_clock;
+pub mod virtual_network;
+pub mod virtual_ports;
+pub mod virtual_relay;
 pub mod weather;

@@ -4,15 +4,18 @@ use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, ExitStatus};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use host_bridge::lock::locked;
 use protocol::{Contact, Estimate, GaugeHealth, Hello, Message, Motion, Range, Role};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::bridge;
-use crate::fake_board::{FakeBoard, wait_until};
+use crate::fake_board::{FakeBoard, Script, wait_by, wait_until};
+use crate::virtual_ports::VirtualBench;
 
 /// Between two motions of a display, in µs.
 pub const MOTION_US: u64 = 2_000;
@@ -21,7 +24,10 @@ pub const ESTIMATE_US: u64 = 10_000;
 
 /// Lines that a program says, as they come.
 #[derive(Clone, Default)]
-struct Lines(Arc<Mutex<Vec<String>>>);
+struct Lines {
+    said: Arc<Mutex<Vec<String>>>,
+    ended: Arc<AtomicBool>,
+}
 
 impl Lines {
     fn of(pipe: Option<impl Read + Send + 'static>) -> Self {
@@ -32,13 +38,19 @@ impl Lines {
                 for line in BufReader::new(pipe).lines().map_while(Result::ok) {
                     written.all().push(line);
                 }
+                written.ended.store(true, Ordering::Release);
             });
         }
         lines
     }
 
     fn all(&self) -> MutexGuard<'_, Vec<String>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.said)
+    }
+
+    /// Whether nothing more comes.
+    fn is_ended(&self) -> bool {
+        self.ended.load(Ordering::Acquire)
     }
 }
 
@@ -125,13 +137,7 @@ impl Relay {
         });
         assert!(ended, "not ended after {limit:?}: {}", self.words());
         // Its pipes are read to the end when nothing more comes.
-        let mut printed = 0;
-        wait_until(Duration::from_millis(200), || {
-            let now = self.stdout.all().len();
-            let same = now == printed && now > 0;
-            printed = now;
-            same
-        });
+        wait_until(limit, || self.stdout.is_ended() && self.stderr.is_ended());
         let status = status.expect("it has ended");
         (status, self.lines(), self.words())
     }
@@ -185,23 +191,32 @@ pub fn estimate(sequence: u32, instant_us: u64) -> Message {
 
 /// A board that says what the board of `role` always says, at its pace, numbered from 0.
 pub fn talking_board(role: Role) -> FakeBoard {
-    let hello = Hello::new(role, "stm32f429zi", [0, 1, 0]);
+    FakeBoard::acting(hello(role), script(role))
+}
+
+/// The same on a line of `bench`.
+pub fn talking_board_on(bench: &VirtualBench, role: Role) -> FakeBoard {
+    FakeBoard::acting_on(bench, hello(role), script(role))
+}
+
+const fn hello(role: Role) -> Hello {
+    Hello::new(role, "stm32f429zi", [0, 1, 0])
+}
+
+fn script(role: Role) -> Script {
     let mut next = 0_u32;
     let (period_us, make): (u64, fn(u32, u64) -> Message) = match role {
         Role::Sensor => (ESTIMATE_US, estimate),
         _ => (MOTION_US, motion),
     };
-    FakeBoard::acting(
-        hello,
-        Box::new(move |now_us| {
-            let mut said = Vec::new();
-            while u64::from(next) * period_us < now_us {
-                said.push(make(next, now_us));
-                next += 1;
-            }
-            said
-        }),
-    )
+    Box::new(move |now_us| {
+        let mut said = Vec::new();
+        while u64::from(next) * period_us < now_us {
+            said.push(make(next, now_us));
+            next += 1;
+        }
+        said
+    })
 }
 
 /// The board's own numbers of the estimates or motions among `messages`, in the order in which they came.
@@ -225,17 +240,11 @@ pub fn listen(
     limit: Duration,
     mut enough: impl FnMut(&[Message]) -> bool,
 ) -> Vec<Message> {
-    let started = Instant::now();
     let mut heard = Vec::new();
-    let came = wait_until(limit, || {
+    let came = wait_by(board, limit, || {
         heard.extend(board.take_heard());
         enough(&heard)
     });
-    assert!(
-        came,
-        "not enough after {:?}: {} heard",
-        started.elapsed(),
-        heard.len()
-    );
+    assert!(came, "not enough after {limit:?}: {} heard", heard.len());
     heard
 }

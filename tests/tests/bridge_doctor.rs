@@ -1,21 +1,29 @@
-//! `host-bridge doctor` as its user starts it, before boards that are well and boards that are not.
+//! `host-bridge doctor` before boards that are well and boards that are not, by virtual time; and as its user
+//! starts it.
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
+
+use host_bridge::bench::{Bench, Seat};
+use host_bridge::doctor::report::Style;
+use host_bridge::doctor::{findings, json, look, report};
 
 use protocol::{
     Contact, DisplayCounters, DisplayState, Estimate, GaugeHealth, Hello, Message, Motion,
     PortCounters, Range, ResetCause, Role, RoleCounters, SensorCounters, Status, Trip,
 };
 use serde_json::Value;
-use serialport::{SerialPort, TTYPort};
 use tests::bridge::{self, Ended};
 use tests::fake_board::{FakeBoard, Script};
+use tests::virtual_ports::VirtualBench;
 
-/// Far more than a look of a second takes.
-const LIMIT: Duration = Duration::from_secs(30);
+/// Only what hangs takes so long.
+const LIMIT: Duration = Duration::from_secs(120);
+/// How long the boards are listened to by virtual time.
+const SPAN: Duration = Duration::from_secs(1);
 
 fn hello(role: Role) -> Hello {
     Hello::new(role, "stm32f429zi", [0, 1, 0])
@@ -101,23 +109,42 @@ fn well_display(uptime_us: u64) -> Status {
     )
 }
 
-fn board(role: Role, status: fn(u64) -> Status) -> FakeBoard {
-    FakeBoard::acting(hello(role), script(role, status))
+fn board(bench: &VirtualBench, role: Role, status: fn(u64) -> Status) -> FakeBoard {
+    FakeBoard::acting_on(bench, hello(role), script(role, status))
 }
 
-fn doctor(sensor: &Path, display: &Path, more: &[&str]) -> Ended {
-    let (sensor, display) = (sensor.to_string_lossy(), display.to_string_lossy());
-    let mut arguments = vec![
-        "doctor",
-        "--for",
-        "1",
-        "--sensor",
-        &sensor,
-        "--display",
-        &display,
-    ];
-    arguments.extend(more);
-    bridge::run(arguments, LIMIT)
+fn seat(port: &Path) -> Seat {
+    Seat {
+        port: Some(port.to_owned()),
+        ..Seat::default()
+    }
+}
+
+/// What a doctor finds.
+struct Found {
+    text: String,
+    document: Value,
+    is_well: bool,
+}
+
+fn examine(bench: &VirtualBench, boards: &Bench) -> Found {
+    let ended = AtomicBool::new(false);
+    let examination = look::look(&bench.system(), boards, SPAN, &ended);
+    let findings = findings::of(&examination);
+    let document = json::write(&examination, &findings);
+    Found {
+        text: report::write(&examination, &findings, Style::Plain),
+        document: serde_json::from_str(&document).unwrap_or_else(|error| panic!("{error}")),
+        is_well: findings.is_empty(),
+    }
+}
+
+fn doctor(bench: &VirtualBench, sensor: &Path, display: &Path) -> Found {
+    let boards = Bench {
+        sensor: seat(sensor),
+        display: seat(display),
+    };
+    examine(bench, &boards)
 }
 
 fn document(ended: &Ended) -> Value {
@@ -138,57 +165,46 @@ fn kinds(document: &Value, board: &str) -> Vec<String> {
 
 #[test]
 fn boards_that_are_well_are_told_so() {
-    let sensor = board(Role::Sensor, well_sensor);
-    let display = board(Role::Display, well_display);
-    let ended = doctor(sensor.path(), display.path(), &[]);
-    assert_eq!(
-        ended.status.code(),
-        Some(0),
-        "{}{}",
-        ended.stdout,
-        ended.stderr
-    );
-    assert!(ended.stdout.ends_with("\nall well\n"), "{}", ended.stdout);
-    assert!(!ended.stdout.contains('\x1b'), "{}", ended.stdout);
+    let bench = VirtualBench::default();
+    let sensor = board(&bench, Role::Sensor, well_sensor);
+    let display = board(&bench, Role::Display, well_display);
+    let Found { text, is_well, .. } = doctor(&bench, sensor.path(), display.path());
+    assert!(is_well && text.ends_with("\nall well\n"), "{text}");
+    assert!(!text.contains('\x1b'), "{text}");
     assert!(
-        ended.stdout.lines().all(|line| line.chars().count() <= 80),
-        "{}",
-        ended.stdout
+        text.lines().all(|line| line.chars().count() <= 80),
+        "{text}"
     );
-    assert!(
-        ended.stdout.contains("sensor 0.1.0 on stm32f429zi"),
-        "{}",
-        ended.stdout
-    );
+    assert!(text.contains("sensor 0.1.0 on stm32f429zi"), "{text}");
 }
 
 #[test]
 fn scripts_get_the_same_as_json() {
-    let sensor = board(Role::Sensor, well_sensor);
-    let display = board(Role::Display, well_display);
-    let ended = doctor(sensor.path(), display.path(), &["--json"]);
-    let document = document(&ended);
-    assert_eq!(ended.status.code(), Some(0), "{document:#}");
-    assert_eq!(document["well"], true);
+    let bench = VirtualBench::default();
+    let sensor = board(&bench, Role::Sensor, well_sensor);
+    let display = board(&bench, Role::Display, well_display);
+    let Found { document, .. } = doctor(&bench, sensor.path(), display.path());
+    assert_eq!(document["well"], true, "{document:#}");
     let board = &document["boards"][0];
     assert_eq!(board["state"], "known");
     assert_eq!(board["hello"]["chip"], "stm32f429zi");
-    assert_eq!(
-        board["clock"]["drift_ppm"].as_f64().map(f64::is_finite),
-        Some(true)
-    );
-    let rate_hz = board["rate_hz"].as_f64().expect("a second's estimates");
-    assert!((80.0..120.0).contains(&rate_hz), "{rate_hz}");
+    // One clock for both, and lines that take no time.
+    assert_eq!(board["clock"]["drift_ppm"].as_f64(), Some(0.0));
     assert_eq!(document["boards"][1]["supervisor"], "ready");
+    for (at, wanted_hz) in [(0, 100.0), (1, 500.0)] {
+        let rate_hz = document["boards"][at]["rate_hz"].as_f64();
+        let rate_hz = rate_hz.expect("a second's messages");
+        // To one message.
+        assert!((rate_hz - wanted_hz).abs() <= 1.0, "{rate_hz}");
+    }
 }
 
 #[test]
 fn exchanged_boards_are_both_named() {
-    let sensor = board(Role::Sensor, well_sensor);
-    let display = board(Role::Display, well_display);
-    let ended = doctor(display.path(), sensor.path(), &["--json"]);
-    let document = document(&ended);
-    assert_eq!(ended.status.code(), Some(1), "{document:#}");
+    let bench = VirtualBench::default();
+    let sensor = board(&bench, Role::Sensor, well_sensor);
+    let display = board(&bench, Role::Display, well_display);
+    let Found { document, .. } = doctor(&bench, display.path(), sensor.path());
     assert_eq!(kinds(&document, "sensor"), ["wrong-role"]);
     assert_eq!(kinds(&document, "display"), ["wrong-role"]);
     assert_eq!(document["boards"][0]["hello"]["role"], "display");
@@ -211,11 +227,11 @@ fn counters_and_a_stop_are_findings() {
         });
         status
     }
-    let sensor = board(Role::Sensor, noisy);
-    let display = board(Role::Display, stopped);
-    let ended = doctor(sensor.path(), display.path(), &[]);
-    assert_eq!(ended.status.code(), Some(1));
-    let words: Vec<&str> = ended.stdout.split_whitespace().collect();
+    let bench = VirtualBench::default();
+    let sensor = board(&bench, Role::Sensor, noisy);
+    let display = board(&bench, Role::Display, stopped);
+    let Found { text, .. } = doctor(&bench, sensor.path(), display.path());
+    let words: Vec<&str> = text.split_whitespace().collect();
     let said = words.join(" ");
     for line in [
         "sensor: restarted by its watchdog twice since power came on",
@@ -225,7 +241,7 @@ fn counters_and_a_stop_are_findings() {
         "display: no stimulus: stopped: emergency stop",
         "4 findings",
     ] {
-        assert!(said.contains(line), "no {line:?} in:\n{}", ended.stdout);
+        assert!(said.contains(line), "no {line:?} in:\n{text}");
     }
     assert!(said.contains("of them while it was looked at"), "{said}");
 }
@@ -239,12 +255,10 @@ fn a_board_that_is_absent_and_one_that_sends_garbage_are_named() {
             seed.to_le_bytes()[3] | 0x80
         })
         .collect();
-    let (mut far, near) = TTYPort::pair().expect("the system has pseudo-terminals");
-    far.write_all(&noise).expect("it takes so many");
-    let port = PathBuf::from(near.name().expect("a pseudo-terminal has a name"));
-    let ended = doctor(Path::new("/dev/no-such-port"), &port, &["--json"]);
-    let document = document(&ended);
-    assert_eq!(ended.status.code(), Some(1), "{document:#}");
+    let bench = VirtualBench::default();
+    let (port, mut end) = bench.cable();
+    end.write_all(&noise).expect("it takes so many");
+    let Found { document, .. } = doctor(&bench, Path::new("/virtual/nowhere"), &port);
     assert_eq!(kinds(&document, "sensor"), ["absent"]);
     assert_eq!(kinds(&document, "display"), ["garbage"]);
     assert_eq!(document["boards"][0]["state"], "absent");
@@ -252,24 +266,36 @@ fn a_board_that_is_absent_and_one_that_sends_garbage_are_named() {
 
 #[test]
 fn a_port_of_another_program_is_named_and_left_to_it() {
-    let sensor = board(Role::Sensor, well_sensor);
-    let display = board(Role::Display, well_display);
+    let [sensor, other_board] = [Role::Sensor, Role::Display].map(FakeBoard::new);
     let other = File::open(sensor.path()).expect("the port is there");
     other.try_lock().expect("nobody else has it");
-    let ended = doctor(sensor.path(), display.path(), &["--json"]);
+    let [busy, wrong] = [&sensor, &other_board].map(|board| board.path().to_string_lossy());
+    // Neither takes a look: nothing is heard, and how long it lasts is no matter.
+    let words = ["doctor", "--json", "--for", "1", "--sensor", &busy];
+    let ended = bridge::run(words.into_iter().chain(["--display", "/dev/none"]), LIMIT);
     let document = document(&ended);
     assert_eq!(ended.status.code(), Some(1), "{document:#}");
     assert_eq!(kinds(&document, "sensor"), ["busy"]);
-    assert_eq!(kinds(&document, "display"), Vec::<String>::new());
+    assert_eq!(kinds(&document, "display"), ["absent"]);
+    let ended = bridge::run(["doctor", "--for", "1", "--sensor", &wrong], LIMIT);
+    assert_eq!(ended.status.code(), Some(1));
+    assert!(
+        ended.stdout.contains("display 0.1.0 on stm32f429zi"),
+        "{}",
+        ended.stdout
+    );
 }
 
 #[test]
 fn one_board_alone_is_a_bench() {
-    let sensor = board(Role::Sensor, well_sensor);
-    let port = sensor.path().to_string_lossy();
-    let ended = bridge::run(["doctor", "--for", "1", "--sensor", &*port], LIMIT);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stdout);
-    assert!(!ended.stdout.contains("\ndisplay\n"), "{}", ended.stdout);
+    let bench = VirtualBench::default();
+    let sensor = board(&bench, Role::Sensor, well_sensor);
+    let boards = Bench {
+        sensor: seat(sensor.path()),
+        display: Seat::default(),
+    };
+    let Found { text, is_well, .. } = examine(&bench, &boards);
+    assert!(is_well && !text.contains("\ndisplay\n"), "{text}");
 }
 
 #[test]
@@ -289,25 +315,22 @@ fn a_bench_file_that_is_wrong_is_refused_before_anything_is_looked_at() {
 
 #[test]
 fn a_firmware_of_another_version_than_the_benchs_is_named() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("bridge_doctor");
-    fs::create_dir_all(&folder).expect("a folder can be made");
-    let newer = FakeBoard::acting(
+    let bench = VirtualBench::default();
+    let newer = FakeBoard::acting_on(
+        &bench,
         Hello::new(Role::Sensor, "stm32f429zi", [9, 9, 9]),
         script(Role::Sensor, well_sensor),
     );
-    let display = board(Role::Display, well_display);
-    let bench = folder.join("elves.toml");
-    let text = format!(
-        "[sensor]\nport = {:?}\nelf = {:?}\n[display]\nport = {:?}\nelf = \"no-such.elf\"\n",
-        newer.path(),
-        tests::elves::path(Role::Sensor),
-        display.path(),
-    );
-    fs::write(&bench, text).expect("a file can be written");
-    let path = bench.to_string_lossy();
-    let ended = bridge::run(["doctor", "--for", "1", "--json", "--bench", &*path], LIMIT);
-    let document = document(&ended);
-    assert_eq!(ended.status.code(), Some(1), "{document:#}");
+    let display = board(&bench, Role::Display, well_display);
+    let with = |port: &Path, elf| Seat {
+        elf: Some(elf),
+        ..seat(port)
+    };
+    let boards = Bench {
+        sensor: with(newer.path(), tests::elves::path(Role::Sensor)),
+        display: with(display.path(), "no-such.elf".into()),
+    };
+    let Found { document, .. } = examine(&bench, &boards);
     assert_eq!(kinds(&document, "sensor"), ["elf-differs"]);
     assert_eq!(kinds(&document, "display"), ["elf-unusable"]);
 }

@@ -9,14 +9,14 @@ use host_bridge::flash::firmware::{Firmware, FirmwareError};
 use host_bridge::flash::plan::Plan;
 use host_bridge::place::Place;
 use host_bridge::state::State;
+use host_bridge::system::System;
 use protocol::{Hello, Role};
 use tests::elves;
 use tests::fake_board::FakeBoard;
+use tests::virtual_ports::VirtualBench;
 
-/// Far more than anything here takes.
-const LIMIT: Duration = Duration::from_secs(10);
-/// For what will not come.
-const SHORT: Duration = Duration::from_millis(300);
+/// Of virtual time, but for what waits for an event of the system's: there only what hangs takes so long.
+const LIMIT: Duration = Duration::from_secs(120);
 
 fn place(board: &FakeBoard) -> Place {
     Place::Port(board.path().clone())
@@ -57,9 +57,11 @@ fn firmwares_that_were_exchanged_are_refused() {
 
 #[test]
 fn the_new_firmware_is_heard() {
+    let bench = VirtualBench::default();
     let wanted = hello(Role::Sensor, [0, 1, 0]);
-    let board = FakeBoard::saying(wanted);
+    let board = FakeBoard::acting_on(&bench, wanted, Box::new(|_| Vec::new()));
     let heard = wait(
+        &bench.system(),
         Role::Sensor,
         place(&board),
         wanted,
@@ -71,13 +73,16 @@ fn the_new_firmware_is_heard() {
 
 #[test]
 fn an_old_firmware_that_still_answers_is_not_taken_for_the_new_one() {
-    let board = FakeBoard::saying(hello(Role::Sensor, [0, 0, 9]));
+    let bench = VirtualBench::default();
+    let old = hello(Role::Sensor, [0, 0, 9]);
+    let board = FakeBoard::acting_on(&bench, old, Box::new(|_| Vec::new()));
     let wanted = hello(Role::Sensor, [0, 1, 0]);
     let error = wait(
+        &bench.system(),
         Role::Sensor,
         place(&board),
         wanted,
-        SHORT,
+        LIMIT,
         &AtomicBool::new(false),
     )
     .expect_err("another version");
@@ -91,9 +96,11 @@ fn an_old_firmware_that_still_answers_is_not_taken_for_the_new_one() {
 
 #[test]
 fn a_board_that_stays_silent_is_said_to_be_flashed_all_the_same() {
+    let system = VirtualBench::default().system();
     let place = Place::Port("/dev/no-such-port".into());
     let wanted = hello(Role::Display, [0, 1, 0]);
-    let error = wait(Role::Display, place, wanted, SHORT, &AtomicBool::new(false))
+    let called_off = AtomicBool::new(false);
+    let error = wait(&system, Role::Display, place, wanted, LIMIT, &called_off)
         .expect_err("nobody is there");
     let text = error.to_string();
     assert!(
@@ -107,16 +114,22 @@ fn a_board_that_stays_silent_is_said_to_be_flashed_all_the_same() {
 fn a_wait_can_be_called_off() {
     let place = Place::Port("/dev/no-such-port".into());
     let wanted = hello(Role::Display, [0, 1, 0]);
-    let error = wait(Role::Display, place, wanted, LIMIT, &AtomicBool::new(true));
+    let system = VirtualBench::default().system();
+    let called_off = AtomicBool::new(true);
+    let error = wait(&system, Role::Display, place, wanted, LIMIT, &called_off);
     assert!(matches!(error, Err(NoHello::CalledOff)), "{error:?}");
 }
 
 #[test]
 fn who_is_there_is_known_before_anything_is_erased() {
-    let sensor = FakeBoard::saying(hello(Role::Sensor, [0, 1, 0]));
-    let display = FakeBoard::saying(hello(Role::Display, [0, 1, 0]));
+    let bench = VirtualBench::default();
+    let [sensor, display] = [Role::Sensor, Role::Display].map(|role| FakeBoard::on(&bench, role));
     let nobody = Place::Port("/dev/no-such-port".into());
-    let states = look_at_all(Role::Sensor, vec![place(&sensor), place(&display), nobody]);
+    let states = look_at_all(
+        &bench.system(),
+        Role::Sensor,
+        vec![place(&sensor), place(&display), nobody],
+    );
     assert!(matches!(states[0], State::Known { .. }), "{:?}", states[0]);
     assert!(
         matches!(states[1], State::Stranger { .. }),
@@ -132,6 +145,6 @@ fn a_console_that_another_program_has_is_named() {
     let _monitor = serialport::new(board.path().to_string_lossy(), 921_600)
         .open_native()
         .expect("the port can be opened");
-    let state = look(Role::Sensor, place(&board));
+    let state = look(&System::default(), Role::Sensor, place(&board));
     assert!(matches!(state, State::Busy { .. }), "{state:?}");
 }

@@ -1,13 +1,11 @@
-//! The bridge's way to a board: found, greeted, lost and found again, and named when something is wrong.
+//! The bridge's way to a board, by virtual time: found, greeted, lost and found again, and named when
+//! something is wrong.
 
-use std::fs::{self, File, OpenOptions};
-use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use host_bridge::clock::Clock;
 use host_bridge::link::{Event, Link, NotSent};
 use host_bridge::place::Place;
 use host_bridge::state::State;
@@ -15,50 +13,80 @@ use protocol::{
     Hello, Message, Motion, PortCounters, ResetCause, Role, RoleCounters, SensorCounters, Status,
     Stop, StopReason,
 };
-use serialport::{SerialPort, TTYPort};
-use tests::fake_board::{FakeBoard, wait_until};
+use tests::fake_board::{FakeBoard, wait_by};
+use tests::virtual_clock::wait_until;
+use tests::virtual_ports::VirtualBench;
 
-/// Far more than anything here takes.
-const LIMIT: Duration = Duration::from_secs(10);
+/// Far more of virtual time than anything here takes.
+const LIMIT: Duration = Duration::from_secs(60);
+const S: u64 = 1_000_000;
 
-fn link(role: Role, board: &FakeBoard) -> (Link, Receiver<Event>) {
-    link_to(role, Place::Port(board.path().clone()))
+/// A link, and what it tells.
+struct Watched {
+    bench: VirtualBench,
+    link: Link,
+    told: Receiver<Event>,
 }
 
-fn link_to(role: Role, place: Place) -> (Link, Receiver<Event>) {
-    let (events, told) = channel();
-    let link = Link::open(role, place, move |event| {
-        let _ = events.send(event);
-    });
-    (link, told)
-}
-
-fn turned(told: &Receiver<Event>, wanted: impl Fn(&State) -> bool) -> State {
-    loop {
-        match told.recv_timeout(LIMIT).expect("the link turns in time") {
-            Event::Turned(state) if wanted(&state) => return state,
-            _ => {}
+impl Watched {
+    fn new(bench: &VirtualBench, role: Role, place: Place) -> Self {
+        let (events, told) = channel();
+        let link = Link::open_on(&bench.system(), role, place, move |event| {
+            let _ = events.send(event);
+        });
+        Self {
+            bench: bench.clone(),
+            link,
+            told,
         }
+    }
+
+    fn at(bench: &VirtualBench, role: Role, board: &FakeBoard) -> Self {
+        Self::new(bench, role, Place::Port(board.path().clone()))
+    }
+
+    fn turned(&self, wanted: impl Fn(&State) -> bool) -> State {
+        let mut found = None;
+        let mut turns = || {
+            found = self.told.try_iter().find_map(|event| match event {
+                Event::StateChanged(state) if wanted(&state) => Some(state),
+                _ => None,
+            });
+            found.is_some()
+        };
+        let has_turned = wait_until(&self.bench.clock, LIMIT, &mut turns);
+        assert!(has_turned, "it stays {}", self.link.state());
+        found.expect("it has turned")
+    }
+
+    fn turns_to(&self, word: &str) -> State {
+        self.turned(|state| state.word() == word)
+    }
+
+    fn tells(&self, wanted: impl Fn(&Event) -> bool) -> bool {
+        wait_until(&self.bench.clock, LIMIT, || {
+            self.told.try_iter().any(|event| wanted(&event))
+        })
+    }
+
+    /// How long it takes to end, in µs.
+    fn end_us(self) -> u64 {
+        let Self { bench, link, told } = self;
+        let began_us = bench.clock.now_us();
+        drop(link);
+        drop(told);
+        bench.clock.now_us() - began_us
     }
 }
 
-fn turns_to(told: &Receiver<Event>, word: &str) -> State {
-    turned(told, |state| state.word() == word)
+fn hears_stop(board: &FakeBoard) -> bool {
+    wait_by(board, LIMIT, || board.take_heard().contains(&STOP))
 }
 
-/// A name in a folder of its own, free to be linked to a board's port.
-fn name_of_a_port(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("bridge_link")
-        .join(test);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("a folder can be made");
-    folder.join("ttyBoard")
-}
-
-/// Puts the name on `board`'s port, as udev does when a cable is put in.
-fn plug(board: &FakeBoard, name: &Path) {
-    symlink(board.path(), name).expect("a link can be made");
+/// Lets time go by.
+fn pass(bench: &VirtualBench, time_us: u64) {
+    let notify = bench.clock.notify();
+    notify.wait_until(bench.clock.now_us() + time_us);
 }
 
 fn motion(sequence: u32) -> Message {
@@ -87,90 +115,64 @@ fn status(uptime_us: u64) -> Message {
 
 #[test]
 fn a_board_is_greeted_heard_and_spoken_to() {
-    let board = FakeBoard::new(Role::Display);
-    let (link, told) = link(Role::Display, &board);
-    turned(&told, State::is_known);
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Display);
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.turned(State::is_known);
     board.say(motion(1));
-    let heard = |event| matches!(event, Event::Heard { message, .. } if message == motion(1));
-    assert!(wait_until(LIMIT, || told.try_iter().any(&heard)));
-    link.post(&STOP).expect("the board is there");
-    assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
-    assert!(wait_until(LIMIT, || link.clocks().is_some()));
+    assert!(
+        watched
+            .tells(|event| matches!(event, Event::Heard { message, .. } if *message == motion(1)))
+    );
+    watched.link.post(&STOP).expect("the board is there");
+    assert!(hears_stop(&board));
+    let compared = || watched.link.clocks().is_some();
+    assert!(wait_until(&bench.clock, LIMIT, compared));
 }
 
 #[test]
 fn a_board_that_is_not_there_is_absent_until_it_is_plugged_in() {
-    let name = name_of_a_port("absent");
-    let (link, told) = link_to(Role::Sensor, Place::Port(name.clone()));
-    let state = turns_to(&told, "absent");
-    assert_eq!(state.to_string(), format!("{}: not there", name.display()));
-    assert_eq!(link.post(&STOP), Err(NotSent::NotKnown));
-    let board = FakeBoard::new(Role::Sensor);
-    plug(&board, &name);
-    turns_to(&told, "known");
-    drop(link);
+    let bench = VirtualBench::default();
+    let name = Path::new("/virtual/by-name");
+    let watched = Watched::new(&bench, Role::Sensor, Place::Port(name.to_owned()));
+    let state = watched.turns_to("absent");
+    assert_eq!(state.to_string(), "/virtual/by-name: not there");
+    assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    bench.ports.link(board.path(), name);
+    watched.turns_to("known");
 }
 
 #[test]
 fn a_cable_put_back_is_seen_within_a_second() {
-    let name = name_of_a_port("cable");
-    let mut board = FakeBoard::new(Role::Display);
-    plug(&board, &name);
-    let (link, told) = link_to(Role::Display, Place::Port(name.clone()));
-    turns_to(&told, "known");
-    let mut longest = Duration::ZERO;
-    for _ in 0..5 {
+    let bench = VirtualBench::default();
+    let name = Path::new("/virtual/by-name");
+    let mut board = FakeBoard::on(&bench, Role::Display);
+    bench.ports.link(board.path(), name);
+    let watched = Watched::new(&bench, Role::Display, Place::Port(name.to_owned()));
+    watched.turns_to("known");
+    for pause_ms in [0, 13, 50, 99, 1_000] {
         drop(board);
-        turns_to(&told, "absent");
-        assert_eq!(link.post(&STOP), Err(NotSent::NotKnown));
-        fs::remove_file(&name).expect("the name is there");
-        board = FakeBoard::new(Role::Display);
-        let back = Instant::now();
-        plug(&board, &name);
-        turns_to(&told, "known");
-        longest = longest.max(back.elapsed());
-        link.post(&STOP).expect("the board is back");
-        assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
+        watched.turns_to("absent");
+        assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
+        board = FakeBoard::on(&bench, Role::Display);
+        pass(&bench, pause_ms * 1_000);
+        let back_us = bench.clock.now_us();
+        bench.ports.link(board.path(), name);
+        watched.turns_to("known");
+        let took_us = bench.clock.now_us() - back_us;
+        assert!(took_us < S, "{took_us} µs");
+        watched.link.post(&STOP).expect("the board is back");
+        assert!(hears_stop(&board));
     }
-    println!("back after {longest:?} at most");
-    assert!(longest < Duration::from_secs(1), "{longest:?}");
-}
-
-#[test]
-fn a_port_of_another_program_is_busy_until_that_ends() {
-    let board = FakeBoard::new(Role::Sensor);
-    // As tio and this program do it.
-    let other = File::open(board.path()).expect("the port is there");
-    other.try_lock().expect("nobody else has it");
-    let (_link, told) = link(Role::Sensor, &board);
-    let state = turns_to(&told, "busy");
-    assert_eq!(
-        state.to_string(),
-        format!("{}: another program has it", board.path().display())
-    );
-    drop(other);
-    turns_to(&told, "known");
-}
-
-#[test]
-fn a_second_link_to_a_port_is_told_that_it_is_busy_and_leaves_the_first_alone() {
-    let board = FakeBoard::new(Role::Sensor);
-    let (first, told) = link(Role::Sensor, &board);
-    turns_to(&told, "known");
-    let (_second, of_second) = link(Role::Sensor, &board);
-    turns_to(&of_second, "busy");
-    first.post(&STOP).expect("the first one has the board");
-    assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
-    assert!(first.state().is_known());
-    drop(first);
-    turns_to(&of_second, "known");
 }
 
 #[test]
 fn a_board_of_another_role_is_named_and_neither_heard_nor_spoken_to() {
-    let board = FakeBoard::new(Role::Display);
-    let (link, told) = link(Role::Sensor, &board);
-    let state = turns_to(&told, "wrong-role");
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Display);
+    let watched = Watched::at(&bench, Role::Sensor, &board);
+    let state = watched.turns_to("wrong-role");
     assert_eq!(
         state.to_string(),
         format!(
@@ -178,17 +180,15 @@ fn a_board_of_another_role_is_named_and_neither_heard_nor_spoken_to() {
             board.path().display()
         )
     );
-    assert_eq!(link.post(&STOP), Err(NotSent::NotKnown));
+    assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
     // Its Hellos are among what is counted: at most two of these five are.
-    let before = link.counters().received;
+    let before = watched.link.counters().received;
     (0..5).for_each(|sequence| board.say(motion(sequence)));
-    assert!(wait_until(LIMIT, || link.counters().received >= before + 5));
-    drop(link);
-    assert!(
-        !told
-            .iter()
-            .any(|event| matches!(event, Event::Heard { .. }))
-    );
+    let all = || watched.link.counters().received >= before + 5;
+    assert!(wait_until(&bench.clock, LIMIT, all));
+    drop(watched.link);
+    let is_heard = |event| matches!(event, Event::Heard { .. });
+    assert!(!watched.told.iter().any(is_heard));
     assert!(!board.take_heard().contains(&STOP));
 }
 
@@ -204,21 +204,22 @@ fn a_board_of_another_protocol_or_schema_is_named_and_not_spoken_to() {
         ..ours
     };
     for hello in [other_protocol, other_schema] {
-        let board = FakeBoard::saying(hello);
-        let (link, told) = link(Role::Sensor, &board);
-        let state = turns_to(&told, "foreign");
-        let said = state.to_string();
+        let bench = VirtualBench::default();
+        let board = FakeBoard::acting_on(&bench, hello, Box::new(|_| Vec::new()));
+        let watched = Watched::at(&bench, Role::Sensor, &board);
+        let said = watched.turns_to("foreign").to_string();
         assert!(said.contains("sensor 9.8.7 on stm32f429zi"), "{said}");
-        assert_eq!(link.post(&STOP), Err(NotSent::NotKnown));
+        assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
     }
 }
 
 #[test]
 fn garbage_text_and_silence_are_told_apart() {
-    let board = FakeBoard::new(Role::Sensor);
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Sensor);
     board.mute(true);
-    let (_link, told) = link(Role::Sensor, &board);
-    turns_to(&told, "silent");
+    let watched = Watched::at(&bench, Role::Sensor, &board);
+    watched.turns_to("silent");
     // Bytes of a line at another speed: every value, none of them a frame.
     let mut seed = 1_u32;
     let garbage: Vec<u8> = (0..2_000)
@@ -228,275 +229,153 @@ fn garbage_text_and_silence_are_told_apart() {
         })
         .collect();
     board.send_bytes(&garbage);
-    let state = turns_to(&told, "garbage");
+    let state = watched.turns_to("garbage");
     assert!(state.advice().expect("advice").contains("921600 baud"));
-    turns_to(&told, "silent");
+    watched.turns_to("silent");
     board.send_bytes(b"sensor 0.1.0  lambda 2.03 mm  v 70 mm/s  link 12 ms\r\n\0");
-    turns_to(&told, "deaf");
+    watched.turns_to("deaf");
     // All of it was borne, and the board is understood as soon as it answers.
     board.mute(false);
     board.restart();
-    turns_to(&told, "known");
+    watched.turns_to("known");
 }
 
 #[test]
 fn a_board_that_falls_silent_is_named_and_known_again_when_it_speaks() {
-    let board = FakeBoard::new(Role::Sensor);
-    let (link, told) = link(Role::Sensor, &board);
-    turns_to(&told, "known");
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    let watched = Watched::at(&bench, Role::Sensor, &board);
+    watched.turns_to("known");
     board.mute(true);
-    turns_to(&told, "silent");
-    assert_eq!(link.post(&STOP), Err(NotSent::NotKnown));
+    watched.turns_to("silent");
+    assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
     board.mute(false);
-    turns_to(&told, "known");
-    link.post(&STOP).expect("the board is back");
-    assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
+    watched.turns_to("known");
+    watched.link.post(&STOP).expect("the board is back");
+    assert!(hears_stop(&board));
 }
 
 #[test]
 fn a_restart_is_told_and_the_clock_asked_for_anew() {
-    let board = FakeBoard::new(Role::Sensor);
-    let (link, told) = link(Role::Sensor, &board);
-    turns_to(&told, "known");
-    // The board's clock stands where the program's does but for its start; a status of a day's uptime.
-    let day_us = 86_400_000_000;
-    board.say(status(day_us));
-    assert!(wait_until(LIMIT, || link.clocks().is_some()));
-    let before_us = link.clocks().expect("an exchange").offset_us;
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    let watched = Watched::at(&bench, Role::Sensor, &board);
+    let clocks = || watched.link.clocks();
+    watched.turns_to("known");
+    // A status of a day's uptime.
+    board.say(status(86_400 * S));
+    assert!(wait_until(&bench.clock, LIMIT, || clocks().is_some()));
+    let before_us = clocks().expect("an exchange").offset_us;
+    pass(&bench, S);
+    board.restart();
     let restarted = || {
         // It is said as soon as the two have greeted each other again.
         board.say(status(7));
-        told.try_iter().any(|event| event == Event::Restarted)
+        watched
+            .told
+            .try_iter()
+            .any(|event| event == Event::Restarted)
     };
-    board.restart();
-    assert!(wait_until(LIMIT, restarted));
+    assert!(wait_until(&bench.clock, LIMIT, restarted));
     // The clock that is asked for anew is the one that began again.
-    let is_later = || {
-        link.clocks()
-            .is_some_and(|clocks| clocks.offset_us < before_us)
-    };
-    assert!(wait_until(LIMIT, is_later));
-    assert!(link.state().is_known());
-}
-
-#[test]
-fn what_is_no_serial_port_is_refused_by_what_it_is() {
-    for (path, what) in [
-        (std::env::temp_dir(), "is a folder, not a serial port"),
-        (
-            std::env::current_exe().expect("a test is a file"),
-            "is a file, not a serial port",
-        ),
-    ] {
-        let (_link, told) = link_to(Role::Sensor, Place::Port(path.clone()));
-        let state = turns_to(&told, "failed");
-        assert_eq!(state.to_string(), format!("{}: {what}", path.display()));
-    }
-}
-
-#[test]
-fn a_line_that_takes_no_bytes_holds_nobody_up() {
-    let board = FakeBoard::new(Role::Display);
-    let (link, told) = link(Role::Display, &board);
-    turns_to(&told, "known");
-    board.deafen(true);
-    let long = Message::Hello(Hello::new(Role::Host, "host-bridge", [0, 1, 0]));
-    let mut slowest = Duration::ZERO;
-    let stuck = wait_until(LIMIT, || {
-        (0..100).any(|_| {
-            let asked = Instant::now();
-            let said = link.post(&long);
-            slowest = slowest.max(asked.elapsed());
-            said == Err(NotSent::Stuck)
-        })
-    });
-    assert!(stuck, "the line took everything");
-    assert!(slowest < Duration::from_millis(500), "{slowest:?}");
-    // The board is heard as before.
-    board.say(motion(1));
-    let heard = |event| matches!(event, Event::Heard { message, .. } if message == motion(1));
-    assert!(wait_until(LIMIT, || told.try_iter().any(&heard)));
-    assert_eq!(link.post(&STOP), Err(NotSent::Stuck));
-    assert!(link.counters().dropped > 0);
-    // What is said when the line takes bytes again is understood: no frame was left half said.
-    board.deafen(false);
-    assert!(wait_until(LIMIT, || link.post(&STOP).is_ok()));
-    assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
+    let is_later = || clocks().is_some_and(|clocks| clocks.offset_us < before_us);
+    assert!(wait_until(&bench.clock, LIMIT, is_later));
+    assert!(watched.link.state().is_known());
 }
 
 #[test]
 fn a_link_ends_at_once_whatever_it_does() {
-    let quick = |link: Link| {
-        let asked = Instant::now();
-        drop(link);
-        let took = asked.elapsed();
-        assert!(took < Duration::from_millis(100), "{took:?}");
-    };
+    const AT_ONCE_US: u64 = 100_000;
+    let bench = VirtualBench::default();
     // While it looks for a port that is not there.
-    for _ in 0..10 {
-        let (link, told) = link_to(Role::Sensor, Place::Port("/dev/no-such-port".into()));
-        turns_to(&told, "absent");
-        quick(link);
+    let nowhere = Place::Port("/virtual/nowhere".into());
+    for pause_us in [0, 20_000, 70_000] {
+        let watched = Watched::new(&bench, Role::Sensor, nowhere.clone());
+        watched.turns_to("absent");
+        pass(&bench, pause_us);
+        assert_eq!(watched.end_us(), 0);
     }
     // While the board speaks as fast as it can, into a line that takes nothing.
     let fast = |now_us| vec![motion(u32::try_from(now_us).unwrap_or(0)); 10];
-    let board = FakeBoard::acting(
-        Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
-        Box::new(fast),
-    );
-    let (link, told) = link(Role::Display, &board);
-    turns_to(&told, "known");
+    let hello = Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]);
+    let board = FakeBoard::acting_on(&bench, hello, Box::new(fast));
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.turns_to("known");
     board.deafen(true);
-    assert!(wait_until(LIMIT, || link.post(&STOP) == Err(NotSent::Stuck)));
-    quick(link);
-    assert!(
-        told.iter()
-            .any(|event| matches!(event, Event::Heard { .. }))
-    );
+    let is_stuck = || watched.link.post(&STOP) == Err(NotSent::Stuck);
+    assert!(wait_until(&bench.clock, LIMIT, is_stuck));
+    assert!(watched.tells(|event| matches!(event, Event::Heard { .. })));
+    let took_us = watched.end_us();
+    assert!(took_us < AT_ONCE_US, "{took_us} µs");
+    // While nothing is said.
+    let board = FakeBoard::on(&bench, Role::Display);
+    board.mute(true);
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.turns_to("silent");
+    let took_us = watched.end_us();
+    assert!(took_us < AT_ONCE_US, "{took_us} µs");
 }
 
 #[test]
-fn every_frame_of_a_full_line_is_heard_in_order() {
-    /// Some 22 bytes each: 48 s of a line at 921 600 baud.
-    const FRAMES: u32 = 200_000;
-    /// Frames that may be under way: what a pseudo-terminal holds.
-    const AHEAD: u64 = 1_000;
-    let board = FakeBoard::new(Role::Display);
-    board.lose_nothing();
-    let heard = Arc::new(AtomicU64::new(0));
-    let wrong = Arc::new(Mutex::new(Vec::new()));
-    let (count, faults) = (Arc::clone(&heard), Arc::clone(&wrong));
-    let link = Link::open(
-        Role::Display,
-        Place::Port(board.path().clone()),
-        move |event| {
-            if let Event::Heard {
-                message: Message::Motion(motion),
-                ..
-            } = event
-            {
-                let expected = count.fetch_add(1, Ordering::SeqCst);
-                if u64::from(motion.sequence) != expected {
-                    faults.lock().expect("sound").push(motion.sequence);
-                }
-            }
-        },
-    );
-    assert!(wait_until(LIMIT, || link.state().is_known()));
-    let began = Instant::now();
-    for sequence in 0..FRAMES {
-        if sequence % 100 == 0 {
-            let there = || heard.load(Ordering::SeqCst) + AHEAD > u64::from(sequence);
-            assert!(wait_until(LIMIT, there), "stuck at {sequence}");
-        }
-        board.say(motion(sequence));
-    }
-    let all = || heard.load(Ordering::SeqCst) == u64::from(FRAMES);
-    assert!(wait_until(LIMIT, all), "{}", heard.load(Ordering::SeqCst));
-    println!("{FRAMES} frames in {:?}", began.elapsed());
-    assert_eq!(*wrong.lock().expect("sound"), Vec::<u32>::new());
-    let counters = link.counters();
-    assert_eq!((counters.lost, counters.corrupt, counters.late), (0, 0, 0));
-}
+fn a_link_that_waits_looks_at_its_line_fifty_times_a_second_and_for_its_port_ten_times() {
+    let bench = VirtualBench::default();
+    let nowhere = Place::Port("/virtual/nowhere".into());
+    let watched = Watched::new(&bench, Role::Sensor, nowhere);
+    watched.turns_to("absent");
+    let before = bench.ports.looks();
+    pass(&bench, 10 * S);
+    let looks = bench.ports.looks() - before;
+    assert!((99..=101).contains(&looks), "{looks} in 10 s");
+    drop(watched);
 
-#[test]
-fn a_link_that_waits_takes_next_to_no_processor_time() {
-    // Time that this thread has had of a processor, in ns: told by the link's own thread.
-    fn spent_ns() -> u64 {
-        let facts = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-        let first = facts.split(' ').next().unwrap_or_default();
-        first.parse().expect("Linux tells what a thread has taken")
-    }
-    let each_second = |now_us: u64| {
-        if now_us % 1_000_000 < 1_000 {
-            vec![status(now_us)]
-        } else {
-            Vec::new()
-        }
-    };
-    let hello = Hello::new(Role::Sensor, "stm32f429zi", [0, 1, 0]);
-    let board = FakeBoard::acting(hello, Box::new(each_second));
-    let (events, told) = channel();
-    let _link = Link::open(
-        Role::Sensor,
-        Place::Port(board.path().clone()),
-        move |event| {
-            if matches!(
-                event,
-                Event::Heard {
-                    message: Message::Pong(_),
-                    ..
-                }
-            ) {
-                let _ = events.send((Instant::now(), spent_ns()));
-            }
-        },
-    );
-    let (began, first_ns) = told.recv_timeout(LIMIT).expect("a pong");
-    let mut last = (began, first_ns);
-    while last.0 - began < Duration::from_millis(1_900) {
-        last = told.recv_timeout(LIMIT).expect("a pong a second");
-    }
-    let share = (last.1 - first_ns) as f64 / (last.0 - began).as_nanos() as f64;
-    println!("{:.2} % of a processor", share * 100.0);
-    // A thread that spins takes all of one, or its share of a busy machine's.
-    assert!(share < 0.05, "{share}");
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    let watched = Watched::at(&bench, Role::Sensor, &board);
+    watched.turns_to("known");
+    let before = bench.ports.reads();
+    pass(&bench, 10 * S);
+    // Answers to its pings and the board's Hellos come in between, each of which takes a look of its own.
+    let reads = bench.ports.reads() - before;
+    assert!((500..=550).contains(&reads), "{reads} in 10 s");
 }
 
 #[test]
 fn two_links_find_their_boards_among_the_same_ports() {
     for roles in [[Role::Sensor, Role::Display], [Role::Display, Role::Sensor]] {
-        let boards = roles.map(FakeBoard::new);
+        let bench = VirtualBench::default();
+        let boards = roles.map(|role| FakeBoard::on(&bench, role));
         // A third board on the desk that says nothing.
-        let (_far, mute) = TTYPort::pair().expect("the system has pseudo-terminals");
-        let ports = vec![
-            PathBuf::from(mute.name().expect("a pseudo-terminal has a name")),
-            boards[0].path().clone(),
-            boards[1].path().clone(),
-        ];
-        let links = [Role::Sensor, Role::Display]
-            .map(|role| (role, link_to(role, Place::Among(ports.clone()))));
-        for (role, (link, told)) in &links {
-            let state = turned(told, State::is_known);
+        let (mute, _end) = bench.cable();
+        let ports = vec![mute, boards[0].path().clone(), boards[1].path().clone()];
+        let links = [Role::Sensor, Role::Display].map(|role| {
+            (
+                role,
+                Watched::new(&bench, role, Place::Among(ports.clone())),
+            )
+        });
+        for (role, watched) in &links {
+            let state = watched.turned(State::is_known);
             let at = roles.iter().position(|of| of == role).expect("one of two");
             assert_eq!(state.port(), Some(boards[at].path()));
-            assert!(link.state().is_known());
+            assert!(watched.link.state().is_known());
         }
     }
 }
 
 #[test]
 fn a_board_among_several_ports_is_found_again_behind_another_one() {
-    let name = name_of_a_port("among");
-    let other = name.with_file_name("ttyOther");
-    let board = FakeBoard::new(Role::Sensor);
-    plug(&board, &name);
-    let (_link, told) = link_to(
-        Role::Sensor,
-        Place::Among(vec![name.clone(), other.clone()]),
-    );
-    assert_eq!(turns_to(&told, "known").port(), Some(&name));
+    let bench = VirtualBench::default();
+    let [name, other] = ["/virtual/one", "/virtual/other"].map(PathBuf::from);
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    bench.ports.link(board.path(), &name);
+    let among = Place::Among(vec![name.clone(), other.clone()]);
+    let watched = Watched::new(&bench, Role::Sensor, among);
+    assert_eq!(watched.turns_to("known").port(), Some(&name));
     drop(board);
-    turns_to(&told, "absent");
-    let stranger = FakeBoard::new(Role::Display);
-    fs::remove_file(&name).expect("the name is there");
-    plug(&stranger, &name);
-    turns_to(&told, "wrong-role");
-    let board = FakeBoard::new(Role::Sensor);
-    plug(&board, &other);
-    assert_eq!(turns_to(&told, "known").port(), Some(&other));
-}
-
-#[test]
-fn a_port_is_free_for_others_when_its_link_has_ended() {
-    let board = FakeBoard::new(Role::Sensor);
-    let (link, told) = link(Role::Sensor, &board);
-    turns_to(&told, "known");
-    drop(link);
-    let other = OpenOptions::new()
-        .read(true)
-        .write(true)
-        .open(board.path())
-        .expect("the port is free");
-    other.try_lock().expect("nobody has it");
+    watched.turns_to("absent");
+    let stranger = FakeBoard::on(&bench, Role::Display);
+    bench.ports.link(stranger.path(), &name);
+    watched.turns_to("wrong-role");
+    let board = FakeBoard::on(&bench, Role::Sensor);
+    bench.ports.link(board.path(), &other);
+    assert_eq!(watched.turns_to("known").port(), Some(&other));
 }

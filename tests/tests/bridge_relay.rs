@@ -1,52 +1,46 @@
-//! Two bridges in two processes, with a board at each: what crosses, in which order, and what the network
-//! may do meanwhile.
+//! Two bridges with a board at each, by virtual time: what crosses, in which order, how old, and what the
+//! network may do meanwhile.
 
-use std::fs;
-use std::os::unix::fs::symlink;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
+use host_bridge::clock::Clock;
+use host_bridge::lock::locked;
 use host_bridge::relay::flow::LATE_SPACING_US;
-use host_bridge::relay::network::LEASE;
-use protocol::{Message, Role, StopReason};
-use rustix::process::Signal;
-use serde_json::Value;
-use tests::fake_board::{FakeBoard, wait_until};
-use tests::relay::{Relay, free_port, listen, motion, sequences, talking_board};
-use tests::weather::Weather;
+use host_bridge::relay::name::Name;
+use host_bridge::relay::operator::{self, Progress, Stopping};
+use protocol::{Message, Role, Stop, StopReason, Trip};
+use tests::fake_board::{FakeBoard, wait_by};
+use tests::relay::{ESTIMATE_US, MOTION_US, listen, motion, sequences, talking_board_on};
+use tests::virtual_ports::VirtualBench;
+use tests::virtual_relay::{VirtualPair, VirtualSite, name};
 
-/// Far more than anything here takes.
-const LIMIT: Duration = Duration::from_secs(20);
+/// Far more of virtual time than anything here takes.
+const LIMIT: Duration = Duration::from_secs(60);
+/// What the command line has by default.
+const MAX_AGE: Duration = Duration::from_millis(400);
+const STOP: Stop = Stop {
+    reason: StopReason::Operator,
+};
 
-/// Two bridges, the display's connecting to the sensor's by way of `weather`.
-struct Pair {
-    sensor: Relay,
-    display: Relay,
-    weather: Weather,
+/// A bench with a talking board at each site.
+struct Sites {
+    sensor: FakeBoard,
+    display: FakeBoard,
+    pair: VirtualPair,
 }
 
-impl Pair {
-    fn new(sensor: &FakeBoard, display: &FakeBoard, more: &[&str]) -> Self {
-        let port = free_port();
-        let weather = Weather::over(port);
-        let listen = format!("tcp/127.0.0.1:{port}");
-        let connect = format!("tcp/127.0.0.1:{}", weather.port());
-        let with = |end, at: &str| -> Vec<String> {
-            let more = more.iter().map(|&word| word.to_owned());
-            [end, at]
-                .map(str::to_owned)
-                .into_iter()
-                .chain(more)
-                .collect()
-        };
-        let start = |role, board: &FakeBoard, arguments: Vec<String>| {
-            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-            Relay::bridge(role, board.path(), &arguments)
-        };
+impl Sites {
+    fn new(max_age: Duration) -> Self {
+        let bench = VirtualBench::default();
+        let [sensor, display] =
+            [Role::Sensor, Role::Display].map(|role| talking_board_on(&bench, role));
+        let pair = VirtualPair::new(&bench, sensor.path(), display.path(), max_age);
         Self {
-            sensor: start(Role::Sensor, sensor, with("--listen", &listen)),
-            display: start(Role::Display, display, with("--connect", &connect)),
-            weather,
+            sensor,
+            display,
+            pair,
         }
     }
 }
@@ -57,8 +51,7 @@ fn at_least(count: usize) -> impl FnMut(&[Message]) -> bool {
 
 /// That each number is above the one before.
 fn assert_rising(heard: &[Message]) {
-    let numbers = sequences(heard);
-    for pair in numbers.windows(2) {
+    for pair in sequences(heard).windows(2) {
         assert!(pair[0] < pair[1], "{} after {}", pair[1], pair[0]);
     }
 }
@@ -68,24 +61,26 @@ fn is_motion(message: &Message) -> bool {
 }
 
 fn is_stop(message: &Message) -> bool {
-    matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator)
+    matches!(message, Message::Stop(stop) if *stop == STOP)
 }
 
-/// The last report that a bridge printed.
-fn last_report(lines: &[String]) -> Value {
-    let last = lines.last().expect("a bridge reports");
-    serde_json::from_str(last).expect("it reports in JSON")
+/// Lets time go by.
+fn pass(bench: &VirtualBench, time: Duration) {
+    let until_us = bench.clock.now_us() + time.as_micros() as u64;
+    bench.clock.notify().wait_until(until_us);
 }
 
 #[test]
-fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &[]);
-    let motions = listen(&sensor, LIMIT, at_least(1_000));
-    let estimates = listen(&display, LIMIT, at_least(200));
-    assert_rising(&motions);
-    assert_rising(&estimates);
+fn every_estimate_and_every_motion_crosses_in_order_as_late_as_the_network_and_nothing_else_does() {
+    const DELAY: Duration = Duration::from_millis(20);
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    pair.network.delay(DELAY, Duration::ZERO);
+    let motions = listen(&sensor, LIMIT, at_least(5_000));
+    let estimates = listen(&display, LIMIT, at_least(1_000));
     let is_estimate = |message: &Message| matches!(message, Message::Estimate(_));
     let is_housekeeping =
         |message: &Message| matches!(message, Message::Ping(_) | Message::Pong(_));
@@ -95,65 +90,51 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
             .iter()
             .all(|m| is_estimate(m) || is_housekeeping(m))
     );
-
-    for bridge in [&pair.sensor, &pair.display] {
-        bridge.signal(Signal::INT);
+    for heard in [&motions, &estimates] {
+        for pair in sequences(heard).windows(2) {
+            assert_eq!(pair[0] + 1, pair[1]);
+        }
     }
-    let (_, lines, _) = pair.sensor.wait(LIMIT);
-    let incoming = last_report(&lines)["incoming"].clone();
-    let (status, lines, words) = pair.display.wait(LIMIT);
-    assert_eq!(status.code(), Some(0), "{words}");
-    let report = last_report(&lines);
-    assert_eq!(report["total"], true);
-    assert_eq!(report["site"], "display");
-    assert_eq!(report["incoming"]["lost"], 0);
-    // A busy machine brings two at once, of which one is replaced, but none goes without being counted.
-    let numbers = sequences(&motions);
-    let missing = u64::from(numbers[numbers.len() - 1] - numbers[0]) + 1 - numbers.len() as u64;
-    let reasons = ["lost", "replaced", "stale", "stuck", "undated", "boardless"];
-    let counts = reasons.map(|reason| incoming[reason].as_u64());
-    let counted = counts
-        .into_iter()
-        .chain([report["outgoing"]["held"].as_u64()])
-        .sum::<Option<u64>>();
-    assert!(
-        Some(missing) <= counted,
-        "{missing} missing: {incoming}, {report}"
-    );
-    // A newer one took their place, or the network had not answered yet: that is for the machine to decide,
-    // all else is not.
-    let replaced = incoming["replaced"].as_u64().unwrap_or(0);
-    let held = report["outgoing"]["held"].as_u64().unwrap_or(0);
-    let gone = missing.saturating_sub(replaced + held);
-    assert_eq!(incoming["lost"], 0, "{incoming}");
-    assert!(
-        gone < numbers.len() as u64 / 20,
-        "{gone} of {} missing: {incoming}, {report}",
-        numbers.len()
-    );
-    assert!(
-        report["incoming"]["passed"].as_u64() >= Some(200),
-        "{report}"
-    );
-    assert!(
-        report["outgoing"]["sent"].as_u64() >= Some(1_000),
-        "{report}"
-    );
-    assert!(report["age"]["p99_us"].is_u64(), "{report}");
+    for (site, period_us) in [(&pair.sensor, MOTION_US), (&pair.display, ESTIMATE_US)] {
+        let report = site.site.report(true);
+        let incoming = report.incoming;
+        let missed = [
+            incoming.arrivals.lost,
+            incoming.arrivals.late,
+            incoming.arrivals.duplicated,
+            incoming.arrivals.superseded,
+            incoming.stale,
+            incoming.undated,
+            incoming.replaced,
+            incoming.stuck,
+            incoming.refused,
+            report.outgoing.failed,
+        ];
+        assert_eq!(missed, [0; 10], "{report:?}");
+        assert!(incoming.passed > 9_000_000 / period_us, "{report:?}");
+        // As old as the network makes it, to the histogram's thirty-second; a board looks once in a ms.
+        let age = report.age.expect("messages have passed");
+        let delay_us = DELAY.as_micros() as u64;
+        for age_us in [age.p50_us, age.p99_us, age.max_us] {
+            let allowed_us = delay_us..=delay_us + delay_us / 32 + 1_000;
+            assert!(allowed_us.contains(&age_us), "{age:?}");
+        }
+        assert_eq!(report.round_trip_us, Some(2 * delay_us));
+    }
 }
 
 #[test]
 fn a_network_that_takes_half_a_second_there_and_back_changes_neither_order_nor_flow() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &["--max-age", "2000"]);
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(Duration::from_secs(2));
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     let mut estimates = Vec::new();
     for (delay_ms, jitter_ms) in [(500, 0), (100, 200), (0, 0), (250, 50)] {
-        pair.weather.delay(
-            Duration::from_millis(delay_ms),
-            Duration::from_millis(jitter_ms),
-        );
+        let [delay, jitter] = [delay_ms, jitter_ms].map(Duration::from_millis);
+        pair.network.delay(delay, jitter);
         motions.extend(listen(&sensor, LIMIT, at_least(400)));
         estimates.extend(listen(&display, LIMIT, at_least(80)));
     }
@@ -163,19 +144,23 @@ fn a_network_that_takes_half_a_second_there_and_back_changes_neither_order_nor_f
 
 #[test]
 fn a_network_slower_than_anything_may_be_is_named_and_nothing_is_played() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &["--max-age", "100"]);
-    pair.weather
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(Duration::from_millis(100));
+    pair.network
         .delay(Duration::from_millis(300), Duration::ZERO);
-    pair.display
-        .says("longer than the 100.00 ms of --max-age", LIMIT);
-    display.take_heard();
-    pair.sensor
-        .says("longer than the 100.00 ms of --max-age", LIMIT);
-    assert!(sequences(&display.take_heard()).is_empty());
-    pair.weather.delay(Duration::ZERO, Duration::ZERO);
+    for site in [&pair.sensor, &pair.display] {
+        site.says("longer than the 100.00 ms of --max-age", LIMIT);
+    }
+    pass(&pair.bench, Duration::from_secs(10));
+    for board in [&sensor, &display] {
+        assert_eq!(sequences(&board.take_heard()), [] as [u32; 0]);
+    }
+    pair.network.delay(Duration::ZERO, Duration::ZERO);
     listen(&display, LIMIT, at_least(20));
+    listen(&sensor, LIMIT, at_least(20));
 }
 
 #[test]
@@ -183,118 +168,55 @@ fn what_was_held_up_too_long_is_never_played() {
     const MAX_AGE_MS: u64 = 150;
     const STILL_MS: u64 = 1_000;
     const TIMES: u64 = 3;
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &["--max-age", &MAX_AGE_MS.to_string()]);
+    let Sites {
+        sensor,
+        display: _display,
+        pair,
+    } = Sites::new(Duration::from_millis(MAX_AGE_MS));
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     for _ in 0..TIMES {
-        pair.weather.hold_still(true);
+        pair.network.hold_still(true);
         // So long that the silence is noticed and what was on its way is old.
-        let still = Instant::now();
-        let silent = || {
-            motions.extend(sensor.take_heard());
-            still.elapsed() >= Duration::from_millis(STILL_MS)
-        };
-        wait_until(LIMIT, silent);
+        pass(&pair.bench, Duration::from_millis(STILL_MS));
+        motions.extend(sensor.take_heard());
         let newest_held = sequences(&motions).last().copied().unwrap_or(0);
-        pair.weather.hold_still(false);
+        pair.network.hold_still(false);
         let after = listen(&sensor, LIMIT, at_least(100));
-        let first = sequences(&after)[0];
-        // 1 s of 500 Hz was held up; all but the last 150 ms is too old. A loaded machine takes its time.
-        assert!(first >= newest_held + 200, "{first} after {newest_held}");
+        // The last that was said before it went on: while answers are late, one goes every 10 ms.
+        let [still, spacing] = [STILL_MS * 1_000, LATE_SPACING_US].map(|us| us / MOTION_US);
+        let first = u64::from(sequences(&after)[0] - newest_held);
+        assert!(first + spacing >= still, "{first} after {newest_held}");
         motions.extend(after);
     }
     assert_rising(&motions);
-    // Nor does a network that is stuck keep a bridge from ending.
-    pair.weather.hold_still(true);
-    pair.sensor.signal(Signal::TERM);
-    let asked = Instant::now();
-    let (status, lines, words) = pair.sensor.wait(LIMIT);
-    println!("ended after {:?}", asked.elapsed());
-    assert_eq!(status.code(), Some(0), "{words}");
-    let report = last_report(&lines);
-    // While answers are late, a message goes into the network that stands still every so often. All of
-    // them come, but for the last 150 ms too old; a loaded machine says half as many.
+    // All of them came, but for the last 150 ms too old.
     let said = TIMES * (STILL_MS - MAX_AGE_MS) * 1_000 / LATE_SPACING_US;
-    let stale = report["incoming"]["stale"].as_u64();
-    println!("{stale:?} too old, {said} said");
-    assert!(stale >= Some(said / 2), "{said} said: {report}");
-}
-
-#[test]
-fn a_router_that_is_killed_and_started_again_brings_the_stream_back() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let at = format!("tcp/127.0.0.1:{}", free_port());
-    let router = || Relay::start(["router", "--listen", &at]);
-    let mut running = router();
-    let _bridges = [
-        Relay::bridge(Role::Sensor, sensor.path(), &["--connect", &at]),
-        Relay::bridge(Role::Display, display.path(), &["--connect", &at]),
-    ];
-    let mut motions = listen(&sensor, LIMIT, at_least(100));
-    for _ in 0..2 {
-        running.kill();
-        motions.extend(sensor.take_heard());
-        running = router();
-        running.says("router, listening", LIMIT);
-        let back = Instant::now();
-        motions.extend(listen(&sensor, LIMIT, at_least(1)));
-        println!("back {:?} after the router", back.elapsed());
-        motions.extend(listen(&sensor, LIMIT, at_least(100)));
-        listen(&display, LIMIT, at_least(10));
-    }
-    assert_rising(&motions);
-}
-
-#[test]
-fn a_site_whose_address_changes_is_back_within_some_seconds() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let pair = Pair::new(&sensor, &display, &[]);
-    let mut motions = listen(&sensor, LIMIT, at_least(100));
-    listen(&display, LIMIT, at_least(20));
-    let before = pair.weather.connections();
-    pair.weather.strand();
-    let changed = Instant::now();
-    // Nothing tells either end. What is on the way when this is asked has come from before.
-    for bridge in [&pair.sensor, &pair.display] {
-        bridge.says("silent", LIMIT);
-    }
-    motions.extend(sensor.take_heard());
-    display.take_heard();
-    let (mut of_sensor, mut of_display) = (false, false);
-    let both = || {
-        let heard = sensor.take_heard();
-        of_sensor |= heard.iter().any(is_motion);
-        motions.extend(heard);
-        of_display |= !sequences(&display.take_heard()).is_empty();
-        of_sensor && of_display
-    };
-    assert!(wait_until(LIMIT, both));
-    println!("back {:?} after the change", changed.elapsed());
-    // The connection is given up when it was silent for so long; then a new one is made.
-    let most = LEASE + Duration::from_secs(2);
-    assert!(changed.elapsed() < most, "{:?}", changed.elapsed());
-    assert!(pair.weather.connections() > before);
-    motions.extend(listen(&sensor, LIMIT, at_least(100)));
-    assert_rising(&motions);
+    let incoming = pair.sensor.site.report(true).incoming;
+    assert!(incoming.stale >= said, "{said} said: {incoming:?}");
+    assert_eq!(incoming.arrivals.lost, 0, "{incoming:?}");
 }
 
 #[test]
 fn a_bridge_that_is_started_anew_is_followed() {
-    let sensor = talking_board(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let mut pair = Pair::new(&sensor, &display, &[]);
+    let Sites {
+        sensor,
+        display,
+        mut pair,
+    } = Sites::new(MAX_AGE);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     for _ in 0..2 {
-        let connect = format!("tcp/127.0.0.1:{}", pair.weather.port());
-        let fresh = ["--connect", &connect];
-        std::mem::replace(
-            &mut pair.display,
-            Relay::bridge(Role::Display, display.path(), &fresh),
-        )
-        .kill();
+        let fresh = || {
+            VirtualSite::new(
+                &pair.bench,
+                &pair.network,
+                Role::Display,
+                display.path(),
+                MAX_AGE,
+            )
+        };
+        // Its line is free when the one before is gone.
+        let fresh = fresh();
+        drop(std::mem::replace(&mut pair.display, fresh));
         motions.extend(sensor.take_heard());
         motions.extend(listen(&sensor, LIMIT, at_least(200)));
         listen(&display, LIMIT, at_least(20));
@@ -302,52 +224,30 @@ fn a_bridge_that_is_started_anew_is_followed() {
     assert_rising(&motions);
 }
 
-/// A name for a port that can be put on another one, as udev does when a cable is put in.
-struct Socket(PathBuf);
-
-impl Socket {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("ridgelink-{name}-{}", std::process::id()));
-        let _ = fs::remove_file(&path);
-        Self(path)
-    }
-
-    fn plug(&self, board: &FakeBoard) {
-        let _ = fs::remove_file(&self.0);
-        symlink(board.path(), &self.0).expect("a link can be made");
-    }
-}
-
-impl Drop for Socket {
-    fn drop(&mut self) {
-        let _ = fs::remove_file(&self.0);
-    }
-}
-
 #[test]
 fn a_board_whose_cable_is_pulled_and_put_back_goes_on_also_if_it_starts_anew() {
-    let sensor = talking_board(Role::Sensor);
-    let mut display = talking_board(Role::Display);
-    let socket = Socket::new("display");
-    socket.plug(&display);
-    let at = format!("tcp/127.0.0.1:{}", free_port());
-    let _sensors = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &at]);
-    let displays = Relay::bridge(Role::Display, &socket.0, &["--connect", &at]);
+    let bench = VirtualBench::default();
+    let sensor = talking_board_on(&bench, Role::Sensor);
+    let mut display = talking_board_on(&bench, Role::Display);
+    let name = Path::new("/virtual/by-name");
+    bench.ports.link(display.path(), name);
+    let pair = VirtualPair::new(&bench, sensor.path(), name, MAX_AGE);
     listen(&sensor, LIMIT, at_least(100));
-    for _ in 0..2 {
+    for times in 1..=2 {
         drop(display);
-        displays.says("not there", LIMIT);
-        // What it said last is on its way yet: it said something every other millisecond.
-        let mut silent = 0;
-        let is_silent = || {
-            let is_new = !sequences(&sensor.take_heard()).is_empty();
-            silent = if is_new { 0 } else { silent + 1 };
-            silent == 50
+        let is_told = || {
+            let words = pair.display.words();
+            let told = words.iter().filter(|line| line.contains("not there"));
+            told.count() == times
         };
-        assert!(wait_until(LIMIT, is_silent), "it goes on for ever");
+        assert!(wait_by(&sensor, LIMIT, is_told));
+        pass(&bench, Duration::from_millis(50));
+        sensor.take_heard();
+        pass(&bench, Duration::from_secs(1));
+        assert_eq!(sequences(&sensor.take_heard()), [] as [u32; 0]);
         // Another start of the board: its numbers begin at 0.
-        display = talking_board(Role::Display);
-        socket.plug(&display);
+        display = talking_board_on(&bench, Role::Display);
+        bench.ports.link(display.path(), name);
         let motions = listen(&sensor, LIMIT, at_least(100));
         assert_rising(&motions);
         listen(&display, LIMIT, at_least(10));
@@ -356,15 +256,19 @@ fn a_board_whose_cable_is_pulled_and_put_back_goes_on_also_if_it_starts_anew() {
 
 #[test]
 fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
-    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
-    let pair = Pair::new(&sensor, &display, &[]);
+    let Sites {
+        sensor,
+        display: _display,
+        pair,
+    } = Sites::new(MAX_AGE);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     sensor.deafen(true);
-    let is_stuck = || {
-        let lines = pair.sensor.lines();
-        !lines.is_empty() && last_report(&lines)["incoming"]["stuck"].as_u64() > Some(300)
-    };
-    assert!(wait_until(LIMIT, is_stuck), "{:?}", pair.sensor.lines());
+    let is_stuck = || pair.sensor.site.report(false).incoming.stuck > 300;
+    assert!(
+        wait_by(&sensor, LIMIT, is_stuck),
+        "{:?}",
+        pair.sensor.words()
+    );
     sensor.deafen(false);
     motions.extend(listen(&sensor, LIMIT, at_least(300)));
     assert_rising(&motions);
@@ -372,12 +276,19 @@ fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
 
 #[test]
 fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
-    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
-    let pair = Pair::new(&sensor, &display, &[]);
+    const DELAY: Duration = Duration::from_millis(30);
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    pair.network.delay(DELAY, Duration::ZERO);
     listen(&sensor, LIMIT, at_least(10));
 
-    pair.sensor.signal(Signal::USR1);
-    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    pair.sensor.site.stop(STOP);
+    // Until the bridge looks what is to be said, one way over the network, and until the board looks.
+    let soon = Duration::from_millis(25) + DELAY + Duration::from_millis(2);
+    listen(&display, soon, |heard| heard.iter().any(is_stop));
     listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
     pair.sensor.says(
         "Stop: the board at the display's site has stopped: by the operator",
@@ -387,48 +298,39 @@ fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
     pair.display
         .says("Stop: the board here has stopped: by the operator", LIMIT);
 
-    pair.display.signal(Signal::USR1);
+    pair.display.site.stop(STOP);
     pair.display
         .says("Stop: with the board at the sensor's site", LIMIT);
 
     // Said while the network is away, it comes when it is back.
-    pair.weather.cut(true);
+    pair.network.cut(true);
     pair.display.says("the sensor's site: silent", LIMIT);
     display.take_heard();
-    pair.sensor.signal(Signal::USR1);
-    pair.weather.cut(false);
+    pair.sensor.site.stop(STOP);
+    pass(&pair.bench, Duration::from_secs(5));
+    assert!(!display.take_heard().iter().any(is_stop));
+    pair.network.cut(false);
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
 }
 
 #[test]
-fn relay_stop_ends_well_only_when_the_display_itself_says_that_it_has_stopped() {
-    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
-    let pair = Pair::new(&sensor, &display, &[]);
+fn an_operators_stop_is_done_only_when_the_display_itself_says_that_it_has_stopped() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
     listen(&sensor, LIMIT, at_least(10));
-    let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
-    let stop = |more: &[&str]| {
-        Relay::start(
-            ["stop", "--connect", &at]
-                .into_iter()
-                .chain(more.iter().copied()),
-        )
+    let clock: Arc<dyn Clock> = Arc::new(pair.bench.clock.clone());
+    let stop = |name: Name, within| -> Stopping {
+        operator::stop(&pair.network, &clock, &name, STOP, within)
+            .unwrap_or_else(|error| panic!("{error}"))
     };
-    let fails = |stop: Relay, what: &str| {
-        let (status, _, words) = stop.wait(LIMIT);
-        assert_eq!(status.code(), Some(1), "{words}");
-        for part in [
-            "NOT STOPPED",
-            what,
-            "press the emergency stop, or cut the display's power",
-        ] {
-            assert!(words.contains(part), "{words}");
-        }
-    };
+    const SHORT: Duration = Duration::from_secs(1);
 
     // Its bridge has written it, and yet the display goes on.
     display.disobey(true);
-    let short = ["--within", "1"];
-    fails(stop(&short), "does not say that it has stopped");
+    assert_eq!(stop(name(), SHORT).progress, Progress::Told);
     let told = display.take_heard().into_iter().filter(is_stop).count();
     assert!(
         told > 1,
@@ -436,58 +338,38 @@ fn relay_stop_ends_well_only_when_the_display_itself_says_that_it_has_stopped() 
     );
 
     // It is told until it obeys.
-    let stopping = stop(&[]);
+    let result = Arc::new(Mutex::new(None));
+    let (theirs, network, own) = (
+        Arc::clone(&result),
+        pair.network.clone(),
+        Arc::clone(&clock),
+    );
+    let stopping = clock.spawn(Box::new(move || {
+        let stopping = operator::stop(&network, &own, &name(), STOP, LIMIT);
+        *locked(&theirs) = stopping.ok();
+    }));
     listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
     display.disobey(false);
-    let (status, _, words) = stopping.wait(LIMIT);
-    assert_eq!(status.code(), Some(0), "{words}");
-    assert!(
-        words.contains("the display has stopped: by the operator"),
-        "{words}"
-    );
+    clock.join(stopping);
+    let wanted = Stopping {
+        progress: Progress::Stopped,
+        trip: Some(Trip::Operator),
+    };
+    assert_eq!(*locked(&result), Some(wanted));
 
-    let other = ["--name", "other", "--within", "1"];
-    fails(stop(&other), "no word from the display's bridge");
+    let other = "other".parse().expect("a name");
+    assert_eq!(stop(other, SHORT).progress, Progress::Unheard);
     drop(display);
     pair.display.says("not there", LIMIT);
-    fails(stop(&short), "its board is not there");
-}
-
-#[test]
-fn two_bridges_of_one_role_and_name_are_told_so() {
-    let (first, second) = (FakeBoard::new(Role::Display), FakeBoard::new(Role::Display));
-    let at = format!("tcp/127.0.0.1:{}", free_port());
-    let _router = Relay::start(["router", "--listen", &at]);
-    let one = Relay::bridge(Role::Display, first.path(), &["--connect", &at]);
-    let other = Relay::bridge(Role::Display, second.path(), &["--connect", &at]);
-    one.says("another bridge calls itself the display's site", LIMIT);
-    other.says("another bridge calls itself the display's site", LIMIT);
-}
-
-#[test]
-fn nobody_there_is_named_and_not_knocked_at_wildly() {
-    let board = FakeBoard::new(Role::Display);
-    let nowhere = Weather::over(free_port());
-    nowhere.cut(true);
-    let at = format!("tcp/127.0.0.1:{}", nowhere.port());
-    let bridge = Relay::bridge(Role::Display, board.path(), &["--connect", &at]);
-    let started = Instant::now();
-    bridge.says(&at, LIMIT);
-    bridge.says("nobody there speaks to us", LIMIT);
-    let per_second = nowhere.connections() as f64 / started.elapsed().as_secs_f64();
-    assert!(per_second < 10.0, "{per_second} connections a second");
-
-    let refused = format!("tcp/127.0.0.1:{}", free_port());
-    let other = FakeBoard::new(Role::Sensor);
-    let bridge = Relay::bridge(Role::Sensor, other.path(), &["--connect", &refused]);
-    bridge.says("nobody listens there", LIMIT);
+    assert_eq!(stop(name(), SHORT).progress, Progress::Heard);
 }
 
 #[test]
 fn a_board_that_says_something_that_is_no_number_is_not_carried() {
-    let sensor = FakeBoard::new(Role::Sensor);
-    let display = talking_board(Role::Display);
-    let _pair = Pair::new(&sensor, &display, &[]);
+    let bench = VirtualBench::default();
+    let sensor = FakeBoard::on(&bench, Role::Sensor);
+    let display = talking_board_on(&bench, Role::Display);
+    let _pair = VirtualPair::new(&bench, sensor.path(), display.path(), MAX_AGE);
     listen(&sensor, LIMIT, at_least(10));
     let say = |sequence, wavelength_mm: f32| {
         let Message::Estimate(mut estimate) = tests::relay::estimate(sequence, 0) else {

@@ -3,18 +3,23 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
 use hil_sim_core::run::recording::ScanRecord;
 use hil_sim_core::scene::Scene;
+use host_bridge::clock::Clock;
 use host_bridge::host_clock::now_us;
-use host_bridge::link::Event;
+use host_bridge::link::{Event, Link};
+use host_bridge::place::Place;
 use host_bridge::recording::reader::Reader;
 use host_bridge::recording::{Recorder, Settings};
 use host_bridge::replay::scene::{self, Made};
+use host_bridge::replay::stand_in::StandIn;
+use host_bridge::replay::{Pace, play};
 use protocol::{
     Configuration, ConfigurationReport, Estimate, Message, Motion, Role, SensorConfiguration,
 };
@@ -22,9 +27,11 @@ use tests::bridge::{self, Running};
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::run::scene as scene_of;
 use tests::utterance::Speaker;
+use tests::virtual_clock;
+use tests::virtual_ports::VirtualBench;
 
-/// Far more than anything here takes.
-const LIMIT: Duration = Duration::from_secs(60);
+/// Only what hangs takes so long.
+const LIMIT: Duration = Duration::from_secs(120);
 
 /// An empty folder for one test.
 fn folder(test: &str) -> PathBuf {
@@ -82,77 +89,70 @@ fn half_a_second() -> Vec<(u64, Role, Message)> {
     said
 }
 
-/// Replays into a board; what it hears of the kind it is for, and how long it took from the first to the
-/// last.
-fn replayed(path: &Path, board: Role, speed: &str, count: usize) -> (Vec<Message>, Duration) {
-    let fake = FakeBoard::new(board);
-    let (target, option) = match board {
-        Role::Display => ("display-board", "--display"),
-        Role::Sensor | Role::Host => ("sensor-board", "--sensor"),
+/// Whether a message is one that a peer says.
+fn is_of_peer(message: &Message) -> bool {
+    matches!(message, Message::Motion(_) | Message::Estimate(_))
+}
+
+/// Replays into a board by virtual time; what it hears of its peer, and when each was said, in µs after the
+/// first.
+fn replayed(path: &Path, role: Role, speed: f64) -> (Vec<Message>, Vec<u64>) {
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, role);
+    let place = Place::Port(board.path().clone());
+    let link = Link::open_on(&bench.system(), role, place, |_| {});
+    let until = |holds: &mut dyn FnMut() -> bool| {
+        assert!(virtual_clock::wait_until(&bench.clock, LIMIT, holds));
     };
-    let running = Running::start(
-        bridge::command()
-            .arg("replay")
-            .arg(path)
-            .args(["--to", target, "--speed", speed, option])
-            .arg(fake.path()),
-    );
-    let mut heard = Vec::new();
-    let (mut first, mut last) = (None, Instant::now());
-    let complete = wait_until(LIMIT, || {
-        let before = heard.len();
-        heard.extend(
-            fake.take_heard()
-                .into_iter()
-                .filter(|message| matches!(message, Message::Motion(_) | Message::Estimate(_))),
-        );
-        if heard.len() > before {
-            last = Instant::now();
-            first.get_or_insert(last);
+    until(&mut || link.state().is_known());
+    let pace = Pace {
+        speed,
+        ..Pace::default()
+    };
+    let mut peer = StandIn::new(role, speed);
+    let mut said_us = Vec::new();
+    let recording = Reader::open(path).expect("a recording");
+    let ended = AtomicBool::new(false);
+    let played = play(&bench.clock, recording, &pace, &ended, |from, event| {
+        let now_us = bench.clock.now_us();
+        if let Some(message) = peer.say(from, &event, now_us) {
+            link.post(&message).expect("the board is there");
+            said_us.push(now_us);
         }
-        heard.len() >= count
     });
-    let ended = running.wait(LIMIT);
-    assert!(
-        complete,
-        "{} of {count}: {}{}",
-        heard.len(),
-        ended.stdout,
-        ended.stderr
-    );
-    assert_eq!(
-        ended.status.code(),
-        Some(0),
-        "{}{}",
-        ended.stdout,
-        ended.stderr
-    );
-    assert_eq!(fake.take_heard().len(), 0, "nothing else is said");
-    (heard, last - first.unwrap_or(last))
+    assert_eq!(played.expect("a whole file").latest, Duration::ZERO);
+    let mut heard = Vec::new();
+    until(&mut || {
+        heard.extend(board.take_heard().into_iter().filter(is_of_peer));
+        heard.len() >= said_us.len()
+    });
+    let first_us = said_us[0];
+    let after = said_us.into_iter().map(|at_us| at_us - first_us);
+    (heard, after.collect())
 }
 
 #[test]
 fn a_sensor_board_hears_the_motions_in_order_and_in_their_time() {
     let path = folder("sensor").join("half.mcap");
     record(&path, half_a_second());
-    for (speed, factor, least) in [("1", 1, 450), ("10", 10, 40), ("100", 100, 0)] {
-        let (heard, took) = replayed(&path, Role::Sensor, speed, 250);
+    for factor in [1, 10, 100] {
+        let (heard, said_us) = replayed(&path, Role::Sensor, factor as f64);
         let Some(Message::Motion(first)) = heard.first().cloned() else {
             panic!("{heard:?}");
         };
-        for (message, at) in heard.iter().zip(0..) {
+        assert_eq!(heard.len(), 250);
+        for ((message, at), said_us) in heard.iter().zip(0..).zip(said_us) {
+            let after_us = 2_000 * u64::from(at) / factor;
             let want = Motion {
                 sequence: at,
-                instant_us: first.instant_us + 2_000 * u64::from(at) / factor,
+                instant_us: first.instant_us + after_us,
                 velocity_um_s: 50_000 * factor as i32,
                 ..motion(at)
             };
-            assert_eq!(*message, Message::Motion(want), "at {speed} times");
+            assert_eq!(*message, Message::Motion(want), "at {factor} times");
+            // A recording's times are in s.
+            assert!(said_us.abs_diff(after_us) <= 1, "{said_us} at {after_us}");
         }
-        assert!(
-            took >= Duration::from_millis(least),
-            "{took:?} at {speed} times"
-        );
     }
 }
 
@@ -168,19 +168,56 @@ fn a_display_board_hears_the_estimates_in_order_and_in_their_time() {
             _ => None,
         })
         .collect();
-    let (heard, took) = replayed(&path, Role::Display, "1", estimates.len());
+    let (heard, said_us) = replayed(&path, Role::Display, 1.0);
     let Some(Message::Estimate(first)) = heard.first().cloned() else {
         panic!("{heard:?}");
     };
-    for ((message, said), at) in heard.iter().zip(estimates).zip(0..) {
+    assert_eq!(heard.len(), estimates.len());
+    for (((message, said), at), said_us) in heard.iter().zip(estimates).zip(0..).zip(said_us) {
+        let after_us = 10_000 * u64::from(at);
         let want = Estimate {
             sequence: at,
-            instant_us: first.instant_us + 10_000 * u64::from(at),
+            instant_us: first.instant_us + after_us,
             ..said
         };
         assert_eq!(*message, Message::Estimate(want));
+        assert!(said_us.abs_diff(after_us) <= 1, "{said_us} at {after_us}");
     }
-    assert!(took >= Duration::from_millis(450), "{took:?}");
+}
+
+#[test]
+fn the_command_says_a_recording_to_a_board_and_nothing_else() {
+    let path = folder("command").join("half.mcap");
+    record(&path, half_a_second());
+    let board = FakeBoard::new(Role::Sensor);
+    board.lose_nothing();
+    let running = Running::start(
+        bridge::command()
+            .arg("replay")
+            .arg(&path)
+            .args(["--to", "sensor-board", "--speed", "10", "--sensor"])
+            .arg(board.path()),
+    );
+    let mut heard = Vec::new();
+    let complete = wait_until(LIMIT, || {
+        heard.extend(board.take_heard().into_iter().filter(is_of_peer));
+        heard.len() >= 250
+    });
+    let ended = running.wait(LIMIT);
+    assert!(
+        complete,
+        "{}: {}{}",
+        heard.len(),
+        ended.stdout,
+        ended.stderr
+    );
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let numbers = heard.iter().map(|message| match message {
+        Message::Motion(motion) => motion.sequence,
+        other => panic!("{other:?}"),
+    });
+    assert!(numbers.eq(0..250));
+    assert_eq!(board.take_heard().len(), 0, "nothing else is said");
 }
 
 #[test]
@@ -291,7 +328,7 @@ fn round(test: &str, toml: &str, from_s: f64, to_s: Option<f64>) -> Round {
     };
     let recording = Reader::open(&path).expect("a recording");
     let made = scene::write(recording, &settings).unwrap_or_else(|error| panic!("{error}"));
-    let again = Scene::load(&made.files[0]).unwrap_or_else(|error| panic!("{error}"));
+    let again = Scene::load(&made.path).unwrap_or_else(|error| panic!("{error}"));
     let run = native::run(&again).expect("a scene that loaded runs");
     Round {
         recorded,

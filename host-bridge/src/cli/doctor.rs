@@ -2,15 +2,13 @@
 
 use std::io::{self, IsTerminal};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use super::output;
+use super::signals::{self, Again};
 use host_bridge::doctor::report::Style;
 use host_bridge::doctor::{findings, json, look, report};
-use signal_hook::consts::{SIGINT, SIGTERM};
-
-use super::output;
+use host_bridge::system::System;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -37,16 +35,6 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "give 0.5 to 3600".to_owned())
 }
 
-/// Set by the first SIGINT or SIGTERM; a second one ends the program.
-fn end_by_signal() -> io::Result<Arc<AtomicBool>> {
-    let ended = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&ended))?;
-        signal_hook::flag::register(signal, Arc::clone(&ended))?;
-    }
-    Ok(ended)
-}
-
 impl Doctor {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -54,8 +42,8 @@ impl Doctor {
         if io::stderr().is_terminal() {
             eprintln!("looking for {:.1} s …", self.span.as_secs_f64());
         }
-        let ended = end_by_signal()?;
-        let examination = look::look(&bench, self.span, &ended);
+        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
+        let examination = look::look(&System::default(), &bench, self.span, &ended);
         let findings = findings::of(&examination);
         let text = if self.json {
             json::write(&examination, &findings) + "\n"

@@ -3,7 +3,6 @@
 use std::io::{self, BufRead, IsTerminal};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
@@ -12,17 +11,18 @@ use host_bridge::bench::Seat;
 use host_bridge::flash::console;
 use host_bridge::flash::firmware::{self, Firmware};
 use host_bridge::flash::plan::{Plan, Summary};
-use host_bridge::flash::probes::{self, Attached, Selector, Undecided, Wish};
+use host_bridge::flash::probes::{self, Attached, ProbeRequest, Selector, Undecided};
 use host_bridge::flash::programmer::{Programmer, Progress};
 use host_bridge::flash::trouble::Trouble;
 use host_bridge::place::{self, Place};
 use host_bridge::state::{Named, State};
+use host_bridge::system::System;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{Hello, Role};
 use serde::Serialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output;
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -154,18 +154,19 @@ impl Flash {
 
     fn carry_out(&self, plan: &Plan, seat: &Seat, other: &Seat) -> anyhow::Result<ExitCode> {
         let role = plan.firmware.role;
+        let system = System::default();
         let links = place::st_links();
-        let wish = Wish::new(self.probe.clone(), seat, other, &links);
-        let probe = self.choose(&wish, role)?;
+        let request = ProbeRequest::new(self.probe.clone(), seat, other, &links);
+        let probe = self.choose(&request, role)?;
         let console = console::place(&seat.place(), probe.serial(), &links)?;
         // Where any console will do, what is heard first need not be this board's.
         if !self.no_hello && console != Place::Anywhere {
-            self.check_console(console::look(role, console.clone()), role)?;
+            self.check_console(console::look(&system, role, console.clone()), role)?;
         }
         let opened = probe.open()?;
         let mut programmer = Programmer::attach(opened, plan, || probe.open().ok())?;
 
-        let called_off = hold_signals()?;
+        let called_off = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let bar = Bar::new();
         let written = programmer.write(plan, |progress| bar.show(progress, &called_off));
         bar.end();
@@ -177,7 +178,14 @@ impl Flash {
         } else {
             let wanted = plan.firmware.hello;
             eprintln!("flashed and verified; waiting for the board's Hello");
-            match console::wait(role, console, wanted, console::PATIENCE, &called_off) {
+            match console::wait(
+                &system,
+                role,
+                console,
+                wanted,
+                console::PATIENCE,
+                &called_off,
+            ) {
                 Ok(hello) => Some(hello),
                 Err(error) => {
                     eprintln!("host-bridge: {error}");
@@ -222,9 +230,9 @@ impl Flash {
     }
 
     /// The probe that is meant; asks if that is not clear and somebody is there to be asked.
-    fn choose(&self, wish: &Wish, role: Role) -> anyhow::Result<Attached> {
+    fn choose(&self, request: &ProbeRequest, role: Role) -> anyhow::Result<Attached> {
         let found = probes::attached();
-        let several = match probes::choose(&found, wish) {
+        let several = match probes::choose(&found, request) {
             Ok(probe) => return Ok(probe),
             Err(Undecided::Several { found }) => found,
             Err(other) => return Err(other.into()),
@@ -312,7 +320,7 @@ fn who(probes: &[Attached], role: Role) -> Vec<Option<State>> {
         .iter()
         .map(|probe| Place::Usb(probe.serial().unwrap_or_default().to_owned()))
         .collect();
-    console::look_at_all(role, places)
+    console::look_at_all(&System::default(), role, places)
         .into_iter()
         .map(|state| (!matches!(state, State::Absent { .. })).then_some(state))
         .collect()
@@ -333,16 +341,6 @@ fn ask<T>(question: &str, read: impl Fn(&str) -> Option<T>) -> anyhow::Result<T>
             return Ok(answer);
         }
     }
-}
-
-/// A flag that the first Ctrl-C sets; the second ends the program, whatever it does.
-fn hold_signals() -> io::Result<Arc<AtomicBool>> {
-    let called_off = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&called_off))?;
-        signal_hook::flag::register(signal, Arc::clone(&called_off))?;
-    }
-    Ok(called_off)
 }
 
 /// What went wrong at the chip: harmless refusals are the caller's, the rest leaves its mark in the status.

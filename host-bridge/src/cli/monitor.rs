@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
@@ -15,7 +13,8 @@ use host_bridge::monitor::firmware_log::{Logs, Origin};
 use host_bridge::monitor::plain::Format;
 use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -90,13 +89,9 @@ impl Monitor {
         if let Some(elf) = &self.display_elf {
             bench.display.elf = Some(elf.clone());
         }
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            // The second one ends the program even where a reader of its lines stands still.
-            signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&ended))
-                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&ended)))
-                .context("can't listen to signals")?;
-        }
+        // The second one ends the program even where a reader of its lines stands still.
+        let ended = signals::flag_set_by(&signals::OF_A_TERMINAL, Again::EndsAtOnce)
+            .context("can't listen to signals")?;
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
         let mut source = open(&bench);

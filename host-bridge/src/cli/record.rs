@@ -16,9 +16,9 @@ use host_bridge::recording::{PART, Progress, Recorder, Settings};
 use host_bridge::state::State;
 use protocol::{Message, Role};
 use serde::Serialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::output;
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -46,8 +46,6 @@ was said to be safe is.";
 const LOOK: Duration = Duration::from_millis(50);
 /// How often the progress is told.
 const TOLD: Duration = Duration::from_secs(1);
-/// How long the sensor board may take to confirm that it is as it was.
-const RESTORED: Duration = Duration::from_secs(1);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
@@ -110,10 +108,7 @@ impl Record {
         let bench = self.boards.find()?;
         let part = Duration::try_from_secs_f64(self.split * 60.0);
         let part = part.map_err(|_| anyhow::anyhow!("--split: give minutes, 0 or more"))?;
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let recorder = Arc::new(Recorder::start(Settings {
             mcap: self.file.clone(),
             csv: self.csv.clone(),
@@ -271,8 +266,8 @@ impl Session<'_> {
         match self.told.recv_timeout(wait) {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                if let Event::Turned(state) = &event {
-                    self.turn(role, state);
+                if let Event::StateChanged(state) = &event {
+                    self.on_state(role, state);
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
@@ -284,7 +279,7 @@ impl Session<'_> {
     }
 
     /// Tells how the way to a board stands now.
-    fn turn(&mut self, role: Role, state: &State) {
+    fn on_state(&mut self, role: Role, state: &State) {
         if state.is_known() {
             self.absent.retain(|absent| *absent != role);
         }
@@ -328,23 +323,12 @@ impl Session<'_> {
         ));
     }
 
-    /// Gives the sensor board its quiet back, and waits until it says so.
+    /// Gives the sensor board its quiet back if it was taken.
     fn restore(&mut self) {
-        let Some(message) = self.stream.restoration() else {
-            return;
-        };
-        let end = Instant::now() + RESTORED;
-        let mut said = self.post(Role::Sensor, &message);
-        while said && !self.stream.is_quiet() && Instant::now() < end {
-            match self.told.recv_timeout(LOOK) {
-                Ok((role, event)) => self.stream.on_event(role, &event),
-                Err(RecvTimeoutError::Timeout) => {
-                    said = self.post(Role::Sensor, &message);
-                }
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
-        }
-        if !self.stream.is_quiet() {
+        let mut links = self.links.iter();
+        let sensor = links.find(|(role, _)| *role == Role::Sensor);
+        let sensor = sensor.map(|(_, link)| link);
+        if !self.stream.restore(&self.told, sensor, |_, _| {}) {
             self.screen.tell(
                 "sensor: could not be told to stop streaming its gauges: it does until it is configured or restarted",
             );

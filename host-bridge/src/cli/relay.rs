@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
@@ -12,16 +12,18 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueHint};
 use host_bridge::relay::credentials::Credentials;
 use host_bridge::relay::endpoint::Endpoint;
-use host_bridge::relay::far::site;
 use host_bridge::relay::name::Name;
 use host_bridge::relay::network::{Ends, Network};
 use host_bridge::relay::operator::{self, Progress};
+use host_bridge::relay::remote::site;
 use host_bridge::relay::report::Report;
 use host_bridge::relay::site::{Settings, Site, opposite};
+use host_bridge::system::System;
 use protocol::{Role, Stop, StopReason};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::SIGUSR1;
 
 use super::output;
+use super::signals::{self, Again};
 
 /// Between two looks whether the bridge is to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -146,36 +148,6 @@ impl Proofs {
     }
 }
 
-/// The flags that signals set.
-struct Signals {
-    ended: Arc<AtomicBool>,
-    stopped: Arc<AtomicBool>,
-}
-
-impl Signals {
-    fn new() -> io::Result<Self> {
-        let signals = Self {
-            ended: Arc::default(),
-            stopped: Arc::default(),
-        };
-        for signal in [SIGINT, SIGTERM] {
-            // Said twice, it ends at once: leaving a network that is stuck may take a while.
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                130,
-                Arc::clone(&signals.ended),
-            )?;
-            signal_hook::flag::register(signal, Arc::clone(&signals.ended))?;
-        }
-        signal_hook::flag::register(SIGUSR1, Arc::clone(&signals.stopped))?;
-        Ok(signals)
-    }
-
-    fn is_ended(&self) -> bool {
-        self.ended.load(Ordering::Relaxed)
-    }
-}
-
 impl Relay {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -199,20 +171,23 @@ impl Bridge {
         };
         let words = in_words(&ends);
         let network = Network::new(ends, self.meeting.proofs.credentials())?;
-        let signals = Signals::new()?;
+        // Leaving a network that is stuck may take a while.
+        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
+        let stopped = signals::flag_set_by(&[SIGUSR1], Again::IsIgnored)?;
         let (bridge, notices) = Site::open(Settings {
             role,
             place: seat.place(),
             name: self.meeting.name,
-            network,
+            network: Arc::new(network),
             max_age: Duration::from_millis(self.max_age.into()),
+            system: System::default(),
         })?;
         let far = opposite(role).map_or("the other site", site);
         say(&format!("host-bridge: {words}, waiting for {far}"));
         let mut before = None;
         let mut due = Instant::now() + REPORT;
-        while !signals.is_ended() {
-            if signals.stopped.swap(false, Ordering::Relaxed) {
+        while !ended.load(Ordering::Relaxed) {
+            if stopped.swap(false, Ordering::Relaxed) {
                 bridge.stop(Stop {
                     reason: StopReason::Operator,
                 });
@@ -241,10 +216,10 @@ impl Router {
         let ends = Ends::Listening(self.listen);
         let words = in_words(&ends);
         let network = Network::new(ends, self.proofs.credentials())?;
-        let signals = Signals::new()?;
+        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let session = network.open_router()?;
         say(&format!("host-bridge: router, {words}"));
-        while !signals.is_ended() {
+        while !ended.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK);
         }
         // Dropped, it leaves the network; whoever is connected sees it at once.
@@ -263,7 +238,13 @@ impl Stopping {
         let stop = Stop {
             reason: StopReason::Operator,
         };
-        let stopping = operator::stop(&network, &self.meeting.name, stop, within);
+        let stopping = operator::stop(
+            &network,
+            &System::default().clock,
+            &self.meeting.name,
+            stop,
+            within,
+        );
         let (progress, trip) = match &stopping {
             Ok(stopping) => (stopping.progress, stopping.trip),
             Err(_) => (Progress::Unheard, None),

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::ValueHint;
+use host_bridge::clock::SystemClock;
 use host_bridge::host_clock::now_us;
 use host_bridge::link::{Event, Link};
 use host_bridge::monitor::{self, Options, Source};
@@ -19,9 +20,9 @@ use host_bridge::replay::scene;
 use host_bridge::replay::stand_in::StandIn;
 use host_bridge::replay::{Pace, Played, SPEEDS, play};
 use protocol::Role;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use super::output;
+use super::signals::{self, Again};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -29,9 +30,9 @@ Plays a recording back: into a monitor, into a board in place of its peer, or in
 
 A display board is told the recorded estimates, a sensor board the recorded motions, each at its time: take \
 the board's peer off, or it will hear two of them. Numbers and instants are made fresh, as of a peer that has \
-just started; a hand or an arm that is played faster moves faster. A scene holds the recorded voltages, as \
-they were at the ADC's pins, and the recorded motion of the arm, which stands for the hand's, too: \
-`hil-sim run` of it makes the estimates that were recorded. A recording that was cut off is played as far as \
+just started; a hand or an arm that is played faster moves faster. A scene names the recording, \
+of which the simulator reads the voltages, as they were at the ADC's pins, and the motion of the arm, which \
+stands for the hand's, too: `hil-sim run` of it makes the estimates that were recorded. A recording that was cut off is played as far as \
 it goes.";
 
 /// How it is used.
@@ -73,7 +74,7 @@ pub struct Replay {
     /// For a scene: it expects the recorded λ and share of valid estimates
     #[arg(long)]
     expect: bool,
-    /// For a scene: writes over files that are there already
+    /// For a scene: writes over a file that is there already
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -145,10 +146,10 @@ impl Replay {
         };
         let made = scene::write(recording, &settings)
             .with_context(|| format!("{}: no scene", self.file.display()))?;
-        let [scene, gauges, motion] = made.files.each_ref().map(|file| file.display());
+        let scene = made.path.display();
         let (valid, all) = made.estimates;
         output::print(&format!(
-            "{scene}, {gauges}, {motion}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
+            "{scene}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
              run it: hil-sim run {scene}",
             made.duration_s,
             made.wavelength_mm,
@@ -159,22 +160,25 @@ impl Replay {
 
     /// Plays it into a monitor, which shows its end until a key ends it.
     fn watch(&self, recording: Reader) -> anyhow::Result<ExitCode> {
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::OF_A_TERMINAL, Again::IsIgnored)?;
         let pace = self.pace();
         let (events, told) = channel();
         let their_end = Arc::clone(&ended);
         let player = thread::spawn(move || {
-            play(recording, &pace, &their_end, |role, mut event| {
-                // Read ahead of its time.
-                if let Event::Heard { at_us, .. } = &mut event {
-                    *at_us = now_us();
-                }
-                // A monitor that has ended listens no more.
-                let _ = events.send((role, event));
-            })
+            play(
+                &SystemClock,
+                recording,
+                &pace,
+                &their_end,
+                |role, mut event| {
+                    // Read ahead of its time.
+                    if let Event::Heard { at_us, .. } = &mut event {
+                        *at_us = now_us();
+                    }
+                    // A monitor that has ended listens no more.
+                    let _ = events.send((role, event));
+                },
+            )
         });
         let source = Source {
             events: told,
@@ -199,14 +203,11 @@ impl Replay {
 
     fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        let ended = Arc::new(AtomicBool::new(false));
-        for signal in [SIGINT, SIGTERM] {
-            signal_hook::flag::register(signal, Arc::clone(&ended))?;
-        }
+        let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let place = bench.seat(role).map(host_bridge::bench::Seat::place);
         let (states, turned) = channel();
         let link = Link::open(role, place.unwrap_or_default(), move |event| {
-            if let Event::Turned(state) = event {
+            if let Event::StateChanged(state) = event {
                 // Nobody waits for it once the board is there.
                 let _ = states.send(state);
             }
@@ -235,7 +236,7 @@ impl Replay {
         let pace = self.pace();
         let mut peer = StandIn::new(role, self.speed);
         let (mut said, mut unsaid) = (0_u64, 0_u64);
-        let played = play(recording, &pace, &ended, |from, event| {
+        let played = play(&SystemClock, recording, &pace, &ended, |from, event| {
             if let Some(message) = peer.say(from, &event, now_us()) {
                 match link.post(&message) {
                     Ok(()) => said += 1,

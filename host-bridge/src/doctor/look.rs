@@ -1,8 +1,7 @@
 //! Looking at a bench: what is plugged in, and what its boards say for some seconds.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::{Message, Ping, Role, Status};
 
@@ -10,55 +9,58 @@ use super::clock::{ClockFacts, Exchange};
 use super::examination::{BoardFacts, ElfFacts, Examination, ProbeFacts};
 use super::permission::{Permission, has_plugdev};
 use crate::bench::{Bench, Seat};
+use crate::clock::{Receiver, Sender, channel, micros};
 use crate::flash::firmware::Firmware;
 use crate::flash::probes;
-use crate::host_clock::now_us;
 use crate::link::{Event, Link};
 use crate::place;
 use crate::state::State;
+use crate::system::System;
 
-/// Longest wait for each board to be named as what it is: three ports without an answer, and a bit.
-const SETTLING: Duration = Duration::from_secs(5);
+/// Longest wait for each board to be named as what it is: three ports without an answer, and a bit; in µs.
+const SETTLING_US: u64 = 5_000_000;
 /// How long a board that is not known may still be found behind another port: two links that began at each
-/// other's port have exchanged them within a look or two.
-const EXCHANGE: Duration = Duration::from_millis(600);
-/// Between two looks at whether all are settled.
-const TURN: Duration = Duration::from_millis(50);
-/// Between two pings: often enough to see a clock drift within seconds.
-const PING_EVERY: Duration = Duration::from_millis(100);
+/// other's port have exchanged them within a look or two; in µs.
+const EXCHANGE_US: u64 = 600_000;
+/// Between two looks at whether all are settled, in µs.
+const LOOK_US: u64 = 50_000;
+/// Between two pings: often enough to see a clock drift within seconds; in µs.
+const PING_EVERY_US: u64 = 100_000;
 
 /// What a link tells.
 type Told = (Role, Event);
 
 /// Looks at everything, and listens for `span` to the boards that are there. If the bench names the place
 /// of one board only, it has only that one, as at one end of a relay. It ends early once `ended` is set.
-pub fn look(bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
+pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
+    let now_us = || system.clock.now_us();
     let goes_on = || !ended.load(Ordering::Acquire);
-    let (tell, told) = channel();
+    let (tell, told) = channel(&system.clock);
     let mut watches: Vec<Watch> = bench
         .roles()
         .into_iter()
-        .filter_map(|role| Some(Watch::open(role, bench.seat(role)?, &tell)))
+        .filter_map(|role| Some(Watch::open(system, role, bench.seat(role)?, &tell)))
         .collect();
     let probes = probes::attached().iter().map(ProbeFacts::from).collect();
-    let settled = Instant::now() + SETTLING;
-    while watches.iter().any(|watch| !watch.is_settled()) && Instant::now() < settled && goes_on() {
-        hear(&mut watches, &told, Instant::now() + TURN);
+    let settled_us = now_us() + SETTLING_US;
+    while watches.iter().any(|watch| !watch.is_settled()) && now_us() < settled_us && goes_on() {
+        hear(&mut watches, &told, now_us() + LOOK_US);
     }
-    let began = Instant::now();
+    let began_us = now_us();
+    let end_us = began_us.saturating_add(micros(span));
     watches.iter_mut().for_each(Watch::begin);
     // A bench without a board needs no patience.
     if watches.iter().any(|watch| watch.facts.state.is_known()) {
-        let mut next_ping = began;
-        while began.elapsed() < span && goes_on() {
-            if Instant::now() >= next_ping {
-                next_ping += PING_EVERY;
+        let mut next_ping_us = began_us;
+        while now_us() < end_us && goes_on() {
+            if now_us() >= next_ping_us {
+                next_ping_us += PING_EVERY_US;
                 watches.iter().for_each(Watch::ping);
             }
-            hear(&mut watches, &told, next_ping.min(began + span));
+            hear(&mut watches, &told, next_ping_us.min(end_us));
         }
     }
-    let looked = began.elapsed();
+    let looked = Duration::from_micros(now_us() - began_us);
     Examination {
         looked_s: looked.as_secs_f64(),
         st_links: place::st_links(),
@@ -68,10 +70,9 @@ pub fn look(bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
     }
 }
 
-/// Takes what is told until `until`, at least one thing or none.
-fn hear(watches: &mut [Watch], told: &Receiver<Told>, until: Instant) {
-    let wait = until.saturating_duration_since(Instant::now());
-    let Ok(first) = told.recv_timeout(wait) else {
+/// Takes what is told until `until_us`, at least one thing or none.
+fn hear(watches: &mut [Watch], told: &Receiver<Told>, until_us: u64) {
+    let Some(first) = told.recv_until(until_us) else {
         return;
     };
     for (role, event) in std::iter::once(first).chain(told.try_iter()) {
@@ -83,21 +84,21 @@ fn hear(watches: &mut [Watch], told: &Receiver<Told>, until: Instant) {
 
 /// A board that is being looked at.
 struct Watch {
+    system: System,
     link: Link,
     facts: BoardFacts,
-    /// When it was last named as something.
-    named: Option<Instant>,
+    /// When it was last named as something, in µs.
+    named_us: Option<u64>,
     exchanges: Vec<Exchange>,
     /// What its role says at a rate, and how much of it has been said since the beginning.
     said: u32,
 }
 
 impl Watch {
-    fn open(role: Role, seat: &Seat, tell: &Sender<Told>) -> Self {
+    fn open(system: &System, role: Role, seat: &Seat, tell: &Sender<Told>) -> Self {
         let tell = tell.clone();
-        let link = Link::open(role, seat.place(), move |event| {
-            // Nobody listens any more when the look is over.
-            let _ = tell.send((role, event));
+        let link = Link::open_on(system, role, seat.place(), move |event| {
+            tell.send((role, event));
         });
         let mut facts = BoardFacts::new(role, link.state());
         facts.elf = seat.elf.as_ref().map(|path| ElfFacts {
@@ -107,9 +108,10 @@ impl Watch {
                 .map_err(|error| error.to_string()),
         });
         Self {
+            system: system.clone(),
             link,
             facts,
-            named: None,
+            named_us: None,
             exchanges: Vec::new(),
             said: 0,
         }
@@ -117,7 +119,14 @@ impl Watch {
 
     /// Whether what it has been named as stands.
     fn is_settled(&self) -> bool {
-        self.facts.state.is_known() || self.named.is_some_and(|named| named.elapsed() > EXCHANGE)
+        self.facts.state.is_known()
+            || self
+                .named_us
+                .is_some_and(|named_us| self.now_us() - named_us > EXCHANGE_US)
+    }
+
+    fn now_us(&self) -> u64 {
+        self.system.clock.now_us()
     }
 
     /// What was said before does not count for rates.
@@ -127,13 +136,14 @@ impl Watch {
 
     fn ping(&self) {
         // A board that is not there answers nothing.
-        let _ = self.link.post(&Message::Ping(Ping { sent_us: now_us() }));
+        let sent_us = self.now_us();
+        let _ = self.link.post(&Message::Ping(Ping { sent_us }));
     }
 
     fn note(&mut self, event: Event) {
         match event {
-            Event::Turned(state) => {
-                self.named = (!matches!(state, State::Opened { .. })).then(Instant::now);
+            Event::StateChanged(state) => {
+                self.named_us = (!matches!(state, State::Opened { .. })).then(|| self.now_us());
                 if let State::Known { hello, .. }
                 | State::Foreign { hello, .. }
                 | State::Stranger { hello, .. } = &state

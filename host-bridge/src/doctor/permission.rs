@@ -4,6 +4,8 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
+use nix::unistd::{Gid, Group, getegid, getgroups};
+
 /// Where the rules of one's own go.
 pub const RULES: &str = "/etc/udev/rules.d/70-st-link.rules";
 /// What makes them hold at once.
@@ -23,46 +25,21 @@ pub struct Permission {
 }
 
 impl Permission {
-    /// Who may open `path`; none if the system does not tell.
+    /// Who may open `path`; `None` if the system does not tell.
     pub fn of(path: &Path) -> Option<Self> {
         let facts = fs::metadata(path).ok()?;
-        let groups = fs::read_to_string("/etc/group").unwrap_or_default();
-        let process = fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let gid = Gid::from_raw(facts.gid());
+        let group = Group::from_gid(gid).ok().flatten();
+        let own = getgroups().unwrap_or_default();
         let user = std::env::var("USER").unwrap_or_default();
-        Some(Self::new(
-            facts.gid(),
-            facts.mode() & 0o777,
-            &groups,
-            &process,
-            &user,
-        ))
-    }
-
-    /// The same from the texts of `/etc/group` and `/proc/self/status`.
-    fn new(gid: u32, mode: u32, groups: &str, process: &str, user: &str) -> Self {
-        let entry = groups
-            .lines()
-            .map(|line| line.split(':').collect::<Vec<_>>())
-            .find(|fields| fields.get(2).is_some_and(|id| *id == gid.to_string()));
-        let field = |at: usize| entry.as_ref().and_then(|fields| fields.get(at));
-        let is_member = process
-            .lines()
-            .filter_map(|line| {
-                line.strip_prefix("Groups:")
-                    .or_else(|| line.strip_prefix("Gid:"))
-            })
-            .flat_map(str::split_whitespace)
-            .any(|id| id == gid.to_string());
-        Self {
-            group: field(0).map_or_else(|| gid.to_string(), |name| (*name).to_owned()),
-            mode,
-            is_member,
-            is_listed: field(3).is_some_and(|users| {
-                users
-                    .split(',')
-                    .any(|listed| !user.is_empty() && listed == user)
-            }),
-        }
+        Some(Self {
+            is_member: gid == getegid() || own.contains(&gid),
+            is_listed: group
+                .as_ref()
+                .is_some_and(|group| group.mem.contains(&user)),
+            group: group.map_or_else(|| gid.to_string(), |group| group.name),
+            mode: facts.mode() & 0o777,
+        })
     }
 
     /// What lets this user open the port.
@@ -85,8 +62,7 @@ impl Permission {
 
 /// Whether the system has the group that many distributions have for plugged-in devices.
 pub fn has_plugdev() -> bool {
-    fs::read_to_string("/etc/group")
-        .is_ok_and(|groups| groups.lines().any(|line| line.starts_with("plugdev:")))
+    Group::from_name("plugdev").is_ok_and(|group| group.is_some())
 }
 
 /// The udev rule that lets users at the probe of an ST-LINK.
@@ -112,43 +88,44 @@ pub fn port_rule() -> String {
 mod tests {
     use super::*;
 
-    const GROUPS: &str = "root:x:0:\ndialout:x:20:ann,bob\nplugdev:x:46:bob\n";
-    const PROCESS: &str = "Name:\tx\nGid:\t1000\t1000\t1000\t1000\nGroups:\t46 1000 \n";
-
     #[test]
-    fn who_is_in_the_group_and_who_will_be() {
-        let of = |gid, mode, user| Permission::new(gid, mode, GROUPS, PROCESS, user);
-        assert_eq!(
-            of(20, 0o660, "eve"),
-            Permission {
-                group: "dialout".to_owned(),
-                mode: 0o660,
-                is_member: false,
-                is_listed: false
-            }
-        );
-        assert!(of(20, 0o660, "bob").is_listed);
-        assert!(!of(20, 0o660, "").is_listed);
-        assert!(of(46, 0o660, "bob").is_member);
-        assert_eq!(of(77, 0o660, "bob").group, "77");
+    fn a_file_of_one_s_own_is_of_a_group_that_one_is_in() {
+        let program = std::env::current_exe().expect("a test is a file");
+        let gid = fs::metadata(&program).expect("it is there").gid();
+        let found = Permission::of(&program).expect("the system tells");
+        let own = getgroups().unwrap_or_default();
+        let is_member = own.contains(&Gid::from_raw(gid)) || getegid().as_raw() == gid;
+        assert_eq!(found.is_member, is_member);
+        assert_eq!(Permission::of(Path::new("/no/such/file")), None);
+        // The one group that every system has.
+        let root = Permission::of(Path::new("/")).expect("the system tells");
+        assert_eq!(root.group, "root");
     }
 
     #[test]
     fn advice_fits_the_permission() {
-        let advice = |gid, mode, user| Permission::new(gid, mode, GROUPS, PROCESS, user).advice();
+        let advice = |group: &str, mode, is_listed| {
+            let permission = Permission {
+                group: group.to_owned(),
+                mode,
+                is_member: false,
+                is_listed,
+            };
+            permission.advice()
+        };
         assert_eq!(
-            advice(20, 0o660, "eve"),
+            advice("dialout", 0o660, false),
             "join the group that owns it: `sudo usermod -aG dialout $USER`, then log in again"
         );
         assert_eq!(
-            advice(20, 0o660, "ann"),
+            advice("dialout", 0o660, true),
             "log out and in again: you are in the group dialout from the next login on"
         );
         let rule = "put this line into /etc/udev/rules.d/70-st-link.rules, then \
             `sudo udevadm control --reload && sudo udevadm trigger`: \
             SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"0483\", MODE=\"0660\", GROUP=\"dialout\", TAG+=\"uaccess\"";
-        assert_eq!(advice(0, 0o660, "ann"), rule);
-        assert_eq!(advice(20, 0o600, "ann"), rule);
+        assert_eq!(advice("root", 0o660, true), rule);
+        assert_eq!(advice("dialout", 0o600, true), rule);
     }
 
     #[test]

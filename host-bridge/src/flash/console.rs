@@ -1,21 +1,24 @@
 //! The board's console before and after: who says Hello there, and whether it is the new firmware.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use protocol::{Hello, Role};
 
+use crate::clock::{Receiver, channel, micros};
 use crate::link::{Event, Link};
+use crate::lock::locked;
 use crate::place::{Place, StLink};
 use crate::state::{Named, State};
+use crate::system::System;
 
 /// How long a board may take from its reset to its first Hello; it takes a tenth of this.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 /// How long a look may take: what a link needs to be sure of silence, and some.
 const LOOK: Duration = Duration::from_millis(2_500);
 /// How often a wait looks up whether it was called off.
-const TURN: Duration = Duration::from_millis(100);
+const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// Where the console of the board of `seat` is, behind a probe of serial number `probe`.
 ///
@@ -67,41 +70,50 @@ pub struct Elsewhere {
     pub probe: String,
 }
 
+/// A link to whoever is at `place`, and what it tells.
+fn listen(system: &System, role: Role, place: Place) -> (Link, Receiver<Event>) {
+    let (events, told) = channel(&system.clock);
+    let link = Link::open_on(system, role, place, move |event| events.send(event));
+    (link, told)
+}
+
 /// How the console at `place` stands, for one who wants the board of `role`: as soon as that is clear.
-pub fn look(role: Role, place: Place) -> State {
-    let (events, told) = channel();
-    let link = Link::open(role, place, move |event| {
-        // Who no longer listens has what he wanted to know.
-        let _ = events.send(event);
-    });
-    let end = Instant::now() + LOOK;
+pub fn look(system: &System, role: Role, place: Place) -> State {
+    let (link, told) = listen(system, role, place);
+    let end_us = system.clock.now_us().saturating_add(micros(LOOK));
     loop {
-        match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
-            Ok(Event::Turned(State::Opened { .. }))
-            | Ok(Event::Heard { .. } | Event::Restarted) => {}
-            Ok(Event::Turned(state)) => return state,
-            Err(_) => return link.state(),
+        match told.recv_until(end_us) {
+            Some(
+                Event::StateChanged(State::Opened { .. }) | Event::Heard { .. } | Event::Restarted,
+            ) => {}
+            Some(Event::StateChanged(state)) => return state,
+            None => return link.state(),
         }
     }
 }
 
 /// Looks at several consoles at once.
-pub fn look_at_all(role: Role, places: Vec<Place>) -> Vec<State> {
+pub fn look_at_all(system: &System, role: Role, places: Vec<Place>) -> Vec<State> {
     let looks: Vec<_> = places
         .into_iter()
         .map(|place| {
-            let kept = place.clone();
-            (kept, std::thread::spawn(move || look(role, place)))
+            let absent = State::Absent {
+                place: place.to_string(),
+            };
+            let found = Arc::new(Mutex::new(absent));
+            let (system_of_look, theirs) = (system.clone(), Arc::clone(&found));
+            let work = move || {
+                let state = look(&system_of_look, role, place);
+                *locked(&theirs) = state;
+            };
+            (found, system.clock.spawn(Box::new(work)))
         })
         .collect();
-    looks
-        .into_iter()
-        .map(|(place, look)| {
-            look.join().unwrap_or(State::Absent {
-                place: place.to_string(),
-            })
-        })
-        .collect()
+    let end = |(found, thread): (Arc<Mutex<State>>, _)| {
+        system.clock.join(thread);
+        locked(&found).clone()
+    };
+    looks.into_iter().map(end).collect()
 }
 
 /// Why the new firmware was not heard.
@@ -142,33 +154,31 @@ pub enum NoHello {
 /// # Errors
 /// If it is not heard, or when `called_off` becomes true.
 pub fn wait(
+    system: &System,
     role: Role,
     place: Place,
     wanted: Hello,
     limit: Duration,
     called_off: &AtomicBool,
 ) -> Result<Hello, NoHello> {
-    let (events, told) = channel();
-    let link = Link::open(role, place, move |event| {
-        // Who no longer listens has what he wanted to know.
-        let _ = events.send(event);
-    });
-    let end = Instant::now() + limit;
+    let (link, told) = listen(system, role, place);
+    let end_us = system.clock.now_us().saturating_add(micros(limit));
     let mut other = None;
     loop {
         if called_off.load(Ordering::Relaxed) {
             return Err(NoHello::CalledOff);
         }
-        let left = end.saturating_duration_since(Instant::now());
-        match told.recv_timeout(left.min(TURN)) {
-            Ok(Event::Turned(State::Known { hello, .. })) if hello.version == wanted.version => {
+        let now_us = system.clock.now_us();
+        match told.recv_until(end_us.min(now_us.saturating_add(micros(LOOK_AGAIN)))) {
+            Some(Event::StateChanged(State::Known { hello, .. }))
+                if hello.version == wanted.version =>
+            {
                 return Ok(hello);
             }
-            Ok(Event::Turned(State::Known { hello, .. })) => other = Some(hello),
-            Ok(_) | Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => break,
+            Some(Event::StateChanged(State::Known { hello, .. })) => other = Some(hello),
+            Some(_) | None => {}
         }
-        if left.is_zero() {
+        if now_us >= end_us {
             break;
         }
     }

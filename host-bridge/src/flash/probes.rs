@@ -108,7 +108,7 @@ impl fmt::Display for Selector {
 
 /// What is known of the probe that is meant.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Wish {
+pub struct ProbeRequest {
     /// What the command line says.
     pub selector: Option<Selector>,
     /// The serial number that the bench has for this board.
@@ -117,7 +117,7 @@ pub struct Wish {
     pub other_serial: Option<String>,
 }
 
-impl Wish {
+impl ProbeRequest {
     /// What command line and bench say of the board of `seat`, whose neighbour has `other`.
     pub fn new(selector: Option<Selector>, seat: &Seat, other: &Seat, links: &[StLink]) -> Self {
         Self {
@@ -178,37 +178,39 @@ fn list(found: &[Attached]) -> String {
 ///
 /// # Errors
 /// If there is none, or if several may be meant.
-pub fn choose(found: &[Attached], wish: &Wish) -> Result<Attached, Undecided> {
+pub fn choose(found: &[Attached], request: &ProbeRequest) -> Result<Attached, Undecided> {
     if found.is_empty() {
         return Err(Undecided::None);
     }
-    let (wanted, fitting): (Option<String>, Vec<&Attached>) = match (&wish.selector, &wish.serial) {
-        (Some(selector), _) => (
-            Some(selector.to_string()),
-            found
-                .iter()
-                .filter(|probe| selector.0.matches_probe(&probe.info))
-                .collect(),
-        ),
-        (None, Some(serial)) => (
-            Some(format!("the one of serial number {serial} in the bench")),
-            found
-                .iter()
-                .filter(|probe| probe.serial() == Some(serial))
-                .collect(),
-        ),
-        (None, None) => (
-            wish.other_serial
-                .as_ref()
-                .map(|other| format!("this board's: the bench has {other} for the other board")),
-            found
-                .iter()
-                .filter(|probe| {
-                    wish.other_serial.is_none() || probe.serial() != wish.other_serial.as_deref()
-                })
-                .collect(),
-        ),
-    };
+    let (wanted, fitting): (Option<String>, Vec<&Attached>) =
+        match (&request.selector, &request.serial) {
+            (Some(selector), _) => (
+                Some(selector.to_string()),
+                found
+                    .iter()
+                    .filter(|probe| selector.0.matches_probe(&probe.info))
+                    .collect(),
+            ),
+            (None, Some(serial)) => (
+                Some(format!("the one of serial number {serial} in the bench")),
+                found
+                    .iter()
+                    .filter(|probe| probe.serial() == Some(serial))
+                    .collect(),
+            ),
+            (None, None) => (
+                request.other_serial.as_ref().map(|other| {
+                    format!("this board's: the bench has {other} for the other board")
+                }),
+                found
+                    .iter()
+                    .filter(|probe| {
+                        request.other_serial.is_none()
+                            || probe.serial() != request.other_serial.as_deref()
+                    })
+                    .collect(),
+            ),
+        };
     match (fitting.as_slice(), wanted) {
         ([only], _) => Ok((*only).clone()),
         ([], Some(wanted)) => Err(Undecided::NotThere {
@@ -249,19 +251,20 @@ mod tests {
 
     #[test]
     fn without_a_probe_the_rules_are_named() {
-        let error = choose(&[], &Wish::default()).expect_err("none is there");
+        let error = choose(&[], &ProbeRequest::default()).expect_err("none is there");
         assert!(error.to_string().contains("udev"), "{error}");
     }
 
     #[test]
     fn the_only_probe_is_meant() {
-        let chosen = choose(&[probe("A")], &Wish::default()).expect("the only one");
+        let chosen = choose(&[probe("A")], &ProbeRequest::default()).expect("the only one");
         assert_eq!(chosen.serial(), Some("A"));
     }
 
     #[test]
     fn of_several_none_is_guessed_and_all_are_named() {
-        let error = choose(&[probe("A"), probe("B")], &Wish::default()).expect_err("several");
+        let error =
+            choose(&[probe("A"), probe("B")], &ProbeRequest::default()).expect_err("several");
         let text = error.to_string();
         assert!(
             text.contains("0483:374b:A") && text.contains("0483:374b:B"),
@@ -272,12 +275,12 @@ mod tests {
 
     #[test]
     fn the_command_line_goes_before_the_bench() {
-        let wish = Wish {
+        let request = ProbeRequest {
             selector: Some("0483:374b:B".parse().expect("a selector")),
             serial: Some("A".to_owned()),
             other_serial: None,
         };
-        let chosen = choose(&[probe("A"), probe("B")], &wish).expect("named");
+        let chosen = choose(&[probe("A"), probe("B")], &request).expect("named");
         assert_eq!(chosen.serial(), Some("B"));
     }
 
@@ -285,9 +288,9 @@ mod tests {
     fn the_bench_knows_its_board_and_its_neighbour() {
         let found = [probe("A"), probe("B")];
         let nothing = seat(None, None);
-        let own = Wish::new(None, &seat(None, Some("B")), &nothing, &[]);
+        let own = ProbeRequest::new(None, &seat(None, Some("B")), &nothing, &[]);
         assert_eq!(choose(&found, &own).expect("named").serial(), Some("B"));
-        let neighbour = Wish::new(None, &nothing, &seat(None, Some("B")), &[]);
+        let neighbour = ProbeRequest::new(None, &nothing, &seat(None, Some("B")), &[]);
         assert_eq!(
             choose(&found, &neighbour).expect("the other").serial(),
             Some("A")
@@ -296,8 +299,8 @@ mod tests {
 
     #[test]
     fn the_neighbours_probe_is_not_taken_though_it_is_the_only_one() {
-        let wish = Wish::new(None, &seat(None, None), &seat(None, Some("A")), &[]);
-        let error = choose(&[probe("A")], &wish).expect_err("the neighbour's");
+        let request = ProbeRequest::new(None, &seat(None, None), &seat(None, Some("A")), &[]);
+        let error = choose(&[probe("A")], &request).expect_err("the neighbour's");
         assert!(error.to_string().contains("other board"), "{error}");
     }
 
@@ -307,22 +310,22 @@ mod tests {
             port: "/dev/null".into(),
             serial: Some("B".to_owned()),
         }];
-        let wish = Wish::new(
+        let request = ProbeRequest::new(
             None,
             &seat(Some("/dev/null"), None),
             &seat(None, None),
             &links,
         );
-        assert_eq!(wish.serial.as_deref(), Some("B"));
+        assert_eq!(request.serial.as_deref(), Some("B"));
     }
 
     #[test]
     fn a_probe_that_is_not_there_is_named_with_those_that_are() {
-        let wish = Wish {
+        let request = ProbeRequest {
             serial: Some("C".to_owned()),
-            ..Wish::default()
+            ..ProbeRequest::default()
         };
-        let text = choose(&[probe("A")], &wish)
+        let text = choose(&[probe("A")], &request)
             .expect_err("another")
             .to_string();
         assert!(

@@ -9,7 +9,7 @@ use protocol::{
 
 use super::board::Board;
 use super::fingertip::Fingertip;
-use super::happening::{Happening, What};
+use super::log_entry::{LogEntry, LogEvent};
 use super::orders::{Orders, Outcome};
 use super::settings::{self, Setting};
 use super::trace::Trace;
@@ -17,8 +17,8 @@ use super::words;
 use crate::link::{Clocks, Event, NotSent};
 
 /// Happenings kept.
-const HAPPENINGS: usize = 500;
-/// A message to the person at the desk stands for so long, in µs.
+const LOG_ENTRIES: usize = 500;
+/// A message to the person who watches stands for so long, in µs.
 const NOTICE_US: u64 = 6_000_000;
 /// A sample is so many sixteenths of an ADC step.
 const CODES_PER_LSB: f32 = 16.0;
@@ -42,7 +42,7 @@ pub struct Traces {
     pub gauges_lsb: [Trace; GAUGES],
 }
 
-/// A message to the person at the desk.
+/// A message to the person who watches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
     /// When it was made, in µs.
@@ -75,12 +75,12 @@ pub struct Dashboard {
     /// The actuators.
     pub fingertip: Fingertip,
     /// What has happened, the oldest first.
-    pub happenings: VecDeque<Happening>,
+    pub log_entries: VecDeque<LogEntry>,
     /// What came of the last change that was asked for.
     pub outcome: Option<Outcome>,
     notice: Option<Notice>,
     orders: [Orders; 2],
-    fresh: Vec<Happening>,
+    fresh: Vec<LogEntry>,
 }
 
 impl Default for Dashboard {
@@ -95,7 +95,7 @@ impl Default for Dashboard {
             safety: None,
             traces: Traces::default(),
             fingertip: Fingertip::default(),
-            happenings: VecDeque::new(),
+            log_entries: VecDeque::new(),
             outcome: None,
             notice: None,
             orders: [Orders::new(Role::Sensor), Orders::new(Role::Display)],
@@ -140,36 +140,36 @@ impl Dashboard {
                 self.board_mut(role).clocks = None;
                 self.fingertip.restart();
                 self.orders(role).read();
-                self.happen(role, What::Restarted);
+                self.log(role, LogEvent::Restarted);
             }
-            Event::Turned(state) => {
+            Event::StateChanged(state) => {
                 if state.is_known() {
                     self.orders(role).read();
                 } else {
                     self.lose(role);
                 }
                 self.board_mut(role).state = Some(state.clone());
-                self.happen(role, What::Link(state));
+                self.log(role, LogEvent::Link(state));
             }
         }
     }
 
     /// Takes note of something that is no event of a link.
-    pub fn happen(&mut self, role: Role, what: What) {
-        let happening = Happening {
+    pub fn log(&mut self, role: Role, what: LogEvent) {
+        let log_entry = LogEntry {
             at_us: self.now_us,
             role,
             what,
         };
-        if self.happenings.len() == HAPPENINGS {
-            self.happenings.pop_front();
+        if self.log_entries.len() == LOG_ENTRIES {
+            self.log_entries.pop_front();
         }
-        self.happenings.push_back(happening.clone());
-        self.fresh.push(happening);
+        self.log_entries.push_back(log_entry.clone());
+        self.fresh.push(log_entry);
     }
 
     /// What has happened since the last call, which is to come now and then.
-    pub fn take_happenings(&mut self) -> Vec<Happening> {
+    pub fn take_log_entries(&mut self) -> Vec<LogEntry> {
         std::mem::take(&mut self.fresh)
     }
 
@@ -261,7 +261,7 @@ impl Dashboard {
         self.change(Role::Sensor, setting, wanted);
     }
 
-    /// Says something to the person at the desk.
+    /// Says something to the person who watches.
     pub fn notify(&mut self, is_bad: bool, text: String) {
         self.notice = Some(Notice {
             at_us: self.now_us,
@@ -270,7 +270,7 @@ impl Dashboard {
         });
     }
 
-    /// What is to be said to the person at the desk at the moment.
+    /// What is to be said to the person who watches at the moment.
     pub const fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
     }
@@ -397,7 +397,7 @@ impl Dashboard {
         }
         self.safety = Some((self.now_us, state));
         self.fingertip.turn(Some(state));
-        self.happen(Role::Display, What::Safety(state));
+        self.log(Role::Display, LogEvent::Safety(state));
     }
 
     /// The board is not there, or not understood.

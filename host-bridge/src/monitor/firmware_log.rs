@@ -14,7 +14,7 @@ use std::time::Duration;
 use defmt_decoder::{DecodeError, Table};
 use protocol::Role;
 
-use super::happening::What;
+use super::log_entry::LogEvent;
 use crate::link::BAUD;
 
 mod probe;
@@ -73,19 +73,19 @@ struct Log {
     role: Role,
     elf: Vec<u8>,
     table: Table,
-    lines: Sender<(Role, What)>,
+    lines: Sender<(Role, LogEvent)>,
     ended: Arc<AtomicBool>,
 }
 
 /// The logs of all boards whose bytes are read; dropping it ends the reading.
 pub struct Logs {
-    lines: Sender<(Role, What)>,
+    lines: Sender<(Role, LogEvent)>,
     ended: Arc<AtomicBool>,
 }
 
 impl Logs {
     /// None is read yet; the lines come out of the receiver.
-    pub fn new() -> (Self, Receiver<(Role, What)>) {
+    pub fn new() -> (Self, Receiver<(Role, LogEvent)>) {
         let (lines, read) = channel();
         let ended = Arc::new(AtomicBool::new(false));
         (Self { lines, ended }, read)
@@ -141,7 +141,7 @@ impl Log {
             };
             if told.as_ref() != Some(&reason) && !self.is_ended() {
                 told = Some(reason.clone());
-                let _ = self.lines.send((self.role, What::LogLost { reason }));
+                let _ = self.lines.send((self.role, LogEvent::LogLost { reason }));
             }
             thread::park_timeout(AGAIN);
         }
@@ -203,7 +203,7 @@ impl Log {
                         let text = frame.display_message().to_string();
                         if self
                             .lines
-                            .send((self.role, What::Log { level, text }))
+                            .send((self.role, LogEvent::Log { level, text }))
                             .is_err()
                         {
                             return Ok(());

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::board::Board;
 use super::dashboard::Dashboard;
-use super::happening::{Happening, What};
+use super::log_entry::{LogEntry, LogEvent};
 use super::words;
 use crate::host_clock::unix_ns;
 use crate::state::State;
@@ -63,16 +63,16 @@ pub fn second(dashboard: &Dashboard) -> String {
 }
 
 /// Something that happened, in one line, which scripts that read the columns take for a comment.
-pub fn happening(happening: &Happening) -> String {
-    let word = match &happening.what {
-        What::Link(state) => state.word(),
+pub fn log_entry(log_entry: &LogEntry) -> String {
+    let word = match &log_entry.what {
+        LogEvent::Link(state) => state.word(),
         what => what.word(),
     };
     format!(
         "# {:8.3} {} {word}: {}",
-        seconds(happening.at_us),
-        happening.role.name(),
-        happening.what
+        seconds(log_entry.at_us),
+        log_entry.role.name(),
+        log_entry.what
     )
 }
 
@@ -128,28 +128,28 @@ pub fn second_json(dashboard: &Dashboard) -> Value {
 }
 
 /// Something that happened, as one JSON object.
-pub fn happening_json(happening: &Happening) -> Value {
+pub fn happening_json(log_entry: &LogEntry) -> Value {
     let mut object = json!({
-        "kind": happening.what.word(),
-        "t_s": seconds(happening.at_us),
-        "unix_s": unix_s(happening.at_us),
-        "board": happening.role.name(),
-        "text": happening.what.to_string(),
+        "kind": log_entry.what.word(),
+        "t_s": seconds(log_entry.at_us),
+        "unix_s": unix_s(log_entry.at_us),
+        "board": log_entry.role.name(),
+        "text": log_entry.what.to_string(),
     });
-    match &happening.what {
-        What::Link(state) => {
+    match &log_entry.what {
+        LogEvent::Link(state) => {
             object["state"] = state.word().into();
             object["advice"] = state.advice().into();
         }
-        What::Safety(state) => {
+        LogEvent::Safety(state) => {
             object["state"] = state.name().into();
             object["reason"] = state.reason().into();
         }
-        What::Log { level, text } => {
+        LogEvent::Log { level, text } => {
             object["level"] = (*level).into();
             object["text"] = text.as_str().into();
         }
-        What::Restarted | What::LogLost { .. } => {}
+        LogEvent::Restarted | LogEvent::LogLost { .. } => {}
     }
     object
 }

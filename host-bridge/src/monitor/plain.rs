@@ -4,8 +4,8 @@ use std::io::{self, ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::desk::Desk;
 use super::line;
+use super::session::Session;
 use crate::host_clock::now_us;
 
 /// Longest wait until a signal, or a line of a log, is seen.
@@ -36,20 +36,20 @@ impl Default for Format {
 /// # Errors
 /// If they can't be written for another reason.
 pub fn run(
-    mut desk: Desk,
+    mut session: Session,
     format: &Format,
     limit: Option<Duration>,
     ended: &AtomicBool,
     output: &mut impl Write,
 ) -> io::Result<()> {
-    match write_lines(&mut desk, format, limit, ended, output) {
+    match write_lines(&mut session, format, limit, ended, output) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written,
     }
 }
 
 fn write_lines(
-    desk: &mut Desk,
+    session: &mut Session,
     format: &Format,
     limit: Option<Duration>,
     ended: &AtomicBool,
@@ -66,31 +66,31 @@ fn write_lines(
     loop {
         let now = now_us();
         let wait = Duration::from_micros(next_us.saturating_sub(now)).min(LOOK);
-        desk.wait(wait);
-        desk.take();
+        session.wait(wait);
+        session.take();
         let now = now_us();
-        let happenings = desk.dashboard.take_happenings();
+        let log_entries = session.dashboard.take_log_entries();
         let is_due = now >= next_us;
-        let is_over = desk.is_over()
+        let is_over = session.is_over()
             || ended.load(Ordering::Acquire)
             || end_us.is_some_and(|end_us| now >= end_us);
-        for happening in &happenings {
+        for log_entry in &log_entries {
             if format.is_json {
-                writeln!(output, "{}", line::happening_json(happening))?;
+                writeln!(output, "{}", line::happening_json(log_entry))?;
             } else {
-                writeln!(output, "{}", line::happening(happening))?;
+                writeln!(output, "{}", line::log_entry(log_entry))?;
             }
         }
         if is_due {
             // One line stands for those that would have been due while nobody took them.
             next_us = (next_us + every_us).max(now);
             if format.is_json {
-                writeln!(output, "{}", line::second_json(&desk.dashboard))?;
+                writeln!(output, "{}", line::second_json(&session.dashboard))?;
             } else {
-                writeln!(output, "{}", line::second(&desk.dashboard))?;
+                writeln!(output, "{}", line::second(&session.dashboard))?;
             }
         }
-        if is_due || !happenings.is_empty() {
+        if is_due || !log_entries.is_empty() {
             output.flush()?;
         }
         if is_over {

@@ -13,10 +13,10 @@ use ratatui::crossterm::event::{self, Event as Typed, KeyEventKind};
 
 use super::MonitorError;
 use super::dashboard::Dashboard;
-use super::desk::Desk;
 use super::draw::draw;
-use super::keeping::Keeping;
 use super::keys::{Asked, press};
+use super::live_recording::LiveRecording;
+use super::session::Session;
 use super::theme::Theme;
 use super::view::{Kept, View};
 
@@ -60,22 +60,22 @@ impl Drop for Screen {
 /// # Errors
 /// If there is no terminal, or if the last of a recording can't be written.
 pub fn run(
-    mut desk: Desk,
+    mut session: Session,
     limit: Option<Duration>,
     ended: &Arc<AtomicBool>,
 ) -> Result<(), MonitorError> {
     let shown = Screen::open(ended).and_then(|mut screen| {
         let end = limit.map(|limit| Instant::now() + limit);
-        show(&mut screen.terminal, &mut desk, end, ended)
+        show(&mut screen.terminal, &mut session, end, ended)
     });
-    let closed = desk.close();
+    let closed = session.close();
     shown?;
     Ok(closed?)
 }
 
 fn show(
     terminal: &mut DefaultTerminal,
-    desk: &mut Desk,
+    session: &mut Session,
     end: Option<Instant>,
     ended: &AtomicBool,
 ) -> io::Result<()> {
@@ -86,14 +86,14 @@ fn show(
     let mut next = Instant::now();
     let typed = listen();
     while !ended.load(Ordering::Acquire) && end.is_none_or(|end| Instant::now() < end) {
-        changed |= desk.take();
+        changed |= session.take();
         // Shown already, in the log.
-        desk.dashboard.take_happenings();
-        view.kept = desk.keeping().map(kept);
-        view.is_over = desk.is_over();
+        session.dashboard.take_log_entries();
+        view.kept = session.recording().map(kept);
+        view.is_over = session.is_over();
         let is_idle = drawn.is_none_or(|drawn| drawn.elapsed() >= IDLE);
         if changed || is_idle {
-            let live = &desk.dashboard;
+            let live = &session.dashboard;
             let shown = frozen.as_deref().unwrap_or(live);
             if let Err(error) = terminal.draw(|frame| draw(frame, live, shown, &view)) {
                 return gone(error, ended);
@@ -117,16 +117,16 @@ fn show(
             if key.kind == KeyEventKind::Release {
                 continue;
             }
-            let asked = press(key, &mut desk.dashboard, &mut view);
-            desk.say();
+            let asked = press(key, &mut session.dashboard, &mut view);
+            session.say();
             match asked {
                 Asked::Nothing => {}
                 Asked::Quit => return Ok(()),
                 Asked::Freeze => {
                     view.is_frozen = !view.is_frozen;
-                    frozen = view.is_frozen.then(|| Box::new(desk.dashboard.clone()));
+                    frozen = view.is_frozen.then(|| Box::new(session.dashboard.clone()));
                 }
-                Asked::Keep => desk.toggle_keeping(),
+                Asked::Keep => session.toggle_recording(),
             }
         }
     }
@@ -147,11 +147,11 @@ fn listen() -> Receiver<Typed> {
     typed
 }
 
-fn kept(keeping: &Keeping) -> Kept {
+fn kept(recording: &LiveRecording) -> Kept {
     Kept {
-        name: keeping.path.display().to_string(),
-        since_us: keeping.since_us,
-        safe_bytes: keeping.progress().safe_bytes,
+        name: recording.path.display().to_string(),
+        since_us: recording.since_us,
+        safe_bytes: recording.progress().safe_bytes,
     }
 }
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
 use super::json_schema::{cells, columns};
-use super::ledger::Entry;
-use super::paper::{Ink, Paper};
 use super::row::{CHANNELS, Kind, channel};
+use super::row_builder::Entry;
+use super::sink::{Sink, SinkWriter};
 
 const NS_PER_S: u64 = 1_000_000_000;
 /// Some hundred lines.
@@ -22,8 +22,8 @@ pub struct CsvFolder {
 }
 
 struct Channel {
-    paper: Paper,
-    writer: csv::Writer<Ink>,
+    sink: Sink,
+    writer: csv::Writer<SinkWriter>,
     cells: Vec<String>,
     dirty: bool,
 }
@@ -95,26 +95,26 @@ impl CsvFolder {
     /// Bytes that are safe.
     pub fn safe_bytes(&self) -> u64 {
         let files = self.files.iter().flatten();
-        files.map(|file| file.paper.safe_bytes()).sum()
+        files.map(|file| file.sink.safe_bytes()).sum()
     }
 
     /// Takes away what is not safe, so that each file ends with a whole line.
     pub fn abandon(self) {
         for file in self.files.into_iter().flatten() {
-            file.paper.cut();
+            file.sink.cut();
         }
     }
 }
 
 impl Channel {
     fn create(path: &Path, kind: Kind, force: bool) -> Result<Self, RecordingError> {
-        let paper = Paper::create(path, force)?;
-        let ink = paper.ink()?;
+        let sink = Sink::create(path, force)?;
+        let writer = sink.writer()?;
         let mut channel = Self {
-            paper,
+            sink,
             writer: csv::WriterBuilder::new()
                 .buffer_capacity(BUFFER_BYTES)
-                .from_writer(ink),
+                .from_writer(writer),
             cells: Vec::new(),
             dirty: true,
         };
@@ -150,10 +150,10 @@ impl Channel {
             let flushed = self.writer.flush();
             flushed.map_err(|source| self.failed(source))?;
         }
-        self.paper.sync()
+        self.sink.sync()
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        self.paper.failed(source)
+        self.sink.failed(source)
     }
 }

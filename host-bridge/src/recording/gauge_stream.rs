@@ -1,11 +1,18 @@
 //! Has a sensor board stream its gauges for as long as they are recorded, and nothing else changed.
 
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant};
+
 use protocol::{Configuration, DisplayConfiguration, Message, Role, SensorConfiguration};
 
-use crate::link::Event;
+use crate::link::{Event, Link};
 
 /// Between two tries.
 const RETRY_US: u64 = 1_000_000;
+/// How long the sensor board may take to confirm at the end that it is as it was.
+const RESTORED: Duration = Duration::from_secs(3);
+/// How often it is told meanwhile.
+const AGAIN: Duration = Duration::from_millis(50);
 
 /// Asks both boards for their configurations, and the sensor board for its gauges.
 #[derive(Default)]
@@ -72,8 +79,8 @@ impl GaugeStream {
             Role::Sensor | Role::Host => &mut self.sensor,
         };
         match event {
-            Event::Turned(state) if state.is_known() => interview.begin(),
-            Event::Turned(_) => interview.stage = Stage::Done,
+            Event::StateChanged(state) if state.is_known() => interview.begin(),
+            Event::StateChanged(_) => interview.stage = Stage::Done,
             Event::Restarted => interview.begin(),
             Event::Heard {
                 message: Message::Configuration(report),
@@ -118,7 +125,7 @@ impl GaugeStream {
 
     /// What gives the sensor board its quiet back; none if it streams of its own accord, or not. What it
     /// reports from now on tells whether it has taken it.
-    pub fn restoration(&mut self) -> Option<Message> {
+    fn restoration(&mut self) -> Option<Message> {
         if !self.switched {
             return None;
         }
@@ -126,8 +133,35 @@ impl GaugeStream {
         Some(Message::Configure(streaming(configuration, false)))
     }
 
+    /// Gives the sensor board its quiet back if it was taken, and waits until it says so; `pass` gets what the
+    /// links tell meanwhile. Whether the board is as it was.
+    pub fn restore(
+        &mut self,
+        events: &Receiver<(Role, Event)>,
+        sensor: Option<&Link>,
+        mut pass: impl FnMut(Role, Event),
+    ) -> bool {
+        let Some(message) = self.restoration() else {
+            return true;
+        };
+        let post = || sensor.is_some_and(|link| link.post(&message).is_ok());
+        let end = Instant::now() + RESTORED;
+        let mut goes_on = post();
+        while goes_on && !self.is_quiet() && Instant::now() < end {
+            match events.recv_timeout(AGAIN) {
+                Ok((role, event)) => {
+                    self.on_event(role, &event);
+                    pass(role, event);
+                }
+                Err(RecvTimeoutError::Timeout) => goes_on = post(),
+                Err(RecvTimeoutError::Disconnected) => goes_on = false,
+            }
+        }
+        self.is_quiet()
+    }
+
     /// Whether the sensor board has said that it does not stream.
-    pub fn is_quiet(&self) -> bool {
+    fn is_quiet(&self) -> bool {
         self.configuration
             .is_some_and(|configuration| !configuration.stream_gauges)
     }

@@ -13,9 +13,9 @@ use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use super::error::RecordingError;
 use super::json_schema::JsonSchema;
-use super::ledger::Entry;
-use super::paper::{Ink, Paper};
 use super::row::{CHANNELS, channel, topic};
+use super::row_builder::Entry;
+use super::sink::{Sink, SinkWriter};
 
 /// What stands in the file's header, for programs that want to know whom it is of.
 pub const PROFILE: &str = "ridgelink";
@@ -28,8 +28,8 @@ const CHUNK_BYTES: u64 = 1 << 20;
 
 /// A file that is being written.
 pub struct McapFile {
-    paper: Paper,
-    writer: Writer<BufWriter<Ink>>,
+    sink: Sink,
+    writer: Writer<BufWriter<SinkWriter>>,
     ids: Vec<u16>,
     sequences: [u32; CHANNELS.len()],
     json: Vec<u8>,
@@ -53,8 +53,8 @@ impl McapFile {
         force: bool,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
-        let paper = Paper::create(path, force)?;
-        let ink = BufWriter::new(paper.ink()?);
+        let sink = Sink::create(path, force)?;
+        let writer = BufWriter::new(sink.writer()?);
         let writer = WriteOptions::new()
             .profile(PROFILE)
             .library(concat!("host-bridge ", env!("CARGO_PKG_VERSION")))
@@ -63,10 +63,10 @@ impl McapFile {
             .chunk_size(Some(CHUNK_BYTES))
             // Chunks are made in memory: nothing that is in the file is ever touched again.
             .disable_seeking(true)
-            .create(ink)
-            .map_err(|error| paper.failed(reason(error)))?;
+            .create(writer)
+            .map_err(|error| sink.failed(reason(error)))?;
         let mut mcap = Self {
-            paper,
+            sink,
             writer,
             ids: Vec::with_capacity(CHANNELS.len()),
             sequences: [0; CHANNELS.len()],
@@ -158,12 +158,12 @@ impl McapFile {
                 .flush()
                 .map_err(|error| self.failed(reason(error)))?;
         }
-        self.paper.sync()
+        self.sink.sync()
     }
 
     /// Bytes that are safe.
     pub const fn safe_bytes(&self) -> u64 {
-        self.paper.safe_bytes()
+        self.sink.safe_bytes()
     }
 
     /// Ends the file as it should end, with index and summary, and makes it safe. Returns its length.
@@ -173,22 +173,22 @@ impl McapFile {
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.sync()?;
         let ended = self.writer.finish().map_err(reason);
-        let mut ink = self.writer.into_inner();
+        let mut writer = self.writer.into_inner();
         ended
-            .and_then(|_| ink.flush())
-            .map_err(|source| self.paper.failed(source))
-            .and_then(|()| self.paper.sync())
-            .inspect_err(|_| self.paper.cut())
-            .map(|()| self.paper.safe_bytes())
+            .and_then(|_| writer.flush())
+            .map_err(|source| self.sink.failed(source))
+            .and_then(|()| self.sink.sync())
+            .inspect_err(|_| self.sink.cut())
+            .map(|()| self.sink.safe_bytes())
     }
 
     /// Takes away what is not safe, so that the file ends with a whole chunk.
     pub fn abandon(self) {
-        self.paper.cut();
+        self.sink.cut();
         drop(self.writer.into_inner());
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {
-        self.paper.failed(source)
+        self.sink.failed(source)
     }
 }

@@ -1,38 +1,58 @@
 //! What waits to be written, between the links' threads and the one that writes.
 
-use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use crossbeam_channel::{
+    Receiver, RecvTimeoutError, SendTimeoutError, Sender, TrySendError, bounded,
+};
 use protocol::Role;
+
+use crate::lock::locked;
 
 /// How many may wait: everything that both boards say in 40 s.
 pub const MOST: usize = 32_768;
 /// How long the first one that finds no room waits for it: a disk that is only slower than what comes
 /// slows it down, one that stands still does not hold up the links.
-const PATIENCE: Duration = Duration::from_millis(100);
+pub const PATIENCE: Duration = Duration::from_millis(100);
 
-/// A queue of bounded length that counts what it could not take.
-pub struct Queue<T> {
-    waiting: Mutex<Waiting<T>>,
-    /// Something has come, or nothing will.
-    came: Condvar,
-    /// Something has gone.
-    went: Condvar,
+/// A queue of bounded length that counts what it could not take, and how long the first one that finds no
+/// room waits for it.
+pub fn queue<T>(patience: Duration) -> (Input<T>, Output<T>) {
+    let (sender, receiver) = bounded(MOST);
+    let refused = Arc::new(Refused::default());
+    let input = Input {
+        sender: Mutex::new(Some(sender)),
+        refused: Arc::clone(&refused),
+        patience,
+    };
+    (input, Output { receiver, refused })
+}
+
+/// What was not taken.
+#[derive(Default)]
+struct Refused {
+    /// Since it was told last, of the sensor and of the display.
+    counts: [AtomicU64; 2],
+    /// Nobody takes anything: there is no use in waiting for room.
+    is_stuck: AtomicBool,
+}
+
+const ROLES: [Role; 2] = [Role::Sensor, Role::Display];
+
+/// Where things are put in.
+pub struct Input<T> {
+    /// `None` once it is closed.
+    sender: Mutex<Option<Sender<T>>>,
+    refused: Arc<Refused>,
     patience: Duration,
 }
 
-struct Waiting<T> {
-    items: VecDeque<T>,
-    /// Not taken since the last [`Queue::take`], of the sensor and of the display.
-    refused: [u64; 2],
-    /// Nobody takes anything: there is no use in waiting for room.
-    stuck: bool,
-    closed: bool,
-}
-
-const fn index(role: Role) -> usize {
-    matches!(role, Role::Display) as usize
+/// Where they are taken out. Dropping it throws away what waits, and what will be put in.
+pub struct Output<T> {
+    receiver: Receiver<T>,
+    refused: Arc<Refused>,
 }
 
 /// What a look at the queue gives.
@@ -47,121 +67,66 @@ pub enum Taken<T> {
     Closed,
 }
 
-impl<T> Default for Queue<T> {
-    fn default() -> Self {
-        Self::with_patience(PATIENCE)
-    }
-}
-
-impl<T> Queue<T> {
-    /// An empty one that has the first one that finds no room wait for so long.
-    fn with_patience(patience: Duration) -> Self {
-        Self {
-            waiting: Mutex::new(Waiting {
-                items: VecDeque::new(),
-                refused: [0; 2],
-                stuck: false,
-                closed: false,
-            }),
-            came: Condvar::new(),
-            went: Condvar::new(),
-            patience,
-        }
-    }
-
-    /// Sound at every moment, whoever died holding it.
-    fn locked(&self) -> MutexGuard<'_, Waiting<T>> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
+impl<T> Input<T> {
     /// Puts in what is of the board of `role`, or counts it as refused.
     pub fn put(&self, role: Role, item: T) {
-        let mut waiting = self.locked();
-        if waiting.items.len() >= MOST && !waiting.stuck && !waiting.closed {
-            let full = |waiting: &mut Waiting<T>| waiting.items.len() >= MOST && !waiting.closed;
-            waiting = self
-                .went
-                .wait_timeout_while(waiting, self.patience, full)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
-        }
-        if waiting.closed {
+        // The lock is not held while room is waited for.
+        let Some(sender) = locked(&self.sender).clone() else {
             return;
-        }
-        waiting.stuck = waiting.items.len() >= MOST;
-        if waiting.stuck {
-            waiting.refused[index(role)] += 1;
-            return;
-        }
-        waiting.items.push_back(item);
-        if waiting.items.len() == 1 {
-            self.came.notify_one();
-        }
-    }
-
-    /// Takes the next one, waiting for it until `until`.
-    pub fn take(&self, until: Instant) -> Taken<T> {
-        let mut waiting = self.locked();
-        if waiting.items.is_empty() && !waiting.closed {
-            let wait = until.saturating_duration_since(Instant::now());
-            waiting = self
-                .came
-                .wait_timeout_while(waiting, wait, |waiting| {
-                    waiting.items.is_empty() && !waiting.closed
-                })
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
-        }
-        // What was refused came after all that waits now.
-        let item = waiting.items.pop_front();
-        if waiting.items.len() + 1 == MOST {
-            self.went.notify_all();
-        }
-        match item {
-            Some(item) => Taken::Item(item),
-            None => {
-                for role in [Role::Sensor, Role::Display] {
-                    let refused = std::mem::take(&mut waiting.refused[index(role)]);
-                    if refused > 0 {
-                        return Taken::Refused(role, refused);
-                    }
-                }
-                if waiting.closed {
-                    Taken::Closed
-                } else {
-                    Taken::Nothing
-                }
+        };
+        let Refused { counts, is_stuck } = &*self.refused;
+        let is_refused = match sender.try_send(item) {
+            Err(TrySendError::Full(item)) if !is_stuck.load(Ordering::Relaxed) => {
+                let sent = sender.send_timeout(item, self.patience);
+                matches!(sent, Err(SendTimeoutError::Timeout(_)))
             }
+            sent => matches!(sent, Err(TrySendError::Full(_))),
+        };
+        is_stuck.store(is_refused, Ordering::Relaxed);
+        if is_refused {
+            counts[usize::from(role == Role::Display)].fetch_add(1, Ordering::Relaxed);
         }
     }
 
     /// Nothing more is let in; what waits can still be taken.
     pub fn close(&self) {
-        self.locked().closed = true;
-        self.came.notify_all();
-        self.went.notify_all();
+        locked(&self.sender).take();
     }
+}
 
-    /// Nothing more is let in, and what waits is thrown away.
-    pub fn abandon(&self) {
-        self.locked().items.clear();
-        self.close();
+impl<T> Output<T> {
+    /// Takes the next one, waiting for it until `until`.
+    pub fn take(&self, until: Instant) -> Taken<T> {
+        if let Ok(item) = self.receiver.try_recv() {
+            return Taken::Item(item);
+        }
+        // What was refused came after all that waited.
+        for (role, count) in ROLES.into_iter().zip(&self.refused.counts) {
+            let refused = count.swap(0, Ordering::Relaxed);
+            if refused > 0 {
+                return Taken::Refused(role, refused);
+            }
+        }
+        match self.receiver.recv_deadline(until) {
+            Ok(item) => Taken::Item(item),
+            Err(RecvTimeoutError::Timeout) => Taken::Nothing,
+            Err(RecvTimeoutError::Disconnected) => Taken::Closed,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
     use std::thread;
 
     use super::*;
 
-    /// Far more than anything here takes.
-    const LIMIT: Duration = Duration::from_secs(30);
+    /// Only what hangs takes so long.
+    const LIMIT: Duration = Duration::from_secs(120);
 
     /// What waits now, in words.
-    fn taken(queue: &Queue<usize>) -> String {
-        match queue.take(Instant::now()) {
+    fn taken(output: &Output<usize>) -> String {
+        match output.take(Instant::now()) {
             Taken::Item(item) => item.to_string(),
             Taken::Refused(role, count) => format!("{count} of the {}", role.name()),
             Taken::Nothing => "nothing".to_owned(),
@@ -169,113 +134,72 @@ mod tests {
         }
     }
 
-    fn full(patience: Duration) -> Queue<usize> {
-        let queue = Queue::with_patience(patience);
-        (0..MOST).for_each(|item| queue.put(Role::Sensor, item));
-        queue
+    fn full(patience: Duration) -> (Input<usize>, Output<usize>) {
+        let (input, output) = queue(patience);
+        (0..MOST).for_each(|item| input.put(Role::Sensor, item));
+        (input, output)
     }
 
     #[test]
     fn what_is_put_in_comes_out_in_order_whoever_put_it_in() {
-        let queue = Queue::default();
-        for (item, role) in [Role::Sensor, Role::Display, Role::Sensor]
-            .into_iter()
-            .enumerate()
-        {
-            queue.put(role, item);
+        let (input, output) = queue(PATIENCE);
+        let roles = [Role::Sensor, Role::Display, Role::Sensor];
+        for (item, role) in roles.into_iter().enumerate() {
+            input.put(role, item);
         }
-        let out = [(); 4].map(|()| taken(&queue));
+        let out = [(); 4].map(|()| taken(&output));
         assert_eq!(out, ["0", "1", "2", "nothing"]);
-    }
-
-    #[test]
-    fn two_boards_that_talk_at_once_each_keep_their_order() {
-        const EACH: usize = MOST / 2;
-        let queue = Arc::new(Queue::default());
-        let speakers = [(Role::Sensor, 0), (Role::Display, 1)].map(|(role, parity)| {
-            let queue = Arc::clone(&queue);
-            thread::spawn(move || (0..EACH).for_each(|item| queue.put(role, 2 * item + parity)))
-        });
-        let mut next = [0, 1];
-        while next != [2 * EACH, 2 * EACH + 1] {
-            let Taken::Item(item) = queue.take(Instant::now() + LIMIT) else {
-                panic!("nothing after {next:?}, or not all of it");
-            };
-            assert_eq!(item, next[item % 2]);
-            next[item % 2] += 2;
-        }
-        for speaker in speakers {
-            speaker.join().expect("it only talks");
-        }
-        assert_eq!(taken(&queue), "nothing");
     }
 
     #[test]
     fn a_disk_that_stands_still_holds_its_speaker_up_only_once_and_what_is_missing_is_told_at_its_place()
      {
-        let queue = full(PATIENCE);
+        let (input, output) = full(PATIENCE);
         let began = Instant::now();
-        queue.put(Role::Display, MOST);
+        input.put(Role::Display, MOST);
         assert!(began.elapsed() >= PATIENCE);
-        // From now on nobody waits: a thousand times the patience would be far over the limit.
-        for item in 0..1_000 {
-            queue.put(Role::Display, item);
+        // From now on nobody waits: two thousand times the patience would be over the limit.
+        for item in 0..2_000 {
+            input.put(Role::Display, item);
         }
-        queue.put(Role::Sensor, 0);
+        input.put(Role::Sensor, 0);
         assert!(began.elapsed() < LIMIT, "{:?}", began.elapsed());
         // What waits was there before what was refused.
-        assert!((0..MOST).all(|item| taken(&queue) == item.to_string()));
-        let out = [(); 3].map(|()| taken(&queue));
-        assert_eq!(out, ["1 of the sensor", "1001 of the display", "nothing"]);
+        assert!((0..MOST).all(|item| taken(&output) == item.to_string()));
+        let out = [(); 3].map(|()| taken(&output));
+        assert_eq!(out, ["1 of the sensor", "2001 of the display", "nothing"]);
         // The disk has caught up: all is taken again, in order.
-        queue.put(Role::Display, 7);
-        assert_eq!(taken(&queue), "7");
+        input.put(Role::Display, 7);
+        assert_eq!(taken(&output), "7");
     }
 
     #[test]
     fn a_disk_that_is_slower_than_what_comes_slows_it_down_and_loses_nothing() {
-        let queue = Arc::new(full(LIMIT));
-        let writer = Arc::clone(&queue);
+        let (input, output) = full(LIMIT);
         let speaker = thread::spawn(move || {
-            (MOST..MOST + 100).for_each(|item| queue.put(Role::Sensor, item));
+            (MOST..MOST + 100).for_each(|item| input.put(Role::Sensor, item));
         });
         // Room is made one by one, for a speaker that waits for it.
         for want in 0..MOST + 100 {
-            match writer.take(Instant::now() + LIMIT) {
+            match output.take(Instant::now() + LIMIT) {
                 Taken::Item(item) => assert_eq!(item, want),
                 _ => panic!("{want} is missing"),
             }
         }
         speaker.join().expect("it only talks");
-        assert_eq!(taken(&writer), "nothing");
+        assert_eq!(taken(&output), "closed");
     }
 
     #[test]
-    fn a_writer_hears_at_once_of_what_comes_and_of_the_end() {
-        let queue = Arc::new(Queue::default());
-        let ear = Arc::clone(&queue);
-        let writer = thread::spawn(move || {
-            let end = Instant::now() + LIMIT;
-            let item = matches!(ear.take(end), Taken::Item(5));
-            item && matches!(ear.take(end), Taken::Closed) && Instant::now() < end
-        });
-        queue.put(Role::Sensor, 5);
-        queue.close();
-        assert!(writer.join().expect("it only listens"));
-        queue.put(Role::Sensor, 6);
-        assert_eq!(taken(&queue), "closed");
-    }
-
-    #[test]
-    fn a_queue_that_is_closed_still_gives_what_waits_and_one_that_is_abandoned_does_not() {
-        let queue = full(LIMIT);
-        queue.close();
+    fn a_queue_that_is_closed_still_gives_what_waits_and_one_whose_end_is_gone_takes_nothing() {
+        let (input, output) = full(LIMIT);
+        input.close();
         // Nothing is waited for, and nothing counted.
-        queue.put(Role::Sensor, MOST);
-        assert!((0..MOST).all(|item| taken(&queue) == item.to_string()));
-        assert_eq!(taken(&queue), "closed");
-        let queue = full(LIMIT);
-        queue.abandon();
-        assert_eq!(taken(&queue), "closed");
+        input.put(Role::Sensor, MOST);
+        assert!((0..MOST).all(|item| taken(&output) == item.to_string()));
+        assert_eq!(taken(&output), "closed");
+        let (input, output) = full(LIMIT);
+        drop(output);
+        input.put(Role::Sensor, MOST);
     }
 }

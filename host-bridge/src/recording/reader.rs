@@ -11,10 +11,10 @@ use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use protocol::Role;
 
-use super::books::CONFIGURATION;
-use super::ledger::Entry;
+use super::files::CONFIGURATION;
 use super::mcap_file::{ABOUT, FORMAT, PROFILE};
 use super::row::{CHANNELS, Kind, Row, topic};
+use super::row_builder::Entry;
 
 /// Read at a time.
 const READ_BYTES: usize = 1 << 16;

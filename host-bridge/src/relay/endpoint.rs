@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 /// How bytes travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Transport {
+pub enum Security {
     /// Open: whoever reaches the port takes part.
     Tcp,
     /// Encrypted, with certificates on both ends.
@@ -18,7 +18,7 @@ pub enum Transport {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Endpoint {
     /// How bytes travel.
-    pub transport: Transport,
+    pub security: Security,
     /// A name, an IPv4 address, or an IPv6 address in brackets.
     pub host: String,
     /// The port, 1 or above.
@@ -46,9 +46,9 @@ impl FromStr for Endpoint {
     type Err = EndpointError;
 
     fn from_str(given: &str) -> Result<Self, EndpointError> {
-        let (transport, rest) = match given.split_once('/') {
-            Some(("tcp", rest)) => (Transport::Tcp, rest),
-            Some(("tls", rest)) => (Transport::Tls, rest),
+        let (security, rest) = match given.split_once('/') {
+            Some(("tcp", rest)) => (Security::Tcp, rest),
+            Some(("tls", rest)) => (Security::Tls, rest),
             _ => return Err(EndpointError::Transport),
         };
         let (host, port) = rest.rsplit_once(':').ok_or(EndpointError::Port)?;
@@ -72,7 +72,7 @@ impl FromStr for Endpoint {
             });
         }
         Ok(Self {
-            transport,
+            security,
             host: host.to_owned(),
             port,
         })
@@ -81,11 +81,11 @@ impl FromStr for Endpoint {
 
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let transport = match self.transport {
-            Transport::Tcp => "tcp",
-            Transport::Tls => "tls",
+        let security = match self.security {
+            Security::Tcp => "tcp",
+            Security::Tls => "tls",
         };
-        write!(f, "{transport}/{}:{}", self.host, self.port)
+        write!(f, "{security}/{}:{}", self.host, self.port)
     }
 }
 

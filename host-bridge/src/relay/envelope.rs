@@ -10,7 +10,7 @@ use protocol::frame::MAX_PAYLOAD;
 use protocol::{Estimate, HELLO_LENGTH, Hello, Message, Ping, Pong, Role, Stop, Trip};
 use serde::{Deserialize, Serialize};
 
-use crate::relay::gate::Saying;
+use crate::relay::gate::SequenceNumber;
 
 /// The version of everything in this file.
 pub const ENVELOPE_VERSION: u8 = 2;
@@ -185,13 +185,13 @@ pub fn is_carried(role: Role, message: &Message) -> bool {
 }
 
 /// What its board says of the place of a message that is carried.
-pub const fn saying(start: u32, message: &Message) -> Option<Saying> {
+pub const fn sequence_number(start: u32, message: &Message) -> Option<SequenceNumber> {
     let sequence = match message {
         Message::Estimate(estimate) => estimate.sequence,
         Message::Motion(motion) => motion.sequence,
         _ => return None,
     };
-    Some(Saying { start, sequence })
+    Some(SequenceNumber { start, sequence })
 }
 
 /// Whether an estimate keeps what its fields promise.

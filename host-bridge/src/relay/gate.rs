@@ -39,7 +39,7 @@ pub struct Arrivals {
 
 /// What a board's message says of its own place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Saying {
+pub struct SequenceNumber {
     /// Counts the starts of the board, as its bridge sees them.
     pub start: u32,
     /// The board's own count.
@@ -57,14 +57,14 @@ pub struct Gate {
     missing: u128,
     /// How many numbers before the newest belong to this session, below [`WINDOW`].
     depth: u64,
-    last: Option<Saying>,
+    last: Option<SequenceNumber>,
     arrivals: Arrivals,
 }
 
 impl Gate {
     /// Judges the envelope numbered `counter` of `session`, and counts it. Who may pass is [`Order::Newer`]
     /// and nobody else.
-    pub fn judge(&mut self, session: u64, counter: u64, saying: Saying) -> Order {
+    pub fn judge(&mut self, session: u64, counter: u64, sequence_number: SequenceNumber) -> Order {
         self.arrivals.received += 1;
         if self.is_retired(session) {
             self.arrivals.superseded += 1;
@@ -75,14 +75,14 @@ impl Gate {
             Order::Newer => {}
             other => return other,
         }
-        let repeats = self
-            .last
-            .is_some_and(|last| saying.start == last.start && !follows(saying, last));
+        let repeats = self.last.is_some_and(|last| {
+            sequence_number.start == last.start && !follows(sequence_number, last)
+        });
         if repeats {
             self.arrivals.superseded += 1;
             return Order::Repeated;
         }
-        self.last = Some(saying);
+        self.last = Some(sequence_number);
         Order::Newer
     }
 
@@ -156,17 +156,21 @@ impl Gate {
     }
 }
 
-/// Whether a board said `saying` after `last`, in counts that wrap.
-const fn follows(saying: Saying, last: Saying) -> bool {
-    saying.sequence.wrapping_sub(last.sequence).cast_signed() > 0
+/// Whether a board said `sequence_number` after `last`, in counts that wrap.
+const fn follows(sequence_number: SequenceNumber, last: SequenceNumber) -> bool {
+    sequence_number
+        .sequence
+        .wrapping_sub(last.sequence)
+        .cast_signed()
+        > 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn said(number: u64) -> Saying {
-        Saying {
+    fn said(number: u64) -> SequenceNumber {
+        SequenceNumber {
             start: 0,
             sequence: number as u32,
         }
@@ -251,7 +255,7 @@ mod tests {
     #[test]
     fn a_board_that_was_started_anew_is_followed_and_one_that_repeats_itself_is_not() {
         let mut gate = Gate::default();
-        let say = |start, sequence| Saying { start, sequence };
+        let say = |start, sequence| SequenceNumber { start, sequence };
         assert_eq!(gate.judge(1, 1, say(0, 900)), Order::Newer);
         assert_eq!(gate.judge(1, 2, say(0, 900)), Order::Repeated);
         assert_eq!(gate.judge(1, 3, say(0, 899)), Order::Repeated);
@@ -263,7 +267,7 @@ mod tests {
     #[test]
     fn a_boards_count_may_wrap() {
         let mut gate = Gate::default();
-        let say = |sequence| Saying { start: 0, sequence };
+        let say = |sequence| SequenceNumber { start: 0, sequence };
         assert_eq!(gate.judge(1, 1, say(u32::MAX)), Order::Newer);
         assert_eq!(gate.judge(1, 2, say(0)), Order::Newer);
     }

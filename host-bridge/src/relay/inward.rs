@@ -5,12 +5,12 @@ use std::time::Duration;
 use protocol::{Ping, Pong, Role, Stop, Trip};
 
 use crate::relay::age::{Age, Ages};
-use crate::relay::envelope::{Content, Envelope, EnvelopeError, saying};
-use crate::relay::far::Far;
+use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
 use crate::relay::flow::Answer;
 use crate::relay::gate::{Gate, Order};
 use crate::relay::histogram::{Histogram, Percentiles};
 use crate::relay::outbox::Waiting;
+use crate::relay::remote::RemoteBridge;
 use crate::relay::report::{Incoming, Notice};
 
 /// What is to be done about an envelope.
@@ -43,7 +43,7 @@ pub struct Inward {
     max_age_us: u64,
     gate: Gate,
     ages: Ages,
-    far: Far,
+    remote: RemoteBridge,
     counts: Incoming,
     total: Histogram,
     recent: Histogram,
@@ -62,7 +62,7 @@ impl Inward {
             max_age_us: u64::try_from(max_age.as_micros()).unwrap_or(u64::MAX),
             gate: Gate::default(),
             ages: Ages::new(max_age),
-            far: Far::default(),
+            remote: RemoteBridge::default(),
             counts: Incoming::default(),
             total: Histogram::default(),
             recent: Histogram::default(),
@@ -78,10 +78,10 @@ impl Inward {
             Ok(envelope) if envelope.role() == Some(self.role) => envelope,
             Err(EnvelopeError::Foreign { hello, version }) => {
                 self.counts.refused += 1;
-                let before = self.far.state().clone();
-                self.far.hear_foreign(hello, version);
-                if *self.far.state() != before {
-                    tell(Notice::Far(self.role, self.far.state().clone()));
+                let before = self.remote.state().clone();
+                self.remote.hear_foreign(hello, version);
+                if *self.remote.state() != before {
+                    tell(Notice::Remote(self.role, self.remote.state().clone()));
                 }
                 return Heard::Nothing;
             }
@@ -98,7 +98,7 @@ impl Inward {
             Content::Board { .. } => self.weigh(envelope, now_us, tell),
             Content::Ping(ping) => Heard::Asked(envelope.session, ping),
             Content::Pong { to, pong } => {
-                let is_ours = to == self.session && self.far.is_session(envelope.session);
+                let is_ours = to == self.session && self.remote.is_session(envelope.session);
                 if is_ours {
                     self.on_pong(&pong, now_us)
                 } else {
@@ -142,14 +142,14 @@ impl Inward {
 
     /// Time passes.
     pub fn elapse(&mut self, now_us: u64, mut tell: impl FnMut(Notice)) {
-        if self.far.elapse(now_us) {
-            tell(Notice::Far(self.role, self.far.state().clone()));
+        if self.remote.elapse(now_us) {
+            tell(Notice::Remote(self.role, self.remote.state().clone()));
         }
     }
 
     /// Who is at the other site.
-    pub const fn far(&self) -> &Far {
-        &self.far
+    pub const fn remote(&self) -> &RemoteBridge {
+        &self.remote
     }
 
     /// What has been counted so far.
@@ -171,11 +171,11 @@ impl Inward {
     }
 
     fn greet(&mut self, envelope: &Envelope, now_us: u64, tell: &mut impl FnMut(Notice)) {
-        if self.far.hear(envelope.hello, envelope.session, now_us) {
+        if self.remote.hear(envelope.hello, envelope.session, now_us) {
             if self.gate.follow(envelope.session) {
                 self.ages.forget();
             }
-            tell(Notice::Far(self.role, self.far.state().clone()));
+            tell(Notice::Remote(self.role, self.remote.state().clone()));
         }
     }
 
@@ -195,10 +195,12 @@ impl Inward {
         let Content::Board { start, message } = envelope.content else {
             return Heard::Nothing;
         };
-        let Some(saying) = saying(start, &message) else {
+        let Some(sequence_number) = sequence_number(start, &message) else {
             return Heard::Nothing;
         };
-        let order = self.gate.judge(envelope.session, envelope.counter, saying);
+        let order = self
+            .gate
+            .judge(envelope.session, envelope.counter, sequence_number);
         if order == Order::Retired && !self.told_retired {
             self.told_retired = true;
             tell(Notice::Retired(self.role));

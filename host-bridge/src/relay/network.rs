@@ -5,12 +5,17 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
+use protocol::Role;
 use rustls::ClientConfig;
 use serde_json::json;
 use zenoh::{Config, Session, Wait};
 
 use crate::relay::credentials::{Credentials, CredentialsError};
-use crate::relay::endpoint::{Endpoint, Transport};
+use crate::relay::endpoint::{Endpoint, Security};
+use crate::relay::name::Name;
+use crate::relay::reach::Reach;
+use crate::relay::transport::{Connection, Subscription, Transport};
+use crate::relay::wire::Wire;
 
 /// First wait before a lost connection is tried again.
 const RETRY_FIRST: Duration = Duration::from_millis(100);
@@ -98,6 +103,29 @@ fn advice(error: &io::Error) -> &'static str {
     }
 }
 
+impl Transport for Network {
+    fn connect(
+        &self,
+        name: &Name,
+        role: Role,
+        subscriptions: Vec<Subscription>,
+    ) -> Result<Box<dyn Connection>, NetworkError> {
+        let wire = Wire::new(self.open()?, name, role, subscriptions)?;
+        Ok(Box::new(wire))
+    }
+
+    fn endpoints(&self) -> &[Endpoint] {
+        match &self.ends {
+            Ends::Listening(_) => &[],
+            Ends::Connecting(endpoints) => endpoints,
+        }
+    }
+
+    fn reach(&self, endpoint: &Endpoint) -> Reach {
+        Reach::of(endpoint, self.tls.as_ref())
+    }
+}
+
 fn engine(error: zenoh::Error) -> NetworkError {
     NetworkError::Engine {
         reason: error.to_string(),
@@ -113,12 +141,12 @@ impl Network {
         let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &ends;
         for endpoint in endpoints {
             let endpoint = endpoint.clone();
-            match (endpoint.transport, &credentials) {
-                (Transport::Tls, None) => {
+            match (endpoint.security, &credentials) {
+                (Security::Tls, None) => {
                     return Err(NetworkError::WithoutCertificates { endpoint });
                 }
-                (Transport::Tcp, Some(_)) => return Err(NetworkError::Open { endpoint }),
-                (Transport::Tls, Some(_))
+                (Security::Tcp, Some(_)) => return Err(NetworkError::Open { endpoint }),
+                (Security::Tls, Some(_))
                     if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
                 {
                     return Err(NetworkError::Unmatched { endpoint });
@@ -147,25 +175,8 @@ impl Network {
         })
     }
 
-    /// Where it connects; empty if it listens.
-    pub fn connects_to(&self) -> &[Endpoint] {
-        match &self.ends {
-            Ends::Listening(_) => &[],
-            Ends::Connecting(endpoints) => endpoints,
-        }
-    }
-
-    /// What a connection is made with, if not in the open.
-    pub const fn tls(&self) -> Option<&Arc<ClientConfig>> {
-        self.tls.as_ref()
-    }
-
-    /// Takes part as a bridge. Where it connects, this returns when somebody has answered or all have been
-    /// tried in vain: to be tried again then. Afterwards the engine keeps up the connection by itself.
-    ///
-    /// # Errors
-    /// If nobody is reached, or one can't listen.
-    pub fn open(&self) -> Result<Session, NetworkError> {
+    /// Takes part as a bridge.
+    fn open(&self) -> Result<Session, NetworkError> {
         let mode = match self.ends {
             // What connects is a client: a router carries on what clients say, but takes peers for
             // neighbours who hear each other.

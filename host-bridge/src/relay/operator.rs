@@ -1,16 +1,16 @@
 //! An operator without a board, who has one thing to say: Stop.
 
-use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Duration;
 
 use protocol::{Role, Stop, Trip};
 
-use crate::host_clock::now_us;
+use crate::clock::{Clock, channel, micros};
 use crate::relay::envelope::{Content, Envelope};
 use crate::relay::name::{Channel, Name};
-use crate::relay::network::{Network, NetworkError};
+use crate::relay::network::NetworkError;
 use crate::relay::site::{bridge_hello, random_number};
-use crate::relay::wire::{Ear, Wire};
+use crate::relay::transport::{Subscription, Transport};
 
 /// Between two times that Stop is said, and between two tries to connect.
 const AGAIN: Duration = Duration::from_millis(100);
@@ -43,48 +43,51 @@ pub struct Stopping {
 /// # Errors
 /// If nobody was reached in that time.
 pub fn stop(
-    network: &Network,
+    network: &dyn Transport,
+    clock: &Arc<dyn Clock>,
     name: &Name,
     stop: Stop,
     within: Duration,
 ) -> Result<Stopping, NetworkError> {
-    let end = Instant::now() + within;
-    let session = loop {
-        match network.open() {
-            Ok(session) => break session,
-            Err(error) if Instant::now() >= end => return Err(error),
-            Err(_) => std::thread::sleep(AGAIN),
+    let end_us = clock.now_us().saturating_add(micros(within));
+    let again_us = || clock.now_us().saturating_add(micros(AGAIN));
+    let (sender, heard) = channel(clock);
+    let subscription = || {
+        let sender = sender.clone();
+        Subscription {
+            keys: name.key(Role::Display, Channel::Stop),
+            on_bytes: Box::new(move |bytes| {
+                if let Ok(envelope) = Envelope::from_bytes(bytes)
+                    && envelope.role() == Some(Role::Display)
+                {
+                    sender.send(envelope.content);
+                }
+            }),
         }
     };
-    let (heard, hears) = mpsc::channel();
-    let ear = Ear {
-        keys: name.key(Role::Display, Channel::Stop),
-        hear: Box::new(move |bytes| {
-            if let Ok(envelope) = Envelope::from_bytes(bytes)
-                && envelope.role() == Some(Role::Display)
-            {
-                let _ = heard.send(envelope.content);
-            }
-        }),
+    let connection = loop {
+        match network.connect(name, Role::Host, vec![subscription()]) {
+            Ok(connection) => break connection,
+            Err(error) if clock.now_us() >= end_us => return Err(error),
+            Err(_) => clock.notify().wait_until(again_us()),
+        }
     };
-    let wire = Wire::new(session, name, Role::Host, vec![ear])?;
     let id = random_number();
     let mut stopping = Stopping {
         progress: Progress::Unheard,
         trip: None,
     };
-    while stopping.progress < Progress::Stopped && Instant::now() < end {
+    while stopping.progress < Progress::Stopped && clock.now_us() < end_us {
         let envelope = Envelope {
             hello: bridge_hello(Role::Host),
             session: id,
             counter: 0,
-            sent_us: now_us(),
+            sent_us: clock.now_us(),
             content: Content::Stop { id, stop },
         };
-        wire.say(Channel::Stop, &envelope);
-        let again = Instant::now() + AGAIN;
-        while let Ok(content) = hears.recv_timeout(again.saturating_duration_since(Instant::now()))
-        {
+        connection.publish(Channel::Stop, &envelope);
+        let again_us = again_us();
+        while let Some(content) = heard.recv_until(again_us) {
             if let Some(now) = told(&content, id) {
                 stopping = now;
             }
@@ -93,7 +96,7 @@ pub fn stop(
             }
         }
     }
-    wire.close();
+    connection.close();
     Ok(stopping)
 }
 

@@ -1,9 +1,11 @@
 //! What is to be said to a board next. Never a queue: a newer message takes the place of one that waits.
 
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use protocol::{Message, Stop};
+
+use crate::clock::Notify;
+use crate::lock::locked;
 
 /// Stops that may wait at once; each is the same to the board.
 const STOPS: usize = 8;
@@ -13,11 +15,11 @@ const STOPS: usize = 8;
 pub struct Waiting {
     /// What is to be said.
     pub message: Message,
-    /// When it is too old to be said, in µs of [`crate::host_clock::now_us`].
+    /// When it is too old to be said, in µs of the bridge's clock.
     pub until_us: u64,
     /// How old it was when it came, in µs.
     pub age_us: u64,
-    /// When it came, in µs of [`crate::host_clock::now_us`].
+    /// When it came, in µs of the bridge's clock.
     pub came_us: u64,
 }
 
@@ -46,17 +48,24 @@ struct Contents {
 }
 
 /// One message at most, and Stops, which overtake it.
-#[derive(Debug, Default)]
 pub struct Outbox {
     contents: Mutex<Contents>,
-    changed: Condvar,
+    changed: Arc<dyn Notify>,
 }
 
 impl Outbox {
+    /// An empty one, for one thread that waits on `changed` and takes things out.
+    pub fn new(changed: Arc<dyn Notify>) -> Self {
+        Self {
+            contents: Mutex::default(),
+            changed,
+        }
+    }
+
     /// Puts a message in. True if another had to make room.
     pub fn put(&self, waiting: Waiting) -> bool {
         let replaced = self.contents().newest.replace(waiting).is_some();
-        self.changed.notify_one();
+        self.changed.notify();
         replaced
     }
 
@@ -69,25 +78,29 @@ impl Outbox {
             contents.stops.push((id, stop));
         }
         drop(contents);
-        self.changed.notify_one();
+        self.changed.notify();
         is_new
     }
 
     /// No more is taken out.
     pub fn close(&self) {
         self.contents().is_closed = true;
-        self.changed.notify_all();
+        self.changed.notify();
     }
 
-    /// Waits for at most `limit` for something to be said, and takes it out.
-    pub fn take(&self, limit: Duration) -> Due {
-        let is_empty = |contents: &mut Contents| {
-            contents.stops.is_empty() && contents.newest.is_none() && !contents.is_closed
-        };
-        let (mut contents, _) = self
-            .changed
-            .wait_timeout_while(self.contents(), limit, is_empty)
-            .unwrap_or_else(PoisonError::into_inner);
+    /// Takes out what is to be said; waits for it until `until_us` at the longest.
+    pub fn take(&self, until_us: u64) -> Due {
+        match self.try_take() {
+            Due::Nothing => {
+                self.changed.wait_until(until_us);
+                self.try_take()
+            }
+            due => due,
+        }
+    }
+
+    fn try_take(&self) -> Due {
+        let mut contents = self.contents();
         if contents.is_closed {
             return Due::Closed;
         }
@@ -99,14 +112,19 @@ impl Outbox {
     }
 
     fn contents(&self) -> MutexGuard<'_, Contents> {
-        self.contents.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.contents)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clock::{Clock, SystemClock};
     use protocol::{Motion, StopReason};
+
+    fn outbox() -> Outbox {
+        Outbox::new(SystemClock.notify())
+    }
 
     fn waiting(sequence: u32) -> Waiting {
         Waiting {
@@ -128,29 +146,29 @@ mod tests {
 
     #[test]
     fn the_newest_takes_the_place_of_what_waits() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         assert!(!outbox.put(waiting(1)));
         assert!(outbox.put(waiting(2)));
-        assert_eq!(outbox.take(Duration::ZERO), Due::Message(waiting(2)));
-        assert_eq!(outbox.take(Duration::ZERO), Due::Nothing);
+        assert_eq!(outbox.take(0), Due::Message(waiting(2)));
+        assert_eq!(outbox.take(0), Due::Nothing);
     }
 
     #[test]
     fn a_stop_overtakes_and_is_never_replaced() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         outbox.put(waiting(1));
         outbox.stop(7, STOP);
         outbox.stop(7, STOP);
         outbox.put(waiting(2));
-        assert_eq!(outbox.take(Duration::ZERO), Due::Stop(7, STOP));
-        assert_eq!(outbox.take(Duration::ZERO), Due::Message(waiting(2)));
+        assert_eq!(outbox.take(0), Due::Stop(7, STOP));
+        assert_eq!(outbox.take(0), Due::Message(waiting(2)));
     }
 
     #[test]
     fn closing_wakes_who_waits() {
-        let outbox = Outbox::default();
+        let outbox = outbox();
         std::thread::scope(|scope| {
-            let waiter = scope.spawn(|| outbox.take(Duration::from_secs(60)));
+            let waiter = scope.spawn(|| outbox.take(u64::MAX));
             outbox.close();
             assert_eq!(waiter.join().expect("it ends"), Due::Closed);
         });

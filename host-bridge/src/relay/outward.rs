@@ -3,9 +3,9 @@
 
 use protocol::{Hello, Message};
 
-use crate::relay::envelope::{Content, Envelope, saying};
+use crate::relay::envelope::{Content, Envelope, sequence_number};
 use crate::relay::flow::{Answer, Flow};
-use crate::relay::gate::Saying;
+use crate::relay::gate::SequenceNumber;
 use crate::relay::report::Outgoing;
 
 /// The outward direction of a bridge.
@@ -15,7 +15,7 @@ pub struct Outward {
     session: u64,
     counter: u64,
     start: u32,
-    last: Option<Saying>,
+    last: Option<SequenceNumber>,
     flow: Flow,
     counts: Outgoing,
 }
@@ -37,7 +37,7 @@ impl Outward {
     /// The envelope for what the board said at `at_us`. None if the network does not take more, or if it
     /// is not carried at all.
     pub fn carry(&mut self, at_us: u64, now_us: u64, message: Message) -> Option<Envelope> {
-        let said = saying(self.start, &message)?;
+        let said = sequence_number(self.start, &message)?;
         // A serial line keeps the order: a board that counts backwards has started anew.
         let goes_on = self
             .last

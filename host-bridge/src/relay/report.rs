@@ -6,10 +6,10 @@ use protocol::{Role, Trip};
 use serde::Serialize;
 
 use crate::relay::endpoint::Endpoint;
-use crate::relay::far::{FarState, site};
 use crate::relay::gate::Arrivals;
 use crate::relay::histogram::Percentiles;
 use crate::relay::reach::Reach;
+use crate::relay::remote::{RemoteState, site};
 use crate::state::State;
 
 /// What has come from the other site, and what became of it.
@@ -54,7 +54,7 @@ pub struct Report {
     pub uptime_s: f64,
     /// [`State::word`] of the board.
     pub board: &'static str,
-    /// [`FarState::word`] of the other site.
+    /// [`RemoteState::word`] of the other site.
     pub far: &'static str,
     /// To the other bridge and back, in µs.
     pub round_trip_us: Option<u64>,
@@ -180,7 +180,7 @@ pub enum Notice {
     /// The board's link stands differently.
     Board(State),
     /// The other site stands differently.
-    Far(Role, FarState),
+    Remote(Role, RemoteState),
     /// A bridge whose place another has taken is still heard.
     Retired(Role),
     /// Another bridge has one's own role and name.
@@ -223,7 +223,7 @@ impl fmt::Display for Notice {
                     .advice()
                     .map_or(Ok(()), |advice| write!(f, ": {advice}"))
             }
-            Self::Far(role, state) => write!(f, "{}: {state}", site(*role)),
+            Self::Remote(role, state) => write!(f, "{}: {state}", site(*role)),
             Self::Retired(role) => write!(
                 f,
                 "{}: a bridge that another one has followed still speaks and is not listened to: end one of them, and start the other anew",

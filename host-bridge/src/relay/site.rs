@@ -13,25 +13,27 @@ mod keeper;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use protocol::{Hello, Message, Ping, Pong, Role, Stop};
 
-use crate::host_clock::now_us;
-use crate::link::{self, Event, Link, NotSent, Voice};
+use crate::clock::{Notify, micros};
+use crate::link::{self, Event, Link, LinkSender, NotSent};
+use crate::lock::locked;
 use crate::place::Place;
 use crate::relay::envelope::{Content, Envelope, is_carried};
 use crate::relay::inward::{Heard, Inward};
 use crate::relay::name::{Channel, Name};
-use crate::relay::network::{Network, NetworkError};
+use crate::relay::network::NetworkError;
 use crate::relay::outbox::{Due, Outbox};
 use crate::relay::outward::Outward;
 use crate::relay::report::{Notice, Report};
 use crate::relay::stops::{Outcome, Standing, Stops};
-use crate::relay::wire::{Ear, Wire};
+use crate::relay::transport::{Connection, Subscription, Transport};
 use crate::state::State;
+use crate::system::System;
 use keeper::Keeper;
 
 /// Between two tries to connect for the first time.
@@ -50,9 +52,11 @@ pub struct Settings {
     /// What both bridges call the bench.
     pub name: Name,
     /// The way to the other site.
-    pub network: Network,
+    pub network: Arc<dyn Transport>,
     /// How old something from the other site may be and still be passed on.
     pub max_age: Duration,
+    /// The clock that it goes by, and the ports among which it looks for its board.
+    pub system: System,
 }
 
 /// A bridge that runs. Dropping it ends it.
@@ -60,20 +64,19 @@ pub struct Site {
     shared: Arc<Shared>,
     link: Link,
     writer: Option<JoinHandle<()>>,
-    /// Dropped to end the keeper.
-    ended: Option<Sender<()>>,
     keeper: Option<JoinHandle<()>>,
 }
 
 /// What the threads share.
 struct Shared {
     role: Role,
-    far: Role,
+    other_role: Role,
     name: Name,
     session: u64,
-    network: Network,
+    network: Arc<dyn Transport>,
+    system: System,
     started_us: u64,
-    wire: OnceLock<Wire>,
+    wire: OnceLock<Box<dyn Connection>>,
     outward: Mutex<Outward>,
     inward: Mutex<Inward>,
     outbox: Outbox,
@@ -81,15 +84,13 @@ struct Shared {
     told_rival: AtomicBool,
     notices: Sender<Notice>,
     is_ended: AtomicBool,
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Wakes the keeper for its end.
+    keeper_woken: Arc<dyn Notify>,
 }
 
 /// A number that no other start of a bridge has.
 pub fn random_number() -> u64 {
-    RandomState::new().hash_one(now_us())
+    RandomState::new().hash_one(0)
 }
 
 /// The role of the board at the other site; none for a host, who has no board.
@@ -122,53 +123,55 @@ impl Site {
             name,
             network,
             max_age,
+            system,
         } = settings;
-        let far = opposite(role).ok_or_else(|| NetworkError::Engine {
+        let clock = Arc::clone(&system.clock);
+        let other_role = opposite(role).ok_or_else(|| NetworkError::Engine {
             reason: "a host has no board to be carried".to_owned(),
         })?;
         let (notices, told) = mpsc::channel();
         let session = random_number();
         let shared = Arc::new(Shared {
             role,
-            far,
+            other_role,
             name,
             session,
             network,
-            started_us: now_us(),
+            started_us: clock.now_us(),
+            system: system.clone(),
             wire: OnceLock::new(),
             outward: Mutex::new(Outward::new(bridge_hello(role), session)),
-            inward: Mutex::new(Inward::new(far, session, max_age)),
-            outbox: Outbox::default(),
+            inward: Mutex::new(Inward::new(other_role, session, max_age)),
+            outbox: Outbox::new(clock.notify()),
             stops: Mutex::new(Stops::default()),
             told_rival: AtomicBool::new(false),
             notices,
             is_ended: AtomicBool::new(false),
+            keeper_woken: clock.notify(),
         });
-        if shared.network.connects_to().is_empty() {
+        if shared.network.endpoints().is_empty() {
             shared.connect()?;
         } else {
             let shared = Arc::clone(&shared);
-            thread::spawn(move || shared.keep_connecting());
+            clock.spawn(Box::new(move || shared.keep_connecting()));
         }
         let carrier = Arc::clone(&shared);
-        let link = Link::open(role, place, move |event| match event {
+        let link = Link::open_on(&system, role, place, move |event| match event {
             Event::Heard { at_us, message } => carrier.carry(at_us, message),
             // What comes of it is told within two seconds.
-            Event::Turned(State::Opened { .. }) => {}
-            Event::Turned(state) => carrier.tell(Notice::Board(state)),
+            Event::StateChanged(State::Opened { .. }) => {}
+            Event::StateChanged(state) => carrier.tell(Notice::Board(state)),
             // Its numbers tell as much, and sooner.
             Event::Restarted => {}
         });
-        let (voice, writing) = (link.voice(), Arc::clone(&shared));
-        let writer = thread::spawn(move || writing.write(&voice));
-        let (ended, ends) = mpsc::channel();
+        let (sender, writing) = (link.sender(), Arc::clone(&shared));
+        let writer = clock.spawn(Box::new(move || writing.write(&sender)));
         let keeping = Arc::clone(&shared);
-        let keeper = thread::spawn(move || Keeper::new(keeping).run(&ends));
+        let keeper = clock.spawn(Box::new(move || Keeper::new(keeping).run()));
         let site = Self {
             shared,
             link,
             writer: Some(writer),
-            ended: Some(ended),
             keeper: Some(keeper),
         };
         Ok((site, told))
@@ -192,9 +195,9 @@ impl Site {
         let mut inward = locked(&shared.inward);
         Report {
             site: shared.role.name(),
-            uptime_s: (now_us() - shared.started_us) as f64 / 1e6,
+            uptime_s: (shared.now_us() - shared.started_us) as f64 / 1e6,
             board: self.link.state().word(),
-            far: inward.far().state().word(),
+            far: inward.remote().state().word(),
             round_trip_us,
             incoming: inward.counts(),
             outgoing,
@@ -212,13 +215,12 @@ impl Drop for Site {
     fn drop(&mut self) {
         self.shared.is_ended.store(true, Ordering::Release);
         self.shared.outbox.close();
-        drop(self.ended.take());
+        self.shared.keeper_woken.notify();
         for thread in [self.writer.take(), self.keeper.take()]
             .into_iter()
             .flatten()
         {
-            // One that panicked has said so on standard error.
-            let _ = thread.join();
+            self.shared.system.clock.join(thread);
         }
         if let Some(wire) = self.shared.wire.get() {
             wire.close();
@@ -227,50 +229,60 @@ impl Drop for Site {
 }
 
 impl Shared {
+    fn now_us(&self) -> u64 {
+        self.system.clock.now_us()
+    }
+
     fn tell(&self, notice: Notice) {
         // Who does not listen any more does not want to know.
         let _ = self.notices.send(notice);
     }
 
     fn say(&self, channel: Channel, content: Content) -> bool {
-        let envelope = locked(&self.outward).other(now_us(), content);
+        let envelope = locked(&self.outward).other(self.now_us(), content);
         self.wire
             .get()
-            .is_some_and(|wire| wire.say(channel, &envelope))
+            .is_some_and(|wire| wire.publish(channel, &envelope))
     }
 
     fn connect(self: &Arc<Self>) -> Result<(), NetworkError> {
-        let session = self.network.open()?;
-        let ear = |keys, hear: fn(&Self, &[u8])| {
+        let subscription = |keys, hear: fn(&Self, &[u8])| {
             // The engine keeps what listens for as long as the wire is there, and the wire is in here.
             let shared = Arc::downgrade(self);
-            let hear = move |bytes: &[u8]| {
+            let on_bytes = move |bytes: &[u8]| {
                 if let Some(shared) = shared.upgrade() {
                     hear(&shared, bytes);
                 }
             };
-            Ear {
+            Subscription {
                 keys,
-                hear: Box::new(hear),
+                on_bytes: Box::new(on_bytes),
             }
         };
-        let ears = vec![
-            ear(self.name.keys(self.far), Self::hear),
-            ear(
+        let subscriptions = vec![
+            subscription(self.name.keys(self.other_role), Self::hear),
+            subscription(
                 self.name.key(Role::Host, Channel::Stop),
                 Self::hear_operator,
             ),
-            ear(self.name.key(self.role, Channel::Clock), Self::hear_rival),
+            subscription(self.name.key(self.role, Channel::Clock), Self::hear_rival),
         ];
-        let wire = Wire::new(session, &self.name, self.role, ears)?;
+        let wire = self.network.connect(&self.name, self.role, subscriptions)?;
         // Only one thread connects, once.
         let _ = self.wire.set(wire);
         Ok(())
     }
 
+    fn pause(&self, span: Duration) {
+        let clock = &self.system.clock;
+        clock
+            .notify()
+            .wait_until(clock.now_us().saturating_add(micros(span)));
+    }
+
     fn keep_connecting(self: &Arc<Self>) {
         while !self.is_ended.load(Ordering::Acquire) && self.connect().is_err() {
-            thread::sleep(CONNECT_AGAIN);
+            self.pause(CONNECT_AGAIN);
         }
     }
 
@@ -287,10 +299,10 @@ impl Shared {
         if !is_carried(self.role, &message) {
             return;
         }
-        let envelope = locked(&self.outward).carry(at_us, now_us(), message);
+        let envelope = locked(&self.outward).carry(at_us, self.now_us(), message);
         // Nobody has answered before there was a wire.
         if let (Some(envelope), Some(wire)) = (envelope, self.wire.get())
-            && !wire.say(Channel::Board, &envelope)
+            && !wire.publish(Channel::Board, &envelope)
         {
             locked(&self.outward).on_failure();
         }
@@ -298,7 +310,7 @@ impl Shared {
 
     /// Bytes came from the other site.
     fn hear(&self, bytes: &[u8]) {
-        let at_us = now_us();
+        let at_us = self.now_us();
         let mut inward = locked(&self.inward);
         match inward.hear(bytes, at_us, |notice| self.tell(notice)) {
             Heard::Nothing => {}
@@ -313,7 +325,7 @@ impl Shared {
                 let pong = Pong {
                     sent_us,
                     received_us: at_us,
-                    answered_us: now_us(),
+                    answered_us: self.now_us(),
                 };
                 self.say(Channel::Clock, Content::Pong { to, pong });
             }
@@ -323,12 +335,12 @@ impl Shared {
             }
             Heard::Stop(id, stop) => {
                 drop(inward);
-                self.on_stop(self.far, id, stop);
+                self.on_stop(self.other_role, id, stop);
             }
             Heard::Stopped(id, trip) => {
                 drop(inward);
                 if locked(&self.stops).on_outcome(id) {
-                    self.tell(Notice::StopHeard(self.far, trip));
+                    self.tell(Notice::StopHeard(self.other_role, trip));
                 }
             }
         }
@@ -372,22 +384,22 @@ impl Shared {
     }
 
     /// Says to the board what is due, until the bridge ends.
-    fn write(&self, voice: &Voice) {
+    fn write(&self, sender: &LinkSender) {
         loop {
-            match self.outbox.take(IDLE) {
+            match self.outbox.take(self.now_us().saturating_add(micros(IDLE))) {
                 Due::Closed => return,
                 Due::Nothing => {}
                 Due::Stop(id, stop) => {
-                    if self.tell_board(voice, id, stop).is_err() {
+                    if self.tell_board(sender, id, stop).is_err() {
                         self.outbox.stop(id, stop);
-                        thread::sleep(STOP_AGAIN);
+                        self.pause(STOP_AGAIN);
                     }
                 }
-                Due::Message(waiting) if now_us() > waiting.until_us => {
+                Due::Message(waiting) if self.now_us() > waiting.until_us => {
                     locked(&self.inward).on_stale();
                 }
-                Due::Message(waiting) => match voice.post(&waiting.message) {
-                    Ok(()) => locked(&self.inward).on_passed(&waiting, now_us()),
+                Due::Message(waiting) => match sender.post(&waiting.message) {
+                    Ok(()) => locked(&self.inward).on_passed(&waiting, self.now_us()),
                     Err(NotSent::NotKnown) => locked(&self.inward).on_boardless(),
                     // A newer one is on its way, and may find the line free.
                     Err(NotSent::Stuck) => locked(&self.inward).on_stuck(),
@@ -397,11 +409,11 @@ impl Shared {
     }
 
     /// Says Stop to the board. A display's answers by its state; a sensor's has nothing to stop.
-    fn tell_board(&self, voice: &Voice, id: u64, stop: Stop) -> Result<(), NotSent> {
+    fn tell_board(&self, sender: &LinkSender, id: u64, stop: Stop) -> Result<(), NotSent> {
         // The lock keeps an answer that is quicker than this thread from being heard before.
         let mut stops = locked(&self.stops);
-        let told_us = now_us();
-        voice.post(&Message::Stop(stop))?;
+        let told_us = self.now_us();
+        sender.post(&Message::Stop(stop))?;
         let is_first = stops.tell(id, told_us);
         let is_over = self.role != Role::Display;
         if is_over {

@@ -1,4 +1,4 @@
-//! The keys on the network that a bridge speaks on and listens to.
+//! The keys on the network that a bridge speaks on and listens to, over the engine.
 
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
@@ -10,17 +10,7 @@ use protocol::Role;
 use crate::relay::envelope::{Envelope, MAX_ENVELOPE};
 use crate::relay::name::{Channel, Name};
 use crate::relay::network::NetworkError;
-
-/// What happens with bytes that come; called from the engine's threads, which it holds up.
-pub type Hear = Box<dyn Fn(&[u8]) + Send + Sync>;
-
-/// Whom a program listens to.
-pub struct Ear {
-    /// The keys.
-    pub keys: String,
-    /// What happens with what they say.
-    pub hear: Hear,
-}
+use crate::relay::transport::{Connection, Subscription};
 
 /// A bridge's, or an operator's, place on the network. Dropping it leaves the network.
 pub struct Wire {
@@ -28,7 +18,7 @@ pub struct Wire {
     board: Publisher<'static>,
     clock: Publisher<'static>,
     stop: Publisher<'static>,
-    _ears: Vec<Subscriber<()>>,
+    _subscribers: Vec<Subscriber<()>>,
 }
 
 fn engine(error: zenoh::Error) -> NetworkError {
@@ -46,17 +36,17 @@ impl Wire {
         session: Session,
         name: &Name,
         role: Role,
-        ears: Vec<Ear>,
+        subscriptions: Vec<Subscription>,
     ) -> Result<Self, NetworkError> {
-        let listen = |ear: Ear| {
-            let Ear { keys, hear } = ear;
+        let subscribe = |subscription: Subscription| {
+            let Subscription { keys, on_bytes } = subscription;
             let callback = move |sample: Sample| {
                 // What is longer than any envelope is not even put together; it counts as malformed.
                 let payload = sample.payload();
                 if payload.len() <= MAX_ENVELOPE {
-                    hear(&payload.to_bytes());
+                    on_bytes(&payload.to_bytes());
                 } else {
-                    hear(&[]);
+                    on_bytes(&[]);
                 }
             };
             session
@@ -66,8 +56,11 @@ impl Wire {
                 .wait()
                 .map_err(engine)
         };
-        let ears = ears.into_iter().map(listen).collect::<Result<_, _>>()?;
-        let speak = |channel, priority, congestion| {
+        let subscribers = subscriptions
+            .into_iter()
+            .map(subscribe)
+            .collect::<Result<_, _>>()?;
+        let publisher = |channel, priority, congestion| {
             session
                 .declare_publisher(name.key(role, channel))
                 .priority(priority)
@@ -80,17 +73,17 @@ impl Wire {
         };
         let stream = (Priority::InteractiveHigh, CongestionControl::Drop);
         Ok(Self {
-            board: speak(Channel::Board, stream.0, stream.1)?,
-            clock: speak(Channel::Clock, stream.0, stream.1)?,
-            stop: speak(Channel::Stop, Priority::RealTime, CongestionControl::Block)?,
+            board: publisher(Channel::Board, stream.0, stream.1)?,
+            clock: publisher(Channel::Clock, stream.0, stream.1)?,
+            stop: publisher(Channel::Stop, Priority::RealTime, CongestionControl::Block)?,
             session,
-            _ears: ears,
+            _subscribers: subscribers,
         })
     }
+}
 
-    /// Gives an envelope to the network. False if the network refuses it; true says nothing of whether
-    /// anybody hears it.
-    pub fn say(&self, channel: Channel, envelope: &Envelope) -> bool {
+impl Connection for Wire {
+    fn publish(&self, channel: Channel, envelope: &Envelope) -> bool {
         let publisher = match channel {
             Channel::Board => &self.board,
             Channel::Clock => &self.clock,
@@ -99,14 +92,13 @@ impl Wire {
         publisher.put(envelope.to_bytes()).wait().is_ok()
     }
 
-    /// How many routers and bridges one is connected to oneself; who connects as a client is not counted.
-    pub fn neighbours(&self) -> usize {
+    /// Who connects as a client is not counted.
+    fn neighbours(&self) -> usize {
         let info = self.session.info();
         info.routers_zid().wait().count() + info.peers_zid().wait().count()
     }
 
-    /// Leaves the network, so that the others know at once.
-    pub fn close(&self) {
+    fn close(&self) {
         // One who leaves has nobody to complain to.
         let _ = self.session.close().wait();
     }

@@ -104,7 +104,7 @@ impl Events {
             Row::Other(row) => row.message().ok()?,
             Row::Link(row) => {
                 return match row.event {
-                    LinkEvent::Turned => row.state(role).map(Event::Turned),
+                    LinkEvent::Turned => row.state(role).map(Event::StateChanged),
                     LinkEvent::Restarted => Some(Event::Restarted),
                     LinkEvent::Gap => None,
                 };

@@ -1,29 +1,28 @@
 //! Makes a scene for the simulator of a recording, so that what happened on a bench becomes a test.
 //!
-//! The recorded samples come from behind the sensor's anti-aliasing filter, which delays them by 4 ms; the
-//! sensor itself dates them, with the arm's place, 4 ms back, so that the two belong together. In the scene
-//! stand voltages at the ADC's pins at that instant, such that the same filter makes the same samples of them
-//! again: see [`super::pins`]. Each sample is placed so that the scene's sensor gives it the number it had,
+//! The scene names the recording and the piece of it; the simulator reads the samples itself. They come from
+//! behind the sensor's anti-aliasing filter, which delays them by 4 ms; the sensor itself dates them, with the
+//! arm's place, 4 ms back, so that the two belong together. The simulator finds voltages at the ADC's pins of
+//! which the same filter makes the same samples again. Each sample is placed so that the scene's sensor gives it the number it had,
 //! up to whole estimates: the scene's estimates come at the same samples as the recorded ones.
 //!
 //! The hand and the arm both move as the recorded arm did: it is the arm that the gauges belong to.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use protocol::{Estimate, GAUGES};
+use protocol::Estimate;
 
-use super::pins::Pins;
 use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::GaugeRow;
 
 mod document;
+mod excerpt;
 mod expectation;
-mod tape;
 
+use excerpt::Excerpt;
 use expectation::Expectation;
-use tape::Tape;
 
 /// The longest scene, in s.
 const LONGEST_S: f64 = 600.0;
@@ -31,14 +30,7 @@ const LONGEST_S: f64 = 600.0;
 const SAMPLES_PER_ESTIMATE: u32 = 10;
 /// What the sensor's filter delays a sample by, in samples.
 const DELAY_SAMPLES: u32 = 4;
-/// Scans for a sample.
-const SCANS: usize = 4;
-const SCAN_S: f64 = 250e-6;
 const SCAN_US: i64 = 250;
-/// A step of a recorded code is a sixteenth of a step of the ADC.
-const CODES_PER_STEP: f64 = 16.0;
-const STEPS: f64 = 4_096.0;
-const VOLTS_PER_STEP: f64 = 3.3 / STEPS;
 /// Half a count of the encoder: in the middle of a count no rounding takes it to the next.
 const HALF_COUNT_MM: f64 = 0.002_5;
 /// Why no scene can be made of a recording.
@@ -117,7 +109,7 @@ pub enum SceneError {
 /// What is made of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The scene's file; the CSV files stand beside it.
+    /// The scene's file.
     pub path: PathBuf,
     /// From where on, in s since the recording's start.
     pub from_s: f64,
@@ -127,15 +119,15 @@ pub struct Settings {
     pub wavelength_mm: Option<f64>,
     /// Whether the scene expects what was recorded.
     pub expect: bool,
-    /// Whether to write over files that are there.
+    /// Whether to write over a file that is there.
     pub force: bool,
 }
 
 /// The scene that was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Made {
-    /// Its files: the scene, the gauges, the motion.
-    pub files: [PathBuf; 3],
+    /// Its file.
+    pub path: PathBuf,
     /// Its length in s.
     pub duration_s: f64,
     /// The wavelength of its surface in mm.
@@ -154,19 +146,16 @@ pub struct Made {
 /// # Errors
 /// If none can be made of it, or a file can't be written.
 pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError> {
-    let recording_path = recording.path().to_owned();
-    let files = files(&settings.path);
-    if let Some(path) = files.iter().find(|path| path.exists() && !settings.force) {
-        return Err(SceneError::Exists { path: path.clone() });
+    let path = settings.path.clone();
+    if path.exists() && !settings.force {
+        return Err(SceneError::Exists { path });
     }
-    let tape = Tape::take(
-        recording,
-        settings.from_s,
-        settings.to_s.unwrap_or(f64::INFINITY),
-    )?;
-    let count = tape.samples.len();
-    let layout = Layout::of(&tape.samples).ok_or(SceneError::NoSamples {
-        path: recording_path,
+    let recording_path = recording.path().to_owned();
+    let to_s = settings.to_s.unwrap_or(f64::INFINITY);
+    let excerpt = Excerpt::take(recording, settings.from_s, to_s)?;
+    let count = excerpt.samples.len();
+    let layout = Layout::of(&excerpt.samples).ok_or(SceneError::NoSamples {
+        path: recording_path.clone(),
         count,
     })?;
     if layout.duration_s > LONGEST_S {
@@ -174,7 +163,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
             duration_s: layout.duration_s,
         });
     }
-    let within: Vec<Estimate> = tape
+    let within: Vec<Estimate> = excerpt
         .estimates
         .iter()
         .filter(|estimate| layout.holds(estimate.instant_us))
@@ -189,56 +178,38 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         .expect
         .then(|| Expectation::of(&within, layout.duration_s))
         .flatten();
-    let toml = document::toml(
-        &files,
-        &tape,
-        layout.duration_s,
-        wavelength_mm,
-        expected.as_ref(),
-    )?;
-    let has_force = tape.sensor.is_some_and(|sensor| sensor.force_channel);
-    let [scene, gauges, motion] = &files;
-    save(gauges, |out| {
-        write_gauges(out, &tape.samples, &layout, has_force)
+    let piece = Piece {
+        recording: &recording_path,
+        logged_s: (settings.from_s, settings.to_s),
+        start_s: layout.start_s(&excerpt.samples),
+        offset_mm: HALF_COUNT_MM - excerpt.samples[layout.first].position_um as f64 / 1_000.0,
+        duration_s: layout.duration_s,
+    };
+    let toml = document::toml(&path, &piece, &excerpt, wavelength_mm, expected.as_ref())?;
+    fs::write(&path, toml).map_err(|source| SceneError::NotWritten {
+        path: path.clone(),
+        source,
     })?;
-    save(motion, |out| write_motion(out, &tape.samples, &layout))?;
-    save(scene, |out| out.write_all(toml.as_bytes()))?;
     Ok(Made {
-        files,
+        path,
         duration_s: layout.duration_s,
         wavelength_mm,
         begin_us: layout.begin_us,
         estimates: (valid.len(), within.len()),
-        cut: tape.cut,
+        cut: excerpt.cut,
     })
 }
 
-/// The scene's file and the CSV files beside it.
-fn files(scene: &Path) -> [PathBuf; 3] {
-    let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
-    [
-        scene.to_owned(),
-        scene.with_file_name(format!("{stem}-gauges.csv")),
-        scene.with_file_name(format!("{stem}-motion.csv")),
-    ]
-}
-
-fn save(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), SceneError> {
-    let mut out =
-        io::BufWriter::new(fs::File::create(path).map_err(|source| not_written(path, source))?);
-    write(&mut out)
-        .and_then(|()| out.flush())
-        .map_err(|source| not_written(path, source))
-}
-
-fn not_written(path: &Path, source: io::Error) -> SceneError {
-    SceneError::NotWritten {
-        path: path.to_owned(),
-        source,
-    }
+/// The piece of a recording that a scene is made of.
+struct Piece<'a> {
+    recording: &'a Path,
+    /// From and to which time since the recording's start messages count, in s.
+    logged_s: (f64, Option<f64>),
+    /// When the scene starts, in s since the first sample of the piece.
+    start_s: f64,
+    /// Added to the arm's places.
+    offset_mm: f64,
+    duration_s: f64,
 }
 
 fn valid_mm(estimate: &Estimate) -> Option<f64> {
@@ -297,54 +268,9 @@ impl Layout {
         (0.0..=self.duration_s).contains(&self.scene_s(instant_us))
     }
 
-    /// When, in s since the scene's start, the scan comes that lies so many scans after the sample of an
-    /// index.
-    fn scan_s(&self, index: usize, scan: usize) -> f64 {
-        let scans = SCANS as i64 * (index as i64 - self.first as i64) + scan as i64 - 1;
-        scans as f64 * SCAN_S
+    /// When the scene starts, in s since the first of these samples, a ms apart.
+    fn start_s(&self, samples: &[GaugeRow]) -> f64 {
+        let first_us = samples.first().map_or(0, |first| first.instant_us);
+        (self.begin_us - first_us.cast_signed()) as f64 * 1e-6
     }
-}
-
-/// Volts at the ADC's pins, four rows for a sample, from the last sample before the scene's start on.
-fn write_gauges(
-    out: &mut dyn Write,
-    samples: &[GaugeRow],
-    layout: &Layout,
-    has_force: bool,
-) -> io::Result<()> {
-    let force = if has_force { ",tangential" } else { "" };
-    writeln!(out, "t_s,g0,g1,g2,g3,g4{force}")?;
-    let channels = GAUGES + usize::from(has_force);
-    let pins = Pins::default();
-    let scans: Vec<Vec<f64>> = (0..channels)
-        .map(|channel| {
-            let steps = |row: &GaugeRow| f64::from(row.codes()[channel]) / CODES_PER_STEP;
-            let steps: Vec<f64> = samples.iter().map(steps).collect();
-            pins.scans(&steps, channel as u64)
-        })
-        .collect();
-    for index in layout.first..samples.len() {
-        let last = index + 1 == samples.len();
-        for scan in 0..if last { 1 } else { SCANS } {
-            write!(out, "{:.5}", layout.scan_s(index, scan))?;
-            for scans in &scans {
-                // The ADC rounds down: half a step more, so that what comes out is rounded to the nearest.
-                let steps = (scans[index * SCANS + scan] + 0.5).clamp(0.0, STEPS);
-                write!(out, ",{:.5}", steps * VOLTS_PER_STEP)?;
-            }
-            writeln!(out)?;
-        }
-    }
-    Ok(())
-}
-
-/// Where the arm was, a row for a sample.
-fn write_motion(out: &mut dyn Write, samples: &[GaugeRow], layout: &Layout) -> io::Result<()> {
-    writeln!(out, "t_s,x_mm")?;
-    let start_um = samples[layout.first].position_um;
-    for (index, sample) in samples.iter().enumerate().skip(layout.first) {
-        let x_mm = (sample.position_um - start_um) as f64 / 1_000.0 + HALF_COUNT_MM;
-        writeln!(out, "{:.5},{x_mm:.4}", layout.scan_s(index, 0))?;
-    }
-    Ok(())
 }

@@ -22,7 +22,7 @@ use ratatui::style::Color;
 const NOW_US: u64 = 20_000_000;
 
 fn known(role: Role) -> Event {
-    Event::Turned(State::Known {
+    Event::StateChanged(State::Known {
         port: format!("/dev/tty-{}", role.name()).into(),
         hello: Hello::new(role, "stm32f429zi", [0, 1, 0]),
     })
@@ -311,7 +311,7 @@ fn a_board_that_is_not_there_is_told_with_advice() {
     };
     let advice = absent.advice().expect("there is something to be done");
     let first = &advice[..30];
-    dashboard.on(NOW_US, Role::Display, Event::Turned(absent));
+    dashboard.on(NOW_US, Role::Display, Event::StateChanged(absent));
     let picture = picture(&dashboard, &view(), 120, 40);
     assert_has(&picture, " display ● /dev/ttyACM9: not there: ");
     assert_has(&picture, first);

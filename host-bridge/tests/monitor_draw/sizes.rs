@@ -209,7 +209,7 @@ fn what_happened_is_told_to_its_end() {
             place: "/dev/ttyACM1".to_owned(),
         };
         let advice = absent.advice().expect("there is something to be done");
-        dashboard.on(NOW_US, Role::Display, Event::Turned(absent));
+        dashboard.on(NOW_US, Role::Display, Event::StateChanged(absent));
         let shown = picture(&dashboard, &view, width, height);
         let from = shown
             .iter()

@@ -60,7 +60,7 @@ fn a_program_that_is_killed_leaves_what_it_said_is_safe() {
         "{} of {safe}",
         motions.len()
     );
-    assert!(motions.len() > 100 && said.starts_with(&motions));
+    assert!(!motions.is_empty() && said.starts_with(&motions));
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series, waveform
 //! ```
 
+mod inverse_filter;
 mod raster;
 mod resampler;
 mod source;
@@ -86,6 +87,7 @@ pub(super) fn gauges(
     let scale = table.number("volts_per_unit", &SCALE)?;
     let offset_v = table.number("offset_v", &OFFSET_V)?;
     let lines = on_lines(table)?;
+    let filtered = table.boolean("filtered")? == Some(true);
     let is_own = source.is_plain() || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
     let conversion = Conversion {
         shift: -start_s,
@@ -172,8 +174,18 @@ pub(super) fn gauges(
     let window = (-AROUND_S, duration_s + AROUND_S);
     let own_time = (GAUGE_TOPIC, GAUGE_TIME);
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
-    covers_time(table, extent, duration_s)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
+    let rows = if filtered {
+        let is_sample = |step: &Even| (step.step - 1e-3).abs() < 1e-6;
+        if lines.is_some() || Even::of(&rows.at).filter(is_sample).is_none() {
+            let message = "the sensor's filter makes samples that are 1 ms apart: take it out, or give such, without interpolation";
+            return Err(table.refuse("filtered", message));
+        }
+        inverse_filter::at_the_pins(&rows)
+    } else {
+        rows
+    };
+    covers_time(table, extent, duration_s)?;
     if lines == Some(true) {
         return Ok(Arc::new(Waveform::on_lines(rows)));
     }
@@ -293,8 +305,8 @@ fn covers_time(
     (first, last): (f64, f64),
     duration_s: f64,
 ) -> Result<(), SceneError> {
-    // The last scan is one scan before the end.
-    if first <= 0.0 && last >= duration_s - 1.0 / f64::from(SCAN_RATE_HZ) {
+    // The last scan is one scan before the end, and a board's clock tells whole µs.
+    if first <= 0.0 && last >= duration_s - 1.01 / f64::from(SCAN_RATE_HZ) {
         return Ok(());
     }
     let message = format!(

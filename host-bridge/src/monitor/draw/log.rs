@@ -9,7 +9,7 @@ use ratatui::text::{Line, Span};
 
 use super::text;
 use crate::monitor::dashboard::Dashboard;
-use crate::monitor::happening::What;
+use crate::monitor::log_entry::LogEvent;
 use crate::monitor::theme::Theme;
 
 /// Width of the time and of the board's name.
@@ -25,27 +25,27 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
     );
     let room = usize::from(area.width.saturating_sub(HEAD_WIDTH)).max(1);
     let mut lines = VecDeque::new();
-    for happening in shown.happenings.iter().rev() {
+    for log_entry in shown.log_entries.iter().rev() {
         if lines.len() >= area.height.into() {
             break;
         }
-        let role = match happening.role {
+        let role = match log_entry.role {
             Role::Sensor => theme.sensor(),
             Role::Display | Role::Host => theme.display(),
         };
-        let style = match &happening.what {
+        let style = match &log_entry.what {
             what if what.is_bad() => theme.bad(),
-            What::Log { .. } => theme.quiet(),
+            LogEvent::Log { .. } => theme.quiet(),
             _ => ratatui::style::Style::new(),
         };
         let head = [
             Span::styled(
-                format!(" {:>9.3} ", happening.at_us as f64 / 1e6),
+                format!(" {:>9.3} ", log_entry.at_us as f64 / 1e6),
                 theme.quiet(),
             ),
-            Span::styled(format!("{:<8}", happening.role.name()), role),
+            Span::styled(format!("{:<8}", log_entry.role.name()), role),
         ];
-        let words = happening.what.to_string();
+        let words = log_entry.what.to_string();
         let mut rows = text::broken(&words, room);
         // The newest stands at the bottom, and each from its first row downwards.
         for row in rows.drain(1..).rev() {

@@ -1,28 +1,25 @@
 //! The thread of a bridge that does what is due from time to time.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use std::thread;
-use std::time::Duration;
 
 use protocol::Ping;
 
-use super::{Shared, locked};
-use crate::host_clock::now_us;
+use super::Shared;
+use crate::lock::locked;
 use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::Content;
 use crate::relay::name::Channel;
-use crate::relay::reach::Reach;
 use crate::relay::report::Notice;
 
-/// How often the keeper looks round; also the time between two pings while they are answered.
-const LOOK: Duration = Duration::from_millis(25);
+/// How often the keeper looks round, in µs; also the time between two pings while they are answered.
+const LOOK_US: u64 = 25_000;
 /// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
 const KNOCK_US: u64 = 100_000;
 /// Between two repetitions of a Stop that nobody has heard or that the board has not obeyed, in µs.
 const STOP_US: u64 = 100_000;
 /// How long nobody is heard before it is found out why, in µs.
-const PUZZLED_US: u64 = 3_000_000;
+const UNHEARD_US: u64 = 3_000_000;
 /// Between two such looks, in µs.
 const LOOK_AGAIN_US: u64 = 10_000_000;
 
@@ -50,9 +47,14 @@ impl Keeper {
         }
     }
 
-    pub fn run(mut self, ends: &Receiver<()>) {
-        while ends.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
-            let at_us = now_us();
+    pub fn run(mut self) {
+        let woken = Arc::clone(&self.shared.keeper_woken);
+        loop {
+            woken.wait_until(self.shared.now_us().saturating_add(LOOK_US));
+            if self.shared.is_ended.load(Ordering::Acquire) {
+                return;
+            }
+            let at_us = self.shared.now_us();
             self.ping(at_us);
             self.repeat_stops(at_us);
             self.look(at_us);
@@ -64,7 +66,9 @@ impl Keeper {
         let is_answered = locked(&self.shared.outward).flow().is_answered(at_us);
         if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
-            let ping = Ping { sent_us: now_us() };
+            let ping = Ping {
+                sent_us: self.shared.now_us(),
+            };
             self.shared.say(Channel::Clock, Content::Ping(ping));
         }
     }
@@ -90,20 +94,21 @@ impl Keeper {
     /// Finds out why nobody is heard, in a thread of its own: it takes a while.
     fn look(&mut self, at_us: u64) {
         if matches!(
-            locked(&self.shared.inward).far().state().word(),
+            locked(&self.shared.inward).remote().state().word(),
             "known" | "foreign"
         ) {
             self.heard_us = at_us;
             locked(&self.found).clear();
         }
-        let is_puzzled = at_us.saturating_sub(self.heard_us) > PUZZLED_US;
-        if !is_puzzled || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
+        let is_unheard = at_us.saturating_sub(self.heard_us) > UNHEARD_US;
+        if !is_unheard || !is_due(self.looked_us, LOOK_AGAIN_US, at_us) {
             return;
         }
         self.looked_us = Some(at_us);
         let (shared, found) = (Arc::clone(&self.shared), Arc::clone(&self.found));
-        thread::spawn(move || {
-            let notices = shared.puzzle();
+        let clock = Arc::clone(&shared.system.clock);
+        clock.spawn(Box::new(move || {
+            let notices = shared.diagnose();
             let mut found = locked(&found);
             for notice in &notices {
                 if !found.contains(notice) {
@@ -111,7 +116,7 @@ impl Keeper {
                 }
             }
             *found = notices;
-        });
+        }));
     }
 }
 
@@ -121,17 +126,17 @@ fn is_due(last_us: Option<u64>, period_us: u64, at_us: u64) -> bool {
 
 impl Shared {
     /// Why the other site is not heard.
-    fn puzzle(&self) -> Vec<Notice> {
-        let endpoints = self.network.connects_to();
+    fn diagnose(&self) -> Vec<Notice> {
+        let endpoints = self.network.endpoints();
         if endpoints.is_empty() {
-            return vec![Notice::Unvisited(self.far)];
+            return vec![Notice::Unvisited(self.other_role)];
         }
         if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
-            return vec![Notice::Alone(self.far)];
+            return vec![Notice::Alone(self.other_role)];
         }
         let reach = |endpoint: &Endpoint| Notice::Unreached {
             endpoint: endpoint.clone(),
-            reach: Reach::of(endpoint, self.network.tls()),
+            reach: self.network.reach(endpoint),
         };
         endpoints.iter().map(reach).collect()
     }

@@ -5,27 +5,26 @@ use std::path::{Path, PathBuf};
 
 use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
 
-use super::SceneError;
+use super::excerpt::Excerpt;
 use super::expectation::Expectation;
-use super::tape::Tape;
+use super::{Piece, SceneError};
 
 /// The longest name that a scene may have.
 const NAME: usize = 64;
 
-/// The scene, with the names of its CSV files.
+/// The scene at `path`, with the name of the recording.
 pub fn toml(
-    files: &[PathBuf; 3],
-    tape: &Tape,
-    duration_s: f64,
+    path: &Path,
+    piece: &Piece<'_>,
+    excerpt: &Excerpt,
     wavelength_mm: f64,
     expected: Option<&Expectation>,
 ) -> Result<String, SceneError> {
-    let [scene, gauges, motion] = files;
     let mut text = String::new();
     let lines = &mut text;
     line(lines, "# Made by `host-bridge replay` of a recording.");
-    line(lines, &format!("name = \"{}\"", name(scene)));
-    line(lines, &format!("duration_s = {duration_s:?}"));
+    line(lines, &format!("name = \"{}\"", name(path)));
+    line(lines, &format!("duration_s = {:?}", piece.duration_s));
     line(lines, "");
     line(lines, "[surface]");
     line(
@@ -38,18 +37,18 @@ pub fn toml(
     );
     line(lines, "");
     line(lines, "[motion]");
-    line(lines, "kind = \"recorded\"");
-    line(lines, &format!("file = \"{}\"", file_name(motion)));
+    recorded(lines, path, piece);
+    line(lines, &format!("offset_mm = {:.4}", piece.offset_mm));
     line(lines, "");
     line(lines, "[gauges]");
-    line(lines, "kind = \"recorded\"");
-    line(lines, &format!("file = \"{}\"", file_name(gauges)));
-    if let Some(sensor) = &tape.sensor {
+    recorded(lines, path, piece);
+    line(lines, "filtered = true");
+    if let Some(sensor) = &excerpt.sensor {
         force(lines, sensor)?;
         line(lines, "");
         estimator(lines, sensor);
     }
-    if let Some(display) = &tape.display {
+    if let Some(display) = &excerpt.display {
         line(lines, "");
         self::display(lines, display);
     }
@@ -83,10 +82,34 @@ fn name(scene: &Path) -> String {
     }
 }
 
-/// The name of a file beside the scene, for a basic string of TOML.
-fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.replace('\\', "\\\\").replace('"', "\\\"")
+/// Which piece of which recording.
+fn recorded(lines: &mut String, scene: &Path, piece: &Piece<'_>) {
+    line(lines, "kind = \"recorded\"");
+    let file = file_beside(scene, piece.recording);
+    let file = file.to_string_lossy();
+    let file = file.replace('\\', "\\\\").replace('"', "\\\"");
+    line(lines, &format!("file = \"{file}\""));
+    let (from_s, to_s) = piece.logged_s;
+    line(lines, &format!("logged_from_s = {from_s:?}"));
+    if let Some(to_s) = to_s {
+        line(lines, &format!("logged_to_s = {to_s:?}"));
+    }
+    line(lines, &format!("start_s = {:.6}", piece.start_s));
+}
+
+/// What the scene calls a recording: names are relative to the scene's own folder.
+fn file_beside(scene: &Path, recording: &Path) -> PathBuf {
+    let folder = |path: &Path| {
+        let parent = path
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty());
+        parent.unwrap_or(Path::new(".")).canonicalize().ok()
+    };
+    match (folder(scene), folder(recording), recording.file_name()) {
+        (Some(scene), Some(found), Some(name)) if scene == found => name.into(),
+        (_, Some(found), Some(name)) => found.join(name),
+        _ => recording.to_owned(),
+    }
 }
 
 fn force(lines: &mut String, sensor: &SensorConfiguration) -> Result<(), SceneError> {

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::super::bounds::{Bounds, SCALE};
+use super::super::bounds::{Bounds, FILE_INSTANT, SCALE};
 use super::super::csv_rows::CsvRows;
 use super::super::table::{Column, Table};
 use super::tape::{Check, Conversion, Tape};
@@ -26,6 +26,9 @@ pub struct Words {
     pub default: &'static str,
 }
 
+/// Which messages of a recording count, by the time at which they were recorded, in s since its start.
+const LOGGED: [&str; 2] = ["logged_from_s", "logged_to_s"];
+
 /// A file's format, and what of it is open.
 pub enum Format {
     /// The whole file.
@@ -46,6 +49,8 @@ pub struct Source<'t> {
     per_unit: Option<f64>,
     /// From row to row, in s or mm.
     every: Option<f64>,
+    /// From and to which time since a recording's start its messages count, in s.
+    logged_s: (f64, f64),
 }
 
 impl<'t> Source<'t> {
@@ -77,6 +82,14 @@ impl<'t> Source<'t> {
                     every
                 }
             }),
+            logged_s: (
+                table
+                    .number(LOGGED[0], &FILE_INSTANT)?
+                    .unwrap_or(f64::NEG_INFINITY),
+                table
+                    .number(LOGGED[1], &FILE_INSTANT)?
+                    .unwrap_or(f64::INFINITY),
+            ),
             headers: headers.iter().map(|&header| header.to_owned()).collect(),
             format,
             path,
@@ -90,8 +103,11 @@ impl<'t> Source<'t> {
     fn check(&self, table: &Table<'_>) -> Result<(), SceneError> {
         let words = self.words;
         let is_wav = matches!(self.format, Format::Wav(_));
-        if self.topic.is_some() && !matches!(self.format, Format::Mcap) {
-            return Err(table.refuse("topic", "the file is no MCAP: take it out"));
+        let is_mcap = matches!(self.format, Format::Mcap);
+        for key in ["topic"].into_iter().chain(LOGGED) {
+            if table.contains(key) && !is_mcap {
+                return Err(table.refuse(key, "the file is no MCAP: take it out"));
+            }
         }
         if is_wav {
             let given = [words.column, words.scale].into_iter();
@@ -201,7 +217,8 @@ impl<'t> Source<'t> {
                 };
                 let is_place = self.words.every != "rate_hz";
                 let mut tape = tape(fields.len());
-                topic::each(&self.path, topic, &fields, (when, is_place), |at, row| {
+                let piece = (when, is_place, self.logged_s);
+                topic::each(&self.path, topic, &fields, piece, |at, row| {
                     tape.take(at, row, check)
                 })?;
                 tape

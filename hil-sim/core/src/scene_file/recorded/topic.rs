@@ -27,12 +27,12 @@ pub enum When<'t> {
 }
 
 /// Hands `fields` of each message on `topic` to `take`, with its time or place: since the first message's,
-/// unless it `is_place`. A file that was cut off is read as far as it goes.
+/// unless it `is_place`. Only messages count that were recorded between two times, in s since the recording's start. A file that was cut off is read as far as it goes.
 pub fn each(
     path: &Path,
     topic: &str,
     fields: &[&str],
-    (when, is_place): (When<'_>, bool),
+    (when, is_place, (from_s, to_s)): (When<'_>, bool, (f64, f64)),
     mut take: impl FnMut(f64, &[f64]) -> Result<(), Refusal>,
 ) -> Result<(), SceneError> {
     let refuse = |key: String, message: String| SceneError {
@@ -53,7 +53,7 @@ pub fn each(
         .with_record_length_limit(LONGEST_RECORD);
     let mut topics: Vec<String> = Vec::new();
     let mut count: u64 = 0;
-    let (mut first_ns, mut first) = (None, None);
+    let (mut start_ns, mut first_ns, mut first) = (None, None, None);
     let mut row = vec![0.0; fields.len()];
     for message in MessageReader::new_with_options(BufReader::new(file), options) {
         let message = match message {
@@ -64,11 +64,16 @@ pub fn each(
                 return Err(refuse(key, format!("damaged: {error}: give a sound file")));
             }
         };
+        let start_ns = *start_ns.get_or_insert(message.log_time);
         let found = &message.channel.topic;
         if found != topic {
             if !topics.contains(found) {
                 topics.push(found.clone());
             }
+            continue;
+        }
+        let logged_s = message.log_time.saturating_sub(start_ns) as f64 / 1e9;
+        if !(from_s..=to_s).contains(&logged_s) {
             continue;
         }
         let key = |field: &str| format!("message {count} of {topic}{field}");

@@ -45,7 +45,7 @@ pub struct Tally {
 
 /// Turns events into entries.
 #[derive(Default)]
-pub struct Ledger {
+pub struct RowBuilder {
     sensor: Board,
     display: Board,
     tally: Tally,
@@ -95,7 +95,7 @@ impl Board {
     }
 }
 
-impl Ledger {
+impl RowBuilder {
     /// What has been counted so far.
     pub const fn tally(&self) -> Tally {
         self.tally
@@ -127,7 +127,7 @@ impl Ledger {
             })
         };
         let message = match event {
-            Event::Turned(state) => {
+            Event::StateChanged(state) => {
                 return write(Row::Link(LinkRow::turned(state)), log_ns);
             }
             Event::Restarted => {

@@ -1,14 +1,14 @@
-//! The desk at which a dashboard is watched: where events come from, and where orders go to.
+//! A dashboard that is watched: where events come from, and where orders go to.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use protocol::Role;
 
 use super::dashboard::Dashboard;
-use super::happening::What;
-use super::keeping::Keeping;
+use super::live_recording::LiveRecording;
+use super::log_entry::LogEvent;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link};
 use crate::recording::RecordingError;
@@ -17,11 +17,6 @@ use crate::recording::gauge_stream::GaugeStream;
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
 
-/// How long the sensor board may take to confirm at the end that it is as it was.
-const RESTORED: Duration = Duration::from_secs(1);
-/// How often it is told meanwhile.
-const AGAIN: Duration = Duration::from_millis(50);
-
 /// Where a monitor hears from.
 pub struct Source {
     /// What the boards say, as it comes. When its senders are gone the monitor has seen all.
@@ -29,31 +24,31 @@ pub struct Source {
     /// The ways to the boards; none where a recording is watched.
     pub links: Vec<(Role, Link)>,
     /// The boards' logs, if they are read.
-    pub logs: Option<Receiver<(Role, What)>>,
+    pub logs: Option<Receiver<(Role, LogEvent)>>,
 }
 
 /// A dashboard with its source.
-pub struct Desk {
+pub struct Session {
     /// What is known.
     pub dashboard: Dashboard,
     source: Source,
     /// Where recordings go.
     folder: PathBuf,
-    keeping: Option<Keeping>,
+    recording: Option<LiveRecording>,
     /// Has the gauges stream for as long as a recording lasts.
     stream: GaugeStream,
     lines_us: Option<u64>,
     is_over: bool,
 }
 
-impl Desk {
+impl Session {
     /// Nothing has come yet. Recordings will go to `folder`.
     pub fn new(source: Source, folder: PathBuf) -> Self {
         Self {
             dashboard: Dashboard::default(),
             source,
             folder,
-            keeping: None,
+            recording: None,
             stream: GaugeStream::default(),
             lines_us: None,
             is_over: false,
@@ -81,7 +76,7 @@ impl Desk {
         if let Some(logs) = &self.source.logs {
             for (role, what) in logs.try_iter() {
                 came = true;
-                self.dashboard.happen(role, what);
+                self.dashboard.log(role, what);
             }
         }
         let due = |at_us: u64| now_us.saturating_sub(at_us) >= LINES_US;
@@ -90,12 +85,16 @@ impl Desk {
             for (role, link) in &self.source.links {
                 let counters = link.counters();
                 self.dashboard.on_line(*role, counters, link.clocks());
-                if let Some(keeping) = &self.keeping {
-                    keeping.keep_counters(*role, counters);
+                if let Some(recording) = &self.recording {
+                    recording.keep_counters(*role, counters);
                 }
             }
-            if self.keeping.as_ref().is_some_and(Keeping::has_failed) {
-                self.end_keeping();
+            if self
+                .recording
+                .as_ref()
+                .is_some_and(LiveRecording::has_failed)
+            {
+                self.end_recording();
             }
         }
         self.ask();
@@ -105,7 +104,7 @@ impl Desk {
 
     /// Asks for what a recording needs. What is not answered is asked again.
     fn ask(&mut self) {
-        if self.keeping.is_none() {
+        if self.recording.is_none() {
             return;
         }
         while let Some((role, message)) = self.stream.due(now_us()) {
@@ -150,23 +149,23 @@ impl Desk {
     }
 
     /// Begins a recording, or ends it; what has come of it is said on the dashboard.
-    pub fn toggle_keeping(&mut self) {
-        if self.keeping.is_some() {
-            self.end_keeping();
+    pub fn toggle_recording(&mut self) {
+        if self.recording.is_some() {
+            self.end_recording();
             return;
         }
-        match Keeping::begin(&self.folder, self.dashboard.now_us) {
-            Ok(keeping) => {
+        match LiveRecording::begin(&self.folder, self.dashboard.now_us) {
+            Ok(recording) => {
                 // What came before it began is a part of it, so that it can be played back to a monitor.
                 self.stream = GaugeStream::new(true);
                 for role in [Role::Sensor, Role::Display] {
                     if let Some(state) = &self.dashboard.board(role).state {
-                        let event = Event::Turned(state.clone());
-                        keeping.keep(role, &event);
+                        let event = Event::StateChanged(state.clone());
+                        recording.keep(role, &event);
                         self.stream.on_event(role, &event);
                     }
                 }
-                self.keeping = Some(keeping);
+                self.recording = Some(recording);
                 self.ask();
                 let gauges = if self.dashboard.sensor.is_known() {
                     "the sensor board is told to stream its gauges for as long as is recorded"
@@ -182,8 +181,8 @@ impl Desk {
     }
 
     /// The recording that is being made.
-    pub const fn keeping(&self) -> Option<&Keeping> {
-        self.keeping.as_ref()
+    pub const fn recording(&self) -> Option<&LiveRecording> {
+        self.recording.as_ref()
     }
 
     /// Ends what is under way.
@@ -192,41 +191,39 @@ impl Desk {
     /// If the last of a recording can't be written.
     pub fn close(mut self) -> Result<(), RecordingError> {
         self.restore();
-        match self.keeping.take() {
-            Some(keeping) => keeping.end().map(|_| ()),
+        match self.recording.take() {
+            Some(recording) => recording.end().map(|_| ()),
             None => Ok(()),
         }
     }
 
-    /// Gives the sensor board its quiet back if a recording took it, and waits until it says so. Whether it
-    /// is as it was.
+    /// Gives the sensor board its quiet back if a recording took it. Whether it is as it was.
     fn restore(&mut self) -> bool {
-        let Some(message) = self.stream.restoration() else {
-            return true;
-        };
-        let end = Instant::now() + RESTORED;
-        let tell = |desk: &Self| {
-            desk.link(Role::Sensor)
-                .is_some_and(|link| link.post(&message).is_ok())
-        };
-        let mut said = tell(self);
-        while said && !self.stream.is_quiet() && Instant::now() < end {
-            match self.source.events.recv_timeout(AGAIN) {
-                Ok((role, event)) => self.on(role, event),
-                Err(RecvTimeoutError::Timeout) => said = tell(self),
-                Err(RecvTimeoutError::Disconnected) => break,
+        let Self {
+            dashboard,
+            source,
+            recording,
+            stream,
+            ..
+        } = self;
+        let mut links = source.links.iter();
+        let sensor = links.find(|(role, _)| *role == Role::Sensor);
+        let sensor = sensor.map(|(_, link)| link);
+        stream.restore(&source.events, sensor, |role, event| {
+            if let Some(recording) = recording {
+                recording.keep(role, &event);
             }
-        }
-        self.stream.is_quiet()
+            dashboard.on(now_us(), role, event);
+        })
     }
 
-    fn end_keeping(&mut self) {
+    fn end_recording(&mut self) {
         let is_restored = self.restore();
-        let Some(keeping) = self.keeping.take() else {
+        let Some(recording) = self.recording.take() else {
             return;
         };
-        let path = keeping.path.display().to_string();
-        match keeping.end() {
+        let path = recording.path.display().to_string();
+        match recording.end() {
             Ok(progress) => self.dashboard.notify(
                 false,
                 format!(
@@ -246,8 +243,8 @@ impl Desk {
     }
 
     fn on(&mut self, role: Role, event: Event) {
-        if let Some(keeping) = &self.keeping {
-            keeping.keep(role, &event);
+        if let Some(recording) = &self.recording {
+            recording.keep(role, &event);
             self.stream.on_event(role, &event);
         }
         self.dashboard.on(now_us(), role, event);

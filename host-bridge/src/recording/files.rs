@@ -10,16 +10,16 @@ use protocol::{PROTOCOL_VERSION, SCHEMA_HASH};
 use super::Settings;
 use super::csv_folder::CsvFolder;
 use super::error::RecordingError;
-use super::ledger::Entry;
 use super::mcap_file::{FORMAT, McapFile};
 use super::row::{HelloRow, LinkEvent, Row};
+use super::row_builder::Entry;
 use crate::host_clock::{now_us, unix_ns};
 
 /// The key of a board's configuration, as JSON, in what a later part tells of it.
 pub const CONFIGURATION: &str = "configuration";
 
 /// What is being written to.
-pub struct Books {
+pub struct RecordingFiles {
     settings: Settings,
     mcap: Option<McapFile>,
     csv: Option<CsvFolder>,
@@ -104,7 +104,7 @@ impl Facts {
     }
 }
 
-impl Books {
+impl RecordingFiles {
     /// Makes the files.
     ///
     /// # Errors
@@ -150,7 +150,7 @@ impl Books {
         }
     }
 
-    /// Writes an entry. It is safe after the next [`Books::sync`].
+    /// Writes an entry. It is safe after the next [`RecordingFiles::sync`].
     ///
     /// # Errors
     /// If a file does not take it.

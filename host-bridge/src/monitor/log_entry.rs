@@ -8,18 +8,18 @@ use crate::state::State;
 
 /// Something that happened at one of the boards.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Happening {
+pub struct LogEntry {
     /// When, in µs of [`crate::host_clock::now_us`].
     pub at_us: u64,
     /// Where.
     pub role: Role,
     /// What.
-    pub what: What,
+    pub what: LogEvent,
 }
 
 /// What happened.
 #[derive(Clone, Debug, PartialEq)]
-pub enum What {
+pub enum LogEvent {
     /// The link stands differently.
     Link(State),
     /// The supervisor's state is another.
@@ -40,7 +40,7 @@ pub enum What {
     },
 }
 
-impl What {
+impl LogEvent {
     /// One word for its kind; never changes.
     pub const fn word(&self) -> &'static str {
         match self {
@@ -63,8 +63,8 @@ impl What {
     }
 }
 
-/// The happening in one line, with the advice if there is one.
-impl fmt::Display for What {
+/// The entry in one line, with the advice if there is one.
+impl fmt::Display for LogEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Link(state) => {

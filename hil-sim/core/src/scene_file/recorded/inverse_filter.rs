@@ -1,4 +1,4 @@
-//! From the samples of a recording back to what stood at the ADC's pins.
+//! `filtered = true`: from samples that the sensor's own filter has made back to what stood at the ADC's pins.
 //!
 //! Samples of 1 kHz do not tell all of what was scanned at 4 kHz: the sensor's anti-aliasing filter has taken
 //! most of what lay above 500 Hz. Of all that could have stood at the pins, the smallest is taken that the
@@ -12,6 +12,12 @@ use std::f64::consts::PI;
 use firmware_sensor::decimate::{AntiAlias, History};
 use firmware_sensor::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan};
 use protocol::CHANNELS;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::plant::gauges::SCAN_RATE_HZ;
+use crate::scene::series::Series;
 
 /// Scans that a sample depends on, and the one of them that it belongs to.
 const TAPS: usize = 32;
@@ -27,11 +33,48 @@ const PIECE: usize = 4_096;
 /// Variance of an ADC's own rounding, in steps²: the scene's ADC brings its own.
 const ROUNDING: f64 = 1.0 / 12.0;
 
+/// Steps of the ADC, and one of them in V.
+const STEPS: f64 = 4_096.0;
+const VOLTS_PER_STEP: f64 = 3.3 / STEPS;
+
 /// The filter's coefficients, the newest scan's first.
 type Filter = [f64; TAPS];
 
+/// The voltages at the pins of which the filter makes these, sample for sample: four rows for each but the
+/// last, at the ADC's instants.
+///
+/// The ADC rounds down: half a step more, so that what comes out is rounded to the nearest.
+pub fn at_the_pins(samples: &Series) -> Series {
+    let inverse = InverseFilter::default();
+    let scans: Vec<Vec<f64>> = (0..samples.width)
+        .map(|column| {
+            let values = samples.values.iter().skip(column).step_by(samples.width);
+            let steps: Vec<f64> = values.map(|volts| volts / VOLTS_PER_STEP).collect();
+            inverse.scans(&steps, column as u64)
+        })
+        .collect();
+    let rate_hz = f64::from(SCAN_RATE_HZ);
+    let count = (samples.at.len() * SCANS_PER_SAMPLE).saturating_sub(SCANS_PER_SAMPLE - 1);
+    // A board's clock tells whole µs.
+    let first = samples
+        .at
+        .first()
+        .map_or(0.0, |first_s| (first_s * rate_hz).round());
+    let volts = |scan: usize| {
+        let row = scans.iter().map(move |scans| scans[scan]);
+        row.map(|steps| (steps + 0.5).clamp(0.0, STEPS) * VOLTS_PER_STEP)
+    };
+    Series {
+        at: (0..count)
+            .map(|scan| (first + scan as f64) / rate_hz)
+            .collect(),
+        values: (0..count).flat_map(volts).collect(),
+        width: samples.width,
+    }
+}
+
 /// What turns samples into scans.
-pub struct Pins {
+struct InverseFilter {
     filter: Filter,
     /// Weight of a sample in the scan that lies so many scans after it, from −4 · [`REACH`] on.
     weights: Vec<f64>,
@@ -39,7 +82,7 @@ pub struct Pins {
     noise_power: Vec<f64>,
 }
 
-impl Default for Pins {
+impl Default for InverseFilter {
     fn default() -> Self {
         let filter = filter();
         let overlap = |lag: i64| -> f64 {
@@ -137,11 +180,11 @@ fn inverse(overlap: impl Fn(i64) -> f64) -> Vec<f64> {
     solution
 }
 
-impl Pins {
-    /// What stood at a pin, in steps of the ADC from mid-rail, four scans for a sample, the first of them at
+impl InverseFilter {
+    /// What stood at a pin, in steps of the ADC, four scans for a sample, the first of them at
     /// its own instant. `samples` are the same; beyond their ends they are taken to go on as the last one.
     /// Equal seeds give equal noise.
-    pub fn scans(&self, samples: &[f64], seed: u64) -> Vec<f64> {
+    fn scans(&self, samples: &[f64], seed: u64) -> Vec<f64> {
         let mut scans = self.smallest(samples);
         let mut noise = self.noise(samples, seed);
         let rest = self.smallest(&self.filtered(&noise));
@@ -184,7 +227,7 @@ impl Pins {
 
     /// White noise, as much as the samples tell of.
     fn noise(&self, samples: &[f64], seed: u64) -> Vec<f64> {
-        let mut draws = Draws(seed);
+        let mut draws = Xoshiro256PlusPlus::seed_from_u64(seed);
         let pieces = samples.chunks(PIECE);
         let deviations =
             pieces.map(|piece| (self.noise_variance(piece) - ROUNDING).max(0.0).sqrt());
@@ -193,7 +236,10 @@ impl Pins {
             .flat_map(|(deviation, piece)| {
                 std::iter::repeat_n(deviation, piece.len() * SCANS_PER_SAMPLE)
             })
-            .map(|deviation| deviation * draws.normal())
+            .map(|deviation| {
+                let draw: f64 = StandardNormal.sample(&mut draws);
+                deviation * draw
+            })
             .collect()
     }
 
@@ -232,33 +278,19 @@ impl Pins {
     }
 }
 
-/// Random numbers: Knuth's MMIX generator.
-struct Draws(u64);
-
-impl Draws {
-    /// From 0 to 1.
-    fn uniform(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Nearly normal, of variance 1: the sum of twelve has a variance of 12/12.
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn normal(seed: u64) -> impl FnMut() -> f64 {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+        move || StandardNormal.sample(&mut random)
+    }
+
     /// The difference between samples and what the filter makes of their scans, away from the ends.
     fn worst(samples: &[f64], seed: u64) -> f64 {
-        let pins = Pins::default();
-        let again = pins.filtered(&pins.scans(samples, seed));
+        let inverse = InverseFilter::default();
+        let again = inverse.filtered(&inverse.scans(samples, seed));
         let inner = 32..samples.len() - 32;
         inner
             .map(|at| (again[at] - samples[at]).abs())
@@ -267,8 +299,8 @@ mod tests {
 
     #[test]
     fn the_filter_makes_the_samples_again_of_the_scans() {
-        let mut draws = Draws(1);
-        let noise: Vec<f64> = (0..2_000).map(|_| 100.0 * draws.normal()).collect();
+        let mut draws = normal(1);
+        let noise: Vec<f64> = (0..2_000).map(|_| 100.0 * draws()).collect();
         let tone = |hz: f64| -> Vec<f64> {
             let turn = 2.0 * PI * hz / 1_000.0;
             (0..2_000)
@@ -290,14 +322,12 @@ mod tests {
     #[test]
     fn noise_is_found_and_stands_in_the_scans_as_it_stood_there() {
         // White noise of 40 steps with a tone, scanned, filtered and taken back.
-        let pins = Pins::default();
-        let mut draws = Draws(9);
+        let inverse = InverseFilter::default();
+        let mut draws = normal(9);
         let scans: Vec<f64> = (0..40_000)
-            .map(|at| {
-                40.0 * draws.normal() + 500.0 * (2.0 * PI * f64::from(at) * 35.0 / 4_000.0).sin()
-            })
+            .map(|at| 40.0 * draws() + 500.0 * (2.0 * PI * f64::from(at) * 35.0 / 4_000.0).sin())
             .collect();
-        let again = pins.scans(&pins.filtered(&scans), 3);
+        let again = inverse.scans(&inverse.filtered(&scans), 3);
         // The third difference, as the sensor takes it: 20 times the variance.
         let power = |scans: &[f64]| -> f64 {
             let squares = scans

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::error::RecordingError;
 
 /// A file that is being written.
-pub struct Paper {
+pub struct Sink {
     path: PathBuf,
     file: File,
     safe_bytes: u64,
@@ -19,12 +19,12 @@ pub struct Paper {
 }
 
 /// What writes to it: nothing more once a write has failed, so that what is safe stays as it is.
-pub struct Ink {
+pub struct SinkWriter {
     file: File,
     full: Arc<AtomicBool>,
 }
 
-impl Paper {
+impl Sink {
     /// Makes a file; `force` writes over one that is there.
     ///
     /// # Errors
@@ -56,9 +56,9 @@ impl Paper {
     ///
     /// # Errors
     /// If the system has no more handles.
-    pub fn ink(&self) -> Result<Ink, RecordingError> {
+    pub fn writer(&self) -> Result<SinkWriter, RecordingError> {
         let file = self.file.try_clone();
-        Ok(Ink {
+        Ok(SinkWriter {
             file: file.map_err(|source| RecordingError::not_made(&self.path, source))?,
             full: Arc::clone(&self.full),
         })
@@ -108,7 +108,7 @@ impl Paper {
     }
 }
 
-impl Write for Ink {
+impl Write for SinkWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.full.load(Ordering::Relaxed) {
             return Err(io::Error::other("an earlier write has failed"));
@@ -127,7 +127,7 @@ impl Write for Ink {
     }
 }
 
-impl Seek for Ink {
+impl Seek for SinkWriter {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }

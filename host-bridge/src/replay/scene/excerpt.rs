@@ -8,7 +8,7 @@ use crate::recording::row::{GaugeRow, Row};
 
 /// A piece of a recording.
 #[derive(Default)]
-pub struct Tape {
+pub struct Excerpt {
     /// Samples without a gap.
     pub samples: Vec<GaugeRow>,
     /// The estimates within the piece.
@@ -42,14 +42,14 @@ fn same(one: &SensorConfiguration, other: &SensorConfiguration) -> bool {
     }
 }
 
-impl Tape {
+impl Excerpt {
     /// Takes what lies between two times, in s since the recording's start.
     ///
     /// # Errors
     /// If the recording can't be read, has no samples there or has a gap there, or if the sensor was
     /// configured otherwise meanwhile.
     pub fn take(mut recording: Reader, from_s: f64, to_s: f64) -> Result<Self, SceneError> {
-        let mut tape = Self::default();
+        let mut excerpt = Self::default();
         let mut runs: Vec<Run> = Vec::new();
         let mut gap_s = None;
         while let Some(entry) = recording.next_entry()? {
@@ -58,12 +58,12 @@ impl Tape {
                 break;
             }
             for (role, row) in recording.take_told() {
-                tape.configured(role, &row, None)?;
+                excerpt.configured(role, &row, None)?;
             }
             let within = at_s >= from_s;
             match entry.row {
                 Row::Gauges(row) if within => {
-                    let follows = tape
+                    let follows = excerpt
                         .samples
                         .last()
                         .is_some_and(|last| row.sample == last.sample.wrapping_add(1));
@@ -72,7 +72,7 @@ impl Tape {
                         last => {
                             if last.is_some() {
                                 gap_s = gap_s.or(Some(at_s));
-                                tape.samples.clear();
+                                excerpt.samples.clear();
                             }
                             runs.push(Run {
                                 from_s: at_s,
@@ -80,16 +80,16 @@ impl Tape {
                             });
                         }
                     }
-                    tape.samples.push(row);
+                    excerpt.samples.push(row);
                 }
-                Row::Estimate(row) if within => tape.estimates.push(row.into()),
+                Row::Estimate(row) if within => excerpt.estimates.push(row.into()),
                 row => {
-                    let changed_s = (within && !tape.samples.is_empty()).then_some(at_s);
-                    tape.configured(entry.role, &row, changed_s)?;
+                    let changed_s = (within && !excerpt.samples.is_empty()).then_some(at_s);
+                    excerpt.configured(entry.role, &row, changed_s)?;
                 }
             }
         }
-        tape.cut = recording.is_cut();
+        excerpt.cut = recording.is_cut();
         if let Some(at_s) = gap_s {
             let longest = runs
                 .into_iter()
@@ -97,7 +97,7 @@ impl Tape {
             let (from_s, to_s) = longest.map_or((0.0, 0.0), |run| (run.from_s, run.to_s));
             return Err(SceneError::Gap { at_s, from_s, to_s });
         }
-        Ok(tape)
+        Ok(excerpt)
     }
 
     /// Takes a reported configuration; one that changes what the samples belong to is refused.

@@ -11,7 +11,7 @@ pub const SILENCE_US: u64 = 2_000_000;
 
 /// How the other site stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum FarState {
+pub enum RemoteState {
     /// Nothing was ever heard.
     Unheard,
     /// A bridge of this build is there.
@@ -32,7 +32,7 @@ pub enum FarState {
     },
 }
 
-impl FarState {
+impl RemoteState {
     /// One word for it, for scripts; never changes.
     pub const fn word(&self) -> &'static str {
         match self {
@@ -44,7 +44,7 @@ impl FarState {
     }
 }
 
-impl fmt::Display for FarState {
+impl fmt::Display for RemoteState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unheard => f.write_str("not heard yet"),
@@ -74,23 +74,23 @@ impl fmt::Display for Bridge<'_> {
 
 /// The other site's bridge.
 #[derive(Clone, Debug)]
-pub struct Far {
-    state: FarState,
+pub struct RemoteBridge {
+    state: RemoteState,
     heard_us: u64,
 }
 
-impl Default for Far {
+impl Default for RemoteBridge {
     fn default() -> Self {
         Self {
-            state: FarState::Unheard,
+            state: RemoteState::Unheard,
             heard_us: 0,
         }
     }
 }
 
-impl Far {
+impl RemoteBridge {
     /// How it stands.
-    pub const fn state(&self) -> &FarState {
+    pub const fn state(&self) -> &RemoteState {
         &self.state
     }
 
@@ -98,30 +98,30 @@ impl Far {
     pub fn hear(&mut self, hello: Hello, session: u64, now_us: u64) -> bool {
         let is_other = !self.is_session(session);
         self.heard_us = now_us;
-        self.state = FarState::Known { hello, session };
+        self.state = RemoteState::Known { hello, session };
         is_other
     }
 
     /// An envelope of another build came. It is no more than noted while a bridge of this build is there.
     pub fn hear_foreign(&mut self, hello: Hello, version: u8) {
-        if !matches!(self.state, FarState::Known { .. }) {
-            self.state = FarState::Foreign { hello, version };
+        if !matches!(self.state, RemoteState::Known { .. }) {
+            self.state = RemoteState::Foreign { hello, version };
         }
     }
 
     /// Time passes. True if the other site has just become silent.
     pub fn elapse(&mut self, now_us: u64) -> bool {
-        let is_silent = matches!(self.state, FarState::Known { .. })
+        let is_silent = matches!(self.state, RemoteState::Known { .. })
             && now_us.saturating_sub(self.heard_us) > SILENCE_US;
         if is_silent {
-            self.state = FarState::Silent;
+            self.state = RemoteState::Silent;
         }
         is_silent
     }
 
     /// Whether it is the one of this session.
     pub const fn is_session(&self, other: u64) -> bool {
-        matches!(self.state, FarState::Known { session, .. } if session == other)
+        matches!(self.state, RemoteState::Known { session, .. } if session == other)
     }
 }
 
@@ -141,25 +141,25 @@ mod tests {
 
     #[test]
     fn who_is_heard_is_known_until_it_is_silent() {
-        let mut far = Far::default();
-        assert!(far.hear(host_hello(), 1, 0));
-        assert!(!far.hear(host_hello(), 1, 10));
-        assert!(!far.elapse(10 + SILENCE_US));
-        assert!(far.elapse(11 + SILENCE_US));
-        assert!(!far.elapse(12 + SILENCE_US), "said once");
-        assert_eq!(far.state(), &FarState::Silent);
+        let mut remote = RemoteBridge::default();
+        assert!(remote.hear(host_hello(), 1, 0));
+        assert!(!remote.hear(host_hello(), 1, 10));
+        assert!(!remote.elapse(10 + SILENCE_US));
+        assert!(remote.elapse(11 + SILENCE_US));
+        assert!(!remote.elapse(12 + SILENCE_US), "said once");
+        assert_eq!(remote.state(), &RemoteState::Silent);
     }
 
     #[test]
     fn another_build_is_named_unless_one_of_this_build_is_there() {
         let mut other = host_hello();
         other.protocol = 77_u16.to_le_bytes();
-        let mut far = Far::default();
-        far.hear_foreign(other, 1);
-        let words = far.state().to_string();
+        let mut remote = RemoteBridge::default();
+        remote.hear_foreign(other, 1);
+        let words = remote.state().to_string();
         assert!(words.contains("speaks protocol 77"), "{words}");
-        far.hear(host_hello(), 1, 0);
-        far.hear_foreign(other, 1);
-        assert_eq!(far.state().word(), "known");
+        remote.hear(host_hello(), 1, 0);
+        remote.hear_foreign(other, 1);
+        assert_eq!(remote.state().word(), "known");
     }
 }

@@ -8,7 +8,7 @@ use crate::link::Event;
 use crate::recording::{PART, Progress, Recorder, RecordingError, Settings, part_path};
 
 /// A recording under way.
-pub struct Keeping {
+pub struct LiveRecording {
     /// Its file.
     pub path: PathBuf,
     /// Since when, in µs of [`crate::host_clock::now_us`].
@@ -16,7 +16,7 @@ pub struct Keeping {
     recorder: Recorder,
 }
 
-impl Keeping {
+impl LiveRecording {
     /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is
     /// free.
     ///

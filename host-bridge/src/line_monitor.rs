@@ -16,7 +16,7 @@ const SPAN_US: u64 = 1_500_000;
 const TEXT_BYTES_A_STRANGE_ONE: u64 = 8;
 
 /// What has been heard on a line since it was opened.
-pub struct Hearing {
+pub struct LineMonitor {
     opened_us: u64,
     patience_us: u64,
     /// When a byte came last.
@@ -61,7 +61,7 @@ pub enum Verdict {
     Garbage,
 }
 
-impl Hearing {
+impl LineMonitor {
     /// Nothing heard yet on a line that was opened at `opened_us`, and that may be silent for
     /// `patience_us` before it is called so.
     pub const fn new(opened_us: u64, patience_us: u64) -> Self {
@@ -169,14 +169,14 @@ mod tests {
     const HELLO: Hello = Hello::new(Role::Sensor, "stm32f429zi", [0, 1, 0]);
     const S: u64 = 1_000_000;
 
-    fn heard(at_us: u64, bytes: &[u8]) -> Hearing {
-        let mut hearing = Hearing::new(0, PATIENCE_US);
-        hearing.hear(at_us, bytes);
-        hearing
+    fn heard(at_us: u64, bytes: &[u8]) -> LineMonitor {
+        let mut line_monitor = LineMonitor::new(0, PATIENCE_US);
+        line_monitor.hear(at_us, bytes);
+        line_monitor
     }
 
-    fn verdict(hearing: &Hearing, at_us: u64) -> Verdict {
-        hearing.judge(at_us, Peer::Silent)
+    fn verdict(line_monitor: &LineMonitor, at_us: u64) -> Verdict {
+        line_monitor.judge(at_us, Peer::Silent)
     }
 
     #[test]
@@ -206,29 +206,29 @@ mod tests {
             unheralded: 1,
             ..PortCounters::new()
         };
-        let mut hearing = heard(S, &[0x80; 99]);
-        hearing.understand(S, &counters);
-        assert_eq!(verdict(&hearing, 2 * S), Verdict::Deaf);
+        let mut line_monitor = heard(S, &[0x80; 99]);
+        line_monitor.understand(S, &counters);
+        assert_eq!(verdict(&line_monitor, 2 * S), Verdict::Deaf);
         // Later it may be something else.
         for at_us in [3 * S, 5 * S] {
-            hearing.hear(at_us, &[0x80; 99]);
-            hearing.understand(at_us, &counters);
+            line_monitor.hear(at_us, &[0x80; 99]);
+            line_monitor.understand(at_us, &counters);
         }
-        assert_eq!(verdict(&hearing, 5 * S), Verdict::Garbage);
+        assert_eq!(verdict(&line_monitor, 5 * S), Verdict::Garbage);
     }
 
     #[test]
     fn a_board_is_known_for_as_long_as_it_is_understood() {
-        let mut hearing = heard(S, &[1; 40]);
+        let mut line_monitor = heard(S, &[1; 40]);
         let counters = PortCounters {
             received: 1,
             ..PortCounters::new()
         };
-        hearing.understand(S, &counters);
+        line_monitor.understand(S, &counters);
         let mut judge = |at_us: u64, bytes: &[u8]| {
-            hearing.hear(at_us, bytes);
-            hearing.understand(at_us, &counters);
-            hearing.judge(at_us, Peer::Known(HELLO))
+            line_monitor.hear(at_us, bytes);
+            line_monitor.understand(at_us, &counters);
+            line_monitor.judge(at_us, Peer::Known(HELLO))
         };
         assert_eq!(judge(S + SILENCE_US, b""), Verdict::Known(HELLO));
         assert_eq!(judge(S + SILENCE_US + 1, b""), Verdict::Garbage);
@@ -238,19 +238,23 @@ mod tests {
 
     #[test]
     fn a_foreign_board_that_is_gone_is_silent() {
-        let mut hearing = heard(S, &[1; 40]);
-        let judge = |hearing: &Hearing, at_us| hearing.judge(at_us, Peer::Foreign(HELLO));
-        assert_eq!(judge(&hearing, S + SILENCE_US), Verdict::Foreign(HELLO));
-        hearing.hear(S + SPAN_US, b"");
-        hearing.hear(S + 2 * SPAN_US, b"");
-        assert_eq!(judge(&hearing, S + 2 * SPAN_US), Verdict::Silent);
+        let mut line_monitor = heard(S, &[1; 40]);
+        let judge =
+            |line_monitor: &LineMonitor, at_us| line_monitor.judge(at_us, Peer::Foreign(HELLO));
+        assert_eq!(
+            judge(&line_monitor, S + SILENCE_US),
+            Verdict::Foreign(HELLO)
+        );
+        line_monitor.hear(S + SPAN_US, b"");
+        line_monitor.hear(S + 2 * SPAN_US, b"");
+        assert_eq!(judge(&line_monitor, S + 2 * SPAN_US), Verdict::Silent);
     }
 
     #[test]
     fn a_ping_is_due_at_once_and_then_once_a_second() {
-        let mut hearing = Hearing::new(0, PATIENCE_US);
+        let mut line_monitor = LineMonitor::new(0, PATIENCE_US);
         let due: Vec<bool> = [5, 6, PING_US + 4, PING_US + 5, PING_US + 6]
-            .map(|at_us| hearing.ping_due(at_us))
+            .map(|at_us| line_monitor.ping_due(at_us))
             .into();
         assert_eq!(due, [true, false, false, true, false]);
     }

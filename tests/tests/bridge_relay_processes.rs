@@ -1,0 +1,283 @@
+//! Bridges and routers in processes of their own, over the system's sockets. Everything waits for events; the
+//! limits are a hang's. What depends on time is in `bridge_relay`, by virtual time.
+
+use std::time::{Duration, Instant};
+
+use protocol::{Message, Role, StopReason};
+use rustix::process::Signal;
+use serde_json::Value;
+use tests::fake_board::{FakeBoard, wait_until};
+use tests::relay::{Relay, free_port, listen, sequences, talking_board};
+use tests::weather::Weather;
+
+/// Only what hangs takes so long.
+const LIMIT: Duration = Duration::from_secs(120);
+
+/// Two bridges, the display's connecting to the sensor's by way of `weather`.
+struct Pair {
+    sensor: Relay,
+    display: Relay,
+    weather: Weather,
+}
+
+impl Pair {
+    fn new(sensor: &FakeBoard, display: &FakeBoard, more: &[&str]) -> Self {
+        let port = free_port();
+        let weather = Weather::over(port);
+        let listen = format!("tcp/127.0.0.1:{port}");
+        let connect = format!("tcp/127.0.0.1:{}", weather.port());
+        let with = |end, at: &str| -> Vec<String> {
+            let more = more.iter().map(|&word| word.to_owned());
+            [end, at]
+                .map(str::to_owned)
+                .into_iter()
+                .chain(more)
+                .collect()
+        };
+        let start = |role, board: &FakeBoard, arguments: Vec<String>| {
+            let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+            Relay::bridge(role, board.path(), &arguments)
+        };
+        Self {
+            sensor: start(Role::Sensor, sensor, with("--listen", &listen)),
+            display: start(Role::Display, display, with("--connect", &connect)),
+            weather,
+        }
+    }
+}
+
+fn at_least(count: usize) -> impl FnMut(&[Message]) -> bool {
+    move |heard| sequences(heard).len() >= count
+}
+
+/// That each number is above the one before.
+fn assert_rising(heard: &[Message]) {
+    let numbers = sequences(heard);
+    for pair in numbers.windows(2) {
+        assert!(pair[0] < pair[1], "{} after {}", pair[1], pair[0]);
+    }
+}
+
+fn is_motion(message: &Message) -> bool {
+    matches!(message, Message::Motion(_))
+}
+
+fn is_stop(message: &Message) -> bool {
+    matches!(message, Message::Stop(stop) if stop.reason == StopReason::Operator)
+}
+
+/// The last report that a bridge printed.
+fn last_report(lines: &[String]) -> Value {
+    let last = lines.last().expect("a bridge reports");
+    serde_json::from_str(last).expect("it reports in JSON")
+}
+
+#[test]
+fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let pair = Pair::new(&sensor, &display, &[]);
+    let motions = listen(&sensor, LIMIT, at_least(1_000));
+    let estimates = listen(&display, LIMIT, at_least(200));
+    assert_rising(&motions);
+    assert_rising(&estimates);
+    let is_estimate = |message: &Message| matches!(message, Message::Estimate(_));
+    let is_housekeeping =
+        |message: &Message| matches!(message, Message::Ping(_) | Message::Pong(_));
+    assert!(motions.iter().all(|m| is_motion(m) || is_housekeeping(m)));
+    assert!(
+        estimates
+            .iter()
+            .all(|m| is_estimate(m) || is_housekeeping(m))
+    );
+
+    for bridge in [&pair.sensor, &pair.display] {
+        bridge.signal(Signal::INT);
+    }
+    let (_, lines, _) = pair.sensor.wait(LIMIT);
+    let incoming = last_report(&lines)["incoming"].clone();
+    let (status, lines, words) = pair.display.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+    let report = last_report(&lines);
+    assert_eq!(report["total"], true);
+    assert_eq!(report["site"], "display");
+    // A busy machine's network loses some, or brings two at once, of which one is replaced: none goes without
+    // being counted.
+    let numbers = sequences(&motions);
+    let missing = u64::from(numbers[numbers.len() - 1] - numbers[0]) + 1 - numbers.len() as u64;
+    let reasons = ["lost", "replaced", "stale", "stuck", "undated", "boardless"];
+    let counts = reasons.map(|reason| incoming[reason].as_u64());
+    let counted = counts
+        .into_iter()
+        .chain([report["outgoing"]["held"].as_u64()])
+        .sum::<Option<u64>>();
+    assert!(
+        Some(missing) <= counted,
+        "{missing} missing: {incoming}, {report}"
+    );
+    assert!(
+        report["incoming"]["passed"].as_u64() >= Some(200),
+        "{report}"
+    );
+    assert!(
+        report["outgoing"]["sent"].as_u64() >= Some(1_000),
+        "{report}"
+    );
+    assert!(report["age"]["p99_us"].is_u64(), "{report}");
+}
+
+#[test]
+fn a_router_that_is_killed_and_started_again_brings_the_stream_back() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let router = || Relay::start(["router", "--listen", &at]);
+    let mut running = router();
+    let _bridges = [
+        Relay::bridge(Role::Sensor, sensor.path(), &["--connect", &at]),
+        Relay::bridge(Role::Display, display.path(), &["--connect", &at]),
+    ];
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    for _ in 0..2 {
+        running.kill();
+        motions.extend(sensor.take_heard());
+        running = router();
+        running.says("router, listening", LIMIT);
+        let back = Instant::now();
+        motions.extend(listen(&sensor, LIMIT, at_least(1)));
+        println!("back {:?} after the router", back.elapsed());
+        motions.extend(listen(&sensor, LIMIT, at_least(100)));
+        listen(&display, LIMIT, at_least(10));
+    }
+    assert_rising(&motions);
+}
+
+#[test]
+fn a_site_whose_address_changes_gives_its_connection_up_and_makes_a_new_one() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let pair = Pair::new(&sensor, &display, &[]);
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    listen(&display, LIMIT, at_least(20));
+    let before = pair.weather.connections();
+    pair.weather.strand();
+    let changed = Instant::now();
+    // Nothing tells either end. What is on the way when this is asked has come from before.
+    for bridge in [&pair.sensor, &pair.display] {
+        bridge.says("silent", LIMIT);
+    }
+    motions.extend(sensor.take_heard());
+    display.take_heard();
+    let (mut of_sensor, mut of_display) = (false, false);
+    let both = || {
+        let heard = sensor.take_heard();
+        of_sensor |= heard.iter().any(is_motion);
+        motions.extend(heard);
+        of_display |= !sequences(&display.take_heard()).is_empty();
+        of_sensor && of_display
+    };
+    assert!(wait_until(LIMIT, both));
+    println!("back {:?} after the change", changed.elapsed());
+    // The connection is given up when it was silent for as long as the engine was told; then a new one is made.
+    assert!(pair.weather.connections() > before);
+    motions.extend(listen(&sensor, LIMIT, at_least(100)));
+    assert_rising(&motions);
+}
+
+#[test]
+fn a_bridge_that_is_killed_and_started_anew_is_followed() {
+    let sensor = talking_board(Role::Sensor);
+    let display = talking_board(Role::Display);
+    let mut pair = Pair::new(&sensor, &display, &[]);
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    for _ in 0..2 {
+        let connect = format!("tcp/127.0.0.1:{}", pair.weather.port());
+        let fresh = ["--connect", &connect];
+        std::mem::replace(
+            &mut pair.display,
+            Relay::bridge(Role::Display, display.path(), &fresh),
+        )
+        .kill();
+        motions.extend(sensor.take_heard());
+        motions.extend(listen(&sensor, LIMIT, at_least(200)));
+        listen(&display, LIMIT, at_least(20));
+    }
+    assert_rising(&motions);
+}
+
+#[test]
+fn a_signal_says_stop_at_both_sites() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &[]);
+    listen(&sensor, LIMIT, at_least(10));
+    pair.sensor.signal(Signal::USR1);
+    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
+    pair.sensor.says(
+        "Stop: the board at the display's site has stopped: by the operator",
+        LIMIT,
+    );
+    // Nor does a network that is stuck keep a bridge from ending.
+    pair.weather.hold_still(true);
+    pair.sensor.signal(Signal::TERM);
+    let (status, _, words) = pair.sensor.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+}
+
+#[test]
+fn relay_stop_says_what_has_come_of_it() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &["--max-age", "60000"]);
+    listen(&sensor, LIMIT, at_least(10));
+    let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
+    let stop = |more: &[&str]| {
+        let words = ["stop", "--connect", &at].into_iter();
+        Relay::start(words.chain(more.iter().copied())).wait(LIMIT)
+    };
+    let (status, _, words) = stop(&["--within", "100"]);
+    assert_eq!(status.code(), Some(0), "{words}");
+    assert!(
+        words.contains("the display has stopped: by the operator"),
+        "{words}"
+    );
+    // Nobody of that name ever answers.
+    let (status, _, words) = stop(&["--name", "other", "--within", "1"]);
+    assert_eq!(status.code(), Some(1), "{words}");
+    for part in [
+        "NOT STOPPED",
+        "no word from the display's bridge",
+        "press the emergency stop, or cut the display's power",
+    ] {
+        assert!(words.contains(part), "{words}");
+    }
+}
+
+#[test]
+fn two_bridges_of_one_role_and_name_are_told_so() {
+    let (first, second) = (FakeBoard::new(Role::Display), FakeBoard::new(Role::Display));
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let _router = Relay::start(["router", "--listen", &at]);
+    let one = Relay::bridge(Role::Display, first.path(), &["--connect", &at]);
+    let other = Relay::bridge(Role::Display, second.path(), &["--connect", &at]);
+    one.says("another bridge calls itself the display's site", LIMIT);
+    other.says("another bridge calls itself the display's site", LIMIT);
+}
+
+#[test]
+fn nobody_there_is_named_and_not_knocked_at_wildly() {
+    let board = FakeBoard::new(Role::Display);
+    let nowhere = Weather::over(free_port());
+    nowhere.cut(true);
+    let at = format!("tcp/127.0.0.1:{}", nowhere.port());
+    let bridge = Relay::bridge(Role::Display, board.path(), &["--connect", &at]);
+    let started = Instant::now();
+    bridge.says(&at, LIMIT);
+    bridge.says("nobody there speaks to us", LIMIT);
+    let per_second = nowhere.connections() as f64 / started.elapsed().as_secs_f64();
+    assert!(per_second < 10.0, "{per_second} connections a second");
+
+    let refused = format!("tcp/127.0.0.1:{}", free_port());
+    let other = FakeBoard::new(Role::Sensor);
+    let bridge = Relay::bridge(Role::Sensor, other.path(), &["--connect", &refused]);
+    bridge.says("nobody listens there", LIMIT);
+}
