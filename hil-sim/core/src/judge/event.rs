@@ -256,9 +256,9 @@ fn borders_mm(scene: &Scene) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::native;
-    use crate::plant::contact::{Integrator, NORMAL_N};
+    use crate::plant::contact::NORMAL_N;
     use crate::scene;
-    use crate::scene::{ArmDrive, Friction, Solver, Specimen};
+    use crate::scene::{ArmDrive, Friction, Integrator, Solver, Specimen};
 
     fn found(scene: &Scene) -> Vec<Event> {
         events(scene, &native::run(scene).expect("a scene in code runs"))

@@ -7,7 +7,8 @@ mod refusal;
 
 use std::path::Path;
 
-use crate::plant::contact::Integrator;
+use protocol::{Method, SensorConfiguration};
+
 use crate::scene::*;
 
 const SURFACE: &str = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";

@@ -17,7 +17,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::plant::gauges::SCAN_RATE_HZ;
-use crate::scene::series::Series;
+use crate::scene::Series;
 
 /// Scans that a sample depends on, and the one of them that it belongs to.
 const TAPS: usize = 32;
