@@ -200,7 +200,9 @@ fn an_import_upwards_and_a_circle_are_seen() {
     let paths = named(&text, &module("scene"));
     for name in ["plant", "link", "run"] {
         assert!(
-            paths.iter().any(|path| path[0] == name),
+            paths
+                .iter()
+                .any(|path| path.first().is_some_and(|first| first == name)),
             "{name}: {paths:?}"
         );
     }

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use hil_sim_boards::cost::measure;
+use hil_sim_studies::study::Table;
 
 use super::Cost;
 use super::say::say;
@@ -25,8 +26,12 @@ const PARTS: [(u64, &str); 9] = [
 impl Cost {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let taken = measure(&self.elf)?;
-        say!("| part | instructions a millisecond | the longest millisecond |");
-        say!("| --- | ---: | ---: |");
+        let heads = [
+            "part",
+            "instructions a millisecond:",
+            "the longest millisecond:",
+        ];
+        let mut table = Table::new(&heads);
         let or_dash =
             |count: Option<u64>| count.map_or("–".to_owned(), |count| count.to_string());
         for (part, name) in PARTS {
@@ -36,8 +41,9 @@ impl Cost {
             let largest = taken
                 .filter(|taken| taken.pieces > 1)
                 .map(|taken| taken.largest);
-            say!("| {name} | {} | {} |", or_dash(mean), or_dash(largest));
+            table.row([name.to_owned(), or_dash(mean), or_dash(largest)]);
         }
+        say!("{table}");
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -12,6 +12,8 @@ use hil_sim_core::scene::Scene;
 use hil_sim_studies::estimators::family;
 use hil_sim_studies::estimators::family::Family;
 
+use hil_sim_studies::study::Table;
+
 use super::say::say;
 use super::{Elves, EngineName, number, progress};
 
@@ -49,13 +51,14 @@ impl Goals {
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
         let judged = run(&scenes, firmwares.as_ref())?;
 
-        say!("{HEADER}");
+        let mut table = Table::new(&HEADS);
         let mut rest = &judged[..];
         for family in &families {
             let (these, others) = rest.split_at(family.scenes.len());
             rest = others;
-            say!("{}", row(family, these));
+            table.row(row(family, these));
         }
+        say!("{table}");
         let mut met = true;
         for (scene, judged) in scenes.iter().zip(&judged) {
             for line in &judged.unmet {
@@ -92,11 +95,20 @@ fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<J
     judged
 }
 
-const HEADER: &str = "\
-| scenes | how many | worst rms, % | goal | least valid share | valid yet > 10 % off, worst, % | least felt right | most felt wrong, % | longest to settle, ms | the paper's count, worst rms, % |
-| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |";
+const HEADS: [&str; 10] = [
+    "scenes",
+    "how many:",
+    "worst rms, %:",
+    "goal:",
+    "least valid share:",
+    "valid yet > 10 % off, worst, %:",
+    "least felt right:",
+    "most felt wrong, %:",
+    "longest to settle, ms:",
+    "the paper's count, worst rms, %:",
+];
 
-fn row(family: &Family, judged: &[Judged]) -> String {
+fn row(family: &Family, judged: &[Judged]) -> [String; 10] {
     let most = |number: fn(&Summary) -> Option<f64>| {
         judged
             .iter()
@@ -109,23 +121,22 @@ fn row(family: &Family, judged: &[Judged]) -> String {
             .filter_map(|judged| number(&judged.summary))
             .reduce(f64::min)
     };
-    format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-        family.title,
-        judged.len(),
+    [
+        family.title.to_owned(),
+        judged.len().to_string(),
         number(most(|summary| summary.rms_percent), 2),
         number(family.goal_percent(), 1),
         number(least(|summary| summary.valid_share), 3),
         number(
             most(|summary| summary.wrong_share).map(|share| 100.0 * share),
-            2
+            2,
         ),
         number(least(|summary| summary.felt_right_share), 3),
         number(
             most(|summary| summary.felt_wrong_share).map(|share| 100.0 * share),
-            2
+            2,
         ),
         number(most(|summary| summary.settling_ms), 0),
         number(most(|summary| summary.counted_rms_percent), 0),
-    )
+    ]
 }

@@ -11,6 +11,7 @@ use super::way::tell_notes;
 use hil_sim_studies::map::shard::Shard;
 use hil_sim_studies::map::survey::whole_methods;
 use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, standing, words};
+use hil_sim_studies::study::Table;
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Maps {
@@ -131,8 +132,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
 }
 
 fn list(maps: &[Map]) {
-    say!("| map | cells | along x | along y | in all cells |");
-    say!("| --- | ---: | --- | --- | --- |");
+    let mut table = Table::new(&["map", "cells:", "along x", "along y", "in all cells"]);
     for map in maps {
         let axis = |axis: &hil_sim_studies::map::axis::Axis| {
             format!(
@@ -142,15 +142,15 @@ fn list(maps: &[Map]) {
                 axis.places()
             )
         };
-        say!(
-            "| {} | {} | {} | {} | {} |",
-            map.name,
-            map.len(),
+        table.row([
+            map.name.to_owned(),
+            map.len().to_string(),
             axis(&map.x),
             axis(&map.y),
-            map.conditions
-        );
+            map.conditions.to_owned(),
+        ]);
     }
+    say!("{table}");
 }
 
 fn print_scene(maps: &[Map], place: &str, methods: &[String]) -> anyhow::Result<()> {

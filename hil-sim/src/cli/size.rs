@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use hil_sim_studies::study::Table;
 use object::{Object, ObjectSection, SectionKind};
 
 use super::Elves;
@@ -23,19 +24,28 @@ pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
     let firmwares = elves.read()?;
     let flash_total = FLASH.end - FLASH.start;
     let ram_total = RAM.end - RAM.start;
-    say!("| ELF | flash, bytes | of 2 MiB | static RAM, bytes | of 192 KiB |");
-    say!("| --- | ---: | ---: | ---: | ---: |");
+    let mut table = Table::new(&[
+        "ELF",
+        "flash, bytes:",
+        "of 2 MiB:",
+        "static RAM, bytes:",
+        "of 192 KiB:",
+    ]);
     for (name, firmware) in [
         ("firmware-sensor", &firmwares.sensor),
         ("firmware-display", &firmwares.display),
     ] {
         let Footprint { flash, ram } = footprint(&object::File::parse(&*firmware.elf)?);
-        say!(
-            "| {name} | {flash} | {:.1} % | {ram} | {:.1} % |",
-            100.0 * flash as f64 / flash_total as f64,
-            100.0 * ram as f64 / ram_total as f64,
-        );
+        let share = |bytes: u64, of: u64| format!("{:.1} %", 100.0 * bytes as f64 / of as f64);
+        table.row([
+            name.to_owned(),
+            flash.to_string(),
+            share(flash, flash_total),
+            ram.to_string(),
+            share(ram, ram_total),
+        ]);
     }
+    say!("{table}");
     Ok(ExitCode::SUCCESS)
 }
 

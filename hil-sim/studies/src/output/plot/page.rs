@@ -189,7 +189,12 @@ impl Page {
 pub fn chart(wide: f64, high: f64, panel: &Panel) -> String {
     const SIZE: f64 = 16.0;
     let beside = panel.room(SIZE, f64::INFINITY);
-    let room = panel.room(SIZE, wide - beside.left - beside.right);
+    // Charts below each other look aligned where their labels are of about the same width.
+    let left = beside.left.max(0.09 * wide);
+    let room = Room {
+        left,
+        ..panel.room(SIZE, wide - left - beside.right)
+    };
     let frame = Frame {
         left: room.left,
         top: room.above,
