@@ -4,7 +4,6 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use firmware_sensor::counting::predicted_mean_mm;
-use hil_sim_boards;
 use hil_sim_boards::Firmwares;
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::scene::Scene;

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim_boards;
 use hil_sim_boards::Firmwares;
 use hil_sim_core::judge::Summary;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};

@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_texts_stay_within_the_picture() {
-        let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/estimation");
+        let scenes = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/estimation");
         let families = crate::estimators::family::load(scenes.as_ref()).unwrap();
         let score = Score {
             rms_percent: Some(0.5),
