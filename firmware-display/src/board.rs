@@ -23,9 +23,9 @@ use embassy_stm32::spi::{self, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::Timer;
 use firmware_display::dac81416;
-use nucleo::care::Vitals;
 use nucleo::encoder::Encoder;
 use nucleo::serial::{self, Serial};
+use nucleo::supervision::Vitals;
 use protocol::Trip;
 use static_cell::StaticCell;
 

@@ -12,10 +12,10 @@ use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use firmware_display::look::{self, Look, Rounds};
 use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
-use nucleo::care::care;
+use nucleo::console::ConsoleOutput;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
-use nucleo::voice::Voice;
+use nucleo::supervision::supervise;
 use protocol::{
     DisplayCounters, DisplayState, Estimate, Hello, Message, RoleCounters, Safety, Stop,
     StopReason, Trip,
@@ -62,7 +62,7 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     }
     spawner.spawn(once(report(ports)));
     let counters = || RoleCounters::Display(COUNTERS.lock(Cell::get));
-    let voice = Voice {
+    let voice = ConsoleOutput {
         hello,
         line: line::line,
         help: &line::HELP,
@@ -73,7 +73,7 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
             line::STOPPING
         },
     };
-    spawner.spawn(once(care(ports, vitals, counters, voice)));
+    spawner.spawn(once(supervise(ports, vitals, counters, voice)));
 }
 
 /// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: LDAC's edge, 95 µs after

@@ -14,15 +14,15 @@
 fn main() {}
 
 #[cfg(target_os = "none")]
-#[path = "../../hil-sim/studies/src/estimators/parts.rs"]
-mod parts;
-#[cfg(target_os = "none")]
-#[path = "../../hil-sim/studies/src/estimators/rivals/mod.rs"]
+#[path = "../../hil-sim/studies/src/estimators/baselines/mod.rs"]
 #[allow(
     dead_code,
     reason = "the simulator has uses for it that a count has not"
 )]
-mod rivals;
+mod baselines;
+#[cfg(target_os = "none")]
+#[path = "../../hil-sim/studies/src/estimators/parts.rs"]
+mod parts;
 #[cfg(target_os = "none")]
 #[path = "../../hil-sim/studies/src/estimators/settings.rs"]
 #[allow(
@@ -47,11 +47,11 @@ mod board {
     use protocol::{CHANNELS, GAUGES, SensorConfiguration};
     use static_cell::ConstStaticCell;
 
+    use crate::baselines::Rival;
+    use crate::baselines::adapter::Entrant;
+    use crate::baselines::registry::{Visitor, show_all};
+    use crate::baselines::spectrum::{LENGTH, LINES, Transform};
     use crate::parts::{FRONT, MILLISECONDS, RIVALS_FROM, SETTINGS_FROM, TRANSFORM};
-    use crate::rivals::Rival;
-    use crate::rivals::entrant::Entrant;
-    use crate::rivals::roster::{Visitor, show_all};
-    use crate::rivals::spectrum::{LENGTH, LINES, Transform};
     use crate::settings::SETTINGS;
 
     type Millisecond = [Scan; SCANS_PER_SAMPLE];

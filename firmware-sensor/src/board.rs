@@ -30,9 +30,9 @@ use embassy_stm32::{bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use firmware_sensor::{Drive, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
-use nucleo::care::Vitals;
 use nucleo::encoder::Encoder;
 use nucleo::serial::{self, Serial};
+use nucleo::supervision::Vitals;
 use protocol::CHANNELS;
 use static_cell::StaticCell;
 

@@ -9,10 +9,10 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
 use firmware_sensor::{Sensor, line};
-use nucleo::care::care;
+use nucleo::console::ConsoleOutput;
 use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
 use nucleo::spawn::once;
-use nucleo::voice::Voice;
+use nucleo::supervision::supervise;
 use protocol::{
     Configuration, ConfigurationReport, Hello, Message, Motion, Refusal, RoleCounters,
     SensorConfiguration, SensorCounters, Setting,
@@ -55,13 +55,13 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     }
     spawner.spawn(once(report(ports)));
     let counters = || RoleCounters::Sensor(COUNTERS.lock(Cell::get));
-    let voice = Voice {
+    let voice = ConsoleOutput {
         hello,
         line: line::line,
         help: &line::HELP,
         stop: || line::NOT_STOPPING,
     };
-    spawner.spawn(once(care(ports, vitals, counters, voice)));
+    spawner.spawn(once(supervise(ports, vitals, counters, voice)));
 }
 
 /// Samples, estimates, drives the arm. Deadline: one sample period, 1 ms. Missed, DMA goes on for

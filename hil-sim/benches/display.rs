@@ -6,7 +6,7 @@ use std::path::Path;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hil_sim_boards::Firmware;
-use hil_sim_boards::display_alone::{Alone, run};
+use hil_sim_boards::display_alone::{DisplayBench, run};
 use hil_sim_core::scene::Motion;
 use protocol::actuators::grid;
 use protocol::{DisplayConfiguration, Mode, Role};
@@ -39,13 +39,13 @@ fn display_alone(criterion: &mut Criterion) {
                         0
                     };
                 }
-                let alone = Alone {
+                let alone = DisplayBench {
                     configuration: DisplayConfiguration {
                         mode,
                         ..DisplayConfiguration::DEFAULT
                     },
                     actuators,
-                    ..Alone::new(hand, 2.0, VIRTUAL_S as f64)
+                    ..DisplayBench::new(hand, 2.0, VIRTUAL_S as f64)
                 };
                 run(alone, &firmware).expect("it runs")
             });

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hil_sim_core::native;
 use hil_sim_core::scene::{
-    Contact, Estimator, Friction, Gauges, Kinematic, Link, Motion, Rung, Scene,
+    Contact, ContactModel, Estimator, Friction, Gauges, Kinematic, Link, Motion, Scene,
 };
 use protocol::Method;
 
@@ -60,7 +60,7 @@ fn native_engine(criterion: &mut Criterion) {
         (
             "viscoelastic",
             Scene {
-                contact: Contact::of(Rung::Viscoelastic, None),
+                contact: Contact::of(ContactModel::Viscoelastic, None),
                 ..scene()
             },
         ),

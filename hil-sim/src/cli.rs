@@ -27,13 +27,13 @@ mod models;
 mod paper;
 mod people;
 mod run;
+mod run_options;
 mod say;
 mod scene_files;
 #[cfg(target_os = "linux")]
 mod serve;
 mod size;
 mod soak;
-mod way;
 
 /// Ridgelink's simulator.
 #[derive(Debug, Parser)]

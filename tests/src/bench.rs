@@ -26,7 +26,7 @@ const STAYS: Duration = Duration::from_millis(50);
 static ALONE: Mutex<()> = Mutex::new(());
 
 /// A bench in a folder of the test's own, the only one of its process.
-pub struct Alone {
+pub struct ExclusiveBench {
     /// The bench.
     pub bench: Bench,
     _turn: MutexGuard<'static, ()>,
@@ -43,13 +43,13 @@ pub fn folder(name: &str) -> PathBuf {
 ///
 /// # Panics
 /// If it can't be set up.
-pub fn bench(name: &str, change: impl FnOnce(&mut Options)) -> Alone {
+pub fn bench(name: &str, change: impl FnOnce(&mut Options)) -> ExclusiveBench {
     // A test that failed has left its bench behind it.
     let turn = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut options = Options::new(folder(name));
     change(&mut options);
     let bench = Bench::start(options, elves::both()).unwrap_or_else(|error| panic!("{error}"));
-    Alone { bench, _turn: turn }
+    ExclusiveBench { bench, _turn: turn }
 }
 
 /// Waits until `wanted` gives something.

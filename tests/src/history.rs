@@ -1,7 +1,7 @@
 //! Replays what a display board did with its own library, word for word.
 
 use firmware_display::{Display, Senses, Settings};
-use hil_sim_core::link::conditions::BYTE_NS;
+use hil_sim_core::link::impairments::BYTE_NS;
 use hil_sim_core::run::recording::{ACTUATORS, EstimateRecord, Recording};
 use protocol::MAX_FRAME;
 

@@ -12,7 +12,7 @@ use hil_sim_core::scene::{Gauges, Kinematic, Link, Motion, Scene, Series, Wavefo
 use protocol::{
     Configuration, DisplayState, Message, Role, RoleCounters, SensorConfiguration, Trip,
 };
-use tests::bench::{Alone, BAUD, Client, bench, folder, until};
+use tests::bench::{BAUD, Client, ExclusiveBench, bench, folder, until};
 use tests::elves;
 
 fn estimate(message: Message) -> Option<f32> {
@@ -91,7 +91,7 @@ fn a_host_on_either_console_hears_the_whole_conversation_and_time_keeps_behind_t
     assert_eq!(standing.sensed.wavelength_mm, 2.0);
 }
 
-fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is(alone: Alone) {
+fn the_bench_file_tells_of_both_boards_and_all_is_gone_when_the_bench_is(alone: ExclusiveBench) {
     let file = alone.bench.bench_file();
     let text = fs::read_to_string(&file).unwrap();
     for (name, key) in [

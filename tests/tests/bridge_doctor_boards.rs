@@ -8,7 +8,7 @@ use hil_sim_boards::bench::{Bench, PortName};
 use protocol::Role;
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use serde_json::Value;
-use tests::bench::{Alone, BAUD, bench};
+use tests::bench::{BAUD, ExclusiveBench, bench};
 use tests::bridge::{self, Ended, Running};
 use tests::fake_board::wait_until;
 
@@ -83,7 +83,7 @@ fn found(board: &str, kind: &str) -> (String, String) {
 #[test]
 fn a_day_at_one_bench() {
     // One specimen: at each border the sensor may say what the display finds implausible, and the doctor tells.
-    let Alone { bench, .. } = &bench("doctor", |options| {
+    let ExclusiveBench { bench, .. } = &bench("doctor", |options| {
         options
             .scene
             .surface

@@ -6,14 +6,14 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use hil_sim_boards::bench::{Command as Order, PortName};
-use tests::bench::{Alone, bench, until};
+use tests::bench::{ExclusiveBench, bench, until};
 use tests::bridge;
 use tests::terminal::Terminal;
 
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(300);
 
-fn monitor(alone: &Alone) -> Command {
+fn monitor(alone: &ExclusiveBench) -> Command {
     let mut command = bridge::command();
     command
         .arg("monitor")
@@ -22,7 +22,7 @@ fn monitor(alone: &Alone) -> Command {
     command
 }
 
-fn steady(name: &str) -> Alone {
+fn steady(name: &str) -> ExclusiveBench {
     bench(name, |options| {
         options.scene = hil_sim_core::scene::Scene::constant(2.0, 50.0);
     })

@@ -5,11 +5,11 @@
 //! of what goes by is kept: a bench may stand for days.
 
 mod baud;
-mod beside;
 mod command;
 mod folder;
 pub mod live_hand;
 mod pace;
+mod port_server;
 mod pty;
 mod socket;
 
@@ -22,19 +22,19 @@ use std::time::{Duration, Instant};
 
 use protocol::Role;
 
-pub use beside::{Outputs, Sensed};
 pub use command::{Command, NoCommand};
 pub use pace::Pace;
+pub use port_server::{Outputs, SensorView};
 
 use super::console::ConsoleHost;
 use super::pair;
 use super::{ElfError, Firmwares};
 use crate::bench::live_hand::DrivenHand;
-use beside::{Beside, Shared};
 use folder::Folder;
-use hil_sim_core::link::wire::Way;
+use hil_sim_core::link::channel::LinkChannel;
 use hil_sim_core::scene::{Gauges, Link, LiveHand, Motion, Scene, SceneError, Specimen};
 use pace::Pacer;
+use port_server::{PortServer, Shared};
 use socket::Socket;
 
 /// The folder that benches stand in by default.
@@ -194,7 +194,7 @@ pub enum ServeError {
         "the scene has weather or faults on the wire between the boards, and --apart takes it out: leave \
          [link] and the link's faults to the bridges, or the boards joined"
     )]
-    Weather,
+    Impairments,
     /// The scene has a host do wrong.
     #[error(
         "the scene's fault \"{kind}\" needs the console, which is yours on a bench: take it out"
@@ -235,7 +235,7 @@ impl From<SceneError> for ServeError {
 
 /// What a bench does at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Standing {
+pub struct BenchStatus {
     /// Virtual time, in s.
     pub now_s: f64,
     /// How far the wall clock is ahead, in all that was given up and not, in s. 0 at [`Pace::Max`].
@@ -243,7 +243,7 @@ pub struct Standing {
     /// The hand's velocity, in mm/s.
     pub hand_mm_s: f64,
     /// What the sensor board said last, and what is true.
-    pub sensed: Sensed,
+    pub sensed: SensorView,
     /// Bytes that were lost because a port's reader was too slow.
     pub dropped: u64,
 }
@@ -293,7 +293,7 @@ impl Bench {
         });
         let (ready, is_ready) = channel();
         let beside = |role, elf: &[u8], pacer| {
-            Beside::new(&scene, role, elf, shared.clone(), ready.clone(), pacer)
+            PortServer::new(&scene, role, elf, shared.clone(), ready.clone(), pacer)
         };
         let sensor = beside(Role::Sensor, &firmwares.sensor.elf, None);
         let display = beside(
@@ -407,9 +407,9 @@ impl Bench {
     }
 
     /// What the bench does at the moment.
-    pub fn standing(&self) -> Standing {
+    pub fn standing(&self) -> BenchStatus {
         let now_s = self.now_s();
-        Standing {
+        BenchStatus {
             now_s,
             behind_s: self.shared.behind_us.load(Ordering::Relaxed) as f64 * 1e-6,
             hand_mm_s: self.hand.velocity_mm_s(now_s),
@@ -466,9 +466,9 @@ fn check(scene: &Scene, hand: &Hand, is_apart: bool) -> Result<(), ServeError> {
     let disturbed = scene.link != Link::default()
         || [Role::Sensor, Role::Display]
             .into_iter()
-            .any(|role| Way::new(scene, role).has_faults());
+            .any(|role| LinkChannel::new(scene, role).has_faults());
     if is_apart && disturbed {
-        return Err(ServeError::Weather);
+        return Err(ServeError::Impairments);
     }
     match (&scene.gauges, hand) {
         (Gauges::Recorded(_), Hand::Told | Hand::Recorded(_)) => Err(ServeError::Gauges),
@@ -501,8 +501,8 @@ fn live(scene: &Scene, hand: Hand) -> DrivenHand {
 fn run(
     scene: &Scene,
     firmwares: &Firmwares,
-    sensor: Beside,
-    display: Beside,
+    sensor: PortServer,
+    display: PortServer,
     shared: &Shared,
 ) -> Result<(), ServeError> {
     let ended = pair::run(scene, firmwares, sensor, display);

@@ -9,7 +9,7 @@ use protocol::{
 
 use super::lockstep::QUANTUM_NS;
 use super::nucleo::{CONSOLE_UART, Nucleo, Pins};
-use hil_sim_core::link::conditions::BYTE_NS;
+use hil_sim_core::link::impairments::BYTE_NS;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::{Fault, Kind};
 

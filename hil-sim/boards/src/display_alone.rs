@@ -20,19 +20,19 @@ use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, 
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
+use super::board_pins::BoardPins;
 use super::display::DisplayPins;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
 use super::recorder::WARM_UP_NS;
 use super::rtt::Log;
-use super::watched::Watched;
 use super::{ElfError, Firmware};
-use hil_sim_core::link::conditions::{BYTE_NS, Weather};
+use hil_sim_core::link::impairments::{BYTE_NS, Impairments};
 use hil_sim_core::plant::fault::hand::HandFault;
 use hil_sim_core::plant::world::World;
+use hil_sim_core::run::decoder::MessageDecoder;
 use hil_sim_core::run::digest::Digest;
-use hil_sim_core::run::listener::Listener;
+use hil_sim_core::run::fault_evidence::FaultEvidence;
 use hil_sim_core::run::recording::{Engine, EstimateRecord, Recording, TickRecord};
-use hil_sim_core::run::signs::Signs;
 use hil_sim_core::scene::{Link, Motion, Scene};
 
 /// How often the far end looks at what it has heard and has to say.
@@ -49,14 +49,14 @@ const SLOWEST_MM_S: f64 = 5.0;
 
 /// What the far end's sensor says of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Said {
+pub struct SensorMessage {
     /// λ in mm.
     pub wavelength_mm: f64,
     /// Amplitude in ADC steps.
     pub amplitude_lsb: f32,
 }
 
-impl Said {
+impl SensorMessage {
     /// λ on a surface of usual height.
     pub const fn of(wavelength_mm: f64) -> Self {
         Self {
@@ -92,10 +92,10 @@ impl Said {
 }
 
 /// λ and amplitude over s since the start.
-pub type Surface = Box<dyn Fn(f64) -> Said + Send>;
+pub type Surface = Box<dyn Fn(f64) -> SensorMessage + Send>;
 
 /// A run to be made.
-pub struct Alone {
+pub struct DisplayBench {
     /// What the board is told to be before the first estimate.
     pub configuration: DisplayConfiguration,
     /// How the actuators are described to it.
@@ -112,14 +112,14 @@ pub struct Alone {
     pub duration_s: f64,
 }
 
-impl Alone {
+impl DisplayBench {
     /// A constant λ, a fair link, everything else as the board starts with.
     pub fn new(hand: Motion, wavelength_mm: f64, duration_s: f64) -> Self {
         Self {
             configuration: DisplayConfiguration::DEFAULT,
             actuators: DEFAULT_ACTUATORS,
             hand,
-            surface: Box::new(move |_| Said::of(wavelength_mm)),
+            surface: Box::new(move |_| SensorMessage::of(wavelength_mm)),
             link: Link::default(),
             seed: 1,
             duration_s,
@@ -151,7 +151,7 @@ pub struct AloneRun {
 }
 
 /// Somebody who looks on while the board runs.
-pub(super) trait Witness: Send + 'static {
+pub(super) trait BoardHook: Send + 'static {
     /// The run has come to an instant at which the far end is served, each millisecond.
     fn on_look(&mut self, _at_ns: u64, _host: &mut dyn Host) {}
 
@@ -159,19 +159,19 @@ pub(super) trait Witness: Send + 'static {
     fn on_settled(&mut self, _settled: &Settled) {}
 }
 
-impl Witness for () {}
+impl BoardHook for () {}
 
 /// Runs `firmware` as `alone` says.
 ///
 /// # Errors
 /// If the board can't be emulated, stops before the end, or refuses the configuration.
-pub fn run(alone: Alone, firmware: &Firmware) -> Result<AloneRun, ElfError> {
+pub fn run(alone: DisplayBench, firmware: &Firmware) -> Result<AloneRun, ElfError> {
     run_before(alone, firmware, ()).map(|(run, ())| run)
 }
 
 /// The same, before a witness, who is given back.
-pub(super) fn run_before<W: Witness>(
-    alone: Alone,
+pub(super) fn run_before<W: BoardHook>(
+    alone: DisplayBench,
     firmware: &Firmware,
     witness: W,
 ) -> Result<(AloneRun, W), ElfError> {
@@ -196,7 +196,7 @@ pub(super) fn run_before<W: Witness>(
     let session = Session::new(Box::new(board.running(&images)), 0, VirtualNanos(LOOK_NS))
         .map_err(|error| board_error(error.to_string()))?;
     let driver = Solo {
-        far: FarEnd::new(alone),
+        far: ScriptedSensor::new(alone),
         log: Log::find(&firmware.elf),
         next_look_ns: LOOK_NS,
         next_log_ns: LOG_NS,
@@ -267,7 +267,7 @@ pub(super) fn run_before<W: Witness>(
             warm_up_s,
             wall_s: (ended - begun).as_secs_f64(),
             hash: digest.finish(),
-            signs: Signs::default(),
+            signs: FaultEvidence::default(),
             scans: Vec::new(),
             ticks: left.ticks,
             estimates: far.estimates,
@@ -297,27 +297,27 @@ fn wrong_rate(ticks: &[TickRecord], rate_hz: u32) -> Option<String> {
 }
 
 /// The scripted sensor, and the way from it to the board.
-struct FarEnd {
-    alone: Alone,
+struct ScriptedSensor {
+    alone: DisplayBench,
     port: Port,
-    weather: Weather,
+    weather: Impairments,
     asked_ns: Option<u64>,
     configured_ns: Option<u64>,
     refused: Option<String>,
     next_estimate_ns: u64,
     /// When its UART has sent all that it was given so far.
     free_ns: u64,
-    heard: Listener,
+    heard: MessageDecoder,
     estimates: Vec<EstimateRecord>,
     statuses: Vec<(u64, Status)>,
     safety: Vec<Safety>,
     motions: u64,
 }
 
-impl FarEnd {
-    fn new(alone: Alone) -> Self {
+impl ScriptedSensor {
+    fn new(alone: DisplayBench) -> Self {
         Self {
-            weather: Weather::new(&alone.link, alone.seed, TO_DISPLAY),
+            weather: Impairments::new(&alone.link, alone.seed, TO_DISPLAY),
             alone,
             port: Port::new(Hello::new(Role::Sensor, "hil-sim", [0, 1, 0])),
             asked_ns: None,
@@ -325,7 +325,7 @@ impl FarEnd {
             refused: None,
             next_estimate_ns: 0,
             free_ns: 0,
-            heard: Listener::default(),
+            heard: MessageDecoder::default(),
             estimates: Vec::new(),
             statuses: Vec::new(),
             safety: Vec::new(),
@@ -451,7 +451,7 @@ impl FarEnd {
 }
 
 struct Solo<W> {
-    far: FarEnd,
+    far: ScriptedSensor,
     log: Option<Log>,
     next_look_ns: u64,
     next_log_ns: u64,
@@ -461,7 +461,7 @@ struct Solo<W> {
     witness: W,
 }
 
-impl<W: Witness> Driver<Nucleo<DisplayPins>> for Solo<W> {
+impl<W: BoardHook> Driver<Nucleo<DisplayPins>> for Solo<W> {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<DisplayPins>>,
@@ -481,7 +481,12 @@ impl<W: Witness> Driver<Nucleo<DisplayPins>> for Solo<W> {
             ..
         } = settled
         {
-            <DisplayPins as Watched>::on_write(session.board_mut(), address, value, virtual_time.0);
+            <DisplayPins as BoardPins>::on_write(
+                session.board_mut(),
+                address,
+                value,
+                virtual_time.0,
+            );
         }
     }
 

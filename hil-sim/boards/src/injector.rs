@@ -10,9 +10,9 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::{ADC3, RCC, TIM3};
 
+use super::board_pins::BoardPins;
 use super::nucleo::Nucleo;
 use super::traps::{Trap, Traps};
-use super::watched::Watched;
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::{Fault, Kind};
@@ -96,7 +96,7 @@ impl Injector {
     }
 
     /// Does what is due; true if power has been cut.
-    pub fn act<P: Watched>(
+    pub fn act<P: BoardPins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,
@@ -118,7 +118,7 @@ impl Injector {
         is_cut
     }
 
-    fn power<P: Watched>(
+    fn power<P: BoardPins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,
@@ -141,7 +141,7 @@ impl Injector {
     }
 
     /// What is done to the processor; false if it can't be.
-    fn injure<P: Watched>(
+    fn injure<P: BoardPins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,

@@ -15,7 +15,7 @@ use rigless::emulator::{Access, Hit, HitKind, Host, Settled, Watch};
 
 use super::{ElfError, Firmware};
 use crate::display_alone;
-use crate::display_alone::{Alone, Witness};
+use crate::display_alone::{BoardHook, DisplayBench};
 
 /// Instructions that a board retires in a second, as the emulator counts them.
 pub const BUDGET: u64 = super::nucleo::INSTRUCTIONS_PER_SECOND.get();
@@ -42,13 +42,17 @@ pub struct Counted {
 ///
 /// # Errors
 /// If the board can't be run, or the ELF's code can't be read.
-pub fn count(alone: Alone, firmware: &Firmware, counted_s: f64) -> Result<Counted, ElfError> {
+pub fn count(
+    alone: DisplayBench,
+    firmware: &Firmware,
+    counted_s: f64,
+) -> Result<Counted, ElfError> {
     let code = instructions(&firmware.elf)
         .ok_or_else(|| unreadable("it has no code with mapping symbols"))?;
     let end_ns = (alone.duration_s * 1e3).ceil() as u64 * 1_000_000;
     let from_ns = end_ns - (counted_s * 1e3).round() as u64 * 1_000_000;
     let functions = functions(&firmware.elf);
-    let watched = Watched {
+    let watched = WatchedCode {
         code,
         routines: routines(&functions),
         caller: None,
@@ -97,7 +101,7 @@ fn unreadable(reason: &str) -> ElfError {
 }
 
 /// Counts how often each instruction is come to.
-struct Watched {
+struct WatchedCode {
     code: Vec<u64>,
     /// Where the compiler's routines begin and end.
     routines: Vec<std::ops::Range<u64>>,
@@ -113,7 +117,7 @@ struct Watched {
     refused: usize,
 }
 
-impl Witness for Watched {
+impl BoardHook for WatchedCode {
     fn on_look(&mut self, at_ns: u64, host: &mut dyn Host) {
         if at_ns < self.from_ns {
             return;

@@ -3,6 +3,7 @@
 
 #[cfg(target_os = "linux")]
 pub mod bench;
+mod board_pins;
 mod console;
 pub mod cost;
 pub mod dac81416;
@@ -21,7 +22,6 @@ mod sensor;
 pub mod soak;
 mod terminal;
 mod traps;
-mod watched;
 mod wire;
 
 use std::time::Instant;
@@ -35,10 +35,10 @@ pub use recorder::WARM_UP_NS;
 pub use terminal::{Terminal, Terminals};
 
 use display::DisplayRecords;
+use hil_sim_core::run::decoder::{MessageDecoder, TimedMessage};
 use hil_sim_core::run::digest::Digest;
-use hil_sim_core::run::listener::{Listener, Said};
+use hil_sim_core::run::fault_evidence::FaultEvidence;
 use hil_sim_core::run::recording::{Engine, EstimateRecord, Recording, ScanRecord};
-use hil_sim_core::run::signs::Signs;
 use hil_sim_core::scene::{Scene, SceneError};
 use pair::Finished;
 use recorder::Recorder;
@@ -180,18 +180,18 @@ fn record(
     digest.outputs(&display.records.outputs);
 
     // What the sensor said, and what of it reached the display.
-    let mut said = Listener::default();
+    let mut said = MessageDecoder::default();
     said.hear(&sensor.witness.sent);
-    let mut heard = Listener::default();
+    let mut heard = MessageDecoder::default();
     heard.hear(&display.witness.heard);
-    let mut display_said = Listener::default();
+    let mut display_said = MessageDecoder::default();
     display_said.hear(&display.witness.sent);
 
     let clock_offset_ns = clock_offset_ns(&said, &sensor.records);
     let mut estimates: Vec<EstimateRecord> = Vec::new();
     // A sensor that has started again, or goes by a clock of its own, says nothing of the scene's.
     let keeps_time = sensor.clock.is_true() && sensor.resets.is_empty();
-    for Said { at_ns, message } in said.messages() {
+    for TimedMessage { at_ns, message } in said.messages() {
         if let Message::Estimate(estimate) = message {
             let made_ns = (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns);
             estimates.push(EstimateRecord {
@@ -204,7 +204,7 @@ fn record(
     // Estimates come in their order but for a few.
     const REORDERED: usize = 256;
     let mut last: usize = 0;
-    for Said { at_ns, message } in heard.messages() {
+    for TimedMessage { at_ns, message } in heard.messages() {
         let from = last.saturating_sub(REORDERED);
         if let Message::Estimate(received) = message
             && let Some(found) = estimates[from..]
@@ -243,7 +243,7 @@ fn record(
         sensor_status,
         display_status,
         log,
-        signs: Signs {
+        signs: FaultEvidence {
             display: display_said.into_messages(),
             sensor: said.into_messages(),
             resets,
@@ -253,7 +253,7 @@ fn record(
 }
 
 /// What the sensor's clock is ahead of the scene's, from the first estimate and the scan that it ends with.
-fn clock_offset_ns(said: &Listener, scans: &[ScanRecord]) -> i64 {
+fn clock_offset_ns(said: &MessageDecoder, scans: &[ScanRecord]) -> i64 {
     let first = said.messages().find_map(|said| match said.message {
         Message::Estimate(estimate) => Some(estimate),
         _ => None,
@@ -265,7 +265,7 @@ fn clock_offset_ns(said: &Listener, scans: &[ScanRecord]) -> i64 {
     })
 }
 
-fn last_status(listener: &Listener) -> Option<Status> {
+fn last_status(listener: &MessageDecoder) -> Option<Status> {
     listener
         .messages()
         .rev()

@@ -8,11 +8,11 @@ use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
+use super::board_pins::BoardPins;
 use super::injector::Injector;
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
-use super::watched::Watched;
 use super::wire::TimedByte;
-use hil_sim_core::link::wire::Way;
+use hil_sim_core::link::channel::LinkChannel;
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::scene::Scene;
 
@@ -30,7 +30,7 @@ pub(super) const PORTIONS_READY: usize = 3;
 const LOG_PERIOD_NS: u64 = 10_000_000;
 
 /// A board between two quanta.
-pub struct Between<'a, P: Watched> {
+pub struct QuantumContext<'a, P: BoardPins> {
     /// The board, as it is run.
     pub session: &'a mut Session<Nucleo<P>>,
     /// What runs it.
@@ -45,7 +45,7 @@ pub struct Between<'a, P: Watched> {
 
 /// What stands beside one board of a pair and makes something of what it sees: all instants are the
 /// scene's clock's.
-pub trait Witness<P: Watched>: Send + 'static {
+pub trait BoardHook<P: BoardPins>: Send + 'static {
     /// The quantum that ends at `now_ns` is over; nothing of it has been exchanged yet.
     fn begin(&mut self, _now_ns: u64) {}
 
@@ -62,7 +62,7 @@ pub trait Witness<P: Watched>: Send + 'static {
 
     /// The peers' bytes have been exchanged: the console's turn, and whatever else is to be done to the
     /// board.
-    fn attend(&mut self, between: Between<'_, P>);
+    fn attend(&mut self, between: QuantumContext<'_, P>);
 
     /// The log is to be read.
     fn log(&mut self, now_ns: u64, host: &mut dyn Host);
@@ -86,7 +86,7 @@ pub struct Cable {
 pub struct Lockstep<W> {
     cable: Cable,
     /// What the peer's bytes go through.
-    way: Way,
+    way: LinkChannel,
     /// What the scene's delay leaves of [`QUANTUM_NS`].
     more_ns: u64,
     injector: Injector,
@@ -118,7 +118,7 @@ impl<W> Lockstep<W> {
         };
         Self {
             cable,
-            way: Way::new(scene, role),
+            way: LinkChannel::new(scene, role),
             more_ns: QUANTUM_NS.saturating_sub(delay_ns),
             injector: Injector::new(scene, role, elf, clock.clone()),
             clock,
@@ -145,9 +145,9 @@ impl<W> Lockstep<W> {
 
     /// Gives the other board what this one has sent in the portion that ends at `now_ns`, and takes what it
     /// sent in the one before; false if it is gone.
-    fn exchange<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
+    fn exchange<P: BoardPins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
     where
-        W: Witness<P>,
+        W: BoardHook<P>,
     {
         let mut portion = board.wire(PEER_UART).take_sent();
         for (at_ns, _) in &mut portion {
@@ -186,7 +186,7 @@ impl<W> Lockstep<W> {
     }
 
     /// What comes next, by the board's clock.
-    fn next_stop<P: Watched>(&self, board: &mut Nucleo<P>, local_ns: u64) -> VirtualNanos {
+    fn next_stop<P: BoardPins>(&self, board: &mut Nucleo<P>, local_ns: u64) -> VirtualNanos {
         let mut next_ns = self.clock.local_ns(self.next_exchange_ns);
         let due = [PEER_UART, CONSOLE_UART].map(|uart| board.wire(uart).next_due());
         for due_ns in due.into_iter().chain([self.injector.next_ns()]).flatten() {
@@ -198,7 +198,7 @@ impl<W> Lockstep<W> {
     }
 }
 
-impl<P: Watched, W: Witness<P>> Driver<Nucleo<P>> for Lockstep<W> {
+impl<P: BoardPins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<P>>,
@@ -249,7 +249,7 @@ impl<P: Watched, W: Witness<P>> Driver<Nucleo<P>> for Lockstep<W> {
             self.next_exchange_ns += PORTION_NS;
         }
         if now_ns >= self.next_quantum_ns {
-            self.witness.attend(Between {
+            self.witness.attend(QuantumContext {
                 session: &mut *session,
                 host,
                 stop,

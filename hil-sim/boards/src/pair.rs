@@ -8,18 +8,18 @@ use rigless::emulator::{self, Start};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
+use super::board_pins::BoardPins;
 use super::display::DisplayPins;
-use super::lockstep::{Cable, Lockstep, PORTION_NS, PORTIONS_READY, Witness};
+use super::lockstep::{BoardHook, Cable, Lockstep, PORTION_NS, PORTIONS_READY};
 use super::nucleo::Nucleo;
 use super::sensor::SensorPins;
 use super::traps::Traps;
-use super::watched::Watched;
 use super::{ElfError, Firmware, Firmwares};
 use hil_sim_core::plant::arm::Arm;
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::plant::fault::hand::HandFault;
 use hil_sim_core::plant::world::World;
-use hil_sim_core::run::signs::Reset;
+use hil_sim_core::run::fault_evidence::Reset;
 use hil_sim_core::scene::Scene;
 
 /// What is said of a board whose fellow failed.
@@ -39,7 +39,7 @@ pub struct Finished<R, W> {
     pub resets: Vec<Reset>,
 }
 
-type Left<P, W> = Finished<<P as Watched>::Records, W>;
+type Left<P, W> = Finished<<P as BoardPins>::Records, W>;
 /// What the sensor board leaves behind, and the display board.
 pub type Both<S, D> = (Left<SensorPins, S>, Left<DisplayPins, D>);
 
@@ -54,8 +54,8 @@ pub fn run<S, D>(
     display: D,
 ) -> Result<Both<S, D>, ElfError>
 where
-    S: Witness<SensorPins>,
-    D: Witness<DisplayPins>,
+    S: BoardHook<SensorPins>,
+    D: BoardHook<DisplayPins>,
 {
     let (sensor_world, display_world) = (World::new(scene)?, World::new(scene)?);
     let arm = Arm::new(&scene.arm, &scene.motion);
@@ -107,7 +107,7 @@ fn is_abandoned(error: &ElfError) -> bool {
     matches!(error, ElfError::Stopped { reason, .. } if reason == ABANDONED)
 }
 
-fn drive<P: Watched, W: Witness<P>>(
+fn drive<P: BoardPins, W: BoardHook<P>>(
     role: Role,
     board: Result<Nucleo<P>, rigless::soc::Error>,
     firmware: &Firmware,

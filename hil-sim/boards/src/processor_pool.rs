@@ -21,7 +21,7 @@ use twox_hash::XxHash3_64;
 const RUNS: u32 = 64;
 
 /// Processors without a run.
-static IDLE: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+static IDLE: Mutex<Vec<PooledProcessor>> = Mutex::new(Vec::new());
 
 /// What a processor is to run: equal for equal images at equal places.
 pub fn program(images: &[Image]) -> u64 {
@@ -40,9 +40,9 @@ pub fn keep(spec: &mut CoreSpec, program: u64) {
     spec.processor = Arc::new(move |endian| {
         let kept = match idle(program) {
             Some(kept) => kept,
-            None => Kept::new(&make, endian, program)?,
+            None => PooledProcessor::new(&make, endian, program)?,
         };
-        Ok(Box::new(Lent {
+        Ok(Box::new(Lease {
             kept: Some(kept),
             mapped: Vec::new(),
             is_as_made: true,
@@ -51,7 +51,7 @@ pub fn keep(spec: &mut CoreSpec, program: u64) {
 }
 
 /// A processor that waits for a run of this program, at power-up.
-fn idle(program: u64) -> Option<Kept> {
+fn idle(program: u64) -> Option<PooledProcessor> {
     let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
     let at = idle.iter().position(|kept| kept.program == program)?;
     let mut kept = idle.swap_remove(at);
@@ -69,7 +69,7 @@ impl Page {
 }
 
 /// A processor, and what it takes to use it again.
-struct Kept {
+struct PooledProcessor {
     processor: Box<dyn Processor>,
     /// Another one that never runs, once there has been a reset.
     twin: Option<Box<dyn Processor>>,
@@ -84,7 +84,7 @@ struct Kept {
     ground: Vec<Page>,
 }
 
-impl Kept {
+impl PooledProcessor {
     fn new(make: &ProcessorConstructor, endian: Endian, program: u64) -> Result<Self, Error> {
         let processor = make(endian)?;
         Ok(Self {
@@ -152,15 +152,15 @@ struct Mapped {
 }
 
 /// A processor for the length of a run. No debugger is ever attached to one.
-struct Lent {
+struct Lease {
     /// None only while it is dropped.
-    kept: Option<Kept>,
+    kept: Option<PooledProcessor>,
     mapped: Vec<Mapped>,
     /// Whether [`Processor::load`] puts back all that the run has changed.
     is_as_made: bool,
 }
 
-impl Lent {
+impl Lease {
     fn processor(&self) -> &dyn Processor {
         &*self.kept.as_ref().expect("kept until dropped").processor
     }
@@ -170,7 +170,7 @@ impl Lent {
     }
 }
 
-impl Drop for Lent {
+impl Drop for Lease {
     fn drop(&mut self) {
         let Some(mut kept) = self.kept.take() else {
             return;
@@ -186,13 +186,13 @@ impl Drop for Lent {
     }
 }
 
-impl Debug for Lent {
+impl Debug for Lease {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
         self.processor().fmt(formatter)
     }
 }
 
-impl Processor for Lent {
+impl Processor for Lease {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         self.processor_mut().run(budget, bus)
     }

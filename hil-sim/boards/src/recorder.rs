@@ -6,13 +6,13 @@ use protocol::Role;
 use rigless::emulator::Host;
 
 use super::ElfError;
+use super::board_pins::BoardPins;
 use super::console::{ConsoleHost, Told};
-use super::lockstep::{Between, Witness};
+use super::lockstep::{BoardHook, QuantumContext};
 use super::nucleo::Nucleo;
 use super::rtt::Log;
 use super::terminal;
 use super::terminal::Terminal;
-use super::watched::Watched;
 use super::wire::TimedByte;
 use hil_sim_core::scene::Scene;
 
@@ -75,7 +75,7 @@ impl Recorder {
     }
 }
 
-impl<P: Watched> Witness<P> for Recorder {
+impl<P: BoardPins> BoardHook<P> for Recorder {
     fn sent(&mut self, _board: &mut Nucleo<P>, sent: &[TimedByte]) {
         self.sent.extend_from_slice(sent);
     }
@@ -84,7 +84,7 @@ impl<P: Watched> Witness<P> for Recorder {
         self.heard.push((due_ns, byte));
     }
 
-    fn attend(&mut self, between: Between<'_, P>) {
+    fn attend(&mut self, between: QuantumContext<'_, P>) {
         if let Some(host) = &mut self.console {
             host.serve(between.session.board_mut(), between.now_ns);
         } else if let Some(terminal) = &mut self.terminal {

@@ -12,15 +12,15 @@ use rigless::emulator::Host;
 
 pub use tally::Check;
 
+use super::board_pins::BoardPins;
 use super::console::ConsoleHost;
 use super::display::DisplayPins;
-use super::lockstep::{Between, Witness};
+use super::lockstep::{BoardHook, QuantumContext};
 use super::nucleo::Nucleo;
 use super::pair;
 use super::pair::Finished;
 use super::rtt::Log;
 use super::sensor::SensorPins;
-use super::watched::Watched;
 use super::wire::TimedByte;
 use super::{ElfError, Firmware, Firmwares};
 use hil_sim_core::scene::{ArmDrive, Follows, Gauges, Kinematic, Link, Motion, Scene, Specimen};
@@ -142,7 +142,7 @@ fn scene(soak: &Soak, end_ns: u64, hand: Motion) -> Scene {
 }
 
 /// What is taken from a board's pins at the end of every quantum.
-trait Drained: Watched {
+trait Drained: BoardPins {
     fn drain(board: &mut Nucleo<Self>, outputs: &mut Outputs)
     where
         Self: Sized;
@@ -174,7 +174,7 @@ struct Half {
     progress: Option<Box<dyn Fn(f64) + Send>>,
 }
 
-impl<P: Drained> Witness<P> for Half {
+impl<P: Drained> BoardHook<P> for Half {
     fn sent(&mut self, board: &mut Nucleo<P>, sent: &[TimedByte]) {
         P::drain(board, &mut self.outputs);
         self.side.sent(sent, &self.outputs);
@@ -188,7 +188,7 @@ impl<P: Drained> Witness<P> for Half {
         self.side.arrived(due_ns, byte);
     }
 
-    fn attend(&mut self, between: Between<'_, P>) {
+    fn attend(&mut self, between: QuantumContext<'_, P>) {
         let now_ns = between.now_ns;
         self.console.serve(between.session.board_mut(), now_ns);
         if now_ns >= self.next_told_ns {

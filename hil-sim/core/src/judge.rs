@@ -26,7 +26,7 @@ pub mod words;
 use protocol::Estimate;
 
 use crate::judge::truth::Truth;
-use crate::run::observer::{Onlooker, retell};
+use crate::run::observer::{RunObserver, replay_to};
 use crate::run::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
 
 pub use actuators::{Actuators, Held};
@@ -47,7 +47,7 @@ pub struct Verdict {
 /// Judges a recording. What a recording is too short or too empty to tell is none, never NaN.
 pub fn judge(truth: &Truth, recording: &Recording) -> Verdict {
     let mut judge = Judge::new(truth);
-    retell(recording, &mut judge);
+    replay_to(recording, &mut judge);
     judge.finish()
 }
 
@@ -94,14 +94,14 @@ impl<'a> Judge<'a> {
     }
 }
 
-impl Onlooker for Judge<'_> {
+impl RunObserver for Judge<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         self.estimates.scan(scan);
     }
 
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.estimates.made(made_ns, estimate);
-        self.actuators.made(made_ns, estimate);
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.estimates.on_estimate(made_ns, estimate);
+        self.actuators.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {

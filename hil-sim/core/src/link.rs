@@ -1,5 +1,5 @@
 //! What the way between the boards does to frames: delay, jitter, loss, reordering, corruption, forged frames.
 
-pub mod conditions;
+pub mod channel;
 pub mod forger;
-pub mod wire;
+pub mod impairments;

@@ -10,21 +10,21 @@
 
 use std::time::Instant;
 
-use crate::link::conditions::BYTE_NS;
-use crate::link::wire::Way;
+use crate::link::channel::LinkChannel;
+use crate::link::impairments::BYTE_NS;
 use crate::plant::arm::Arm;
 use crate::plant::fault::clock::Clock;
 use crate::plant::fault::gauges::GaugeFaults;
 use crate::plant::fault::hand::HandFault;
 use crate::plant::motion::encoder;
 use crate::plant::world::World;
+use crate::run::decoder::TimedMessage;
 use crate::run::digest::Digest;
-use crate::run::listener::Said;
-use crate::run::observer::Onlooker;
+use crate::run::fault_evidence::FaultEvidence;
+use crate::run::observer::RunObserver;
 use crate::run::recording::{
     Engine, EstimateRecord, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
 };
-use crate::run::signs::Signs;
 use crate::scene::fault::Fault;
 use crate::scene::fault::catalogue::Needs;
 use crate::scene::{Scene, SceneError};
@@ -66,7 +66,7 @@ pub fn run(scene: &Scene) -> Result<Recording, SceneError> {
 ///
 /// # Errors
 /// If the scene cannot be run.
-pub fn run_before(scene: &Scene, onlooker: &mut impl Onlooker) -> Result<Ran, SceneError> {
+pub fn run_before(scene: &Scene, onlooker: &mut impl RunObserver) -> Result<Ran, SceneError> {
     let mut pair = Pair::new(scene, onlooker)?;
     let steps = (scene.duration_s * f64::from(firmware_sensor::SCAN_RATE_HZ)).round() as u64;
     let started = Instant::now();
@@ -130,10 +130,10 @@ struct Pair<'o, O> {
     onlooker: &'o mut O,
 }
 
-impl<'o, O: Onlooker> Pair<'o, O> {
+impl<'o, O: RunObserver> Pair<'o, O> {
     fn new(scene: &Scene, onlooker: &'o mut O) -> Result<Self, SceneError> {
         check(scene)?;
-        let end = |role, mark, to| End::new(role, Way::new(scene, to), mark);
+        let end = |role, mark, to| End::new(role, LinkChannel::new(scene, to), mark);
         Ok(Self {
             world: World::new(scene)?,
             arm: Arm::new(&scene.arm, &scene.motion),
@@ -259,7 +259,7 @@ impl<'o, O: Onlooker> Pair<'o, O> {
         }
         if let Some(estimate) = output.estimate {
             self.say(Role::Sensor, now_ns, Message::Estimate(estimate));
-            self.onlooker.made(now_ns, &estimate);
+            self.onlooker.on_estimate(now_ns, &estimate);
             let sent = self
                 .sensor_end
                 .send(now_ns, &Message::Estimate(estimate), &mut self.digest);
@@ -333,7 +333,7 @@ impl<'o, O: Onlooker> Pair<'o, O> {
 
     /// Tells what a board says of itself.
     fn say(&mut self, role: Role, at_ns: u64, message: Message) {
-        self.onlooker.said(role, &Said { at_ns, message });
+        self.onlooker.said(role, &TimedMessage { at_ns, message });
     }
 }
 
@@ -353,7 +353,7 @@ fn display_of(scene: &Scene) -> Result<Display, SceneError> {
 /// A board's port towards the other board, and the wire that leads away from it.
 struct End {
     port: Port,
-    wire: Way,
+    wire: LinkChannel,
     /// When the wire has carried all that was sent so far.
     free_ns: u64,
     /// The board's mark in the hash.
@@ -361,7 +361,7 @@ struct End {
 }
 
 impl End {
-    fn new(role: Role, wire: Way, mark: u8) -> Self {
+    fn new(role: Role, wire: LinkChannel, mark: u8) -> Self {
         Self {
             port: Port::new(Hello::new(role, CHIP, VERSION)),
             wire,
@@ -403,7 +403,7 @@ impl End {
 
     /// Takes what has arrived over the peer's `wire`, and hands on each message with its last byte's
     /// arrival.
-    fn hear(&mut self, wire: &mut Way, now_ns: u64, mut handle: impl FnMut(u64, Message)) {
+    fn hear(&mut self, wire: &mut LinkChannel, now_ns: u64, mut handle: impl FnMut(u64, Message)) {
         let mut bytes = [0; 64];
         let mut length = 0;
         while let Some((due_ns, byte)) = wire.pop(now_ns) {
@@ -429,7 +429,7 @@ struct Tape {
     ticks: Vec<TickRecord>,
     estimates: Vec<EstimateRecord>,
     outputs: Vec<OutputRecord>,
-    signs: Signs,
+    signs: FaultEvidence,
 }
 
 impl Tape {
@@ -441,7 +441,7 @@ impl Tape {
             ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
             outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
-            signs: Signs::default(),
+            signs: FaultEvidence::default(),
         }
     }
 
@@ -464,12 +464,12 @@ impl Tape {
     }
 }
 
-impl Onlooker for Tape {
+impl RunObserver for Tape {
     fn scan(&mut self, scan: &ScanRecord) {
         self.scans.push(*scan);
     }
 
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
         self.estimates.push(EstimateRecord {
             made_ns,
             received_ns: None,
@@ -491,7 +491,7 @@ impl Onlooker for Tape {
         }
     }
 
-    fn said(&mut self, role: Role, said: &Said) {
+    fn said(&mut self, role: Role, said: &TimedMessage) {
         match role {
             Role::Sensor => self.signs.sensor.push(said.clone()),
             Role::Display => self.signs.display.push(said.clone()),

@@ -1,8 +1,8 @@
 //! What a run leaves behind, and who listens while it goes on.
 
 pub mod batch;
+pub mod decoder;
 pub mod digest;
-pub mod listener;
+pub mod fault_evidence;
 pub mod observer;
 pub mod recording;
-pub mod signs;

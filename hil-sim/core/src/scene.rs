@@ -162,9 +162,9 @@ pub enum Follows {
 /// on recorded gauges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// Which rung: the scene's, or with `"auto"` what [`crate::plant::contact::ladder`] chose.
-    pub rung: Rung,
-    /// How sticky the surface is; none: not at all. Always some with [`Rung::StickSlip`], none below it.
+    /// Which rung: the scene's, or with `"auto"` what [`crate::plant::contact::select`] chose.
+    pub rung: ContactModel,
+    /// How sticky the surface is; none: not at all. Always some with [`ContactModel::StickSlip`], none below it.
     pub friction: Option<Friction>,
     /// How its equations are solved.
     pub solver: Solver,
@@ -172,7 +172,7 @@ pub struct Contact {
 
 /// The rungs of the ladder of contact models, the simplest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Rung {
+pub enum ContactModel {
     /// The fingertip is where the arm is, a point.
     Kinematic,
     /// The same, a patch.
@@ -199,7 +199,7 @@ pub enum Solver {
     },
 }
 
-impl Rung {
+impl ContactModel {
     /// All of them, the simplest first.
     pub const ALL: [Self; 5] = [
         Self::Kinematic,
@@ -228,10 +228,10 @@ impl Rung {
 
 impl Contact {
     /// Where the arm is, a point.
-    pub const KINEMATIC: Self = Self::of(Rung::Kinematic, None);
+    pub const KINEMATIC: Self = Self::of(ContactModel::Kinematic, None);
 
     /// A rung as it is solved by default.
-    pub const fn of(rung: Rung, friction: Option<Friction>) -> Self {
+    pub const fn of(rung: ContactModel, friction: Option<Friction>) -> Self {
         Self {
             rung,
             friction,
@@ -241,7 +241,7 @@ impl Contact {
 
     /// A slider that sticks and slips.
     pub const fn stick_slip(friction: Friction) -> Self {
-        Self::of(Rung::StickSlip, Some(friction))
+        Self::of(ContactModel::StickSlip, Some(friction))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::instructions;
 use hil_sim_boards::instructions::{BUDGET, Counted};
 use hil_sim_core::scene::Motion;
@@ -69,13 +69,13 @@ impl Budget {
                 let motion = Motion::Constant {
                     speed_mm_s: SPEED_MM_S,
                 };
-                let alone = Alone {
+                let alone = DisplayBench {
                     configuration: DisplayConfiguration {
                         mode,
                         update_rate,
                         ..DisplayConfiguration::DEFAULT
                     },
-                    ..Alone::new(motion, WAVELENGTH_MM, SETTLING_S + COUNTED_S)
+                    ..DisplayBench::new(motion, WAVELENGTH_MM, SETTLING_S + COUNTED_S)
                 };
                 let counted = instructions::count(alone, &firmware, COUNTED_S)?;
                 let head = format!("{} Hz {}", update_rate.hz(), word_of_mode(mode));

@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use clap::Subcommand;
 use hil_sim_core::scene::Scene;
 use hil_sim_studies::estimators::bank;
-use hil_sim_studies::estimators::contest;
-use hil_sim_studies::estimators::contest::contestants;
+use hil_sim_studies::estimators::benchmark;
+use hil_sim_studies::estimators::benchmark::contestants;
 use hil_sim_studies::estimators::costs::Costs;
 use hil_sim_studies::estimators::efficiency;
 use hil_sim_studies::estimators::family;
-use hil_sim_studies::estimators::result::{ContestResult, Entry};
+use hil_sim_studies::estimators::result::{BenchmarkResult, Entry};
 use hil_sim_studies::estimators::score::Score;
 
 use super::files::{create_folder, keep};
@@ -106,7 +106,7 @@ impl Estimators {
 
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
         let progress = progress(scenes.len() as u64, "scenes");
-        let summaries = contest::run(&contestants, &scenes, |_| 0.0, || progress.inc(1))?;
+        let summaries = benchmark::run(&contestants, &scenes, |_| 0.0, || progress.inc(1))?;
         progress.finish_and_clear();
 
         let mut entries = bank::entries(&families)?;
@@ -130,7 +130,7 @@ impl Estimators {
             }
         });
         entries.extend(running);
-        let result = ContestResult { families, entries };
+        let result = BenchmarkResult { families, entries };
         keep(&result, &self.out)
     }
 }

@@ -8,12 +8,12 @@ use anyhow::bail;
 use hil_sim_core::run::batch;
 use hil_sim_core::scene::SceneError;
 use hil_sim_studies::output::annotation::Annotation;
-use hil_sim_studies::output::golden::{Golden, Standing, complaint};
+use hil_sim_studies::output::golden::{Comparison, Golden, complaint};
 
 use super::progress;
+use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
-use super::way::{Loaded, Way};
 
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Command {
@@ -42,7 +42,7 @@ pub(super) struct What {
     #[arg(long, value_name = "FILE", default_value = "golden.toml")]
     file: PathBuf,
     #[command(flatten)]
-    way: Way,
+    way: RunOptions,
 }
 
 /// A scene's runs so far.
@@ -80,8 +80,8 @@ impl What {
                 met = false;
                 say!("{}: {line} ({count} of {repeat} runs)", path.display());
                 let (file, at) = match standing {
-                    Standing::Other(_, at) => (golden.path(), at),
-                    Standing::Same | Standing::Missing => (path.as_path(), None),
+                    Comparison::Other(_, at) => (golden.path(), at),
+                    Comparison::Same | Comparison::Missing => (path.as_path(), None),
                 };
                 self.way.annotate(&Annotation {
                     file: &file.display().to_string(),

@@ -27,8 +27,8 @@ use hil_sim_studies::jury::table::{Row, Weighed};
 use protocol::{DisplayConfiguration, Method, SensorConfiguration};
 use serde::Serialize;
 
+use super::run_options::{self, Ready};
 use super::say::say;
-use super::way::{self, Ready};
 use super::{Elves, EngineName, progress};
 
 /// Surfaces named as the worst.
@@ -292,7 +292,7 @@ impl Jury {
         let scenes: Vec<(Entry, Scene)> = entries
             .into_iter()
             .map(|entry| {
-                let mut scene = way::load(&entry.scene, self.engine)?;
+                let mut scene = run_options::load(&entry.scene, self.engine)?;
                 if let Some(method) = self.method {
                     scene.estimator.method = method.into();
                 }

@@ -6,11 +6,11 @@ use std::process::ExitCode;
 use std::thread;
 
 use super::progress;
+use super::run_options::tell_notes;
 use super::say::{self, say};
-use super::way::tell_notes;
 use hil_sim_studies::map::shard::Shard;
 use hil_sim_studies::map::survey::whole_methods;
-use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, standing, words};
+use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, summary, words};
 use hil_sim_studies::study::Table;
 
 #[derive(Debug, clap::Args)]
@@ -95,7 +95,7 @@ impl Maps {
                 tell_notes(&map.scene(0, method)?);
             }
         }
-        let mut table = vec![standing::HEADER.to_owned()];
+        let mut table = vec![summary::HEADER.to_owned()];
         let mut words = Vec::new();
         for map in &maps {
             let (lines, said) = make(map, &plan, self.merge)?;
@@ -126,7 +126,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
     let methods = whole_methods(map, &rows);
     let lines = methods
         .iter()
-        .map(|method| standing::line(map, method, &rows))
+        .map(|method| summary::line(map, method, &rows))
         .collect();
     Ok((lines, words::text(map, &methods, &rows)))
 }

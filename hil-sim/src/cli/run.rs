@@ -14,16 +14,16 @@ use hil_sim_core::scene::SceneError;
 use hil_sim_core::scene_file::line::line_of;
 use hil_sim_studies::map::shard::Shard;
 use hil_sim_studies::output::annotation::Annotation;
-use hil_sim_studies::output::golden::{Golden, Standing, complaint};
+use hil_sim_studies::output::golden::{Comparison, Golden, complaint};
 use hil_sim_studies::output::json::JsonList;
 use hil_sim_studies::output::junit;
 use hil_sim_studies::output::junit::{Case, Fate};
 use hil_sim_studies::output::report::{Chapter, html};
 
 use super::number;
+use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
-use super::way::{Loaded, Way};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -36,7 +36,7 @@ pub(super) struct Run {
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
     #[command(flatten)]
-    way: Way,
+    way: RunOptions,
     /// Run the i-th of n parts of the scenes only: each scene is in exactly one part
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -140,7 +140,7 @@ impl Run {
 
 /// What is written down of the runs, in their order.
 struct Books<'a> {
-    way: &'a Way,
+    way: &'a RunOptions,
     golden: Option<Golden>,
     json: Option<(BufWriter<File>, &'a Path, JsonList)>,
     cases: Vec<Case>,
@@ -182,8 +182,8 @@ impl Books<'_> {
             let standing = golden.standing(&name, self.way.engine(), hash);
             unmet.extend(complaint(&standing, hash, golden, &name));
             places.push(match standing {
-                Standing::Other(_, at) => (golden.path(), at),
-                Standing::Same | Standing::Missing => (path.as_path(), None),
+                Comparison::Other(_, at) => (golden.path(), at),
+                Comparison::Same | Comparison::Missing => (path.as_path(), None),
             });
         }
         let is_met = unmet.is_empty();

@@ -9,10 +9,10 @@ use std::process::ExitCode;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use hil_sim_boards::bench::{Bench, Command, Hand, Options, Pace, PortName, Standing};
+use hil_sim_boards::bench::{Bench, BenchStatus, Command, Hand, Options, Pace, PortName};
 use hil_sim_core::scene::{Motion, Scene};
 
-use super::way::tell_notes;
+use super::run_options::tell_notes;
 use super::{Elves, number};
 use input::{Input, Keys};
 use screen::Screen;
@@ -207,7 +207,7 @@ fn greet(bench: &Bench, scene: &str, has_keys: bool) {
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-fn status(bench: &Bench, last: (Instant, Standing), now: (Instant, Standing)) -> String {
+fn status(bench: &Bench, last: (Instant, BenchStatus), now: (Instant, BenchStatus)) -> String {
     let wall_s = (now.0 - last.0).as_secs_f64();
     let (before, standing) = (last.1, now.1);
     let sensed = &standing.sensed;

@@ -1,9 +1,10 @@
 //! What every estimator gives and what it costs.
 
 pub mod bank;
+pub mod baselines;
+pub mod benchmark;
 pub mod bound;
 pub mod confidence;
-pub mod contest;
 pub mod costs;
 pub mod efficiency;
 pub mod family;
@@ -12,7 +13,6 @@ pub mod parts;
 pub mod picture;
 pub mod pitch;
 pub mod result;
-pub mod rivals;
 pub mod score;
 pub mod settings;
 pub mod tally;

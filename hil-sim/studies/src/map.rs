@@ -17,7 +17,7 @@ pub mod picture;
 pub mod ramp;
 pub mod row;
 pub mod shard;
-pub mod standing;
+pub mod summary;
 pub mod survey;
 #[cfg(test)]
 mod tests;

@@ -7,15 +7,15 @@
 //! ```
 //!
 //! The observer feels what the actuators' voltages really do under the moving hand: the travel of the hand
-//! for each wave, with its errors over time, and not the number that an estimator gave ([`felt`]). His skin
-//! is the paper's Table II ([`skin`]), his chance is seeded ([`observer`]).
+//! for each wave, with its errors over time, and not the number that an estimator gave ([`presented`]). His skin
+//! is the paper's Table II ([`thresholds`]), his chance is seeded ([`observer`]).
 //!
 //! | file | what |
 //! | --- | --- |
 //! | [`published`] | the paper's Tables II to IV |
 //! | [`hand`], [`given`], [`bench`] | what is run, and on what |
-//! | [`felt`] | the waves of a run's voltages |
-//! | [`skin`], [`observer`] | who feels them |
+//! | [`presented`] | the waves of a run's voltages |
+//! | [`thresholds`], [`observer`] | who feels them |
 //! | [`limits`] | Table II, by the method of limits |
 //! | [`pairs`] | Table III, by paired comparison |
 //! | [`thurstone`], [`mosteller`] | Table IV and its test |
@@ -33,7 +33,6 @@
 //! guess.
 
 pub mod bench;
-pub mod felt;
 pub mod given;
 pub mod hand;
 pub mod interval;
@@ -43,12 +42,13 @@ pub mod normal;
 pub mod observer;
 pub mod pair;
 pub mod pairs;
+pub mod presented;
 pub mod published;
 pub mod record;
 pub mod recount;
-pub mod skin;
 pub mod study;
 pub mod tables;
+pub mod thresholds;
 pub mod thurstone;
 
 /// What every output says of itself.

@@ -3,13 +3,13 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
-pub mod care;
 pub mod clock;
+pub mod console;
 pub mod encoder;
 pub mod identity;
 pub mod ports;
 pub mod reset;
 pub mod serial;
 pub mod spawn;
+pub mod supervision;
 pub mod trip;
-pub mod voice;

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use firmware_display::balance::{TIME_CONSTANT_S, WORKING_S};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_core::run::recording::{ACTUATORS, Recording, WORD_V, volts};
 use hil_sim_core::scene::Scene;
 use tests::elves;
@@ -78,7 +78,7 @@ const FAR_NS: u64 = (FAR_S * 1e9) as u64;
 fn far_and_back() -> &'static Recording {
     static RUN: LazyLock<Recording> = LazyLock::new(|| {
         let scene = back_and_slower(FAR_S, 4.5);
-        let alone = Alone::new(scene.motion, 2.0, scene.duration_s);
+        let alone = DisplayBench::new(scene.motion, 2.0, scene.duration_s);
         display_alone::run(alone, &elves::both().display)
             .unwrap()
             .recording

@@ -12,7 +12,7 @@ use super::pty::Pty;
 use super::{PortName, ServeError};
 use crate::lockstep::QUANTUM_NS;
 use crate::wire::TimedByte;
-use hil_sim_core::link::conditions::BYTE_NS;
+use hil_sim_core::link::impairments::BYTE_NS;
 
 /// The boards' rate.
 pub const BAUD: u32 = 921_600;

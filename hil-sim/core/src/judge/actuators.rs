@@ -13,7 +13,7 @@ use crate::judge::reaction::{Peaks, Reaction, Reactions};
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::track::COUNT_MM;
 use crate::judge::truth::Truth;
-use crate::run::observer::{Onlooker, retell};
+use crate::run::observer::{RunObserver, replay_to};
 use crate::run::recording::{ACTUATORS, OutputRecord, Recording, TickRecord, WORD_V, volts};
 
 /// Voltage below which an actuator does not vibrate, in V.
@@ -51,7 +51,7 @@ pub struct Actuators {
 /// Judges the outputs of a recording.
 pub fn judge(truth: &Truth, recording: &Recording) -> Actuators {
     let mut judge = Judge::new(truth);
-    retell(recording, &mut judge);
+    replay_to(recording, &mut judge);
     judge.finish()
 }
 
@@ -175,9 +175,9 @@ impl Judge {
     }
 }
 
-impl Onlooker for Judge {
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.stimulus.made(made_ns, estimate);
+impl RunObserver for Judge {
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.stimulus.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::judge::track::interpolate;
 use crate::judge::truth::Truth;
 use crate::judge::{finite, mean, seconds, words};
-use crate::run::observer::{Onlooker, retell};
+use crate::run::observer::{RunObserver, replay_to};
 use crate::run::recording::{Recording, ScanRecord};
 
 /// Speed from which on the arm counts as in motion, in mm/s.
@@ -109,7 +109,7 @@ impl JudgedEstimate {
 /// Judges the estimates of a recording, one by one and as a whole.
 pub fn judge(truth: &Truth, recording: &Recording) -> (Vec<JudgedEstimate>, Summary) {
     let mut judge = Judge::new(truth);
-    retell(recording, &mut judge);
+    replay_to(recording, &mut judge);
     judge.finish()
 }
 
@@ -229,7 +229,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-impl Onlooker for Judge<'_> {
+impl RunObserver for Judge<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         let here @ (t_s, x_mm) = (seconds(scan.at_ns), scan.position_mm);
         match self.arm.replace(here) {
@@ -248,7 +248,7 @@ impl Onlooker for Judge<'_> {
         }
     }
 
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
         let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
         self.travelling_ns.push(Some(made_ns));
         self.estimates.push(JudgedEstimate {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::plant::contact::Contact;
 use crate::plant::skew::Skew;
 use crate::plant::surface::Surface;
-use crate::run::observer::{Onlooker, retell};
+use crate::run::observer::{RunObserver, replay_to};
 use crate::run::recording::{Recording, ScanRecord};
 use crate::scene::{Follows, Gauges, Motion, Scene};
 
@@ -52,7 +52,7 @@ pub enum Kind {
 /// Everything that happened in a run of `scene`, in its order.
 pub fn events(scene: &Scene, recording: &Recording) -> Vec<Event> {
     let mut events = Events::new(scene);
-    retell(recording, &mut events);
+    replay_to(recording, &mut events);
     events.finish()
 }
 
@@ -104,7 +104,7 @@ impl<'a> Events<'a> {
     }
 }
 
-impl Onlooker for Events<'_> {
+impl RunObserver for Events<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         let t_s = scan.at_ns as f64 * 1e-9;
         if let Some(turns) = &mut self.turns {

@@ -12,10 +12,10 @@ use protocol::{
 };
 
 use crate::judge::fault::outputs::Outputs;
-use crate::run::listener::Said;
-use crate::run::observer::{Onlooker, retell_signs};
+use crate::run::decoder::TimedMessage;
+use crate::run::fault_evidence::Reset;
+use crate::run::observer::{RunObserver, retell_signs};
 use crate::run::recording::{OutputRecord, Recording};
-use crate::run::signs::Reset;
 use crate::scene::fault::{Fault, Kind};
 
 /// What became of one fault.
@@ -105,7 +105,7 @@ pub fn judge(faults: &[Fault], recording: &Recording) -> Vec<Finding> {
 
 /// Judges one fault of a recording by what came before `until_ns`.
 pub fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
-    let mut watch = Watch::new(fault, until_ns);
+    let mut watch = FaultMonitor::new(fault, until_ns);
     watch.review(recording);
     watch.finish()
 }
@@ -113,7 +113,7 @@ pub fn finding(fault: &Fault, until_ns: u64, recording: &Recording) -> Finding {
 /// Judges the faults of a run as it goes on: what is kept of each does not grow.
 #[derive(Clone, Debug)]
 pub struct Judge {
-    watches: Vec<Watch>,
+    watches: Vec<FaultMonitor>,
 }
 
 impl Judge {
@@ -127,7 +127,7 @@ impl Judge {
                 .map(Fault::begins_ns)
                 .filter(|&at_ns| at_ns > fault.begins_ns())
                 .min();
-            Watch::new(fault, next_ns.unwrap_or(end_ns).min(end_ns))
+            FaultMonitor::new(fault, next_ns.unwrap_or(end_ns).min(end_ns))
         };
         Self {
             watches: faults.iter().map(watch).collect(),
@@ -136,18 +136,18 @@ impl Judge {
 
     /// What became of each fault.
     pub fn finish(self) -> Vec<Finding> {
-        self.watches.into_iter().map(Watch::finish).collect()
+        self.watches.into_iter().map(FaultMonitor::finish).collect()
     }
 }
 
-impl Onlooker for Judge {
+impl RunObserver for Judge {
     fn output(&mut self, output: &OutputRecord) {
         for watch in &mut self.watches {
             watch.output(output);
         }
     }
 
-    fn said(&mut self, role: Role, said: &Said) {
+    fn said(&mut self, role: Role, said: &TimedMessage) {
         for watch in &mut self.watches {
             watch.said(role, said);
         }
@@ -168,7 +168,7 @@ impl Onlooker for Judge {
 
 /// Looks on a fault.
 #[derive(Clone, Debug)]
-struct Watch {
+struct FaultMonitor {
     fault: Fault,
     /// What concerns it is in this time, in ns.
     due_ns: Range<u64>,
@@ -178,20 +178,20 @@ struct Watch {
     /// The first reset that the scene did not bring about.
     reset: Option<Reset>,
     resets: usize,
-    display: Voice,
-    sensor: Voice,
+    display: BoardReports,
+    sensor: BoardReports,
 }
 
 /// What a board says.
 #[derive(Clone, Debug, Default)]
-struct Voice {
+struct BoardReports {
     /// The last counters that the board has not forgotten.
     before: Option<Status>,
     /// When the fault first showed, in ns, and how.
     sign: Option<(u64, String)>,
 }
 
-impl Watch {
+impl FaultMonitor {
     fn new(fault: &Fault, until_ns: u64) -> Self {
         Self {
             fault: *fault,
@@ -200,8 +200,8 @@ impl Watch {
             clear_ns: None,
             reset: None,
             resets: 0,
-            display: Voice::default(),
-            sensor: Voice::default(),
+            display: BoardReports::default(),
+            sensor: BoardReports::default(),
         }
     }
 
@@ -237,12 +237,12 @@ impl Watch {
     }
 }
 
-impl Onlooker for Watch {
+impl RunObserver for FaultMonitor {
     fn output(&mut self, output: &OutputRecord) {
         self.outputs.add(output);
     }
 
-    fn said(&mut self, role: Role, said: &Said) {
+    fn said(&mut self, role: Role, said: &TimedMessage) {
         let voice = match role {
             Role::Display => &mut self.display,
             Role::Sensor => &mut self.sensor,

@@ -157,7 +157,7 @@ mod tests {
     use crate::judge::stimulus::{Stimulus, Told};
     use crate::judge::synthetic::Run;
     use crate::judge::truth::Truth;
-    use crate::run::observer::{Onlooker, retell};
+    use crate::run::observer::{RunObserver, replay_to};
     use crate::run::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V, volts};
 
     /// For each stroke, the instants in s and the voltage of actuator 0 about its middle.
@@ -167,9 +167,9 @@ mod tests {
         found: Vec<Vec<(f64, f64)>>,
     }
 
-    impl Onlooker for Strokes {
-        fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-            self.stimulus.made(made_ns, estimate);
+    impl RunObserver for Strokes {
+        fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+            self.stimulus.on_estimate(made_ns, estimate);
         }
 
         fn tick(&mut self, tick: &TickRecord) {
@@ -220,7 +220,7 @@ mod tests {
             middle: AboutMiddle::default(),
             found: vec![Vec::new()],
         };
-        retell(&run.record(), &mut strokes);
+        replay_to(&run.record(), &mut strokes);
         strokes.stimulus.end();
         strokes.follow();
         strokes.found.retain(|stroke| !stroke.is_empty());

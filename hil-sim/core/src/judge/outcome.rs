@@ -11,10 +11,10 @@ use crate::judge::fault::{Finding, judge};
 use crate::judge::truth::Truth;
 use crate::native;
 use crate::plant::surface::Surface;
-use crate::run::listener::Said;
-use crate::run::observer::Onlooker;
+use crate::run::decoder::TimedMessage;
+use crate::run::fault_evidence::Reset;
+use crate::run::observer::RunObserver;
 use crate::run::recording::{OutputRecord, Ran, Recording, ScanRecord, TickRecord};
-use crate::run::signs::Reset;
 use crate::scene::{Scene, SceneError};
 
 /// A run and what came of it.
@@ -119,7 +119,7 @@ struct Judges<'a> {
     events: Option<Events<'a>>,
 }
 
-impl Onlooker for Judges<'_> {
+impl RunObserver for Judges<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         self.run.scan(scan);
         if let Some(events) = &mut self.events {
@@ -127,8 +127,8 @@ impl Onlooker for Judges<'_> {
         }
     }
 
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.run.made(made_ns, estimate);
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.run.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {
@@ -144,7 +144,7 @@ impl Onlooker for Judges<'_> {
         self.run.received(number, received_ns);
     }
 
-    fn said(&mut self, role: Role, said: &Said) {
+    fn said(&mut self, role: Role, said: &TimedMessage) {
         self.faults.said(role, said);
     }
 

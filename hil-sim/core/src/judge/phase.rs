@@ -9,7 +9,7 @@ use protocol::{DisplayConfiguration, Estimate};
 
 use crate::judge::seconds;
 use crate::judge::truth::Truth;
-use crate::run::observer::Onlooker;
+use crate::run::observer::RunObserver;
 use crate::run::recording::{OutputRecord, TickRecord};
 
 /// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
@@ -120,8 +120,8 @@ impl DuePhase {
     }
 }
 
-impl Onlooker for DuePhase {
-    fn made(&mut self, _made_ns: u64, estimate: &Estimate) {
+impl RunObserver for DuePhase {
+    fn on_estimate(&mut self, _made_ns: u64, estimate: &Estimate) {
         self.made.add(*estimate);
     }
 
@@ -254,7 +254,7 @@ impl Followed {
 mod tests {
     use super::*;
     use crate::judge::synthetic::Run;
-    use crate::run::observer::retell;
+    use crate::run::observer::replay_to;
     use crate::run::recording::Recording;
 
     /// Asks for the phase at an instant as soon as it can be told.
@@ -264,9 +264,9 @@ mod tests {
         answer: Option<Due>,
     }
 
-    impl Onlooker for Asking {
-        fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-            self.due.made(made_ns, estimate);
+    impl RunObserver for Asking {
+        fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+            self.due.on_estimate(made_ns, estimate);
         }
 
         fn tick(&mut self, tick: &TickRecord) {
@@ -293,7 +293,7 @@ mod tests {
             t_s,
             answer: None,
         };
-        retell(recording, &mut asking);
+        replay_to(recording, &mut asking);
         let due = asking.answer.expect("the recording goes on after that");
         (due, asking.due.shortest_mm().expect("some λ̂ is in force"))
     }
@@ -362,7 +362,7 @@ mod tests {
         let recording = Run::steady(50.0, 2.0).record();
         let surface = |_| 2.0;
         let mut due = DuePhase::new(&Truth::new("", "", &surface));
-        due.made(0, &recording.estimates[0].estimate);
+        due.on_estimate(0, &recording.estimates[0].estimate);
         due.received(0, 1_000);
         due.received(0, 2_000);
         assert_eq!(due.arrived.len(), 1);

@@ -6,7 +6,7 @@ use crate::judge::phase::{Due, DuePhase};
 use crate::judge::track::Turns;
 use crate::judge::truth::Truth;
 use crate::judge::voltage::{Edge, Edges};
-use crate::run::observer::Onlooker;
+use crate::run::observer::RunObserver;
 use crate::run::recording::{OutputRecord, TickRecord};
 
 /// What a tick tells of the stimulus.
@@ -71,9 +71,9 @@ impl Stimulus {
     }
 }
 
-impl Onlooker for Stimulus {
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.due.made(made_ns, estimate);
+impl RunObserver for Stimulus {
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.due.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {

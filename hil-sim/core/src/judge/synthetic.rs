@@ -4,10 +4,10 @@
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
 use crate::judge::track::COUNT_MM;
+use crate::run::fault_evidence::FaultEvidence;
 use crate::run::recording::{
     ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
-use crate::run::signs::Signs;
 
 /// From one output tick to the next, in s.
 pub const TICK_S: f64 = 500e-6;
@@ -116,7 +116,7 @@ impl Run {
             sensor_status: None,
             display_status: None,
             log: Vec::new(),
-            signs: Signs::default(),
+            signs: FaultEvidence::default(),
         }
     }
 

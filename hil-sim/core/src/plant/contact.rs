@@ -7,18 +7,18 @@
 //! | --- | --- | --- |
 //! | `kinematic` | where the arm is | the point below it |
 //! | `rigid` | where the arm is | the patch around it ([`crate::plant::patch`]) |
-//! | `viscoelastic` | behind a spring and a damper ([`Hanging`]) | the patch |
+//! | `viscoelastic` | behind a spring and a damper ([`SpringDamper`]) | the patch |
 //! | `stick-slip` | behind them, against friction, at rest or sliding ([`Slider`]) | the point |
 //! | `reference` | behind them, clinging by bristles ([`Bristles`]), in the smallest steps | the patch |
 //!
 //! The reference is slow, and there to judge the others by. `stick-slip` leaves the patch out: what it
-//! would change is less than what the guesses at friction are good for. [`ladder`] says which rung a scene
+//! would change is less than what the guesses at friction are good for. [`select`] says which rung a scene
 //! needs.
 
 mod bristles;
 pub mod integrator;
-pub mod ladder;
 mod path;
+pub mod select;
 mod slider;
 mod spring;
 pub mod stability;
@@ -26,11 +26,11 @@ mod stepped;
 mod stribeck;
 
 use crate::scene;
-use crate::scene::{Friction, Integrator, Rung, Solver};
+use crate::scene::{ContactModel, Friction, Integrator, Solver};
 
 pub use bristles::{BRISTLES_DAMPING, BRISTLES_N_PER_M, Bristles};
 pub use slider::{DAMPING_N_S_PER_M, MASS_KG, STEP_SHARE, Slider};
-pub use spring::{Hanging, Spring};
+pub use spring::{Spring, SpringDamper};
 pub use stepped::{CREEP_M_S, SLIP_M_S, Stepped};
 pub use stribeck::{KINETIC, NORMAL_N, STRIBECK_M_S, Stribeck};
 
@@ -56,13 +56,13 @@ pub enum Contact {
     /// The fingertip is where the arm is: no slip, no stick, no force.
     Rigid,
     /// It hangs on a spring, solved exactly.
-    Hanging(Hanging),
+    SpringDamper(SpringDamper),
     /// The same, by steps.
-    Swinging(Stepped<Spring, 2>),
+    SteppedSpring(Stepped<Spring, 2>),
     /// A slider that the arm pulls by a spring, against friction; rest is a state of its own.
     Slider(Slider),
     /// The same with bristles, by steps.
-    Clinging(Stepped<Bristles, 3>),
+    LuGre(Stepped<Bristles, 3>),
 }
 
 impl Contact {
@@ -74,12 +74,12 @@ impl Contact {
             |friction: Friction| Bristles::new(Stribeck::new(friction), stiffness_n_per_m);
         let smallest = (Integrator::Radau, EVENT_STEP_S);
         let (integrator, step_s) = match (contact.rung, contact.solver) {
-            (Rung::Reference, _) => smallest,
+            (ContactModel::Reference, _) => smallest,
             (_, Solver::Stepped { integrator, step_s }) => (integrator, step_s),
-            (Rung::Kinematic | Rung::Rigid, Solver::Exact) => return Self::Rigid,
-            (Rung::Viscoelastic | Rung::StickSlip, Solver::Exact) => {
+            (ContactModel::Kinematic | ContactModel::Rigid, Solver::Exact) => return Self::Rigid,
+            (ContactModel::Viscoelastic | ContactModel::StickSlip, Solver::Exact) => {
                 return match contact.friction {
-                    None => Self::Hanging(Hanging::new(stiffness_n_per_m)),
+                    None => Self::SpringDamper(SpringDamper::new(stiffness_n_per_m)),
                     Some(friction) => {
                         Self::Slider(Slider::new(Stribeck::new(friction), stiffness_n_per_m))
                     }
@@ -87,9 +87,9 @@ impl Contact {
             }
         };
         match contact.friction {
-            None => Self::Swinging(Stepped::new(spring, integrator, step_s, true)),
+            None => Self::SteppedSpring(Stepped::new(spring, integrator, step_s, true)),
             Some(friction) => {
-                Self::Clinging(Stepped::new(bristles(friction), integrator, step_s, false))
+                Self::LuGre(Stepped::new(bristles(friction), integrator, step_s, false))
             }
         }
     }
@@ -106,11 +106,11 @@ impl Contact {
                     sticks: false,
                 };
             }
-            Self::Hanging(hanging) => {
+            Self::SpringDamper(hanging) => {
                 hanging.follow(t_s, arm_m);
                 (hanging.stretch_m(), hanging.spring_n(), false)
             }
-            Self::Swinging(stepped) => {
+            Self::SteppedSpring(stepped) => {
                 stepped.follow(t_s, arm_m);
                 let stretch_m = stepped.stretch_m();
                 let force_n = stepped.system().stiffness_n_per_m * stretch_m;
@@ -120,7 +120,7 @@ impl Contact {
                 slider.follow(t_s, arm_m);
                 (slider.stretch_m(), slider.spring_n(), slider.sticks())
             }
-            Self::Clinging(stepped) => {
+            Self::LuGre(stepped) => {
                 stepped.follow(t_s, arm_m);
                 let stretch_m = stepped.stretch_m();
                 let force_n = stepped.system().stiffness_n_per_m() * stretch_m;
@@ -139,9 +139,9 @@ impl Contact {
     /// from then on. None where a model knows no rest.
     pub fn take_turns(&mut self) -> Vec<(f64, bool)> {
         match self {
-            Self::Rigid | Self::Hanging(_) | Self::Swinging(_) => Vec::new(),
+            Self::Rigid | Self::SpringDamper(_) | Self::SteppedSpring(_) => Vec::new(),
             Self::Slider(slider) => slider.take_turns(),
-            Self::Clinging(stepped) => stepped.take_turns(),
+            Self::LuGre(stepped) => stepped.take_turns(),
         }
     }
 }

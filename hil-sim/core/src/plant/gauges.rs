@@ -6,13 +6,13 @@
 //! whole, by that angle of its fundamental.
 
 mod force;
+mod gauge_fault;
 mod pink;
 mod recorded;
 mod resonance;
 mod stream;
 #[cfg(test)]
 mod tests;
-mod trouble;
 
 use std::f64::consts::TAU;
 
@@ -24,12 +24,12 @@ use crate::plant::surface::Surface;
 use crate::scene::Kinematic;
 
 pub use force::{ForceChannel, NOISE_N};
+use gauge_fault::GaugeFault;
+pub use gauge_fault::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 use pink::{Pink, Poles};
 pub use recorded::RecordedGauges;
 use resonance::{Resonance, Ring};
 use stream::Stream;
-use trouble::Trouble;
-pub use trouble::{BROKEN_HUM, BROKEN_NOISE, SATURATED_GAIN, STUCK_CODE};
 
 /// Scans of all channels per second.
 pub const SCAN_RATE_HZ: u32 = 4_000;
@@ -91,7 +91,7 @@ pub(crate) const fn advance(gauge: usize) -> u32 {
 pub struct KinematicGauges {
     sound: [Lane; GAUGES],
     broken: [Lane; GAUGES],
-    trouble: Trouble,
+    trouble: GaugeFault,
     resonance: Option<(Resonance, [Option<Ring>; GAUGES])>,
     /// Amplitude at each of the mains' frequencies.
     hum_codes: [f64; 2],
@@ -121,7 +121,7 @@ struct Slow {
 impl KinematicGauges {
     /// The gauges of a scene. The noise depends on `seed` alone: a broken gauge changes no other's.
     pub fn new(kinematic: &Kinematic, seed: u64) -> Self {
-        let trouble = Trouble::new(kinematic, stream::draws(seed, Stream::Broken));
+        let trouble = GaugeFault::new(kinematic, stream::draws(seed, Stream::Broken));
         let slow = kinematic.pink > 0.0 || kinematic.drift > 0.0 || kinematic.offset > 0.0;
         Self {
             sound: std::array::from_fn(|gauge| Lane::new(gauge, 1.0)),

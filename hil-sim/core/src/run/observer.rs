@@ -11,18 +11,18 @@
 
 use protocol::{Estimate, Role};
 
-use crate::run::listener::Said;
+use crate::run::decoder::TimedMessage;
+use crate::run::fault_evidence::{FaultEvidence, Reset};
 use crate::run::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
-use crate::run::signs::{Reset, Signs};
 
 /// Is told of a run, in the order of time. Of one instant, what is further up here comes first. Nobody needs
 /// to listen to everything.
-pub trait Onlooker {
+pub trait RunObserver {
     /// An ADC scan.
     fn scan(&mut self, _scan: &ScanRecord) {}
 
     /// The sensor has made an estimate, at an instant in ns since the scene's start.
-    fn made(&mut self, _made_ns: u64, _estimate: &Estimate) {}
+    fn on_estimate(&mut self, _made_ns: u64, _estimate: &Estimate) {}
 
     /// A tick of the display's.
     fn tick(&mut self, _tick: &TickRecord) {}
@@ -36,7 +36,7 @@ pub trait Onlooker {
     fn received(&mut self, _number: usize, _received_ns: u64) {}
 
     /// What a board sent, in which a fault may show.
-    fn said(&mut self, _role: Role, _said: &Said) {}
+    fn said(&mut self, _role: Role, _said: &TimedMessage) {}
 
     /// A board was reset.
     fn reset(&mut self, _reset: &Reset) {}
@@ -46,10 +46,10 @@ pub trait Onlooker {
 }
 
 /// Nobody.
-impl Onlooker for () {}
+impl RunObserver for () {}
 
 /// Tells of a run as it was recorded; what shows of faults comes at the end.
-pub fn retell(recording: &Recording, to: &mut impl Onlooker) {
+pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
     let made = &recording.estimates;
     let mut arrivals: Vec<(u64, usize)> = made
         .iter()
@@ -81,7 +81,7 @@ pub fn retell(recording: &Recording, to: &mut impl Onlooker) {
             }
         } else if made_ns == next_ns {
             if let Some(record) = made.next() {
-                to.made(record.made_ns, &record.estimate);
+                to.on_estimate(record.made_ns, &record.estimate);
             }
         } else if tick_ns == next_ns {
             if let Some(tick) = ticks.next() {
@@ -99,7 +99,7 @@ pub fn retell(recording: &Recording, to: &mut impl Onlooker) {
 }
 
 /// Tells of what shows of faults alone.
-pub fn retell_signs(signs: &Signs, to: &mut impl Onlooker) {
+pub fn retell_signs(signs: &FaultEvidence, to: &mut impl RunObserver) {
     for said in &signs.display {
         to.said(Role::Display, said);
     }

@@ -2,7 +2,7 @@
 
 use protocol::{CHANNELS, Estimate, Status};
 
-use crate::run::signs::Signs;
+use crate::run::fault_evidence::FaultEvidence;
 
 /// Actuators driven (Okamoto et al. 2009, section IV).
 pub const ACTUATORS: usize = 50;
@@ -136,7 +136,7 @@ pub struct Recording {
     /// Log lines of both boards, decoded from defmt: instant in ns, board, text. Empty from `native`.
     pub log: Vec<(u64, &'static str, String)>,
     /// What the run shows of faults.
-    pub signs: Signs,
+    pub signs: FaultEvidence,
 }
 
 impl Recording {

@@ -2,9 +2,9 @@
 
 use super::bounds::STEP;
 use super::table::Table;
-use crate::plant::contact::{EVENT_STEP_S, Stribeck, ladder, stability};
+use crate::plant::contact::{EVENT_STEP_S, Stribeck, select, stability};
 use crate::scene::{
-    Contact, Friction, Gauges, Integrator, Motion, Rung, SceneError, Solver, Surface,
+    Contact, ContactModel, Friction, Gauges, Integrator, Motion, SceneError, Solver, Surface,
 };
 
 /// Longest step of a method that is not told one, in s.
@@ -30,11 +30,11 @@ pub(super) fn read(
         "model",
         &[
             ("auto", None),
-            ("kinematic", Some(Rung::Kinematic)),
-            ("rigid", Some(Rung::Rigid)),
-            ("viscoelastic", Some(Rung::Viscoelastic)),
-            ("stick-slip", Some(Rung::StickSlip)),
-            ("reference", Some(Rung::Reference)),
+            ("kinematic", Some(ContactModel::Kinematic)),
+            ("rigid", Some(ContactModel::Rigid)),
+            ("viscoelastic", Some(ContactModel::Viscoelastic)),
+            ("stick-slip", Some(ContactModel::StickSlip)),
+            ("reference", Some(ContactModel::Reference)),
         ],
     )?;
     let friction = table.choice(
@@ -47,7 +47,12 @@ pub(super) fn read(
         ],
     )?;
     match (model, friction) {
-        (Some(rung @ (Rung::Kinematic | Rung::Rigid | Rung::Viscoelastic)), Some(_)) => {
+        (
+            Some(
+                rung @ (ContactModel::Kinematic | ContactModel::Rigid | ContactModel::Viscoelastic),
+            ),
+            Some(_),
+        ) => {
             return Err(table.refuse(
                 "friction",
                 format!(
@@ -56,7 +61,7 @@ pub(super) fn read(
                 ),
             ));
         }
-        (Some(Rung::StickSlip), None) => {
+        (Some(ContactModel::StickSlip), None) => {
             return Err(table.refuse(
                 "friction",
                 "without friction nothing sticks: give \"mild\", \"strong\" or \"severe\", or model = \"kinematic\"",
@@ -67,7 +72,7 @@ pub(super) fn read(
     let (rung, reason) = match model {
         Some(rung) => (rung, None),
         None => {
-            let choice = ladder::choose(
+            let choice = select::choose(
                 scenery.surface,
                 scenery.motion,
                 scenery.gauges,
@@ -89,7 +94,7 @@ pub(super) fn read(
 
 fn solver(
     table: &mut Table<'_>,
-    rung: Rung,
+    rung: ContactModel,
     friction: Option<Friction>,
     scenery: &Scenery<'_>,
 ) -> Result<Solver, SceneError> {
@@ -107,11 +112,11 @@ fn solver(
             )),
         };
     };
-    if !matches!(rung, Rung::Viscoelastic | Rung::StickSlip) {
+    if !matches!(rung, ContactModel::Viscoelastic | ContactModel::StickSlip) {
         return Err(table.refuse(
             "integrator",
             match rung {
-                Rung::Reference => "the reference has its own: take it out, or give another model",
+                ContactModel::Reference => "the reference has its own: take it out, or give another model",
                 _ => "there is nothing to integrate: take it out, or give model = \"viscoelastic\" or \"stick-slip\"",
             },
         ));

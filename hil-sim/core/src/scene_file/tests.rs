@@ -357,43 +357,43 @@ fn friction_decides_the_contact_where_it_is_left_open() {
 fn a_contact_that_is_left_open_is_the_lowest_rung_that_does_and_says_why() {
     let scene = |text: &str| Scene::parse(Path::new("x.toml"), text).unwrap();
     for (text, rung, reason) in [
-        (SURFACE.to_owned(), Rung::Kinematic, "keeps up with"),
+        (SURFACE.to_owned(), ContactModel::Kinematic, "keeps up with"),
         (
             "[surface]\nspecimens = [{ wavelength_mm = 1.0, length_mm = 5.0 }, { wavelength_mm = 2.0 }]"
                 .to_owned(),
-            Rung::Kinematic,
+            ContactModel::Kinematic,
             "a point can tell apart",
         ),
         (
             "[surface]\nspecimens = [{ wavelength_mm = 1.0, length_mm = 50.0 }, { wavelength_mm = 2.0, length_mm = 5.0 }, { wavelength_mm = 3.0 }]"
                 .to_owned(),
-            Rung::Rigid,
+            ContactModel::Rigid,
             "a specimen of 5 mm is shorter",
         ),
         (
             "[surface]\nspecimens = [{ wavelength_mm = 0.7, length_mm = 50.0 }, { wavelength_mm = 4.0 }]\n[gauges]\nsnr_db = 20"
                 .to_owned(),
-            Rung::Rigid,
+            ContactModel::Rigid,
             "of the longest's amplitude, in noise",
         ),
         (
             format!("{SURFACE}[gauges]\nsecond_harmonic = 0.8"),
-            Rung::Rigid,
+            ContactModel::Rigid,
             "of a second harmonic of 0.8",
         ),
         (
             format!("{SURFACE}[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 0.83"),
-            Rung::Kinematic,
+            ContactModel::Kinematic,
             "keeps up with",
         ),
         (
             format!("{SURFACE}[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 70\nfrequency_hz = 8"),
-            Rung::Viscoelastic,
+            ContactModel::Viscoelastic,
             "swings on its spring by",
         ),
         (
             format!("{SURFACE}[contact]\nfriction = \"mild\""),
-            Rung::StickSlip,
+            ContactModel::StickSlip,
             "there is friction",
         ),
     ] {
@@ -403,7 +403,7 @@ fn a_contact_that_is_left_open_is_the_lowest_rung_that_does_and_says_why() {
         assert!(given.contains(reason), "{given}");
     }
     let told = scene(&format!("{SURFACE}[contact]\nmodel = \"reference\""));
-    assert_eq!(told.contact, Contact::of(Rung::Reference, None));
+    assert_eq!(told.contact, Contact::of(ContactModel::Reference, None));
     assert_eq!(told.contact_reason, None);
 }
 

@@ -12,10 +12,10 @@ use std::thread;
 use hil_sim_core::judge::event::{Kind, events};
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
-use hil_sim_core::plant::contact::ladder::{
+use hil_sim_core::plant::contact::select::{
     BORDER_S, ENOUGH_BLIND_PERCENT, ENOUGH_COUNT_PERCENT, ENOUGH_PERCENT, ENOUGH_SHARE,
 };
-use hil_sim_core::scene::{Contact, Gauges, Rung, Scene};
+use hil_sim_core::scene::{Contact, ContactModel, Gauges, Scene};
 use protocol::Method;
 
 fn scenes_below(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -34,7 +34,7 @@ fn scenes_below(folder: &Path, found: &mut Vec<PathBuf>) {
 }
 
 /// λ̂'s RMS error in percent, on a rung, but for the time after each border.
-fn rms_percent(scene: &Scene, rung: Rung) -> Option<f64> {
+fn rms_percent(scene: &Scene, rung: ContactModel) -> Option<f64> {
     let friction = scene.contact.friction;
     let scene = Scene {
         contact: Contact::of(rung, friction),
@@ -67,12 +67,12 @@ fn rms_percent(scene: &Scene, rung: Rung) -> Option<f64> {
 }
 
 /// The next rung that does not leave out what the scene's own has.
-fn above(contact: Contact) -> Option<Rung> {
+fn above(contact: Contact) -> Option<ContactModel> {
     match contact.rung {
-        Rung::Kinematic => Some(Rung::Rigid),
-        Rung::Rigid => Some(Rung::Viscoelastic),
-        Rung::Viscoelastic | Rung::StickSlip => Some(Rung::Reference),
-        Rung::Reference => None,
+        ContactModel::Kinematic => Some(ContactModel::Rigid),
+        ContactModel::Rigid => Some(ContactModel::Viscoelastic),
+        ContactModel::Viscoelastic | ContactModel::StickSlip => Some(ContactModel::Reference),
+        ContactModel::Reference => None,
     }
 }
 
@@ -143,9 +143,9 @@ fn the_next_rung_up_changes_no_committed_scene_by_more_than_is_stated() {
 #[test]
 fn each_rung_has_a_scene_that_the_rung_below_does_not_do() {
     for (file, below) in [
-        ("ladder/second-harmonic", Rung::Kinematic),
-        ("ladder/shaking", Rung::Rigid),
-        ("ladder/sticky", Rung::Viscoelastic),
+        ("ladder/second-harmonic", ContactModel::Kinematic),
+        ("ladder/shaking", ContactModel::Rigid),
+        ("ladder/sticky", ContactModel::Viscoelastic),
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../scenes/{file}.toml"));
         let scene = Scene::load(&path).expect("a committed scene is usable");

@@ -5,7 +5,7 @@ use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::judge::{Held, Judge};
 use hil_sim_core::native;
-use hil_sim_core::run::observer::Onlooker;
+use hil_sim_core::run::observer::RunObserver;
 use hil_sim_core::run::recording::{OutputRecord, ScanRecord, TickRecord};
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_core::scene::{
@@ -159,13 +159,13 @@ struct Weighing<'a> {
     most: Held,
 }
 
-impl Onlooker for Weighing<'_> {
+impl RunObserver for Weighing<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         self.judge.scan(scan);
     }
 
-    fn made(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.judge.made(made_ns, estimate);
+    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+        self.judge.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {

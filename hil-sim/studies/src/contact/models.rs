@@ -21,7 +21,7 @@ use hil_sim_core::plant::patch::Patch;
 use hil_sim_core::plant::surface::Surface;
 use hil_sim_core::scene;
 use hil_sim_core::scene::Integrator;
-use hil_sim_core::scene::{Friction, Motion, Rung, Scene, Solver, Specimen};
+use hil_sim_core::scene::{ContactModel, Friction, Motion, Scene, Solver, Specimen};
 
 /// Steps of the integrators that take what they are told, in µs.
 pub const STEPS_US: [f64; 8] = [250.0, 125.0, 50.0, 25.0, 10.0, 5.0, 2.0, 1.0];
@@ -42,7 +42,7 @@ pub struct Case {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entrant {
     /// The rung.
-    pub rung: Rung,
+    pub rung: ContactModel,
     /// None if it is solved exactly, or from event to event.
     pub integrator: Option<Integrator>,
     /// Its step in µs; none if it chooses its own, or has none.
@@ -100,15 +100,15 @@ pub fn entrants(case: &Case) -> Vec<Entrant> {
         integrator: None,
         step_us: None,
     };
-    let mut entrants: Vec<Entrant> = Rung::ALL
+    let mut entrants: Vec<Entrant> = ContactModel::ALL
         .into_iter()
         // Without friction nothing sticks.
-        .filter(|&rung| friction.is_some() || rung != Rung::StickSlip)
+        .filter(|&rung| friction.is_some() || rung != ContactModel::StickSlip)
         .map(exact)
         .collect();
     let rung = match friction {
-        Some(_) => Rung::StickSlip,
-        None => Rung::Viscoelastic,
+        Some(_) => ContactModel::StickSlip,
+        None => ContactModel::Viscoelastic,
     };
     for integrator in Integrator::ALL {
         let steps: Vec<Option<f64>> = if integrator.is_fixed() {
@@ -130,7 +130,7 @@ impl Entrant {
         scene::Contact {
             rung: self.rung,
             // Below stick-slip nothing knows it; the reference takes what is there.
-            friction: friction.filter(|_| self.rung >= Rung::StickSlip),
+            friction: friction.filter(|_| self.rung >= ContactModel::StickSlip),
             solver: match self.integrator {
                 None => Solver::Exact,
                 Some(integrator) => Solver::Stepped {
@@ -194,7 +194,7 @@ pub fn measure(done: impl Fn()) -> Vec<Row> {
         let reference = felt(
             &case,
             &textures,
-            scene::Contact::of(Rung::Reference, friction),
+            scene::Contact::of(ContactModel::Reference, friction),
         );
         for entrant in entrants(&case) {
             let contact = entrant.contact(friction);
@@ -265,7 +265,7 @@ impl Study for [Row] {
                 row.entrant.rung.name().to_owned(),
                 number(row.pace, 0),
                 match (row.entrant.rung, row.error_percent) {
-                    (Rung::Reference, _) => "–".to_owned(),
+                    (ContactModel::Reference, _) => "–".to_owned(),
                     (_, Some(percent)) => format!("{percent:.2e}"),
                     (_, None) => "diverges".to_owned(),
                 },
@@ -297,7 +297,12 @@ impl Study for [Row] {
 mod tests {
     use super::*;
 
-    fn error(case: usize, rung: Rung, integrator: Option<Integrator>, step_us: Option<f64>) -> f64 {
+    fn error(
+        case: usize,
+        rung: ContactModel,
+        integrator: Option<Integrator>,
+        step_us: Option<f64>,
+    ) -> f64 {
         let case = &cases()[case];
         let friction = case.scene.contact.friction;
         let entrant = Entrant {
@@ -309,7 +314,7 @@ mod tests {
         let reference = felt(
             case,
             &textures,
-            scene::Contact::of(Rung::Reference, friction),
+            scene::Contact::of(ContactModel::Reference, friction),
         );
         error_percent(
             case,
@@ -323,22 +328,29 @@ mod tests {
     fn where_a_rung_knows_all_that_happens_it_is_the_reference() {
         // A hand at a steady speed sets the reference's spring into no motion. But rounding may decide at a
         // scan whether a period's table is asked or the patch summed up: 2e-4 at one of 2000.
-        assert!(error(0, Rung::Rigid, None, None) < 0.02);
+        assert!(error(0, ContactModel::Rigid, None, None) < 0.02);
         // f32, and Radau's tolerance.
-        assert!(error(1, Rung::Viscoelastic, None, None) < 1e-3);
+        assert!(error(1, ContactModel::Viscoelastic, None, None) < 1e-3);
     }
 
     #[test]
     fn where_it_does_not_it_is_far_off() {
-        assert!(error(0, Rung::Kinematic, None, None) > 10.0);
-        assert!(error(1, Rung::Rigid, None, None) > 1.0);
-        assert!(error(2, Rung::Viscoelastic, None, None) > 30.0);
+        assert!(error(0, ContactModel::Kinematic, None, None) > 10.0);
+        assert!(error(1, ContactModel::Rigid, None, None) > 1.0);
+        assert!(error(2, ContactModel::Viscoelastic, None, None) > 30.0);
     }
 
     #[test]
     fn shorter_steps_come_nearer() {
         for (integrator, order) in [(Integrator::Euler, 1), (Integrator::Implicit, 2)] {
-            let at = |step_us| error(1, Rung::Viscoelastic, Some(integrator), Some(step_us));
+            let at = |step_us| {
+                error(
+                    1,
+                    ContactModel::Viscoelastic,
+                    Some(integrator),
+                    Some(step_us),
+                )
+            };
             let ratio = at(50.0) / at(25.0);
             let due = f64::from(1 << order);
             assert!((ratio / due - 1.0).abs() < 0.25, "{integrator:?}: {ratio}");

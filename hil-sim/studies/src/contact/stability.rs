@@ -75,9 +75,9 @@ impl Outcome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Test {
     /// Bristles on a surface: the arm rubs and stops, the fingertip should rest.
-    Clinging,
+    LuGre,
     /// A spring without friction: the arm starts, the fingertip should swing and calm down.
-    Swinging,
+    SteppedSpring,
 }
 
 /// A map of one integrator.
@@ -111,7 +111,7 @@ pub fn integrators() -> impl Iterator<Item = Integrator> {
 
 /// Makes all maps, on all cores. `done` is told after each of [`runs`].
 pub fn measure(grid: (usize, usize), done: impl Fn() + Sync) -> Vec<Map> {
-    let wanted: Vec<(Test, Integrator)> = [Test::Clinging, Test::Swinging]
+    let wanted: Vec<(Test, Integrator)> = [Test::LuGre, Test::SteppedSpring]
         .into_iter()
         .flat_map(|test| integrators().map(move |integrator| (test, integrator)))
         .collect();
@@ -140,8 +140,8 @@ fn spread((low, high): (f64, f64), count: usize) -> impl Iterator<Item = f64> {
 
 fn map(test: Test, integrator: Integrator, (stiffnesses, steps): (usize, usize)) -> Map {
     let (stiffness_range, step_range) = match test {
-        Test::Clinging => (BRISTLES_N_PER_M, CLINGING_STEPS_S),
-        Test::Swinging => (FINGERTIP_N_PER_M, SWINGING_STEPS_S),
+        Test::LuGre => (BRISTLES_N_PER_M, CLINGING_STEPS_S),
+        Test::SteppedSpring => (FINGERTIP_N_PER_M, SWINGING_STEPS_S),
     };
     let rows = spread(stiffness_range, stiffnesses)
         .map(|stiffness_n_per_m| MapRow {
@@ -162,19 +162,19 @@ fn map(test: Test, integrator: Integrator, (stiffnesses, steps): (usize, usize))
 /// The longest step that the guard allows, in s.
 pub fn allowed_s(test: Test, integrator: Integrator, stiffness_n_per_m: f64) -> f64 {
     match test {
-        Test::Clinging => {
+        Test::LuGre => {
             let (bristles, fastest_m_s) = clinging(stiffness_n_per_m);
             stability::longest_clinging_s(integrator, &bristles, fastest_m_s)
         }
-        Test::Swinging => stability::longest_swinging_s(integrator, stiffness_n_per_m),
+        Test::SteppedSpring => stability::longest_swinging_s(integrator, stiffness_n_per_m),
     }
 }
 
 /// What becomes of a fingertip in steps of `step_s`.
 pub fn outcome(test: Test, integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome {
     match test {
-        Test::Clinging => cling(integrator, stiffness_n_per_m, step_s),
-        Test::Swinging => swing(integrator, stiffness_n_per_m, step_s),
+        Test::LuGre => cling(integrator, stiffness_n_per_m, step_s),
+        Test::SteppedSpring => swing(integrator, stiffness_n_per_m, step_s),
     }
 }
 
@@ -271,8 +271,8 @@ impl Study for [Map] {
         let records = rows.flat_map(|(map, row)| {
             let record = |(step_s, outcome): &(f64, Outcome)| Record {
                 test: match map.test {
-                    Test::Clinging => "clinging",
-                    Test::Swinging => "swinging",
+                    Test::LuGre => "clinging",
+                    Test::SteppedSpring => "swinging",
                 },
                 integrator: map.integrator.name(),
                 stiffness_n_per_m: format!("{:.4e}", row.stiffness_n_per_m),
@@ -299,9 +299,9 @@ mod tests {
         for integrator in integrators() {
             for bristles_n_per_m in [1e3, 1e4, 2e5, 1e6] {
                 // A scan is the longest that a scene may ask for.
-                let step_s = allowed_s(Test::Clinging, integrator, bristles_n_per_m).min(250e-6);
+                let step_s = allowed_s(Test::LuGre, integrator, bristles_n_per_m).min(250e-6);
                 assert_eq!(
-                    outcome(Test::Clinging, integrator, bristles_n_per_m, 0.98 * step_s),
+                    outcome(Test::LuGre, integrator, bristles_n_per_m, 0.98 * step_s),
                     Outcome::Sound,
                     "{integrator:?}, {bristles_n_per_m} N/m"
                 );
@@ -313,7 +313,7 @@ mod tests {
     fn explicit_steps_of_a_scan_lose_bristles_that_are_as_stiff_as_ours() {
         for integrator in [Integrator::Euler, Integrator::SemiImplicit, Integrator::Rk4] {
             assert_eq!(
-                outcome(Test::Clinging, integrator, 2e5, 250e-6),
+                outcome(Test::LuGre, integrator, 2e5, 250e-6),
                 Outcome::Diverges,
                 "{integrator:?}"
             );
@@ -324,8 +324,9 @@ mod tests {
     fn a_swing_grows_beyond_the_guard_s_limit_and_never_within_half_of_it() {
         for integrator in [Integrator::Euler, Integrator::SemiImplicit, Integrator::Rk4] {
             for stiffness_n_per_m in [400.0, 10_000.0] {
-                let allowed_s = allowed_s(Test::Swinging, integrator, stiffness_n_per_m);
-                let at = |step_s| outcome(Test::Swinging, integrator, stiffness_n_per_m, step_s);
+                let allowed_s = allowed_s(Test::SteppedSpring, integrator, stiffness_n_per_m);
+                let at =
+                    |step_s| outcome(Test::SteppedSpring, integrator, stiffness_n_per_m, step_s);
                 assert!(
                     at(1.1 * allowed_s) >= Outcome::Chatters,
                     "{integrator:?}, {stiffness_n_per_m} N/m"
@@ -343,7 +344,7 @@ mod tests {
         for stiffness_n_per_m in spread(FINGERTIP_N_PER_M, 8) {
             for step_s in spread(SWINGING_STEPS_S, 12) {
                 let outcome = outcome(
-                    Test::Swinging,
+                    Test::SteppedSpring,
                     Integrator::Implicit,
                     stiffness_n_per_m,
                     step_s,

@@ -20,7 +20,7 @@ use serde::Serialize;
 use super::timing::{STROKE, WAVELENGTH_MM};
 use crate::study::{Fixed, Short, Study, Table, csv_text, number};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::actuators;
 use hil_sim_core::judge::edges::edges;
@@ -104,9 +104,9 @@ fn links(quick: bool) -> Vec<Link> {
 fn row(firmware: &Firmware, link: Link, quick: bool) -> Result<Row, ElfError> {
     let duration_s = if quick { 2.0 } else { 8.0 };
     let run = display_alone::run(
-        Alone {
+        DisplayBench {
             link,
-            ..Alone::new(STROKE, WAVELENGTH_MM, duration_s)
+            ..DisplayBench::new(STROKE, WAVELENGTH_MM, duration_s)
         },
         firmware,
     )?;

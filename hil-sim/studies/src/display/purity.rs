@@ -13,14 +13,14 @@ use serde::Serialize;
 
 use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::mean::{Held, about_a_second_s};
 use hil_sim_core::judge::spectrum::{Line, Spectrum, spectra};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
 use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::recording::{ACTUATORS, Recording, volts};
-use stretch::{Course, Stretch};
+use stretch::{StimulusSequence, Stretch};
 
 /// The highest a spur may be, in dB over the stimulus.
 pub const GOAL_DBC: f64 = -80.0;
@@ -182,15 +182,15 @@ fn run(plan: &Plan, firmware: &Firmware, extent: Extent) -> Result<Vec<Row>, Elf
             }
         }
     }
-    let course = Course::new(stretches);
-    let alone = Alone {
+    let course = StimulusSequence::new(stretches);
+    let alone = DisplayBench {
         configuration: DisplayConfiguration {
             mode: plan.mode,
             update_rate: plan.rate,
             ..DisplayConfiguration::DEFAULT
         },
         surface: course.surface(),
-        ..Alone::new(course.hand(), 2.0, course.ends_s() + 0.01)
+        ..DisplayBench::new(course.hand(), 2.0, course.ends_s() + 0.01)
     };
     let recording = display_alone::run(alone, firmware)?.recording;
     Ok(course
@@ -472,8 +472,8 @@ fn levels_dbc(row: &Row) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hil_sim_core::run::fault_evidence::FaultEvidence;
     use hil_sim_core::run::recording::{Engine, OutputRecord, TickRecord};
-    use hil_sim_core::run::signs::Signs;
 
     const RATE: UpdateRate = UpdateRate::Hz2000;
 
@@ -523,7 +523,7 @@ mod tests {
             warm_up_s: 0.0,
             wall_s: 1.0,
             hash: 0,
-            signs: Signs::default(),
+            signs: FaultEvidence::default(),
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::study::{Fixed, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::{Alone, AloneRun};
+use hil_sim_boards::display_alone::{AloneRun, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
 use hil_sim_core::run::batch::on_all_cores;
@@ -87,9 +87,9 @@ pub fn measure(firmware: &Firmware, quick: bool) -> Result<Vec<Stop>, ElfError> 
 fn stop(firmware: &Firmware, configuration: DisplayConfiguration) -> Result<Stop, ElfError> {
     let run = |hand: Motion, duration_s: f64| -> Result<AloneRun, ElfError> {
         display_alone::run(
-            Alone {
+            DisplayBench {
                 configuration,
-                ..Alone::new(hand, WAVELENGTH_MM, duration_s)
+                ..DisplayBench::new(hand, WAVELENGTH_MM, duration_s)
             },
             firmware,
         )
@@ -307,8 +307,8 @@ impl Study for [Stop] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hil_sim_core::run::fault_evidence::FaultEvidence;
     use hil_sim_core::run::recording::{Engine, TickRecord};
-    use hil_sim_core::run::signs::Signs;
 
     /// A hand that stops at 1 s and goes on at 1.4 s; channel 24 stands at 0x9000 and channel 3 at
     /// 0x7000 until 1 s, then at half of it for 5 and 9 ms, then at 0 V until 2 ms after the start.
@@ -350,7 +350,7 @@ mod tests {
             warm_up_s: 0.0,
             wall_s: 1.0,
             hash: 0,
-            signs: Signs::default(),
+            signs: FaultEvidence::default(),
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),

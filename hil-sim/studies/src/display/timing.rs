@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::Alone;
+use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::actuators;
 use hil_sim_core::judge::edges::{Edges, edges};
@@ -101,10 +101,10 @@ fn row(firmware: &Firmware, rate: UpdateRate, link: Link, quick: bool) -> Result
     };
     let duration_s = if quick { 1.5 } else { 8.0 };
     let run = display_alone::run(
-        Alone {
+        DisplayBench {
             configuration,
             link,
-            ..Alone::new(STROKE, WAVELENGTH_MM, duration_s)
+            ..DisplayBench::new(STROKE, WAVELENGTH_MM, duration_s)
         },
         firmware,
     )?;

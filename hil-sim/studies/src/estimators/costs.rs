@@ -6,7 +6,7 @@ use std::path::Path;
 use hil_sim_boards::ElfError;
 use hil_sim_boards::cost::{Taken, measure_example};
 
-use super::contest::{Contestant, Work};
+use super::benchmark::{Contestant, Work};
 use super::fourier::operations_of_transform;
 use super::parts::{FRONT, SETTINGS_FROM, TRANSFORM};
 use super::settings::SETTINGS;

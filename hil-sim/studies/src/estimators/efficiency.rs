@@ -12,9 +12,9 @@ use serde::Serialize;
 use crate::study::{Fixed, Short, Study, Table, csv_text, number};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Profile, Scene, SceneError};
 
+use super::benchmark;
+use super::benchmark::Contestant;
 use super::bound::{Tone, WAVES, window_mm};
-use super::contest;
-use super::contest::Contestant;
 use super::settings::{Knob, Setting};
 use protocol::SensorConfiguration;
 
@@ -148,7 +148,7 @@ pub fn measure(done: impl Fn() + Sync) -> Result<Vec<Row>, SceneError> {
         })
         .collect();
     let scenes: Vec<&Scene> = scenes.iter().collect();
-    let summaries = contest::run(&contestants, &scenes, from_s, done)?;
+    let summaries = benchmark::run(&contestants, &scenes, from_s, done)?;
     let mut rows = Vec::new();
     for (asked, (_, gauges)) in ASKED.iter().enumerate() {
         let per_row = WAVELENGTHS_MM.len();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use super::rivals::spectrum::{LENGTH, LINES, Transform};
+use super::baselines::spectrum::{LENGTH, LINES, Transform};
 use super::tally::{Tally, operations};
 
 /// `realfft`'s, without vector instructions.

@@ -2,7 +2,7 @@
 
 use super::bank;
 use super::family::Family;
-use super::result::{ContestResult, Entry, WINDOWS, Window};
+use super::result::{BenchmarkResult, Entry, WINDOWS, Window};
 use crate::output::plot::axis::Axis;
 use crate::output::plot::font::{Anchor, Font};
 use crate::output::plot::mark::Mark;
@@ -36,7 +36,7 @@ const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 const ASIDE: Font = Font::new(10.0);
 
 /// Draws it.
-pub fn draw(result: &ContestResult) -> String {
+pub fn draw(result: &BenchmarkResult) -> String {
     let mut page = Page::default();
     page.note(
         "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated Cortex-M4F. \
@@ -83,7 +83,7 @@ fn budget() -> Mark {
 }
 
 /// How long each takes to settle, over its cost.
-fn settling(result: &ContestResult, index: usize, family: &Family) -> Panel {
+fn settling(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let title = format!("{}: settled within 10 %, ms", family.title);
     let goals = goals_ms(family);
     let goals = goals
@@ -99,7 +99,7 @@ fn settling(result: &ContestResult, index: usize, family: &Family) -> Panel {
 }
 
 /// Each one's error over its cost.
-fn errors(result: &ContestResult, index: usize, family: &Family) -> Panel {
+fn errors(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let cost = cost_axis();
     let bounds = WINDOWS.into_iter().filter_map(|window| {
         let percent = window.bound_percent(family)?;
@@ -131,7 +131,7 @@ fn errors(result: &ContestResult, index: usize, family: &Family) -> Panel {
 }
 
 /// The first family's error over the time to settle, the fits' lengths beside their marks.
-fn against_settling(result: &ContestResult) -> Panel {
+fn against_settling(result: &BenchmarkResult) -> Panel {
     let time = Axis::even(0.0, 400.0, 100.0, "ms to settle after the boundary");
     let panel = Panel::new("Table I, 20 dB: RMS error, %", &time, &error_axis());
     let mut families = result.families.iter();
@@ -172,7 +172,7 @@ fn goals_ms(family: &Family) -> Vec<f64> {
 
 /// Lines along the knobs, then every mark; `family` is whose valid share makes one faint.
 fn marks(
-    result: &ContestResult,
+    result: &BenchmarkResult,
     family: usize,
     y: &Axis,
     place: impl Fn(&Entry) -> Option<Point>,
@@ -230,7 +230,7 @@ fn knob_line(knob: &str, colour: crate::output::plot::palette::Colour) -> Stroke
     })
 }
 
-impl Study for ContestResult {
+impl Study for BenchmarkResult {
     const NAME: &'static str = "estimators";
 
     fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
@@ -245,7 +245,7 @@ impl Study for ContestResult {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::contest::contestants;
+    use crate::estimators::benchmark::contestants;
     use crate::estimators::costs::Cost;
     use crate::estimators::score::Score;
 
@@ -283,7 +283,7 @@ mod tests {
         let entries = entries.collect();
         crate::output::plot::fits::assert_fits(
             "estimators",
-            &draw(&ContestResult { families, entries }),
+            &draw(&BenchmarkResult { families, entries }),
         );
     }
 }

@@ -5,7 +5,7 @@ use pitch_detection::detector::mcleod::McLeodDetector;
 use pitch_detection::detector::yin::YINDetector;
 use protocol::GAUGES;
 
-use super::rivals::{HEARD, Rival, Window};
+use super::baselines::{HEARD, Rival, Window};
 use super::tally::{Tally, operations};
 
 /// YIN answers at the first dip of its normalised difference below 1 less this: 0.2.

@@ -38,7 +38,7 @@ impl Entry {
 
 /// Everything that the chart shows.
 #[derive(Clone, Debug)]
-pub struct ContestResult {
+pub struct BenchmarkResult {
     /// The families.
     pub families: Vec<Family>,
     /// The contestants, knobs in order.
@@ -130,7 +130,7 @@ impl<'a> Record<'a> {
     }
 }
 
-impl ContestResult {
+impl BenchmarkResult {
     /// A line for each contestant and family, and for each bound.
     ///
     /// # Errors
@@ -193,7 +193,7 @@ mod tests {
                 },
             ],
         };
-        let result = ContestResult {
+        let result = BenchmarkResult {
             families: vec![
                 family("steady", scene),
                 family("clean", Scene::constant(1.0, 50.0)),

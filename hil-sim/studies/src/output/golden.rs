@@ -65,7 +65,7 @@ pub enum GoldenError {
 
 /// What a run has to do with the golden hash of its scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum Comparison {
     /// It is the same.
     Same,
     /// There is none.
@@ -198,13 +198,13 @@ impl Golden {
     }
 
     /// What a run's hash has to do with the golden one of the scene of that name.
-    pub fn standing(&self, name: &str, engine: Engine, hash: u64) -> Standing {
+    pub fn standing(&self, name: &str, engine: Engine, hash: u64) -> Comparison {
         match self.hash(name, engine) {
-            None => Standing::Missing,
-            Some(golden) if *golden == format!("{hash:016x}") => Standing::Same,
+            None => Comparison::Missing,
+            Some(golden) if *golden == format!("{hash:016x}") => Comparison::Same,
             Some(golden) => {
                 let line = line_of(&self.text, &[name, engine.name()]);
-                Standing::Other(golden.clone(), line)
+                Comparison::Other(golden.clone(), line)
             }
         }
     }
@@ -244,14 +244,14 @@ impl Golden {
 }
 
 /// What to say of a run whose hash is not the golden one; none if it is.
-pub fn complaint(standing: &Standing, hash: u64, golden: &Golden, name: &str) -> Option<String> {
+pub fn complaint(standing: &Comparison, hash: u64, golden: &Golden, name: &str) -> Option<String> {
     let path = golden.path().display();
     match standing {
-        Standing::Same => None,
-        Standing::Missing => Some(format!(
+        Comparison::Same => None,
+        Comparison::Missing => Some(format!(
             "golden: {path} has no hash of {name}: look at the run, then hil-sim golden renew"
         )),
-        Standing::Other(golden, _) => Some(format!(
+        Comparison::Other(golden, _) => Some(format!(
             "golden: {hash:016x} is not {golden} of {path}: the run has changed: look at what and why, and if it is meant, hil-sim golden renew"
         )),
     }
@@ -277,17 +277,20 @@ mod tests {
         let mut golden = Golden::open(&path).unwrap();
         let name = golden.name(&scene).unwrap();
         assert_eq!(name, "sub/a \"b\".toml");
-        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Missing);
+        assert_eq!(
+            golden.standing(&name, Engine::Native, 7),
+            Comparison::Missing
+        );
         assert_eq!(golden.renew(&name, Engine::Native, 7), None);
         golden.write().unwrap();
 
         let mut golden = Golden::read(&path).unwrap();
-        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Same);
-        assert_eq!(golden.standing(&name, Engine::Elf, 7), Standing::Missing);
+        assert_eq!(golden.standing(&name, Engine::Native, 7), Comparison::Same);
+        assert_eq!(golden.standing(&name, Engine::Elf, 7), Comparison::Missing);
         let other = golden.standing(&name, Engine::Native, 8);
         assert_eq!(
             other,
-            Standing::Other("0000000000000007".to_owned(), Some(5))
+            Comparison::Other("0000000000000007".to_owned(), Some(5))
         );
         let complaint = complaint(&other, 8, &golden, &name).unwrap();
         assert!(
@@ -297,8 +300,8 @@ mod tests {
         golden.renew(&name, Engine::Elf, 9);
         golden.write().unwrap();
         let golden = Golden::read(&path).unwrap();
-        assert_eq!(golden.standing(&name, Engine::Native, 7), Standing::Same);
-        assert_eq!(golden.standing(&name, Engine::Elf, 9), Standing::Same);
+        assert_eq!(golden.standing(&name, Engine::Native, 7), Comparison::Same);
+        assert_eq!(golden.standing(&name, Engine::Elf, 9), Comparison::Same);
 
         // From another folder the scene has another name.
         let elsewhere = Golden::open(&folder.join("sub/golden.toml")).unwrap();

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::psychophysics::given::Course;
+use crate::psychophysics::given::StimulusSequence;
 use hil_sim_boards;
 use hil_sim_boards::{ElfError, Firmwares};
 use hil_sim_core::native;
@@ -24,7 +24,7 @@ pub enum Job {
     /// Both boards in a scene.
     Pair(Box<Scene>),
     /// The display alone.
-    Display(Course),
+    Display(StimulusSequence),
 }
 
 /// A job failed.

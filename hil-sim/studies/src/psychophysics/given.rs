@@ -5,15 +5,15 @@
 use firmware_display::{Display, Senses, Settings};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration};
 
-use crate::psychophysics::felt::{ACTUATOR, Felt};
 use crate::psychophysics::hand::{FREQUENCY_HZ, PEAK_MM_S};
+use crate::psychophysics::presented::{ACTUATOR, Felt};
 use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::{Alone, Said};
+use hil_sim_boards::display_alone::{DisplayBench, SensorMessage};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::run::digest::Digest;
+use hil_sim_core::run::fault_evidence::FaultEvidence;
 use hil_sim_core::run::recording::{Engine, OutputRecord, Recording, TickRecord};
-use hil_sim_core::run::signs::Signs;
 use hil_sim_core::scene::Motion;
 
 /// A stroke to and fro, in s.
@@ -26,11 +26,11 @@ const TICK_NS: u64 = 500_000;
 
 /// Wavelengths to be presented, in mm, one after the other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course {
+pub struct StimulusSequence {
     wavelengths_mm: Vec<f64>,
 }
 
-impl Course {
+impl StimulusSequence {
     /// A course of these.
     pub fn new(wavelengths_mm: &[f64]) -> Self {
         Self {
@@ -59,9 +59,9 @@ impl Course {
     /// Runs it on the display's ELF.
     pub(super) fn on_elf(&self, firmware: &Firmware) -> Result<Recording, ElfError> {
         let course = self.clone();
-        let alone = Alone {
-            surface: Box::new(move |t_s| Said::of(course.wavelength_mm(t_s))),
-            ..Alone::new(Self::hand(), self.wavelengths_mm[0], self.duration_s())
+        let alone = DisplayBench {
+            surface: Box::new(move |t_s| SensorMessage::of(course.wavelength_mm(t_s))),
+            ..DisplayBench::new(Self::hand(), self.wavelengths_mm[0], self.duration_s())
         };
         display_alone::run(alone, firmware).map(|run| run.recording)
     }
@@ -93,7 +93,7 @@ impl Course {
                 });
             }
             if tick.is_multiple_of(TICKS_PER_ESTIMATE) {
-                let said = Said::of(self.wavelength_mm(t_s));
+                let said = SensorMessage::of(self.wavelength_mm(t_s));
                 let sequence = (tick / TICKS_PER_ESTIMATE) as u32;
                 let velocity_mm_s = hand.velocity_mm_s(t_s);
                 display.on_estimate(&said.estimate(sequence, at_ns / 1_000, velocity_mm_s));
@@ -130,7 +130,7 @@ fn empty(duration_s: f64) -> Recording {
         sensor_status: None,
         display_status: None,
         log: Vec::new(),
-        signs: Signs::default(),
+        signs: FaultEvidence::default(),
     }
 }
 
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn the_display_presents_each_given_wavelength_to_a_count_of_the_encoder_at_either_end() {
         let given_mm = [0.4, 0.6, 1.0, 2.0, 4.0, 5.6];
-        let course = Course::new(&given_mm);
+        let course = StimulusSequence::new(&given_mm);
         let felt = course.felt(&course.on_library());
         for (given_mm, felt) in given_mm.into_iter().zip(felt) {
             let felt = felt.unwrap();

@@ -7,11 +7,11 @@
 //! and how far apart the stimuli; that they begin 1.6 mm from the standard, or at the shortest stimulus
 //! of 0.4 mm, is an assumption.
 
-use crate::psychophysics::felt::{Felt, Glimpse};
 use crate::psychophysics::interval::{mean, sample_deviation};
 use crate::psychophysics::observer::{Answer, Observer};
+use crate::psychophysics::presented::{Felt, IntegrationWindow};
 use crate::psychophysics::published::{Limens, SERIES, STEP_MM, TABLE_2};
-use crate::psychophysics::skin::Skin;
+use crate::psychophysics::thresholds::Skin;
 
 /// How far from the standard a series begins, in steps.
 const SPAN_STEPS: usize = 8;
@@ -32,13 +32,18 @@ fn step_mm(step: usize) -> f64 {
 
 /// Which way a series goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum Direction {
     Up,
     Down,
 }
 
 /// Table II once over, with one observer for each skin, from `stimuli` as [`comparisons_mm`] lists them.
-pub fn table(stimuli: &[Felt], skins: &[Skin], glimpse: Glimpse, seed: u64) -> [Limens; 4] {
+pub fn table(
+    stimuli: &[Felt],
+    skins: &[Skin],
+    glimpse: IntegrationWindow,
+    seed: u64,
+) -> [Limens; 4] {
     let mut observers: Vec<Observer> = skins
         .iter()
         .zip(0u64..)
@@ -66,7 +71,7 @@ fn subject(observer: &mut Observer, stimuli: &[Felt], standard_mm: f64) -> (f64,
     let first = standard.saturating_sub(SPAN_STEPS).max(SHORTEST_STEP);
     let last = (standard + SPAN_STEPS).min(LONGEST_STEP);
     let mut limens = Vec::with_capacity(2 * SERIES);
-    for way in [Way::Up, Way::Down].repeat(SERIES) {
+    for way in [Direction::Up, Direction::Down].repeat(SERIES) {
         let mut answer = |step: usize| {
             let comparison = &stimuli[step - SHORTEST_STEP];
             observer.compare(comparison, &stimuli[standard - SHORTEST_STEP], standard_mm)
@@ -82,14 +87,14 @@ fn subject(observer: &mut Observer, stimuli: &[Felt], standard_mm: f64) -> (f64,
 /// The lower and the upper limen of one series, in mm. One that is not met lies half a step beyond the
 /// series' end.
 fn series(
-    way: Way,
+    way: Direction,
     first: usize,
     last: usize,
     answer: &mut impl FnMut(usize) -> Answer,
 ) -> (f64, f64) {
     let half_mm = 0.5 * STEP_MM;
     match way {
-        Way::Up => {
+        Direction::Up => {
             let mut lower_mm = None;
             for step in first..=last {
                 let limen_mm = step_mm(step) - half_mm;
@@ -104,7 +109,7 @@ fn series(
             let beyond_mm = step_mm(last) + half_mm;
             (lower_mm.unwrap_or(beyond_mm), beyond_mm)
         }
-        Way::Down => {
+        Direction::Down => {
             let mut upper_mm = None;
             for step in (first..=last).rev() {
                 let limen_mm = step_mm(step) + half_mm;
@@ -137,7 +142,7 @@ mod tests {
 
     #[test]
     fn both_ways_find_the_limens_between_the_steps_about_them() {
-        for way in [Way::Up, Way::Down] {
+        for way in [Direction::Up, Direction::Down] {
             let (lower_mm, upper_mm) = series(way, 2, 13, &mut certain);
             assert!((lower_mm - 0.9).abs() < 1e-12, "{way:?} {lower_mm}");
             assert!((upper_mm - 1.3).abs() < 1e-12, "{way:?} {upper_mm}");
@@ -147,9 +152,9 @@ mod tests {
     #[test]
     fn a_limen_that_is_not_met_lies_half_a_step_beyond() {
         let mut never = |_: usize| Answer::Equal;
-        let (lower_mm, upper_mm) = series(Way::Up, 4, 6, &mut never);
+        let (lower_mm, upper_mm) = series(Direction::Up, 4, 6, &mut never);
         assert!((lower_mm - 0.7).abs() < 1e-12 && (upper_mm - 1.3).abs() < 1e-12);
-        let (lower_mm, upper_mm) = series(Way::Down, 4, 6, &mut never);
+        let (lower_mm, upper_mm) = series(Direction::Down, 4, 6, &mut never);
         assert!((lower_mm - 0.7).abs() < 1e-12 && (upper_mm - 1.3).abs() < 1e-12);
     }
 
@@ -167,7 +172,7 @@ mod tests {
         let stimuli: Vec<Felt> = comparisons_mm().into_iter().map(Felt::steady).collect();
         const TABLES: u64 = 400;
         let tables: Vec<_> = (0..TABLES)
-            .map(|seed| table(&stimuli, &Skin::subjects(), Glimpse::Wave, seed))
+            .map(|seed| table(&stimuli, &Skin::subjects(), IntegrationWindow::Wave, seed))
             .collect();
         for (column, expected) in TABLE_2.iter().enumerate() {
             let limen_mm = mean(tables.iter().map(|table| table[column].limen_mm));

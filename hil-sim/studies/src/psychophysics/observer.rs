@@ -4,9 +4,9 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::psychophysics::felt::{Felt, Glimpse};
 use crate::psychophysics::normal;
-use crate::psychophysics::skin::Skin;
+use crate::psychophysics::presented::{Felt, IntegrationWindow};
+use crate::psychophysics::thresholds::Skin;
 
 /// For how long a sensation is gathered, in s: a guess, and not a number of the paper's.
 /// [`crate::psychophysics::study`] says what a shorter and a longer one would change.
@@ -27,13 +27,13 @@ pub enum Answer {
 #[derive(Clone, Debug)]
 pub struct Observer {
     skin: Skin,
-    glimpse: Glimpse,
+    glimpse: IntegrationWindow,
     draws: Xoshiro256PlusPlus,
 }
 
 impl Observer {
     /// With a skin, and a seed for where he looks and what his nerves add.
-    pub fn new(skin: Skin, glimpse: Glimpse, seed: u64) -> Self {
+    pub fn new(skin: Skin, glimpse: IntegrationWindow, seed: u64) -> Self {
         Self {
             skin,
             glimpse,
@@ -97,7 +97,7 @@ mod tests {
     const BOUND: f64 = 4.0 * 0.5 / 200.0;
 
     fn observer() -> Observer {
-        Observer::new(Skin::average(), Glimpse::Wave, 1)
+        Observer::new(Skin::average(), IntegrationWindow::Wave, 1)
     }
 
     fn share(of: impl FnMut() -> bool) -> f64 {

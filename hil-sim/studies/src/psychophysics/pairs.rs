@@ -1,12 +1,12 @@
 //! Paired comparison: Table III.
 
-use crate::psychophysics::felt::{Felt, Glimpse};
 use crate::psychophysics::observer::Observer;
 use crate::psychophysics::pair::{self, Pair};
-use crate::psychophysics::skin::Skin;
+use crate::psychophysics::presented::{Felt, IntegrationWindow};
+use crate::psychophysics::thresholds::Skin;
 
 /// Table III once over: `trials` of each pair of the samples, which are in order of wavelength.
-pub fn table(samples: &[Felt], trials: u32, glimpse: Glimpse, seed: u64) -> Vec<Pair> {
+pub fn table(samples: &[Felt], trials: u32, glimpse: IntegrationWindow, seed: u64) -> Vec<Pair> {
     let mut observer = Observer::new(Skin::average(), glimpse, seed);
     pair::of(samples.len())
         .map(|(shorter, longer)| {
@@ -24,7 +24,7 @@ pub fn table(samples: &[Felt], trials: u32, glimpse: Glimpse, seed: u64) -> Vec<
 }
 
 /// Where the shares of Table III go in the long run, as if of `trials` each.
-pub fn long_run(samples: &[Felt], trials: u32, glimpse: Glimpse, seed: u64) -> Vec<Pair> {
+pub fn long_run(samples: &[Felt], trials: u32, glimpse: IntegrationWindow, seed: u64) -> Vec<Pair> {
     /// Glimpses of each pair: the mean of shares is then within 0.002 of where it goes.
     const GLIMPSES: u32 = 20_000;
     let mut observer = Observer::new(Skin::average(), glimpse, seed);
@@ -61,7 +61,7 @@ mod tests {
                 .iter()
                 .map(|mm| Felt::noisy(*mm, noise))
                 .collect();
-            let share = mean_share(&long_run(&samples, 10, Glimpse::Wave, 1));
+            let share = mean_share(&long_run(&samples, 10, IntegrationWindow::Wave, 1));
             // The study's are rounded to 0.01; limens that go with the felt wavelength, and a spread that
             // ends, instead of a normal one, cost up to another 0.015.
             assert!((share - predicted).abs() < 0.02, "{noise} {share}");
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn a_table_has_every_pair_once_and_whole_answers() {
         let samples: Vec<Felt> = SAMPLES_MM.into_iter().map(Felt::steady).collect();
-        let table = table(&samples, 10, Glimpse::Wave, 3);
+        let table = table(&samples, 10, IntegrationWindow::Wave, 3);
         assert_eq!(table.len(), 6);
         assert!(table.iter().all(|pair| pair.correct.fract() == 0.0
             && pair.correct <= 10.0

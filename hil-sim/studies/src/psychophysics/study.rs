@@ -7,8 +7,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::psychophysics::bench::Job;
-use crate::psychophysics::felt::{ACTUATOR, Felt, Glimpse};
-use crate::psychophysics::given::Course;
+use crate::psychophysics::given::StimulusSequence;
 use crate::psychophysics::hand;
 use crate::psychophysics::interval::{Interval, mean, middle, wilson};
 use crate::psychophysics::limits;
@@ -17,9 +16,10 @@ use crate::psychophysics::observer::GLIMPSE_S;
 use crate::psychophysics::pair::Pair;
 use crate::psychophysics::pairs;
 use crate::psychophysics::pairs::mean_share;
+use crate::psychophysics::presented::{ACTUATOR, Felt, IntegrationWindow};
 use crate::psychophysics::published::{Limens, SAMPLES_MM, TABLE_2, TRIALS};
 use crate::psychophysics::recount::Recount;
-use crate::psychophysics::skin::Skin;
+use crate::psychophysics::thresholds::Skin;
 use crate::psychophysics::thurstone::{Scale, scale};
 use hil_sim_core::run::recording::{Engine, Recording};
 use hil_sim_core::scene::{Estimator, Scene};
@@ -264,10 +264,10 @@ pub fn jobs(plan: &Plan) -> Vec<Job> {
 }
 
 /// All comparison stimuli, in two runs for two cores.
-fn courses() -> [Course; 2] {
+fn courses() -> [StimulusSequence; 2] {
     let all_mm = limits::comparisons_mm();
     let (one, other) = all_mm.split_at(all_mm.len().div_ceil(2));
-    [Course::new(one), Course::new(other)]
+    [StimulusSequence::new(one), StimulusSequence::new(other)]
 }
 
 /// A specimen under a hand that strokes to and fro; the same hand and noise for every estimator.
@@ -384,7 +384,7 @@ fn given_stimuli(recordings: &[Recording]) -> Result<Vec<Stimulus>, Silent> {
 }
 
 fn columns(plan: Plan, given: &[Stimulus]) -> Vec<Column> {
-    let glimpse = Glimpse::Seconds(GLIMPSE_S);
+    let glimpse = IntegrationWindow::Seconds(GLIMPSE_S);
     let real: Vec<Felt> = given.iter().map(|stimulus| stimulus.felt.clone()).collect();
     let clean: Vec<Felt> = given
         .iter()
@@ -446,7 +446,7 @@ impl Compared {
             samples.push(Stimulus::new(wavelength_mm, felt));
         }
         let felt: Vec<Felt> = samples.iter().map(|sample| sample.felt.clone()).collect();
-        let glimpse = Glimpse::Seconds(GLIMPSE_S);
+        let glimpse = IntegrationWindow::Seconds(GLIMPSE_S);
         let Plan { seed, trials, .. } = plan;
         let once = pairs::table(&felt, trials, glimpse, seed ^ SALTS[2]);
         let long_run = |glimpse| pairs::long_run(&felt, trials, glimpse, seed ^ SALTS[3]);
@@ -498,7 +498,7 @@ impl Compared {
                 .collect(),
             scaled: scales.len() as f64 / again.len() as f64,
             rejected: Some(mean(rejected)).filter(|share| share.is_finite()),
-            by_glimpse: [Glimpse::Wave, glimpse, Glimpse::Stroke]
+            by_glimpse: [IntegrationWindow::Wave, glimpse, IntegrationWindow::Stroke]
                 .map(|glimpse| mean_share(&long_run(glimpse))),
             samples,
             once,

@@ -5,8 +5,8 @@ use protocol::{Safety, Trip};
 
 use super::*;
 use crate::judge::synthetic::Run;
+use crate::run::fault_evidence::{FaultEvidence, Reset};
 use crate::run::recording::ACTUATORS;
-use crate::run::signs::{Reset, Signs};
 
 const MS: u64 = 1_000_000;
 const AT_MS: u64 = 100;
@@ -28,15 +28,15 @@ fn driven(from_ms: u64, to_ms: u64, then: u16) -> Vec<OutputRecord> {
     ticks.chain([last]).collect()
 }
 
-fn said(at_ms: u64, state: DisplayState) -> Said {
+fn said(at_ms: u64, state: DisplayState) -> TimedMessage {
     let instant_us = at_ms * 1_000;
-    Said {
+    TimedMessage {
         at_ns: at_ms * MS,
         message: Message::Safety(Safety { instant_us, state }),
     }
 }
 
-fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: Signs) -> Finding {
+fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: FaultEvidence) -> Finding {
     let recording = Recording {
         outputs,
         signs,
@@ -46,10 +46,10 @@ fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: Signs) -> Finding {
     finding(&fault, END_MS * MS, &recording)
 }
 
-fn stopped() -> Signs {
-    Signs {
+fn stopped() -> FaultEvidence {
+    FaultEvidence {
         display: vec![said(AT_MS + 3, DisplayState::Stopped(Trip::Converter))],
-        ..Signs::default()
+        ..FaultEvidence::default()
     }
 }
 
@@ -112,7 +112,7 @@ fn more_resets_than_the_kind_has_are_against_the_table() {
         at_ns: at_ms * MS,
         is_injected: false,
     };
-    let signs = |resets| Signs {
+    let signs = |resets| FaultEvidence {
         resets,
         ..stopped()
     };
@@ -126,14 +126,14 @@ fn more_resets_than_the_kind_has_are_against_the_table() {
 
 #[test]
 fn what_was_said_before_the_fault_or_after_its_time_is_no_sign_of_it() {
-    let signs = Signs {
+    let signs = FaultEvidence {
         display: vec![
             said(AT_MS - 1, DisplayState::Stopped(Trip::Converter)),
             said(AT_MS + 1, DisplayState::Driving),
             said(END_MS, DisplayState::Stopped(Trip::Converter)),
         ],
         clears_ns: vec![(AT_MS - 1) * MS],
-        ..Signs::default()
+        ..FaultEvidence::default()
     };
     let finding = judged(Kind::DacAlarm, driven(0, AT_MS + 2, ZERO_VOLT), signs);
     assert_eq!(finding.unmet(), ["no sign of it"]);
@@ -141,9 +141,9 @@ fn what_was_said_before_the_fault_or_after_its_time_is_no_sign_of_it() {
 
 #[test]
 fn a_sign_of_what_is_no_fault_is_a_false_alarm() {
-    let signs = Signs {
+    let signs = FaultEvidence {
         clears_ns: vec![(AT_MS + 5) * MS],
-        ..Signs::default()
+        ..FaultEvidence::default()
     };
     let finding = judged(Kind::Nothing, driven(0, END_MS, ZERO_VOLT), signs);
     assert_eq!(finding.unmet(), ["a sign of what is no fault: CLR fell"]);

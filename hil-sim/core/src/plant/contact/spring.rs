@@ -91,7 +91,7 @@ impl Swing {
 
 /// A fingertip on a spring that follows the arm.
 #[derive(Clone, Debug)]
-pub struct Hanging {
+pub struct SpringDamper {
     spring: Spring,
     path: Path,
     /// Stretch in m and velocity in m/s; none until the arm's first velocity is known: it is set down
@@ -100,7 +100,7 @@ pub struct Hanging {
     swing: Swing,
 }
 
-impl Hanging {
+impl SpringDamper {
     /// A fingertip that is set down relaxed and moving with the arm.
     pub fn new(stiffness_n_per_m: f64) -> Self {
         let spring = Spring { stiffness_n_per_m };
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_steady_arm_is_followed_without_a_swing() {
-        let mut hanging = Hanging::new(400.0);
+        let mut hanging = SpringDamper::new(400.0);
         for scan in 0..4_000 {
             let t_s = f64::from(scan) * SCAN_S;
             hanging.follow(t_s, 0.05 * t_s);
@@ -169,7 +169,7 @@ mod tests {
     fn a_shaking_arm_is_followed_with_the_gain_of_a_resonance() {
         for hz in [2.0, 10.0, 20.0, 50.0, 100.0] {
             let omega = std::f64::consts::TAU * hz;
-            let mut hanging = Hanging::new(400.0);
+            let mut hanging = SpringDamper::new(400.0);
             let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0u32);
             for scan in 0..16_000 {
                 let t_s = f64::from(scan) * SCAN_S;
@@ -200,7 +200,7 @@ mod tests {
         // c² = 4 k m at 1.4 N/m: below it creeps back instead of swinging.
         for stiffness_n_per_m in [1.0, 1.40625, 10.0, 400.0, 10_000.0] {
             let spring = Spring { stiffness_n_per_m };
-            let mut hanging = Hanging::new(stiffness_n_per_m);
+            let mut hanging = SpringDamper::new(stiffness_n_per_m);
             let mut state = [0.0, 0.0];
             let arm_m = |t_s: f64| 0.01 * (40.0 * t_s).sin();
             hanging.state = Some(state);

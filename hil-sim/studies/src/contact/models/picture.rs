@@ -9,8 +9,8 @@ use crate::output::plot::palette::{
 };
 use crate::output::plot::panel::Panel;
 use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use hil_sim_core::scene::ContactModel;
 use hil_sim_core::scene::Integrator;
-use hil_sim_core::scene::Rung;
 
 /// Errors below are drawn there.
 const LEAST_PERCENT: f64 = 1e-5;
@@ -18,13 +18,13 @@ const LEAST_PERCENT: f64 = 1e-5;
 const REFERENCE: Stroke = Stroke::new(SOFT, 1.2).dashed("4 3");
 
 /// What a rung that is solved exactly looks like.
-fn of_rung(rung: Rung) -> Symbol {
+fn of_rung(rung: ContactModel) -> Symbol {
     let colour = match rung {
-        Rung::Kinematic => SKY,
-        Rung::Rigid => BLUE,
-        Rung::Viscoelastic => GREEN,
-        Rung::StickSlip => VERMILION,
-        Rung::Reference => INK,
+        ContactModel::Kinematic => SKY,
+        ContactModel::Rigid => BLUE,
+        ContactModel::Viscoelastic => GREEN,
+        ContactModel::StickSlip => VERMILION,
+        ContactModel::Reference => INK,
     };
     Symbol::new(colour, Shape::Circle)
 }
@@ -55,7 +55,9 @@ pub fn draw(rows: &[Row]) -> String {
         "Contact models: error to the reference, in %, over speed on one core; 50 mm/s, or 100 mm/s at 8 Hz. \
          Full: a rung as it is; hollow, joined: by steps, 250 µs on the right, 1 µs on the left.",
     );
-    let rungs = Rung::ALL.iter().filter(|rung| **rung != Rung::Reference);
+    let rungs = ContactModel::ALL
+        .iter()
+        .filter(|rung| **rung != ContactModel::Reference);
     let mut legend: Vec<(Key, &str)> = rungs
         .map(|rung| (Key::Symbol(of_rung(*rung)), rung.name()))
         .collect();
@@ -89,7 +91,7 @@ fn marks(rows: &[&Row]) -> Vec<Mark> {
     }
     for row in rows.iter().filter(|row| row.entrant.integrator.is_none()) {
         match row.entrant.rung {
-            Rung::Reference => {
+            ContactModel::Reference => {
                 marks.push(Mark::Upright(REFERENCE, row.pace, String::new()));
             }
             rung => marks.extend(at(row).map(|point| Mark::symbol(of_rung(rung), point))),

@@ -34,7 +34,7 @@ pub fn draw(maps: &[Map]) -> String {
     let mut legend = fills.to_vec();
     legend.push((Key::Line(LIMIT), "longest step allowed"));
     page.legend(&legend);
-    for test in [Test::Clinging, Test::Swinging] {
+    for test in [Test::LuGre, Test::SteppedSpring] {
         let of_test = |integrator| {
             let mut maps = maps.iter().filter(|map| map.test == test);
             maps.find(|map| map.integrator == integrator)
@@ -50,8 +50,8 @@ pub fn draw(maps: &[Map]) -> String {
 
 fn panel(map: &Map) -> Panel {
     let (steps_s, stiffnesses, what) = match map.test {
-        Test::Clinging => (CLINGING_STEPS_S, BRISTLES_N_PER_M, "bristles, N/m"),
-        Test::Swinging => (SWINGING_STEPS_S, FINGERTIP_N_PER_M, "spring, N/m"),
+        Test::LuGre => (CLINGING_STEPS_S, BRISTLES_N_PER_M, "bristles, N/m"),
+        Test::SteppedSpring => (SWINGING_STEPS_S, FINGERTIP_N_PER_M, "spring, N/m"),
     };
     let x = Axis::decades(steps_s.0 * 1e6, steps_s.1 * 1e6, "step, µs");
     let y = Axis::powers(stiffnesses.0, stiffnesses.1, "");
@@ -84,7 +84,7 @@ mod tests {
             allowed_s: 1e-5,
             cells: OUTCOMES.map(|(outcome, ..)| (1e-5, outcome)).to_vec(),
         };
-        let maps: Vec<Map> = [Test::Clinging, Test::Swinging]
+        let maps: Vec<Map> = [Test::LuGre, Test::SteppedSpring]
             .into_iter()
             .flat_map(|test| {
                 integrators().map(move |integrator| Map {

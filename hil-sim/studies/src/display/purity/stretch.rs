@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::Hand;
-use hil_sim_boards::display_alone::{Said, Surface};
+use hil_sim_boards::display_alone::{SensorMessage, Surface};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
 use hil_sim_core::scene::{Motion, Series};
 
@@ -47,12 +47,12 @@ impl Stretch {
 }
 
 /// Stretches in their order.
-pub struct Course {
+pub struct StimulusSequence {
     stretches: Vec<(f64, Stretch)>,
     ends_s: f64,
 }
 
-impl Course {
+impl StimulusSequence {
     pub fn new(stretches: Vec<Stretch>) -> Self {
         let mut ends_s = BEGINNING_S;
         let stretches = stretches
@@ -113,7 +113,7 @@ impl Course {
             .collect();
         Box::new(move |t_s| {
             let next = stretches.partition_point(|&(from_s, _)| from_s <= t_s);
-            Said::of(stretches[next.max(1) - 1].1)
+            SensorMessage::of(stretches[next.max(1) - 1].1)
         })
     }
 }
@@ -139,7 +139,7 @@ mod tests {
             wavelength_mm: 2.0,
             lasts_s: 3.0,
         };
-        let course = Course::new(vec![steady, stroke, steady]);
+        let course = StimulusSequence::new(vec![steady, stroke, steady]);
         assert!((course.ends_s() - 7.1).abs() < 1e-12);
         let hand = course.hand();
         assert_eq!(hand.velocity_mm_s(0.05), 0.0);

@@ -7,8 +7,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Instant, Ticker};
 use protocol::{Message, ResetCause, RoleCounters, Status};
 
+use crate::console::ConsoleOutput;
 use crate::ports::{Ports, Side};
-use crate::voice::Voice;
 
 /// Between two looks: eight in a watchdog's time.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -58,11 +58,11 @@ impl Vitals {
 /// counters show that the board does its work. Deadline: 400 ms, the watchdog's; missed, the board
 /// restarts.
 #[embassy_executor::task]
-pub async fn care(
+pub async fn supervise(
     ports: &'static Ports,
     mut vitals: Vitals,
     counters: fn() -> RoleCounters,
-    voice: Voice,
+    voice: ConsoleOutput,
 ) {
     let mut ticker = Ticker::every(PERIOD);
     let mut next_status = Instant::now() + STATUS_PERIOD;

@@ -14,13 +14,13 @@ use super::pace::Pacer;
 use super::socket::Socket;
 use super::{Command, PortName, lock};
 use crate::ElfError;
+use crate::board_pins::BoardPins;
 use crate::console::ConsoleHost;
 use crate::display::DisplayPins;
-use crate::lockstep::{Between, QUANTUM_NS, Witness};
+use crate::lockstep::{BoardHook, QUANTUM_NS, QuantumContext};
 use crate::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
 use crate::rtt::Channel;
 use crate::sensor::SensorPins;
-use crate::watched::Watched;
 use crate::wire::TimedByte;
 use hil_sim_core::run::recording::{ACTUATORS, volts};
 use hil_sim_core::scene::Scene;
@@ -57,7 +57,7 @@ impl Default for Outputs {
 
 /// What the sensor board makes of what it touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensed {
+pub struct SensorView {
     /// What it said last to its peer; none if it has not said anything yet.
     pub estimate: Option<Estimate>,
     /// The true wavelength under the fingertip, in mm.
@@ -79,7 +79,7 @@ pub struct Shared {
     pub end_ns: AtomicU64,
     /// Whether they are to stop before.
     pub stops: AtomicBool,
-    pub sensed: Mutex<Sensed>,
+    pub sensed: Mutex<SensorView>,
     pub outputs: Mutex<Outputs>,
     pub orders: Mutex<VecDeque<(Role, Command)>>,
 }
@@ -124,7 +124,7 @@ impl Shared {
 }
 
 /// What differs between the two boards' pins.
-pub trait Shown: Watched {
+pub trait BenchPins: BoardPins {
     /// Shows what the pins have come to since the last call, and forgets it.
     fn show(board: &mut Nucleo<Self>, shared: &Shared)
     where
@@ -138,7 +138,7 @@ pub trait Shown: Watched {
     }
 }
 
-impl Shown for SensorPins {
+impl BenchPins for SensorPins {
     fn show(board: &mut Nucleo<Self>, shared: &Shared) {
         let (pins, _) = board.pins();
         pins.scans.clear();
@@ -146,7 +146,7 @@ impl Shown for SensorPins {
     }
 }
 
-impl Shown for DisplayPins {
+impl BenchPins for DisplayPins {
     fn show(board: &mut Nucleo<Self>, shared: &Shared) {
         let last = Self::take_records(board).outputs.pop();
         let mut outputs = lock(&shared.outputs);
@@ -163,7 +163,7 @@ impl Shown for DisplayPins {
 }
 
 /// Beside one board.
-pub struct Beside {
+pub struct PortServer {
     role: Role,
     shared: Arc<Shared>,
     /// The host that sets the board up before anybody else has its console.
@@ -182,7 +182,7 @@ pub struct Beside {
     pacer: Option<Pacer>,
 }
 
-impl Beside {
+impl PortServer {
     /// Beside the board of `role` in `scene`, which runs `elf`.
     pub fn new(
         scene: &Scene,
@@ -222,7 +222,7 @@ impl Beside {
     }
 
     /// Goes on with setting the board up; true once that is done.
-    fn set_up<P: Watched>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
+    fn set_up<P: BoardPins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
         if let Some(host) = &mut self.setup {
             host.serve(board, now_ns);
             let reason = match host.told {
@@ -245,7 +245,7 @@ impl Beside {
     }
 
     /// Lets a port's bytes go both ways.
-    fn carry<P: Watched>(
+    fn carry<P: BoardPins>(
         &self,
         board: &mut Nucleo<P>,
         (uart, name): (usize, PortName),
@@ -261,7 +261,7 @@ impl Beside {
     }
 }
 
-impl<P: Shown> Witness<P> for Beside {
+impl<P: BenchPins> BoardHook<P> for PortServer {
     fn begin(&mut self, now_ns: u64) {
         let Some(pacer) = &mut self.pacer else { return };
         let behind = pacer.wait(now_ns);
@@ -298,8 +298,8 @@ impl<P: Shown> Witness<P> for Beside {
 
     fn heard(&mut self, _due_ns: u64, _byte: u8) {}
 
-    fn attend(&mut self, between: Between<'_, P>) {
-        let Between {
+    fn attend(&mut self, between: QuantumContext<'_, P>) {
+        let QuantumContext {
             session,
             host,
             stop,

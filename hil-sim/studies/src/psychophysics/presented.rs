@@ -45,7 +45,7 @@ pub struct Felt {
 
 /// For how long a sensation is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Glimpse {
+pub enum IntegrationWindow {
     /// One wave.
     Wave,
     /// So many s, or until the stroke ends.
@@ -153,7 +153,7 @@ impl Felt {
     }
 
     /// What is felt from a share of the time on, 0 to 1, of a glimpse: travel over waves, in mm.
-    pub fn glimpse_mm(&self, share: f64, glimpse: Glimpse) -> f64 {
+    pub fn glimpse_mm(&self, share: f64, glimpse: IntegrationWindow) -> f64 {
         let at_s = share * self.lasts_s();
         let met = self.ends_s.partition_point(|&end_s| end_s <= at_s);
         let met = met.min(self.waves.len() - 1);
@@ -167,17 +167,17 @@ impl Felt {
             time_s
         };
         match glimpse {
-            Glimpse::Wave => {
+            IntegrationWindow::Wave => {
                 gather(&self.waves[met]);
             }
-            Glimpse::Seconds(seconds) => {
+            IntegrationWindow::Seconds(seconds) => {
                 for wave in self.waves[met..].iter().take_while(of_stroke) {
                     if gather(wave) >= seconds {
                         break;
                     }
                 }
             }
-            Glimpse::Stroke => {
+            IntegrationWindow::Stroke => {
                 for wave in self.waves.iter().filter(of_stroke) {
                     gather(wave);
                 }
@@ -285,12 +285,12 @@ mod tests {
             wave(5, 9.0, 1),
         ])
         .unwrap();
-        assert_eq!(felt.glimpse_mm(0.3, Glimpse::Wave), 2.0);
-        assert_eq!(felt.glimpse_mm(0.3, Glimpse::Seconds(1.5)), 4.0);
-        assert_eq!(felt.glimpse_mm(0.3, Glimpse::Seconds(9.0)), 4.0);
-        assert_eq!(felt.glimpse_mm(0.3, Glimpse::Stroke), 3.0);
-        assert_eq!(felt.glimpse_mm(0.99, Glimpse::Stroke), 9.0);
-        assert_eq!(felt.glimpse_mm(1.0, Glimpse::Wave), 9.0);
+        assert_eq!(felt.glimpse_mm(0.3, IntegrationWindow::Wave), 2.0);
+        assert_eq!(felt.glimpse_mm(0.3, IntegrationWindow::Seconds(1.5)), 4.0);
+        assert_eq!(felt.glimpse_mm(0.3, IntegrationWindow::Seconds(9.0)), 4.0);
+        assert_eq!(felt.glimpse_mm(0.3, IntegrationWindow::Stroke), 3.0);
+        assert_eq!(felt.glimpse_mm(0.99, IntegrationWindow::Stroke), 9.0);
+        assert_eq!(felt.glimpse_mm(1.0, IntegrationWindow::Wave), 9.0);
         assert_eq!(felt.mean_mm(), 4.5);
     }
 

@@ -5,7 +5,7 @@ use protocol::receiver::{Event, Receiver};
 
 /// A message, and when its frame was complete.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Said {
+pub struct TimedMessage {
     /// Instant of the frame's last byte, in ns since the scene's start.
     pub at_ns: u64,
     /// The message.
@@ -14,12 +14,12 @@ pub struct Said {
 
 /// Collects the messages of one direction of a link.
 #[derive(Default)]
-pub struct Listener {
+pub struct MessageDecoder {
     receiver: Receiver,
-    said: Vec<Said>,
+    said: Vec<TimedMessage>,
 }
 
-impl Listener {
+impl MessageDecoder {
     /// Takes bytes in their order.
     pub fn hear(&mut self, bytes: &[(u64, u8)]) {
         for &(at_ns, byte) in bytes {
@@ -29,23 +29,23 @@ impl Listener {
                     Event::Greeted(hello) => Message::Hello(hello),
                     Event::Foreign(_) | Event::Unheralded | Event::Text => return,
                 };
-                self.said.push(Said { at_ns, message });
+                self.said.push(TimedMessage { at_ns, message });
             });
         }
     }
 
     /// Takes what was said since the last call.
-    pub fn take(&mut self) -> Vec<Said> {
+    pub fn take(&mut self) -> Vec<TimedMessage> {
         std::mem::take(&mut self.said)
     }
 
     /// What was said so far.
-    pub fn messages(&self) -> impl DoubleEndedIterator<Item = &Said> {
+    pub fn messages(&self) -> impl DoubleEndedIterator<Item = &TimedMessage> {
         self.said.iter()
     }
 
     /// The same, for good.
-    pub fn into_messages(self) -> Vec<Said> {
+    pub fn into_messages(self) -> Vec<TimedMessage> {
         self.said
     }
 }

@@ -9,7 +9,7 @@ use crate::ports::Ports;
 const HINT: &str = "? for help";
 
 /// What a board has to say for itself.
-pub struct Voice {
+pub struct ConsoleOutput {
     /// Who it is.
     pub hello: Hello,
     /// It in a line.
@@ -20,7 +20,7 @@ pub struct Voice {
     pub stop: fn() -> &'static str,
 }
 
-impl Voice {
+impl ConsoleOutput {
     /// Says who it is, and why it started.
     pub fn greet(&self, ports: &Ports, status: &Status) {
         let role = Role::from_byte(self.hello.role).map_or("board", Role::name);

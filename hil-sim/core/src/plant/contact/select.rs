@@ -15,7 +15,7 @@
 use std::f64::consts::TAU;
 
 use crate::plant::patch::{REACH_MM, felt_share};
-use crate::scene::{Friction, Gauges, Motion, Rung, Surface};
+use crate::scene::{ContactModel, Friction, Gauges, Motion, Surface};
 
 use super::spring::Spring;
 
@@ -43,7 +43,7 @@ pub const SWING_SHARE: f64 = 0.005;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choice {
     /// The rung.
-    pub rung: Rung,
+    pub rung: ContactModel,
     /// What of the scene asks for it, in words.
     pub reason: String,
 }
@@ -60,14 +60,14 @@ pub fn choose(
     let choice = |rung, reason| Choice { rung, reason };
     if friction.is_some() {
         return choice(
-            Rung::StickSlip,
+            ContactModel::StickSlip,
             "there is friction: the fingertip sticks and slips".to_owned(),
         );
     }
     let swing = swing_share(motion, stiffness_n_per_m);
     if swing > SWING_SHARE {
         return choice(
-            Rung::Viscoelastic,
+            ContactModel::Viscoelastic,
             format!(
                 "the hand speeds up so fast that the fingertip swings on its spring by {:.1} % of the hand's motion",
                 100.0 * swing
@@ -75,10 +75,10 @@ pub fn choose(
         );
     }
     if let Some(reason) = needs_patch(surface, gauges) {
-        return choice(Rung::Rigid, reason);
+        return choice(ContactModel::Rigid, reason);
     }
     choice(
-        Rung::Kinematic,
+        ContactModel::Kinematic,
         "no friction, a hand that the fingertip keeps up with, and specimens that a point can tell apart"
             .to_owned(),
     )

@@ -5,13 +5,13 @@
 //! from these same files, so that their instructions are counted where ours are. (For that this module's
 //! file is a `mod.rs`: its parts are found from either crate.)
 
-pub mod entrant;
+pub mod adapter;
 pub mod goertzel;
 pub mod harmonic_sum;
 pub mod linear_prediction;
 pub mod notch;
 pub mod phase_lock;
-pub mod roster;
+pub mod registry;
 pub mod spectrum;
 
 use protocol::GAUGES;

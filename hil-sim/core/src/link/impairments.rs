@@ -16,7 +16,7 @@ pub const BYTE_NS: u64 = (10 * 1_000_000_000 + 921_600 / 2) / 921_600;
 
 /// The way of one stream of bytes.
 #[derive(Clone, Debug)]
-pub struct Weather {
+pub struct Impairments {
     link: Link,
     delay_ns: u64,
     draws: Xoshiro256PlusPlus,
@@ -36,7 +36,7 @@ enum Fate {
     IsHeld,
 }
 
-impl Weather {
+impl Impairments {
     /// The way in one `direction` (any number; two directions draw differently) of a scene's link.
     pub fn new(link: &Link, seed: u64, direction: u64) -> Self {
         // The generator's seeding spreads neighbouring numbers.
@@ -138,7 +138,7 @@ mod tests {
 
     /// Sends frames `n n 0` for n from 1 to 200, again and again, a millisecond apart; gives what arrives.
     fn send(link: Link, seed: u64, frames: usize) -> Vec<(u64, u8)> {
-        let mut weather = Weather::new(&link, seed, 0);
+        let mut weather = Impairments::new(&link, seed, 0);
         for frame in 0..frames {
             let number = 1 + (frame % 200) as u8;
             for (place, byte) in [number, number, 0].into_iter().enumerate() {
@@ -326,7 +326,7 @@ mod tests {
             ..Link::default()
         };
         let survivors = |direction| {
-            let mut weather = Weather::new(&link, 1, direction);
+            let mut weather = Impairments::new(&link, 1, direction);
             (0..64u64).for_each(|at| weather.push(at * BYTE_NS, 0));
             std::iter::from_fn(|| weather.pop(u64::MAX))
                 .map(|(due, _)| due)

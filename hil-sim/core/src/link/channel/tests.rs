@@ -19,7 +19,7 @@ struct Arrived {
 fn arrive(fault: Fault) -> Arrived {
     let mut scene = Scene::constant(2.0, 50.0);
     scene.faults = vec![fault];
-    let mut way = Way::new(&scene, Role::Display);
+    let mut way = LinkChannel::new(&scene, Role::Display);
     let mut sender = Sender::new(Hello::new(Role::Sensor, "test", [0, 0, 0]));
     let hello = sender.hello_due(0).unwrap();
     sender.on_greeting(false);

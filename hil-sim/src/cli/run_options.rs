@@ -18,7 +18,7 @@ use super::{Elves, EngineName};
 
 /// How scenes are run, and how it is told.
 #[derive(Debug, clap::Args)]
-pub(super) struct Way {
+pub(super) struct RunOptions {
     /// What runs the firmware
     #[arg(long, value_enum, default_value_t = EngineName::Native)]
     engine: EngineName,
@@ -83,7 +83,7 @@ impl Ready {
     }
 }
 
-impl Way {
+impl RunOptions {
     pub fn engine(&self) -> Engine {
         match self.engine {
             EngineName::Native => Engine::Native,

@@ -9,8 +9,8 @@ use protocol::Role;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use crate::link::conditions::{BYTE_NS, Weather};
 use crate::link::forger::Forger;
+use crate::link::impairments::{BYTE_NS, Impairments};
 use crate::scene::Scene;
 use crate::scene::fault::{Fault, Kind, nanoseconds};
 
@@ -19,8 +19,8 @@ const HISTORY_NS: u64 = 1_100_000_000;
 
 /// Takes bytes in and hands on what arrives, each with its instant, in order.
 #[derive(Clone, Debug)]
-pub struct Way {
-    weather: Weather,
+pub struct LinkChannel {
+    weather: Impairments,
     faults: Vec<Fault>,
     draws: Xoshiro256PlusPlus,
     forger: Forger,
@@ -45,7 +45,7 @@ pub struct Way {
     free_ns: u64,
 }
 
-impl Way {
+impl LinkChannel {
     /// The way towards the board of role `to` in a scene.
     pub fn new(scene: &Scene, to: Role) -> Self {
         let direction = u64::from(to == Role::Sensor);
@@ -68,7 +68,7 @@ impl Way {
             .collect();
         faults.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Self {
-            weather: Weather::new(&scene.link, scene.seed, direction),
+            weather: Impairments::new(&scene.link, scene.seed, direction),
             listens: !faults.is_empty(),
             faults,
             draws: Xoshiro256PlusPlus::seed_from_u64(scene.seed ^ (0x5EED << 8 | direction)),

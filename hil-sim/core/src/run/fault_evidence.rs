@@ -2,7 +2,7 @@
 
 use protocol::Role;
 
-use crate::run::listener::Said;
+use crate::run::decoder::TimedMessage;
 
 /// A reset of a board after its power-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,11 +17,11 @@ pub struct Reset {
 
 /// All that a run shows of faults, beside the outputs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Signs {
+pub struct FaultEvidence {
     /// What the display sent to the sensor, and when: its bytes, not what arrived of them.
-    pub display: Vec<Said>,
+    pub display: Vec<TimedMessage>,
     /// What the sensor sent to the display.
-    pub sensor: Vec<Said>,
+    pub sensor: Vec<TimedMessage>,
     /// Resets of either board.
     pub resets: Vec<Reset>,
     /// When CLR fell, in ns since the scene's start.

@@ -20,16 +20,16 @@ pub const BROKEN_HUM: f64 = 2.0;
 
 /// What is wrong with which gauge, and when.
 #[derive(Clone, Debug)]
-pub(super) struct Trouble {
+pub(super) struct GaugeFault {
     from_s: f64,
     until_s: f64,
-    ailments: [Ailment; GAUGES],
+    ailments: [GaugeFaultKind; GAUGES],
     noise: Xoshiro256PlusPlus,
 }
 
 /// What is wrong with a gauge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ailment {
+enum GaugeFaultKind {
     None,
     Dead,
     Saturated,
@@ -38,7 +38,7 @@ enum Ailment {
     Humming,
 }
 
-impl Trouble {
+impl GaugeFault {
     /// The troubles of a scene; `noise` is drawn from for the noisy gauges only.
     pub fn new(kinematic: &Kinematic, noise: Xoshiro256PlusPlus) -> Self {
         Self {
@@ -48,16 +48,16 @@ impl Trouble {
                 .map_or(f64::INFINITY, |for_s| kinematic.trouble_from_s + for_s),
             ailments: std::array::from_fn(|gauge| {
                 let lists = [
-                    (&kinematic.dead, Ailment::Dead),
-                    (&kinematic.saturated, Ailment::Saturated),
-                    (&kinematic.stuck, Ailment::Stuck),
-                    (&kinematic.noisy, Ailment::Noisy),
-                    (&kinematic.humming, Ailment::Humming),
+                    (&kinematic.dead, GaugeFaultKind::Dead),
+                    (&kinematic.saturated, GaugeFaultKind::Saturated),
+                    (&kinematic.stuck, GaugeFaultKind::Stuck),
+                    (&kinematic.noisy, GaugeFaultKind::Noisy),
+                    (&kinematic.humming, GaugeFaultKind::Humming),
                 ];
                 lists
                     .into_iter()
                     .find(|(list, _)| list[gauge])
-                    .map_or(Ailment::None, |(_, ailment)| ailment)
+                    .map_or(GaugeFaultKind::None, |(_, ailment)| ailment)
             }),
             noise,
         }
@@ -72,8 +72,8 @@ impl Trouble {
     /// The gain of a gauge's amplifier while the trouble is on, relative to a sound one's.
     pub fn gain(&self, gauge: usize) -> f64 {
         match self.ailments[gauge] {
-            Ailment::Dead => 0.0,
-            Ailment::Saturated => SATURATED_GAIN,
+            GaugeFaultKind::Dead => 0.0,
+            GaugeFaultKind::Saturated => SATURATED_GAIN,
             _ => 1.0,
         }
     }
@@ -83,13 +83,13 @@ impl Trouble {
     #[inline]
     pub fn level(&mut self, gauge: usize, level: f32, hum: impl Fn() -> f64) -> f32 {
         match self.ailments[gauge] {
-            Ailment::None | Ailment::Dead | Ailment::Saturated => level,
-            Ailment::Stuck => f32::from(STUCK_CODE),
-            Ailment::Noisy => {
+            GaugeFaultKind::None | GaugeFaultKind::Dead | GaugeFaultKind::Saturated => level,
+            GaugeFaultKind::Stuck => f32::from(STUCK_CODE),
+            GaugeFaultKind::Noisy => {
                 let sample: f32 = StandardNormal.sample(&mut self.noise);
                 level + sample * (BROKEN_NOISE * CODES_PER_UNIT) as f32
             }
-            Ailment::Humming => level + (BROKEN_HUM * CODES_PER_UNIT * hum()) as f32,
+            GaugeFaultKind::Humming => level + (BROKEN_HUM * CODES_PER_UNIT * hum()) as f32,
         }
     }
 }

@@ -15,11 +15,11 @@ use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::recording::{EstimateRecord, Recording};
 use hil_sim_core::scene::{Scene, SceneError};
 
+use super::baselines::Rival;
+use super::baselines::adapter::{Answer, Entrant};
+use super::baselines::registry::{Visitor, show_all};
 use super::fourier::RealFft;
 use super::pitch::{mcleod, yin};
-use super::rivals::Rival;
-use super::rivals::entrant::{Answer, Entrant};
-use super::rivals::roster::{Visitor, show_all};
 use super::settings::{SETTINGS, Setting};
 
 /// Who runs.
@@ -287,7 +287,7 @@ fn estimate(answer: Answer, sequence: u32, instant_us: u64) -> Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::rivals::HEARD;
+    use crate::estimators::baselines::HEARD;
 
     /// What a rival hears of a clean sine, and how far off it may be by its own documentation, in Hz, once
     /// its longest window is full.

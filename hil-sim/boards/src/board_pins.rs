@@ -7,7 +7,7 @@ use hil_sim_core::run::recording::ScanRecord;
 use hil_sim_core::scene::fault::Fault;
 
 /// What the driver does for one board's pins beyond the seam itself.
-pub trait Watched: Pins {
+pub trait BoardPins: Pins {
     /// What is written down at the pins.
     type Records: Send;
 
@@ -29,7 +29,7 @@ pub trait Watched: Pins {
     }
 }
 
-impl Watched for SensorPins {
+impl BoardPins for SensorPins {
     type Records = Vec<ScanRecord>;
 
     fn take_records(board: &mut Nucleo<Self>) -> Vec<ScanRecord> {
@@ -42,7 +42,7 @@ impl Watched for SensorPins {
     }
 }
 
-impl Watched for DisplayPins {
+impl BoardPins for DisplayPins {
     type Records = DisplayRecords;
 
     fn take_records(board: &mut Nucleo<Self>) -> DisplayRecords {
