@@ -2,9 +2,35 @@
 
 use std::io::{self, Write};
 
-use protocol::{MAX_FRAME, Message, Port, PortCounters};
+use protocol::{Hello, MAX_FRAME, Message, Port, PortCounters, Role};
 
-use crate::link::{NotSent, host_hello};
+/// Speed of a console, 8N1.
+pub const BAUD: u32 = 921_600;
+
+/// Why something was not said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NotSent {
+    /// Nobody is there who would understand it.
+    #[error("the board is not there")]
+    NotKnown,
+    /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
+    #[error("the line takes no bytes")]
+    Stuck,
+}
+
+/// How a host introduces itself.
+pub fn host_hello() -> Hello {
+    let number = |text: &str| text.parse().unwrap_or(0);
+    Hello::new(
+        Role::Host,
+        "host-bridge",
+        [
+            number(env!("CARGO_PKG_VERSION_MAJOR")),
+            number(env!("CARGO_PKG_VERSION_MINOR")),
+            number(env!("CARGO_PKG_VERSION_PATCH")),
+        ],
+    )
+}
 
 /// What is said on an open line.
 pub struct Line {

@@ -10,10 +10,11 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use protocol::{ClockOffset, Hello, Message, Peer, Ping, PortCounters, Role};
+use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role};
 
 use crate::clock::{Notify, micros};
 use crate::line::Line;
+pub use crate::line::{BAUD, NotSent, host_hello};
 use crate::line_monitor::{LineMonitor, Verdict};
 use crate::lock::locked;
 use crate::place::Place;
@@ -22,8 +23,6 @@ use crate::search::{Candidates, Search};
 use crate::state::State;
 use crate::system::{Opened, System};
 
-/// Speed of a console, 8N1.
-pub const BAUD: u32 = 921_600;
 /// How long a lost board is waited for between two looks: a cable that is put back is seen well within
 /// a second.
 pub const RETRY: Duration = Duration::from_millis(100);
@@ -48,17 +47,6 @@ pub enum Event {
     Restarted,
     /// The link stands differently.
     StateChanged(State),
-}
-
-/// Why something was not said.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NotSent {
-    /// Nobody is there who would understand it.
-    #[error("the board is not there")]
-    NotKnown,
-    /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
-    #[error("the line takes no bytes")]
-    Stuck,
 }
 
 /// What the two clocks of a link are to each other.
@@ -88,20 +76,6 @@ struct Shared {
     system: System,
     /// Wakes a reader that waits to try again.
     woken: Arc<dyn Notify>,
-}
-
-/// How a host introduces itself.
-pub fn host_hello() -> Hello {
-    let number = |text: &str| text.parse().unwrap_or(0);
-    Hello::new(
-        Role::Host,
-        "host-bridge",
-        [
-            number(env!("CARGO_PKG_VERSION_MAJOR")),
-            number(env!("CARGO_PKG_VERSION_MINOR")),
-            number(env!("CARGO_PKG_VERSION_PATCH")),
-        ],
-    )
 }
 
 impl Link {

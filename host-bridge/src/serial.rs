@@ -5,17 +5,18 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
 
-use crate::link::BAUD;
+use crate::clock::SystemClock;
+use crate::line::BAUD;
 use crate::lock::locked;
 use crate::place::Place;
 use crate::state::State;
-use crate::system::{Input, Opened, Ports};
+use crate::system::{Input, Opened, Ports, System};
 
 /// Longest wait for bytes; also how late a Hello or a ping may be.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
@@ -144,6 +145,16 @@ fn refused_port(path: &Path, error: &serialport::Error) -> State {
             port,
             reason: format!("can't be used as a serial port: {error}"),
         },
+    }
+}
+
+/// This computer.
+impl Default for System {
+    fn default() -> Self {
+        Self {
+            clock: Arc::new(SystemClock),
+            ports: Arc::new(SerialPorts),
+        }
     }
 }
 

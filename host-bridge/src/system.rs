@@ -4,9 +4,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::clock::{Clock, SystemClock};
+use crate::clock::Clock;
 use crate::place::Place;
-use crate::serial::SerialPorts;
 use crate::state::State;
 
 /// A clock and serial ports.
@@ -16,16 +15,6 @@ pub struct System {
     pub clock: Arc<dyn Clock>,
     /// The serial ports.
     pub ports: Arc<dyn Ports>,
-}
-
-/// This computer.
-impl Default for System {
-    fn default() -> Self {
-        Self {
-            clock: Arc::new(SystemClock),
-            ports: Arc::new(SerialPorts),
-        }
-    }
 }
 
 /// Serial ports.

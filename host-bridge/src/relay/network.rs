@@ -1,7 +1,6 @@
 //! The network's engine, set up for two bridges: nothing is looked for, lost connections come back soon,
 //! little waits to be sent.
 
-use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,10 +9,11 @@ use rustls::ClientConfig;
 use serde_json::json;
 use zenoh::{Config, Session, Wait};
 
-use crate::relay::credentials::{Credentials, CredentialsError};
+use crate::relay::credentials::Credentials;
 use crate::relay::endpoint::{Endpoint, Security};
 use crate::relay::name::Name;
 use crate::relay::reach::Reach;
+pub use crate::relay::transport::NetworkError;
 use crate::relay::transport::{Connection, Subscription, Transport};
 use crate::relay::wire::Wire;
 
@@ -48,59 +48,6 @@ pub struct Network {
     ends: Ends,
     credentials: Option<Credentials>,
     tls: Option<Arc<ClientConfig>>,
-}
-
-/// Why a program can't take part.
-#[derive(Debug, thiserror::Error)]
-pub enum NetworkError {
-    /// Credentials can't be used.
-    #[error(transparent)]
-    Credentials(#[from] CredentialsError),
-    /// TLS without certificates.
-    #[error("{endpoint} wants certificates on both ends: give --ca, --certificate and --key")]
-    WithoutCertificates {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
-    /// Certificates, but an open endpoint.
-    #[error("{endpoint} would leave certificates unused and let anybody in: say tls/{}:{}, or leave out --ca, --certificate and --key", .endpoint.host, .endpoint.port)]
-    Open {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
-    /// The engine can't match an IPv6 address with a certificate.
-    #[error(
-        "{endpoint}: an IPv6 address can't be matched with a certificate: give the host's name"
-    )]
-    Unmatched {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
-    /// One can't listen there.
-    #[error("{endpoint}: can't listen: {reason}: {}", advice(.reason))]
-    Listening {
-        /// The endpoint.
-        endpoint: Endpoint,
-        /// The system's reason.
-        reason: io::Error,
-    },
-    /// The engine refuses.
-    #[error("the network's engine refuses: {reason}")]
-    Engine {
-        /// In its words.
-        reason: String,
-    },
-}
-
-fn advice(error: &io::Error) -> &'static str {
-    match error.kind() {
-        io::ErrorKind::AddrInUse => "another program listens there: end it, or take another port",
-        io::ErrorKind::AddrNotAvailable => {
-            "this computer has no such address: take one of its own, or 0.0.0.0 for all of them"
-        }
-        io::ErrorKind::PermissionDenied => "take a port above 1023",
-        _ => "see the host's name and the port",
-    }
 }
 
 impl Transport for Network {

@@ -9,8 +9,7 @@ use protocol::Role;
 
 use crate::relay::envelope::{Envelope, MAX_ENVELOPE};
 use crate::relay::name::{Channel, Name};
-use crate::relay::network::NetworkError;
-use crate::relay::transport::{Connection, Subscription};
+use crate::relay::transport::{Connection, NetworkError, Subscription};
 
 /// A bridge's, or an operator's, place on the network. Dropping it leaves the network.
 pub struct Wire {
