@@ -19,6 +19,10 @@
 //! | 6 | the same with `Method::AdaptedCounting` |
 //! | 7 | the same with `Method::Crossings` |
 //! | 8 | the same with `Method::Spectrum` |
+//! | 9 | the same, 1 mm at 70 mm/s throughout |
+//! | 10 | the same with noise as strong as the fundamental |
+//! | 11 | the same as 9 with hum of 50 Hz as large as the signal |
+//! | 12 | 4 mm at 30 mm/s, a second wave of 0.618 λ nearly as strong |
 //!
 //! On a computer this is an empty program: `cargo bench -p firmware-sensor` measures there.
 #![cfg_attr(target_os = "none", no_std)]
@@ -72,7 +76,7 @@ mod board {
             *sample = [(); GAUGES].map(|()| f32::from(noise.code()) - f32::from(MID_RAIL_CODE));
         }
         run(scans, samples);
-        rub(scans, encoder, &mut noise);
+        rub(&STROKE, scans, encoder, &mut noise);
         for (number, method) in [
             (5, Method::Counting),
             (6, Method::AdaptedCounting),
@@ -80,6 +84,10 @@ mod board {
             (8, Method::Spectrum),
         ] {
             sense(number, method, scans, encoder);
+        }
+        for (number, rubbed) in HARD {
+            rub(&rubbed, scans, encoder, &mut noise);
+            sense(number, Method::Spectrum, scans, encoder);
         }
         mark(DONE);
         loop {
@@ -124,30 +132,87 @@ mod board {
         mark(104);
     }
 
+    /// What is rubbed, and how.
+    struct Rubbed {
+        wavelength_mm: f32,
+        /// The highest speed of a stroke; the only one, if `strokes_hz` is 0.
+        peak_mm_s: f32,
+        strokes_hz: f32,
+        /// Noise, hum of 50 Hz and a second wave of 0.618 λ, over the fundamental's amplitude; the noise in rms.
+        noise: f32,
+        hum: f32,
+        second_wave: f32,
+    }
+
+    /// The paper's stroke over 2 mm, noise 20 dB below the fundamental in 0–500 Hz, white to 2 kHz:
+    /// 0.1/√2 · √4 of the amplitude.
+    const STROKE: Rubbed = Rubbed {
+        wavelength_mm: 2.0,
+        peak_mm_s: 70.0,
+        strokes_hz: 0.83,
+        noise: 0.1 * core::f32::consts::SQRT_2,
+        hum: 0.0,
+        second_wave: 0.0,
+    };
+    const FINE: Rubbed = Rubbed {
+        wavelength_mm: 1.0,
+        strokes_hz: 0.0,
+        ..STROKE
+    };
+    /// Seconds that take the default estimator longer.
+    const HARD: [(u32, Rubbed); 4] = [
+        (9, FINE),
+        (
+            10,
+            Rubbed {
+                noise: 10.0 * STROKE.noise,
+                ..FINE
+            },
+        ),
+        (11, Rubbed { hum: 1.0, ..FINE }),
+        (
+            12,
+            Rubbed {
+                wavelength_mm: 4.0,
+                peak_mm_s: 30.0,
+                second_wave: 0.9,
+                ..FINE
+            },
+        ),
+    ];
+
     /// A rub over a grating, as the gauges and the encoder have it.
     #[inline(never)]
-    fn rub(scans: &mut Signal, encoder: &mut [u16; MILLISECONDS], noise: &mut Noise) {
-        const PEAK_MM_S: f32 = 70.0;
-        const STROKES_HZ: f32 = 0.83;
-        const WAVELENGTH_MM: f32 = 2.0;
+    fn rub(
+        rubbed: &Rubbed,
+        scans: &mut Signal,
+        encoder: &mut [u16; MILLISECONDS],
+        noise: &mut Noise,
+    ) {
         const SWING: f32 = 370.0;
         const PLACES_MM: [f32; GAUGES] = [-3.2, -1.3, 0.0, 1.6, 3.0];
-        // Uniform codes, ±2 048, have a deviation of 1 182. 20 dB below a sine of 370 in 0–500 Hz, white to
-        // 2 kHz: 0.1 · 370/√2 · √4 = 52.
-        const NOISE: f32 = 52.0 / 1_182.0;
+        // Uniform codes, ±2 048, have a deviation of 1 182.
+        let of_code = rubbed.noise * SWING / 1_182.0;
         let position_mm = |scan: usize| {
             let t_s = scan as f32 / SCAN_RATE_HZ as f32;
-            PEAK_MM_S / (TAU * STROKES_HZ) * (1.0 - libm::cosf(TAU * STROKES_HZ * t_s))
+            if rubbed.strokes_hz == 0.0 {
+                return rubbed.peak_mm_s * t_s;
+            }
+            let omega = TAU * rubbed.strokes_hz;
+            rubbed.peak_mm_s / omega * (1.0 - libm::cosf(omega * t_s))
         };
         for (ms, (scans, encoder)) in scans.iter_mut().zip(encoder).enumerate() {
             let first = ms * SCANS_PER_SAMPLE;
             for (number, scan) in scans.iter_mut().enumerate() {
                 let arm_mm = position_mm(first + number);
+                let t_s = (first + number) as f32 / SCAN_RATE_HZ as f32;
+                let hum = rubbed.hum * libm::sinf(TAU * 50.0 * t_s);
                 for (code, place_mm) in scan.iter_mut().zip(PLACES_MM) {
-                    let angle = TAU * (arm_mm + place_mm) / WAVELENGTH_MM;
-                    let signal = libm::sinf(angle) + 0.2 * libm::sinf(3.0 * angle);
+                    let angle = TAU * (arm_mm + place_mm) / rubbed.wavelength_mm;
+                    let second = rubbed.second_wave * libm::sinf(angle / 0.618);
+                    let signal = libm::sinf(angle) + 0.2 * libm::sinf(3.0 * angle) + second + hum;
                     let random = f32::from(noise.code()) - f32::from(MID_RAIL_CODE);
-                    *code = (f32::from(MID_RAIL_CODE) + SWING * signal + NOISE * random) as u16;
+                    *code = (f32::from(MID_RAIL_CODE) + SWING * signal + of_code * random) as u16;
                 }
                 scan[GAUGES] = MID_RAIL_CODE;
             }

@@ -11,7 +11,7 @@ use super::say::say;
 /// Milliseconds of samples that each part works through.
 const MILLISECONDS: u64 = 1_000;
 /// The parts, by number.
-const PARTS: [(u64, &str); 9] = [
+const PARTS: [(u64, &str); 13] = [
     (1, "band-pass and crossings of five gauges"),
     (2, "the same with the crate biquad"),
     (3, "the same with the crate idsp"),
@@ -21,6 +21,10 @@ const PARTS: [(u64, &str); 9] = [
     (6, "the whole sensor, adapted counting"),
     (7, "the whole sensor, crossings"),
     (8, "the whole sensor, spectrum"),
+    (9, "the same, 1 mm at 70 mm/s"),
+    (10, "that, noise as strong as the signal"),
+    (11, "that at 20 dB, hum as large as the signal"),
+    (12, "the same, 4 mm at 30 mm/s, two waves"),
 ];
 
 impl Cost {
