@@ -4,6 +4,7 @@
 use std::any::Any;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
@@ -46,6 +47,8 @@ pub struct FakeBoard {
     heard: Arc<Mutex<Vec<Message>>>,
     clock: Arc<dyn Clock>,
     line: Option<JoinHandle<()>>,
+    /// Set when the cable is pulled: a patient write ends.
+    pulled: Arc<AtomicBool>,
     /// Keeps the line alive while nobody has it open.
     kept: Option<Box<dyn Any + Send>>,
 }
@@ -98,9 +101,10 @@ impl FakeBoard {
     ) -> Self {
         let (orders, given) = channel();
         let heard = Arc::new(Mutex::new(Vec::new()));
-        let (hears, own) = (Arc::clone(&heard), Arc::clone(&clock));
+        let pulled = Arc::new(AtomicBool::new(false));
+        let (hears, own, gone) = (Arc::clone(&heard), Arc::clone(&clock), Arc::clone(&pulled));
         let line = clock.spawn(Box::new(move || {
-            run(end, &*own, hello, script, &given, &hears);
+            run(end, &*own, hello, script, &given, &hears, &gone);
         }));
         Self {
             path,
@@ -108,6 +112,7 @@ impl FakeBoard {
             heard,
             clock,
             line: Some(line),
+            pulled,
             kept: Some(kept),
         }
     }
@@ -167,7 +172,9 @@ impl FakeBoard {
 impl Drop for FakeBoard {
     fn drop(&mut self) {
         let _ = self.orders.send(Order::End);
-        // A write that waits for a reader who will not come ends with this.
+        // A patient write would wait for ever for a reader who will not come: a pseudo-terminal that nobody has
+        // open is full, or takes nothing, and says no more.
+        self.pulled.store(true, Ordering::Relaxed);
         self.kept = None;
         if let Some(line) = self.line.take() {
             self.clock.join(line);
@@ -182,6 +189,7 @@ fn run(
     mut script: Script,
     given: &Receiver<Order>,
     heard: &Mutex<Vec<Message>>,
+    pulled: &AtomicBool,
 ) {
     let mut started_us = clock.now_us();
     let pause = clock.notify();
@@ -213,7 +221,7 @@ fn run(
         let mut said = script(now_us).into_iter().chain(answer);
         loop {
             while let count @ 1.. = port.take(&mut out) {
-                if !is_mute && !write(&mut master, &out[..count], is_patient) {
+                if !is_mute && !write(&mut master, &out[..count], is_patient, pulled) {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
@@ -253,11 +261,14 @@ fn stopped(instant_us: u64, reason: StopReason) -> Message {
 }
 
 /// Writes all of it; false if it found no room, in spite of all patience.
-fn write(master: &mut impl Write, mut bytes: &[u8], is_patient: bool) -> bool {
+fn write(master: &mut impl Write, mut bytes: &[u8], is_patient: bool, pulled: &AtomicBool) -> bool {
     if !is_patient {
         return master.write_all(bytes).is_ok();
     }
     while !bytes.is_empty() {
+        if pulled.load(Ordering::Relaxed) {
+            return false;
+        }
         match master.write(bytes) {
             Ok(count) => bytes = &bytes[count..],
             Err(error) if is_pause(&error) => {}
