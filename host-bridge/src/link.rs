@@ -368,6 +368,10 @@ impl<F: FnMut(Event)> Reader<F> {
             (self.tell)(Event::Restarted);
         }
         if let Message::Pong(pong) = &message {
+            if !line_monitor.is_answer(pong.sent_us) {
+                // Another program's, which goes by another clock.
+                return;
+            }
             locked(&self.shared.clock).on_pong(pong, at_us);
         }
         (self.tell)(Event::Heard { at_us, message });
