@@ -57,12 +57,12 @@ impl Line {
         }
     }
 
-    /// Says `message` now.
+    /// Says `message` now. A Stop is said to whoever is there: all versions understand it.
     ///
     /// # Errors
     /// If nobody is there who would understand it, or the line is stuck.
     pub fn say(&mut self, message: &Message) -> Result<(), NotSent> {
-        if !self.is_known {
+        if !self.is_known && !matches!(message, Message::Stop(_)) {
             return Err(NotSent::NotKnown);
         }
         self.port.post(message);

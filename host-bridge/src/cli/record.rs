@@ -134,6 +134,7 @@ impl Record {
             })
             .collect();
         drop(events);
+        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let absent = Session {
             recorder: &recorder,
             links: &links,
