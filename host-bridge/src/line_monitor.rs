@@ -8,8 +8,6 @@ pub const PATIENCE_US: u64 = 1_500_000;
 const SILENCE_US: u64 = 2_500_000;
 /// Between two pings.
 const PING_US: u64 = 1_000_000;
-/// Pings whose answers are still waited for.
-const PINGS: usize = 4;
 /// What is heard is judged by this much time at least, and by twice as much at most: a board that speaks
 /// text has a line a second.
 const SPAN_US: u64 = 1_500_000;
@@ -30,8 +28,6 @@ pub struct LineMonitor {
     /// Frames of somebody who has not said Hello, so far.
     unheralded: u32,
     pinged_us: Option<u64>,
-    /// The last pings that were sent.
-    pings_us: [Option<u64>; PINGS],
     /// When the newer span began.
     span_us: u64,
     /// This span, and the one before.
@@ -77,7 +73,6 @@ impl LineMonitor {
             understood: 0,
             unheralded: 0,
             pinged_us: None,
-            pings_us: [None; PINGS],
             span_us: opened_us,
             spans: [Sound {
                 bytes: 0,
@@ -119,15 +114,8 @@ impl LineMonitor {
             .is_none_or(|pinged_us| at_us.saturating_sub(pinged_us) >= PING_US);
         if due {
             self.pinged_us = Some(at_us);
-            self.pings_us.rotate_right(1);
-            self.pings_us[0] = Some(at_us);
         }
         due
-    }
-
-    /// Whether a pong that returns `sent_us` answers a ping of this line's: others may share the port.
-    pub fn is_answer(&self, sent_us: u64) -> bool {
-        self.pings_us.contains(&Some(sent_us))
     }
 
     /// The board has started anew: its clock is to be asked for.
@@ -269,7 +257,5 @@ mod tests {
             .map(|at_us| line_monitor.ping_due(at_us))
             .into();
         assert_eq!(due, [true, false, false, true, false]);
-        let sent = [5, 6, PING_US + 5].map(|sent_us| line_monitor.is_answer(sent_us));
-        assert_eq!(sent, [true, false, true]);
     }
 }

@@ -375,10 +375,10 @@ impl<F: FnMut(Event)> Reader<F> {
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
         if matches!(peer, Peer::Known(_)) && line_monitor.ping_due(at_us) {
-            line.port.post(&Message::Ping(Ping { sent_us: at_us }));
+            line.queue(&Message::Ping(Ping { sent_us: at_us }));
         }
         if let Some(stop) = self.shared.stop_due(at_us) {
-            line.port.post(&stop);
+            line.queue(&stop);
         }
         // What a stuck line refuses is counted, and said again when it is due again.
         let _ = line.flush();
@@ -423,8 +423,12 @@ impl<F: FnMut(Event)> Reader<F> {
             (self.tell)(Event::Restarted);
         }
         if let Message::Pong(pong) = &message {
-            if !line_monitor.is_answer(pong.sent_us) {
-                // Another program's, which goes by another clock.
+            let line = locked(&self.shared.line);
+            let is_ours = line
+                .as_ref()
+                .is_some_and(|line| line.is_answer(pong.sent_us));
+            drop(line);
+            if !is_ours {
                 return;
             }
             locked(&self.shared.clock).on_pong(pong, at_us);

@@ -153,7 +153,7 @@ fn a_stop_is_over_when_every_board_has_answered_and_is_called_unanswered_until_t
     dashboard.stop();
     let text = |dashboard: &Dashboard| dashboard.notice().expect("it is told").text.clone();
     assert_eq!(text(&dashboard), "stop: sent, not confirmed yet");
-    let mut stopped = |dashboard: &mut Dashboard, role: Role| {
+    let stopped = |dashboard: &mut Dashboard, role: Role| {
         let message = Message::Stopped(Stopped::by(Trip::Operator));
         dashboard.on(10, role, Event::Heard { at_us: 10, message });
     };

@@ -206,7 +206,7 @@ impl Dashboard {
             let names = names.join(" and ");
             self.notify(
                 true,
-                format!("NOT STOPPED: {names}: no answer; told again until there is: use the emergency stop"),
+                format!("NOT STOPPED: {names}: no answer, told again: use the emergency stop"),
             );
         }
         let is_over = |notice: &Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;

@@ -192,7 +192,7 @@ fn a_notice_is_told_to_its_end() {
         let shown = picture(&dashboard, &view(), width, height);
         assert_has(
             &shown,
-            " NOT STOPPED: sensor and display: no answer; told again",
+            " NOT STOPPED: sensor and display: no answer, told again",
         );
         assert_has(&shown, "use the emergency stop");
     }
