@@ -12,7 +12,7 @@ use super::log_entry::LogEvent;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link};
 use crate::recording::RecordingError;
-use crate::recording::gauge_stream::GaugeStream;
+use crate::recording::gauge_stream::{GaugeStream, Lease};
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
@@ -37,6 +37,8 @@ pub struct Session {
     recording: Option<LiveRecording>,
     /// Has the gauges stream for as long as a recording lasts.
     stream: GaugeStream,
+    /// The same for who watches.
+    watch: Lease,
     lines_us: Option<u64>,
     is_over: bool,
 }
@@ -50,6 +52,7 @@ impl Session {
             folder,
             recording: None,
             stream: GaugeStream::default(),
+            watch: Lease::default(),
             lines_us: None,
             is_over: false,
         }
@@ -102,8 +105,14 @@ impl Session {
         came
     }
 
-    /// Asks for what a recording needs. What is not answered is asked again.
+    /// Asks for what a recording needs, and who watches. What is not answered is asked again.
     fn ask(&mut self) {
+        let wanted = self.dashboard.streams && self.dashboard.sensor.is_known();
+        if let Some(message) = wanted.then(|| self.watch.due(now_us())).flatten()
+            && let Some(link) = self.link(Role::Sensor)
+        {
+            let _ = link.post(&message);
+        }
         if self.recording.is_none() {
             return;
         }
@@ -189,36 +198,14 @@ impl Session {
     ///
     /// # Errors
     /// If the last of a recording can't be written.
-    pub fn close(mut self) -> Result<(), RecordingError> {
-        self.restore();
-        match self.recording.take() {
+    pub fn close(self) -> Result<(), RecordingError> {
+        match self.recording {
             Some(recording) => recording.end().map(|_| ()),
             None => Ok(()),
         }
     }
 
-    /// Gives the sensor board its quiet back if a recording took it. Whether it is as it was.
-    fn restore(&mut self) -> bool {
-        let Self {
-            dashboard,
-            source,
-            recording,
-            stream,
-            ..
-        } = self;
-        let mut links = source.links.iter();
-        let sensor = links.find(|(role, _)| *role == Role::Sensor);
-        let sensor = sensor.map(|(_, link)| link);
-        stream.restore(&source.events, sensor, |role, event| {
-            if let Some(recording) = recording {
-                recording.keep(role, &event);
-            }
-            dashboard.on(now_us(), role, event);
-        })
-    }
-
     fn end_recording(&mut self) {
-        let is_restored = self.restore();
         let Some(recording) = self.recording.take() else {
             return;
         };
@@ -234,11 +221,6 @@ impl Session {
             Err(error) => self
                 .dashboard
                 .notify(true, format!("RECORDING ENDED: {error}")),
-        }
-        if !is_restored {
-            let words =
-                "the sensor board could not be told to stop streaming its gauges: g tells it";
-            self.dashboard.notify(true, words.to_owned());
         }
     }
 

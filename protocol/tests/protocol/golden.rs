@@ -51,9 +51,18 @@ const GOLDEN: &[(&str, &str)] = &[
         "49020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
          07f107f207f307f40701904ea84601f40302030405060708090a0b04021658282500",
     ),
-    ("configure a sensor", "04020105011301500217055f01dc0b9003c09a0ca9e0fb1b00"),
-    ("configure a display", "200201050184868808010101f4031432148827ac02d804f8acd19101ffd3826200"),
-    ("configuration taken", "0402010606bdeda1cb071301500217055f01dc0b9003c09a0cfe06296f00"),
+    (
+        "configure a sensor",
+        "04020105011301500217055f01dc0b9003c09a0ca9e0fb1b00",
+    ),
+    (
+        "configure a display",
+        "200201050184868808010101f4031432148827ac02d804f8acd19101ffd3826200",
+    ),
+    (
+        "configuration taken",
+        "0402010606bdeda1cb071301500217055f01dc0b9003c09a0cfe06296f00",
+    ),
     (
         "configuration refused",
         "28020106011225bfb802c0b80284868808010101f4031432148827ac02d804f8acd19101bd07c38c\
@@ -72,7 +81,10 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     ("safety: driving", "0d02010bc08db70102a61d952a00"),
     ("safety: stopped", "0e02010bc08db7010404d21faabc00"),
-    ("stopped by the emergency stop", "0302010a48414c5402a872028300"),
+    (
+        "stopped by the emergency stop",
+        "0302010a48414c5402a872028300",
+    ),
     ("ask for the configuration", "0402010d05ed03213f00"),
     ("ask for the capabilities", "0902010d017b33264800"),
     (
@@ -86,7 +98,10 @@ const GOLDEN: &[(&str, &str)] = &[
          020c03f403020d038827020e03d00f050f0a901c056385df7700",
     ),
     ("stream the gauges", "0a02010fe8076268c10700"),
-    ("arm: stopped by the operator", "09020110c08db701020579b4448800"),
+    (
+        "arm: stopped by the operator",
+        "09020110c08db701020579b4448800",
+    ),
 ];
 
 fn bytes(hexadecimal: &str) -> Vec<u8> {
