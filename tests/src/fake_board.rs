@@ -147,8 +147,7 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Deafen(is_deaf));
     }
 
-    /// Has the board take no notice of a Stop, for as long as it disobeys; it obeys otherwise, and
-    /// says so.
+    /// Has the board take no notice of a Stop, for as long as it disobeys; it obeys otherwise, and says so.
     pub fn disobey(&self, disobeys: bool) {
         let _ = self.orders.send(Order::Disobey(disobeys));
     }
@@ -195,8 +194,8 @@ fn run(
     let pause = clock.notify();
     let mut port = Port::new(hello);
     let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
-    let mut obeys = true;
     let is_display = hello.role == Role::Display.byte();
+    let mut obeys = true;
     let mut bytes = [0; 4_096];
     let mut out = [0; MAX_FRAME];
     loop {

@@ -11,5 +11,6 @@ pub mod ports;
 pub mod reset;
 pub mod serial;
 pub mod spawn;
+pub mod stop;
 pub mod supervision;
 pub mod trip;

@@ -17,6 +17,7 @@ mod link;
 mod log;
 mod reversal;
 mod silence;
+mod stop;
 mod table_1;
 mod travelling;
 
