@@ -13,10 +13,12 @@ use embassy_time::Instant;
 use firmware_display::capabilities::CAPABILITIES;
 use firmware_display::look::{self, Look, Rounds};
 use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
+use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
+use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::side::Side;
 use nucleo::spawn::once;
-use nucleo::stop::{self, answer};
+use nucleo::stop;
 use nucleo::supervision::supervise;
 use protocol::{
     DisplayCounters, DisplayState, Estimate, Hello, Message, Question, RoleCounters, Safety, Stop,

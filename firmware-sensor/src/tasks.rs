@@ -10,10 +10,12 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
 use firmware_sensor::capabilities::CAPABILITIES;
 use firmware_sensor::{Drive, Sensor, Settings, line};
+use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
+use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::side::Side;
 use nucleo::spawn::once;
-use nucleo::stop::{self, answer};
+use nucleo::stop;
 use nucleo::supervision::supervise;
 use protocol::{
     Arm, ArmState, Hello, Message, Motion, Question, RoleCounters, SensorConfiguration,

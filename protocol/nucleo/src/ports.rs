@@ -13,19 +13,11 @@ use protocol::port::Port;
 use protocol::receiver::Peer;
 use protocol::{Console, Hello, Key, Latest, Message, PortCounters};
 
+use crate::side::Side;
 use crate::stop;
 
 /// Most bytes handed to a transmitter's DMA at once.
 const BURST_BYTES: usize = 256;
-
-/// Which port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The other board.
-    Peer,
-    /// The ST-LINK's virtual COM port.
-    Console,
-}
 
 /// What tasks of any priority want said on both ports; full only if the thread is held up for 8 ms.
 pub static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
