@@ -403,7 +403,12 @@ fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
         &["wants certificates", "--ca"],
     );
     assert_refused(
-        &["router", "--listen", "tcp/no-such-host.invalid:7447", "--insecure"],
+        &[
+            "router",
+            "--listen",
+            "tcp/no-such-host.invalid:7447",
+            "--insecure",
+        ],
         &["no-such-host.invalid", "can't listen"],
     );
     assert_refused(

@@ -230,7 +230,10 @@ impl Network {
                     "transport/link/tls/connect_private_key",
                     json!(credentials.key),
                 ),
-                ("access_control", access::rules(&self.names)),
+                (
+                    "access_control",
+                    access::rules(&self.names, matches!(self.ends, Ends::Connecting(_))),
+                ),
                 ("transport/link/tls/enable_mtls", json!(true)),
                 // Never without: the engine also believes the CAs of the web, so that any of their
                 // customers could listen in place of the other site. That one would still have to be called

@@ -8,7 +8,7 @@ use protocol::{
     SensorConfiguration,
 };
 use tests::bridge;
-use tests::fake_board::{FakeBoard, wait_until};
+use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
 use crate::{LIMIT, Pair, entries, folder, messages, of, signal, succeeded};
