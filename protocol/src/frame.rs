@@ -77,11 +77,11 @@ pub fn encode<'a>(
 
 /// Reads a payload that every version says alike; None if it is of another kind.
 pub fn frozen(payload: &[u8]) -> Option<Message> {
-    let hello = payload.split_first().and_then(|(&first, fields)| {
-        let hello = Hello::from_bytes(fields)?;
-        (first == 0).then_some(Message::Hello(hello))
-    });
-    hello
+    let [0, fields @ ..] = payload else {
+        return None;
+    };
+    Hello::from_bytes(fields)
+        .map(Message::Hello)
         .or_else(|| Stop::from_bytes(payload).map(Message::Stop))
         .or_else(|| Stopped::from_bytes(payload).map(Message::Stopped))
 }
