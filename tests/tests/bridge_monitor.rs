@@ -372,7 +372,7 @@ fn a_key_stops_the_display_and_its_answer_is_shown() {
         reason: StopReason::Operator,
     };
     assert_eq!(running.bench().stopped, Some(stop));
-    assert!(terminal.shows(LIMIT, "confirmed by the display"));
+    assert!(terminal.shows(LIMIT, "confirmed by the sensor and the display"));
     terminal.type_keys("q");
     assert!(ended(&mut child).success());
 }
