@@ -26,12 +26,13 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::RecvTimeoutError;
 use protocol::{Message, frame};
 
+use crate::clock::SystemClock;
 use crate::line::host_hello;
 use crate::lock::locked;
 use crate::place::{Place, is_far};
 use crate::serial;
 use crate::state::State;
-use crate::system::{Input, Opened, Ports};
+use crate::system::{Input, Opened, Ports, System};
 use bus::{Guest, Host};
 use claim::{Claim, Device};
 use funnel::Funnel;
@@ -51,6 +52,16 @@ static OPEN: Mutex<BTreeMap<PathBuf, usize>> = Mutex::new(BTreeMap::new());
 /// This computer's ports, which other programs of this user may have open as well.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPorts;
+
+/// This computer.
+impl Default for System {
+    fn default() -> Self {
+        Self {
+            clock: Arc::new(SystemClock),
+            ports: Arc::new(SharedPorts),
+        }
+    }
+}
 
 impl Ports for SharedPorts {
     fn candidates(&self, place: &Place) -> Vec<PathBuf> {
