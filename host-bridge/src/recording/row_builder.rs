@@ -5,27 +5,27 @@ use protocol::{
 };
 
 use super::row::{
-    ClockRow, DisplayConfigurationRow, DisplayStatusRow, EstimateRow, GaugeRow, LinkRow, Lost,
-    OtherRow, Row, SensorConfigurationRow, SensorStatusRow,
+    CHANNELS, ClockRow, DisplayReportRow, DisplayStatusRow, EstimateRow, LinkRow, LogRow, Lost,
+    OtherRow, Row, SensorReportRow, SensorStatusRow, channel,
 };
 use crate::host_clock::unix_ns;
 use crate::link::Event;
 
 const SAMPLE_NS: u64 = 1_000_000;
 
-/// A row and its times.
+/// A row and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The board that it is of.
     pub role: Role,
     /// What is written down.
     pub row: Row,
-    /// When it was heard, in ns since 1970. Samples come eight at a time: theirs is when they were taken.
-    /// Never decreases on a channel.
+    /// When it was taken, in ns since 1970: the instant that the board gives, by its clock's offset to this
+    /// host's; when it was heard where the board gives none, or nothing is known of its clock yet. Of a block of
+    /// samples it is the first one's. Never later than when it was heard, and never decreases on a channel.
+    ///
+    /// Recordings of format 1 have the time at which it was heard here.
     pub log_ns: u64,
-    /// When it was said or taken, by the board's own clock mapped to this host's; when it was heard where
-    /// the board gives no instant, or nothing is known of its clock yet.
-    pub publish_ns: u64,
 }
 
 /// What has been counted.
@@ -49,6 +49,8 @@ pub struct RowBuilder {
     sensor: Board,
     display: Board,
     tally: Tally,
+    /// The last time on each channel.
+    last_ns: [u64; CHANNELS.len()],
 }
 
 /// What is known of a board.
@@ -58,7 +60,6 @@ struct Board {
     samples: Numbers,
     estimates: Numbers,
     motions: Numbers,
-    last_sample_ns: u64,
 }
 
 /// Numbers that count up by one.
@@ -81,14 +82,6 @@ impl Numbers {
 }
 
 impl Board {
-    /// Everything that a restart ends.
-    fn restart(&mut self) {
-        *self = Self {
-            last_sample_ns: self.last_sample_ns,
-            ..Self::default()
-        };
-    }
-
     /// An instant of the board's on the calendar.
     fn calendar_ns(&self, instant_us: u64) -> Option<u64> {
         self.clock.to_own_us(instant_us).map(unix_ns)
@@ -112,31 +105,23 @@ impl RowBuilder {
         at_us: u64,
         mut put: impl FnMut(Entry) -> Result<(), E>,
     ) -> Result<(), E> {
-        let log_ns = unix_ns(at_us);
+        let heard_ns = unix_ns(at_us);
         let board = match role {
             Role::Display => &mut self.display,
             Role::Sensor | Role::Host => &mut self.sensor,
         };
-        let tally = &mut self.tally;
-        let mut write = |row, publish_ns| {
-            put(Entry {
-                role,
-                row,
-                log_ns,
-                publish_ns,
-            })
-        };
         let message = match event {
             Event::StateChanged(state) => {
-                return write(Row::Link(LinkRow::turned(state)), log_ns);
+                return put(self.entry(role, Row::Link(LinkRow::turned(state)), heard_ns));
             }
             Event::Restarted => {
-                board.restart();
-                return write(Row::Link(LinkRow::restarted()), log_ns);
+                // It ends all that was known.
+                *board = Board::default();
+                return put(self.entry(role, Row::Link(LinkRow::restarted()), heard_ns));
             }
             Event::Heard { message, .. } => message,
         };
-        tally.messages += 1;
+        self.tally.messages += 1;
         let (lost, skipped) = match message {
             Message::Estimate(estimate) => {
                 (Lost::Estimates, board.estimates.take(estimate.sequence, 1))
@@ -151,38 +136,37 @@ impl RowBuilder {
             }
             _ => (Lost::Samples, 0),
         };
-        if skipped > 0 {
-            tally.gaps += 1;
-            tally.lost += u64::from(skipped);
-            write(Row::Link(LinkRow::gap(lost, skipped.into())), log_ns)?;
-        }
-        if let (Role::Sensor, Message::Gauges(gauges)) = (role, message) {
-            tally.samples += GAUGE_BLOCK as u64;
-            for (row, left) in GaugeRow::all(gauges)
-                .into_iter()
-                .zip((0..GAUGE_BLOCK as u64).rev())
-            {
-                let taken_ns = board
-                    .calendar_ns(row.instant_us)
-                    // A board whose time runs faster, as a simulator's may, was not ahead of its words.
-                    .filter(|&taken_ns| taken_ns <= log_ns)
-                    .unwrap_or_else(|| log_ns.saturating_sub(left * SAMPLE_NS))
-                    .max(board.last_sample_ns + 1);
-                board.last_sample_ns = taken_ns;
-                put(Entry {
-                    role,
-                    row: Row::Gauges(row),
-                    log_ns: taken_ns,
-                    publish_ns: taken_ns,
-                })?;
-            }
-            return Ok(());
-        }
         let (row, instant_us) = row(role, message, at_us, &mut board.clock);
-        let publish_ns = instant_us
+        // A block has waited for its last sample.
+        let latest_ns = match row {
+            Row::Gauges(_) => heard_ns.saturating_sub((GAUGE_BLOCK as u64 - 1) * SAMPLE_NS),
+            _ => heard_ns,
+        };
+        // A board whose time runs faster, as a simulator's may, was not ahead of its words.
+        let taken_ns = instant_us
             .and_then(|instant_us| board.calendar_ns(instant_us))
-            .map_or(log_ns, |said_ns| said_ns.min(log_ns));
-        write(row, publish_ns)
+            .map_or(latest_ns, |taken_ns| taken_ns.min(latest_ns));
+        if matches!(row, Row::Gauges(_)) {
+            self.tally.samples += GAUGE_BLOCK as u64;
+        }
+        if skipped > 0 {
+            self.tally.gaps += 1;
+            self.tally.lost += u64::from(skipped);
+            // Right before what came after what is missing.
+            let gap = Row::Link(LinkRow::gap(lost, skipped.into()));
+            put(self.entry(role, gap, taken_ns))?;
+        }
+        put(self.entry(role, row, taken_ns))
+    }
+
+    /// An entry, no earlier than the one before on its channel.
+    fn entry(&mut self, role: Role, row: Row, taken_ns: u64) -> Entry {
+        let mut log_ns = taken_ns;
+        if let Some(at) = channel(role, row.kind()) {
+            log_ns = log_ns.max(self.last_ns[at]);
+            self.last_ns[at] = log_ns;
+        }
+        Entry { role, row, log_ns }
     }
 
     /// Enters what this end of the line to the board of `role` has counted.
@@ -190,16 +174,32 @@ impl RowBuilder {
     /// # Errors
     /// Whatever `put` fails with.
     pub fn enter_counters<E>(
-        &self,
+        &mut self,
         role: Role,
         counters: PortCounters,
         at_us: u64,
         put: impl FnOnce(Entry) -> Result<(), E>,
     ) -> Result<(), E> {
-        put(now(role, Row::Line(counters), at_us))
+        put(self.entry(role, Row::Line(counters), unix_ns(at_us)))
     }
 
-    /// Enters that events of the board of `role` could not be taken.
+    /// Enters a line of the log of the board of `role`, with defmt's level.
+    ///
+    /// # Errors
+    /// Whatever `put` fails with.
+    pub fn enter_log<E>(
+        &mut self,
+        role: Role,
+        (level, text): (Option<&str>, &str),
+        at_us: u64,
+        put: impl FnOnce(Entry) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let at_ns = unix_ns(at_us);
+        let row = LogRow::new(role.name(), level, text, at_ns);
+        put(self.entry(role, Row::Log(row), at_ns))
+    }
+
+    /// Enters that events of the board of `role` could not be taken, from `at_us` on.
     ///
     /// # Errors
     /// Whatever `put` fails with.
@@ -212,17 +212,7 @@ impl RowBuilder {
     ) -> Result<(), E> {
         self.tally.unwritten += missing;
         let row = LinkRow::gap(Lost::Unwritten, missing);
-        put(now(role, Row::Link(row), at_us))
-    }
-}
-
-fn now(role: Role, row: Row, at_us: u64) -> Entry {
-    let log_ns = unix_ns(at_us);
-    Entry {
-        role,
-        row,
-        log_ns,
-        publish_ns: log_ns,
+        put(self.entry(role, Row::Link(row), unix_ns(at_us)))
     }
 }
 
@@ -234,6 +224,9 @@ fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (R
             Row::Estimate(EstimateRow::from(*estimate)),
             Some(estimate.instant_us),
         ),
+        (Role::Sensor, Message::Gauges(gauges)) => {
+            (Row::Gauges(gauges.into()), Some(gauges.instant_us))
+        }
         (Role::Display, Message::Motion(motion)) => (Row::Motion(*motion), Some(motion.instant_us)),
         (Role::Display, Message::Safety(safety)) => {
             (Row::Safety((*safety).into()), Some(safety.instant_us))
@@ -254,14 +247,14 @@ fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (R
             let (refused, hash) = (report.refused, report.hash);
             let row = match (role, report.configuration) {
                 (Role::Sensor, Configuration::Sensor(in_force)) => {
-                    Row::SensorConfiguration(SensorConfigurationRow {
+                    Row::SensorConfiguration(SensorReportRow {
                         refused,
                         hash,
                         in_force,
                     })
                 }
                 (Role::Display, Configuration::Display(in_force)) => {
-                    Row::DisplayConfiguration(DisplayConfigurationRow {
+                    Row::DisplayConfiguration(DisplayReportRow {
                         refused,
                         hash,
                         in_force,

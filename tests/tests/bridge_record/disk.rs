@@ -108,9 +108,10 @@ fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
     let samples: Vec<u32> = read
         .iter()
         .filter_map(|entry| match entry.row {
-            Row::Gauges(row) => Some(row.sample),
+            Row::Gauges(row) => Some(row.first_sample),
             _ => None,
         })
+        .flat_map(|first| first..first + GAUGE_BLOCK as u32)
         .collect();
     assert!(samples.iter().copied().eq(0..samples.len() as u32));
     let safe = number_before(&ended.stderr, "samples,");
