@@ -21,7 +21,8 @@ def values(message):
     """Every value of a message, with those of messages within it, in order."""
     names = getattr(message, "__dataclass_fields__", None) or message.__slots__
     for name in names:
-        if name.startswith("_"):
+        # rosbags has a message's constants among its fields.
+        if name.startswith("_") or name.isupper():
             continue
         yield from flat(getattr(message, name))
 

@@ -30,7 +30,7 @@ pub const ABOUT: &str = "ridgelink";
 pub const FORMAT: &str = "2";
 /// Before it is compressed: more than a second of everything, so that what closes a chunk is the time.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// zstd's: twice as slow as its usual 3, some 5 % smaller.
+/// zstd's.
 const COMPRESSION_LEVEL: u32 = 9;
 /// The other keys of a channel in a recording of ROS 2.
 const QOS: (&str, &str) = ("offered_qos_profiles", "");

@@ -198,7 +198,7 @@ mod tests {
     }
 
     fn full(patience: Duration) -> (Input<usize>, Output<usize>) {
-        let (input, mut output) = queue(patience);
+        let (input, output) = queue(patience);
         (0..MOST).for_each(|item| input.put(Role::Sensor, 0, item));
         (input, output)
     }

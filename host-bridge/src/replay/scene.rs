@@ -134,6 +134,8 @@ pub struct Made {
     pub estimates: (usize, usize),
     /// Whether the recording was cut off.
     pub cut: bool,
+    /// Rows of an older protocol that say nothing in this version's.
+    pub passed_over: u64,
 }
 
 /// Writes the scene of a recording.
@@ -191,6 +193,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         begin_us: layout.begin_us,
         estimates: (valid.len(), within.len()),
         cut: excerpt.cut,
+        passed_over: excerpt.passed_over,
     })
 }
 

@@ -26,6 +26,8 @@ pub struct Excerpt {
     pub display: Option<DisplayConfiguration>,
     /// Whether the recording was cut off.
     pub cut: bool,
+    /// Rows of an older protocol that say nothing in this version's.
+    pub passed_over: u64,
 }
 
 /// A run of samples without a gap, by time in s.
@@ -105,6 +107,7 @@ impl Excerpt {
             }
         }
         excerpt.cut = recording.is_cut();
+        excerpt.passed_over = recording.passed_over();
         if let Some(at_s) = gap_s {
             let longest = runs
                 .into_iter()
