@@ -17,6 +17,7 @@ mod record;
 mod relay;
 mod replay;
 mod signals;
+mod stop;
 
 /// Ridgelink's bridge: flashes, watches, records and replays the boards, and carries their link over
 /// networks.
@@ -63,6 +64,9 @@ enum Command {
     /// Carries the link between two sites over a network
     #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
+    /// Stops the boards, now
+    #[command(after_long_help = stop::EXAMPLES)]
+    Stop(stop::StopBoards),
     /// Looks at what is attached, and says what is wrong and what to do
     Doctor(doctor::Doctor),
     /// Prints completions for a shell
@@ -121,6 +125,7 @@ impl Arguments {
             Command::Record(record) => record.execute(),
             Command::Replay(replay) => replay.execute(),
             Command::Relay(relay) => relay.execute(),
+            Command::Stop(stop) => stop.execute(),
             Command::Doctor(doctor) => doctor.execute(),
             Command::Completions(completions) => completions.execute(),
             Command::Man(man) => man.execute(),

@@ -23,5 +23,6 @@ pub mod replay;
 mod restart;
 mod search;
 mod serial;
+mod shared_port;
 pub mod state;
 pub mod system;

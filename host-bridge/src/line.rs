@@ -1,11 +1,15 @@
 //! What is said on an open serial line: whole frames or nothing, without ever waiting.
 
+use std::collections::VecDeque;
 use std::io::{self, Write};
 
 use protocol::{Hello, MAX_FRAME, Message, Port, PortCounters, Role};
 
 /// Speed of a console, 8N1.
 pub const BAUD: u32 = 921_600;
+
+/// Pings whose answers are still waited for.
+const PINGS: usize = 64;
 
 /// Why something was not said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -43,6 +47,8 @@ pub struct Line {
     rest: Vec<u8>,
     /// Frames that the line did not take.
     refused: u32,
+    /// The last pings that were sent, by their instants.
+    pings_us: VecDeque<u64>,
 }
 
 impl Line {
@@ -54,19 +60,35 @@ impl Line {
             output,
             rest: Vec::new(),
             refused: 0,
+            pings_us: VecDeque::with_capacity(PINGS),
         }
     }
 
-    /// Says `message` now.
+    /// Says `message` now. A Stop is said to whoever is there: all versions understand it.
     ///
     /// # Errors
     /// If nobody is there who would understand it, or the line is stuck.
     pub fn say(&mut self, message: &Message) -> Result<(), NotSent> {
-        if !self.is_known {
+        if !self.is_known && !matches!(message, Message::Stop(_)) {
             return Err(NotSent::NotKnown);
         }
-        self.port.post(message);
+        self.queue(message);
         self.flush()
+    }
+
+    /// Queues `message`, whoever is there; [`Line::flush`] writes it.
+    pub fn queue(&mut self, message: &Message) {
+        if let Message::Ping(ping) = message {
+            self.pings_us.truncate(PINGS - 1);
+            self.pings_us.push_front(ping.sent_us);
+        }
+        self.port.post(message);
+    }
+
+    /// Whether a pong that returns `sent_us` answers a ping of this line's: other programs may share the port,
+    /// and go by other clocks.
+    pub fn is_answer(&self, sent_us: u64) -> bool {
+        self.pings_us.contains(&sent_us)
     }
 
     /// Writes what is to be said. What the line takes no byte of is dropped; a frame of which it has taken

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role};
+use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role, Stop};
 
 use crate::clock::{Notify, micros};
 use crate::line::Line;
@@ -26,6 +26,8 @@ use crate::system::{Opened, System};
 /// How long a lost board is waited for between two looks: a cable that is put back is seen well within
 /// a second.
 pub const RETRY: Duration = Duration::from_millis(100);
+/// Between two times that Stop is said to a board that has not answered it, in µs.
+const STOP_AGAIN_US: u64 = 40_000;
 /// Longest read: what comes in some 40 ms at full speed.
 const READ_BYTES: usize = 4_096;
 
@@ -72,6 +74,8 @@ struct Shared {
     clock: Mutex<ClockOffset>,
     /// Of the line before, while there is none.
     counters: Mutex<PortCounters>,
+    /// A Stop that the board has not answered, and when it was said last.
+    stop: Mutex<Option<(Stop, u64)>>,
     ended: AtomicBool,
     system: System,
     /// Wakes a reader that waits to try again.
@@ -105,6 +109,7 @@ impl Link {
             }),
             clock: Mutex::new(ClockOffset::new()),
             counters: Mutex::new(PortCounters::new()),
+            stop: Mutex::new(None),
             ended: AtomicBool::new(false),
             woken: system.clock.notify(),
             system: system.clone(),
@@ -136,6 +141,19 @@ impl Link {
     /// If nobody is there, or the line is stuck.
     pub fn post(&self, message: &Message) -> Result<(), NotSent> {
         self.shared.post(message)
+    }
+
+    /// Stops the board. See [`LinkSender::stop`].
+    ///
+    /// # Errors
+    /// If it could not be said yet.
+    pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
+        self.shared.stop(stop)
+    }
+
+    /// Whether the board has not answered a Stop yet.
+    pub fn is_stopping(&self) -> bool {
+        locked(&self.shared.stop).is_some()
     }
 
     /// How the link stands.
@@ -185,9 +203,34 @@ impl LinkSender {
     pub fn post(&self, message: &Message) -> Result<(), NotSent> {
         self.shared.post(message)
     }
+
+    /// Stops whatever board is there: says so now, and again until it answers that it has stopped; a board
+    /// that comes later is told as soon as its port is open. Never waits.
+    ///
+    /// # Errors
+    /// If it could not be said yet.
+    pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
+        self.shared.stop(stop)
+    }
 }
 
 impl Shared {
+    fn stop(&self, stop: Stop) -> Result<(), NotSent> {
+        *locked(&self.stop) = Some((stop, self.now_us()));
+        self.post(&Message::Stop(stop))
+    }
+
+    /// A Stop that is to be said again.
+    fn stop_due(&self, at_us: u64) -> Option<Message> {
+        let mut pending = locked(&self.stop);
+        let (stop, said_us) = pending.as_mut()?;
+        if at_us.saturating_sub(*said_us) < STOP_AGAIN_US {
+            return None;
+        }
+        *said_us = at_us;
+        Some(Message::Stop(*stop))
+    }
+
     fn post(&self, message: &Message) -> Result<(), NotSent> {
         locked(&self.line)
             .as_mut()
@@ -252,6 +295,10 @@ impl<F: FnMut(Event)> Reader<F> {
             LineMonitor::new(self.shared.now_us(), self.search.patience_us(path));
         locked(&self.shared.clock).clear();
         *locked(&self.shared.line) = Some(Line::new(output));
+        if let Some((_, said_us)) = locked(&self.shared.stop).as_mut() {
+            // Nobody can have heard it on this line.
+            *said_us = 0;
+        }
         let mut bytes = vec![0; READ_BYTES];
         let mut messages = Vec::new();
         let mut end = None;
@@ -283,9 +330,14 @@ impl<F: FnMut(Event)> Reader<F> {
             if !choosy || is_known {
                 self.set_state(state);
             }
-            // What another board says is nobody's business here.
-            for message in messages.drain(..).filter(|_| is_known) {
-                self.pass(&mut line_monitor, at_us, message);
+            for message in messages.drain(..) {
+                // What another board says is nobody's business here, but that it has stopped.
+                if let Message::Stopped(_) = message {
+                    locked(&self.shared.stop).take();
+                    (self.tell)(Event::Heard { at_us, message });
+                } else if is_known {
+                    self.pass(&mut line_monitor, at_us, message);
+                }
             }
         }
         let line = locked(&self.shared.line).take();
@@ -323,7 +375,10 @@ impl<F: FnMut(Event)> Reader<F> {
         line.is_known = state.is_known();
         // One that has fallen silent is asked as well: its console speaks frames for as long as it hears some.
         if matches!(peer, Peer::Known(_)) && line_monitor.ping_due(at_us) {
-            line.port.post(&Message::Ping(Ping { sent_us: at_us }));
+            line.queue(&Message::Ping(Ping { sent_us: at_us }));
+        }
+        if let Some(stop) = self.shared.stop_due(at_us) {
+            line.queue(&stop);
         }
         // What a stuck line refuses is counted, and said again when it is due again.
         let _ = line.flush();
@@ -368,6 +423,14 @@ impl<F: FnMut(Event)> Reader<F> {
             (self.tell)(Event::Restarted);
         }
         if let Message::Pong(pong) = &message {
+            let line = locked(&self.shared.line);
+            let is_ours = line
+                .as_ref()
+                .is_some_and(|line| line.is_answer(pong.sent_us));
+            drop(line);
+            if !is_ours {
+                return;
+            }
             locked(&self.shared.clock).on_pong(pong, at_us);
         }
         (self.tell)(Event::Heard { at_us, message });

@@ -1,11 +1,10 @@
 //! This computer's serial ports: opened for this program alone, and written to without ever waiting.
 
-use std::collections::BTreeSet;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -13,10 +12,9 @@ use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
 
 use crate::clock::SystemClock;
 use crate::line::BAUD;
-use crate::lock::locked;
-use crate::place::Place;
+use crate::shared_port::SharedPorts;
 use crate::state::State;
-use crate::system::{Input, Opened, Ports, System};
+use crate::system::{Input, Opened, System};
 
 /// Longest wait for bytes; also how late a Hello or a ping may be.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
@@ -24,78 +22,40 @@ const READ_TIMEOUT: Duration = Duration::from_millis(20);
 /// How long what was said last may take to leave a line that is closed.
 const DRAIN: Duration = Duration::from_millis(40);
 
-/// The ports that this program has open.
-static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// This computer's ports.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SerialPorts;
-
-/// Opened by itself so that it alone never blocks: a blocked write would hold up the reader.
-struct Output {
-    tty: File,
-    path: PathBuf,
-}
-
-impl Ports for SerialPorts {
-    fn candidates(&self, place: &Place) -> Vec<PathBuf> {
-        place.candidates()
+/// Opens a port for this program alone.
+///
+/// # Errors
+/// If it can't be: the state says why.
+pub fn open(path: &Path) -> Result<Opened, State> {
+    // A link that is put elsewhere between the two openings must not lead to two boards.
+    let device = fs::canonicalize(path).map_err(|error| refused(path, &error))?;
+    let kind = fs::metadata(&device)
+        .map_err(|error| refused(path, &error))?
+        .file_type();
+    if !kind.is_char_device() {
+        let what = if kind.is_dir() { "a folder" } else { "a file" };
+        return Err(State::Failed {
+            port: path.to_owned(),
+            reason: format!("is {what}, not a serial port"),
+        });
     }
-
-    fn is_open(&self, port: &Path) -> bool {
-        locked(&OPEN).contains(port)
-    }
-
-    fn open(&self, path: &Path) -> Result<Opened, State> {
-        // A link that is put elsewhere between the two openings must not lead to two boards.
-        let device = fs::canonicalize(path).map_err(|error| refused(path, &error))?;
-        let kind = fs::metadata(&device)
-            .map_err(|error| refused(path, &error))?
-            .file_type();
-        if !kind.is_char_device() {
-            let what = if kind.is_dir() { "a folder" } else { "a file" };
-            return Err(State::Failed {
-                port: path.to_owned(),
-                reason: format!("is {what}, not a serial port"),
-            });
-        }
-        let mut tty = OpenOptions::new()
-            .write(true)
-            .custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY)
-            .open(&device)
-            .map_err(|error| refused(path, &error))?;
-        let input = serialport::new(device.to_string_lossy(), BAUD)
-            .timeout(READ_TIMEOUT)
-            .open_native()
-            .map_err(|error| refused_port(path, &error))?;
-        // What a terminal may have left half said is over with it. A line that does not even take this is
-        // found out later.
-        let _ = tty.write(&[0]);
-        locked(&OPEN).insert(path.to_owned());
-        Ok(Opened {
-            input: Box::new(input),
-            output: Box::new(Output {
-                tty,
-                path: path.to_owned(),
-            }),
-        })
-    }
-}
-
-impl Write for Output {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.tty.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Drop for Output {
-    fn drop(&mut self) {
-        locked(&OPEN).remove(&self.path);
-    }
+    let mut tty = OpenOptions::new()
+        .write(true)
+        .custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY)
+        .open(&device)
+        .map_err(|error| refused(path, &error))?;
+    let input = serialport::new(device.to_string_lossy(), BAUD)
+        .timeout(READ_TIMEOUT)
+        .open_native()
+        .map_err(|error| refused_port(path, &error))?;
+    // What a terminal may have left half said is over with it. A line that does not even take this is
+    // found out later.
+    let _ = tty.write(&[0]);
+    Ok(Opened {
+        input: Box::new(input),
+        // Opened by itself so that it alone never blocks: a blocked write would hold up the reader.
+        output: Box::new(tty),
+    })
 }
 
 impl Input for TTYPort {
@@ -153,7 +113,7 @@ impl Default for System {
     fn default() -> Self {
         Self {
             clock: Arc::new(SystemClock),
-            ports: Arc::new(SerialPorts),
+            ports: Arc::new(SharedPorts),
         }
     }
 }
@@ -176,13 +136,7 @@ mod tests {
 
     #[test]
     fn what_is_no_terminal_is_refused_by_what_it_is() {
-        let said = |path: &Path| {
-            SerialPorts
-                .open(path)
-                .map(|_| ())
-                .expect_err("no terminal")
-                .to_string()
-        };
+        let said = |path: &Path| open(path).map(|_| ()).expect_err("no terminal").to_string();
         assert_eq!(
             said(&std::env::temp_dir()),
             format!(

@@ -13,12 +13,8 @@ use protocol::actuators::{self, grid};
 use protocol::{
     Configuration, ConfigurationReport, Contact, DisplayConfiguration, DisplayState, Estimate,
     GAUGES, GaugeHealth, Hello, Message, Mode, Range, Refusal, Role, Safety, SensorConfiguration,
-    Setting, Stop, StopReason, Trip,
+    Setting, Stopped, Trip,
 };
-
-const STOP: Message = Message::Stop(Stop {
-    reason: StopReason::Operator,
-});
 
 fn connected() -> Dashboard {
     let mut dashboard = Dashboard::default();
@@ -151,46 +147,36 @@ fn a_change_that_is_not_answered_is_given_up() {
 }
 
 #[test]
-fn a_stop_is_said_at_once_and_again_until_the_display_has_stopped() {
+fn a_stop_is_over_when_every_board_has_answered_and_is_called_unanswered_until_then() {
     let mut dashboard = connected();
+    dashboard.linked = vec![Role::Sensor, Role::Display];
     dashboard.stop();
-    assert_eq!(dashboard.take_outbox(Role::Display), [STOP]);
-    dashboard.elapse(10);
-    dashboard.take_outbox(Role::Display);
-    dashboard.elapse(300_000);
-    assert_eq!(dashboard.take_outbox(Role::Display), [STOP]);
-    let message = Message::Safety(Safety {
-        instant_us: 0,
-        state: DisplayState::Stopped(Trip::Operator),
-    });
-    let at_us = 310_000;
-    dashboard.on(at_us, Role::Display, Event::Heard { at_us, message });
-    let notice = dashboard.notice().expect("it is told");
-    assert_eq!(notice.text, "stop: confirmed by the display");
-    dashboard.elapse(320_000);
-    // Nothing but the question for its configuration.
-    let said = dashboard.take_outbox(Role::Display);
-    assert!(!said.contains(&STOP), "{said:?}");
+    let text = |dashboard: &Dashboard| dashboard.notice().expect("it is told").text.clone();
+    assert_eq!(text(&dashboard), "stop: sent, not confirmed yet");
+    let stopped = |dashboard: &mut Dashboard, role: Role| {
+        let message = Message::Stopped(Stopped::by(Trip::Operator));
+        dashboard.on(10, role, Event::Heard { at_us: 10, message });
+    };
+    stopped(&mut dashboard, Role::Display);
+    assert_eq!(text(&dashboard), "stop: confirmed by the display");
+    dashboard.elapse(500_000);
+    let words = text(&dashboard);
+    assert!(
+        words.starts_with("NOT STOPPED: sensor: no answer"),
+        "{words}"
+    );
+    stopped(&mut dashboard, Role::Sensor);
+    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
+    dashboard.elapse(2_000_000);
+    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
 }
 
 #[test]
-fn a_stop_waits_for_a_display_that_is_away() {
+fn a_stop_that_has_no_way_to_any_board_is_called_so() {
     let mut dashboard = connected();
-    let absent = State::Absent {
-        place: "/dev/tty".to_owned(),
-    };
-    dashboard.on(0, Role::Display, Event::StateChanged(absent));
     dashboard.stop();
-    dashboard.take_outbox(Role::Display);
-    dashboard.elapse(60_000_000);
-    assert_eq!(dashboard.take_outbox(Role::Display), []);
-    let known = State::Known {
-        port: "/dev/tty".into(),
-        hello: Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
-    };
-    dashboard.on(60_000_001, Role::Display, Event::StateChanged(known));
-    dashboard.elapse(60_000_002);
-    assert!(dashboard.take_outbox(Role::Display).contains(&STOP));
+    let notice = dashboard.notice().expect("it is told");
+    assert!(notice.is_bad && notice.text.starts_with("NOT STOPPED: there is no way"));
 }
 
 #[test]

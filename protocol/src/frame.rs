@@ -8,16 +8,24 @@
 //! sequence and the payload. COBS leaves 0x00 for the end of a frame alone, so that whoever joins
 //! late or heard noise is in step again at the next 0x00.
 //!
-//! Three things never change, whatever [`PROTOCOL_VERSION`](crate::PROTOCOL_VERSION) says: COBS and
-//! CRC as above, the sequence's place in front, and the payload of a [`Hello`](crate::Hello): a 0x00,
-//! then the 35 bytes of [`Hello::to_bytes`](crate::Hello::to_bytes). By these, any two versions can
-//! count each other's frames and say that they differ.
+//! These never change, whatever [`PROTOCOL_VERSION`](crate::PROTOCOL_VERSION) says: COBS and CRC as above,
+//! the sequence's place in front, and three payloads, which begin with a 0x00:
+//!
+//! | payload | bytes after the 0x00 |
+//! | --- | --- |
+//! | [`Hello`](crate::Hello) | the 35 of [`Hello::to_bytes`](crate::Hello::to_bytes) |
+//! | [`Stop`](crate::Stop) | `STOP`, then the reason |
+//! | [`Stopped`](crate::Stopped) | `HALT`, then the cause |
+//!
+//! By these, any two versions can count each other's frames, say that they differ, and stop each other.
 
 use postcard_schema::Schema;
 use postcard_schema::schema::{DataModelType, DataModelVariant, NamedType};
 
 use crate::checksum::CRC_32;
+use crate::hello::Hello;
 use crate::message::Message;
+use crate::stop::{Stop, Stopped};
 
 /// Bytes of the sequence number in front of the payload.
 const SEQUENCE: usize = 2;
@@ -57,8 +65,35 @@ pub fn encode<'a>(
     out: &'a mut [u8; MAX_FRAME],
 ) -> Option<&'a [u8]> {
     let mut scratch = [0; MAX_PAYLOAD];
-    let payload = postcard::to_slice(message, &mut scratch).ok()?;
-    encode_payload(sequence, payload, out)
+    match message {
+        Message::Stop(stop) => encode_payload(sequence, &stop.to_bytes(), out),
+        Message::Stopped(stopped) => encode_payload(sequence, &stopped.to_bytes(), out),
+        message => {
+            let payload = postcard::to_slice(message, &mut scratch).ok()?;
+            encode_payload(sequence, payload, out)
+        }
+    }
+}
+
+/// Reads a payload that every version says alike; None if it is of another kind.
+pub fn frozen(payload: &[u8]) -> Option<Message> {
+    let hello = payload.split_first().and_then(|(&first, fields)| {
+        let hello = Hello::from_bytes(fields)?;
+        (first == 0).then_some(Message::Hello(hello))
+    });
+    hello
+        .or_else(|| Stop::from_bytes(payload).map(Message::Stop))
+        .or_else(|| Stopped::from_bytes(payload).map(Message::Stopped))
+}
+
+/// Reads a payload of this version; None if it is no message of it.
+pub fn message(payload: &[u8]) -> Option<Message> {
+    frozen(payload).or_else(|| match postcard::take_from_bytes(payload) {
+        // What is frozen is said in no other way.
+        Ok((Message::Hello(_) | Message::Stop(_) | Message::Stopped(_), _)) => None,
+        Ok((message, [])) => Some(message),
+        _ => None,
+    })
 }
 
 /// Encodes any payload of up to [`MAX_PAYLOAD`] bytes as the frame numbered `sequence`: also what

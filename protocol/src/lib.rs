@@ -21,6 +21,7 @@ pub mod safety;
 pub mod sender;
 mod sequence;
 pub mod status;
+pub mod stop;
 
 pub use actuators::{
     ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN,
@@ -36,7 +37,7 @@ pub use hello::{HELLO_LENGTH, Hello, Role};
 pub use latest::Latest;
 pub use message::{
     CHANNELS, Contact, Estimate, GAUGE_BLOCK, GAUGES, GaugeHealth, GaugeSample, Gauges, Message,
-    Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, Stop, StopReason,
+    Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH,
 };
 pub use port::Port;
 pub use receiver::{Event, Peer, Receiver};
@@ -44,3 +45,4 @@ pub use refusal::{Refusal, Setting};
 pub use safety::{DisplayState, Hold, Safety, Trip};
 pub use sender::Sender;
 pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};
+pub use stop::{STOP_LENGTH, Stop, StopReason, Stopped};

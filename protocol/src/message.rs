@@ -12,7 +12,8 @@
 //! | [`ConfigurationReport`] | boards | – | answers both |
 //! | [`Safety`] | display | at each change | the supervisor's state |
 //! | [`Ping`], [`Pong`] | all | – | round trip and clock offset |
-//! | [`Stop`] | host | – | no more stimulus |
+//! | [`Stop`] | all | – | no more stimulus, and the arm stands still |
+//! | [`Stopped`] | boards | – | answers each Stop |
 //!
 //! The order of the variants and of the fields is the wire's: a change of either changes
 //! [`SCHEMA_HASH`] and asks for a new [`PROTOCOL_VERSION`].
@@ -25,9 +26,10 @@ use crate::configuration::{Configuration, ConfigurationReport};
 use crate::hello::{Hello, MAGIC, Role};
 use crate::safety::Safety;
 use crate::status::Status;
+use crate::stop::{Stop, Stopped};
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 4;
+pub const PROTOCOL_VERSION: u16 = 5;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
@@ -66,12 +68,16 @@ pub enum Message {
     Ping(Ping),
     /// Answers a [`Ping`].
     Pong(Pong),
-    /// Ends the stimulus until the display board's reset button or power.
+    /// Stops the board, until its reset button or power. On the wire it is [`Stop::to_bytes`]: always the
+    /// same bytes, and never variant 9.
     Stop(Stop),
     /// Describes ten actuators, for a [`Message::Configure`] to come. Answered only if refused.
     Actuators(Actuators),
     /// The display's supervisor has changed its state.
     Safety(Safety),
+    /// Answers a [`Message::Stop`]. On the wire it is [`Stopped::to_bytes`]: always the same bytes, and
+    /// never variant 12.
+    Stopped(Stopped),
 }
 
 /// Which of the paper's ranges an instant is in, equation (8): T1 while v(t)·v(t−A) ≥ 0.
@@ -215,23 +221,6 @@ pub struct Pong {
     pub received_us: u64,
     /// The answerer's clock when it sent this, in µs.
     pub answered_us: u64,
-}
-
-/// Why the stimulus was stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum StopReason {
-    /// A person asked for it.
-    Operator,
-    /// A host program found something wrong.
-    Host,
-}
-
-/// Ends the stimulus: obeyed at the next output tick and kept until the display board's reset button or
-/// power.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct Stop {
-    /// Why.
-    pub reason: StopReason,
 }
 
 impl Hello {

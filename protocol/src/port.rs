@@ -54,9 +54,18 @@ impl Port {
 
     /// Queues `message` if somebody who understands it listens. A frame that does not fit into the
     /// queue is dropped whole and counted.
+    ///
+    /// A [`Stop`](crate::Stop), and the answer to one, is queued whoever listens, and always: a Stop takes the
+    /// place of all that waits to be sent, an answer does if there is no room. A 0x00 comes before it, to end
+    /// whatever went out before.
     pub fn post(&mut self, message: &Message) {
+        match message {
+            Message::Stop(_) => self.give_up(),
+            Message::Stopped(_) if !self.has_room() => self.give_up(),
+            _ => {}
+        }
         let mut frame = [0; MAX_FRAME];
-        if self.queue.capacity() - self.queue.len() < MAX_FRAME {
+        if !self.has_room() {
             self.dropped = self.dropped.wrapping_add(1);
         } else if let Some(bytes) = self.sender.encode(message, &mut frame) {
             for &byte in bytes {
@@ -64,6 +73,20 @@ impl Port {
                 debug_assert!(fits.is_ok(), "the queue had room for a whole frame");
             }
         }
+    }
+
+    /// Whether any frame finds room.
+    fn has_room(&self) -> bool {
+        self.queue.capacity() - self.queue.len() >= MAX_FRAME
+    }
+
+    /// Drops all that waits to be sent, and counts its frames.
+    fn give_up(&mut self) {
+        let ends = self.queue.iter().filter(|&&byte| byte == 0).count();
+        self.dropped = self.dropped.wrapping_add(ends as u32);
+        self.queue.clear();
+        let fits = self.queue.push_back(0);
+        debug_assert!(fits.is_ok(), "the queue is empty");
     }
 
     /// Queues bytes that are no frame, if there is room for all of them.
@@ -94,7 +117,7 @@ impl Port {
         // One that waits looks at every byte: a person may have typed right before a program came.
         let portion = if sender.waits() { 1 } else { bytes.len() };
         for bytes in bytes.chunks(portion.max(1)) {
-            if sender.waits() && begins_hello(bytes) && is_typed(receiver.unended()) {
+            if sender.waits() && begins_frozen(bytes) && is_typed(receiver.unended()) {
                 receiver.forget_unended();
             }
             receiver.receive(bytes, |event| {
@@ -201,8 +224,8 @@ impl Port {
     }
 }
 
-/// Whether a [`Hello`]'s frame may begin so: with the code of one of the three bytes before its magic, of
-/// which the last is always 0.
-fn begins_hello(bytes: &[u8]) -> bool {
+/// Whether a frame may begin so that every version understands: with the code of one of the three bytes
+/// before the rest of it, of which the last is always 0.
+fn begins_frozen(bytes: &[u8]) -> bool {
     matches!(bytes, [1..=3, ..])
 }

@@ -23,7 +23,8 @@ pub(crate) fn is_typed(bytes: &[u8]) -> bool {
     reason = "no allocator to box with, and an event lives on the stack for one frame"
 )]
 pub enum Event {
-    /// A message from a compatible peer; never a Hello, and never one that is late or came before.
+    /// A message from a compatible peer; never a Hello, and never one that is late or came before. A
+    /// [`Stop`](crate::Stop), or the answer to one, from anybody, also late and once more.
     Message(Message),
     /// A compatible peer said Hello.
     Greeted(Hello),
@@ -55,7 +56,8 @@ pub enum Peer {
 /// Every frame that ends, except an empty one and a line of text, raises exactly one of the counters
 /// `received`, `corrupt`, `overlong`, `late`, `duplicated`, `malformed`, `foreign` and `unheralded`;
 /// `lost` counts the gaps between them. A Hello is handed on even if it is late or came before: what it
-/// says does not grow old. A line of text says that the peer has started over, or has taken its leave:
+/// says does not grow old. So is a [`Stop`](crate::Stop), and the answer to one, from whoever it is: known,
+/// foreign, speaking text or silent so far. A line of text says that the peer has started over, or has taken its leave:
 /// what it said before is forgotten, and nothing else is read before its Hello.
 pub struct Receiver {
     /// The frame so far, still in COBS.
@@ -154,10 +156,10 @@ impl Reader {
             count(&mut self.counters.corrupt);
             return None;
         };
-        if let [0, fields @ ..] = payload
-            && let Some(hello) = Hello::from_bytes(fields)
-        {
-            return Some(self.read_hello(sequence, hello));
+        match frame::frozen(payload) {
+            Some(Message::Hello(hello)) => return Some(self.read_hello(sequence, hello)),
+            Some(stop) => return Some(self.read_stop(sequence, stop)),
+            None => {}
         }
         let arrival = self.sequences.note(sequence);
         if !self.count_arrival(arrival) {
@@ -172,13 +174,12 @@ impl Reader {
                 count(&mut self.counters.foreign);
                 None
             }
-            Peer::Known(_) => match postcard::take_from_bytes(payload) {
-                // A Hello that `from_bytes` refused is none.
-                Ok((message, [])) if !matches!(message, Message::Hello(_)) => {
+            Peer::Known(_) => match frame::message(payload) {
+                Some(message) => {
                     count(&mut self.counters.received);
                     Some(Event::Message(message))
                 }
-                _ => {
+                None => {
                     count(&mut self.counters.malformed);
                     None
                 }
@@ -202,6 +203,15 @@ impl Reader {
             }
             Event::Foreign(hello)
         }
+    }
+
+    /// Hands on a Stop, or the answer to one, whoever says it and whenever.
+    fn read_stop(&mut self, sequence: u16, message: Message) -> Event {
+        let arrival = self.sequences.note_stop(sequence);
+        if self.count_arrival(arrival) {
+            count(&mut self.counters.received);
+        }
+        Event::Message(message)
     }
 
     /// Counts gaps, late and repeated frames; whether this one is neither late nor repeated.

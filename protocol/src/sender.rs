@@ -11,8 +11,8 @@ const ASK_PERIOD_US: u64 = 100_000;
 
 /// The sending direction of a port: numbers and encodes frames.
 ///
-/// It lets nothing but [`Hello`] out until the peer has said a compatible one itself, so that no
-/// version has to guess at what another one says. Who starts asks; who is asked answers; an answer
+/// It lets nothing but [`Hello`], [`Stop`](crate::Stop) and the answer to one out until the peer has said a
+/// compatible Hello itself, so that no version has to guess at what another one says. Who starts asks; who is asked answers; an answer
 /// asks no more, so the exchange ends. One that waits to be spoken to does not start.
 pub struct Sender {
     hello: Hello,
@@ -54,13 +54,17 @@ impl Sender {
     }
 
     /// Encodes `message` as the next frame and counts it. None while the peer is not greeted, unless
-    /// it is a Hello.
+    /// every version understands it: see [`crate::frame`].
     pub fn encode<'a>(
         &mut self,
         message: &Message,
         out: &'a mut [u8; MAX_FRAME],
     ) -> Option<&'a [u8]> {
-        if !self.greeted && !matches!(message, Message::Hello(_)) {
+        let is_frozen = matches!(
+            message,
+            Message::Hello(_) | Message::Stop(_) | Message::Stopped(_)
+        );
+        if !self.greeted && !is_frozen {
             return None;
         }
         let bytes = frame::encode(self.sequence, message, out)?;

@@ -105,6 +105,20 @@ impl Sequences {
         arrival
     }
 
+    /// Notes a Stop, or the answer to one, which may be of somebody who says nothing else and numbers for
+    /// himself: a number from far off is no part of this stream.
+    pub(crate) fn note_stop(&mut self, sequence: u16) -> Arrival {
+        match self.newest {
+            Some(newest)
+                if sequence.wrapping_sub(newest) < WINDOW
+                    || newest.wrapping_sub(sequence) < WINDOW =>
+            {
+                self.note(sequence)
+            }
+            _ => Arrival::Fresh { lost: 0 },
+        }
+    }
+
     /// Moves the newest number on by `ahead`; what is skipped is missing.
     fn advance(&mut self, newest: u16, ahead: u16) {
         let sequence = newest.wrapping_add(ahead);

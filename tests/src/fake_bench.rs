@@ -161,9 +161,10 @@ impl FakeBench {
                     let report = report(refused, Configuration::Display(self.displaying));
                     self.display.say(report);
                 }
+                // The board itself answers.
                 Message::Stop(stop) => {
                     self.stopped = Some(stop);
-                    self.turn(DisplayState::Stopped(Trip::Operator));
+                    self.state = DisplayState::Stopped(Trip::Operator);
                 }
                 _ => {}
             }

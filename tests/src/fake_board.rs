@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{
-    DisplayState, Hello, MAX_FRAME, Message, Port, Role, Safety, Stop, StopReason, Trip,
+    DisplayState, Hello, MAX_FRAME, Message, Port, Role, Safety, Stop, StopReason, Stopped,
 };
 
 use host_bridge::clock::{Clock, SystemClock};
@@ -147,7 +147,7 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Deafen(is_deaf));
     }
 
-    /// Has the board take no notice of a Stop, for as long as it disobeys; a display obeys otherwise, and
+    /// Has the board take no notice of a Stop, for as long as it disobeys; it obeys otherwise, and
     /// says so.
     pub fn disobey(&self, disobeys: bool) {
         let _ = self.orders.send(Order::Disobey(disobeys));
@@ -195,7 +195,8 @@ fn run(
     let pause = clock.notify();
     let mut port = Port::new(hello);
     let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
-    let mut obeys = hello.role == Role::Display.byte();
+    let mut obeys = true;
+    let is_display = hello.role == Role::Display.byte();
     let mut bytes = [0; 4_096];
     let mut out = [0; MAX_FRAME];
     loop {
@@ -217,8 +218,11 @@ fn run(
             }
             locked(heard).push(message);
         });
-        let answer = stop.filter(|_| obeys).map(|reason| stopped(now_us, reason));
-        let mut said = script(now_us).into_iter().chain(answer);
+        let stop = stop.filter(|_| obeys);
+        let state = stop.filter(|_| is_display);
+        let state = state.map(|reason| safety(now_us, reason));
+        let answer = stop.map(|reason| Message::Stopped(Stopped::by(reason.trip())));
+        let mut said = script(now_us).into_iter().chain(state).chain(answer);
         loop {
             while let count @ 1.. = port.take(&mut out) {
                 if !is_mute && !write(&mut master, &out[..count], is_patient, pulled) {
@@ -251,12 +255,8 @@ fn run(
 }
 
 /// What a display says at `instant_us` when it has obeyed a Stop.
-fn stopped(instant_us: u64, reason: StopReason) -> Message {
-    let trip = match reason {
-        StopReason::Operator => Trip::Operator,
-        StopReason::Host => Trip::Host,
-    };
-    let state = DisplayState::Stopped(trip);
+const fn safety(instant_us: u64, reason: StopReason) -> Message {
+    let state = DisplayState::Stopped(reason.trip());
     Message::Safety(Safety { instant_us, state })
 }
 

@@ -20,6 +20,9 @@ use tests::virtual_ports::VirtualBench;
 /// Far more of virtual time than anything here takes.
 const LIMIT: Duration = Duration::from_secs(60);
 const S: u64 = 1_000_000;
+const OPERATOR: Stop = Stop {
+    reason: StopReason::Operator,
+};
 
 /// A link, and what it tells.
 struct Watched {
@@ -180,7 +183,7 @@ fn a_board_of_another_role_is_named_and_neither_heard_nor_spoken_to() {
             board.path().display()
         )
     );
-    assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
+    assert_eq!(watched.link.post(&motion(9)), Err(NotSent::NotKnown));
     // Its Hellos are among what is counted: at most two of these five are.
     let before = watched.link.counters().received;
     (0..5).for_each(|sequence| board.say(motion(sequence)));
@@ -189,7 +192,72 @@ fn a_board_of_another_role_is_named_and_neither_heard_nor_spoken_to() {
     drop(watched.link);
     let is_heard = |event| matches!(event, Event::Heard { .. });
     assert!(!watched.told.iter().any(is_heard));
+    assert!(!board.take_heard().contains(&motion(9)));
+}
+
+/// Stop is said, answered, and said no more.
+fn assert_stopped(bench: &VirtualBench, watched: &Watched, board: &FakeBoard) {
+    watched.link.stop(OPERATOR).expect("there is a line");
+    assert!(hears_stop(board));
+    assert!(wait_until(&bench.clock, LIMIT, || !watched
+        .link
+        .is_stopping()));
+    board.take_heard();
+    let end_us = bench.clock.now_us() + 1_000_000;
+    assert!(wait_until(&bench.clock, LIMIT, || bench.clock.now_us() > end_us));
     assert!(!board.take_heard().contains(&STOP));
+}
+
+#[test]
+fn a_stop_is_said_to_whoever_is_there() {
+    let ours = Hello::new(Role::Sensor, "stm32f429zi", [9, 8, 7]);
+    let foreign = Hello {
+        protocol: [0xff, 0x7f],
+        ..ours
+    };
+    let display = Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]);
+    for (hello, word) in [
+        (foreign, "foreign"),
+        (display, "wrong-role"),
+        (ours, "known"),
+    ] {
+        let bench = VirtualBench::default();
+        let board = FakeBoard::acting_on(&bench, hello, Box::new(|_| Vec::new()));
+        let watched = Watched::at(&bench, Role::Sensor, &board);
+        watched.turns_to(word);
+        assert_stopped(&bench, &watched, &board);
+    }
+}
+
+#[test]
+fn a_stop_is_said_again_to_a_board_that_does_not_answer_and_to_one_that_comes_later() {
+    let bench = VirtualBench::default();
+    let board = FakeBoard::on(&bench, Role::Display);
+    board.mute(true);
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.link.stop(OPERATOR).ok();
+    let mut said = 0;
+    assert!(wait_until(&bench.clock, LIMIT, || {
+        said += board
+            .take_heard()
+            .iter()
+            .filter(|&message| *message == STOP)
+            .count();
+        said > 20
+    }));
+    assert!(watched.link.is_stopping());
+    board.mute(false);
+    assert!(wait_until(&bench.clock, LIMIT, || !watched
+        .link
+        .is_stopping()));
+
+    let name = Path::new("/virtual/later");
+    let absent = Watched::new(&bench, Role::Display, Place::Port(name.to_owned()));
+    assert_eq!(absent.link.stop(OPERATOR), Err(NotSent::NotKnown));
+    drop(watched);
+    board.take_heard();
+    bench.ports.link(board.path(), name);
+    assert!(hears_stop(&board));
 }
 
 #[test]
@@ -209,7 +277,7 @@ fn a_board_of_another_protocol_or_schema_is_named_and_not_spoken_to() {
         let watched = Watched::at(&bench, Role::Sensor, &board);
         let said = watched.turns_to("foreign").to_string();
         assert!(said.contains("sensor 9.8.7 on stm32f429zi"), "{said}");
-        assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
+        assert_eq!(watched.link.post(&motion(9)), Err(NotSent::NotKnown));
     }
 }
 
@@ -248,7 +316,7 @@ fn a_board_that_falls_silent_is_named_and_known_again_when_it_speaks() {
     watched.turns_to("known");
     board.mute(true);
     watched.turns_to("silent");
-    assert_eq!(watched.link.post(&STOP), Err(NotSent::NotKnown));
+    assert_eq!(watched.link.post(&motion(9)), Err(NotSent::NotKnown));
     board.mute(false);
     watched.turns_to("known");
     watched.link.post(&STOP).expect("the board is back");

@@ -41,6 +41,13 @@ fn turns_to(told: &Receiver<Event>, word: &str) -> State {
     turned(told, |state| state.word() == word)
 }
 
+fn hears(told: &Receiver<Event>, sequence: u32) {
+    let wanted = motion(sequence);
+    while !matches!(told.recv_timeout(LIMIT).expect("it is heard"), Event::Heard { message, .. } if message == wanted)
+    {
+    }
+}
+
 fn motion(sequence: u32) -> Message {
     Message::Motion(Motion {
         sequence,
@@ -71,17 +78,65 @@ fn a_port_of_another_program_is_busy_until_that_ends() {
 }
 
 #[test]
-fn a_second_link_to_a_port_is_told_that_it_is_busy_and_leaves_the_first_alone() {
+fn programs_that_share_a_port_hear_the_same_and_are_one_host_to_the_board() {
     let board = FakeBoard::new(Role::Sensor);
-    let (first, told) = link(Role::Sensor, &board);
-    turns_to(&told, "known");
-    let (_second, of_second) = link(Role::Sensor, &board);
-    turns_to(&of_second, "busy");
-    first.post(&STOP).expect("the first one has the board");
-    assert!(wait_until(LIMIT, || board.take_heard().contains(&STOP)));
-    assert!(first.state().is_known());
-    drop(first);
-    turns_to(&of_second, "known");
+    let links: Vec<(Link, Receiver<Event>)> = (0..4).map(|_| link(Role::Sensor, &board)).collect();
+    for (_, told) in &links {
+        turns_to(told, "known");
+    }
+    board.say(motion(1));
+    for (_, told) in &links {
+        hears(told, 1);
+    }
+    for (link, _) in &links {
+        link.post(&STOP).expect("each has the board");
+    }
+    let mut stops = 0;
+    assert!(wait_until(LIMIT, || {
+        let heard = board.take_heard();
+        stops += heard.iter().filter(|&message| *message == STOP).count();
+        stops == links.len()
+    }));
+    for (link, _) in &links {
+        let counters = link.counters();
+        assert_eq!((counters.lost, counters.corrupt, counters.late), (0, 0, 0));
+    }
+}
+
+#[test]
+fn when_the_owner_of_a_port_ends_another_goes_on_without_a_word_to_its_user() {
+    let board = FakeBoard::new(Role::Sensor);
+    let mut links: Vec<(Link, Receiver<Event>)> = Vec::new();
+    for _ in 0..4 {
+        let next = link(Role::Sensor, &board);
+        turns_to(&next.1, "known");
+        links.push(next);
+    }
+    let mut sequence = 0;
+    while links.len() > 1 {
+        drop(links.remove(0));
+        for (link, told) in &links {
+            let first = sequence + 1;
+            // What is said while nobody has the port is lost, and counted: it is said again until heard.
+            assert!(wait_until(LIMIT, || {
+                sequence += 1;
+                board.say(motion(sequence));
+                told.try_iter().any(|event| match event {
+                    Event::StateChanged(state) => panic!("{state}"),
+                    Event::Heard {
+                        message: Message::Motion(motion),
+                        ..
+                    } => motion.sequence >= first,
+                    Event::Heard { .. } => false,
+                    Event::Restarted => false,
+                })
+            }));
+            assert!(wait_until(LIMIT, || {
+                let _ = link.post(&STOP);
+                board.take_heard().contains(&STOP)
+            }));
+        }
+    }
 }
 
 #[test]

@@ -211,20 +211,18 @@ fn what_is_wrong_with_a_port_is_named_with_advice() {
 }
 
 #[test]
-fn the_second_monitor_says_that_the_ports_are_busy() {
+fn a_second_monitor_sees_the_same_and_goes_on_when_the_first_one_ends() {
     let running = bench();
     let first = Lines::of(monitor(&running).arg("--plain"));
     first.with("display safety: driving");
     let second = Lines::of(monitor(&running).arg("--plain"));
-    let [line, _] = second.with_each(["sensor busy: ", "display busy: "]);
-    assert!(
-        line.contains("another program has it: close the other program"),
-        "{line}"
-    );
-    // The first one is not disturbed, and its ports are free when it ends.
+    second.with(" known      known ");
+    // The first one is not disturbed.
     first.with(" known      known ");
     drop(first);
-    second.with(" known      known ");
+    for _ in 0..3 {
+        second.with(" known      known ");
+    }
 }
 
 #[test]

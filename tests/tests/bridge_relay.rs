@@ -10,7 +10,7 @@ use host_bridge::lock::locked;
 use host_bridge::relay::flow::LATE_SPACING_US;
 use host_bridge::relay::name::Name;
 use host_bridge::relay::operator::{self, Progress, Stopping};
-use protocol::{Message, Role, Stop, StopReason, Trip};
+use protocol::{Message, Role, Stop, StopReason, Stopped, Trip};
 use tests::fake_board::{FakeBoard, wait_by};
 use tests::relay::{ESTIMATE_US, MOTION_US, listen, motion, sequences, talking_board_on};
 use tests::virtual_ports::VirtualBench;
@@ -225,6 +225,94 @@ fn a_bridge_that_is_started_anew_is_followed() {
 }
 
 #[test]
+fn a_second_bridge_watches_while_the_first_one_speaks_and_leaves_no_trace() {
+    let Sites {
+        sensor,
+        display: _display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    let mut motions = listen(&sensor, LIMIT, at_least(100));
+    let other_board = talking_board_on(&pair.bench, Role::Display);
+    let rival = VirtualSite::new(
+        &pair.bench,
+        &pair.network,
+        Role::Display,
+        other_board.path(),
+        MAX_AGE,
+    );
+    pair.sensor.says("a second bridge is there", LIMIT);
+    rival.says("another bridge calls itself the display's site", LIMIT);
+    pass(&pair.bench, Duration::from_secs(3));
+    drop(rival);
+    pass(&pair.bench, Duration::from_secs(3));
+    motions.extend(sensor.take_heard());
+    // All of the first one's, 500 a second, and none of another's.
+    let numbers = sequences(&motions);
+    let gap = numbers
+        .windows(2)
+        .map(|pair| pair[1].wrapping_sub(pair[0]))
+        .max();
+    assert_eq!(gap, Some(1), "{:?}", pair.sensor.words());
+}
+
+#[test]
+fn the_bench_is_taken_by_who_waits_when_its_holder_is_silent() {
+    let Sites {
+        sensor,
+        display,
+        mut pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(100));
+    let other_board = talking_board_on(&pair.bench, Role::Display);
+    let waiting = VirtualSite::new(
+        &pair.bench,
+        &pair.network,
+        Role::Display,
+        other_board.path(),
+        MAX_AGE,
+    );
+    pair.sensor.says("a second bridge is there", LIMIT);
+    drop(display);
+    sensor.take_heard();
+    // The board is gone, and its bridge still there: the bench stays with it.
+    pass(&pair.bench, Duration::from_secs(3));
+    assert_eq!(sequences(&sensor.take_heard()), [] as [u32; 0]);
+    drop(std::mem::replace(&mut pair.display, waiting));
+    listen(&sensor, Duration::from_millis(500), at_least(100));
+}
+
+#[test]
+fn a_board_that_another_program_stopped_stops_the_other_site() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(10));
+    display.say(Message::Stopped(Stopped::by(Trip::EmergencyStop)));
+    listen(&sensor, LIMIT, |heard| {
+        heard
+            .iter()
+            .any(|message| matches!(message, Message::Stop(_)))
+    });
+    pair.display
+        .says("the board at the sensor's site has stopped", LIMIT);
+    // And that is all: nobody says it back.
+    pass(&pair.bench, Duration::from_secs(1));
+    sensor.take_heard();
+    display.take_heard();
+    pass(&pair.bench, Duration::from_secs(1));
+    for board in [&sensor, &display] {
+        let heard = board.take_heard();
+        assert!(
+            !heard
+                .iter()
+                .any(|message| matches!(message, Message::Stop(_)))
+        );
+    }
+}
+
+#[test]
 fn a_board_whose_cable_is_pulled_and_put_back_goes_on_also_if_it_starts_anew() {
     let bench = VirtualBench::default();
     let sensor = talking_board_on(&bench, Role::Sensor);
@@ -286,8 +374,8 @@ fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
     listen(&sensor, LIMIT, at_least(10));
 
     pair.sensor.site.stop(STOP);
-    // Until the bridge looks what is to be said, one way over the network, and until the board looks.
-    let soon = Duration::from_millis(25) + DELAY + Duration::from_millis(2);
+    // One way over the network, and until the board looks.
+    let soon = DELAY + Duration::from_millis(2);
     listen(&display, soon, |heard| heard.iter().any(is_stop));
     listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
     pair.sensor.says(
@@ -299,8 +387,10 @@ fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
         .says("Stop: the board here has stopped: by the operator", LIMIT);
 
     pair.display.site.stop(STOP);
-    pair.display
-        .says("Stop: with the board at the sensor's site", LIMIT);
+    pair.display.says(
+        "Stop: the board at the sensor's site has stopped: by the operator",
+        LIMIT,
+    );
 
     // Said while the network is away, it comes when it is back.
     pair.network.cut(true);

@@ -90,12 +90,14 @@ impl Monitor {
             bench.display.elf = Some(elf.clone());
         }
         // The second one ends the program even where a reader of its lines stands still.
-        let ended = signals::flag_set_by(&signals::OF_A_TERMINAL, Again::EndsAtOnce)
+        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)
             .context("can't listen to signals")?;
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
         let mut source = open(&bench);
         source.logs = Some(lines);
+        let boards = source.links.iter().map(|(_, link)| link.sender());
+        signals::stop_boards(boards.collect()).context("can't listen to signals")?;
         let format = Format {
             is_json: self.json,
             every: self.every,

@@ -30,8 +30,8 @@ Writes everything that both boards say, and what their links do, to MCAP, to CSV
 Once a second what has been heard is made safe on the disk: that much is kept whatever happens, and only that \
 is counted as safe. The MCAP file reads as it is in Foxglove, PlotJuggler, ROS 2 and whatever else knows ROS 2's \
 messages: a channel for each board and kind of message, and one for each firmware's log where the bench names an \
-ELF and its rtt. The sensor board is told to stream its gauges meanwhile, \
-for which its estimators begin anew, and to stop when the recording ends. A board that is not there is named, \
+ELF and its rtt. The sensor board is asked for its gauges meanwhile, \
+which changes nothing else of it. A board that is not there is named, \
 and recorded from the moment it comes; one that goes and returns is recorded on. A bench that names one board \
 only has only that one.";
 
@@ -61,7 +61,7 @@ pub struct Record {
     /// A folder for CSV files, one for each board and kind of message
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     csv: Option<PathBuf>,
-    /// Leaves the sensor board as it is: no samples, unless it streams them already
+    /// Asks for no samples: none are recorded, unless somebody else asks for them
     #[arg(long)]
     no_gauges: bool,
     /// Ends after so many seconds
@@ -140,6 +140,7 @@ impl Record {
         drop(events);
         let (logs, lines) = Logs::new();
         follow(&bench, &roles, &logs)?;
+        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let absent = Session {
             recorder: &recorder,
             links: &links,
@@ -255,8 +256,7 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Records until it is asked to end, or can't go on; then the sensor board is as it was. Returns the
-    /// boards that were never there.
+    /// Records until it is asked to end, or can't go on. Returns the boards that were never there.
     fn run(mut self, ended: &AtomicBool, until: Option<Duration>) -> Vec<Role> {
         for role in BOARDS {
             if self.link(role).is_none() {
@@ -267,7 +267,6 @@ impl Session<'_> {
             }
         }
         self.record(ended, until);
-        self.restore();
         self.absent
     }
 
@@ -353,18 +352,6 @@ impl Session<'_> {
             bytes(progress.safe_bytes),
             missing(&progress),
         ));
-    }
-
-    /// Gives the sensor board its quiet back if it was taken.
-    fn restore(&mut self) {
-        let mut links = self.links.iter();
-        let sensor = links.find(|(role, _)| *role == Role::Sensor);
-        let sensor = sensor.map(|(_, link)| link);
-        if !self.stream.restore(&self.told, sensor, |_, _| {}) {
-            self.screen.tell(
-                "sensor: could not be told to stop streaming its gauges: it does until it is configured or restarted",
-            );
-        }
     }
 }
 

@@ -20,7 +20,6 @@ use host_bridge::relay::report::Report;
 use host_bridge::relay::site::{Settings, Site, opposite};
 use host_bridge::system::System;
 use protocol::{Role, Stop, StopReason};
-use signal_hook::consts::SIGUSR1;
 
 use super::output;
 use super::signals::{self, Again};
@@ -173,7 +172,6 @@ impl Bridge {
         let network = Network::new(ends, self.meeting.proofs.credentials())?;
         // Leaving a network that is stuck may take a while.
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
-        let stopped = signals::flag_set_by(&[SIGUSR1], Again::IsIgnored)?;
         let (bridge, notices) = Site::open(Settings {
             role,
             place: seat.place(),
@@ -182,16 +180,17 @@ impl Bridge {
             max_age: Duration::from_millis(self.max_age.into()),
             system: System::default(),
         })?;
+        let stop = bridge.stopper();
+        signals::on_stop(move || {
+            stop(Stop {
+                reason: StopReason::Operator,
+            });
+        })?;
         let far = opposite(role).map_or("the other site", site);
         say(&format!("host-bridge: {words}, waiting for {far}"));
         let mut before = None;
         let mut due = Instant::now() + REPORT;
         while !ended.load(Ordering::Relaxed) {
-            if stopped.swap(false, Ordering::Relaxed) {
-                bridge.stop(Stop {
-                    reason: StopReason::Operator,
-                });
-            }
             match notices.recv_timeout(LOOK.min(due.saturating_duration_since(Instant::now()))) {
                 Ok(notice) => say(&format!("host-bridge: {notice}")),
                 Err(RecvTimeoutError::Timeout) => {}

@@ -161,7 +161,7 @@ impl Replay {
 
     /// Plays it into a monitor, which shows its end until a key ends it.
     fn watch(&self, recording: Reader) -> anyhow::Result<ExitCode> {
-        let ended = signals::flag_set_by(&signals::OF_A_TERMINAL, Again::IsIgnored)?;
+        let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let pace = self.pace();
         let (events, told) = channel();
         let their_end = Arc::clone(&ended);

@@ -4,13 +4,39 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use host_bridge::link::LinkSender;
+use protocol::{Stop, StopReason};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
+use signal_hook::iterator::Signals;
 
-/// What asks for an end.
-pub const USUAL: [i32; 2] = [SIGINT, SIGTERM];
-/// And the terminal that goes away.
-pub const OF_A_TERMINAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+/// What asks for an end; a terminal that goes away does.
+pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+
+/// Has SIGUSR1 stop the boards, by a thread that waits for nothing else.
+///
+/// # Errors
+/// If the system does not let one listen to signals.
+pub fn stop_boards(boards: Vec<LinkSender>) -> io::Result<()> {
+    on_stop(move || {
+        for board in &boards {
+            // What can't be said yet is said as soon as it can.
+            let _ = board.stop(Stop {
+                reason: StopReason::Operator,
+            });
+        }
+    })
+}
+
+/// Has SIGUSR1 call `stop`, on a thread of its own.
+///
+/// # Errors
+/// If the system does not let one listen to signals.
+pub fn on_stop(stop: impl Fn() + Send + 'static) -> io::Result<()> {
+    let mut signals = Signals::new([SIGUSR1])?;
+    std::thread::spawn(move || signals.forever().for_each(|_| stop()));
+    Ok(())
+}
 
 /// What a second signal does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

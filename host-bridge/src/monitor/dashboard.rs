@@ -24,6 +24,8 @@ const NOTICE_US: u64 = 6_000_000;
 const CODES_PER_LSB: f32 = 16.0;
 /// µs between two samples of a gauge.
 const SAMPLE_US: u64 = 1_000;
+/// A board answers a Stop within milliseconds; after so long, in µs, whoever said it is told that it did not.
+const STOP_US: u64 = 500_000;
 
 /// The last seconds of everything that is traced.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +80,10 @@ pub struct Dashboard {
     pub log_entries: VecDeque<LogEntry>,
     /// What came of the last change that was asked for.
     pub outcome: Option<Outcome>,
+    /// The boards to which there is a way: none where a recording is watched.
+    pub linked: Vec<Role>,
+    /// The boards that have not answered a Stop, and since when.
+    stopping: Option<(u64, Vec<Role>)>,
     notice: Option<Notice>,
     orders: [Orders; 2],
     fresh: Vec<LogEntry>,
@@ -97,6 +103,8 @@ impl Default for Dashboard {
             fingertip: Fingertip::default(),
             log_entries: VecDeque::new(),
             outcome: None,
+            linked: Vec::new(),
+            stopping: None,
             notice: None,
             orders: [Orders::new(Role::Sensor), Orders::new(Role::Display)],
             fresh: Vec::new(),
@@ -191,6 +199,16 @@ impl Dashboard {
                 self.conclude(role, outcome);
             }
         }
+        if let Some((since_us, boards)) = &self.stopping
+            && now_us.saturating_sub(*since_us) >= STOP_US
+        {
+            let names: Vec<&str> = boards.iter().map(|role| role.name()).collect();
+            let names = names.join(" and ");
+            self.notify(
+                true,
+                format!("NOT STOPPED: {names}: no answer, told again: use the emergency stop"),
+            );
+        }
         let is_over = |notice: &Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;
         if self.notice.as_ref().is_some_and(is_over) {
             self.notice = None;
@@ -203,31 +221,30 @@ impl Dashboard {
     }
 
     /// Something could not be said.
-    pub fn on_not_sent(&mut self, role: Role, message: &Message, why: NotSent) {
-        let name = role.name();
-        let text = match message {
-            Message::Stop(_) => format!(
-                "NOT STOPPED: {name}: {why}; will be told again when it is there: use the emergency stop"
-            ),
-            _ => format!("{name}: {why}"),
-        };
-        self.notify(true, text);
+    pub fn on_not_sent(&mut self, role: Role, why: NotSent) {
+        self.notify(true, format!("{}: {why}", role.name()));
     }
 
-    /// There is no way to a board, as where a recording is watched.
-    pub fn on_no_way(&mut self, message: &Message) {
-        if let Message::Stop(_) = message {
-            self.orders(Role::Display).stopped();
-            let words = "NOT STOPPED: there is no way to the display from here";
-            self.notify(true, words.to_owned());
-        }
-    }
-
-    /// Stops the stimulus until the display board's reset button or power.
+    /// Stop was said on every way there is: shows who has answered.
     pub fn stop(&mut self) {
-        let now_us = self.now_us;
-        self.orders(Role::Display).stop(now_us);
+        if self.linked.is_empty() {
+            let words = "NOT STOPPED: there is no way to the boards from here";
+            return self.notify(true, words.to_owned());
+        }
+        self.stopping = Some((self.now_us, self.linked.clone()));
         self.notify(false, "stop: sent, not confirmed yet".to_owned());
+    }
+
+    /// The board of `role` says that it has stopped.
+    fn on_stopped(&mut self, role: Role) {
+        let Some((_, boards)) = &mut self.stopping else {
+            return;
+        };
+        boards.retain(|board| *board != role);
+        if boards.is_empty() {
+            self.stopping = None;
+        }
+        self.notify(false, format!("stop: confirmed by the {}", role.name()));
     }
 
     /// Reads both configurations anew.
@@ -319,6 +336,7 @@ impl Dashboard {
             (Role::Sensor, Message::Gauges(gauges)) => self.on_gauges(at_us, gauges),
             (Role::Display, Message::Motion(motion)) => self.on_motion(at_us, motion),
             (Role::Display, Message::Safety(safety)) => self.turn(safety.state),
+            (_, Message::Stopped(_)) => self.on_stopped(role),
             (_, Message::Status(status)) => {
                 self.board_mut(role).status = Some((at_us, *status));
                 if let (Role::Display, RoleCounters::Display(counters)) = (role, &status.role) {
@@ -386,12 +404,6 @@ impl Dashboard {
 
     /// The supervisor is in a state, be it a new one or not.
     fn turn(&mut self, state: DisplayState) {
-        if let DisplayState::Stopped(_) = state
-            && self.orders(Role::Display).is_stopping()
-        {
-            self.orders(Role::Display).stopped();
-            self.notify(false, "stop: confirmed by the display".to_owned());
-        }
         if self.safety.is_some_and(|(_, before)| before == state) {
             return;
         }

@@ -15,7 +15,8 @@ use defmt_decoder::{DecodeError, Table};
 use protocol::Role;
 
 use super::log_entry::LogEvent;
-use crate::link::BAUD;
+use crate::shared_port::SharedPorts;
+use crate::system::{Opened, Ports};
 
 mod probe;
 
@@ -156,11 +157,8 @@ impl Log {
         let file = File::open(path).map_err(failed)?;
         if file.is_terminal() {
             // Opened as a line, so that the system does not take the bytes for text.
-            let line = serialport::new(path.to_string_lossy(), BAUD)
-                .timeout(LOOK)
-                .open_native()
-                .map_err(|error| format!("{}: {error}", path.display()))?;
-            return self.pump(line, false).map_err(failed);
+            let opened = SharedPorts.open(path).map_err(|state| state.to_string())?;
+            return self.listen(opened).map_err(failed);
         }
         let grows = file.metadata().is_ok_and(|metadata| metadata.is_file());
         self.pump(file, grows).map_err(failed)
@@ -171,6 +169,19 @@ impl Log {
         let stream = TcpStream::connect(address).map_err(failed)?;
         stream.set_read_timeout(Some(LOOK)).map_err(failed)?;
         self.pump(stream, false).map_err(failed)
+    }
+
+    /// Decodes what comes over a line that other programs may listen to as well.
+    fn listen(&self, opened: Opened) -> io::Result<()> {
+        let Opened { mut input, .. } = opened;
+        let mut bytes = vec![0; READ_BYTES];
+        let result = self.decode(|| match input.read(&mut bytes) {
+            Ok(count) => Ok(Some(bytes[..count].to_vec())),
+            Err(error) if is_pause(&error) => Ok(Some(Vec::new())),
+            Err(error) => Err(error),
+        });
+        input.close(true);
+        result
     }
 
     /// Decodes what a reader gives, until it ends; one that `grows` goes on after its end.

@@ -19,16 +19,21 @@ pub enum Asked {
     Quit,
 }
 
-/// A key was pressed. A stop is a stop whatever is open.
+/// Whether a key says Stop, whatever is open.
+pub fn is_stop(key: KeyEvent) -> bool {
+    let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
+    !with_control && matches!(key.code, KeyCode::Char('s' | 'S' | ' '))
+}
+
+/// A key was pressed. One that says Stop has said so to the boards already.
 pub fn press(key: KeyEvent, dashboard: &mut Dashboard, view: &mut View) -> Asked {
     let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
-    match key.code {
-        KeyCode::Char('c') if with_control => return Asked::Quit,
-        KeyCode::Char('s' | 'S' | ' ') => {
-            dashboard.stop();
-            return Asked::Nothing;
-        }
-        _ => {}
+    if with_control && key.code == KeyCode::Char('c') {
+        return Asked::Quit;
+    }
+    if is_stop(key) {
+        dashboard.stop();
+        return Asked::Nothing;
     }
     if view.form.is_some() {
         press_in_form(key.code, dashboard, view);

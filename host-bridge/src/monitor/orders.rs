@@ -1,4 +1,4 @@
-//! What is said to the boards: stops, questions for their configurations, and changes of them.
+//! What is said to the boards: questions for their configurations, and changes of them.
 //!
 //! A configuration is taken as a whole, and another program may have changed it. So it is read right
 //! before it is changed: a board that is given the other one's configuration refuses it, and its answer
@@ -6,12 +6,12 @@
 
 use protocol::{
     Configuration, ConfigurationReport, DisplayConfiguration, Message, Refusal, Role,
-    SensorConfiguration, Stop, StopReason,
+    SensorConfiguration,
 };
 
 use super::settings::{Misread, Setting};
 
-/// A question, or a stop, that was not answered is repeated after so long, in µs.
+/// A question that was not answered is repeated after so long, in µs.
 const AGAIN_US: u64 = 300_000;
 /// A change that was not answered is given up after so long, in µs.
 const GIVEN_UP_US: u64 = 2_000_000;
@@ -26,7 +26,7 @@ struct Change {
     sent: Option<Configuration>,
 }
 
-/// What a change, or a stop, has come to.
+/// What a change has come to.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The setting is in force.
@@ -51,8 +51,6 @@ pub struct Orders {
     /// When the configuration was asked for last, while it is wanted.
     wanted: Option<Option<u64>>,
     change: Option<Change>,
-    /// Since when the display is to stop, and when it was told so last.
-    stop: Option<(u64, u64)>,
     outbox: Vec<Message>,
 }
 
@@ -63,7 +61,6 @@ impl Orders {
             role,
             wanted: None,
             change: None,
-            stop: None,
             outbox: Vec::new(),
         }
     }
@@ -85,23 +82,7 @@ impl Orders {
         self.wanted = Some(None);
     }
 
-    /// Stops the stimulus, and says so again until [`Orders::stopped`].
-    pub fn stop(&mut self, now_us: u64) {
-        self.stop = Some((now_us, now_us));
-        self.outbox.push(STOP);
-    }
-
-    /// The display has stopped, or can't be told.
-    pub fn stopped(&mut self) {
-        self.stop = None;
-    }
-
-    /// Whether a stop is not obeyed yet.
-    pub const fn is_stopping(&self) -> bool {
-        self.stop.is_some()
-    }
-
-    /// The board has gone: what was on the way is void, but for a stop.
+    /// The board has gone: what was on the way is void.
     pub fn lost(&mut self) {
         self.wanted = None;
         self.outbox.clear();
@@ -162,12 +143,6 @@ impl Orders {
                 *asked_us = Some(now_us);
                 self.outbox.push(question(self.role));
             }
-            if let Some((_, told_us)) = &mut self.stop
-                && due(*told_us)
-            {
-                *told_us = now_us;
-                self.outbox.push(STOP);
-            }
         }
         let given_up = |since_us: u64| now_us.saturating_sub(since_us) >= GIVEN_UP_US;
         if self
@@ -186,10 +161,6 @@ impl Orders {
         std::mem::take(&mut self.outbox)
     }
 }
-
-const STOP: Message = Message::Stop(Stop {
-    reason: StopReason::Operator,
-});
 
 /// What the board of `role` refuses, and answers with its own.
 const fn question(role: Role) -> Message {

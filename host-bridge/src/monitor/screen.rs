@@ -11,14 +11,17 @@ use std::time::{Duration, Instant};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Typed, KeyEventKind};
 
+use protocol::{Stop, StopReason};
+
 use super::MonitorError;
 use super::dashboard::Dashboard;
 use super::draw::draw;
-use super::keys::{Asked, press};
+use super::keys::{Asked, is_stop, press};
 use super::live_recording::LiveRecording;
 use super::session::Session;
 use super::theme::Theme;
 use super::view::{Kept, View};
+use crate::link::LinkSender;
 
 /// Between two pictures: 30 a second.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 30);
@@ -84,7 +87,7 @@ fn show(
     let mut drawn: Option<Instant> = None;
     let mut changed = true;
     let mut next = Instant::now();
-    let typed = listen();
+    let typed = listen(session.senders());
     while !ended.load(Ordering::Acquire) && end.is_none_or(|end| Instant::now() < end) {
         changed |= session.take();
         // Shown already, in the log.
@@ -134,11 +137,22 @@ fn show(
 }
 
 /// What is typed. On a thread of its own, which is left behind at the end: crossterm never comes back from
-/// a terminal that has hung up.
-fn listen() -> Receiver<Typed> {
+/// a terminal that has hung up. It says Stop itself: whoever draws may have to wait for the terminal.
+fn listen(boards: Vec<LinkSender>) -> Receiver<Typed> {
     let (events, typed) = channel();
     thread::spawn(move || {
         while let Ok(event) = event::read() {
+            if let Typed::Key(key) = &event
+                && key.kind != KeyEventKind::Release
+                && is_stop(*key)
+            {
+                for board in &boards {
+                    // What can't be said yet is said as soon as it can.
+                    let _ = board.stop(Stop {
+                        reason: StopReason::Operator,
+                    });
+                }
+            }
             if events.send(event).is_err() {
                 return;
             }

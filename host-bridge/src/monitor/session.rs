@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use protocol::Role;
@@ -10,9 +11,9 @@ use super::dashboard::Dashboard;
 use super::live_recording::LiveRecording;
 use super::log_entry::LogEvent;
 use crate::host_clock::now_us;
-use crate::link::{Event, Link};
-use crate::recording::RecordingError;
+use crate::link::{Event, Link, LinkSender};
 use crate::recording::gauge_stream::GaugeStream;
+use crate::recording::{Progress, RecordingError};
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
@@ -35,6 +36,8 @@ pub struct Session {
     /// Where recordings go.
     folder: PathBuf,
     recording: Option<LiveRecording>,
+    /// A recording that is being ended, by a thread of its own: a disk may take its time.
+    ending: Option<(String, JoinHandle<Result<Progress, RecordingError>>)>,
     /// Has the gauges stream for as long as a recording lasts.
     stream: GaugeStream,
     lines_us: Option<u64>,
@@ -44,11 +47,15 @@ pub struct Session {
 impl Session {
     /// Nothing has come yet. Recordings will go to `folder`.
     pub fn new(source: Source, folder: PathBuf) -> Self {
+        let linked = source.links.iter().map(|(role, _)| *role).collect();
+        let mut dashboard = Dashboard::default();
+        dashboard.linked = linked;
         Self {
-            dashboard: Dashboard::default(),
+            dashboard,
             source,
             folder,
             recording: None,
+            ending: None,
             stream: GaugeStream::default(),
             lines_us: None,
             is_over: false,
@@ -100,9 +107,24 @@ impl Session {
                 self.end_recording();
             }
         }
+        if self
+            .ending
+            .as_ref()
+            .is_some_and(|(_, ending)| ending.is_finished())
+        {
+            came = true;
+            // Told on the dashboard.
+            let _ = self.finish_recording();
+        }
         self.ask();
         self.say();
         came
+    }
+
+    /// The ways on which Stop is said.
+    pub fn senders(&self) -> Vec<LinkSender> {
+        let links = self.source.links.iter();
+        links.map(|(_, link)| link.sender()).collect()
     }
 
     /// Asks for what a recording needs. What is not answered is asked again.
@@ -126,12 +148,10 @@ impl Session {
     pub fn say(&mut self) {
         for role in [Role::Sensor, Role::Display] {
             for message in self.dashboard.take_outbox(role) {
-                let Some(link) = self.link(role) else {
-                    self.dashboard.on_no_way(&message);
-                    continue;
-                };
-                if let Err(why) = link.post(&message) {
-                    self.dashboard.on_not_sent(role, &message, why);
+                if let Some(link) = self.link(role)
+                    && let Err(why) = link.post(&message)
+                {
+                    self.dashboard.on_not_sent(role, why);
                 }
             }
         }
@@ -193,11 +213,10 @@ impl Session {
     /// # Errors
     /// If the last of a recording can't be written.
     pub fn close(mut self) -> Result<(), RecordingError> {
-        self.restore();
-        match self.recording.take() {
-            Some(recording) => recording.end().map(|_| ()),
-            None => Ok(()),
+        if self.recording.is_some() {
+            self.end_recording();
         }
+        self.finish_recording()
     }
 
     /// Gives the sensor board its quiet back if a recording took it. Whether it is as it was.
@@ -226,7 +245,26 @@ impl Session {
             return;
         };
         let path = recording.path.display().to_string();
-        match recording.end() {
+        // One at a time: the one before has had all its time.
+        let _ = self.finish_recording();
+        self.ending = Some((path, thread::spawn(move || recording.end())));
+        if !is_restored {
+            let words =
+                "the sensor board could not be told to stop streaming its gauges: g tells it";
+            self.dashboard.notify(true, words.to_owned());
+        }
+    }
+
+    /// Waits for the end of a recording, and tells what has come of it.
+    fn finish_recording(&mut self) -> Result<(), RecordingError> {
+        let Some((path, ending)) = self.ending.take() else {
+            return Ok(());
+        };
+        // A thread that panicked has said so on standard error.
+        let Ok(ended) = ending.join() else {
+            return Ok(());
+        };
+        match &ended {
             Ok(progress) => self.dashboard.notify(
                 false,
                 format!(
@@ -238,11 +276,7 @@ impl Session {
                 .dashboard
                 .notify(true, format!("RECORDING ENDED: {error}")),
         }
-        if !is_restored {
-            let words =
-                "the sensor board could not be told to stop streaming its gauges: g tells it";
-            self.dashboard.notify(true, words.to_owned());
-        }
+        ended.map(|_| ())
     }
 
     fn on(&mut self, role: Role, event: Event) {

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::relay::gate::SequenceNumber;
 
 /// The version of everything in this file.
-pub const ENVELOPE_VERSION: u8 = 2;
+pub const ENVELOPE_VERSION: u8 = 3;
 
 /// Bytes in front of the content.
 const HEADER: usize = HELLO_LENGTH + 1 + 3 * size_of::<u64>();
@@ -56,8 +56,7 @@ pub enum Content {
     Stopped {
         /// Which one.
         id: u64,
-        /// The reason for which the display's board says that it has stopped; none from the sensor's
-        /// bridge, whose board has the Stop and nothing to stop.
+        /// The reason for which the board says that it has stopped; none if the bridge does not know it.
         trip: Option<Trip>,
     },
     /// The Stop of this number was heard, and the board has not said yet that it has stopped.
@@ -67,6 +66,8 @@ pub enum Content {
         /// Whether the board has been told.
         is_told: bool,
     },
+    /// The bridge ends: another one may have its place.
+    Leaving,
 }
 
 /// One thing said by one bridge to the other.
@@ -287,6 +288,7 @@ mod tests {
             ),
             of(Role::Sensor, Content::Stopped { id, trip: None }),
             of(Role::Display, Content::Stopping { id, is_told: true }),
+            of(Role::Display, Content::Leaving),
         ]
     }
 

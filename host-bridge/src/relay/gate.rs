@@ -1,11 +1,9 @@
 //! Nothing old after something newer: which envelopes of a stream may pass, and what became of the rest.
 
-use std::collections::VecDeque;
-
 /// How far back a late envelope is told from one that came twice.
 const WINDOW: u64 = 128;
-/// Earlier sessions that are remembered, so that none of their stragglers is taken for a new one.
-const RETIRED: usize = 16;
+/// Whoever holds a stream keeps it for so long after it was heard last, in µs; then another may have it.
+pub const LEASE_US: u64 = 1_000_000;
 
 /// What an envelope's place says about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +14,8 @@ pub enum Order {
     Late,
     /// It came before.
     Duplicate,
-    /// From a bridge that another has followed.
-    Retired,
+    /// From a bridge that does not hold the stream: another does.
+    Rival,
     /// Newer, and yet what the board says in it is not.
     Repeated,
 }
@@ -33,7 +31,7 @@ pub struct Arrivals {
     pub late: u64,
     /// Came again.
     pub duplicated: u64,
-    /// Came from a bridge that another has followed, or repeated what the board had said before.
+    /// Came from a bridge while another held the stream, or repeated what the board had said before.
     pub superseded: u64,
 }
 
@@ -49,8 +47,8 @@ pub struct SequenceNumber {
 /// The order of one stream.
 #[derive(Clone, Debug, Default)]
 pub struct Gate {
-    session: Option<u64>,
-    retired: VecDeque<u64>,
+    /// Who holds the stream, and when it was heard last, in µs.
+    holder: Option<(u64, u64)>,
     /// The newest envelope's number, once there is one.
     newest: Option<u64>,
     /// Bit b set: number `newest - b` was skipped and is still missing.
@@ -66,11 +64,10 @@ impl Gate {
     /// and nobody else.
     pub fn judge(&mut self, session: u64, counter: u64, sequence_number: SequenceNumber) -> Order {
         self.arrivals.received += 1;
-        if self.is_retired(session) {
+        if !self.is_holder(session) {
             self.arrivals.superseded += 1;
-            return Order::Retired;
+            return Order::Rival;
         }
-        self.follow(session);
         match self.place(counter) {
             Order::Newer => {}
             other => return other,
@@ -86,19 +83,32 @@ impl Gate {
         Order::Newer
     }
 
-    /// Whether another bridge has followed the one of `session`.
-    pub fn is_retired(&self, session: u64) -> bool {
-        self.retired.contains(&session)
+    /// Whether the bridge of `session` holds the stream.
+    pub fn is_holder(&self, session: u64) -> bool {
+        self.holder.is_some_and(|(holder, _)| holder == session)
     }
 
-    /// The bridge of `session` is there: what another one still says of its board is not listened to any
-    /// more. True if there was none, or another one.
-    pub fn follow(&mut self, session: u64) -> bool {
-        let is_other = self.session != Some(session);
-        if is_other {
-            self.begin(session);
+    /// The bridge of `session` was heard at `now_us`. It gets the stream if nobody holds it, or if who holds it
+    /// has not been heard for [`LEASE_US`]: true if it got it just now.
+    pub fn ask(&mut self, session: u64, now_us: u64) -> bool {
+        match &mut self.holder {
+            Some((holder, heard_us)) if *holder == session => {
+                *heard_us = now_us;
+                false
+            }
+            Some((_, heard_us)) if now_us.saturating_sub(*heard_us) < LEASE_US => false,
+            _ => {
+                self.begin(session, now_us);
+                true
+            }
         }
-        is_other
+    }
+
+    /// The bridge of `session` leaves: another may have the stream at once.
+    pub fn leave(&mut self, session: u64) {
+        if self.is_holder(session) {
+            self.holder = None;
+        }
     }
 
     /// What has been counted so far.
@@ -107,11 +117,8 @@ impl Gate {
     }
 
     /// Another bridge speaks from now on.
-    fn begin(&mut self, session: u64) {
-        if let Some(old) = self.session.replace(session) {
-            self.retired.truncate(RETIRED - 1);
-            self.retired.push_front(old);
-        }
+    fn begin(&mut self, session: u64, now_us: u64) {
+        self.holder = Some((session, now_us));
         self.newest = None;
         self.missing = 0;
         self.depth = 0;
@@ -176,9 +183,16 @@ mod tests {
         }
     }
 
+    /// A gate whose stream the bridge of `session` holds.
+    fn held(session: u64) -> Gate {
+        let mut gate = Gate::default();
+        assert!(gate.ask(session, 0));
+        gate
+    }
+
     /// What becomes of the envelopes `counters` of one session.
     fn judged(counters: &[u64]) -> (Vec<Order>, Arrivals) {
-        let mut gate = Gate::default();
+        let mut gate = held(7);
         let orders = counters
             .iter()
             .map(|&counter| gate.judge(7, counter, said(counter)))
@@ -225,7 +239,7 @@ mod tests {
     fn every_number_passes_at_most_once_and_only_upwards_in_any_order() {
         // A generator of Lehmer's, so that the shuffling is the same each time.
         let mut state: u64 = 1;
-        let mut gate = Gate::default();
+        let mut gate = held(1);
         let mut newest = None;
         for step in 0..20_000_u64 {
             state = state * 48_271 % 0x7fff_ffff;
@@ -243,18 +257,33 @@ mod tests {
     }
 
     #[test]
-    fn a_bridge_that_was_started_anew_is_followed_and_its_forerunner_is_not() {
-        let mut gate = Gate::default();
+    fn the_first_bridge_keeps_the_stream_and_a_rival_that_comes_and_goes_leaves_no_trace() {
+        let mut gate = held(1);
         assert_eq!(gate.judge(1, 500, said(500)), Order::Newer);
-        assert_eq!(gate.judge(2, 0, said(501)), Order::Newer);
-        assert_eq!(gate.judge(1, 501, said(502)), Order::Retired);
-        assert_eq!(gate.judge(2, 1, said(503)), Order::Newer);
-        assert_eq!(gate.arrivals().superseded, 1);
+        assert!(!gate.ask(2, LEASE_US - 1));
+        assert_eq!(gate.judge(2, 0, said(7)), Order::Rival);
+        assert_eq!(gate.judge(1, 501, said(501)), Order::Newer);
+        let arrivals = gate.arrivals();
+        assert_eq!((arrivals.superseded, arrivals.lost), (1, 0));
+    }
+
+    #[test]
+    fn a_stream_is_taken_when_its_bridge_leaves_or_is_silent() {
+        let mut gate = held(1);
+        assert!(!gate.ask(1, 5));
+        assert!(!gate.ask(2, 4 + LEASE_US));
+        assert!(gate.ask(2, 5 + LEASE_US));
+        assert_eq!(gate.judge(1, 9, said(9)), Order::Rival);
+        gate.leave(1);
+        assert!(gate.is_holder(2), "it was another's to leave");
+        gate.leave(2);
+        assert!(gate.ask(1, 6 + LEASE_US));
+        assert_eq!(gate.judge(1, 9, said(9)), Order::Newer);
     }
 
     #[test]
     fn a_board_that_was_started_anew_is_followed_and_one_that_repeats_itself_is_not() {
-        let mut gate = Gate::default();
+        let mut gate = held(1);
         let say = |start, sequence| SequenceNumber { start, sequence };
         assert_eq!(gate.judge(1, 1, say(0, 900)), Order::Newer);
         assert_eq!(gate.judge(1, 2, say(0, 900)), Order::Repeated);
@@ -266,7 +295,7 @@ mod tests {
 
     #[test]
     fn a_boards_count_may_wrap() {
-        let mut gate = Gate::default();
+        let mut gate = held(1);
         let say = |sequence| SequenceNumber { start: 0, sequence };
         assert_eq!(gate.judge(1, 1, say(u32::MAX)), Order::Newer);
         assert_eq!(gate.judge(1, 2, say(0)), Order::Newer);

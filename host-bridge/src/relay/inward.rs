@@ -49,7 +49,7 @@ pub struct Inward {
     recent: Histogram,
     /// The last one.
     round_trip_us: u64,
-    told_retired: bool,
+    told_rival: bool,
     told_slow: bool,
 }
 
@@ -67,7 +67,7 @@ impl Inward {
             total: Histogram::default(),
             recent: Histogram::default(),
             round_trip_us: 0,
-            told_retired: false,
+            told_rival: false,
             told_slow: false,
         }
     }
@@ -90,10 +90,8 @@ impl Inward {
                 return Heard::Nothing;
             }
         };
-        // A retired bridge is not listened to, but what it says of a Stop is true.
-        if !self.gate.is_retired(envelope.session) {
-            self.greet(&envelope, now_us, &mut tell);
-        }
+        self.greet(&envelope, now_us, &mut tell);
+        let is_holder = self.gate.is_holder(envelope.session);
         match envelope.content {
             Content::Board { .. } => self.weigh(envelope, now_us, tell),
             Content::Ping(ping) => Heard::Asked(envelope.session, ping),
@@ -106,9 +104,14 @@ impl Inward {
                 }
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
-            Content::Stopped { id, trip } => Heard::Stopped(id, trip),
+            // Only of the board that is held: anybody could say so.
+            Content::Stopped { id, trip } if is_holder => Heard::Stopped(id, trip),
+            Content::Leaving => {
+                self.gate.leave(envelope.session);
+                Heard::Nothing
+            }
             // It is said again, until it is done.
-            Content::Stopping { .. } => Heard::Nothing,
+            Content::Stopped { .. } | Content::Stopping { .. } => Heard::Nothing,
         }
     }
 
@@ -171,10 +174,16 @@ impl Inward {
     }
 
     fn greet(&mut self, envelope: &Envelope, now_us: u64, tell: &mut impl FnMut(Notice)) {
-        if self.remote.hear(envelope.hello, envelope.session, now_us) {
-            if self.gate.follow(envelope.session) {
-                self.ages.forget();
+        if self.gate.ask(envelope.session, now_us) {
+            self.ages.forget();
+            self.told_rival = false;
+        }
+        if !self.gate.is_holder(envelope.session) {
+            if !self.told_rival {
+                self.told_rival = true;
+                tell(Notice::Watcher(self.role));
             }
+        } else if self.remote.hear(envelope.hello, envelope.session, now_us) {
             tell(Notice::Remote(self.role, self.remote.state().clone()));
         }
     }
@@ -201,10 +210,6 @@ impl Inward {
         let order = self
             .gate
             .judge(envelope.session, envelope.counter, sequence_number);
-        if order == Order::Retired && !self.told_retired {
-            self.told_retired = true;
-            tell(Notice::Retired(self.role));
-        }
         if order != Order::Newer {
             return Heard::Nothing;
         }

@@ -2,13 +2,10 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use protocol::{Message, Stop};
+use protocol::Message;
 
 use crate::clock::Notify;
 use crate::lock::locked;
-
-/// Stops that may wait at once; each is the same to the board.
-const STOPS: usize = 8;
 
 /// A message that waits for the line.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +27,6 @@ pub struct Waiting {
     reason = "it is taken out and said at once"
 )]
 pub enum Due {
-    /// A Stop, and its number.
-    Stop(u64, Stop),
     /// The newest message.
     Message(Waiting),
     /// Nothing came in time.
@@ -42,12 +37,11 @@ pub enum Due {
 
 #[derive(Debug, Default)]
 struct Contents {
-    stops: Vec<(u64, Stop)>,
     newest: Option<Waiting>,
     is_closed: bool,
 }
 
-/// One message at most, and Stops, which overtake it.
+/// One message at most.
 pub struct Outbox {
     contents: Mutex<Contents>,
     changed: Arc<dyn Notify>,
@@ -67,19 +61,6 @@ impl Outbox {
         let replaced = self.contents().newest.replace(waiting).is_some();
         self.changed.notify();
         replaced
-    }
-
-    /// Puts a Stop in. False if it is in already, or if there are too many.
-    pub fn stop(&self, id: u64, stop: Stop) -> bool {
-        let mut contents = self.contents();
-        let is_known = contents.stops.iter().any(|(known, _)| *known == id);
-        let is_new = !is_known && contents.stops.len() < STOPS;
-        if is_new {
-            contents.stops.push((id, stop));
-        }
-        drop(contents);
-        self.changed.notify();
-        is_new
     }
 
     /// No more is taken out.
@@ -104,10 +85,6 @@ impl Outbox {
         if contents.is_closed {
             return Due::Closed;
         }
-        if !contents.stops.is_empty() {
-            let (id, stop) = contents.stops.remove(0);
-            return Due::Stop(id, stop);
-        }
         contents.newest.take().map_or(Due::Nothing, Due::Message)
     }
 
@@ -120,7 +97,7 @@ impl Outbox {
 mod tests {
     use super::*;
     use crate::clock::{Clock, SystemClock};
-    use protocol::{Motion, StopReason};
+    use protocol::Motion;
 
     fn outbox() -> Outbox {
         Outbox::new(SystemClock.notify())
@@ -140,10 +117,6 @@ mod tests {
         }
     }
 
-    const STOP: Stop = Stop {
-        reason: StopReason::Operator,
-    };
-
     #[test]
     fn the_newest_takes_the_place_of_what_waits() {
         let outbox = outbox();
@@ -151,17 +124,6 @@ mod tests {
         assert!(outbox.put(waiting(2)));
         assert_eq!(outbox.take(0), Due::Message(waiting(2)));
         assert_eq!(outbox.take(0), Due::Nothing);
-    }
-
-    #[test]
-    fn a_stop_overtakes_and_is_never_replaced() {
-        let outbox = outbox();
-        outbox.put(waiting(1));
-        outbox.stop(7, STOP);
-        outbox.stop(7, STOP);
-        outbox.put(waiting(2));
-        assert_eq!(outbox.take(0), Due::Stop(7, STOP));
-        assert_eq!(outbox.take(0), Due::Message(waiting(2)));
     }
 
     #[test]

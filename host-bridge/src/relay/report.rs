@@ -181,9 +181,9 @@ pub enum Notice {
     Board(State),
     /// The other site stands differently.
     Remote(Role, RemoteState),
-    /// A bridge whose place another has taken is still heard.
-    Retired(Role),
-    /// Another bridge has one's own role and name.
+    /// A second bridge is heard from there; it watches while the first one speaks.
+    Watcher(Role),
+    /// Another bridge has one's own role and name, and may hold the bench.
     Rival(Role),
     /// This many µs the network takes: longer than anything may be old.
     Slow {
@@ -207,10 +207,10 @@ pub enum Notice {
     StopSaid(Role),
     /// This site's board was told to stop.
     StopPassed,
-    /// This site's board says that it has stopped, for this reason.
-    Stopped(Trip),
+    /// This site's board says that it has stopped, for this reason, if this program knows it.
+    Stopped(Option<Trip>),
     /// The Stop said here is done at that site: the reason for which its board says that it has stopped,
-    /// if it is one that can.
+    /// if this program knows it.
     StopHeard(Role, Option<Trip>),
 }
 
@@ -224,14 +224,14 @@ impl fmt::Display for Notice {
                     .map_or(Ok(()), |advice| write!(f, ": {advice}"))
             }
             Self::Remote(role, state) => write!(f, "{}: {state}", site(*role)),
-            Self::Retired(role) => write!(
+            Self::Watcher(role) => write!(
                 f,
-                "{}: a bridge that another one has followed still speaks and is not listened to: end one of them, and start the other anew",
+                "{}: a second bridge is there; the first one keeps the bench until it ends, or is silent for a second",
                 site(*role)
             ),
             Self::Rival(role) => write!(
                 f,
-                "another bridge calls itself {} under this name: end one of them, or give one another --name",
+                "another bridge calls itself {} under this name: whichever was first holds the bench, the other one watches; to hand it over, end the first",
                 site(*role)
             ),
             Self::Slow { age_us, max_age_us } => write!(
@@ -253,14 +253,17 @@ impl fmt::Display for Notice {
             ),
             Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),
             Self::StopPassed => f.write_str("Stop: with the board here"),
-            Self::Stopped(trip) => write!(f, "Stop: the board here has stopped: {}", trip.name()),
-            Self::StopHeard(role, None) => write!(f, "Stop: with the board at {}", site(*role)),
-            Self::StopHeard(role, Some(trip)) => write!(
+            Self::Stopped(trip) => write!(f, "Stop: the board here has stopped: {}", cause(*trip)),
+            Self::StopHeard(role, trip) => write!(
                 f,
                 "Stop: the board at {} has stopped: {}",
                 site(*role),
-                trip.name()
+                cause(*trip)
             ),
         }
     }
+}
+
+fn cause(trip: Option<Trip>) -> &'static str {
+    trip.map_or("a cause that only a later version knows", Trip::name)
 }

@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use protocol::{Hello, Message, Ping, Pong, Role, Stop};
+use protocol::{Hello, Message, Ping, Pong, Role, Stop, StopReason};
 
 use crate::clock::{Notify, micros};
 use crate::link::{self, Event, Link, LinkSender, NotSent};
@@ -30,7 +30,7 @@ use crate::relay::network::NetworkError;
 use crate::relay::outbox::{Due, Outbox};
 use crate::relay::outward::Outward;
 use crate::relay::report::{Notice, Report};
-use crate::relay::stops::{Outcome, Standing, Stops};
+use crate::relay::stops::{Standing, Stops};
 use crate::relay::transport::{Connection, Subscription, Transport};
 use crate::state::State;
 use crate::system::System;
@@ -38,8 +38,6 @@ use keeper::Keeper;
 
 /// Between two tries to connect for the first time.
 const CONNECT_AGAIN: Duration = Duration::from_millis(250);
-/// Between two tries to give a Stop to a board that does not take it.
-const STOP_AGAIN: Duration = Duration::from_millis(20);
 /// Longest wait of the writer for something to write.
 const IDLE: Duration = Duration::from_secs(1);
 
@@ -80,6 +78,7 @@ struct Shared {
     outward: Mutex<Outward>,
     inward: Mutex<Inward>,
     outbox: Outbox,
+    board: OnceLock<LinkSender>,
     stops: Mutex<Stops>,
     told_rival: AtomicBool,
     notices: Sender<Notice>,
@@ -143,6 +142,7 @@ impl Site {
             outward: Mutex::new(Outward::new(bridge_hello(role), session)),
             inward: Mutex::new(Inward::new(other_role, session, max_age)),
             outbox: Outbox::new(clock.notify()),
+            board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
             told_rival: AtomicBool::new(false),
             notices,
@@ -161,10 +161,11 @@ impl Site {
             // What comes of it is told within two seconds.
             Event::StateChanged(State::Opened { .. }) => {}
             Event::StateChanged(state) => carrier.tell(Notice::Board(state)),
-            // Its numbers tell as much, and sooner.
-            Event::Restarted => {}
+            // Its numbers tell the other site, and sooner.
+            Event::Restarted => locked(&carrier.stops).on_restart(),
         });
         let (sender, writing) = (link.sender(), Arc::clone(&shared));
+        let _ = shared.board.set(link.sender());
         let writer = clock.spawn(Box::new(move || writing.write(&sender)));
         let keeping = Arc::clone(&shared);
         let keeper = clock.spawn(Box::new(move || Keeper::new(keeping).run()));
@@ -177,13 +178,16 @@ impl Site {
         Ok((site, told))
     }
 
-    /// Says Stop to both boards: to this one now, to the other one as soon as the network lets it through,
-    /// and to a display's board again until it says that it has stopped.
+    /// A way to say Stop that can be handed to other threads.
+    pub fn stopper(&self) -> impl Fn(Stop) + Send + Sync + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |stop| shared.stop(stop)
+    }
+
+    /// Says Stop to both boards: to this one now, to the other one as soon as the network lets it through, and
+    /// to each again until it says that it has stopped.
     pub fn stop(&self, stop: Stop) {
-        let id = random_number();
-        locked(&self.shared.stops).say(id, stop);
-        self.shared.outbox.stop(id, stop);
-        self.shared.tell(Notice::StopSaid(self.shared.role));
+        self.shared.stop(stop);
     }
 
     /// How the bridge stands. Ages are of the time since this was last asked, or of all of it.
@@ -222,6 +226,7 @@ impl Drop for Site {
         {
             self.shared.system.clock.join(thread);
         }
+        self.shared.say(Channel::Board, Content::Leaving);
         if let Some(wire) = self.shared.wire.get() {
             wire.close();
         }
@@ -290,10 +295,18 @@ impl Shared {
     fn carry(&self, at_us: u64, message: Message) {
         let obeyed = locked(&self.stops).obeyed(at_us, &message);
         if let Some((trip, ids)) = obeyed {
-            self.tell(Notice::Stopped(trip));
+            // By another program, or by the board itself: both stop.
+            let (id, reason) = (random_number(), StopReason::Host);
+            let is_news = locked(&self.stops).spread(id, Stop { reason });
+            if is_news || !ids.is_empty() {
+                self.tell(Notice::Stopped(trip));
+            }
             for id in ids {
-                let trip = Some(trip);
                 self.say(Channel::Stop, Content::Stopped { id, trip });
+            }
+            if is_news {
+                let stop = Stop { reason };
+                self.say(Channel::Stop, Content::Stop { id, stop });
             }
         }
         if !is_carried(self.role, &message) {
@@ -369,16 +382,12 @@ impl Shared {
         let standing = locked(&self.stops).hear(id, stop);
         let content = match standing {
             Standing::New => {
-                self.outbox.stop(id, stop);
+                self.tell_board(id, stop);
                 self.tell(Notice::StopSaid(by));
                 return;
             }
             Standing::Pending { is_told } => Content::Stopping { id, is_told },
-            Standing::Done(Outcome::Passed) => Content::Stopped { id, trip: None },
-            Standing::Done(Outcome::Stopped(trip)) => {
-                let trip = Some(trip);
-                Content::Stopped { id, trip }
-            }
+            Standing::Done(trip) => Content::Stopped { id, trip },
         };
         self.say(Channel::Stop, content);
     }
@@ -389,12 +398,6 @@ impl Shared {
             match self.outbox.take(self.now_us().saturating_add(micros(IDLE))) {
                 Due::Closed => return,
                 Due::Nothing => {}
-                Due::Stop(id, stop) => {
-                    if self.tell_board(sender, id, stop).is_err() {
-                        self.outbox.stop(id, stop);
-                        self.pause(STOP_AGAIN);
-                    }
-                }
                 Due::Message(waiting) if self.now_us() > waiting.until_us => {
                     locked(&self.inward).on_stale();
                 }
@@ -408,24 +411,25 @@ impl Shared {
         }
     }
 
-    /// Says Stop to the board. A display's answers by its state; a sensor's has nothing to stop.
-    fn tell_board(&self, sender: &LinkSender, id: u64, stop: Stop) -> Result<(), NotSent> {
+    fn stop(&self, stop: Stop) {
+        let id = random_number();
+        locked(&self.stops).say(id, stop);
+        self.tell_board(id, stop);
+        self.tell(Notice::StopSaid(self.role));
+        self.say(Channel::Stop, Content::Stop { id, stop });
+    }
+
+    /// Says Stop to the board, whose link says it again until it is answered.
+    fn tell_board(&self, id: u64, stop: Stop) {
+        let Some(board) = self.board.get() else {
+            return;
+        };
         // The lock keeps an answer that is quicker than this thread from being heard before.
         let mut stops = locked(&self.stops);
         let told_us = self.now_us();
-        sender.post(&Message::Stop(stop))?;
-        let is_first = stops.tell(id, told_us);
-        let is_over = self.role != Role::Display;
-        if is_over {
-            stops.pass(id);
-        }
-        drop(stops);
-        if is_first {
+        if board.stop(stop).is_ok() && stops.tell(id, told_us) {
+            drop(stops);
             self.tell(Notice::StopPassed);
         }
-        if is_over {
-            self.say(Channel::Stop, Content::Stopped { id, trip: None });
-        }
-        Ok(())
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::{DisplayState, Message, RoleCounters, Stop, Trip};
+use protocol::{Message, Stop, Trip};
 
 /// Stops that may wait for this site's board at once; each is the same to it.
 const PENDING: usize = 8;
@@ -20,17 +20,8 @@ pub enum Standing {
         /// Whether it has been told.
         is_told: bool,
     },
-    /// It is done.
-    Done(Outcome),
-}
-
-/// What has come of a Stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// A sensor's board has it, which has nothing to stop and says nothing of it.
-    Passed,
-    /// A display's board says that it has stopped, for this reason.
-    Stopped(Trip),
+    /// The board says that it has stopped, for this reason, if this program knows it.
+    Done(Option<Trip>),
 }
 
 /// A Stop that the board has not obeyed yet.
@@ -47,7 +38,9 @@ struct Pending {
 pub struct Stops {
     unheard: Vec<(u64, Stop)>,
     pending: Vec<Pending>,
-    done: VecDeque<(u64, Outcome)>,
+    done: VecDeque<(u64, Option<Trip>)>,
+    /// The board has stopped since its last start, or is about to.
+    is_halted: bool,
 }
 
 impl Stops {
@@ -59,8 +52,8 @@ impl Stops {
 
     /// Stop came, for the board here: how it stands.
     pub fn hear(&mut self, id: u64, stop: Stop) -> Standing {
-        if let Some((_, outcome)) = self.done.iter().find(|(done, _)| *done == id) {
-            return Standing::Done(*outcome);
+        if let Some((_, trip)) = self.done.iter().find(|(done, _)| *done == id) {
+            return Standing::Done(*trip);
         }
         if let Some(pending) = self.pending.iter().find(|pending| pending.id == id) {
             let is_told = pending.told_us.is_some();
@@ -70,6 +63,7 @@ impl Stops {
             // Those that wait stop the board as well; this one is said again and heard then.
             return Standing::Pending { is_told: false };
         }
+        self.is_halted = true;
         let told_us = None;
         self.pending.push(Pending { id, stop, told_us });
         Standing::New
@@ -85,16 +79,13 @@ impl Stops {
         })
     }
 
-    /// The board has it, and is of a kind that says nothing of it.
-    pub fn pass(&mut self, id: u64) {
-        self.pending.retain(|pending| pending.id != id);
-        self.finish(id, Outcome::Passed);
-    }
-
-    /// A display's board said something at `at_us`: the reason for which it has stopped, and the Stops
-    /// that it was told before.
-    pub fn obeyed(&mut self, at_us: u64, message: &Message) -> Option<(Trip, Vec<u64>)> {
-        let trip = stopped(message)?;
+    /// The board said something at `at_us`. If it is that it has stopped: why, and the Stops that it was told
+    /// before.
+    pub fn obeyed(&mut self, at_us: u64, message: &Message) -> Option<(Option<Trip>, Vec<u64>)> {
+        let Message::Stopped(stopped) = message else {
+            return None;
+        };
+        let trip = stopped.trip();
         let is_obeyed = |pending: &Pending| pending.told_us.is_some_and(|told_us| told_us <= at_us);
         let ids: Vec<u64> = self
             .pending
@@ -102,9 +93,25 @@ impl Stops {
             .map(|pending| pending.id)
             .collect();
         for &id in &ids {
-            self.finish(id, Outcome::Stopped(trip));
+            self.finish(id, trip);
         }
-        (!ids.is_empty()).then_some((trip, ids))
+        Some((trip, ids))
+    }
+
+    /// The board has stopped: true if no Stop is known that it could have been by, so that the other site is
+    /// to be told, by the Stop numbered `id`.
+    pub fn spread(&mut self, id: u64, stop: Stop) -> bool {
+        let is_news = !self.is_halted;
+        if is_news {
+            self.is_halted = true;
+            self.unheard.push((id, stop));
+        }
+        is_news
+    }
+
+    /// The board has started anew.
+    pub fn on_restart(&mut self) {
+        self.is_halted = false;
     }
 
     /// What the other site says of a Stop: true if it was said here and nothing was known of it yet.
@@ -119,49 +126,31 @@ impl Stops {
         self.unheard.clone()
     }
 
-    /// Those to be said to this site's board again: it was told, and a line may garble what is said.
-    pub fn unobeyed(&self) -> Vec<(u64, Stop)> {
-        let is_told = |pending: &&Pending| pending.told_us.is_some();
-        let told = self.pending.iter().filter(is_told);
-        told.map(|pending| (pending.id, pending.stop)).collect()
+    /// Those that this site's board has not been told yet.
+    pub fn untold(&self) -> Vec<(u64, Stop)> {
+        let is_untold = |pending: &&Pending| pending.told_us.is_none();
+        let untold = self.pending.iter().filter(is_untold);
+        untold.map(|pending| (pending.id, pending.stop)).collect()
     }
 
-    fn finish(&mut self, id: u64, outcome: Outcome) {
+    fn finish(&mut self, id: u64, trip: Option<Trip>) {
         self.done.truncate(DONE - 1);
-        self.done.push_front((id, outcome));
-    }
-}
-
-/// The reason for which a display says that it has stopped, if it says so.
-const fn stopped(message: &Message) -> Option<Trip> {
-    let state = match message {
-        Message::Safety(safety) => safety.state,
-        Message::Status(status) => match status.role {
-            RoleCounters::Display(counters) => counters.state,
-            RoleCounters::Sensor(_) => return None,
-        },
-        _ => return None,
-    };
-    match state {
-        DisplayState::Stopped(trip) => Some(trip),
-        _ => None,
+        self.done.push_front((id, trip));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::{Safety, StopReason};
+    use protocol::{DisplayState, Safety, StopReason, Stopped};
 
     const STOP: Stop = Stop {
         reason: StopReason::Operator,
     };
+    const TRIP: Option<Trip> = Some(Trip::Operator);
 
-    fn says(state: DisplayState) -> Message {
-        Message::Safety(Safety {
-            instant_us: 0,
-            state,
-        })
+    fn stopped() -> Message {
+        Message::Stopped(Stopped::by(Trip::Operator))
     }
 
     #[test]
@@ -169,18 +158,29 @@ mod tests {
         let mut stops = Stops::default();
         assert_eq!(stops.hear(1, STOP), Standing::New);
         assert_eq!(stops.hear(1, STOP), Standing::Pending { is_told: false });
-        let stopped = says(DisplayState::Stopped(Trip::Operator));
-        assert_eq!(stops.obeyed(4, &stopped), None, "not told yet");
+        assert_eq!(stops.untold(), [(1, STOP)]);
+        assert_eq!(
+            stops.obeyed(4, &stopped()),
+            Some((TRIP, vec![])),
+            "not told yet"
+        );
         assert!(stops.tell(1, 5));
         assert!(!stops.tell(1, 7), "told again");
         assert_eq!(stops.hear(1, STOP), Standing::Pending { is_told: true });
-        assert_eq!(stops.unobeyed(), [(1, STOP)]);
-        assert_eq!(stops.obeyed(4, &stopped), None, "said before");
-        assert_eq!(stops.obeyed(6, &says(DisplayState::Driving)), None);
-        let trip = Trip::Operator;
-        assert_eq!(stops.obeyed(6, &stopped), Some((trip, vec![1])));
-        assert_eq!(stops.hear(1, STOP), Standing::Done(Outcome::Stopped(trip)));
-        assert!(stops.unobeyed().is_empty());
+        assert!(stops.untold().is_empty());
+        assert_eq!(
+            stops.obeyed(4, &stopped()),
+            Some((TRIP, vec![])),
+            "said before"
+        );
+        let state = DisplayState::Stopped(Trip::Operator);
+        let safety = Message::Safety(Safety {
+            instant_us: 0,
+            state,
+        });
+        assert_eq!(stops.obeyed(6, &safety), None, "it may be of long ago");
+        assert_eq!(stops.obeyed(6, &stopped()), Some((TRIP, vec![1])));
+        assert_eq!(stops.hear(1, STOP), Standing::Done(TRIP));
     }
 
     #[test]
@@ -189,8 +189,8 @@ mod tests {
         stops.say(1, STOP);
         assert_eq!(stops.unheard(), [(1, STOP)]);
         stops.tell(1, 0);
-        stops.pass(1);
-        assert_eq!(stops.hear(1, STOP), Standing::Done(Outcome::Passed));
+        stops.obeyed(1, &stopped());
+        assert_eq!(stops.hear(1, STOP), Standing::Done(TRIP));
         assert_eq!(stops.unheard(), [(1, STOP)]);
         assert!(!stops.on_outcome(2));
         assert!(stops.on_outcome(1));
@@ -199,14 +199,31 @@ mod tests {
     }
 
     #[test]
+    fn a_board_that_was_stopped_by_others_stops_the_other_site_once_a_start() {
+        let mut stops = Stops::default();
+        assert!(stops.spread(1, STOP));
+        assert!(!stops.spread(2, STOP));
+        assert_eq!(stops.unheard(), [(1, STOP)]);
+        stops.on_restart();
+        assert!(stops.spread(3, STOP));
+        // One that came from the other site does not go back.
+        let mut stops = Stops::default();
+        stops.hear(4, STOP);
+        assert!(!stops.spread(5, STOP));
+    }
+
+    #[test]
     fn many_stops_take_no_memory() {
         let mut stops = Stops::default();
         for id in 0..1_000 {
             stops.hear(id, STOP);
-        }
-        assert_eq!(stops.pending.len(), PENDING);
-        for id in 0..1_000 {
-            stops.pass(id);
+            assert!(stops.pending.len() <= PENDING);
+            if id % 3 == 0 {
+                for (told, _) in stops.untold() {
+                    stops.tell(told, id);
+                }
+                stops.obeyed(id, &stopped());
+            }
         }
         assert_eq!(stops.done.len(), DONE);
     }

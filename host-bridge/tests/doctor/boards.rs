@@ -29,7 +29,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
         &found,
         "foreign",
         &format!(
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 4, this program speaks 4 too, \
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 5, this program speaks 5 too, \
              but of schema 0000000000000007, not {ours}"
         ),
         "flash the firmware of this build: `host-bridge flash`",
@@ -48,9 +48,9 @@ fn boards_of_another_version_are_named_by_what_differs() {
         [
             format!(
                 "the boards do not understand each other: sensor protocol 9 schema {ours}, \
-                 display protocol 4 schema {ours}"
+                 display protocol 5 schema {ours}"
             ),
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 4"
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 5"
                 .to_owned(),
         ]
     );
@@ -73,8 +73,8 @@ fn a_firmware_that_is_not_the_benchs_is_told_from_one_that_cant_be_read() {
         }),
         "elf-differs",
         &format!(
-            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 4 schema {ours}, but firmware-sensor \
-             is sensor 0.2.0 on stm32f429zi with protocol 4 schema {ours}"
+            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 5 schema {ours}, but firmware-sensor \
+             is sensor 0.2.0 on stm32f429zi with protocol 5 schema {ours}"
         ),
         "flash what the bench names: `host-bridge flash sensor`",
     );

@@ -1,6 +1,6 @@
 //! At 80 × 24 and at 120 × 40 every word and number is there as a whole.
 
-use host_bridge::link::{Clocks, Event, NotSent};
+use host_bridge::link::{Clocks, Event};
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::form::Form;
 use host_bridge::monitor::orders::Outcome;
@@ -8,7 +8,7 @@ use host_bridge::monitor::view::{Kept, Panel};
 use host_bridge::state::State;
 use protocol::{
     Configuration, ConfigurationReport, Contact, DisplayState, Estimate, GaugeHealth, Message,
-    PortCounters, Range, Refusal, Role, SensorConfiguration, Setting, Stop, StopReason, Trip,
+    PortCounters, Range, Refusal, Role, SensorConfiguration, Setting, Trip,
 };
 
 use crate::{NOW_US, assert_has, busy, estimate, heard, picture, view};
@@ -186,14 +186,13 @@ fn the_supervisor_s_reason_and_the_marks_are_both_there() {
 fn a_notice_is_told_to_its_end() {
     for (width, height) in SIZES {
         let mut dashboard = widest();
-        let stop = Message::Stop(Stop {
-            reason: StopReason::Operator,
-        });
-        dashboard.on_not_sent(Role::Display, &stop, NotSent::NotKnown);
+        dashboard.linked = vec![Role::Sensor, Role::Display];
+        dashboard.stop();
+        dashboard.elapse(dashboard.now_us + 500_000);
         let shown = picture(&dashboard, &view(), width, height);
         assert_has(
             &shown,
-            " NOT STOPPED: display: the board is not there; will be told",
+            " NOT STOPPED: sensor and display: no answer, told again",
         );
         assert_has(&shown, "use the emergency stop");
     }

@@ -6,12 +6,13 @@ use crate::messages::{
 use proptest::prelude::*;
 use protocol::console::SILENCE_US;
 use protocol::{
-    Console, Event, Hello, Key, Message, Peer, Ping, Port, PortCounters, Receiver, Role, Stop,
-    StopReason,
+    Console, DisplayState, Event, Hello, Key, Message, Peer, Ping, Port, PortCounters, Receiver,
+    Role, Safety, Stop, StopReason, Stopped, Trip,
 };
 
-const STOP: Message = Message::Stop(Stop {
-    reason: StopReason::Operator,
+const WORD: Message = Message::Safety(Safety {
+    instant_us: 7,
+    state: DisplayState::Ready,
 });
 /// How often a board looks after its console.
 const POLL_US: u64 = 50_000;
@@ -74,7 +75,7 @@ fn to_nobody_it_says_its_lines_and_nothing_else() {
     let mut console = console();
     assert!(polled(&mut console, 0, 3_000_000).is_empty());
     console.say("lambda 2.000 mm");
-    console.port().post(&STOP);
+    console.port().post(&WORD);
     assert!(console.is_text());
     assert_eq!(said(console.port()), b"lambda 2.000 mm\r\n\0");
     assert_eq!(console.port().counters(), PortCounters::new());
@@ -85,8 +86,8 @@ fn a_hello_is_answered_at_once_and_ends_the_text() {
     let (mut console, mut host) = acquainted(1_000);
     console.say("not to a program");
     assert!(!console.port().has_bytes());
-    console.port().post(&STOP);
-    assert_eq!(exchange(&mut console, &mut host, 2_000).1, [STOP]);
+    console.port().post(&WORD);
+    assert_eq!(exchange(&mut console, &mut host, 2_000).1, [WORD]);
 }
 
 #[test]
@@ -99,7 +100,7 @@ fn a_foreign_hello_ends_the_text_too_and_is_told_who_speaks() {
     let mut receiver = Receiver::new();
     let told = events(&mut receiver, &said(console.port()));
     assert!(matches!(told[..], [Event::Greeted(_)]), "{told:?}");
-    console.port().post(&STOP);
+    console.port().post(&WORD);
     assert!(!console.port().has_bytes(), "it would not be understood");
 }
 
@@ -134,9 +135,9 @@ fn a_stop_after_long_silence_is_obeyed_and_brings_the_frames_back() {
     polled(&mut console, 0, 2 * SILENCE_US);
     assert!(console.is_text());
     said(console.port());
-    host.post(&STOP);
+    host.post(&WORD);
     let (to_console, _) = exchange(&mut console, &mut host, 2 * SILENCE_US);
-    assert_eq!(to_console, [STOP]);
+    assert_eq!(to_console, [WORD]);
     assert!(!console.is_text());
 }
 
@@ -151,8 +152,8 @@ fn a_host_that_hears_text_says_hello_at_once() {
     assert_eq!(host.peer(), Peer::Text);
     exchange(&mut console, &mut host, 3_000_000);
     assert!(!console.is_text());
-    console.port().post(&STOP);
-    assert_eq!(exchange(&mut console, &mut host, 3_001_000).1, [STOP]);
+    console.port().post(&WORD);
+    assert_eq!(exchange(&mut console, &mut host, 3_001_000).1, [WORD]);
     let counters = host.counters();
     assert_eq!(
         (counters.corrupt, counters.late, counters.duplicated),
@@ -371,5 +372,30 @@ proptest! {
         ].concat();
         let received = events(&mut receiver, &frames);
         prop_assert_eq!(received.last(), Some(&Event::Message(next)));
+    }
+}
+
+#[test]
+fn a_stop_is_heard_and_answered_while_the_console_speaks_text_whatever_was_typed_before() {
+    let stop = Message::Stop(Stop {
+        reason: StopReason::Operator,
+    });
+    let stopped = Message::Stopped(Stopped::by(Trip::Operator));
+    for typed in [&b""[..], b"help", b"\x1b[A", b"\xFF\x80garbage"] {
+        let (mut console, mut host) = (console(), host());
+        host.post(&stop);
+        let mut bytes = typed.to_vec();
+        bytes.extend(said(&mut host));
+        let mut heard = Vec::new();
+        console
+            .port()
+            .receive(1_000, &bytes, |message| heard.push(message));
+        assert_eq!(heard, [stop.clone()], "{typed:?}");
+        console.say("lambda none");
+        console.port().post(&stopped);
+        let bytes = said(console.port());
+        let mut answered = Vec::new();
+        host.receive(2_000, &bytes, |message| answered.push(message));
+        assert_eq!(answered, [stopped.clone()]);
     }
 }

@@ -7,7 +7,8 @@ use crate::messages::{
     CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples,
 };
 use protocol::{
-    Event, HELLO_LENGTH, Hello, Hold, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver, Trip,
+    Event, HELLO_LENGTH, Hello, Hold, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver, Stop,
+    StopReason, Stopped, Trip,
 };
 use protocol::{SCHEMA_HASH, frame};
 
@@ -19,8 +20,8 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c0415f3564a4a0c23eae67353544d3332463432395a4901010101010201060110\
-         9f1d8400",
+        "030201065244474c05152830475e40dc4d357353544d3332463432395a490101010101020106014e\
+         72728000",
     ),
     (
         "estimate",
@@ -69,8 +70,8 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     ("ping", "0a020107e807da39d20900"),
     ("pong", "0e020108e807d00f82102723874600"),
-    ("stop by the operator", "0402010905e9c64d5b00"),
-    ("stop by the host", "09020109017ff64a2c00"),
+    ("stop by the operator", "0302010553544f5005e769d17b00"),
+    ("stop by the host", "0302010a53544f50017159d60c00"),
     (
         "actuators",
         "0502010a1409f80a80800280800116b717f80a80800280800101ef2ef80a80800280800116a746f8\
@@ -80,6 +81,10 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     ("safety: driving", "0d02010bc08db70102a61d952a00"),
     ("safety: stopped", "0e02010bc08db7010404d21faabc00"),
+    (
+        "stopped by the emergency stop",
+        "0302010a48414c5402a872028300",
+    ),
 ];
 
 fn bytes(hexadecimal: &str) -> Vec<u8> {
@@ -116,13 +121,13 @@ fn every_golden_frame_is_received_as_its_message() {
 
 #[test]
 fn the_golden_frames_show_every_variant() {
-    // Variant bytes 0 to 11, the largest of them the number of variants less one.
+    // Variant bytes 0 to 12, the largest of them the number of variants less one.
     let mut variants: Vec<u8> = samples()
         .iter()
         .map(|(_, message)| postcard::to_stdvec(message).expect("it encodes")[0])
         .collect();
     variants.dedup();
-    assert_eq!(variants, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    assert_eq!(variants, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
 }
 
 #[test]
@@ -143,8 +148,8 @@ fn every_choice_within_a_message_has_its_byte() {
 
 #[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 4);
-    assert_eq!(SCHEMA_HASH, 0xe6ea_230c_4a4a_56f3);
+    assert_eq!(PROTOCOL_VERSION, 5);
+    assert_eq!(SCHEMA_HASH, 0x354d_dc40_5e47_3028);
 }
 
 #[test]
@@ -181,4 +186,39 @@ fn a_hello_of_any_version_lies_as_this_one_does() {
     let received = events(&mut receiver, frame.expect("it fits"));
     assert_eq!(received, [Event::Foreign(later)]);
     assert_eq!(receiver.peer(), Peer::Foreign(later));
+}
+
+#[test]
+fn a_stop_and_its_answer_of_any_version_lie_as_these_do() {
+    for (byte, reason) in [
+        (0, StopReason::Operator),
+        (1, StopReason::Host),
+        (2, StopReason::Host),
+        (255, StopReason::Host),
+    ] {
+        let stop = Stop { reason };
+        let payload = [0, b'S', b'T', b'O', b'P', byte];
+        assert_eq!(frame::frozen(&payload), Some(Message::Stop(stop)));
+        assert_eq!(StopReason::from_byte(reason.byte()), reason);
+        if byte < 2 {
+            assert_eq!(stop.to_bytes(), payload);
+            assert_eq!(Stopped::by(reason.trip()).cause, byte);
+        }
+    }
+    for cause in 0..=255 {
+        let stopped = Stopped { cause };
+        let payload = [0, b'H', b'A', b'L', b'T', cause];
+        assert_eq!(stopped.to_bytes(), payload);
+        assert_eq!(frame::frozen(&payload), Some(Message::Stopped(stopped)));
+        let trip = stopped.trip();
+        assert_eq!(trip, Trip::ALL.get(usize::from(cause)).copied());
+        assert!(trip.is_none_or(|trip| Stopped::by(trip) == stopped));
+    }
+    // The whole frame: what another version's must be too.
+    let mut out = [0; MAX_FRAME];
+    let stop = Message::Stop(Stop {
+        reason: StopReason::Operator,
+    });
+    let frame = frame::encode(SEQUENCE, &stop, &mut out).expect("it fits");
+    assert_eq!(frame, bytes("0302010553544f5005e769d17b00"));
 }

@@ -53,7 +53,10 @@ pub fn raw_frame(sequence: u16, payload: &[u8]) -> Vec<u8> {
 
 /// The frame numbered `sequence`, of a message.
 pub fn numbered(sequence: u16, message: &Message) -> Vec<u8> {
-    raw_frame(sequence, &postcard::to_stdvec(message).expect("it encodes"))
+    let mut out = [0; MAX_FRAME];
+    frame::encode(sequence, message, &mut out)
+        .expect("every message fits")
+        .to_vec()
 }
 
 /// Everything a receiver hands on for these bytes.
@@ -106,6 +109,7 @@ pub fn content() -> impl Strategy<Value = Message> {
         }),
         prop_oneof![Just(StopReason::Operator), Just(StopReason::Host)]
             .prop_map(|reason| Message::Stop(Stop { reason })),
+        any::<u8>().prop_map(|cause| Message::Stopped(Stopped { cause })),
         (
             any::<u8>(),
             any::<[(i16, i16, u16, u16, bool); ACTUATOR_BLOCK]>()

@@ -1,6 +1,9 @@
 //! Two ports, joined in memory.
 
-use protocol::{Hello, Message, Peer, Ping, Port, Role, Stop, StopReason};
+use protocol::port::QUEUE_BYTES;
+use protocol::{
+    DisplayState, Hello, Message, Peer, Ping, Port, Role, Safety, Stop, StopReason, Stopped, Trip,
+};
 
 fn port(role: Role) -> Port {
     Port::new(Hello::new(role, "test", [1, 2, 3]))
@@ -28,6 +31,11 @@ fn acquainted() -> (Port, Port) {
     (sensor, host)
 }
 
+/// A message like any other.
+const WORD: Message = Message::Safety(Safety {
+    instant_us: 7,
+    state: DisplayState::Ready,
+});
 const STOP: Message = Message::Stop(Stop {
     reason: StopReason::Operator,
 });
@@ -56,7 +64,7 @@ fn the_exchange_of_greetings_ends() {
 #[test]
 fn nothing_is_said_to_a_port_that_nobody_listens_on() {
     let mut alone = port(Role::Display);
-    alone.post(&STOP);
+    alone.post(&WORD);
     assert!(!alone.has_bytes());
     assert_eq!(alone.counters().sent, 0);
 }
@@ -64,8 +72,8 @@ fn nothing_is_said_to_a_port_that_nobody_listens_on() {
 #[test]
 fn a_message_is_handed_on_once_and_whole() {
     let (mut sensor, mut host) = acquainted();
-    host.post(&STOP);
-    assert_eq!(carry(&mut host, &mut sensor, 1), [STOP]);
+    host.post(&WORD);
+    assert_eq!(carry(&mut host, &mut sensor, 1), [WORD]);
     assert!(carry(&mut host, &mut sensor, 1).is_empty());
 }
 
@@ -89,7 +97,7 @@ fn a_full_queue_drops_whole_frames_and_counts_them() {
     let (mut sensor, mut host) = acquainted();
     let posts = 1_000;
     for _ in 0..posts {
-        host.post(&STOP);
+        host.post(&WORD);
     }
     let dropped = host.counters().dropped;
     assert!(dropped > 0, "1 000 frames are more than the queue holds");
@@ -118,7 +126,7 @@ fn a_port_whose_peer_was_reflashed_with_another_version_tells_it_so() {
     reflashed.poll(2_000_000);
     assert!(carry(&mut reflashed, &mut sensor, 2_000_000).is_empty());
     assert!(matches!(sensor.peer(), Peer::Foreign(hello) if hello.version == [9, 0, 0]));
-    sensor.post(&STOP);
+    sensor.post(&WORD);
     sensor.poll(4_000_000);
     let handed_on = carry(&mut sensor, &mut reflashed, 4_000_000);
     assert!(handed_on.is_empty(), "greetings only, not {handed_on:?}");
@@ -126,4 +134,61 @@ fn a_port_whose_peer_was_reflashed_with_another_version_tells_it_so() {
         matches!(reflashed.peer(), Peer::Known(_)),
         "it was told who speaks"
     );
+}
+
+#[test]
+fn a_stop_and_its_answer_go_out_to_whoever_is_there() {
+    let stopped = Message::Stopped(Stopped::by(Trip::Operator));
+    let mut foreign = Hello::new(Role::Host, "test", [9, 0, 0]);
+    foreign.protocol = [0xFF, 0xFF];
+    // Nobody, and somebody of another version.
+    for stranger in [None, Some(foreign)] {
+        let (mut host, mut board) = (port(Role::Host), port(Role::Display));
+        if let Some(hello) = stranger {
+            host = Port::new(hello);
+            host.poll(0);
+            carry(&mut host, &mut board, 0);
+            carry(&mut board, &mut host, 0);
+            assert!(matches!(board.peer(), Peer::Foreign(_)));
+        }
+        host.post(&STOP);
+        assert_eq!(carry(&mut host, &mut board, 1), [STOP]);
+        board.post(&stopped);
+        assert_eq!(carry(&mut board, &mut host, 2), [stopped.clone()]);
+    }
+}
+
+#[test]
+fn a_stop_takes_the_place_of_all_that_waits_and_nothing_that_went_out_before_spoils_it() {
+    let (mut host, mut board) = acquainted();
+    while host.counters().dropped == 0 {
+        host.post(&WORD);
+    }
+    // The beginning of a frame is gone already.
+    let mut begun = [0; 5];
+    assert_eq!(host.take(&mut begun), begun.len());
+    board.receive(1, &begun, |message| panic!("{message:?}"));
+    host.post(&STOP);
+    let mut bytes = [0; QUEUE_BYTES];
+    let count = host.take(&mut bytes);
+    assert!(count <= 20, "{count} bytes before the Stop's end");
+    let mut heard = Vec::new();
+    board.receive(1, &bytes[..count], |message| heard.push(message));
+    assert_eq!(heard, [STOP]);
+    // All that was posted is accounted for.
+    let counters = host.counters();
+    let words = counters.sent - 2;
+    assert_eq!(counters.dropped, words + 1, "{counters:?}");
+    assert_eq!(board.counters().corrupt, 1);
+}
+
+#[test]
+fn the_answer_to_a_stop_finds_room_in_a_full_queue() {
+    let (mut board, mut host) = acquainted();
+    while board.counters().dropped == 0 {
+        board.post(&WORD);
+    }
+    let stopped = Message::Stopped(Stopped::by(Trip::Host));
+    board.post(&stopped);
+    assert_eq!(carry(&mut board, &mut host, 1), [stopped]);
 }

@@ -4,7 +4,7 @@ use crate::messages::{
     content, events, frame_of, greeted_receiver, hello, message, numbered, open_sender,
 };
 use proptest::prelude::*;
-use protocol::{Event, MAX_FRAME, Message, PortCounters, Receiver};
+use protocol::{Event, MAX_FRAME, Message, PortCounters, Receiver, Stop, StopReason, Stopped};
 
 fn expected(message: &Message) -> Event {
     match message {
@@ -211,5 +211,26 @@ proptest! {
         prop_assert_eq!(counters.received + counters.late, 1 + distinct.len() as u32);
         prop_assert_eq!(counters.duplicated as usize, sent.len() - distinct.len());
         prop_assert_eq!(counters.lost as usize, usize::from(newest) - distinct.len());
+    }
+
+    #[test]
+    fn a_stop_is_heard_whatever_came_before_it(
+        before in stream(),
+        garbage in proptest::collection::vec(any::<u8>(), 0..2 * MAX_FRAME),
+        sequence in any::<u16>(),
+        stop in prop_oneof![
+            any::<bool>().prop_map(|by_operator| {
+                let reason = if by_operator { StopReason::Operator } else { StopReason::Host };
+                Message::Stop(Stop { reason })
+            }),
+            any::<u8>().prop_map(|cause| Message::Stopped(Stopped { cause })),
+        ],
+    ) {
+        let mut receiver = Receiver::new();
+        events(&mut receiver, &before);
+        events(&mut receiver, &garbage);
+        events(&mut receiver, &[0]);
+        let heard = events(&mut receiver, &numbered(sequence, &stop));
+        prop_assert_eq!(heard, [Event::Message(stop)]);
     }
 }

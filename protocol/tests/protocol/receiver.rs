@@ -3,7 +3,9 @@
 use crate::messages::{
     events, foreign_hello, greeted_receiver, hello, longest_like, numbered, raw_frame, samples,
 };
-use protocol::{Event, MAX_FRAME, Message, Peer, Ping, PortCounters, Receiver};
+use protocol::{
+    Event, MAX_FRAME, Message, Peer, Ping, PortCounters, Receiver, Stop, StopReason, Stopped, Trip,
+};
 
 /// A message that names the frame it stood in.
 fn ping(n: u16) -> Message {
@@ -201,13 +203,19 @@ fn good_frames_that_hold_no_message_are_malformed() {
     let mut no_magic = vec![0];
     no_magic.extend(hello().to_bytes());
     no_magic[1] ^= 1;
-    let payloads: [&[u8]; 6] = [
+    let payloads: [&[u8]; 11] = [
         &[],
         &[200],
         &payload[..payload.len() - 1],
         &longer,
         &[0],
         &no_magic,
+        // What is frozen, cut or too long, or as a message of this version.
+        b"\0STOP",
+        b"\0STOP\0\0",
+        b"\0HAL\0",
+        &[9, 0],
+        &[12, 0],
     ];
 
     let mut receiver = greeted_receiver();
@@ -340,4 +348,60 @@ fn a_few_very_old_frames_do_not_move_the_stream() {
         );
     }
     assert_eq!(receiver.counters(), counted!(received: 11, late: 70));
+}
+
+/// A Stop, and the answer to one.
+fn stops() -> [Message; 2] {
+    [
+        Message::Stop(Stop {
+            reason: StopReason::Operator,
+        }),
+        Message::Stopped(Stopped::by(Trip::Limit)),
+    ]
+}
+
+#[test]
+fn a_stop_is_handed_on_from_whoever_says_it_and_leaves_what_is_known_of_him() {
+    for stop in stops() {
+        let silent = Receiver::new();
+        let mut text = Receiver::new();
+        assert_eq!(events(&mut text, b"lambda none\r\n\0"), [Event::Text]);
+        let mut foreign = Receiver::new();
+        events(&mut foreign, &numbered(4, &Message::Hello(foreign_hello())));
+        for mut receiver in [silent, text, foreign, greeted_receiver()] {
+            let before = (receiver.peer(), receiver.counters().received);
+            let heard = events(&mut receiver, &numbered(5, &stop));
+            assert_eq!(heard, [Event::Message(stop.clone())]);
+            let after = (receiver.peer(), receiver.counters().received);
+            assert_eq!(after, (before.0, before.1 + 1));
+        }
+    }
+}
+
+#[test]
+fn a_stop_is_handed_on_late_and_twice_and_counted_so() {
+    for stop in stops() {
+        let mut receiver = greeted_receiver();
+        assert_eq!(heard(&mut receiver, [1, 3]), [1, 3]);
+        for _ in 0..2 {
+            let heard = events(&mut receiver, &numbered(2, &stop));
+            assert_eq!(heard, [Event::Message(stop.clone())]);
+        }
+        assert_eq!(
+            receiver.counters(),
+            counted!(received: 3, late: 1, duplicated: 1)
+        );
+    }
+}
+
+#[test]
+fn a_stop_of_somebody_who_numbers_for_himself_puts_nothing_out_of_step() {
+    for (number, stop) in [0, 20_000, 40_000].into_iter().zip(stops().iter().cycle()) {
+        let mut receiver = Receiver::new();
+        events(&mut receiver, &hello_frame(5_000, true));
+        let stopped = events(&mut receiver, &numbered(number, stop));
+        assert_eq!(stopped, [Event::Message(stop.clone())]);
+        assert_eq!(heard(&mut receiver, 5_001..5_010).len(), 9);
+        assert_eq!(receiver.counters(), counted!(received: 11));
+    }
 }

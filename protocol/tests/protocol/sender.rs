@@ -1,7 +1,9 @@
 //! The handshake, as the sender keeps it.
 
 use crate::messages::{events, hello};
-use protocol::{Event, Hello, MAX_FRAME, Message, Ping, Receiver, Sender, frame};
+use protocol::{
+    Event, Hello, MAX_FRAME, Message, Ping, Receiver, Sender, Stop, StopReason, Stopped, frame,
+};
 
 const PING: Message = Message::Ping(Ping { sent_us: 1 });
 const SECOND_US: u64 = 1_000_000;
@@ -14,16 +16,21 @@ fn asks(message: Option<Message>) -> Option<bool> {
 }
 
 #[test]
-fn nothing_but_hello_leaves_before_the_peer_has_greeted() {
+fn nothing_but_hello_stop_and_its_answer_leaves_before_the_peer_has_greeted() {
     let mut sender = Sender::new(hello());
     let mut out = [0; MAX_FRAME];
     assert_eq!(sender.encode(&PING, &mut out), None);
     assert_eq!(sender.sent(), 0);
     assert!(sender.encode(&Message::Hello(hello()), &mut out).is_some());
     assert_eq!(sender.sent(), 1);
+    let reason = StopReason::Operator;
+    let stop = Message::Stop(Stop { reason });
+    let stopped = Message::Stopped(Stopped::by(reason.trip()));
+    assert!(sender.encode(&stop, &mut out).is_some());
+    assert!(sender.encode(&stopped, &mut out).is_some());
     sender.on_greeting(false);
     assert!(sender.encode(&PING, &mut out).is_some());
-    assert_eq!(sender.sent(), 2);
+    assert_eq!(sender.sent(), 4);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::relay::report::Notice;
 const LOOK_US: u64 = 25_000;
 /// Between two pings while they are not, in µs: how soon a stream goes on when the network is back.
 const KNOCK_US: u64 = 100_000;
-/// Between two repetitions of a Stop that nobody has heard or that the board has not obeyed, in µs.
+/// Between two repetitions of a Stop that the other site has not answered or the board has not been told, in µs.
 const STOP_US: u64 = 100_000;
 /// How long nobody is heard before it is found out why, in µs.
 const UNHEARD_US: u64 = 3_000_000;
@@ -78,13 +78,13 @@ impl Keeper {
             return;
         }
         let stops = locked(&self.shared.stops);
-        let (unheard, unobeyed) = (stops.unheard(), stops.unobeyed());
+        let (unheard, untold) = (stops.unheard(), stops.untold());
         drop(stops);
-        if !unheard.is_empty() || !unobeyed.is_empty() {
+        if !unheard.is_empty() || !untold.is_empty() {
             self.stopped_us = Some(at_us);
         }
-        for (id, stop) in unobeyed {
-            self.shared.outbox.stop(id, stop);
+        for (id, stop) in untold {
+            self.shared.tell_board(id, stop);
         }
         for (id, stop) in unheard {
             self.shared.say(Channel::Stop, Content::Stop { id, stop });

@@ -75,6 +75,7 @@ pub fn longest_like(message: &Message) -> Message {
             instant_us: u64::MAX,
             state: DisplayState::Stopped(Trip::StackOverflow),
         }),
+        Message::Stopped(_) => Message::Stopped(Stopped { cause: u8::MAX }),
     }
 }
 

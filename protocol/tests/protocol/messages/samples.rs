@@ -186,5 +186,9 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 state: DisplayState::Stopped(Trip::Converter),
             }),
         ),
+        (
+            "stopped by the emergency stop",
+            Message::Stopped(Stopped::by(Trip::EmergencyStop)),
+        ),
     ]
 }

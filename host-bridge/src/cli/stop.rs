@@ -1,0 +1,90 @@
+//! `host-bridge stop`.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use host_bridge::link::{Event, Link};
+use protocol::{Message, Role, Stop, StopReason};
+
+/// How it is used.
+pub const EXAMPLES: &str = "\
+A display's outputs go to 0 V, a sensor's arm drive goes off, and both stay so until the board's reset button or \
+power. Every version of the firmware understands it, and a board that has another program's attention as well. \
+With two sites, `relay stop` reaches them from anywhere.
+
+Exit status: 0 every board of the bench says that it has stopped; 1 one does not: then press the emergency stop, \
+or cut the power.";
+
+/// What `stop` is asked for.
+#[derive(Debug, clap::Args)]
+pub struct StopBoards {
+    /// How long to say so and to wait for the boards' word
+    #[arg(long, value_name = "S", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=3_600))]
+    within: u32,
+    #[command(flatten)]
+    boards: super::Where,
+}
+
+impl StopBoards {
+    /// Does it.
+    pub fn execute(self) -> anyhow::Result<ExitCode> {
+        let bench = self.boards.find()?;
+        let (events, told) = channel();
+        let mut waiting: Vec<(Role, Link)> = Vec::new();
+        for role in bench.roles() {
+            let Some(seat) = bench.seat(role) else {
+                continue;
+            };
+            let events = events.clone();
+            let link = Link::open(role, seat.place(), move |event| {
+                // Nobody listens any more at the end.
+                let _ = events.send((role, event));
+            });
+            // What can't be said yet is said as soon as it can.
+            let _ = link.stop(Stop {
+                reason: StopReason::Operator,
+            });
+            waiting.push((role, link));
+        }
+        let end = Instant::now() + Duration::from_secs(self.within.into());
+        while !waiting.is_empty() {
+            match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok((
+                    role,
+                    Event::Heard {
+                        message: Message::Stopped(stopped),
+                        ..
+                    },
+                )) => {
+                    waiting.retain(|(waits, _)| *waits != role);
+                    say(&format!(
+                        "{} has stopped: {}",
+                        role.name(),
+                        stopped
+                            .trip()
+                            .map_or("a reason that this program does not know", |trip| trip
+                                .name())
+                    ));
+                }
+                Ok(_) => {}
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        for (role, link) in &waiting {
+            let state = link.state();
+            let advice = state.advice().unwrap_or("it does not answer");
+            say(&format!(
+                "NOT STOPPED as far as is known: {}: {state} ({advice}): press the emergency stop, or cut its power",
+                role.name()
+            ));
+        }
+        Ok(ExitCode::from(u8::from(!waiting.is_empty())))
+    }
+}
+
+fn say(text: &str) {
+    // Nobody may be there to read it.
+    let _ = writeln!(io::stderr(), "host-bridge: {text}");
+}
