@@ -60,6 +60,11 @@ def read(path):
     return {topic: pd.DataFrame(found) for topic, found in rows.items()}
 
 
+def legend(axes, columns):
+    """Above the plot, so that it hides nothing."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, frameon=False)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording")
@@ -84,7 +89,7 @@ def main():
     top.plot(hand.t, hand.mm_s, label="hand")
     top.plot(estimate.t, estimate.mm_s, "--", label="arm")
     top.set_ylabel("velocity, mm/s")
-    top.legend(loc="upper right")
+    legend(top, 2)
 
     middle.plot(estimate.t, estimate.counted_mm, color="tab:gray", lw=0.8, label="the paper's count")
     middle.plot(
@@ -110,7 +115,7 @@ def main():
     likely = estimate.wavelength_mm.where(estimate.valid).max()
     middle.set_ylim(0, 2 * (given.wavelength or likely))
     middle.set_ylabel("wavelength λ, mm")
-    middle.legend(loc="upper right", ncols=2)
+    legend(middle, 4)
 
     for at, gauge in enumerate(GAUGES):
         # One above the other.
@@ -118,7 +123,7 @@ def main():
         bottom.plot(gauges.t, 1e3 * volts + 100 * at, lw=0.6, label=f"gauge {at}")
     bottom.set_ylabel("gauges, mV (100 mV apart)")
     bottom.set_xlabel("time, s")
-    bottom.legend(loc="upper right", ncols=5)
+    legend(bottom, 5)
     figure.savefig(given.figure, dpi=120)
     return 0
 

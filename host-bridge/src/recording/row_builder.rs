@@ -1,7 +1,7 @@
 //! From what a link tells to rows with their times; what is missing is found and written down, too.
 
 use protocol::{
-    ClockOffset, Configuration, GAUGE_BLOCK, Message, PortCounters, Role, RoleCounters,
+    ClockOffset, Configuration, GAUGE_BLOCK, Message, Pong, PortCounters, Role, RoleCounters,
 };
 
 use super::row::{
@@ -12,6 +12,9 @@ use crate::host_clock::unix_ns;
 use crate::link::Event;
 
 const SAMPLE_NS: u64 = 1_000_000;
+/// How far a clock may be from where its offset says, in µs, beyond the instants between which it was read:
+/// twice what two crystals 100 ppm apart drift over the eight exchanges that the offset is the best of.
+const DRIFT_US: u64 = 1_600;
 
 /// A row and its time.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +60,9 @@ pub struct RowBuilder {
 #[derive(Default)]
 struct Board {
     clock: ClockOffset,
+    /// Whether the last answer came from where the offset says: a clock that goes at another rate, such as that
+    /// of an emulator that can't keep up, tells nothing of this host's time.
+    keeps_time: bool,
     samples: Numbers,
     estimates: Numbers,
     motions: Numbers,
@@ -84,7 +90,21 @@ impl Numbers {
 impl Board {
     /// An instant of the board's on the calendar.
     fn calendar_ns(&self, instant_us: u64) -> Option<u64> {
-        self.clock.to_own_us(instant_us).map(unix_ns)
+        let own_us = self.clock.to_own_us(instant_us);
+        own_us.filter(|_| self.keeps_time).map(unix_ns)
+    }
+
+    /// Takes an answer that was heard at `at_us`.
+    fn on_pong(&mut self, pong: &Pong, at_us: u64) {
+        let expected_us = self.clock.to_own_us(pong.answered_us);
+        self.keeps_time = expected_us.is_some_and(|own_us| {
+            (pong.sent_us.saturating_sub(DRIFT_US)..=at_us.saturating_add(DRIFT_US))
+                .contains(&own_us)
+        });
+        if !self.keeps_time {
+            self.clock.clear();
+        }
+        self.clock.on_pong(pong, at_us);
     }
 }
 
@@ -136,7 +156,7 @@ impl RowBuilder {
             }
             _ => (Lost::Samples, 0),
         };
-        let (row, instant_us) = row(role, message, at_us, &mut board.clock);
+        let (row, instant_us) = row(role, message, at_us, board);
         // A block has waited for its last sample.
         let latest_ns = match row {
             Row::Gauges(_) => heard_ns.saturating_sub((GAUGE_BLOCK as u64 - 1) * SAMPLE_NS),
@@ -218,7 +238,7 @@ impl RowBuilder {
 
 /// A message's row, and its instant of the board's clock if it has one. What that board never says goes
 /// to the channel for others.
-fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (Row, Option<u64>) {
+fn row(role: Role, message: &Message, at_us: u64, board: &mut Board) -> (Row, Option<u64>) {
     match (role, message) {
         (Role::Sensor, Message::Estimate(estimate)) => (
             Row::Estimate(EstimateRow::from(*estimate)),
@@ -265,17 +285,89 @@ fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (R
             (row, None)
         }
         (_, Message::Pong(pong)) => {
-            clock.on_pong(pong, at_us);
+            board.on_pong(pong, at_us);
             let row = Row::Clock(ClockRow {
                 sent_us: pong.sent_us,
                 received_us: pong.received_us,
                 answered_us: pong.answered_us,
                 heard_us: at_us,
-                offset_us: clock.offset_us(),
-                round_trip_us: clock.round_trip_us(),
+                offset_us: board.clock.offset_us(),
+                round_trip_us: board.clock.round_trip_us(),
             });
             (row, Some(pong.answered_us))
         }
         _ => (Row::Other(OtherRow::new(message)), None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use protocol::Motion;
+
+    use super::*;
+
+    /// The times, in µs of this host's clock, of motions that a display said at those and that were heard 3 ms
+    /// later. Its clock is 7 s ahead and goes `rate` times as fast; a second lies between two pings.
+    fn motion_times_us(rate: f64, said_us: &[u64]) -> Vec<u64> {
+        let board_us = |own_us: u64| 7_000_000 + (own_us as f64 * rate) as u64;
+        let mut builder = RowBuilder::default();
+        let mut times = Vec::new();
+        let mut pinged_us = 0;
+        for &own_us in said_us {
+            while pinged_us + 1_000_000 < own_us {
+                pinged_us += 1_000_000;
+                let pong = Pong {
+                    sent_us: pinged_us,
+                    received_us: board_us(pinged_us + 500),
+                    answered_us: board_us(pinged_us + 520),
+                };
+                let event = Event::Heard {
+                    at_us: pinged_us + 1_020,
+                    message: Message::Pong(pong),
+                };
+                let entered = builder.enter(Role::Display, &event, pinged_us + 1_020, |_| {
+                    Ok::<_, Infallible>(())
+                });
+                assert_eq!(entered, Ok(()));
+            }
+            let motion = Motion {
+                sequence: times.len() as u32,
+                instant_us: board_us(own_us),
+                position_um: 0,
+                velocity_um_s: 0,
+            };
+            let event = Event::Heard {
+                at_us: own_us + 3_000,
+                message: Message::Motion(motion),
+            };
+            let entered = builder.enter(Role::Display, &event, own_us + 3_000, |entry| {
+                times.push((entry.log_ns - unix_ns(0)) / 1_000);
+                Ok::<_, Infallible>(())
+            });
+            assert_eq!(entered, Ok(()));
+        }
+        times
+    }
+
+    #[test]
+    fn a_row_has_the_time_at_which_it_was_taken_once_the_boards_clock_is_known() {
+        let times = motion_times_us(1.0, &[500_000, 1_500_000, 2_500_000, 2_502_000]);
+        // One answer says where the clock stands, the second that it keeps time.
+        assert_eq!(times[..2], [503_000, 1_503_000]);
+        for (time, taken) in times[2..].iter().zip([2_500_000, 2_502_000_u64]) {
+            // Half the round trip of 1 ms bounds the offset's error.
+            assert!(time.abs_diff(taken) <= 510, "{time} for {taken}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_goes_at_another_rate_dates_nothing() {
+        for rate in [0.5, 2.0] {
+            let said: Vec<u64> = (1..20).map(|at| at * 500_000 + 250_000).collect();
+            let heard: Vec<u64> = said.iter().map(|said_us| said_us + 3_000).collect();
+            assert_eq!(motion_times_us(rate, &said), heard, "{rate}");
+        }
     }
 }
