@@ -41,6 +41,8 @@ pub struct Display {
     stimulus: Stimulus,
     limits: Limits,
     send_anyway: bool,
+    /// Stopped, and seen to be at 0 V.
+    is_off: bool,
     counters: DisplayCounters,
 }
 
@@ -62,6 +64,7 @@ impl Display {
             stimulus: Stimulus::new(&configuration, actuators),
             limits: Limits::new(configuration.update_rate, configuration.amplitude_mv),
             send_anyway: false,
+            is_off: false,
             counters: DisplayCounters::ZERO,
             configuration,
         };
@@ -135,15 +138,24 @@ impl Display {
 
     /// 0 V from the next tick on, and for good.
     pub fn stop(&mut self, reason: StopReason) {
-        self.ask(match reason {
-            StopReason::Operator => Trip::Operator,
-            StopReason::Host => Trip::Host,
-        });
+        self.ask(reason.trip());
+    }
+
+    /// What has stopped it for good, once the outputs are off: CLR is low, or the tick before sent 0 V and the
+    /// converters have it.
+    pub fn off(&self) -> Option<Trip> {
+        match self.state {
+            DisplayState::Stopped(trip) if self.is_off => Some(trip),
+            _ => None,
+        }
     }
 
     /// One output tick, with the hand encoder's counter and the board as it is.
     pub fn tick(&mut self, encoder: u16, senses: &Senses) -> Output {
         count(&mut self.counters.ticks, true);
+        // The words that a stopped display sent last are 0 V.
+        let is_zero = senses.is_clear || senses.transfer == Transfer::Done;
+        self.is_off = is_zero && matches!(self.state, DisplayState::Stopped(_));
         let quarters = per_tick(self.configuration.update_rate);
         let elapsed = quarters.saturating_mul(senses.missed_ticks.saturating_add(1));
         let travel = self.hand.read(encoder, elapsed);

@@ -22,6 +22,7 @@ extern crate std;
 
 pub mod array;
 pub mod balance;
+pub mod capabilities;
 pub mod dac81416;
 pub mod display;
 pub mod endurance;

@@ -15,7 +15,7 @@ pub const HELP: [&str; 11] = [
     "bad     frames of it that were corrupt, or of another version",
     "miss    output ticks that were not served in time",
     "and then what the display does: ready, driving, fading or stopped, and why",
-    "keys:   ? this help     ! stop the stimulus until the reset button or power",
+    "keys:   ? this help     ! stop stimulus and arm until the reset button or power",
 ];
 
 /// The answer to a key that asks for a stop.

@@ -11,6 +11,8 @@ pub struct Senses {
     pub transfer: Transfer,
     /// CLR fell by itself since the last tick: ticks were not served, and the outputs are at 0 V.
     pub clear_fell: bool,
+    /// CLR is low: the outputs are at 0 V, whatever the converters hold.
+    pub is_clear: bool,
     /// What a look into a converter's registers said, if there was one since the last tick.
     pub readback: Readback,
     /// A motion found no room since the last tick: the tasks behind the ports do not get to run, and

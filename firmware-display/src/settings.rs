@@ -2,7 +2,8 @@
 
 use protocol::actuators::{self, ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS};
 use protocol::{
-    Actuators, Configuration, ConfigurationReport, DisplayConfiguration, Refusal, Setting,
+    Actuators, Configuration, ConfigurationReport, Configure, DisplayConfiguration, Refusal,
+    Setting,
 };
 
 /// What is in force, and the description of the actuators that is being sent.
@@ -33,7 +34,7 @@ impl Settings {
             sent: *actuators,
             ..Self::DEFAULT
         };
-        settings.take(&Configuration::Display(configuration))?;
+        settings.take(&Configure::anyway(Configuration::Display(configuration)))?;
         Ok(settings)
     }
 
@@ -62,7 +63,7 @@ impl Settings {
             self.sent[first..first + ACTUATOR_BLOCK].copy_from_slice(&block.actuators);
             return None;
         }
-        Some(self.report(Some(Refusal {
+        Some(self.refusing(Some(Refusal {
             setting: Setting::ActuatorsFirst,
             index: block.first,
             low: 0,
@@ -70,23 +71,29 @@ impl Settings {
         })))
     }
 
-    /// Takes a configuration whose every value, and whose every actuator's, is in its range; any other
-    /// changes nothing. The answer names what is in force then.
-    pub fn on_configure(&mut self, asked: &Configuration) -> ConfigurationReport {
+    /// Takes a configuration whose every value, and whose every actuator's, is in its range, if what it
+    /// replaces is in force; any other changes nothing. The answer names what is in force then.
+    pub fn on_configure(&mut self, asked: &Configure) -> ConfigurationReport {
         let taken = self.take(asked);
-        self.report(taken.err())
+        self.refusing(taken.err())
     }
 
-    fn take(&mut self, asked: &Configuration) -> Result<(), Refusal> {
+    /// What is in force.
+    pub fn report(&self) -> ConfigurationReport {
+        self.refusing(None)
+    }
+
+    fn take(&mut self, request: &Configure) -> Result<(), Refusal> {
         let refuse = |setting| Refusal {
             setting,
             index: 0,
             low: 0,
             high: 0,
         };
-        let Configuration::Display(asked) = asked else {
+        let Configuration::Display(asked) = &request.configuration else {
             return Err(refuse(Setting::Role));
         };
+        request.check_replaces(self.report().hash)?;
         asked.check()?;
         if asked.actuators != self.configuration.actuators {
             let sent = actuators::hash(&self.sent);
@@ -104,13 +111,8 @@ impl Settings {
         Ok(())
     }
 
-    fn report(&self, refused: Option<Refusal>) -> ConfigurationReport {
-        let configuration = Configuration::Display(self.configuration);
-        ConfigurationReport {
-            refused,
-            hash: configuration.hash(),
-            configuration,
-        }
+    fn refusing(&self, refused: Option<Refusal>) -> ConfigurationReport {
+        ConfigurationReport::of(Configuration::Display(self.configuration), refused)
     }
 }
 
@@ -147,7 +149,7 @@ mod tests {
         send(&mut settings, &described);
         assert_eq!(settings.actuators(), &DEFAULT_ACTUATORS);
         let asked = asking_for(&described);
-        let report = settings.on_configure(&asked);
+        let report = settings.on_configure(&Configure::anyway(asked));
         assert_eq!((report.refused, report.configuration), (None, asked));
         assert_eq!(report.hash, asked.hash());
         assert_eq!(settings.actuators(), &described);
@@ -157,7 +159,7 @@ mod tests {
     fn the_description_in_force_is_kept_by_a_configuration_that_names_it() {
         let mut settings = Settings::DEFAULT;
         send(&mut settings, &grid(700));
-        let report = settings.on_configure(&asking_for(&DEFAULT_ACTUATORS));
+        let report = settings.on_configure(&Configure::anyway(asking_for(&DEFAULT_ACTUATORS)));
         assert_eq!(report.refused, None);
         assert_eq!(settings.actuators(), &DEFAULT_ACTUATORS);
     }
@@ -171,7 +173,7 @@ mod tests {
             actuators: described[20..30].try_into().unwrap(),
         };
         assert_eq!(settings.on_actuators(&block), None);
-        let report = settings.on_configure(&asking_for(&described));
+        let report = settings.on_configure(&Configure::anyway(asking_for(&described)));
         let refused = report.refused.unwrap();
         assert_eq!(refused.setting, Setting::Actuators);
         let in_force = Configuration::Display(DisplayConfiguration::DEFAULT);
@@ -197,7 +199,7 @@ mod tests {
             change(&mut described[37]);
             send(&mut settings, &described);
             let before = (*settings.configuration(), *settings.actuators());
-            let report = settings.on_configure(&asking_for(&described));
+            let report = settings.on_configure(&Configure::anyway(asking_for(&described)));
             let expected = Refusal {
                 setting,
                 index: 37,
@@ -212,7 +214,8 @@ mod tests {
     #[test]
     fn the_other_boards_configuration_and_a_block_that_fits_nowhere_are_refused() {
         let mut settings = Settings::DEFAULT;
-        let report = settings.on_configure(&Configuration::Sensor(SensorConfiguration::DEFAULT));
+        let other = Configuration::Sensor(SensorConfiguration::DEFAULT);
+        let report = settings.on_configure(&Configure::anyway(other));
         assert_eq!(report.refused.unwrap().setting, Setting::Role);
         for first in [5, 50, 255] {
             let block = Actuators {
@@ -226,6 +229,26 @@ mod tests {
             );
         }
         assert_eq!(settings, Settings::DEFAULT);
+    }
+
+    #[test]
+    fn what_replaces_another_configuration_than_the_one_in_force_is_refused_with_that() {
+        let mut settings = Settings::DEFAULT;
+        let before = settings.report();
+        let replacing = |amplitude_mv| Configure {
+            replaces: Some(before.hash),
+            configuration: Configuration::Display(DisplayConfiguration {
+                amplitude_mv,
+                ..DisplayConfiguration::DEFAULT
+            }),
+        };
+        let taken = settings.on_configure(&replacing(4_000));
+        assert_eq!(taken.refused, None);
+        let refused = settings.on_configure(&replacing(3_000));
+        let setting = refused.refused.map(|refusal| refusal.setting);
+        assert_eq!(setting, Some(Setting::Replaces));
+        assert_eq!(refused.configuration, taken.configuration);
+        assert_eq!(settings.configuration().amplitude_mv, 4_000);
     }
 
     #[test]

@@ -10,15 +10,19 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
+use firmware_display::capabilities::CAPABILITIES;
 use firmware_display::look::{self, Look, Rounds};
 use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
+use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
+use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::side::Side;
 use nucleo::spawn::once;
+use nucleo::stop;
 use nucleo::supervision::supervise;
 use protocol::{
-    DisplayCounters, DisplayState, Estimate, Hello, Message, RoleCounters, Safety, Stop,
-    StopReason, Trip,
+    DisplayCounters, DisplayState, Estimate, Hello, Message, Question, RoleCounters, Safety, Stop,
+    Trip,
 };
 use static_cell::StaticCell;
 
@@ -61,15 +65,14 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
     }
     spawner.spawn(once(report(ports)));
+    spawner.spawn(once(answer(ports)));
     let counters = || RoleCounters::Display(COUNTERS.lock(Cell::get));
     let voice = ConsoleOutput {
         hello,
         line: line::line,
         help: &line::HELP,
-        stop: || {
-            STOP.signal(Stop {
-                reason: StopReason::Operator,
-            });
+        stop: |stop| {
+            STOP.signal(stop);
             line::STOPPING
         },
     };
@@ -98,11 +101,13 @@ async fn drive(
     loop {
         let (encoder, missed_ticks) = ticks.next().await;
         let (transfer, readback) = converters.finish();
+        let is_clear = converters.is_clear();
         let senses = Senses {
             stop_input_open: inputs.stop_is_open(),
             alarm: inputs.alarm(),
             transfer,
-            clear_fell: released && converters.is_clear(),
+            clear_fell: released && is_clear,
+            is_clear,
             readback,
             unheard: core::mem::take(&mut unheard),
             missed_ticks,
@@ -139,7 +144,7 @@ async fn drive(
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
             unheard = OUTBOX.try_send(Message::Motion(motion)).is_err();
         }
-        announced.tell(display.state());
+        announced.tell(display.state(), display.off());
         COUNTERS.lock(|shared| shared.set(display.counters()));
     }
 }
@@ -177,12 +182,18 @@ impl Pace {
 struct Announced {
     kept: DisplayState,
     told: DisplayState,
+    is_off: bool,
 }
 
 impl Announced {
-    /// Keeps why the display was stopped where a reset does not reach, and tells of each change as soon
-    /// as there is room for the message.
-    fn tell(&mut self, state: DisplayState) {
+    /// Keeps why the display was stopped where a reset does not reach, says when its outputs are off, and tells
+    /// of each change as soon as there is room for the message.
+    fn tell(&mut self, state: DisplayState, off: Option<Trip>) {
+        if let Some(trip) = off
+            && !core::mem::replace(&mut self.is_off, true)
+        {
+            stop::OFF.signal(trip);
+        }
         if state != self.kept {
             self.kept = state;
             if let DisplayState::Stopped(trip) = state {
@@ -198,6 +209,7 @@ impl Announced {
         }
     }
 }
+
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
 async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
@@ -224,6 +236,15 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                 }
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));
+            }
+            Message::Question(question) => {
+                let answer = match question {
+                    Question::Configuration => {
+                        Message::Configuration(SETTINGS.lock(|settings| settings.borrow().report()))
+                    }
+                    Question::Capabilities => Message::Capabilities(CAPABILITIES),
+                };
+                let _ = OUTBOX.try_send(answer);
             }
             _ => {}
         })

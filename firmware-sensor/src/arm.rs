@@ -1,6 +1,6 @@
 //! The slave arm follows the operator's hand: [`Motion`]s in, PWM duty and direction out.
 
-use protocol::Motion;
+use protocol::{ArmState, Motion, Trip};
 
 /// Milliseconds without a [`Motion`] after which the arm stands still.
 const SILENCE_MS: u32 = 100;
@@ -26,10 +26,12 @@ impl Drive {
     pub const FULL: u16 = (84_000_000_u32 / 20_000) as u16;
 }
 
-/// Follows the hand from where both were when its first motion came.
+/// Follows the hand from where both were when its first motion came, until it is stopped.
 #[derive(Clone, Debug, Default)]
 pub struct Arm {
     following: Option<Following>,
+    /// What stopped it first, for good.
+    stopped: Option<Trip>,
 }
 
 #[derive(Clone, Debug)]
@@ -45,12 +47,15 @@ struct Following {
 
 impl Arm {
     /// Takes a motion that came while the arm was at `arm_um`. One with an older or the same sequence
-    /// is refused, and false returned.
+    /// is refused, and false returned; so is any once it is stopped.
     ///
     /// The first motion, also the first one after [a silence](Arm::step), fixes the offset between hand
     /// and arm: the arm never jumps to where the hand went meanwhile, and a restarted display, which
     /// counts from 0 again, is followed.
     pub fn on_motion(&mut self, motion: &Motion, arm_um: i64) -> bool {
+        if self.stopped.is_some() {
+            return false;
+        }
         let offset_um = match &self.following {
             None => motion.position_um.saturating_sub(arm_um),
             Some(f) if motion.sequence.wrapping_sub(f.sequence).cast_signed() > 0 => f.offset_um,
@@ -64,6 +69,21 @@ impl Arm {
             age_ms: 0,
         });
         true
+    }
+
+    /// The drive is off from now on, for good.
+    pub fn stop(&mut self, trip: Trip) {
+        self.following = None;
+        self.stopped = self.stopped.or(Some(trip));
+    }
+
+    /// What it does.
+    pub fn state(&self) -> ArmState {
+        match (self.stopped, &self.following) {
+            (Some(trip), _) => ArmState::Stopped(trip),
+            (None, Some(_)) => ArmState::Following,
+            (None, None) => ArmState::Resting,
+        }
     }
 
     /// The drive for the next millisecond, with the arm at `arm_um`: the hand's velocity plus kp times
@@ -176,6 +196,21 @@ mod tests {
         assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
         assert!(arm.on_motion(&motion(0, 900_000, 0), 5_000));
         assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+    }
+
+    #[test]
+    fn once_stopped_it_stands_still_whatever_comes_and_the_first_cause_is_told() {
+        let mut arm = Arm::default();
+        assert_eq!(arm.state(), ArmState::Resting);
+        arm.on_motion(&motion(0, 0, 50_000), 0);
+        assert_eq!(arm.state(), ArmState::Following);
+        arm.stop(Trip::Operator);
+        arm.stop(Trip::Host);
+        for sequence in 1..300 {
+            assert!(!arm.on_motion(&motion(sequence, 5_000_000, 50_000), 0));
+            assert_eq!(arm.step(0, FULL_SCALE_UM_S), Drive::default());
+        }
+        assert_eq!(arm.state(), ArmState::Stopped(Trip::Operator));
     }
 
     #[test]

@@ -24,6 +24,7 @@ pub mod amplitude;
 pub mod arm;
 pub mod bandpass;
 pub mod block;
+pub mod capabilities;
 pub mod counting;
 pub mod crossing;
 pub mod crossings;
@@ -37,6 +38,7 @@ pub mod method;
 pub mod noise;
 pub mod phasor;
 pub mod sensor;
+pub mod settings;
 pub mod slip;
 pub mod spectrum;
 pub mod stroke;
@@ -44,6 +46,7 @@ pub mod travel;
 
 pub use arm::Drive;
 pub use sensor::{Output, Sensor};
+pub use settings::Settings;
 
 use protocol::CHANNELS;
 

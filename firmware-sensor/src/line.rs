@@ -15,15 +15,14 @@ pub const HELP: [&str; 11] = [
     "bad     frames of it that were corrupt, or of another version",
     "miss    samples that were not done in time",
     "gauges  ok, or what is wrong with which of the gauges 0 to 4",
-    "keys:   ? this help     (! stops, on the display board's console only)",
+    "keys:   ? this help     ! stop arm and stimulus until the reset button or power",
 ];
 
-/// The answer to a key that asks for a stop: the sensor board has nothing to stop.
-pub const NOT_STOPPING: &str =
-    "NOT stopped: type ! on the display board's console, or open its emergency stop";
+/// The answer to a key that asks for a stop.
+pub const STOPPING: &str = "stopping: the arm's drive is off until the reset button or power";
 
-/// The sensor in a line. Where gauges in trouble leave no room for all in a row of a terminal, the counters go
-/// first and then the age.
+/// The sensor in a line. Where gauges in trouble, or an arm that was stopped, leave no room for all in a row of a
+/// terminal, the counters go first and then the age.
 pub fn line(latest: &Latest, status: &Status) -> Line {
     let mut line = Line::new();
     wavelength(&mut line, latest);
@@ -32,10 +31,18 @@ pub fn line(latest: &Latest, status: &Status) -> Line {
     let before_age = line.len();
     age(&mut line, latest.motion_age_ms(status.uptime_us));
     let before_counters = line.len();
+    let mut stopped = None;
     if let RoleCounters::Sensor(sensor) = &status.role {
         counters(&mut line, &status.peer, sensor.deadline_misses);
+        stopped = sensor.stopped;
     }
-    if let Some(estimate) = estimate {
+    if let Some(trip) = stopped {
+        let before = "  arm stopped: ";
+        let needed = before.len() + trip.name().len();
+        make_room(&mut line, before_counters, needed);
+        make_room(&mut line, before_age, needed);
+        put(&mut line, format_args!("{before}{}", trip.name()));
+    } else if let Some(estimate) = estimate {
         if estimate.health == [GaugeHealth::Good; GAUGES] {
             put(&mut line, format_args!("  gauges ok"));
         } else {
@@ -70,7 +77,7 @@ fn trouble(health: &[GaugeHealth; GAUGES]) -> Line {
 #[cfg(test)]
 mod tests {
     use protocol::{
-        Contact, Estimate, Message, Motion, PortCounters, Range, ResetCause, SensorCounters,
+        Contact, Estimate, Message, Motion, PortCounters, Range, ResetCause, SensorCounters, Trip,
     };
 
     use protocol::line::WIDTH;
@@ -127,6 +134,22 @@ mod tests {
     }
 
     #[test]
+    fn an_arm_that_was_stopped_is_told_of_first() {
+        for trip in Trip::ALL {
+            let mut health = [GaugeHealth::Good; GAUGES];
+            health[1] = GaugeHealth::Dead;
+            let mut status = status(3_000_000);
+            if let RoleCounters::Sensor(sensor) = &mut status.role {
+                sensor.stopped = Some(trip);
+            }
+            let line = line(&latest(2.001, 70_000, health), &status);
+            assert!(line.len() <= WIDTH, "{line}");
+            assert!(line.ends_with(trip.name()), "{line}");
+            assert!(line.contains("  arm stopped: "), "{line}");
+        }
+    }
+
+    #[test]
     fn gauges_in_trouble_are_named() {
         let mut health = [GaugeHealth::Good; GAUGES];
         health[1] = GaugeHealth::Dead;
@@ -175,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_help_fits_on_a_terminal() {
-        for line in HELP.into_iter().chain([NOT_STOPPING]) {
+        for line in HELP.into_iter().chain([STOPPING]) {
             assert!(line.len() <= 80, "{line}");
             assert!(
                 line.bytes().all(|byte| matches!(byte, b' '..=b'~')),

@@ -3,7 +3,7 @@
 //! ```text
 //! TIM3 ─trigger─> ADC3 ─DMA─> sample ── Estimate, Gauges ──> report ─> ports ─> USART2, USART3
 //!      └─latch──> TIM4 ─────>   │ ^                                      │
-//!                       arm PWM <┘ └────── Motion, Configure ────────────┘
+//!                       arm PWM <┘ └────── Motion, Configure, Stop ──────┘
 //! ```
 #![cfg_attr(target_os = "none", no_std, no_main)]
 

@@ -1,7 +1,9 @@
 //! The sensor board as a whole: scans, encoder and [`Motion`]s in; estimates, samples and the arm's
 //! drive out.
 
-use protocol::{Contact, Estimate, GAUGES, Gauges, Motion, SensorConfiguration};
+use protocol::{
+    ArmState, Contact, Estimate, GAUGES, Gauges, Motion, SensorConfiguration, StreamGauges, Trip,
+};
 
 use crate::arm::{Arm, Drive};
 use crate::bandpass::{BAND, BandPass, Lane, ORDER};
@@ -33,7 +35,7 @@ const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
 pub struct Output {
     /// Every tenth time.
     pub estimate: Option<Estimate>,
-    /// Every eighth time, if the configuration asks for them.
+    /// Every eighth time, while they are asked for.
     pub gauges: Option<Gauges>,
     /// For the arm, at once.
     pub drive: Drive,
@@ -57,6 +59,8 @@ pub struct Sensor {
     estimator: Running,
     arm: Arm,
     block: Block,
+    /// Samples that are still to be sent.
+    streaming: u32,
     /// Samples that are still to pass before the estimators begin.
     settling: u32,
     samples: u32,
@@ -88,6 +92,7 @@ impl Sensor {
             estimator: Running::new(&configuration),
             arm: Arm::default(),
             block: Block::default(),
+            streaming: 0,
             settling: SETTLING_SAMPLES,
             samples: 0,
             estimates: 0,
@@ -108,7 +113,6 @@ impl Sensor {
         self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
-        self.block.clear();
     }
 
     /// The default estimator, if that is the one that runs.
@@ -121,7 +125,24 @@ impl Sensor {
         self.configuration
     }
 
-    /// Takes a motion from the link. False if it was refused, being older than the last one.
+    /// Sends samples from now on, for as long as is asked for, or was before if that is longer.
+    pub fn stream_gauges(&mut self, asked: &StreamGauges) {
+        let for_ms = asked.for_ms.min(StreamGauges::LONGEST_MS);
+        // A sample is a millisecond.
+        self.streaming = self.streaming.max(for_ms.into());
+    }
+
+    /// The arm's drive is off from the next millisecond on, for good. Estimates go on.
+    pub fn stop(&mut self, trip: Trip) {
+        self.arm.stop(trip);
+    }
+
+    /// What the arm does.
+    pub fn arm(&self) -> ArmState {
+        self.arm.state()
+    }
+
+    /// Takes a motion from the link. False if it was refused, being older than the last one, or the arm stopped.
     pub fn on_motion(&mut self, motion: &Motion) -> bool {
         let arm_um = self
             .started
@@ -215,9 +236,11 @@ impl Sensor {
         } else {
             None
         };
-        let gauges = if self.configuration.stream_gauges {
+        let gauges = if self.streaming > 0 {
+            self.streaming -= 1;
             self.block.push(started.place(number, instant_us), &sample)
         } else {
+            self.block.clear();
             None
         };
         let drive = self

@@ -8,14 +8,18 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant};
-use firmware_sensor::{Sensor, line};
+use firmware_sensor::capabilities::CAPABILITIES;
+use firmware_sensor::{Drive, Sensor, Settings, line};
+use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, Side, report, speak};
+use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::side::Side;
 use nucleo::spawn::once;
+use nucleo::stop;
 use nucleo::supervision::supervise;
 use protocol::{
-    Configuration, ConfigurationReport, Hello, Message, Motion, Refusal, RoleCounters,
-    SensorConfiguration, SensorCounters, Setting,
+    Arm, ArmState, Hello, Message, Motion, Question, RoleCounters, SensorConfiguration,
+    SensorCounters, Stop, StreamGauges, Trip,
 };
 use static_cell::StaticCell;
 
@@ -27,9 +31,12 @@ const SAMPLE_PERIOD: Duration = Duration::from_hz(firmware_sensor::SAMPLE_RATE_H
 /// From the ports to the sampling task: the latest counts.
 static MOTION: Signal<CriticalSectionRawMutex, Motion> = Signal::new();
 static CONFIGURE: Signal<CriticalSectionRawMutex, SensorConfiguration> = Signal::new();
-/// The configuration in force, whichever port it came from.
-static CONFIGURATION: Mutex<CriticalSectionRawMutex, Cell<SensorConfiguration>> =
-    Mutex::new(Cell::new(SensorConfiguration::DEFAULT));
+static STOP: Signal<CriticalSectionRawMutex, Stop> = Signal::new();
+/// The longest time that anybody has asked for since the last sample, in ms.
+static STREAM_MS: Mutex<CriticalSectionRawMutex, Cell<u16>> = Mutex::new(Cell::new(0));
+/// What is in force, whichever port it came from.
+static SETTINGS: Mutex<CriticalSectionRawMutex, Cell<Settings>> =
+    Mutex::new(Cell::new(Settings::DEFAULT));
 /// What the sampling task has counted so far.
 static COUNTERS: Mutex<CriticalSectionRawMutex, Cell<SensorCounters>> =
     Mutex::new(Cell::new(SensorCounters::ZERO));
@@ -42,39 +49,55 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         sampling,
         sampler,
         arm,
+        trip,
         peer,
         console,
         vitals,
     } = board;
     let [major, minor, patch] = hello.version;
     defmt::info!("sensor {}.{}.{} started", major, minor, patch);
-    sampling.spawn(once(sample(sampler, arm)));
+    sampling.spawn(once(sample(sampler, arm, trip)));
     for (side, serial) in [(Side::Peer, peer), (Side::Console, console)] {
         spawner.spawn(once(listen(ports, side, serial.receiver)));
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
     }
     spawner.spawn(once(report(ports)));
+    spawner.spawn(once(answer(ports)));
     let counters = || RoleCounters::Sensor(COUNTERS.lock(Cell::get));
     let voice = ConsoleOutput {
         hello,
         line: line::line,
         help: &line::HELP,
-        stop: || line::NOT_STOPPING,
+        stop: |stop| {
+            STOP.signal(stop);
+            line::STOPPING
+        },
     };
     spawner.spawn(once(supervise(ports, vitals, counters, voice)));
 }
 
 /// Samples, estimates, drives the arm. Deadline: one sample period, 1 ms. Missed, DMA goes on for
 /// one more period and nothing is lost; missed twice, scans are lost and counted, and the filters
-/// run on with what comes next.
+/// run on with what comes next. A Stop takes the drive off before anything is computed, and also if there are
+/// no scans.
 #[embassy_executor::task]
-async fn sample(mut sampler: Sampler, mut arm: ArmDrive) {
+async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>) {
     let mut sensor = Sensor::new(SensorConfiguration::default());
     let mut counters = SensorCounters::default();
+    let mut announced = Announced::default();
+    if let Some(trip) = persisted {
+        sensor.stop(trip);
+    }
     arm.enable();
     sampler.start();
     loop {
-        let (scans, encoder) = match sampler.next().await {
+        let sampled = sampler.next().await;
+        announced.tell(sensor.arm());
+        if let Some(stop) = STOP.try_take() {
+            sensor.stop(stop.reason.trip());
+            arm.set(Drive::default());
+        }
+        let (scans, encoder) = match sampled {
             Ok(sample) => sample,
             Err(lost) => {
                 let count = match lost {
@@ -90,12 +113,16 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive) {
             sensor.configure(configuration);
         }
         if let Some(motion) = MOTION.try_take() {
-            sensor.on_motion(&motion);
-            counters.motions = counters.motions.wrapping_add(1);
+            let taken = sensor.on_motion(&motion);
+            counters.motions = counters.motions.wrapping_add(u32::from(taken));
         }
+        sensor.stream_gauges(&StreamGauges {
+            for_ms: STREAM_MS.lock(Cell::take),
+        });
         let output = sensor.step(begun.as_micros(), &scans, encoder);
         arm.set(output.drive);
         counters.samples = counters.samples.wrapping_add(1);
+        counters.stopped = sensor.arm().trip();
         if let Some(estimate) = output.estimate {
             let taken = OUTBOX.try_send(Message::Estimate(estimate)).is_ok();
             counters.estimates = counters.estimates.wrapping_add(u32::from(taken));
@@ -114,37 +141,69 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive) {
     }
 }
 
+/// What was said of the arm.
+#[derive(Default)]
+struct Announced {
+    kept: Option<Trip>,
+    told: ArmState,
+    is_off: bool,
+}
+
+impl Announced {
+    /// A sample after the last commands went to the pins: keeps why the arm was stopped where a reset does not
+    /// reach, says that its drive is off, and tells of each change as soon as there is room for the message.
+    fn tell(&mut self, state: ArmState) {
+        if let Some(trip) = state.trip() {
+            if self.kept.is_none() {
+                self.kept = Some(trip);
+                nucleo::trip::latch(trip);
+            }
+            // A whole period of the PWM at rest has gone by.
+            if !core::mem::replace(&mut self.is_off, true) {
+                stop::OFF.signal(trip);
+            }
+        }
+        if state != self.told {
+            let instant_us = Instant::now().as_micros();
+            let arm = Message::Arm(Arm { instant_us, state });
+            if OUTBOX.try_send(arm).is_ok() {
+                self.told = state;
+            }
+        }
+    }
+}
+
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
 async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
     ports
         .listen(side, uart, |message| match message {
             Message::Motion(motion) => MOTION.signal(motion),
+            Message::Stop(stop) => STOP.signal(stop),
+            Message::StreamGauges(asked) => {
+                STREAM_MS.lock(|longest| longest.set(longest.get().max(asked.for_ms)));
+            }
             Message::Configure(asked) => {
-                let refused = match asked {
-                    Configuration::Sensor(asked) => match asked.check() {
-                        Ok(()) => {
-                            CONFIGURATION.lock(|current| current.set(asked));
-                            CONFIGURE.signal(asked);
-                            None
-                        }
-                        Err(refusal) => Some(refusal),
-                    },
-                    Configuration::Display(_) => Some(Refusal {
-                        setting: Setting::Role,
-                        index: 0,
-                        low: 0,
-                        high: 0,
-                    }),
-                };
-                let configuration = Configuration::Sensor(CONFIGURATION.lock(Cell::get));
-                let answer = ConfigurationReport {
-                    refused,
-                    hash: configuration.hash(),
-                    configuration,
-                };
+                let (answer, settings) = SETTINGS.lock(|shared| {
+                    let mut settings = shared.get();
+                    let answer = settings.on_configure(&asked);
+                    shared.set(settings);
+                    (answer, settings)
+                });
+                if answer.refused.is_none() {
+                    CONFIGURE.signal(*settings.configuration());
+                }
                 // Full only if the thread is held up: the host asks again.
                 let _ = OUTBOX.try_send(Message::Configuration(answer));
+            }
+            Message::Question(question) => {
+                let answer = match question {
+                    Question::Configuration => {
+                        Message::Configuration(SETTINGS.lock(Cell::get).report())
+                    }
+                    Question::Capabilities => Message::Capabilities(CAPABILITIES),
+                };
+                let _ = OUTBOX.try_send(answer);
             }
             _ => {}
         })

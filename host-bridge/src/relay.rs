@@ -10,6 +10,7 @@
 //! dropped, and so is what was too long on its way. Nothing here keeps the operator safe: the display's
 //! supervisor does that, on its board, whatever the network does.
 
+pub mod access;
 pub mod age;
 pub mod credentials;
 pub mod endpoint;

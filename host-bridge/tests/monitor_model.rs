@@ -11,9 +11,9 @@ use host_bridge::monitor::trace::{Trace, column_us};
 use host_bridge::state::State;
 use protocol::actuators::{self, grid};
 use protocol::{
-    Configuration, ConfigurationReport, Contact, DisplayConfiguration, DisplayState, Estimate,
-    GAUGES, GaugeHealth, Hello, Message, Mode, Range, Refusal, Role, Safety, SensorConfiguration,
-    Setting, Stopped, Trip,
+    Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration, DisplayState,
+    Estimate, GAUGES, GaugeHealth, Hello, Message, Mode, Question, Range, Refusal, Role, Safety,
+    SensorConfiguration, Setting, Stopped, Trip,
 };
 
 fn connected() -> Dashboard {
@@ -28,7 +28,7 @@ fn connected() -> Dashboard {
     dashboard
 }
 
-/// What a board says when it is asked for its configuration by being given the other one's.
+/// What a board says of its configuration.
 fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option<Setting>) {
     let role = match configuration {
         Configuration::Sensor(_) => Role::Sensor,
@@ -52,18 +52,13 @@ fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option
 fn each_board_is_asked_for_its_configuration_until_it_answers() {
     let mut dashboard = connected();
     dashboard.elapse(1);
-    let asks_sensor = vec![Message::Configure(Configuration::Display(
-        DisplayConfiguration::DEFAULT,
-    ))];
-    assert_eq!(dashboard.take_outbox(Role::Sensor), asks_sensor);
-    let asks_display = vec![Message::Configure(Configuration::Sensor(
-        SensorConfiguration::DEFAULT,
-    ))];
-    assert_eq!(dashboard.take_outbox(Role::Display), asks_display);
+    let asks = vec![Message::Question(Question::Configuration)];
+    assert_eq!(dashboard.take_outbox(Role::Sensor), asks);
+    assert_eq!(dashboard.take_outbox(Role::Display), asks);
     dashboard.elapse(100_000);
     assert_eq!(dashboard.take_outbox(Role::Sensor), []);
     dashboard.elapse(400_000);
-    assert_eq!(dashboard.take_outbox(Role::Sensor), asks_sensor);
+    assert_eq!(dashboard.take_outbox(Role::Sensor), asks);
     let own = Configuration::Sensor(SensorConfiguration {
         window_ms: 77,
         ..SensorConfiguration::DEFAULT
@@ -75,45 +70,57 @@ fn each_board_is_asked_for_its_configuration_until_it_answers() {
 }
 
 #[test]
-fn streaming_is_switched_in_the_configuration_that_is_in_force_and_nothing_else_is() {
+fn watching_gauges_changes_no_configuration() {
     let mut dashboard = connected();
-    dashboard.toggle_gauges();
     dashboard.elapse(1);
-    assert_eq!(dashboard.take_outbox(Role::Sensor).len(), 1);
-    let before = SensorConfiguration {
-        window_ms: 123,
-        waves: 3,
-        ..SensorConfiguration::DEFAULT
-    };
-    says(
-        &mut dashboard,
-        Configuration::Sensor(before),
-        Some(Setting::Role),
-    );
-    let wanted = Configuration::Sensor(SensorConfiguration {
-        stream_gauges: true,
-        ..before
-    });
+    dashboard.take_outbox(Role::Sensor);
+    for streams in [true, false] {
+        dashboard.toggle_gauges();
+        assert_eq!(dashboard.streams, streams);
+        dashboard.elapse(2);
+        assert_eq!(dashboard.take_outbox(Role::Sensor), []);
+    }
+}
+
+#[test]
+fn a_change_is_made_of_what_is_in_force_and_again_if_another_comes_in_between() {
+    let mut dashboard = connected();
+    let setting = &settings::SENSOR[4];
+    assert_eq!(setting.name, "waves");
+    dashboard.change(Role::Sensor, setting, "5");
+    dashboard.elapse(1);
     assert_eq!(
         dashboard.take_outbox(Role::Sensor),
-        [Message::Configure(wanted)]
+        [Message::Question(Question::Configuration)]
     );
-    says(&mut dashboard, wanted, None);
+    let with = |window_ms, waves| {
+        Configuration::Sensor(SensorConfiguration {
+            window_ms,
+            waves,
+            ..SensorConfiguration::DEFAULT
+        })
+    };
+    let change = |from: Configuration, to| {
+        Message::Configure(Configure {
+            replaces: Some(from.hash()),
+            configuration: to,
+        })
+    };
+    says(&mut dashboard, with(80, 8), None);
+    let first = change(with(80, 8), with(80, 5));
+    assert_eq!(dashboard.take_outbox(Role::Sensor), [first]);
+    // Somebody else has set the window meanwhile.
+    says(&mut dashboard, with(120, 8), Some(Setting::Replaces));
+    let second = change(with(120, 8), with(120, 5));
+    assert_eq!(dashboard.take_outbox(Role::Sensor), [second]);
+    assert_eq!(dashboard.outcome, None);
+    says(&mut dashboard, with(120, 5), None);
     assert_eq!(
         dashboard.outcome,
         Some(Outcome::Taken {
-            name: "stream_gauges",
-            value: "on".to_owned()
+            name: "waves",
+            value: "5 λ".to_owned()
         })
-    );
-    // And off again.
-    dashboard.toggle_gauges();
-    dashboard.elapse(2);
-    dashboard.take_outbox(Role::Sensor);
-    says(&mut dashboard, wanted, Some(Setting::Role));
-    assert_eq!(
-        dashboard.take_outbox(Role::Sensor),
-        [Message::Configure(Configuration::Sensor(before))]
     );
 }
 
@@ -166,9 +173,10 @@ fn a_stop_is_over_when_every_board_has_answered_and_is_called_unanswered_until_t
         "{words}"
     );
     stopped(&mut dashboard, Role::Sensor);
-    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
+    let all = "stop: confirmed by the sensor and the display";
+    assert_eq!(text(&dashboard), all);
     dashboard.elapse(2_000_000);
-    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
+    assert_eq!(text(&dashboard), all);
 }
 
 #[test]

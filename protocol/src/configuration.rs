@@ -4,6 +4,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::actuators::{self, DEFAULT_ACTUATORS};
+use crate::capabilities::SettingRange;
 use crate::checksum::CRC_32;
 use crate::refusal::{Refusal, Setting};
 
@@ -44,8 +45,6 @@ pub struct SensorConfiguration {
     pub force_mn_per_v: u16,
     /// Shear stiffness k of the fingertip in N/m, 10 to 60 000; 0 to estimate it.
     pub stiffness_n_per_m: u16,
-    /// Whether [`crate::Gauges`] blocks are sent.
-    pub stream_gauges: bool,
     /// The arm's speed in µm/s at full PWM duty, 1 000 to 2 000 000.
     pub arm_full_scale_um_s: u32,
 }
@@ -62,7 +61,6 @@ impl SensorConfiguration {
         force_channel: false,
         force_mn_per_v: 1_000,
         stiffness_n_per_m: 400,
-        stream_gauges: false,
         arm_full_scale_um_s: 200_000,
     };
 }
@@ -171,11 +169,46 @@ impl Configuration {
     }
 }
 
-/// A board's answer to [`crate::Message::Configure`].
+/// Asks a board to take a configuration as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Configure {
+    /// [`Configuration::hash`] of the one that it is to replace: if another is in force, it is refused, so that
+    /// nobody undoes what somebody else has just changed. None: whatever is in force.
+    pub replaces: Option<u32>,
+    /// The configuration.
+    pub configuration: Configuration,
+}
+
+impl Configure {
+    /// Whatever is in force.
+    pub const fn anyway(configuration: Configuration) -> Self {
+        Self {
+            replaces: None,
+            configuration,
+        }
+    }
+
+    /// Checks that what is in force is what is to be replaced.
+    ///
+    /// # Errors
+    /// If it is not: a refusal of [`Setting::Replaces`].
+    pub fn check_replaces(&self, in_force: u32) -> Result<(), Refusal> {
+        match self.replaces {
+            Some(replaces) if replaces != in_force => Err(Refusal {
+                setting: Setting::Replaces,
+                index: 0,
+                low: in_force.into(),
+                high: in_force.into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A board's answer to [`crate::Message::Configure`] and [`crate::Question::Configuration`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct ConfigurationReport {
-    /// None if the configuration asked for is now in force; else the first setting that was out of
-    /// its range, and nothing was changed.
+    /// None if the configuration asked for, if any, is now in force; else why it is not, and nothing was changed.
     pub refused: Option<Refusal>,
     /// [`Configuration::hash`] of the configuration in force.
     pub hash: u32,
@@ -183,54 +216,77 @@ pub struct ConfigurationReport {
     pub configuration: Configuration,
 }
 
+impl ConfigurationReport {
+    /// That `configuration` is in force.
+    pub fn of(configuration: Configuration, refused: Option<Refusal>) -> Self {
+        Self {
+            refused,
+            hash: configuration.hash(),
+            configuration,
+        }
+    }
+}
+
 impl SensorConfiguration {
+    /// The ranges of all settings that are numbers.
+    pub const RANGES: [SettingRange; 8] = [
+        SettingRange::new(Setting::WindowMs, 10, 200),
+        SettingRange::new(Setting::CountedGauge, 0, 4),
+        SettingRange::new(Setting::Gauges, 1, 31),
+        SettingRange::new(Setting::Waves, 2, 8),
+        SettingRange::new(Setting::ValidPercent, 50, 99),
+        SettingRange::new(Setting::ForceScale, 1, 60_000),
+        SettingRange::new(Setting::Stiffness, 10, 60_000).or_zero(),
+        SettingRange::new(Setting::ArmFullScale, 1_000, 2_000_000),
+    ];
+
     /// Checks every range; the first setting outside of its own is the error.
     pub fn check(&self) -> Result<(), Refusal> {
-        within(self.window_ms.into(), 10, 200, Setting::WindowMs)?;
-        within(self.counted_gauge.into(), 0, 4, Setting::CountedGauge)?;
-        within(self.gauges.into(), 1, 31, Setting::Gauges)?;
-        within(self.waves.into(), 2, 8, Setting::Waves)?;
-        within(self.valid_percent.into(), 50, 99, Setting::ValidPercent)?;
-        within(self.force_mn_per_v.into(), 1, 60_000, Setting::ForceScale)?;
-        if self.stiffness_n_per_m != 0 {
-            within(
-                self.stiffness_n_per_m.into(),
-                10,
-                60_000,
-                Setting::Stiffness,
-            )?;
-        }
-        within(
+        let values: [u32; 8] = [
+            self.window_ms.into(),
+            self.counted_gauge.into(),
+            self.gauges.into(),
+            self.waves.into(),
+            self.valid_percent.into(),
+            self.force_mn_per_v.into(),
+            self.stiffness_n_per_m.into(),
             self.arm_full_scale_um_s,
-            1_000,
-            2_000_000,
-            Setting::ArmFullScale,
-        )
+        ];
+        check(&Self::RANGES, &values)
     }
 }
 
 impl DisplayConfiguration {
+    /// The largest amplitude of the stimulus, in mV (Okamoto et al. 2009, equation (12)).
+    pub const MOST_AMPLITUDE_MV: u16 = 5_000;
+
+    /// The ranges of all settings that are numbers.
+    pub const RANGES: [SettingRange; 7] = [
+        SettingRange::new(Setting::MaxAgeMs, 20, 5_000),
+        SettingRange::new(Setting::FadeInMs, 1, 1_000),
+        SettingRange::new(Setting::FadeOutMs, 1, 1_000),
+        SettingRange::new(Setting::GlideMs, 0, 500),
+        SettingRange::new(Setting::AmplitudeMv, 0, Self::MOST_AMPLITUDE_MV as u32),
+        SettingRange::new(Setting::ReferenceLsb, 0, 2_000),
+        SettingRange::new(Setting::FullDriveS, 10, 3_600),
+    ];
+
     /// Checks every range; the first setting outside of its own is the error.
     pub fn check(&self) -> Result<(), Refusal> {
-        within(self.max_age_ms.into(), 20, 5_000, Setting::MaxAgeMs)?;
-        within(self.fade_in_ms.into(), 1, 1_000, Setting::FadeInMs)?;
-        within(self.fade_out_ms.into(), 1, 1_000, Setting::FadeOutMs)?;
-        within(self.glide_ms.into(), 0, 500, Setting::GlideMs)?;
-        within(self.amplitude_mv.into(), 0, 5_000, Setting::AmplitudeMv)?;
-        within(self.reference_lsb.into(), 0, 2_000, Setting::ReferenceLsb)?;
-        within(self.full_drive_s.into(), 10, 3_600, Setting::FullDriveS)
+        let values = [
+            self.max_age_ms,
+            self.fade_in_ms,
+            self.fade_out_ms,
+            self.glide_ms,
+            self.amplitude_mv,
+            self.reference_lsb,
+            self.full_drive_s,
+        ];
+        check(&Self::RANGES, &values.map(u32::from))
     }
 }
 
-fn within(value: u32, low: u32, high: u32, setting: Setting) -> Result<(), Refusal> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(Refusal {
-            setting,
-            index: 0,
-            low: low.into(),
-            high: high.into(),
-        })
-    }
+fn check<const N: usize>(ranges: &[SettingRange; N], values: &[u32; N]) -> Result<(), Refusal> {
+    let mut checks = ranges.iter().zip(values);
+    checks.try_for_each(|(range, &value)| range.check(value))
 }

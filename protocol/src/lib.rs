@@ -5,6 +5,7 @@
 #![no_std]
 
 pub mod actuators;
+pub mod capabilities;
 mod checksum;
 pub mod clock;
 pub mod configuration;
@@ -26,10 +27,13 @@ pub mod stop;
 pub use actuators::{
     ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN,
 };
+pub use capabilities::{
+    Capabilities, DisplayCapabilities, Question, SensorCapabilities, SettingRange,
+};
 pub use clock::ClockOffset;
 pub use configuration::{
-    Configuration, ConfigurationReport, DisplayConfiguration, Method, Mode, SensorConfiguration,
-    UpdateRate,
+    Configuration, ConfigurationReport, Configure, DisplayConfiguration, Method, Mode,
+    SensorConfiguration, UpdateRate,
 };
 pub use console::{Console, Key, Line};
 pub use frame::MAX_FRAME;
@@ -37,12 +41,12 @@ pub use hello::{HELLO_LENGTH, Hello, Role};
 pub use latest::Latest;
 pub use message::{
     CHANNELS, Contact, Estimate, GAUGE_BLOCK, GAUGES, GaugeHealth, GaugeSample, Gauges, Message,
-    Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH,
+    Motion, PROTOCOL_VERSION, Ping, Pong, Range, SCHEMA_HASH, StreamGauges,
 };
 pub use port::Port;
 pub use receiver::{Event, Peer, Receiver};
 pub use refusal::{Refusal, Setting};
-pub use safety::{DisplayState, Hold, Safety, Trip};
+pub use safety::{Arm, ArmState, DisplayState, Hold, Safety, Trip};
 pub use sender::Sender;
 pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};
 pub use stop::{STOP_LENGTH, Stop, StopReason, Stopped};

@@ -5,12 +5,16 @@
 //! | [`Hello`] | all | at start, on request, once a second until answered; from a [`console`](crate::console) only when spoken to | who is there, and do we understand each other |
 //! | [`Estimate`] | sensor | 100 Hz | the surface, the contact with it, the gauges' health |
 //! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
-//! | [`Gauges`] | sensor | 125 Hz, when asked for | samples, for recording |
+//! | [`Gauges`] | sensor | 125 Hz, while asked for | samples, for recording |
 //! | [`Status`] | boards | 1 Hz | every counter |
-//! | [`Message::Configure`] | host | – | asks for a configuration |
+//! | [`Configure`] | host | – | asks for a configuration |
+//! | [`Question`] | host | – | asks what is in force, or what the board can do |
 //! | [`Actuators`] | host | – | a part of the fingertip's description, for the next configuration |
-//! | [`ConfigurationReport`] | boards | – | answers both |
+//! | [`ConfigurationReport`] | boards | – | answers these |
+//! | [`Capabilities`] | boards | – | answers a question |
+//! | [`StreamGauges`] | host | repeated | asks for gauges, for a while |
 //! | [`Safety`] | display | at each change | the supervisor's state |
+//! | [`Arm`] | sensor | at each change | what the arm does |
 //! | [`Ping`], [`Pong`] | all | – | round trip and clock offset |
 //! | [`Stop`] | all | – | no more stimulus, and the arm stands still |
 //! | [`Stopped`] | boards | – | answers each Stop |
@@ -22,9 +26,10 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::actuators::Actuators;
-use crate::configuration::{Configuration, ConfigurationReport};
+use crate::capabilities::{Capabilities, Question};
+use crate::configuration::{ConfigurationReport, Configure};
 use crate::hello::{Hello, MAGIC, Role};
-use crate::safety::Safety;
+use crate::safety::{Arm, Safety};
 use crate::status::Status;
 use crate::stop::{Stop, Stopped};
 
@@ -61,8 +66,9 @@ pub enum Message {
     /// Every counter of a board.
     Status(Status),
     /// Asks a board to take this configuration as a whole.
-    Configure(Configuration),
-    /// A board's configuration as it stands, after a [`Message::Configure`] or refused [`Actuators`].
+    Configure(Configure),
+    /// A board's configuration as it stands, after a [`Message::Configure`], refused [`Actuators`] or a
+    /// [`Question`].
     Configuration(ConfigurationReport),
     /// Asks for a [`Pong`].
     Ping(Ping),
@@ -78,6 +84,14 @@ pub enum Message {
     /// Answers a [`Message::Stop`]. On the wire it is [`Stopped::to_bytes`]: always the same bytes, and
     /// never variant 12.
     Stopped(Stopped),
+    /// Asks a board something, and changes nothing.
+    Question(Question),
+    /// What a board can do.
+    Capabilities(Capabilities),
+    /// Asks for [`Gauges`], for a while.
+    StreamGauges(StreamGauges),
+    /// What the sensor does with the arm has changed.
+    Arm(Arm),
 }
 
 /// Which of the paper's ranges an instant is in, equation (8): T1 while v(t)·v(t−A) ≥ 0.
@@ -192,7 +206,7 @@ pub struct GaugeSample {
     pub travel_um: i16,
 }
 
-/// A block of consecutive samples, sent when [`crate::SensorConfiguration::stream_gauges`] is set.
+/// A block of consecutive samples, sent for as long as [`StreamGauges`] asks for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Gauges {
     /// Index of the first sample since the sensor's start: a gap shows what was lost.
@@ -203,6 +217,19 @@ pub struct Gauges {
     pub position_um: i64,
     /// The samples, 1 ms apart.
     pub samples: [GaugeSample; GAUGE_BLOCK],
+}
+
+/// Asks for [`Gauges`] from now on, for a while. Whoever wants them says so again before the while is over; the
+/// longest that anybody asked for counts, so that nobody ends what another wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct StreamGauges {
+    /// For how long, in ms; what is above [`StreamGauges::LONGEST_MS`] is taken for that.
+    pub for_ms: u16,
+}
+
+impl StreamGauges {
+    /// The longest while, in ms.
+    pub const LONGEST_MS: u16 = 10_000;
 }
 
 /// Asks the other end for its clock.

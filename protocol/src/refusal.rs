@@ -26,6 +26,10 @@ impl core::fmt::Display for Refusal {
         } = self;
         match setting {
             Setting::Role => write!(f, "the configuration is for the other board"),
+            Setting::Replaces => write!(
+                f,
+                "the configuration in force is not the one that was to be replaced, but {low:#010x}"
+            ),
             Setting::Actuators => write!(
                 f,
                 "Actuators names neither the description in force nor the one that was sent, {low:#010x}"
@@ -92,4 +96,6 @@ pub enum Setting {
     ActuatorY,
     /// [`crate::Actuator::gain_q15`]
     ActuatorGain,
+    /// [`crate::Configure::replaces`]: another configuration is in force.
+    Replaces,
 }

@@ -46,7 +46,8 @@ impl Hold {
     }
 }
 
-/// Why the stimulus was stopped for good: until the reset button or power.
+/// Why the stimulus, or the arm, was stopped for good: until the reset button or power. The numbers never
+/// change, since [`crate::Stopped`] carries them; new ones go to the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Trip {
     /// [`crate::StopReason::Operator`]
@@ -164,6 +165,57 @@ impl fmt::Display for DisplayState {
     }
 }
 
+/// What the sensor board does with the arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ArmState {
+    /// It stands still: no motion of the hand has come for 100 ms.
+    #[default]
+    Resting,
+    /// It follows the hand.
+    Following,
+    /// Its drive is off for good.
+    Stopped(Trip),
+}
+
+impl ArmState {
+    /// The state in a word, without the reason for it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Resting => "resting",
+            Self::Following => "following",
+            Self::Stopped(_) => "stopped",
+        }
+    }
+
+    /// What stopped it, if it is stopped.
+    pub const fn trip(self) -> Option<Trip> {
+        match self {
+            Self::Stopped(trip) => Some(trip),
+            Self::Resting | Self::Following => None,
+        }
+    }
+}
+
+/// The state in words, with the reason for it: "stopped: by the operator".
+impl fmt::Display for ArmState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        match self.trip() {
+            Some(trip) => write!(f, ": {}", trip.name()),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Tells of each change of what the arm does, within some milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Arm {
+    /// When it changed, in µs of the sensor's clock.
+    pub instant_us: u64,
+    /// The state since then.
+    pub state: ArmState,
+}
+
 /// Tells of each change of the supervisor's state, within some milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Safety {
@@ -197,6 +249,15 @@ mod tests {
             ),
             (
                 DisplayState::Stopped(Trip::Operator),
+                "stopped: by the operator",
+            ),
+        ] {
+            assert_eq!(state.to_string(), words);
+        }
+        for (state, words) in [
+            (ArmState::Following, "following"),
+            (
+                ArmState::Stopped(Trip::Operator),
                 "stopped: by the operator",
             ),
         ] {

@@ -3,7 +3,7 @@
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-use crate::safety::DisplayState;
+use crate::safety::{DisplayState, Trip};
 
 /// Why a board started last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -98,6 +98,8 @@ pub struct SensorCounters {
     pub estimates: u32,
     /// Motions that reached the arm's drive.
     pub motions: u32,
+    /// What has stopped the arm's drive for good; none while it may follow.
+    pub stopped: Option<Trip>,
 }
 
 impl SensorCounters {
@@ -109,6 +111,7 @@ impl SensorCounters {
         deadline_misses: 0,
         estimates: 0,
         motions: 0,
+        stopped: None,
     };
 }
 

@@ -76,7 +76,7 @@ fn main() -> ExitCode {
             let heard = board.take_heard();
             heard
                 .iter()
-                .any(|message| matches!(message, Message::Configure(_)))
+                .any(|message| matches!(message, Message::Question(_)))
         };
         assert!(
             wait_until(Duration::from_secs(30), asked),

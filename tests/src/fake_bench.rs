@@ -1,5 +1,5 @@
 //! Two fake boards that talk as real ones do: a hand that rubs to and fro over a surface of 2 mm, an arm
-//! that follows, gauges that stream when they are told to.
+//! that follows, gauges that stream while they are asked for.
 
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use protocol::{
     Configuration, ConfigurationReport, Contact, DisplayConfiguration, DisplayCounters,
     DisplayState, Estimate, GAUGES, GaugeHealth, GaugeSample, Gauges, Message, Motion,
-    PortCounters, Refusal, ResetCause, Role, RoleCounters, Safety, SensorConfiguration,
+    PortCounters, Question, Refusal, ResetCause, Role, RoleCounters, Safety, SensorConfiguration,
     SensorCounters, Setting, Status, Stop, Trip,
 };
 
@@ -42,6 +42,7 @@ pub struct FakeBench {
     /// What the display was told to stop by, if it was.
     pub stopped: Option<Stop>,
     elapsed_ms: u64,
+    streams_until_ms: u64,
 }
 
 impl FakeBench {
@@ -61,7 +62,13 @@ impl FakeBench {
             state: DisplayState::Driving,
             stopped: None,
             elapsed_ms: 0,
+            streams_until_ms: 0,
         }
+    }
+
+    /// Whether the gauges are streamed for somebody.
+    pub fn streams(&self) -> bool {
+        self.elapsed_ms < self.streams_until_ms
     }
 
     /// What the boards say in the next 2 ms, and their answers to what they have heard.
@@ -84,7 +91,7 @@ impl FakeBench {
             self.sensor
                 .say(Message::Estimate(estimate(sequence(10), velocity_um_s)));
         }
-        if ms.is_multiple_of(8) && self.sensing.stream_gauges {
+        if ms.is_multiple_of(8) && ms < self.streams_until_ms {
             let samples = std::array::from_fn(|sample| GaugeSample {
                 codes: codes(position_mm(seconds + sample as f64 * 1e-3)),
                 travel_um: 70,
@@ -134,9 +141,19 @@ impl FakeBench {
 
     fn answer(&mut self) {
         for heard in self.sensor.take_heard() {
+            if let Message::StreamGauges(asked) = heard {
+                let until_ms = self.elapsed_ms + u64::from(asked.for_ms);
+                self.streams_until_ms = self.streams_until_ms.max(until_ms);
+            }
+            if let Message::Question(Question::Configuration) = heard {
+                let report = report(None, Configuration::Sensor(self.sensing));
+                self.sensor.say(report);
+            }
             if let Message::Configure(asked) = heard {
-                let mut refused = None;
-                match asked {
+                let in_force = Configuration::Sensor(self.sensing);
+                let mut refused = asked.check_replaces(in_force.hash()).err();
+                match asked.configuration {
+                    _ if refused.is_some() => {}
                     Configuration::Sensor(asked) => match asked.check() {
                         Ok(()) => self.sensing = asked,
                         Err(refusal) => refused = Some(refusal),
@@ -149,9 +166,15 @@ impl FakeBench {
         }
         for heard in self.display.take_heard() {
             match heard {
+                Message::Question(Question::Configuration) => {
+                    let report = report(None, Configuration::Display(self.displaying));
+                    self.display.say(report);
+                }
                 Message::Configure(asked) => {
-                    let mut refused = None;
-                    match asked {
+                    let in_force = Configuration::Display(self.displaying);
+                    let mut refused = asked.check_replaces(in_force.hash()).err();
+                    match asked.configuration {
+                        _ if refused.is_some() => {}
                         Configuration::Display(asked) => match asked.check() {
                             Ok(()) => self.displaying = asked,
                             Err(refusal) => refused = Some(refusal),
@@ -186,11 +209,7 @@ const OTHER_BOARD: Refusal = Refusal {
 };
 
 fn report(refused: Option<Refusal>, configuration: Configuration) -> Message {
-    Message::Configuration(ConfigurationReport {
-        refused,
-        hash: configuration.hash(),
-        configuration,
-    })
+    Message::Configuration(ConfigurationReport::of(configuration, refused))
 }
 
 /// λ wanders by a few thousandths, the paper's count by what a count of whole crossings does.

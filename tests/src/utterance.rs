@@ -1,8 +1,8 @@
 //! Whatever a board might say, drawn from a seed.
 
 use protocol::{
-    ACTUATOR_BLOCK, Actuator, Actuators, CHANNELS, Configuration, ConfigurationReport, Contact,
-    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth,
+    ACTUATOR_BLOCK, Actuator, Actuators, CHANNELS, Configuration, ConfigurationReport, Configure,
+    Contact, DisplayConfiguration, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth,
     GaugeSample, Gauges, Hold, Message, Method, Mode, Motion, Pong, PortCounters, Range, Refusal,
     ResetCause, Role, RoleCounters, Safety, SensorConfiguration, SensorCounters, Setting, Status,
     Stop, StopReason, Trip, UpdateRate,
@@ -92,7 +92,9 @@ impl Speaker {
                 first: 10,
                 actuators: [Actuator::at(3, -4); ACTUATOR_BLOCK],
             }),
-            _ => Message::Configure(Configuration::Sensor(self.sensor_configuration())),
+            _ => Message::Configure(Configure::anyway(Configuration::Sensor(
+                self.sensor_configuration(),
+            ))),
         }
     }
 
@@ -226,6 +228,7 @@ impl Speaker {
             deadline_misses: self.u32(),
             estimates: self.u32(),
             motions: self.u32(),
+            stopped: None,
         };
         // Not an estimate's number.
         let sequence = self.sequence;
@@ -274,7 +277,6 @@ impl Speaker {
             force_channel: self.chance(),
             force_mn_per_v: self.u32() as u16,
             stiffness_n_per_m: self.u32() as u16,
-            stream_gauges: true,
             arm_full_scale_um_s: self.u32(),
         }
     }

@@ -296,9 +296,7 @@ fn the_emergency_stop_stops_and_a_reset_brings_the_board_and_its_log_back(bench:
 fn boards_are_set_as_the_scene_asks_before_their_ports_appear(bench: &Bench) {
     let mut client = Client::open(&bench.path(PortName::SensorConsole), BAUD);
     client.hear("an estimate", estimate);
-    // Asked for the other role's, a board refuses and tells its own.
-    let other = Configuration::Display(protocol::DisplayConfiguration::DEFAULT);
-    client.say(&Message::Configure(other));
+    client.say(&Message::Question(protocol::Question::Configuration));
     let configuration = client.hear("the configuration", |message| match message {
         Message::Configuration(report) => Some(report.configuration),
         _ => None,

@@ -82,7 +82,7 @@ fn the_dashboard_stops_a_board_and_streams_its_gauges() {
     );
     terminal.type_keys("g");
     assert!(
-        terminal.shows(LIMIT, "stream_gauges is on now"),
+        terminal.shows(LIMIT, "the gauges are streamed from now on"),
         "{}",
         terminal.last_shown()
     );

@@ -1,6 +1,7 @@
 //! Bridges and routers in processes of their own, over the system's sockets. Everything waits for events; the
 //! limits are a hang's. What depends on time is in `bridge_relay`, by virtual time.
 
+use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use protocol::{Message, Role, StopReason};
@@ -250,6 +251,31 @@ fn relay_stop_says_what_has_come_of_it() {
     ] {
         assert!(words.contains(part), "{words}");
     }
+}
+
+#[test]
+fn relay_stop_does_not_wait_for_an_end_that_is_dead() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &[]);
+    listen(&sensor, LIMIT, at_least(10));
+    // It takes connections, and never says a word.
+    let dead = TcpListener::bind(("127.0.0.1", 0)).expect("a port is free");
+    let dead = dead.local_addr().expect("it is bound");
+    let (dead, at) = (
+        format!("tcp/{dead}"),
+        format!("tcp/127.0.0.1:{}", pair.weather.port()),
+    );
+    let words = [
+        "stop",
+        "--connect",
+        &dead,
+        "--connect",
+        &at,
+        "--within",
+        "9",
+    ];
+    let (status, _, words) = Relay::start(words).wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
 }
 
 #[test]

@@ -5,6 +5,8 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use host_bridge::relay::credentials::Credentials;
+use host_bridge::relay::endpoint::Endpoint;
 use host_bridge::relay::envelope::{Content, Envelope};
 use host_bridge::relay::name::{Channel, Name};
 use host_bridge::relay::network::{Ends, Network};
@@ -12,8 +14,8 @@ use host_bridge::relay::site::bridge_hello;
 use host_bridge::relay::transport::{Connection, Transport};
 use protocol::{Hello, Ping, Role};
 use rcgen::{
-    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
-    date_time_ymd,
+    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa,
+    Issuer, KeyPair, date_time_ymd,
 };
 use tests::bridge;
 use tests::fake_board::{FakeBoard, wait_until};
@@ -35,6 +37,7 @@ enum Kind {
     Expired,
     OfAnotherHost,
     ForServersOnly,
+    OfAnotherBench,
 }
 
 impl Authority {
@@ -67,6 +70,16 @@ impl Authority {
             "localhost"
         };
         let mut params = CertificateParams::new([host.to_owned()]).expect("a name");
+        let role = name.rsplit('-').next().unwrap_or(name);
+        let bench = if kind == Kind::OfAnotherBench {
+            "other"
+        } else {
+            "bench"
+        };
+        params.distinguished_name = DistinguishedName::new();
+        params
+            .distinguished_name
+            .push(DnType::CommonName, format!("{bench}.{role}"));
         params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
         if kind != Kind::ForServersOnly {
             params
@@ -118,7 +131,7 @@ fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
 
     // Strangers: a certificate of another CA, one that believes in another CA, and none at all.
     let stranger = theirs.proofs("display", Kind::Good, &ours);
-    let distrustful = ours.proofs("distrustful", Kind::Good, &theirs);
+    let distrustful = ours.proofs("distrustful-display", Kind::Good, &theirs);
     for (at, proofs, words) in [
         (&tls, stranger, "our certificate is rejected there"),
         (&tls, distrustful, "not made by the CA given with --ca"),
@@ -143,10 +156,100 @@ fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
     listen(&display, LIMIT, |heard| sequences(heard).len() >= 20);
     listen(&sensor, LIMIT, |heard| sequences(heard).len() >= 100);
 
+    let operator = ours.proofs("operator", Kind::Good, &ours);
     let mut stop = vec!["stop", "--connect", &tls];
-    stop.extend(good.iter().map(String::as_str));
+    stop.extend(operator.iter().map(String::as_str));
     let (status, _, words) = Relay::start(stop).wait(LIMIT);
     assert_eq!(status.code(), Some(0), "{words}");
+}
+
+/// What `proofs` are read for.
+fn network(ends: Ends, proofs: &[String]) -> Network {
+    let file = |at: usize| PathBuf::from(&proofs[at]);
+    let credentials = Credentials {
+        ca: file(1),
+        certificate: file(3),
+        key: file(5),
+    };
+    let name: Name = "bench".parse().expect("a name");
+    Network::new(ends, Some(credentials), vec![name], false).expect("it can connect")
+}
+
+#[test]
+fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
+    let ours = Authority::new("roles");
+    let sensor = talking_board(Role::Sensor);
+    let tls = format!("tls/localhost:{}", free_port());
+    let good = ours.proofs("sensor", Kind::Good, &ours);
+    let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &good);
+    listening.says("listening", LIMIT);
+    let name: Name = "bench".parse().expect("a name");
+    let endpoint: Endpoint = tls.parse().expect("an endpoint");
+    // A foreign sensor, an operator, and the display of another bench, each as if it were the display: none is
+    // heard, whatever it says, a forged Stopped among it.
+    let forgers: Vec<Box<dyn Connection>> = [
+        ("foreign-sensor", Kind::Good),
+        ("operator", Kind::Good),
+        ("display", Kind::OfAnotherBench),
+    ]
+    .into_iter()
+    .map(|(certificate, kind)| {
+        let proofs = ours.proofs(certificate, kind, &ours);
+        network(Ends::Connecting(vec![endpoint.clone()]), &proofs)
+            .connect(&name, Role::Display, Vec::new())
+            .expect("the CA lets it in")
+    })
+    .collect();
+    let forge = || {
+        for forger in &forgers {
+            forger.publish(Channel::Clock, &ping(bridge_hello(Role::Display)));
+            let stopped = Content::Stopped { id: 1, trip: None };
+            let content = Envelope {
+                content: stopped,
+                ..ping(bridge_hello(Role::Display))
+            };
+            forger.publish(Channel::Stop, &content);
+        }
+    };
+    // Who belongs there is heard all the while.
+    let display = talking_board(Role::Display);
+    let good = ours.proofs("real-display", Kind::Good, &ours);
+    let _connecting = start(Role::Display, &display, ["--connect", &tls], &good);
+    let mut motions = 0;
+    assert!(wait_until(LIMIT, || {
+        forge();
+        motions += sequences(&sensor.take_heard()).len();
+        motions >= 200
+    }));
+    assert!(
+        !listening.words().contains("a second bridge"),
+        "{}",
+        listening.words()
+    );
+    // Only what the real one has said has come.
+    let said = listening.words().matches("the display's site: ").count();
+    assert_eq!(said, 1, "{}", listening.words());
+}
+
+#[test]
+fn listening_beyond_this_computer_without_tls_is_to_be_asked_for() {
+    let sensor = talking_board(Role::Sensor);
+    let at = format!("tcp/0.0.0.0:{}", free_port());
+    let path = sensor.path().to_string_lossy();
+    assert_refused(
+        &["sensor", "--sensor", &path, "--listen", &at],
+        &[
+            "would let anybody who reaches it move the arm",
+            "--insecure",
+        ],
+    );
+    let bridge = Relay::bridge(
+        Role::Sensor,
+        sensor.path(),
+        &["--listen", &at, "--insecure"],
+    );
+    bridge.says("INSECURE: whoever reaches", LIMIT);
+    bridge.says("listening", LIMIT);
 }
 
 #[test]
@@ -176,7 +279,7 @@ fn a_listener_of_another_name_or_without_tls_is_not_believed() {
     let board = talking_board(Role::Display);
     let good = ours.proofs("display", Kind::Good, &ours);
     let tls = format!("tls/localhost:{}", free_port());
-    let other = ours.proofs("other", Kind::OfAnotherHost, &ours);
+    let other = ours.proofs("other-sensor", Kind::OfAnotherHost, &ours);
     let sensor = talking_board(Role::Sensor);
     let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &other);
     listening.says("listening", LIMIT);
@@ -198,7 +301,8 @@ fn impostor(port: u16) -> Box<dyn Connection> {
     let endpoint = format!("tcp/127.0.0.1:{port}")
         .parse()
         .expect("an endpoint");
-    let network = Network::new(Ends::Connecting(vec![endpoint]), None).expect("it can connect");
+    let network = Network::new(Ends::Connecting(vec![endpoint]), None, Vec::new(), false)
+        .expect("it can connect");
     let name: Name = "bench".parse().expect("a name");
     network
         .connect(&name, Role::Display, Vec::new())
@@ -299,11 +403,16 @@ fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
         &["wants certificates", "--ca"],
     );
     assert_refused(
-        &["router", "--listen", "tcp/no-such-host.invalid:7447"],
+        &[
+            "router",
+            "--listen",
+            "tcp/no-such-host.invalid:7447",
+            "--insecure",
+        ],
         &["no-such-host.invalid", "can't listen"],
     );
     assert_refused(
-        &["router", "--listen", "tcp/192.0.2.1:7447"],
+        &["router", "--listen", "tcp/192.0.2.1:7447", "--insecure"],
         &["192.0.2.1:7447", "no such address", "0.0.0.0"],
     );
     let taken = TcpListener::bind("127.0.0.1:0").expect("the system has ports");

@@ -22,6 +22,7 @@ use host_bridge::replay::stand_in::StandIn;
 use host_bridge::replay::{Pace, play};
 use protocol::{
     Configuration, ConfigurationReport, Estimate, Message, Motion, Role, SensorConfiguration,
+    StreamGauges,
 };
 use tests::bridge::{self, Running};
 use tests::fake_board::{FakeBoard, wait_until};
@@ -262,20 +263,12 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
 
 /// What a sensor board says that reads these scans, its gauges streamed, and how it is set.
 fn said_of(scans: &[ScanRecord], configuration: SensorConfiguration) -> Vec<(u64, Role, Message)> {
-    let streaming = SensorConfiguration {
-        stream_gauges: true,
-        ..configuration
-    };
-    let configuration = Configuration::Sensor(streaming);
-    let report = ConfigurationReport {
-        refused: None,
-        hash: configuration.hash(),
-        configuration,
-    };
+    let report = ConfigurationReport::of(Configuration::Sensor(configuration), None);
     let mut said = vec![(0, Role::Sensor, Message::Configuration(report))];
-    let mut sensor = Sensor::new(streaming);
+    let mut sensor = Sensor::new(configuration);
     let (samples, _) = scans.as_chunks::<SCANS_PER_SAMPLE>();
     for scans in samples {
+        sensor.stream_gauges(&StreamGauges { for_ms: 1_000 });
         let last = &scans[SCANS_PER_SAMPLE - 1];
         let at_us = last.at_ns / 1_000;
         let output = sensor.step(at_us, &scans.map(|scan| scan.codes), last.encoder);

@@ -115,7 +115,7 @@ prop_compose! {
         unheard in prop::bool::weighted(0.1),
         missed_ticks in prop_oneof![8 => Just(0), 1 => 0..10_u32, 1 => any::<u32>()],
     ) -> Senses {
-        Senses { stop_input_open, alarm, transfer, clear_fell, readback, unheard, missed_ticks }
+        Senses { stop_input_open, alarm, transfer, clear_fell, is_clear: clear_fell, readback, unheard, missed_ticks }
     }
 }
 

@@ -14,6 +14,7 @@ pub const HEALTHY: Senses = Senses {
     alarm: false,
     transfer: firmware_display::Transfer::Done,
     clear_fell: false,
+    is_clear: false,
     readback: firmware_display::Readback::None,
     unheard: false,
     missed_ticks: 0,
@@ -36,7 +37,9 @@ pub fn settings(
         actuators: protocol::actuators::hash(described),
         ..*configuration
     });
-    let refused = settings.on_configure(&asked).refused;
+    let refused = settings
+        .on_configure(&protocol::Configure::anyway(asked))
+        .refused;
     assert_eq!(refused, None, "{configuration:?}");
     settings
 }

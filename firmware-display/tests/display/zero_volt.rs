@@ -1,7 +1,7 @@
 //! How long it takes from each fault to 0 V on all channels: the numbers of the table of hazards in
 //! docs/src/explanation/safety.md.
 
-use firmware_display::{ConverterFault, Display, Output, Readback, Transfer};
+use firmware_display::{ConverterFault, Display, Output, Readback, Senses, Transfer};
 use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, StopReason, Trip, UpdateRate};
 
 use crate::rig::{RATES, Rig, at, configured, sound};
@@ -35,6 +35,35 @@ fn assert_stays_stopped(rig: &mut Rig, trip: Trip) {
     rig.move_on();
     assert_eq!(rig.state(), DisplayState::Stopped(trip));
     assert!(rig.is_silent() && !rig.output.release);
+}
+
+#[test]
+fn a_stopped_display_is_off_once_the_converters_have_0_v_or_clr_is_low_and_not_before() {
+    // The words of the tick that stops fail twice; the third time they arrive. Or CLR falls meanwhile.
+    let failed = Senses {
+        transfer: Transfer::Failed,
+        ..Senses::default()
+    };
+    let clear = Senses {
+        is_clear: true,
+        ..failed
+    };
+    for last in [Senses::default(), clear] {
+        let mut rig = Rig::driving(&DisplayConfiguration::DEFAULT);
+        assert_eq!(rig.display.off(), None);
+        rig.display.stop(StopReason::Operator);
+        rig.move_on();
+        assert_eq!(rig.state(), DisplayState::Stopped(Trip::Operator));
+        assert_eq!(rig.display.off(), None);
+        for _ in 0..2 {
+            rig.senses = failed;
+            rig.move_on();
+            assert_eq!(rig.display.off(), None);
+        }
+        rig.senses = last;
+        rig.move_on();
+        assert_eq!(rig.display.off(), Some(Trip::Operator));
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use firmware_sensor::{
     MICROMETRES_PER_COUNT, MID_RAIL_CODE, Output, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan, Sensor,
 };
-use protocol::{GAUGES, SensorConfiguration};
+use protocol::{GAUGES, SensorConfiguration, StreamGauges};
 
 /// A triangular stroke: out and back at a speed, from 0.
 #[derive(Clone, Copy)]
@@ -27,9 +27,9 @@ impl Stroke {
 
 /// Five gauges in turn on a sine, felt `late_s` after the encoder was read.
 fn feel(stroke: Stroke, wavelength_mm: f64, late_s: f64, duration_s: f64) -> Vec<Output> {
-    let mut sensor = Sensor::new(SensorConfiguration {
-        stream_gauges: true,
-        ..SensorConfiguration::DEFAULT
+    let mut sensor = Sensor::new(SensorConfiguration::DEFAULT);
+    sensor.stream_gauges(&StreamGauges {
+        for_ms: StreamGauges::LONGEST_MS,
     });
     let scan = |t_s: f64| -> Scan {
         let x_mm = stroke.position_mm(t_s - late_s);

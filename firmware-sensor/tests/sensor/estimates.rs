@@ -7,7 +7,10 @@ use firmware_sensor::{
     Drive, ESTIMATE_RATE_HZ, MICROMETRES_PER_COUNT, MID_RAIL_CODE, Output, SCAN_RATE_HZ,
     SCANS_PER_SAMPLE, Scan, Sensor,
 };
-use protocol::{Estimate, Gauges, Method, Motion, Range, SensorConfiguration};
+use protocol::{
+    ArmState, Estimate, GAUGE_BLOCK, Gauges, Method, Motion, Range, SensorConfiguration,
+    StreamGauges, Trip,
+};
 
 const WINDOW_S: f64 = 0.08;
 /// The codes that a gauge swings from mid-rail, and how far its rest may be off.
@@ -263,10 +266,8 @@ fn a_rub_to_and_fro_is_in_t1_as_long_as_the_paper_says_and_valid_only_then() {
 
 #[test]
 fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
-    let mut sensor = Sensor::new(SensorConfiguration {
-        stream_gauges: true,
-        ..COUNTING
-    });
+    let mut sensor = Sensor::new(COUNTING);
+    sensor.stream_gauges(&StreamGauges { for_ms: 1_000 });
     let speed_mm_s = 40.0;
     let outputs = rub(&mut sensor, 1.0, 4.0, |t_s| speed_mm_s * t_s);
     let blocks: Vec<Gauges> = outputs.iter().filter_map(|output| output.gauges).collect();
@@ -302,6 +303,61 @@ fn the_gauge_blocks_follow_each_other_and_carry_the_signal_where_it_was_felt() {
             .iter()
             .all(|o| o.gauges.is_none())
     );
+}
+
+#[test]
+fn gauges_stream_for_the_longest_time_that_anybody_asked_for_and_leave_the_estimates_alone() {
+    let hand = |t_s: f64| 40.0 * t_s;
+    let quiet = rub(&mut counting_sensor(), 1.5, 4.0, hand);
+    let mut sensor = counting_sensor();
+    let ask = |sensor: &mut Sensor, for_ms| sensor.stream_gauges(&StreamGauges { for_ms });
+    // One wants half a second, another has had enough at once, a third wants less.
+    ask(&mut sensor, 500);
+    ask(&mut sensor, 0);
+    ask(&mut sensor, 100);
+    let streamed = rub(&mut sensor, 1.5, 4.0, hand);
+    let blocks = streamed.iter().filter(|output| output.gauges.is_some());
+    assert_eq!(blocks.count(), 500 / GAUGE_BLOCK);
+    let estimates = |outputs: &[Output]| -> Vec<Estimate> {
+        let estimates = outputs.iter().filter_map(|output| output.estimate);
+        estimates.collect()
+    };
+    assert_eq!(estimates(&streamed), estimates(&quiet));
+    // Nobody gets more than the longest while.
+    ask(&mut sensor, u16::MAX);
+    let longest = f64::from(StreamGauges::LONGEST_MS);
+    let streamed = rub(&mut sensor, longest / 1e3 + 1.0, 4.0, |_| 0.0);
+    let blocks = streamed.iter().filter(|output| output.gauges.is_some());
+    let most = usize::from(StreamGauges::LONGEST_MS) / GAUGE_BLOCK;
+    assert_eq!(blocks.count(), most);
+}
+
+#[test]
+fn a_stop_takes_the_drive_off_for_good_and_the_estimates_go_on() {
+    let mut sensor = counting_sensor();
+    let motion = |sequence| Motion {
+        sequence,
+        instant_us: 0,
+        position_um: 77_000,
+        velocity_um_s: 100_000,
+    };
+    assert!(sensor.on_motion(&motion(0)));
+    assert!(rub(&mut sensor, 0.05, 2.0, |_| 0.0)[49].drive.duty > 0);
+    sensor.stop(Trip::Operator);
+    assert_eq!(sensor.arm(), ArmState::Stopped(Trip::Operator));
+    for sequence in 1..50 {
+        assert!(!sensor.on_motion(&motion(sequence)));
+        let outputs = rub(&mut sensor, 0.02, 2.0, |_| 0.0);
+        assert!(
+            outputs
+                .iter()
+                .all(|output| output.drive == Drive::default())
+        );
+        let estimates = outputs.iter().filter(|output| output.estimate.is_some());
+        assert_eq!(estimates.count(), 2);
+    }
+    sensor.configure(COUNTING);
+    assert_eq!(sensor.arm(), ArmState::Stopped(Trip::Operator));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Whatever comes in, what goes out makes sense.
 
 use firmware_sensor::{Scan, Sensor};
-use protocol::{Estimate, Method, SensorConfiguration};
+use protocol::{Estimate, Method, SensorConfiguration, StreamGauges};
 
 /// Splitmix64.
 struct Random(u64);
@@ -39,7 +39,6 @@ impl Random {
                 1 => 10,
                 _ => self.within(10, 60_000) as u16,
             },
-            stream_gauges: self.within(0, 1) == 1,
             arm_full_scale_um_s: self.within(1_000, 2_000_000),
         };
         configuration.check().unwrap();
@@ -106,6 +105,9 @@ fn a_million_steps_of_garbage_make_sense() {
             1..=4 => {
                 configuration = random.configuration();
                 sensor.configure(configuration);
+                sensor.stream_gauges(&StreamGauges {
+                    for_ms: random.next() as u16,
+                });
             }
             _ => {}
         }

@@ -3,8 +3,9 @@
 
 use protocol::actuators::ACTUATORS;
 use protocol::{
-    ACTUATOR_BLOCK, Actuator, Actuators, Configuration, ConfigurationReport, DisplayConfiguration,
-    Hello, MAX_FRAME, Message, Peer, Ping, Port, Role, SensorConfiguration, Stop, StopReason,
+    ACTUATOR_BLOCK, Actuator, Actuators, Configuration, ConfigurationReport, Configure,
+    DisplayConfiguration, Hello, MAX_FRAME, Message, Peer, Ping, Port, Role, SensorConfiguration,
+    Stop, StopReason,
 };
 
 use super::lockstep::QUANTUM_NS;
@@ -170,7 +171,8 @@ impl ConsoleHost {
             for &block in &self.described {
                 self.port.post(&Message::Actuators(block));
             }
-            self.port.post(&Message::Configure(wanted));
+            self.port
+                .post(&Message::Configure(Configure::anyway(wanted)));
             self.asked_ns = Some(now_ns);
         }
     }
@@ -232,10 +234,11 @@ impl ConsoleHost {
             Some(Configuration::Display(wanted)) => wanted,
             _ => DisplayConfiguration::DEFAULT,
         };
-        Message::Configure(Configuration::Display(DisplayConfiguration {
+        let configuration = Configuration::Display(DisplayConfiguration {
             amplitude_mv: IMPOSSIBLE_MV,
             ..wanted
-        }))
+        });
+        Message::Configure(Configure::anyway(configuration))
     }
 }
 

@@ -13,8 +13,8 @@ use std::time::Instant;
 
 use protocol::actuators::{ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS};
 use protocol::{
-    Actuators, Configuration, ConfigurationReport, Contact, DisplayConfiguration, Estimate,
-    GaugeHealth, Hello, MAX_FRAME, Message, Peer, Port, Range, Role, Safety, Status,
+    Actuators, Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration,
+    Estimate, GaugeHealth, Hello, MAX_FRAME, Message, Peer, Port, Range, Role, Safety, Status,
 };
 use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
 use rigless::session::Session;
@@ -394,12 +394,12 @@ impl ScriptedSensor {
                 }));
             }
         }
-        self.port.post(&Message::Configure(Configuration::Display(
-            DisplayConfiguration {
-                actuators: protocol::actuators::hash(&described),
-                ..self.alone.configuration
-            },
-        )));
+        let configuration = Configuration::Display(DisplayConfiguration {
+            actuators: protocol::actuators::hash(&described),
+            ..self.alone.configuration
+        });
+        self.port
+            .post(&Message::Configure(Configure::anyway(configuration)));
     }
 
     fn estimate(&mut self, now_ns: u64) {

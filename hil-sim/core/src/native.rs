@@ -198,12 +198,13 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             sensor_counters,
             ..
         } = self;
-        sensor_end.hear(&mut display_end.wire, now_ns, |_, message| {
-            if let Message::Motion(motion) = message
-                && sensor.on_motion(&motion)
-            {
-                sensor_counters.motions = sensor_counters.motions.wrapping_add(1);
+        sensor_end.hear(&mut display_end.wire, now_ns, |_, message| match message {
+            Message::Motion(motion) => {
+                let taken = u32::from(sensor.on_motion(&motion));
+                sensor_counters.motions = sensor_counters.motions.wrapping_add(taken);
             }
+            Message::Stop(stop) => sensor.stop(stop.reason.trip()),
+            _ => {}
         });
     }
 

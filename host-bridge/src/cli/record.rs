@@ -65,7 +65,7 @@ pub struct Record {
     #[arg(long)]
     no_gauges: bool,
     /// Ends after so many seconds
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds)]
     until: Option<Duration>,
     /// Begins another MCAP file, FILE-2.mcap and so on, after so many minutes; 0 for never: the file's
     /// index takes 2.5 MB of memory for each hour of it
@@ -82,14 +82,6 @@ pub struct Record {
     json: bool,
     #[command(flatten)]
     boards: super::Where,
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse()
-        .ok()
-        .filter(|&seconds| seconds > 0.0)
-        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
-        .ok_or_else(|| "give a time above 0 s".to_owned())
 }
 
 /// What a script is told.

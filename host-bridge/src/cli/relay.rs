@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::RecvTimeoutError;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
@@ -37,8 +38,10 @@ At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
 With a router in between, both connect to it:
                 host-bridge relay router --listen tcp/0.0.0.0:7447
 
-With tls/ in place of tcp/, all of them want --ca, --certificate and --key, and whoever has no certificate \
-of that CA is refused.
+With tls/ in place of tcp/, all of them want --ca, --certificate and --key. Whoever has no certificate of that CA \
+is refused, and the certificate's common name decides for whom it may speak: NAME.sensor, NAME.display, \
+NAME.router, or NAME.operator for `relay stop`, where NAME is what --name says. Without TLS, listening beyond this \
+computer wants --insecure.
 
 Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards until the display says \
 that it has stopped. Once a second a bridge \
@@ -79,6 +82,9 @@ struct Bridge {
     /// Prints the statistics as lines of JSON on standard output
     #[arg(long)]
     json: bool,
+    /// Listens beyond this computer without TLS: whoever reaches it may move the arm
+    #[arg(long)]
+    insecure: bool,
 }
 
 #[derive(Debug, Args)]
@@ -97,6 +103,13 @@ struct EitherEnd {
 struct Router {
     #[command(flatten)]
     proofs: Proofs,
+    /// The benches that it carries, by what their sites call them; several may be given. Without certificates it
+    /// carries all
+    #[arg(long = "name", value_name = "NAME", default_value = "bench")]
+    names: Vec<Name>,
+    /// Listens beyond this computer without TLS: whoever reaches it may move the arm
+    #[arg(long)]
+    insecure: bool,
     /// Where to wait for bridges, e.g. tcp/0.0.0.0:7447; several may be given
     #[arg(long, value_name = "ENDPOINT", required = true)]
     listen: Vec<Endpoint>,
@@ -106,7 +119,7 @@ struct Router {
 struct Stopping {
     #[command(flatten)]
     meeting: Meeting,
-    /// Where a bridge or a router listens
+    /// Where a bridge or a router listens; of several, all are told at once
     #[arg(long, value_name = "ENDPOINT", required = true)]
     connect: Vec<Endpoint>,
     /// How long to say so and to wait for the board's word
@@ -169,7 +182,14 @@ impl Bridge {
             Ends::Listening(self.ends.listen)
         };
         let words = in_words(&ends);
-        let network = Network::new(ends, self.meeting.proofs.credentials())?;
+        warn_of(&ends, self.insecure);
+        let names = vec![self.meeting.name.clone()];
+        let network = Network::new(
+            ends,
+            self.meeting.proofs.credentials(),
+            names,
+            self.insecure,
+        )?;
         // Leaving a network that is stuck may take a while.
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let (bridge, notices) = Site::open(Settings {
@@ -214,12 +234,13 @@ impl Router {
     fn execute(self) -> anyhow::Result<ExitCode> {
         let ends = Ends::Listening(self.listen);
         let words = in_words(&ends);
-        let network = Network::new(ends, self.proofs.credentials())?;
+        warn_of(&ends, self.insecure);
+        let network = Network::new(ends, self.proofs.credentials(), self.names, self.insecure)?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let session = network.open_router()?;
         say(&format!("host-bridge: router, {words}"));
         while !ended.load(Ordering::Relaxed) {
-            std::thread::sleep(LOOK);
+            thread::sleep(LOOK);
         }
         // Dropped, it leaves the network; whoever is connected sees it at once.
         drop(session);
@@ -229,31 +250,41 @@ impl Router {
 
 impl Stopping {
     fn execute(self) -> anyhow::Result<ExitCode> {
-        let network = Network::new(
-            Ends::Connecting(self.connect),
-            self.meeting.proofs.credentials(),
-        )?;
         let within = Duration::from_secs(self.within.into());
-        let stop = Stop {
-            reason: StopReason::Operator,
-        };
-        let stopping = operator::stop(
-            &network,
-            &System::default().clock,
-            &self.meeting.name,
-            stop,
-            within,
-        );
-        let (progress, trip) = match &stopping {
-            Ok(stopping) => (stopping.progress, stopping.trip),
-            Err(_) => (Progress::Unheard, None),
-        };
-        if let Some(trip) = trip {
-            say(&format!(
-                "host-bridge: Stop: the display has stopped: {}",
-                trip.name()
-            ));
-            return Ok(ExitCode::SUCCESS);
+        let name = self.meeting.name;
+        let credentials = self.meeting.proofs.credentials();
+        let (outcomes, told) = channel();
+        // All at once: one that is dead must not hold up the others.
+        for endpoint in self.connect {
+            let ends = Ends::Connecting(vec![endpoint]);
+            let network = Network::new(ends, credentials.clone(), vec![name.clone()], false)?;
+            let (outcomes, name) = (outcomes.clone(), name.clone());
+            thread::spawn(move || {
+                let stop = Stop {
+                    reason: StopReason::Operator,
+                };
+                let clock = System::default().clock;
+                // Nobody waits any more once one has come through.
+                let _ = outcomes.send(operator::stop(&network, &clock, &name, stop, within));
+            });
+        }
+        drop(outcomes);
+        let mut progress = Progress::Unheard;
+        let mut errors = Vec::new();
+        for outcome in told {
+            match outcome {
+                Ok(stopping) => {
+                    if let Some(trip) = stopping.trip {
+                        say(&format!(
+                            "host-bridge: Stop: the display has stopped: {}",
+                            trip.name()
+                        ));
+                        return Ok(ExitCode::SUCCESS);
+                    }
+                    progress = progress.max(stopping.progress);
+                }
+                Err(error) => errors.push(error),
+            }
         }
         let so_far = match progress {
             Progress::Unheard => "no word from the display's bridge",
@@ -268,10 +299,23 @@ impl Stopping {
             "host-bridge: NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
             self.within
         ));
-        if let Err(error) = stopping {
+        for error in errors {
             say(&format!("host-bridge: {error}"));
         }
         Ok(ExitCode::from(1))
+    }
+}
+
+/// Says what an open end means.
+fn warn_of(ends: &Ends, is_insecure: bool) {
+    if let Ends::Listening(endpoints) = ends
+        && is_insecure
+    {
+        for endpoint in endpoints {
+            say(&format!(
+                "host-bridge: INSECURE: whoever reaches {endpoint} may move the arm"
+            ));
+        }
     }
 }
 

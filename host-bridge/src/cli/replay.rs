@@ -216,7 +216,7 @@ impl Replay {
         let end = Instant::now() + PATIENCE;
         while !link.state().is_known() {
             if ended.load(Ordering::Relaxed) {
-                return Ok(ExitCode::SUCCESS);
+                return Ok(ExitCode::FAILURE);
             }
             if Instant::now() >= end {
                 let state = link.state();
@@ -245,7 +245,13 @@ impl Replay {
                 }
             }
         })?;
-        report(role, &played, said, unsaid)
+        let status = report(role, &played, said, unsaid)?;
+        Ok(if ended.load(Ordering::Relaxed) {
+            // Not to its end.
+            ExitCode::FAILURE
+        } else {
+            status
+        })
     }
 }
 

@@ -75,7 +75,7 @@ const PEER: [Fault<PortCounters>; 11] = [
         |c| c.dropped,
         true,
         "frames not sent because the line was full",
-        "send less over it: no gauge streaming (stream_gauges) where it is not needed",
+        "send less over it: no gauge streaming where it is not needed",
     ),
     Fault::new(
         "lost",
@@ -156,7 +156,7 @@ const CONSOLE: [Fault<PortCounters>; 11] = [
         |c| c.dropped,
         true,
         "frames not sent because the line was full",
-        "send less over it: no gauge streaming (stream_gauges) where it is not needed",
+        "send less over it: no gauge streaming where it is not needed",
     ),
     Fault::new(
         "lost",

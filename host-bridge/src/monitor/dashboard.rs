@@ -11,7 +11,7 @@ use super::board::Board;
 use super::fingertip::Fingertip;
 use super::log_entry::{LogEntry, LogEvent};
 use super::orders::{Orders, Outcome};
-use super::settings::{self, Setting};
+use super::settings::Setting;
 use super::trace::Trace;
 use super::words;
 use crate::link::{Clocks, Event, NotSent};
@@ -78,6 +78,8 @@ pub struct Dashboard {
     pub fingertip: Fingertip,
     /// What has happened, the oldest first.
     pub log_entries: VecDeque<LogEntry>,
+    /// Whether the gauges are to be streamed for who watches.
+    pub streams: bool,
     /// What came of the last change that was asked for.
     pub outcome: Option<Outcome>,
     /// The boards to which there is a way: none where a recording is watched.
@@ -102,11 +104,12 @@ impl Default for Dashboard {
             traces: Traces::default(),
             fingertip: Fingertip::default(),
             log_entries: VecDeque::new(),
+            streams: false,
             outcome: None,
             linked: Vec::new(),
             stopping: None,
             notice: None,
-            orders: [Orders::new(Role::Sensor), Orders::new(Role::Display)],
+            orders: [Orders::new(), Orders::new()],
             fresh: Vec::new(),
         }
     }
@@ -241,10 +244,16 @@ impl Dashboard {
             return;
         };
         boards.retain(|board| *board != role);
-        if boards.is_empty() {
+        let waits = boards.clone();
+        if waits.is_empty() {
             self.stopping = None;
         }
-        self.notify(false, format!("stop: confirmed by the {}", role.name()));
+        let confirmed = self.linked.iter().filter(|board| !waits.contains(board));
+        let names: Vec<&str> = confirmed.map(|board| board.name()).collect();
+        self.notify(
+            false,
+            format!("stop: confirmed by the {}", names.join(" and the ")),
+        );
     }
 
     /// Reads both configurations anew.
@@ -265,17 +274,22 @@ impl Dashboard {
         self.orders(role).change(setting, text, now_us);
     }
 
-    /// Switches the streaming of gauges on, or off.
+    /// Has the gauges streamed for who watches, or no longer.
     pub fn toggle_gauges(&mut self) {
-        let setting = settings::stream_gauges();
-        let is_on = |value: String| value == words::SWITCH[1].0;
-        let streams = self
-            .sensor
-            .configuration
-            .and_then(|configuration| setting.value(&configuration))
-            .is_some_and(is_on);
-        let (wanted, _) = words::SWITCH[usize::from(!streams)];
-        self.change(Role::Sensor, setting, wanted);
+        if !self.board(Role::Sensor).is_known() {
+            self.notify(
+                true,
+                format!("{}: {}", Role::Sensor.name(), NotSent::NotKnown),
+            );
+            return;
+        }
+        self.streams = !self.streams;
+        let text = if self.streams {
+            "the gauges are streamed from now on"
+        } else {
+            "the gauges are asked for no longer"
+        };
+        self.notify(false, text.to_owned());
     }
 
     /// Says something to the person who watches.

@@ -1,13 +1,10 @@
 //! What is said to the boards: questions for their configurations, and changes of them.
 //!
-//! A configuration is taken as a whole, and another program may have changed it. So it is read right
-//! before it is changed: a board that is given the other one's configuration refuses it, and its answer
-//! carries its own.
+//! A configuration is taken as a whole, and another program may have changed it. So it is read right before it
+//! is changed, and the change names what it replaces: if that is not in force any more, the board refuses, and
+//! the change is made again of what is.
 
-use protocol::{
-    Configuration, ConfigurationReport, DisplayConfiguration, Message, Refusal, Role,
-    SensorConfiguration,
-};
+use protocol::{Configuration, ConfigurationReport, Configure, Message, Question, Refusal};
 
 use super::settings::{Misread, Setting};
 
@@ -45,9 +42,8 @@ pub enum Outcome {
 }
 
 /// The orders to one board.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Orders {
-    role: Role,
     /// When the configuration was asked for last, while it is wanted.
     wanted: Option<Option<u64>>,
     change: Option<Change>,
@@ -55,10 +51,9 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Nothing is to be said to the board of `role`.
-    pub const fn new(role: Role) -> Self {
+    /// Nothing is to be said.
+    pub const fn new() -> Self {
         Self {
-            role,
             wanted: None,
             change: None,
             outbox: Vec::new(),
@@ -90,46 +85,53 @@ impl Orders {
 
     /// The board has answered. What has come of a change, if it was the answer to one.
     pub fn on_report(&mut self, report: &ConfigurationReport) -> Option<Outcome> {
-        let is_reading =
-            matches!(report.refused, Some(refusal) if refusal.setting == protocol::Setting::Role);
-        if is_reading {
-            self.wanted = None;
-        }
+        self.wanted = None;
         let change = self.change.as_mut()?;
-        match change.sent {
-            None if is_reading => {
-                match change.setting.changed(report.configuration, &change.text) {
-                    Ok(configuration) => {
-                        change.sent = Some(configuration);
-                        self.outbox.push(Message::Configure(configuration));
-                        None
-                    }
-                    Err(misread) => {
-                        self.change = None;
-                        Some(Outcome::Misread(misread))
-                    }
-                }
+        match (change.sent, report.refused) {
+            (None, _) => self.make_change(report),
+            // Another program's change came in between.
+            (Some(_), Some(refusal)) if refusal.setting == protocol::Setting::Replaces => {
+                self.make_change(report)
             }
-            Some(sent) if !is_reading => {
+            (Some(_), Some(refusal)) => {
+                self.change = None;
+                Some(Outcome::Refused(refusal))
+            }
+            (Some(sent), None) if report.configuration == sent => {
                 let setting = change.setting;
                 self.change = None;
-                match report.refused {
-                    Some(refusal) => Some(Outcome::Refused(refusal)),
-                    None if report.configuration == sent => Some(Outcome::Taken {
-                        name: setting.name,
-                        value: [
-                            setting.value(&sent).unwrap_or_default().as_str(),
-                            setting.unit,
-                        ]
-                        .join(" ")
-                        .trim_end()
-                        .to_owned(),
-                    }),
-                    // Another program's change came in between.
-                    None => Some(Outcome::Unanswered),
-                }
+                Some(Outcome::Taken {
+                    name: setting.name,
+                    value: [
+                        setting.value(&sent).unwrap_or_default().as_str(),
+                        setting.unit,
+                    ]
+                    .join(" ")
+                    .trim_end()
+                    .to_owned(),
+                })
             }
-            _ => None,
+            // The answer to somebody else.
+            (Some(_), None) => None,
+        }
+    }
+
+    /// Makes the change of what `report` says is in force.
+    fn make_change(&mut self, report: &ConfigurationReport) -> Option<Outcome> {
+        let change = self.change.as_mut()?;
+        match change.setting.changed(report.configuration, &change.text) {
+            Ok(configuration) => {
+                change.sent = Some(configuration);
+                self.outbox.push(Message::Configure(Configure {
+                    replaces: Some(report.hash),
+                    configuration,
+                }));
+                None
+            }
+            Err(misread) => {
+                self.change = None;
+                Some(Outcome::Misread(misread))
+            }
         }
     }
 
@@ -141,7 +143,7 @@ impl Orders {
                 && asked_us.is_none_or(due)
             {
                 *asked_us = Some(now_us);
-                self.outbox.push(question(self.role));
+                self.outbox.push(QUESTION);
             }
         }
         let given_up = |since_us: u64| now_us.saturating_sub(since_us) >= GIVEN_UP_US;
@@ -162,10 +164,4 @@ impl Orders {
     }
 }
 
-/// What the board of `role` refuses, and answers with its own.
-const fn question(role: Role) -> Message {
-    Message::Configure(match role {
-        Role::Sensor => Configuration::Display(DisplayConfiguration::DEFAULT),
-        _ => Configuration::Sensor(SensorConfiguration::DEFAULT),
-    })
-}
+const QUESTION: Message = Message::Question(Question::Configuration);

@@ -12,7 +12,7 @@ use super::live_recording::LiveRecording;
 use super::log_entry::LogEvent;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link, LinkSender};
-use crate::recording::gauge_stream::GaugeStream;
+use crate::recording::gauge_stream::{GaugeStream, Lease};
 use crate::recording::{Progress, RecordingError};
 
 /// How often the links' own counters are looked at, in µs.
@@ -40,8 +40,12 @@ pub struct Session {
     ending: Option<(String, JoinHandle<Result<Progress, RecordingError>>)>,
     /// Has the gauges stream for as long as a recording lasts.
     stream: GaugeStream,
+    /// The same for who watches.
+    watch: Lease,
     lines_us: Option<u64>,
     is_over: bool,
+    /// Whether a board was ever there and understood.
+    has_met: bool,
 }
 
 impl Session {
@@ -57,8 +61,10 @@ impl Session {
             recording: None,
             ending: None,
             stream: GaugeStream::default(),
+            watch: Lease::default(),
             lines_us: None,
             is_over: false,
+            has_met: false,
         }
     }
 
@@ -127,8 +133,14 @@ impl Session {
         links.map(|(_, link)| link.sender()).collect()
     }
 
-    /// Asks for what a recording needs. What is not answered is asked again.
+    /// Asks for what a recording needs, and who watches. What is not answered is asked again.
     fn ask(&mut self) {
+        let wanted = self.dashboard.streams && self.dashboard.sensor.is_known();
+        if let Some(message) = wanted.then(|| self.watch.due(now_us())).flatten()
+            && let Some(link) = self.link(Role::Sensor)
+        {
+            let _ = link.post(&message);
+        }
         if self.recording.is_none() {
             return;
         }
@@ -219,28 +231,7 @@ impl Session {
         self.finish_recording()
     }
 
-    /// Gives the sensor board its quiet back if a recording took it. Whether it is as it was.
-    fn restore(&mut self) -> bool {
-        let Self {
-            dashboard,
-            source,
-            recording,
-            stream,
-            ..
-        } = self;
-        let mut links = source.links.iter();
-        let sensor = links.find(|(role, _)| *role == Role::Sensor);
-        let sensor = sensor.map(|(_, link)| link);
-        stream.restore(&source.events, sensor, |role, event| {
-            if let Some(recording) = recording {
-                recording.keep(role, &event);
-            }
-            dashboard.on(now_us(), role, event);
-        })
-    }
-
     fn end_recording(&mut self) {
-        let is_restored = self.restore();
         let Some(recording) = self.recording.take() else {
             return;
         };
@@ -248,11 +239,6 @@ impl Session {
         // One at a time: the one before has had all its time.
         let _ = self.finish_recording();
         self.ending = Some((path, thread::spawn(move || recording.end())));
-        if !is_restored {
-            let words =
-                "the sensor board could not be told to stop streaming its gauges: g tells it";
-            self.dashboard.notify(true, words.to_owned());
-        }
     }
 
     /// Waits for the end of a recording, and tells what has come of it.
@@ -279,7 +265,13 @@ impl Session {
         ended.map(|_| ())
     }
 
+    /// Whether a board was ever there and understood.
+    pub const fn has_met(&self) -> bool {
+        self.has_met
+    }
+
     fn on(&mut self, role: Role, event: Event) {
+        self.has_met |= matches!(&event, Event::StateChanged(state) if state.is_known());
         if let Some(recording) = &self.recording {
             recording.keep(role, &event);
             self.stream.on_event(role, &event);

@@ -177,7 +177,7 @@ macro_rules! choice {
 }
 
 /// The sensor board's settings.
-pub static SENSOR: [Setting; 11] = [
+pub static SENSOR: [Setting; 10] = [
     choice!(sensor, sensor_mut, method, "", METHODS),
     number!(sensor, sensor_mut, window_ms, "ms"),
     number!(sensor, sensor_mut, counted_gauge, ""),
@@ -196,7 +196,6 @@ pub static SENSOR: [Setting; 11] = [
     choice!(sensor, sensor_mut, force_channel, "", SWITCH),
     number!(sensor, sensor_mut, force_mn_per_v, "mN/V"),
     number!(sensor, sensor_mut, stiffness_n_per_m, "N/m"),
-    choice!(sensor, sensor_mut, stream_gauges, "", SWITCH),
     number!(sensor, sensor_mut, arm_full_scale_um_s, "µm/s"),
 ];
 
@@ -220,10 +219,4 @@ pub fn of(role: Role) -> &'static [Setting] {
         Role::Display => &DISPLAY,
         Role::Host => &[],
     }
-}
-
-/// Whether gauges are streamed.
-pub fn stream_gauges() -> &'static Setting {
-    const PLACE: usize = 9;
-    &SENSOR[PLACE]
 }

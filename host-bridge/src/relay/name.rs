@@ -64,6 +64,11 @@ impl Name {
         format!("ridgelink/{self}/{}/{channel}", role.name())
     }
 
+    /// All that is said at the bench.
+    pub fn all_keys(&self) -> String {
+        format!("ridgelink/{self}/**")
+    }
+
     /// All that the bridge of `role` says.
     pub fn keys(&self, role: Role) -> String {
         format!("ridgelink/{self}/{}/*", role.name())

@@ -9,6 +9,7 @@ use rustls::ClientConfig;
 use serde_json::json;
 use zenoh::{Config, Session, Wait};
 
+use crate::relay::access;
 use crate::relay::credentials::Credentials;
 use crate::relay::endpoint::{Endpoint, Security};
 use crate::relay::name::Name;
@@ -48,6 +49,8 @@ pub struct Network {
     ends: Ends,
     credentials: Option<Credentials>,
     tls: Option<Arc<ClientConfig>>,
+    /// The benches that it takes part in, as far as certificates decide it.
+    names: Vec<Name>,
 }
 
 impl Transport for Network {
@@ -80,11 +83,18 @@ fn engine(error: zenoh::Error) -> NetworkError {
 }
 
 impl Network {
-    /// Looks at everything that can be looked at before anybody is talked to.
+    /// Looks at everything that can be looked at before anybody is talked to. With credentials, certificates
+    /// decide who may speak for which board of the benches `names`: see [`access`]. Without, nobody listens
+    /// beyond this computer unless it `is_insecure` on purpose.
     ///
     /// # Errors
     /// If endpoints and credentials don't fit, credentials can't be used, or one can't listen.
-    pub fn new(ends: Ends, credentials: Option<Credentials>) -> Result<Self, NetworkError> {
+    pub fn new(
+        ends: Ends,
+        credentials: Option<Credentials>,
+        names: Vec<Name>,
+        is_insecure: bool,
+    ) -> Result<Self, NetworkError> {
         let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &ends;
         for endpoint in endpoints {
             let endpoint = endpoint.clone();
@@ -93,6 +103,13 @@ impl Network {
                     return Err(NetworkError::WithoutCertificates { endpoint });
                 }
                 (Security::Tcp, Some(_)) => return Err(NetworkError::Open { endpoint }),
+                (Security::Tcp, None)
+                    if matches!(ends, Ends::Listening(_))
+                        && !endpoint.is_loopback()
+                        && !is_insecure =>
+                {
+                    return Err(NetworkError::Insecure { endpoint });
+                }
                 (Security::Tls, Some(_))
                     if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
                 {
@@ -119,6 +136,7 @@ impl Network {
             ends,
             credentials,
             tls,
+            names,
         })
     }
 
@@ -212,9 +230,14 @@ impl Network {
                     "transport/link/tls/connect_private_key",
                     json!(credentials.key),
                 ),
+                (
+                    "access_control",
+                    access::rules(&self.names, matches!(self.ends, Ends::Connecting(_))),
+                ),
                 ("transport/link/tls/enable_mtls", json!(true)),
                 // Never without: the engine also believes the CAs of the web, so that any of their
-                // customers could listen in place of the other site.
+                // customers could listen in place of the other site. That one would still have to be called
+                // as the rules want it.
                 ("transport/link/tls/verify_name_on_connect", json!(true)),
                 ("transport/link/tls/close_link_on_expiration", json!(true)),
             ]);

@@ -28,6 +28,14 @@ pub enum NetworkError {
         /// The endpoint.
         endpoint: Endpoint,
     },
+    /// Others could reach an open endpoint, unasked.
+    #[error(
+        "{endpoint} would let anybody who reaches it move the arm: say tls/{}:{} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", .endpoint.host, .endpoint.port
+    )]
+    Insecure {
+        /// The endpoint.
+        endpoint: Endpoint,
+    },
     /// The engine can't match an IPv6 address with a certificate.
     #[error(
         "{endpoint}: an IPv6 address can't be matched with a certificate: give the host's name"

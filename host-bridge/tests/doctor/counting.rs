@@ -127,6 +127,7 @@ fn what_a_sensor_counts_is_a_finding() {
                 deadline_misses: 4,
                 estimates: 5,
                 motions: 6,
+                stopped: None,
             };
         });
     });

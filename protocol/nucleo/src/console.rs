@@ -1,9 +1,10 @@
 //! What the console says to a person: a banner, a line a second, and answers to keys.
 
 use protocol::line::banner;
-use protocol::{Hello, Key, Latest, Line, Role, Status};
+use protocol::{Hello, Key, Latest, Line, Role, Status, Stop, StopReason};
 
 use crate::ports::Ports;
+use crate::stop;
 
 /// Said to who types what has no meaning.
 const HINT: &str = "? for help";
@@ -16,8 +17,8 @@ pub struct ConsoleOutput {
     pub line: fn(&Latest, &Status) -> Line,
     /// What the line means.
     pub help: &'static [&'static str],
-    /// Somebody typed that the stimulus is to stop: does what the board can do, and says what that is.
-    pub stop: fn() -> &'static str,
+    /// Somebody typed a Stop: obeys, and says what that does.
+    pub stop: fn(Stop) -> &'static str,
 }
 
 impl ConsoleOutput {
@@ -43,7 +44,13 @@ impl ConsoleOutput {
                     ports.say(line);
                 }
             }
-            Key::Stop => ports.say((self.stop)()),
+            Key::Stop => {
+                let stop = Stop {
+                    reason: StopReason::Operator,
+                };
+                ports.say((self.stop)(stop));
+                stop::on_key(stop);
+            }
             Key::Other => ports.say(HINT),
         }
     }

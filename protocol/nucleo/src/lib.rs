@@ -3,6 +3,7 @@
 #![no_std]
 #![cfg(target_os = "none")]
 
+pub mod answer;
 pub mod clock;
 pub mod console;
 pub mod encoder;
@@ -10,6 +11,8 @@ pub mod identity;
 pub mod ports;
 pub mod reset;
 pub mod serial;
+pub mod side;
 pub mod spawn;
+pub mod stop;
 pub mod supervision;
 pub mod trip;

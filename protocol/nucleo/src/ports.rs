@@ -13,17 +13,11 @@ use protocol::port::Port;
 use protocol::receiver::Peer;
 use protocol::{Console, Hello, Key, Latest, Message, PortCounters};
 
+use crate::side::Side;
+use crate::stop;
+
 /// Most bytes handed to a transmitter's DMA at once.
 const BURST_BYTES: usize = 256;
-
-/// Which port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// The other board.
-    Peer,
-    /// The ST-LINK's virtual COM port.
-    Console,
-}
 
 /// What tasks of any priority want said on both ports; full only if the thread is held up for 8 ms.
 pub static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
@@ -109,7 +103,12 @@ impl Ports {
             latest.said(message);
             port.post(message);
         });
-        self.with(Side::Console, |port, _| port.post(message));
+        self.post_on(Side::Console, message);
+    }
+
+    /// Says `message` to whoever listens on one port.
+    pub fn post_on(&self, side: Side, message: &Message) {
+        self.with(side, |port, _| port.post(message));
     }
 
     /// Says a line to whoever reads the console, if it is a person.
@@ -162,6 +161,7 @@ impl Ports {
                     self.with(side, |port, latest| {
                         port.receive(now_us, &bytes[..count], |message| {
                             latest.heard(now_us, &message);
+                            stop::on(side, &message);
                             handle(message);
                         })
                     });

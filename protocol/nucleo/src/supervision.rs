@@ -8,7 +8,8 @@ use embassy_time::{Duration, Instant, Ticker};
 use protocol::{Message, ResetCause, RoleCounters, Status};
 
 use crate::console::ConsoleOutput;
-use crate::ports::{Ports, Side};
+use crate::ports::Ports;
+use crate::side::Side;
 
 /// Between two looks: eight in a watchdog's time.
 const PERIOD: Duration = Duration::from_millis(50);

@@ -1,5 +1,5 @@
-//! Why the stimulus was stopped for good, in RAM that a reset leaves alone: a display that the watchdog
-//! had to restart stays stopped.
+//! Why the board was stopped for good, in RAM that a reset leaves alone: one that the watchdog had to restart
+//! stays stopped.
 
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
@@ -27,13 +27,20 @@ pub fn latch(trip: Trip) {
     }
 }
 
-/// The trip from before the reset whose cause is `cause`. A restart by the watchdog is one by itself;
-/// power and the reset button leave none. To be called once, at start.
+/// The trip from before the reset whose cause is `cause`, as [`kept_after`]; a restart by the watchdog is one
+/// by itself. To be called once, at start.
 pub fn after(cause: ResetCause) -> Option<Trip> {
-    match cause {
-        ResetCause::Power | ResetCause::Pin => store([0; 2]),
-        ResetCause::Watchdog => latch(Trip::Watchdog),
-        ResetCause::Software => {}
+    if cause == ResetCause::Watchdog {
+        latch(Trip::Watchdog);
+    }
+    kept_after(cause)
+}
+
+/// The trip from before the reset whose cause is `cause`; power and the reset button leave none. To be called
+/// once, at start.
+pub fn kept_after(cause: ResetCause) -> Option<Trip> {
+    if matches!(cause, ResetCause::Power | ResetCause::Pin) {
+        store([0; 2]);
     }
     kept()
 }

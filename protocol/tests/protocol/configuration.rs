@@ -2,7 +2,8 @@
 
 use protocol::actuators::{self, grid};
 use protocol::{
-    Configuration, DEFAULT_ACTUATORS, DisplayConfiguration, Refusal, SensorConfiguration, Setting,
+    Configuration, Configure, DEFAULT_ACTUATORS, DisplayConfiguration, Refusal,
+    SensorConfiguration, Setting,
 };
 
 /// The answer to the sensor's default configuration with one change.
@@ -132,6 +133,27 @@ fn every_change_of_a_configuration_gives_it_another_hash() {
     for (at, hash) in hashes.iter().enumerate() {
         assert!(!hashes[..at].contains(hash), "{at}");
     }
+}
+
+#[test]
+fn a_configuration_replaces_what_it_names_or_anything_and_nothing_else() {
+    let configuration = Configuration::Sensor(SensorConfiguration::DEFAULT);
+    let in_force = configuration.hash();
+    let asking = |replaces| Configure {
+        replaces,
+        configuration,
+    };
+    assert_eq!(Configure::anyway(configuration), asking(None));
+    assert_eq!(asking(None).check_replaces(in_force), Ok(()));
+    assert_eq!(asking(Some(in_force)).check_replaces(in_force), Ok(()));
+    let refusal = Refusal {
+        setting: Setting::Replaces,
+        index: 0,
+        low: in_force.into(),
+        high: in_force.into(),
+    };
+    let asked = asking(Some(in_force ^ 1)).check_replaces(in_force);
+    assert_eq!(asked, Err(refusal));
 }
 
 #[test]

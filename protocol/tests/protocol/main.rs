@@ -9,3 +9,4 @@ mod port;
 mod properties;
 mod receiver;
 mod sender;
+mod table;

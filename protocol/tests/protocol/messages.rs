@@ -86,7 +86,12 @@ pub fn content() -> impl Strategy<Value = Message> {
         motion().prop_map(Message::Motion),
         gauges().prop_map(Message::Gauges),
         status().prop_map(Message::Status),
-        configuration().prop_map(Message::Configure),
+        (any::<Option<u32>>(), configuration()).prop_map(|(replaces, configuration)| {
+            Message::Configure(Configure {
+                replaces,
+                configuration,
+            })
+        }),
         (
             proptest::option::of(refusal()),
             any::<u32>(),
@@ -122,6 +127,12 @@ pub fn content() -> impl Strategy<Value = Message> {
             }),
         (any::<u64>(), state())
             .prop_map(|(instant_us, state)| Message::Safety(Safety { instant_us, state })),
+        prop_oneof![Just(Question::Configuration), Just(Question::Capabilities)]
+            .prop_map(Message::Question),
+        capabilities().prop_map(Message::Capabilities),
+        any::<u16>().prop_map(|for_ms| Message::StreamGauges(StreamGauges { for_ms })),
+        (any::<u64>(), arm_state())
+            .prop_map(|(instant_us, state)| Message::Arm(Arm { instant_us, state })),
     ]
 }
 
@@ -161,7 +172,7 @@ pub const HEALTHS: [GaugeHealth; 6] = [
 ];
 
 /// Every [`Setting`], in the wire's order.
-pub const SETTINGS: [Setting; 21] = [
+pub const SETTINGS: [Setting; 22] = [
     Setting::Role,
     Setting::WindowMs,
     Setting::CountedGauge,
@@ -183,6 +194,7 @@ pub const SETTINGS: [Setting; 21] = [
     Setting::ActuatorX,
     Setting::ActuatorY,
     Setting::ActuatorGain,
+    Setting::Replaces,
 ];
 
 fn finite() -> impl Strategy<Value = f32> {
@@ -293,7 +305,7 @@ fn status() -> impl Strategy<Value = Status> {
     )
 }
 
-/// Sensor counters from six numbers, in their order.
+/// Sensor counters from six numbers, in their order, and the longest end.
 pub fn sensor_counters(n: [u32; 6]) -> SensorCounters {
     SensorCounters {
         samples: n[0],
@@ -302,6 +314,7 @@ pub fn sensor_counters(n: [u32; 6]) -> SensorCounters {
         deadline_misses: n[3],
         estimates: n[4],
         motions: n[5],
+        stopped: Some(Trip::Operator),
     }
 }
 
@@ -330,7 +343,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
     prop_oneof![
         (
             proptest::sample::select(METHODS.to_vec()),
-            any::<([u16; 3], [u8; 4], [bool; 2], u32)>()
+            any::<([u16; 3], [u8; 4], bool, u32)>()
         )
             .prop_map(
                 |(
@@ -338,7 +351,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     (
                         [window_ms, force_mn_per_v, stiffness_n_per_m],
                         [counted_gauge, gauges, waves, valid_percent],
-                        [force_channel, stream_gauges],
+                        force_channel,
                         arm_full_scale_um_s,
                     ),
                 )| {
@@ -352,7 +365,6 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                         force_channel,
                         force_mn_per_v,
                         stiffness_n_per_m,
-                        stream_gauges,
                         arm_full_scale_um_s,
                     })
                 }
@@ -414,6 +426,101 @@ fn actuator((x_um, y_um, gain_q15, phase, inverted): (i16, i16, u16, u16, bool))
         phase,
         inverted,
     }
+}
+
+/// Capabilities of a sensor.
+pub fn sensor_capabilities() -> SensorCapabilities {
+    SensorCapabilities {
+        gauges: GAUGES as u8,
+        channels: CHANNELS as u8,
+        scan_rate_hz: 4_000,
+        sample_rate_hz: 1_000,
+        estimate_rate_hz: 100,
+        full_scale_mv: 3_300,
+        count_um: 5,
+        shortest_um: 600,
+        longest_um: 8_000,
+        methods: METHODS.len() as u8,
+        stream_ms: StreamGauges::LONGEST_MS,
+        ranges: SensorConfiguration::RANGES,
+    }
+}
+
+/// Capabilities of a display.
+pub fn display_capabilities() -> DisplayCapabilities {
+    DisplayCapabilities {
+        actuators: ACTUATORS as u8,
+        pitch_um: 1_500,
+        furthest_um: 20_000,
+        modes: 2,
+        update_rates_hz: [2_000, 4_000],
+        motion_rate_hz: 500,
+        count_um: 5,
+        full_scale_mv: 5_000,
+        slew_mv_per_ms: 10_000,
+        energy_v2: 20,
+        standing_mv: 3_500,
+        ranges: DisplayConfiguration::RANGES,
+    }
+}
+
+/// A range of a setting whose number on the wire is the longest.
+pub fn setting_range((low, high, or_zero): (u32, u32, bool)) -> SettingRange {
+    SettingRange {
+        setting: Setting::Replaces,
+        low,
+        high,
+        or_zero,
+    }
+}
+
+fn capabilities() -> impl Strategy<Value = Capabilities> {
+    prop_oneof![
+        any::<([u8; 3], [u16; 8], [(u32, u32, bool); 8])>().prop_map(
+            |([gauges, channels, methods], n, ranges)| {
+                Capabilities::Sensor(SensorCapabilities {
+                    gauges,
+                    channels,
+                    scan_rate_hz: n[0],
+                    sample_rate_hz: n[1],
+                    estimate_rate_hz: n[2],
+                    full_scale_mv: n[3],
+                    count_um: n[4],
+                    shortest_um: n[5],
+                    longest_um: n[6],
+                    methods,
+                    stream_ms: n[7],
+                    ranges: ranges.map(setting_range),
+                })
+            }
+        ),
+        any::<([u8; 2], [u16; 8], [u16; 2], [(u32, u32, bool); 7])>().prop_map(
+            |([actuators, modes], n, update_rates_hz, ranges)| {
+                Capabilities::Display(DisplayCapabilities {
+                    actuators,
+                    pitch_um: n[0],
+                    furthest_um: n[1],
+                    modes,
+                    update_rates_hz,
+                    motion_rate_hz: n[2],
+                    count_um: n[3],
+                    full_scale_mv: n[4],
+                    slew_mv_per_ms: n[5],
+                    energy_v2: n[6],
+                    standing_mv: n[7],
+                    ranges: ranges.map(setting_range),
+                })
+            }
+        ),
+    ]
+}
+
+fn arm_state() -> impl Strategy<Value = ArmState> {
+    prop_oneof![
+        Just(ArmState::Resting),
+        Just(ArmState::Following),
+        proptest::sample::select(Trip::ALL.to_vec()).prop_map(ArmState::Stopped),
+    ]
 }
 
 fn state() -> impl Strategy<Value = DisplayState> {

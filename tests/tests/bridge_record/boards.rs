@@ -20,7 +20,7 @@ fn asked(board: &FakeBoard) -> bool {
         let heard = board.take_heard();
         heard
             .iter()
-            .any(|message| matches!(message, Message::Configure(_)))
+            .any(|message| matches!(message, Message::Question(_)))
     })
 }
 

@@ -76,7 +76,7 @@ impl Pair {
                 let heard = board.take_heard();
                 heard
                     .iter()
-                    .any(|message| matches!(message, Message::Configure(_)))
+                    .any(|message| matches!(message, Message::Question(_)))
             };
             assert!(wait_until(LIMIT, asked), "the {} is not asked", role.name());
         }

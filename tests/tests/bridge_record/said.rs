@@ -1,14 +1,14 @@
-//! Everything that is said is recorded, and nothing is changed but the gauges' streaming.
+//! Everything that is said is recorded, and nothing is changed.
 
 use std::fs;
 
 use host_bridge::recording::row::Row;
 use protocol::{
-    Configuration, ConfigurationReport, DisplayConfiguration, GAUGE_BLOCK, Message, Refusal, Role,
-    SensorConfiguration, Setting,
+    Configuration, ConfigurationReport, DisplayConfiguration, GAUGE_BLOCK, Message, Question, Role,
+    SensorConfiguration,
 };
 use tests::bridge;
-use tests::fake_board::{FakeBoard, wait_until};
+use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
 use crate::{LIMIT, Pair, entries, folder, messages, of, signal, succeeded};
@@ -81,82 +81,51 @@ fn everything_that_is_said_is_in_the_file_once_and_in_order() {
     assert_eq!(lines("display-motion.csv"), motions.count());
 }
 
-/// Answers as a board does that has this configuration; returns the one that is then in force.
-fn configure(
-    board: &FakeBoard,
-    role: Role,
-    in_force: Configuration,
-    asked: &Configuration,
-) -> Configuration {
-    let own = matches!(
-        (role, asked),
-        (Role::Sensor, Configuration::Sensor(_)) | (Role::Display, Configuration::Display(_))
-    );
-    let refused = (!own).then_some(Refusal {
-        setting: Setting::Role,
-        index: 0,
-        low: 0,
-        high: 0,
-    });
-    let configuration = if own { *asked } else { in_force };
-    board.say(Message::Configuration(ConfigurationReport {
-        refused,
-        hash: configuration.hash(),
-        configuration,
-    }));
-    configuration
-}
-
 #[test]
-fn gauges_are_streamed_while_they_are_recorded_and_nothing_else_is_changed() {
+fn gauges_are_asked_for_again_and_again_while_they_are_recorded_and_nothing_is_changed() {
     let path = folder("gauges").join("gauges.mcap");
     let pair = Pair::new();
     let running = pair.record(&mut bridge::command(), &[path.to_str().expect("UTF-8")]);
-    let before = SensorConfiguration {
+    let in_force = SensorConfiguration {
         window_ms: 123,
-        valid_percent: 77,
         ..SensorConfiguration::DEFAULT
     };
-    let streaming = SensorConfiguration {
-        stream_gauges: true,
-        ..before
-    };
-    let mut in_force = Configuration::Sensor(before);
-    let mut display = Configuration::Display(DisplayConfiguration::DEFAULT);
-    let mut asked = Vec::new();
-    let mut hear = |wanted: SensorConfiguration| {
-        wait_until(LIMIT, || {
-            for (role, own) in [(Role::Sensor, &mut in_force), (Role::Display, &mut display)] {
-                for message in pair.board(role).take_heard() {
-                    if let Message::Configure(configuration) = message {
-                        *own = configure(pair.board(role), role, *own, &configuration);
-                        asked.push((role, configuration));
+    let configurations = [
+        (Role::Sensor, Configuration::Sensor(in_force)),
+        (
+            Role::Display,
+            Configuration::Display(DisplayConfiguration::DEFAULT),
+        ),
+    ];
+    let (mut questions, mut leases) = (0, 0);
+    let heard = wait_until(LIMIT, || {
+        for (role, configuration) in configurations {
+            for message in pair.board(role).take_heard() {
+                match message {
+                    Message::Question(Question::Configuration) => {
+                        questions += 1;
+                        let report = ConfigurationReport::of(configuration, None);
+                        pair.board(role).say(Message::Configuration(report));
                     }
+                    Message::StreamGauges(asked) => {
+                        assert_eq!(role, Role::Sensor);
+                        assert!(asked.for_ms > 0);
+                        leases += 1;
+                    }
+                    Message::Configure(asked) => panic!("{asked:?}"),
+                    _ => {}
                 }
             }
-            in_force == Configuration::Sensor(wanted)
-        })
-    };
-    assert!(hear(streaming), "the gauges are not asked for");
+        }
+        questions >= 2 && leases >= 3
+    });
+    assert!(heard, "{questions} questions, {leases} requests");
     signal(&running, "-TERM");
-    assert!(hear(before), "the board is not as it was");
     succeeded(&running.wait(LIMIT));
-    assert_eq!(
-        display,
-        Configuration::Display(DisplayConfiguration::DEFAULT)
-    );
-    // Each board was asked with what is for the other; the sensor was set twice.
-    let set = asked
-        .iter()
-        .filter(|asked| matches!(asked, (Role::Sensor, Configuration::Sensor(_))));
-    assert_eq!(set.count(), 2, "{asked:?}");
     let (entries, _) = entries(&path);
-    let reported = |wanted: SensorConfiguration| {
-        entries.iter().any(
-            |entry| matches!(&entry.row, Row::SensorConfiguration(row) if row.in_force == wanted),
-        )
-    };
-    assert!(reported(before) && reported(streaming));
+    assert!(entries.iter().any(
+        |entry| matches!(&entry.row, Row::SensorConfiguration(row) if row.in_force == in_force)
+    ));
     assert!(
         entries
             .iter()

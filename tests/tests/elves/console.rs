@@ -167,8 +167,7 @@ fn watch(toml: &str, at_sensor: &[(u64, Act)], at_display: &[(u64, Act)]) -> Wat
     }
 }
 
-/// A person at each console, who asks for help and types what has no meaning; at last the one at the
-/// display's stops it.
+/// A person at each console, who asks for help and types what has no meaning, and at last stops the board.
 static PERSON: LazyLock<Watched> = LazyLock::new(|| {
     let keys = [
         (1_500 * MS, Act::Type("?")),
@@ -234,10 +233,10 @@ fn the_lines_tell_wavelength_velocity_and_age_as_they_are() {
             assert!((youngest_ms..=oldest_ms).contains(&age_ms), "{line}");
             // A reason takes the counters' place.
             let counted = line.contains(" ms  lost 0 bad 0 miss 0  ");
-            assert_eq!(counted, !line.contains("  stopped: "), "{line}");
+            assert_eq!(counted, !line.contains(" stopped: "), "{line}");
         }
     }
-    for (_, line) in PERSON.sensor.statuses() {
+    for (_, line) in &PERSON.sensor.statuses()[..2] {
         assert!(line.ends_with("  gauges ok"), "{line}");
     }
     let states: Vec<_> = PERSON.display.statuses();
@@ -270,15 +269,18 @@ fn a_question_mark_gets_help_and_nonsense_a_hint() {
 }
 
 #[test]
-fn an_exclamation_mark_stops_the_display_and_the_sensor_says_that_it_does_not() {
+fn an_exclamation_mark_stops_the_board_and_the_lines_say_so() {
     let said = |seen: &Seen, wanted: &str| {
         let lines = seen.lines();
         lines.iter().any(|(_, line)| line == wanted)
     };
     assert!(said(&PERSON.display, firmware_display::line::STOPPING));
-    assert!(said(&PERSON.sensor, firmware_sensor::line::NOT_STOPPING));
+    assert!(said(&PERSON.sensor, firmware_sensor::line::STOPPING));
     let last = PERSON.display.statuses().pop().unwrap();
     assert!(last.1.ends_with("  stopped: by the operator"), "{last:?}");
+    let last = PERSON.sensor.statuses().pop().unwrap();
+    let end = "  arm stopped: by the operator";
+    assert!(last.1.ends_with(end), "{last:?}");
     let RoleCounters::Display(counters) = PERSON.recording.display_status.unwrap().role else {
         panic!("{:?}", PERSON.recording.display_status);
     };

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use tests::run::{Run, scene};
 
 mod arm;
+mod asking;
 mod bit_for_bit;
 mod configuration;
 mod console;
@@ -17,6 +18,7 @@ mod link;
 mod log;
 mod reversal;
 mod silence;
+mod stop;
 mod table_1;
 mod travelling;
 

@@ -43,14 +43,6 @@ impl Run {
     }
 }
 
-/// The same but for whether samples are sent, which the recording itself changes.
-fn same(one: &SensorConfiguration, other: &SensorConfiguration) -> bool {
-    *one == SensorConfiguration {
-        stream_gauges: one.stream_gauges,
-        ..*other
-    }
-}
-
 impl Excerpt {
     /// Takes what lies between two times, in s since the recording's start.
     ///
@@ -128,7 +120,7 @@ impl Excerpt {
         match (role, row) {
             (Role::Sensor, Row::SensorConfiguration(row)) => {
                 let before = self.sensor.replace(row.in_force);
-                let changed = before.is_some_and(|before| !same(&before, &row.in_force));
+                let changed = before.is_some_and(|before| before != row.in_force);
                 if let Some(at_s) = changed_s.filter(|_| changed) {
                     return Err(SceneError::Reconfigured { at_s });
                 }

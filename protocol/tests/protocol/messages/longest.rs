@@ -2,7 +2,7 @@
 
 use protocol::*;
 
-use super::{actuator, display_counters, port};
+use super::{actuator, display_counters, port, sensor_capabilities, setting_range};
 
 /// The longest message of the same kind: every number where its varint is longest. The match names
 /// every variant, so that a new one does not compile until it stands here too.
@@ -47,7 +47,10 @@ pub fn longest_like(message: &Message) -> Message {
             console: port([u32::MAX; 13]),
             role: RoleCounters::Display(display_counters([u32::MAX; 14])),
         }),
-        Message::Configure(_) => Message::Configure(longest_configuration()),
+        Message::Configure(_) => Message::Configure(Configure {
+            replaces: Some(u32::MAX),
+            configuration: longest_configuration(),
+        }),
         Message::Configuration(_) => Message::Configuration(ConfigurationReport {
             refused: Some(Refusal {
                 setting: Setting::ActuatorGain,
@@ -76,6 +79,26 @@ pub fn longest_like(message: &Message) -> Message {
             state: DisplayState::Stopped(Trip::StackOverflow),
         }),
         Message::Stopped(_) => Message::Stopped(Stopped { cause: u8::MAX }),
+        Message::Question(_) => Message::Question(Question::Capabilities),
+        Message::Capabilities(_) => {
+            Message::Capabilities(Capabilities::Sensor(SensorCapabilities {
+                scan_rate_hz: u16::MAX,
+                sample_rate_hz: u16::MAX,
+                estimate_rate_hz: u16::MAX,
+                full_scale_mv: u16::MAX,
+                count_um: u16::MAX,
+                shortest_um: u16::MAX,
+                longest_um: u16::MAX,
+                stream_ms: u16::MAX,
+                ranges: [setting_range((u32::MAX, u32::MAX, true)); 8],
+                ..sensor_capabilities()
+            }))
+        }
+        Message::StreamGauges(_) => Message::StreamGauges(StreamGauges { for_ms: u16::MAX }),
+        Message::Arm(_) => Message::Arm(Arm {
+            instant_us: u64::MAX,
+            state: ArmState::Stopped(Trip::StackOverflow),
+        }),
     }
 }
 
@@ -90,7 +113,6 @@ fn longest_configuration() -> Configuration {
         force_channel: true,
         force_mn_per_v: u16::MAX,
         stiffness_n_per_m: u16::MAX,
-        stream_gauges: true,
         arm_full_scale_um_s: u32::MAX,
     })
 }

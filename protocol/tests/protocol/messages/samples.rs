@@ -2,7 +2,10 @@
 
 use protocol::*;
 
-use super::{actuator, display_counters, hello, port, sensor_counters};
+use super::{
+    actuator, display_capabilities, display_counters, hello, port, sensor_capabilities,
+    sensor_counters,
+};
 
 /// One message of each kind, with every role and both outcomes of a configuration.
 pub fn samples() -> Vec<(&'static str, Message)> {
@@ -16,7 +19,6 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         force_channel: true,
         force_mn_per_v: 1_500,
         stiffness_n_per_m: 400,
-        stream_gauges: true,
         arm_full_scale_um_s: 200_000,
     });
     let display = Configuration::Display(DisplayConfiguration {
@@ -118,8 +120,17 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 10_000, 9_000, 1, 500, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11,
             ]))),
         ),
-        ("configure a sensor", Message::Configure(sensor)),
-        ("configure a display", Message::Configure(display)),
+        (
+            "configure a sensor",
+            Message::Configure(Configure::anyway(sensor)),
+        ),
+        (
+            "configure a display",
+            Message::Configure(Configure {
+                replaces: Some(0x0102_0304),
+                configuration: display,
+            }),
+        ),
         (
             "configuration taken",
             Message::Configuration(ConfigurationReport {
@@ -189,6 +200,33 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         (
             "stopped by the emergency stop",
             Message::Stopped(Stopped::by(Trip::EmergencyStop)),
+        ),
+        (
+            "ask for the configuration",
+            Message::Question(Question::Configuration),
+        ),
+        (
+            "ask for the capabilities",
+            Message::Question(Question::Capabilities),
+        ),
+        (
+            "a sensor's capabilities",
+            Message::Capabilities(Capabilities::Sensor(sensor_capabilities())),
+        ),
+        (
+            "a display's capabilities",
+            Message::Capabilities(Capabilities::Display(display_capabilities())),
+        ),
+        (
+            "stream the gauges",
+            Message::StreamGauges(StreamGauges { for_ms: 1_000 }),
+        ),
+        (
+            "arm: stopped by the operator",
+            Message::Arm(Arm {
+                instant_us: 3_000_000,
+                state: ArmState::Stopped(Trip::Operator),
+            }),
         ),
     ]
 }
