@@ -89,6 +89,9 @@ impl Session {
         if let Some(logs) = &self.source.logs {
             for (role, what) in logs.try_iter() {
                 came = true;
+                if let (Some(recording), LogEvent::Log { level, text }) = (&self.recording, &what) {
+                    recording.keep_log(role, *level, text.clone());
+                }
                 self.dashboard.log(role, what);
             }
         }
