@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueHint};
 use host_bridge::bench::{Bench, BenchError, Seat};
@@ -100,6 +101,17 @@ impl Where {
         put(&mut bench.display, self.display.as_ref());
         bench.checked()
     }
+}
+
+/// A time above 0 s, and short enough to be waited for: a hundred years.
+fn seconds(text: &str) -> Result<Duration, String> {
+    const LONGEST_S: f64 = 100.0 * 365.0 * 86_400.0;
+    text.parse::<f64>()
+        .ok()
+        .filter(|seconds| (f64::MIN_POSITIVE..=LONGEST_S).contains(seconds))
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
+        .filter(|time| !time.is_zero())
+        .ok_or_else(|| "give a number of seconds above 0, and at most a hundred years".to_owned())
 }
 
 fn put(seat: &mut Seat, place: Option<&Place>) {

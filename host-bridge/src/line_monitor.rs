@@ -28,6 +28,8 @@ pub struct LineMonitor {
     /// Frames of somebody who has not said Hello, so far.
     unheralded: u32,
     pinged_us: Option<u64>,
+    /// Since when the other end has spoken text.
+    text_us: Option<u64>,
     /// When the newer span began.
     span_us: u64,
     /// This span, and the one before.
@@ -73,6 +75,7 @@ impl LineMonitor {
             understood: 0,
             unheralded: 0,
             pinged_us: None,
+            text_us: None,
             span_us: opened_us,
             spans: [Sound {
                 bytes: 0,
@@ -124,7 +127,17 @@ impl LineMonitor {
     }
 
     /// What all this tells.
-    pub fn judge(&self, at_us: u64, peer: Peer) -> Verdict {
+    pub fn judge(&mut self, at_us: u64, peer: Peer) -> Verdict {
+        match peer {
+            Peer::Text if self.text_us.is_none() => {
+                // What it said before, in frames, is no garbage: a board that has started anew says a line of
+                // text before it is greeted.
+                self.text_us = Some(at_us);
+                self.spans = [Sound::default(); 2];
+            }
+            Peer::Text => {}
+            _ => self.text_us = None,
+        }
         let recent = |when_us: Option<u64>| {
             when_us.is_some_and(|when_us| at_us.saturating_sub(when_us) <= SILENCE_US)
         };
@@ -133,6 +146,13 @@ impl LineMonitor {
             Peer::Foreign(hello) if recent(self.heard_us) => Verdict::Foreign(hello),
             Peer::Silent | Peer::Text
                 if at_us.saturating_sub(self.opened_us) <= self.patience_us =>
+            {
+                Verdict::Open
+            }
+            Peer::Text
+                if self
+                    .text_us
+                    .is_some_and(|text_us| at_us.saturating_sub(text_us) <= PATIENCE_US) =>
             {
                 Verdict::Open
             }
@@ -175,15 +195,18 @@ mod tests {
         line_monitor
     }
 
-    fn verdict(line_monitor: &LineMonitor, at_us: u64) -> Verdict {
+    fn verdict(line_monitor: &mut LineMonitor, at_us: u64) -> Verdict {
         line_monitor.judge(at_us, Peer::Silent)
     }
 
     #[test]
     fn nothing_is_said_of_a_line_before_it_had_time_to_answer() {
-        assert_eq!(verdict(&heard(S, &[0x80; 99]), PATIENCE_US), Verdict::Open);
         assert_eq!(
-            verdict(&heard(S, &[0x80; 99]), PATIENCE_US + 1),
+            verdict(&mut heard(S, &[0x80; 99]), PATIENCE_US),
+            Verdict::Open
+        );
+        assert_eq!(
+            verdict(&mut heard(S, &[0x80; 99]), PATIENCE_US + 1),
             Verdict::Garbage
         );
     }
@@ -191,13 +214,32 @@ mod tests {
     #[test]
     fn text_is_told_from_garbage_and_from_silence() {
         let line = b"lambda 2.03 mm, v 70 mm/s\r\n\0";
-        assert_eq!(verdict(&heard(S, line), 2 * S), Verdict::Deaf);
+        assert_eq!(verdict(&mut heard(S, line), 2 * S), Verdict::Deaf);
         let mut disturbed = *line;
         disturbed[3] = 0xff;
-        assert_eq!(verdict(&heard(S, &disturbed), 2 * S), Verdict::Deaf);
+        assert_eq!(verdict(&mut heard(S, &disturbed), 2 * S), Verdict::Deaf);
         disturbed[..9].fill(0xff);
-        assert_eq!(verdict(&heard(S, &disturbed), 2 * S), Verdict::Garbage);
-        assert_eq!(verdict(&heard(S, b""), 2 * S), Verdict::Silent);
+        assert_eq!(verdict(&mut heard(S, &disturbed), 2 * S), Verdict::Garbage);
+        assert_eq!(verdict(&mut heard(S, b""), 2 * S), Verdict::Silent);
+    }
+
+    #[test]
+    fn a_board_that_starts_anew_in_the_middle_of_its_frames_is_no_garbage() {
+        let mut line_monitor = heard(S, &[0x80; 9_000]);
+        line_monitor.hear(9 * S, &[0x80; 9_000]);
+        line_monitor.hear(
+            9 * S + 1,
+            b"ridgelink display 0.1.0, started by reset pin\r\n\0",
+        );
+        let text_us = 9 * S + 1;
+        let judge = |line_monitor: &mut LineMonitor, at_us| line_monitor.judge(at_us, Peer::Text);
+        assert_eq!(judge(&mut line_monitor, text_us), Verdict::Open);
+        let late_us = text_us + PATIENCE_US;
+        assert_eq!(judge(&mut line_monitor, late_us), Verdict::Open);
+        line_monitor.hear(late_us, b"a line of text\r\n");
+        assert_eq!(judge(&mut line_monitor, late_us + 1), Verdict::Deaf);
+        line_monitor.hear(late_us + 1, &[0x80; 99]);
+        assert_eq!(judge(&mut line_monitor, late_us + 1), Verdict::Garbage);
     }
 
     #[test]
@@ -208,13 +250,13 @@ mod tests {
         };
         let mut line_monitor = heard(S, &[0x80; 99]);
         line_monitor.understand(S, &counters);
-        assert_eq!(verdict(&line_monitor, 2 * S), Verdict::Deaf);
+        assert_eq!(verdict(&mut line_monitor, 2 * S), Verdict::Deaf);
         // Later it may be something else.
         for at_us in [3 * S, 5 * S] {
             line_monitor.hear(at_us, &[0x80; 99]);
             line_monitor.understand(at_us, &counters);
         }
-        assert_eq!(verdict(&line_monitor, 5 * S), Verdict::Garbage);
+        assert_eq!(verdict(&mut line_monitor, 5 * S), Verdict::Garbage);
     }
 
     #[test]
@@ -240,14 +282,14 @@ mod tests {
     fn a_foreign_board_that_is_gone_is_silent() {
         let mut line_monitor = heard(S, &[1; 40]);
         let judge =
-            |line_monitor: &LineMonitor, at_us| line_monitor.judge(at_us, Peer::Foreign(HELLO));
+            |line_monitor: &mut LineMonitor, at_us| line_monitor.judge(at_us, Peer::Foreign(HELLO));
         assert_eq!(
-            judge(&line_monitor, S + SILENCE_US),
+            judge(&mut line_monitor, S + SILENCE_US),
             Verdict::Foreign(HELLO)
         );
         line_monitor.hear(S + SPAN_US, b"");
         line_monitor.hear(S + 2 * SPAN_US, b"");
-        assert_eq!(judge(&line_monitor, S + 2 * SPAN_US), Verdict::Silent);
+        assert_eq!(judge(&mut line_monitor, S + 2 * SPAN_US), Verdict::Silent);
     }
 
     #[test]

@@ -62,11 +62,16 @@ pub enum MonitorError {
     Recording(#[from] RecordingError),
 }
 
-/// Watches what `source` tells, until a key or `ended` ends it; lines end with the source, too.
+/// Watches what `source` tells, until a key or `ended` ends it; lines end with the source, too. True if somebody
+/// watched, or if a board was there to be written of.
 ///
 /// # Errors
 /// If standard output takes no more, unless nobody reads it any more, or if a recording can't be written.
-pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result<(), MonitorError> {
+pub fn run(
+    source: Source,
+    options: &Options,
+    ended: &Arc<AtomicBool>,
+) -> Result<bool, MonitorError> {
     let session = Session::new(source, options.folder.clone());
     let format = match options.plain {
         None if io::stdout().is_terminal() => None,
@@ -75,15 +80,15 @@ pub fn run(source: Source, options: &Options, ended: &Arc<AtomicBool>) -> Result
     };
     match format {
         Some(format) => {
-            plain::run(
+            let mut output = io::stdout().lock();
+            Ok(plain::run(
                 session,
                 &format,
                 options.limit,
                 ended,
-                &mut io::stdout().lock(),
-            )?;
-            Ok(())
+                &mut output,
+            )?)
         }
-        None => screen::run(session, options.limit, ended),
+        None => screen::run(session, options.limit, ended).map(|()| true),
     }
 }

@@ -5,8 +5,8 @@
 //! MCAP ─> reader: rows ─> replay
 //! ```
 //!
-//! MCAP holds JSON with its JSON Schema, which Foxglove and PlotJuggler read as they come. There is a
-//! channel for each board and kind of message: [`row::CHANNELS`].
+//! MCAP holds messages of ROS 2 with their definitions, which Foxglove, PlotJuggler and ROS 2's own tools read
+//! as they come. There is a channel for each board and kind of message: [`row::CHANNELS`].
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -19,14 +19,16 @@ use crate::host_clock::now_us;
 use crate::link::Event;
 use crate::lock::locked;
 
+mod columns;
 mod csv_folder;
+mod descriptions;
 mod error;
 mod files;
 pub mod gauge_stream;
-mod json_schema;
 mod mcap_file;
 mod queue;
 pub mod reader;
+mod ros2;
 pub mod row;
 mod row_builder;
 mod sink;
@@ -36,7 +38,7 @@ pub use files::part_path;
 pub use row_builder::{Entry, Tally};
 
 use files::RecordingFiles;
-use queue::{Input, Output, PATIENCE, Taken, queue};
+use queue::{Input, Loss, Output, PATIENCE, Taken, queue};
 use row_builder::RowBuilder;
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
@@ -84,6 +86,12 @@ enum Note {
         at_us: u64,
         counters: PortCounters,
     },
+    Log {
+        role: Role,
+        at_us: u64,
+        level: Option<&'static str>,
+        text: String,
+    },
 }
 
 type Writer = JoinHandle<Result<Progress, RecordingError>>;
@@ -127,7 +135,7 @@ impl Recorder {
         };
         let event = event.clone();
         let note = Note::Event { role, at_us, event };
-        self.notes.put(role, Box::new(note));
+        self.notes.put(role, at_us, Box::new(note));
     }
 
     /// Takes what this end of the line to the board of `role` has counted.
@@ -138,7 +146,19 @@ impl Recorder {
             at_us,
             counters,
         };
-        self.notes.put(role, Box::new(note));
+        self.notes.put(role, at_us, Box::new(note));
+    }
+
+    /// Takes a line of the log of the board of `role`, which was read just now; `level` is defmt's.
+    pub fn on_log(&self, role: Role, level: Option<&'static str>, text: String) {
+        let at_us = now_us();
+        let note = Note::Log {
+            role,
+            at_us,
+            level,
+            text,
+        };
+        self.notes.put(role, at_us, Box::new(note));
     }
 
     /// How it stands.
@@ -217,10 +237,18 @@ impl WriterThread {
                         row_builder
                             .enter_counters(role, counters, at_us, |entry| files.write(&entry))?;
                     }
+                    Note::Log {
+                        role,
+                        at_us,
+                        level,
+                        text,
+                    } => {
+                        row_builder
+                            .enter_log(role, (level, &text), at_us, |entry| files.write(&entry))?;
+                    }
                 },
-                Taken::Refused(role, missing) => {
-                    row_builder
-                        .enter_unwritten(role, missing, now_us(), |entry| files.write(&entry))?;
+                Taken::Refused(Loss { role, count, at_us }) => {
+                    row_builder.enter_unwritten(role, count, at_us, |entry| files.write(&entry))?;
                 }
                 Taken::Nothing => {}
                 Taken::Closed => return Ok(()),

@@ -58,6 +58,8 @@ pub struct Played {
     pub latest: Duration,
     /// Whether the recording was cut off.
     pub cut: bool,
+    /// Rows of an older protocol that say nothing in this version's.
+    pub passed_over: u64,
 }
 
 /// Tells the events of a recording, each at its time by `clock`, until its end or until `ended`.
@@ -93,6 +95,7 @@ pub fn play(
         tell(role, event);
     }
     played.cut = events.is_cut();
+    played.passed_over = events.passed_over();
     Ok(played)
 }
 

@@ -173,9 +173,10 @@ fn a_stop_is_over_when_every_board_has_answered_and_is_called_unanswered_until_t
         "{words}"
     );
     stopped(&mut dashboard, Role::Sensor);
-    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
+    let all = "stop: confirmed by the sensor and the display";
+    assert_eq!(text(&dashboard), all);
     dashboard.elapse(2_000_000);
-    assert_eq!(text(&dashboard), "stop: confirmed by the sensor");
+    assert_eq!(text(&dashboard), all);
 }
 
 #[test]

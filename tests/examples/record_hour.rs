@@ -231,8 +231,8 @@ fn check(path: &Path, until_ms: u64) -> (u64, u64) {
     {
         match entry.row {
             Row::Gauges(row) => {
-                assert_eq!(u64::from(row.sample), samples, "in order");
-                samples += 1;
+                assert_eq!(u64::from(row.first_sample), samples, "in order");
+                samples += GAUGE_BLOCK as u64;
             }
             Row::Motion(motion) => {
                 assert_eq!(u64::from(motion.sequence), motions, "in order");

@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use protocol::{
-    DisplayState, Hello, MAX_FRAME, Message, Port, Role, Safety, Stop, StopReason, Stopped,
+    Console, DisplayState, Hello, MAX_FRAME, Message, Role, Safety, Stop, StopReason, Stopped,
 };
 
 use host_bridge::clock::{Clock, SystemClock};
@@ -21,6 +21,8 @@ use crate::pty::Near;
 use crate::virtual_clock;
 use crate::virtual_ports::VirtualBench;
 
+/// Between two lines of text, in µs.
+const LINE_US: u64 = 1_000_000;
 /// How often the board looks at its line.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -192,7 +194,9 @@ fn run(
 ) {
     let mut started_us = clock.now_us();
     let pause = clock.notify();
-    let mut port = Port::new(hello);
+    // As at a board: text for a person until a program says Hello.
+    let mut console = Console::new(hello);
+    let mut line_us = 0;
     let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
     let is_display = hello.role == Role::Display.byte();
     let mut obeys = true;
@@ -211,7 +215,7 @@ fn run(
         };
         let now_us = clock.now_us() - started_us;
         let mut stop = None;
-        port.receive(now_us, &bytes[..count], |message| {
+        console.port().receive(now_us, &bytes[..count], |message| {
             if let Message::Stop(Stop { reason }) = message {
                 stop = Some(reason);
             }
@@ -222,19 +226,24 @@ fn run(
         let state = state.map(|reason| safety(now_us, reason));
         let answer = stop.map(|reason| Message::Stopped(Stopped::by(reason.trip())));
         let mut said = script(now_us).into_iter().chain(state).chain(answer);
+        console.poll(now_us);
+        if now_us >= line_us {
+            line_us = now_us + LINE_US;
+            console.say("a fake board: ? for help");
+        }
         loop {
-            while let count @ 1.. = port.take(&mut out) {
+            while let count @ 1.. = console.port().take(&mut out) {
                 if !is_mute && !write(&mut master, &out[..count], is_patient, pulled) {
                     // Nobody reads: the bytes are lost, as on a wire.
                     break;
                 }
             }
             if let Some(message) = said.next() {
-                port.post(&message);
+                console.port().post(&message);
                 continue;
             }
             match given.try_recv() {
-                Ok(Order::Say(message)) => port.post(&message),
+                Ok(Order::Say(message)) => console.port().post(&message),
                 Ok(Order::Bytes(bytes)) => {
                     let _ = master.write_all(&bytes);
                 }
@@ -243,7 +252,8 @@ fn run(
                 Ok(Order::Disobey(now)) => obeys = !now,
                 Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {
-                    port = Port::new(hello);
+                    console = Console::new(hello);
+                    line_us = 0;
                     started_us = clock.now_us();
                 }
                 Ok(Order::End) => return,

@@ -441,7 +441,7 @@ fn a_force_channel_is_recorded_and_played_too() {
 #[test]
 fn a_piece_of_a_recording_makes_a_scene() {
     // The longer fits are made by every third estimate: beginning here, the scene is in step with the board.
-    let round = round("piece", STROKES, 1.33, Some(3.13));
+    let round = round("piece", STROKES, 1.325, Some(3.13));
     assert!(
         (1.7..=1.8).contains(&round.made.duration_s),
         "{:?}",

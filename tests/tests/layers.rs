@@ -22,9 +22,10 @@ const LAYERS: [(&str, &[&str]); 2] = [
 ];
 
 /// All crates.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "protocol",
     "protocol/nucleo",
+    "ros2msg",
     "firmware-sensor",
     "firmware-display",
     "host-bridge",

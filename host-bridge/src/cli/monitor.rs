@@ -37,7 +37,8 @@ Examples:
   host-bridge monitor --json | jq 'select(.kind == \"second\") | .estimate.wavelength_mm'
 
 The columns of --plain are named in its first line; lines that begin with # are changes. Exit status 0 at the end \
-that was asked for, by a key, a signal or --for; 2 if it can't watch at all.";
+that was asked for, by a key, a signal or --for; 1 if lines were written and no board was ever there; 2 if it \
+can't watch at all.";
 
 /// What `monitor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -51,10 +52,10 @@ pub struct Monitor {
     #[arg(long)]
     json: bool,
     /// Time between two lines
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = super::seconds)]
     every: Duration,
     /// Ends by itself after so long
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds)]
     limit: Option<Duration>,
     /// The sensor board's firmware, to read its log
     #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]
@@ -68,15 +69,6 @@ pub struct Monitor {
     /// The folder for recordings that the key r begins
     #[arg(long, value_name = "FOLDER", default_value = ".", value_hint = ValueHint::DirPath)]
     record_to: PathBuf,
-}
-
-/// A time above 0.
-fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse::<f64>()
-        .ok()
-        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
-        .filter(|duration| !duration.is_zero())
-        .ok_or_else(|| "give a number of seconds above 0".to_owned())
 }
 
 impl Monitor {
@@ -107,8 +99,8 @@ impl Monitor {
             limit: self.limit,
             folder: self.record_to,
         };
-        monitor::run(source, &options, &ended)?;
-        Ok(ExitCode::SUCCESS)
+        let has_met = monitor::run(source, &options, &ended)?;
+        Ok(ExitCode::from(u8::from(!has_met)))
     }
 
     /// Reads the logs of the boards whose ELF and whose bytes are known.

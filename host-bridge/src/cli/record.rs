@@ -9,8 +9,11 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use clap::ValueHint;
+use host_bridge::bench::Bench;
 use host_bridge::host_clock::now_us;
 use host_bridge::link::{Event, Link};
+use host_bridge::monitor::firmware_log::{LogError, Logs, Origin};
+use host_bridge::monitor::log_entry::LogEvent;
 use host_bridge::recording::gauge_stream::GaugeStream;
 use host_bridge::recording::{PART, Progress, Recorder, Settings};
 use host_bridge::state::State;
@@ -25,8 +28,9 @@ pub const ABOUT: &str = "\
 Writes everything that both boards say, and what their links do, to MCAP, to CSV or to both.
 
 Once a second what has been heard is made safe on the disk: that much is kept whatever happens, and only that \
-is counted as safe. The MCAP file reads as it is in Foxglove, PlotJuggler and whatever else knows MCAP with \
-JSON: a channel for each board and kind of message. The sensor board is asked for its gauges meanwhile, \
+is counted as safe. The MCAP file reads as it is in Foxglove, PlotJuggler, ROS 2 and whatever else knows ROS 2's \
+messages: a channel for each board and kind of message, and one for each firmware's log where the bench names an \
+ELF and its rtt. The sensor board is asked for its gauges meanwhile, \
 which changes nothing else of it. A board that is not there is named, \
 and recorded from the moment it comes; one that goes and returns is recorded on. A bench that names one board \
 only has only that one.";
@@ -39,8 +43,8 @@ Examples:
   host-bridge record --csv rubbing --no-gauges       a folder of CSV files
   host-bridge record arm.mcap --sensor /dev/ttyACM0  the sensor board alone
 
-Exit status: 0 recorded, to the end that was asked for; 2 nothing could be recorded, or not to the end: what \
-was said to be safe is.";
+Exit status: 0 recorded, to the end that was asked for; 1 the same with --for, but a board of the bench was never \
+there; 2 nothing could be recorded, or not to the end: what was said to be safe is.";
 
 /// How often is looked whether there is something to do.
 const LOOK: Duration = Duration::from_millis(50);
@@ -61,7 +65,7 @@ pub struct Record {
     #[arg(long)]
     no_gauges: bool,
     /// Ends after so many seconds
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds)]
     until: Option<Duration>,
     /// Begins another MCAP file, FILE-2.mcap and so on, after so many minutes; 0 for never: the file's
     /// index takes 2.5 MB of memory for each hour of it
@@ -78,14 +82,6 @@ pub struct Record {
     json: bool,
     #[command(flatten)]
     boards: super::Where,
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse()
-        .ok()
-        .filter(|&seconds| seconds > 0.0)
-        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
-        .ok_or_else(|| "give a time above 0 s".to_owned())
 }
 
 /// What a script is told.
@@ -134,11 +130,14 @@ impl Record {
             })
             .collect();
         drop(events);
+        let (logs, lines) = Logs::new();
+        follow(&bench, &roles, &logs)?;
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let absent = Session {
             recorder: &recorder,
             links: &links,
             told,
+            lines,
             stream: GaugeStream::new(!self.no_gauges),
             absent: BOARDS.into(),
             screen: Screen::new(self.quiet),
@@ -150,7 +149,12 @@ impl Record {
         drop(links);
         let progress = recorder.stop()?;
         self.report(seconds, &progress, &absent)?;
-        Ok(ExitCode::SUCCESS)
+        let is_missed = self.until.is_some() && roles.iter().any(|role| absent.contains(role));
+        Ok(if is_missed {
+            ExitCode::FAILURE
+        } else {
+            ExitCode::SUCCESS
+        })
     }
 
     fn report(&self, seconds: f64, progress: &Progress, absent: &[Role]) -> anyhow::Result<()> {
@@ -181,6 +185,18 @@ impl Record {
             missing(progress),
         ))
     }
+}
+
+/// Reads the logs of the boards whose ELF and whose bytes the bench names.
+fn follow(bench: &Bench, roles: &[Role], logs: &Logs) -> Result<(), LogError> {
+    for &role in roles {
+        if let Some(seat) = bench.seat(role)
+            && let (Some(elf), Some(rtt)) = (&seat.elf, &seat.rtt)
+        {
+            logs.follow(role, elf, Origin::of(rtt))?;
+        }
+    }
+    Ok(())
 }
 
 /// Whether an event changes what is to be said to a board.
@@ -222,6 +238,8 @@ struct Session<'a> {
     recorder: &'a Recorder,
     links: &'a [(Role, Link)],
     told: Receiver<(Role, Event)>,
+    /// The boards' logs.
+    lines: Receiver<(Role, LogEvent)>,
     stream: GaugeStream,
     /// The boards that have not been there yet.
     absent: Vec<Role>,
@@ -270,6 +288,12 @@ impl Session<'_> {
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+        }
+        for (role, what) in self.lines.try_iter() {
+            match what {
+                LogEvent::Log { level, text } => self.recorder.on_log(role, level, text),
+                other => self.screen.tell(&format!("{}: {other}", role.name())),
+            }
         }
         while let Some((role, message)) = self.stream.due(now_us()) {
             // Asked again if it is not answered.

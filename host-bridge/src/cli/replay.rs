@@ -149,11 +149,12 @@ impl Replay {
         let scene = made.path.display();
         let (valid, all) = made.estimates;
         output::print(&format!(
-            "{scene}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}\n\
+            "{scene}: {:.2} s, λ = {:.3} mm, {valid} of {all} recorded estimates valid{}{}\n\
              run it: hil-sim run {scene}",
             made.duration_s,
             made.wavelength_mm,
             cut(made.cut),
+            passed_over(made.passed_over),
         ))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -215,7 +216,7 @@ impl Replay {
         let end = Instant::now() + PATIENCE;
         while !link.state().is_known() {
             if ended.load(Ordering::Relaxed) {
-                return Ok(ExitCode::SUCCESS);
+                return Ok(ExitCode::FAILURE);
             }
             if Instant::now() >= end {
                 let state = link.state();
@@ -244,7 +245,13 @@ impl Replay {
                 }
             }
         })?;
-        report(role, &played, said, unsaid)
+        let status = report(role, &played, said, unsaid)?;
+        Ok(if ended.load(Ordering::Relaxed) {
+            // Not to its end.
+            ExitCode::FAILURE
+        } else {
+            status
+        })
     }
 }
 
@@ -253,6 +260,14 @@ fn cut(is_cut: bool) -> &'static str {
         "; the recording was cut off there"
     } else {
         ""
+    }
+}
+
+/// What an older recording holds that is not played, in words; empty if nothing is.
+fn passed_over(count: u64) -> String {
+    match count {
+        0 => String::new(),
+        count => format!("; {count} rows of an older protocol say nothing in this version's"),
     }
 }
 
@@ -266,11 +281,12 @@ fn report(role: Role, played: &Played, said: u64, unsaid: u64) -> anyhow::Result
         unsaid => format!(", {unsaid} could not be said"),
     };
     output::print(&format!(
-        "{said} {what} said to the {} board{missed}; {:.1} s of the recording, the latest {:.1} ms late{}",
+        "{said} {what} said to the {} board{missed}; {:.1} s of the recording, the latest {:.1} ms late{}{}",
         role.name(),
         played.recorded_s,
         played.latest.as_secs_f64() * 1e3,
         cut(played.cut),
+        passed_over(played.passed_over),
     ))?;
     Ok(if unsaid == 0 {
         ExitCode::SUCCESS

@@ -244,10 +244,16 @@ impl Dashboard {
             return;
         };
         boards.retain(|board| *board != role);
-        if boards.is_empty() {
+        let waits = boards.clone();
+        if waits.is_empty() {
             self.stopping = None;
         }
-        self.notify(false, format!("stop: confirmed by the {}", role.name()));
+        let confirmed = self.linked.iter().filter(|board| !waits.contains(board));
+        let names: Vec<&str> = confirmed.map(|board| board.name()).collect();
+        self.notify(
+            false,
+            format!("stop: confirmed by the {}", names.join(" and the ")),
+        );
     }
 
     /// Reads both configurations anew.

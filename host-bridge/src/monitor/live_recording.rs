@@ -52,6 +52,11 @@ impl LiveRecording {
         self.recorder.on_counters(role, counters);
     }
 
+    /// Keeps a line of a board's log; `level` is defmt's.
+    pub fn keep_log(&self, role: Role, level: Option<&'static str>, text: String) {
+        self.recorder.on_log(role, level, text);
+    }
+
     /// How it stands.
     pub fn progress(&self) -> Progress {
         self.recorder.progress()

@@ -33,6 +33,8 @@ impl Default for Format {
 /// Writes lines until `ended`, for `limit` at most, until the source has ended, or until nobody reads them any
 /// more.
 ///
+/// True if a board was there, or if nobody reads any more.
+///
 /// # Errors
 /// If they can't be written for another reason.
 pub fn run(
@@ -41,10 +43,11 @@ pub fn run(
     limit: Option<Duration>,
     ended: &AtomicBool,
     output: &mut impl Write,
-) -> io::Result<()> {
+) -> io::Result<bool> {
     match write_lines(&mut session, format, limit, ended, output) {
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written,
+        // Who reads no more has seen enough.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(true),
+        written => written.map(|()| session.has_met()),
     }
 }
 

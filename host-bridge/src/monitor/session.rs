@@ -44,6 +44,8 @@ pub struct Session {
     watch: Lease,
     lines_us: Option<u64>,
     is_over: bool,
+    /// Whether a board was ever there and understood.
+    has_met: bool,
 }
 
 impl Session {
@@ -62,6 +64,7 @@ impl Session {
             watch: Lease::default(),
             lines_us: None,
             is_over: false,
+            has_met: false,
         }
     }
 
@@ -86,6 +89,9 @@ impl Session {
         if let Some(logs) = &self.source.logs {
             for (role, what) in logs.try_iter() {
                 came = true;
+                if let (Some(recording), LogEvent::Log { level, text }) = (&self.recording, &what) {
+                    recording.keep_log(role, *level, text.clone());
+                }
                 self.dashboard.log(role, what);
             }
         }
@@ -259,7 +265,13 @@ impl Session {
         ended.map(|_| ())
     }
 
+    /// Whether a board was ever there and understood.
+    pub const fn has_met(&self) -> bool {
+        self.has_met
+    }
+
     fn on(&mut self, role: Role, event: Event) {
+        self.has_met |= matches!(&event, Event::StateChanged(state) if state.is_known());
         if let Some(recording) = &self.recording {
             recording.keep(role, &event);
             self.stream.on_event(role, &event);

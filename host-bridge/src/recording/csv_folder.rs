@@ -4,20 +4,27 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use postcard_schema::Schema;
+use postcard_schema::schema::NamedType;
+use protocol::Gauges;
+use serde_json::Value;
+
+use super::columns::{cells, columns};
 use super::error::RecordingError;
-use super::json_schema::{cells, columns};
-use super::row::{CHANNELS, Kind, channel};
+use super::row::{CHANNELS, GaugeRow, Kind, Row, SAMPLE_US, channel};
 use super::row_builder::Entry;
 use super::sink::{Sink, SinkWriter};
 
 const NS_PER_S: u64 = 1_000_000_000;
+const NS_PER_US: u64 = 1_000;
 /// Some hundred lines.
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// A folder that is being written. A channel's file is made when something is said on it.
 pub struct CsvFolder {
     folder: PathBuf,
-    force: bool,
+    /// It was made here, and goes if it is not kept.
+    fresh: bool,
     files: [Option<Channel>; CHANNELS.len()],
 }
 
@@ -35,12 +42,14 @@ pub fn file_name(at: usize) -> String {
 }
 
 impl CsvFolder {
-    /// Makes the folder. `force` takes one that is not empty, and removes the files of a recording.
+    /// Makes the folder. `force` takes one that is not empty. Dropping it before [`CsvFolder::keep`] takes
+    /// away what was made.
     ///
     /// # Errors
     /// If there is one with anything in it, or it can't be made.
     pub fn create(folder: &Path, force: bool) -> Result<Self, RecordingError> {
         let not_made = |source| RecordingError::not_made(folder, source);
+        let fresh = !folder.exists();
         fs::create_dir_all(folder).map_err(not_made)?;
         let full = fs::read_dir(folder).map_err(not_made)?.next().is_some();
         if full && !force {
@@ -48,8 +57,20 @@ impl CsvFolder {
                 path: folder.to_owned(),
             });
         }
+        Ok(Self {
+            folder: folder.to_owned(),
+            fresh,
+            files: [const { None }; CHANNELS.len()],
+        })
+    }
+
+    /// The folder stays, and the files of an earlier recording go.
+    ///
+    /// # Errors
+    /// If one of them can't be removed.
+    pub fn keep(&mut self) -> Result<(), RecordingError> {
         for at in 0..CHANNELS.len() {
-            let path = folder.join(file_name(at));
+            let path = self.folder.join(file_name(at));
             match fs::remove_file(&path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
                     return Err(RecordingError::NotMade { path, source });
@@ -57,11 +78,8 @@ impl CsvFolder {
                 _ => {}
             }
         }
-        Ok(Self {
-            folder: folder.to_owned(),
-            force,
-            files: [const { None }; CHANNELS.len()],
-        })
+        self.fresh = false;
+        Ok(())
     }
 
     /// Writes an entry. It is safe after the next [`CsvFolder::sync`].
@@ -75,11 +93,7 @@ impl CsvFolder {
         };
         let file = match &mut self.files[at] {
             Some(file) => file,
-            none => none.insert(Channel::create(
-                &self.folder.join(file_name(at)),
-                kind,
-                self.force,
-            )?),
+            none => none.insert(Channel::create(&self.folder.join(file_name(at)), kind)?),
         };
         file.write(entry)
     }
@@ -99,16 +113,33 @@ impl CsvFolder {
     }
 
     /// Takes away what is not safe, so that each file ends with a whole line.
-    pub fn abandon(self) {
-        for file in self.files.into_iter().flatten() {
+    pub fn abandon(&mut self) {
+        for file in self.files.iter().flatten() {
             file.sink.cut();
         }
     }
 }
 
+impl Drop for CsvFolder {
+    fn drop(&mut self) {
+        if self.fresh {
+            // Only an empty one goes.
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// What a line of a channel's file is made of.
+fn shape(kind: Kind) -> &'static NamedType {
+    match kind {
+        Kind::Gauges => GaugeRow::SCHEMA,
+        kind => kind.shape(),
+    }
+}
+
 impl Channel {
-    fn create(path: &Path, kind: Kind, force: bool) -> Result<Self, RecordingError> {
-        let sink = Sink::create(path, force)?;
+    fn create(path: &Path, kind: Kind) -> Result<Self, RecordingError> {
+        let sink = Sink::create(path, false)?;
         let writer = sink.writer()?;
         let mut channel = Self {
             sink,
@@ -118,23 +149,38 @@ impl Channel {
             cells: Vec::new(),
             dirty: true,
         };
-        channel.cells = ["log_time_s", "publish_time_s"].map(str::to_owned).to_vec();
-        channel.cells.append(&mut columns(kind.shape()));
+        channel.cells = vec!["time_s".to_owned()];
+        channel.cells.append(&mut columns(shape(kind)));
         channel.write_cells()?;
         Ok(channel)
     }
 
     fn write(&mut self, entry: &Entry) -> Result<(), RecordingError> {
-        self.cells.clear();
-        for ns in [entry.log_ns, entry.publish_ns] {
-            let text = format!("{}.{:09}", ns / NS_PER_S, ns % NS_PER_S);
-            self.cells.push(text);
+        if let Row::Gauges(block) = &entry.row {
+            let mut ns = entry.log_ns;
+            for row in GaugeRow::all(&Gauges::from(block)) {
+                let value = serde_json::to_value(row);
+                let value = value.map_err(|error| self.failed(error.into()))?;
+                self.write_line(ns, GaugeRow::SCHEMA, &value)?;
+                ns += SAMPLE_US * NS_PER_US;
+            }
+            return Ok(());
         }
-        let value = entry
-            .row
-            .value()
-            .map_err(|error| self.failed(error.into()))?;
-        cells(entry.row.kind().shape(), Some(&value), &mut self.cells);
+        let value = entry.row.value();
+        let value = value.map_err(|error| self.failed(error.into()))?;
+        self.write_line(entry.log_ns, entry.row.kind().shape(), &value)
+    }
+
+    fn write_line(
+        &mut self,
+        ns: u64,
+        shape: &'static NamedType,
+        value: &Value,
+    ) -> Result<(), RecordingError> {
+        self.cells.clear();
+        let time = format!("{}.{:09}", ns / NS_PER_S, ns % NS_PER_S);
+        self.cells.push(time);
+        cells(shape, Some(value), &mut self.cells);
         self.write_cells()
     }
 
@@ -150,7 +196,8 @@ impl Channel {
             let flushed = self.writer.flush();
             flushed.map_err(|source| self.failed(source))?;
         }
-        self.sink.sync()
+        self.sink.sync()?;
+        self.sink.keep()
     }
 
     fn failed(&self, source: io::Error) -> RecordingError {

@@ -51,21 +51,29 @@ pub fn part_path(path: &Path, part: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// A later part of an earlier recording of this name, which would be in the way hours from now.
-fn later_part(path: &Path) -> Option<PathBuf> {
+/// The later parts of an earlier recording of this name, which would be in the way hours from now, or be
+/// taken for this one's.
+fn later_parts(path: &Path) -> Vec<PathBuf> {
+    found_parts(path).unwrap_or_default()
+}
+
+fn found_parts(path: &Path) -> Option<Vec<PathBuf>> {
     let folder = path.parent().filter(|folder| folder.as_os_str() != "");
     let stem = path.file_stem()?.to_str()?;
-    fs::read_dir(folder.unwrap_or(Path::new(".")))
+    let parts = fs::read_dir(folder.unwrap_or(Path::new(".")))
         .ok()?
         .flatten()
         .map(|entry| entry.path())
-        .find(|found| {
+        .filter(|found| {
             found.extension() == path.extension()
                 && found
                     .file_stem()
                     .and_then(|found| found.to_str()?.strip_prefix(stem)?.strip_prefix('-'))
-                    .is_some_and(|number| number.parse::<u32>().is_ok())
-        })
+                    .and_then(|number| number.parse().ok())
+                    // Not 1, and no number that is written otherwise.
+                    .is_some_and(|number| number > 1 && part_path(path, number) == *found)
+        });
+    Some(parts.collect())
 }
 
 fn about(part: u32) -> BTreeMap<String, String> {
@@ -113,10 +121,12 @@ impl RecordingFiles {
         if settings.mcap.is_none() && settings.csv.is_none() {
             return Err(RecordingError::Nowhere);
         }
-        if let Some(path) = settings.mcap.as_deref().and_then(later_part)
+        let old_parts = settings.mcap.as_deref().map_or(Vec::new(), later_parts);
+        if let Some(path) = old_parts.first()
             && settings.part.is_some()
             && !settings.force
         {
+            let path = path.clone();
             return Err(RecordingError::Exists { path });
         }
         let mcap = settings
@@ -128,26 +138,30 @@ impl RecordingFiles {
             .csv
             .as_deref()
             .map(|folder| CsvFolder::create(folder, settings.force))
-            .transpose();
-        match csv {
-            Ok(csv) => Ok(Self {
-                settings,
-                mcap,
-                csv,
-                part: 1,
-                begun: Instant::now(),
-                ended_bytes: 0,
-                boards: BTreeMap::new(),
-            }),
-            Err(error) => {
-                // Nothing has been recorded: nothing should look as if.
-                drop(mcap);
-                if let Some(path) = &settings.mcap {
-                    let _ = fs::remove_file(path);
-                }
-                Err(error)
+            .transpose()?;
+        let mut files = Self {
+            settings,
+            mcap,
+            csv,
+            part: 1,
+            begun: Instant::now(),
+            ended_bytes: 0,
+            boards: BTreeMap::new(),
+        };
+        // Nothing old goes before everything new is there.
+        if let Some(csv) = &mut files.csv {
+            csv.keep()?;
+        }
+        if let Some(mcap) = &mut files.mcap {
+            mcap.keep()?;
+        }
+        if files.settings.force {
+            for path in old_parts {
+                fs::remove_file(&path)
+                    .map_err(|source| RecordingError::NotMade { path, source })?;
             }
         }
+        Ok(files)
     }
 
     /// Writes an entry. It is safe after the next [`RecordingFiles::sync`].
@@ -218,6 +232,7 @@ impl RecordingFiles {
         self.begun = Instant::now();
         let path = part_path(path, self.part);
         let mut mcap = McapFile::create(&path, self.settings.force, about(self.part))?;
+        mcap.keep()?;
         for (name, facts) in &self.boards {
             mcap.tell(name, facts.map())?;
         }
@@ -251,7 +266,7 @@ impl RecordingFiles {
         if let Some(mcap) = self.mcap {
             mcap.abandon();
         }
-        if let Some(csv) = self.csv {
+        if let Some(mut csv) = self.csv {
             csv.abandon();
         }
     }

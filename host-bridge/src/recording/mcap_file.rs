@@ -3,6 +3,8 @@
 //! It is only ever appended to, chunk by chunk, so that whatever cuts it off leaves whole chunks behind.
 //! The writer keeps some 600 bytes of index a chunk until the end, which is why a long recording goes on
 //! in a new file from time to time: see [`super::Settings::part`].
+//!
+//! It is written as ROS 2 writes its own: the profile `ros2`, schemas in `ros2msg`, messages in CDR.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write};
@@ -10,30 +12,41 @@ use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions, Writer};
+use ros2msg::Definition;
 
 use super::error::RecordingError;
-use super::json_schema::JsonSchema;
+use super::ros2;
 use super::row::{CHANNELS, channel, topic};
 use super::row_builder::Entry;
 use super::sink::{Sink, SinkWriter};
 
-/// What stands in the file's header, for programs that want to know whom it is of.
-pub const PROFILE: &str = "ridgelink";
+/// What stands in the file's header: it can be read as a recording of ROS 2.
+pub const PROFILE: &str = "ros2";
+/// What stands in the file's header before this program's version.
+pub const LIBRARY: &str = "host-bridge ";
 /// The metadata record that tells of the recording as a whole.
 pub const ABOUT: &str = "ridgelink";
 /// The version of the rows: raised when one changes so that older programs can't read it.
-pub const FORMAT: &str = "1";
-/// Before it is compressed. A second of everything is a quarter of it.
+pub const FORMAT: &str = "2";
+/// Before it is compressed: more than a second of everything, so that what closes a chunk is the time.
 const CHUNK_BYTES: u64 = 1 << 20;
+/// zstd's.
+const COMPRESSION_LEVEL: u32 = 6;
+/// The other keys of a channel in a recording of ROS 2.
+const QOS: (&str, &str) = ("offered_qos_profiles", "");
 
 /// A file that is being written.
 pub struct McapFile {
     sink: Sink,
     writer: Writer<BufWriter<SinkWriter>>,
-    ids: Vec<u16>,
-    sequences: [u32; CHANNELS.len()],
-    json: Vec<u8>,
+    channels: Vec<Channel>,
+    cdr: Vec<u8>,
     dirty: bool,
+}
+
+struct Channel {
+    id: u16,
+    definition: Definition,
 }
 
 fn reason(error: McapError) -> io::Error {
@@ -44,21 +57,28 @@ fn reason(error: McapError) -> io::Error {
 }
 
 impl McapFile {
-    /// Makes a file, with all schemas and channels in it; `force` writes over one that is there.
+    /// Makes a file, with all schemas and channels in it; `force` takes the place of one that is there, at
+    /// [`McapFile::keep`].
     ///
     /// # Errors
-    /// If there is one already, or it can't be made or written.
+    /// If there is one already, or it can't be made or written; then none is made.
     pub fn create(
         path: &Path,
         force: bool,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordingError> {
         let sink = Sink::create(path, force)?;
+        Self::begin(sink, about)
+    }
+
+    /// What was made goes with the sink if this fails.
+    fn begin(sink: Sink, about: BTreeMap<String, String>) -> Result<Self, RecordingError> {
         let writer = BufWriter::new(sink.writer()?);
         let writer = WriteOptions::new()
             .profile(PROFILE)
-            .library(concat!("host-bridge ", env!("CARGO_PKG_VERSION")))
+            .library(&format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
+            .compression_level(COMPRESSION_LEVEL)
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
             // Chunks are made in memory: nothing that is in the file is ever touched again.
@@ -68,9 +88,8 @@ impl McapFile {
         let mut mcap = Self {
             sink,
             writer,
-            ids: Vec::with_capacity(CHANNELS.len()),
-            sequences: [0; CHANNELS.len()],
-            json: Vec::new(),
+            channels: Vec::with_capacity(CHANNELS.len()),
+            cdr: Vec::new(),
             dirty: true,
         };
         // First of all whose it is.
@@ -82,17 +101,17 @@ impl McapFile {
     }
 
     fn add_channels(&mut self) -> Result<(), McapError> {
+        let keys = BTreeMap::from([(QOS.0.to_owned(), QOS.1.to_owned())]);
         for (role, kind) in CHANNELS {
             let shape = kind.shape();
-            let schema = serde_json::to_vec(&JsonSchema(shape)).map_err(io::Error::from)?;
-            let name = shape.name.strip_suffix("Row").unwrap_or(shape.name);
-            let schema =
-                self.writer
-                    .add_schema(&format!("ridgelink.{name}"), "jsonschema", &schema)?;
-            let id =
-                self.writer
-                    .add_channel(schema, &topic(role, kind), "json", &BTreeMap::new())?;
-            self.ids.push(id);
+            let name = ros2::name(shape);
+            let text = ros2::schema(shape).map_err(io::Error::other)?;
+            let definition = Definition::parse(&name, &text).map_err(io::Error::other)?;
+            let schema = self.writer.add_schema(&name, "ros2msg", text.as_bytes())?;
+            let id = self
+                .writer
+                .add_channel(schema, &topic(role, kind), "cdr", &keys)?;
+            self.channels.push(Channel { id, definition });
         }
         Ok(())
     }
@@ -131,21 +150,24 @@ impl McapFile {
             return Ok(());
         };
         self.dirty = true;
-        self.json.clear();
+        let written = self.append(at, entry);
+        written.map_err(|error| self.failed(error))
+    }
+
+    fn append(&mut self, at: usize, entry: &Entry) -> io::Result<()> {
+        let channel = &self.channels[at];
         let header = MessageHeader {
-            channel_id: self.ids[at],
-            sequence: self.sequences[at],
+            channel_id: channel.id,
+            // None: messages that can be lost carry their own, and this one would take 6 % of the file.
+            sequence: 0,
             log_time: entry.log_ns,
-            publish_time: entry.publish_ns,
+            publish_time: entry.log_ns,
         };
-        self.sequences[at] = self.sequences[at].wrapping_add(1);
-        entry
-            .row
-            .write(&mut self.json)
-            .map_err(|error| self.failed(error.into()))?;
-        self.writer
-            .write_to_known_channel(&header, &self.json)
-            .map_err(|error| self.failed(reason(error)))
+        let value = ros2::outward(entry.row.kind().shape(), &entry.row.value()?);
+        self.cdr.clear();
+        ros2msg::encode(&channel.definition, &value, &mut self.cdr).map_err(io::Error::other)?;
+        let written = self.writer.write_to_known_channel(&header, &self.cdr);
+        written.map_err(reason)
     }
 
     /// Closes the chunk and makes everything written so far safe.
@@ -159,6 +181,14 @@ impl McapFile {
                 .map_err(|error| self.failed(reason(error)))?;
         }
         self.sink.sync()
+    }
+
+    /// The file stays, and stands in the place of the one that was there; until then dropping it takes it away.
+    ///
+    /// # Errors
+    /// If it can't get that place.
+    pub fn keep(&mut self) -> Result<(), RecordingError> {
+        self.sink.keep()
     }
 
     /// Bytes that are safe.

@@ -1,6 +1,6 @@
 //! What waits to be written, between the links' threads and the one that writes.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -21,46 +21,81 @@ pub const PATIENCE: Duration = Duration::from_millis(100);
 /// room waits for it.
 pub fn queue<T>(patience: Duration) -> (Input<T>, Output<T>) {
     let (sender, receiver) = bounded(MOST);
-    let refused = Arc::new(Refused::default());
+    let refused = Arc::<Mutex<Refused>>::default();
     let input = Input {
         sender: Mutex::new(Some(sender)),
         refused: Arc::clone(&refused),
+        is_stuck: AtomicBool::new(false),
         patience,
     };
-    (input, Output { receiver, refused })
+    let output = Output {
+        receiver,
+        refused,
+        told: Vec::new(),
+        next: None,
+    };
+    (input, output)
 }
 
-/// What was not taken.
+/// What was not taken since it was told last.
 #[derive(Default)]
-struct Refused {
-    /// Since it was told last, of the sensor and of the display.
-    counts: [AtomicU64; 2],
-    /// Nobody takes anything: there is no use in waiting for room.
-    is_stuck: AtomicBool,
+struct Refused(Vec<Loss>);
+
+/// Some of a board that were not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loss {
+    /// The board.
+    pub role: Role,
+    /// How many.
+    pub count: u64,
+    /// When the first of them was put in, in µs of this host's clock.
+    pub at_us: u64,
 }
 
-const ROLES: [Role; 2] = [Role::Sensor, Role::Display];
+impl Refused {
+    fn add(&mut self, loss: Loss) {
+        match self.0.iter_mut().find(|known| known.role == loss.role) {
+            Some(known) => {
+                known.count += loss.count;
+                known.at_us = known.at_us.min(loss.at_us);
+            }
+            None => self.0.push(loss),
+        }
+    }
+}
+
+/// Something, and what was not taken right before it.
+struct Waiting<T> {
+    losses: Vec<Loss>,
+    item: T,
+}
 
 /// Where things are put in.
 pub struct Input<T> {
     /// `None` once it is closed.
-    sender: Mutex<Option<Sender<T>>>,
-    refused: Arc<Refused>,
+    sender: Mutex<Option<Sender<Waiting<T>>>>,
+    refused: Arc<Mutex<Refused>>,
+    /// Nobody takes anything: there is no use in waiting for room.
+    is_stuck: AtomicBool,
     patience: Duration,
 }
 
 /// Where they are taken out. Dropping it throws away what waits, and what will be put in.
 pub struct Output<T> {
-    receiver: Receiver<T>,
-    refused: Arc<Refused>,
+    receiver: Receiver<Waiting<T>>,
+    refused: Arc<Mutex<Refused>>,
+    /// To be told before anything else.
+    told: Vec<Loss>,
+    /// Comes after what is to be told.
+    next: Option<T>,
 }
 
 /// What a look at the queue gives.
 pub enum Taken<T> {
     /// The next one.
     Item(T),
-    /// So many of a board were not taken before the next one.
-    Refused(Role, u64),
+    /// Some were not taken, between the one before and the next one.
+    Refused(Loss),
     /// Nothing has come by the time given.
     Nothing,
     /// Nothing will come any more.
@@ -68,23 +103,34 @@ pub enum Taken<T> {
 }
 
 impl<T> Input<T> {
-    /// Puts in what is of the board of `role`, or counts it as refused.
-    pub fn put(&self, role: Role, item: T) {
+    /// Puts in what is of the board of `role`, of `at_us` of this host's clock, or counts it as refused.
+    pub fn put(&self, role: Role, at_us: u64, item: T) {
         // The lock is not held while room is waited for.
         let Some(sender) = locked(&self.sender).clone() else {
             return;
         };
-        let Refused { counts, is_stuck } = &*self.refused;
-        let is_refused = match sender.try_send(item) {
-            Err(TrySendError::Full(item)) if !is_stuck.load(Ordering::Relaxed) => {
-                let sent = sender.send_timeout(item, self.patience);
-                matches!(sent, Err(SendTimeoutError::Timeout(_)))
+        // Whatever gets in next tells of what did not.
+        let losses = std::mem::take(&mut locked(&self.refused).0);
+        let waiting = Waiting { losses, item };
+        let refused = match sender.try_send(waiting) {
+            Err(TrySendError::Full(waiting)) if !self.is_stuck.load(Ordering::Relaxed) => {
+                match sender.send_timeout(waiting, self.patience) {
+                    Err(SendTimeoutError::Timeout(waiting)) => Some(waiting),
+                    _ => None,
+                }
             }
-            sent => matches!(sent, Err(TrySendError::Full(_))),
+            Err(TrySendError::Full(waiting)) => Some(waiting),
+            _ => None,
         };
-        is_stuck.store(is_refused, Ordering::Relaxed);
-        if is_refused {
-            counts[usize::from(role == Role::Display)].fetch_add(1, Ordering::Relaxed);
+        self.is_stuck.store(refused.is_some(), Ordering::Relaxed);
+        if let Some(waiting) = refused {
+            let mut refused = locked(&self.refused);
+            waiting
+                .losses
+                .into_iter()
+                .for_each(|loss| refused.add(loss));
+            let count = 1;
+            refused.add(Loss { role, count, at_us });
         }
     }
 
@@ -96,22 +142,39 @@ impl<T> Input<T> {
 
 impl<T> Output<T> {
     /// Takes the next one, waiting for it until `until`.
-    pub fn take(&self, until: Instant) -> Taken<T> {
-        if let Ok(item) = self.receiver.try_recv() {
-            return Taken::Item(item);
+    pub fn take(&mut self, until: Instant) -> Taken<T> {
+        if let Some(ready) = self.ready() {
+            return ready;
         }
-        // What was refused came after all that waited.
-        for (role, count) in ROLES.into_iter().zip(&self.refused.counts) {
-            let refused = count.swap(0, Ordering::Relaxed);
-            if refused > 0 {
-                return Taken::Refused(role, refused);
+        let waiting = match self.receiver.try_recv() {
+            Ok(waiting) => Some(waiting),
+            // Nothing has got in since they were refused.
+            Err(_) => {
+                self.told = std::mem::take(&mut locked(&self.refused).0);
+                if let Some(ready) = self.ready() {
+                    return ready;
+                }
+                match self.receiver.recv_deadline(until) {
+                    Ok(waiting) => Some(waiting),
+                    Err(RecvTimeoutError::Timeout) => None,
+                    Err(RecvTimeoutError::Disconnected) => return Taken::Closed,
+                }
             }
+        };
+        let Some(waiting) = waiting else {
+            return Taken::Nothing;
+        };
+        self.told = waiting.losses;
+        self.next = Some(waiting.item);
+        self.ready().unwrap_or(Taken::Nothing)
+    }
+
+    /// What has been taken already.
+    fn ready(&mut self) -> Option<Taken<T>> {
+        if let Some(loss) = self.told.pop() {
+            return Some(Taken::Refused(loss));
         }
-        match self.receiver.recv_deadline(until) {
-            Ok(item) => Taken::Item(item),
-            Err(RecvTimeoutError::Timeout) => Taken::Nothing,
-            Err(RecvTimeoutError::Disconnected) => Taken::Closed,
-        }
+        self.next.take().map(Taken::Item)
     }
 }
 
@@ -125,10 +188,10 @@ mod tests {
     const LIMIT: Duration = Duration::from_secs(120);
 
     /// What waits now, in words.
-    fn taken(output: &Output<usize>) -> String {
+    fn taken(output: &mut Output<usize>) -> String {
         match output.take(Instant::now()) {
             Taken::Item(item) => item.to_string(),
-            Taken::Refused(role, count) => format!("{count} of the {}", role.name()),
+            Taken::Refused(loss) => format!("{} of the {}", loss.count, loss.role.name()),
             Taken::Nothing => "nothing".to_owned(),
             Taken::Closed => "closed".to_owned(),
         }
@@ -136,48 +199,82 @@ mod tests {
 
     fn full(patience: Duration) -> (Input<usize>, Output<usize>) {
         let (input, output) = queue(patience);
-        (0..MOST).for_each(|item| input.put(Role::Sensor, item));
+        (0..MOST).for_each(|item| input.put(Role::Sensor, 0, item));
         (input, output)
     }
 
     #[test]
     fn what_is_put_in_comes_out_in_order_whoever_put_it_in() {
-        let (input, output) = queue(PATIENCE);
+        let (input, mut output) = queue(PATIENCE);
         let roles = [Role::Sensor, Role::Display, Role::Sensor];
         for (item, role) in roles.into_iter().enumerate() {
-            input.put(role, item);
+            input.put(role, 0, item);
         }
-        let out = [(); 4].map(|()| taken(&output));
+        let out = [(); 4].map(|()| taken(&mut output));
         assert_eq!(out, ["0", "1", "2", "nothing"]);
     }
 
     #[test]
     fn a_disk_that_stands_still_holds_its_speaker_up_only_once_and_what_is_missing_is_told_at_its_place()
      {
-        let (input, output) = full(PATIENCE);
+        let (input, mut output) = full(PATIENCE);
         let began = Instant::now();
-        input.put(Role::Display, MOST);
+        input.put(Role::Display, 0, MOST);
         assert!(began.elapsed() >= PATIENCE);
         // From now on nobody waits: two thousand times the patience would be over the limit.
         for item in 0..2_000 {
-            input.put(Role::Display, item);
+            input.put(Role::Display, 0, item);
         }
-        input.put(Role::Sensor, 0);
+        input.put(Role::Sensor, 0, 0);
         assert!(began.elapsed() < LIMIT, "{:?}", began.elapsed());
         // What waits was there before what was refused.
-        assert!((0..MOST).all(|item| taken(&output) == item.to_string()));
-        let out = [(); 3].map(|()| taken(&output));
+        assert!((0..MOST).all(|item| taken(&mut output) == item.to_string()));
+        let out = [(); 3].map(|()| taken(&mut output));
         assert_eq!(out, ["1 of the sensor", "2001 of the display", "nothing"]);
         // The disk has caught up: all is taken again, in order.
-        input.put(Role::Display, 7);
-        assert_eq!(taken(&output), "7");
+        input.put(Role::Display, 0, 7);
+        assert_eq!(taken(&mut output), "7");
+    }
+
+    #[test]
+    fn what_is_missing_is_told_before_what_came_later() {
+        let (input, mut output) = full(Duration::ZERO);
+        for at_us in [70, 80] {
+            input.put(Role::Display, at_us, 0);
+        }
+        assert_eq!(taken(&mut output), "0");
+        input.put(Role::Sensor, 90, MOST);
+        // Full again.
+        input.put(Role::Sensor, 100, 0);
+        assert_eq!(taken(&mut output), "1");
+        input.put(Role::Display, 110, MOST + 1);
+        assert!((2..MOST).all(|item| taken(&mut output) == item.to_string()));
+        match output.take(Instant::now()) {
+            Taken::Refused(loss) => {
+                let want = Loss {
+                    role: Role::Display,
+                    count: 2,
+                    at_us: 70,
+                };
+                assert_eq!(loss, want);
+            }
+            _ => panic!("the loss is missing"),
+        }
+        let out = [(); 4].map(|()| taken(&mut output));
+        let want = [
+            MOST.to_string(),
+            "1 of the sensor".to_owned(),
+            (MOST + 1).to_string(),
+            "nothing".to_owned(),
+        ];
+        assert_eq!(out, want);
     }
 
     #[test]
     fn a_disk_that_is_slower_than_what_comes_slows_it_down_and_loses_nothing() {
-        let (input, output) = full(LIMIT);
+        let (input, mut output) = full(LIMIT);
         let speaker = thread::spawn(move || {
-            (MOST..MOST + 100).for_each(|item| input.put(Role::Sensor, item));
+            (MOST..MOST + 100).for_each(|item| input.put(Role::Sensor, 0, item));
         });
         // Room is made one by one, for a speaker that waits for it.
         for want in 0..MOST + 100 {
@@ -187,19 +284,19 @@ mod tests {
             }
         }
         speaker.join().expect("it only talks");
-        assert_eq!(taken(&output), "closed");
+        assert_eq!(taken(&mut output), "closed");
     }
 
     #[test]
     fn a_queue_that_is_closed_still_gives_what_waits_and_one_whose_end_is_gone_takes_nothing() {
-        let (input, output) = full(LIMIT);
+        let (input, mut output) = full(LIMIT);
         input.close();
         // Nothing is waited for, and nothing counted.
-        input.put(Role::Sensor, MOST);
-        assert!((0..MOST).all(|item| taken(&output) == item.to_string()));
-        assert_eq!(taken(&output), "closed");
+        input.put(Role::Sensor, 0, MOST);
+        assert!((0..MOST).all(|item| taken(&mut output) == item.to_string()));
+        assert_eq!(taken(&mut output), "closed");
         let (input, output) = full(LIMIT);
         drop(output);
-        input.put(Role::Sensor, MOST);
+        input.put(Role::Sensor, 0, MOST);
     }
 }

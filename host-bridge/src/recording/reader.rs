@@ -1,21 +1,30 @@
 //! Reads a recording back, from start to end, without holding it in memory. One that was cut off is read
 //! as far as it goes.
+//!
+//! | format | profile | messages |
+//! | --- | --- | --- |
+//! | 2 | `ros2` | CDR, by the file's own `ros2msg` schemas: fields that are new or gone are no matter |
+//! | 1 | `ridgelink` | JSON; a row for each sample of the gauges |
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use protocol::Role;
+use protocol::{GAUGE_BLOCK, PROTOCOL_VERSION, Role};
+use ros2msg::{DecodeError, Definition, DefinitionError, decode};
 
 use super::files::CONFIGURATION;
-use super::mcap_file::{ABOUT, FORMAT, PROFILE};
-use super::row::{CHANNELS, Kind, Row, topic};
+use super::mcap_file::{ABOUT, FORMAT, LIBRARY, PROFILE};
+use super::ros2;
+use super::row::{CHANNELS, GaugeRow, Kind, Row, block, topic};
 use super::row_builder::Entry;
 
+/// The profile of recordings of format 1, and that format.
+const OLD: (&str, &str) = ("ridgelink", "1");
 /// Read at a time.
 const READ_BYTES: usize = 1 << 16;
 /// Longer records are none of a recording: a damaged length must not ask for all memory.
@@ -61,6 +70,16 @@ pub enum ReadError {
         /// What is wrong.
         source: McapError,
     },
+    /// A channel's schema is no definition of messages.
+    #[error("{path}: the schema of {topic}: {source}")]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// The channel.
+        topic: String,
+        /// What is wrong.
+        source: DefinitionError,
+    },
     /// What is on a channel does not belong there.
     #[error("{path}: {topic} at {at_s:.3} s: {source}")]
     Row {
@@ -71,8 +90,19 @@ pub enum ReadError {
         /// Its time since the recording's start, in s.
         at_s: f64,
         /// What is wrong.
-        source: serde_json::Error,
+        source: RowError,
     },
+}
+
+/// What is wrong with a row.
+#[derive(Debug, thiserror::Error)]
+pub enum RowError {
+    /// It is not as its schema says.
+    #[error(transparent)]
+    Bytes(#[from] DecodeError),
+    /// It is as its schema says, and no row of this version.
+    #[error(transparent)]
+    Fields(#[from] serde_json::Error),
 }
 
 /// A recording that is being read.
@@ -80,13 +110,27 @@ pub struct Reader {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    channels: BTreeMap<u16, (Role, Kind)>,
+    /// Their names and texts.
+    schemas: BTreeMap<u16, (String, String)>,
+    channels: BTreeMap<u16, Channel>,
+    /// The protocol's version that the boards were to speak.
+    protocol: u16,
+    passed_over: u64,
+    /// Samples of format 1 that are no whole block yet, and the first one's time.
+    samples: (u64, Vec<GaugeRow>),
     first_ns: Option<u64>,
     /// The last that was read, for error messages.
     last: Option<(String, f64)>,
     ended: Option<Ending>,
     /// Configurations that a later part of a recording tells at its beginning.
     told: Vec<(Role, Row)>,
+}
+
+struct Channel {
+    role: Role,
+    kind: Kind,
+    /// None if its messages are JSON.
+    definition: Option<Definition>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +161,11 @@ impl Reader {
             path: path.to_owned(),
             file,
             reader: LinearReader::new_with_options(options),
+            schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            protocol: 0,
+            passed_over: 0,
+            samples: (0, Vec::with_capacity(GAUGE_BLOCK)),
             first_ns: None,
             last: None,
             ended: None,
@@ -133,27 +181,37 @@ impl Reader {
             path: path.to_owned(),
             what: what.to_owned(),
         };
-        let mut profile = None;
+        let mut format = None;
         loop {
             let record = match self.next_record() {
-                Err(ReadError::Damaged { path, .. }) if profile.is_none() => {
+                Err(ReadError::Damaged { path, .. }) if format.is_none() => {
                     return Err(foreign(&path, "is no MCAP file"));
                 }
                 record => record?,
             };
             match record {
                 None => return Err(foreign(&self.path, "ends before anything was recorded")),
-                Some(Record::Header(header)) if header.profile != PROFILE => {
-                    let what = format!("was made by another program ({})", header.library);
-                    return Err(foreign(&self.path, &what));
+                Some(Record::Header(header)) => {
+                    format = Some(match header.profile.as_str() {
+                        PROFILE if header.library.starts_with(LIBRARY) => FORMAT,
+                        profile if profile == OLD.0 => OLD.1,
+                        _ => {
+                            let what = format!("was made by another program ({})", header.library);
+                            return Err(foreign(&self.path, &what));
+                        }
+                    });
                 }
-                Some(Record::Header(header)) => profile = Some(header.profile),
                 Some(Record::Metadata(metadata)) if metadata.name == ABOUT => {
-                    let format = metadata.metadata.get("format").cloned().unwrap_or_default();
-                    if format != FORMAT {
+                    let told = |key: &str| metadata.metadata.get(key).cloned().unwrap_or_default();
+                    let told_format = told("format");
+                    if format != Some(told_format.as_str()) {
                         let path = self.path.clone();
-                        return Err(ReadError::Newer { path, format });
+                        return Err(ReadError::Newer {
+                            path,
+                            format: told_format,
+                        });
                     }
+                    self.protocol = told("protocol").parse().unwrap_or(0);
                     return Ok(());
                 }
                 Some(_) => {}
@@ -189,25 +247,61 @@ impl Reader {
             let Record::Message { header, data } = record else {
                 continue;
             };
-            let Some(&(role, kind)) = self.channels.get(&header.channel_id) else {
+            let Some(channel) = self.channels.get(&header.channel_id) else {
                 continue;
             };
-            self.first_ns.get_or_insert(header.log_time);
-            let at_s = self.since_start_s(header.log_time);
-            let row = kind.read(&data).map_err(|source| ReadError::Row {
-                path: self.path.clone(),
-                topic: topic(role, kind),
-                at_s,
-                source,
-            })?;
+            let (role, kind) = (channel.role, channel.kind);
+            let read = channel.read(&data);
+            let log_ns = header.log_time;
+            self.first_ns.get_or_insert(log_ns);
+            let at_s = self.since_start_s(log_ns);
             self.last = Some((topic(role, kind), at_s));
-            return Ok(Some(Entry {
-                role,
-                row,
-                log_ns: header.log_time,
-                publish_ns: header.publish_time,
-            }));
+            let (row, log_ns) = match read {
+                Ok(Read::Row(row)) => (row, log_ns),
+                Ok(Read::Sample(sample)) => match self.gather(sample, log_ns) {
+                    Some(whole) => whole,
+                    None => continue,
+                },
+                // What an older board said may be no word of this version any more.
+                Err(RowError::Fields(_)) if self.protocol < PROTOCOL_VERSION => {
+                    self.passed_over += 1;
+                    continue;
+                }
+                Err(source) => {
+                    return Err(ReadError::Row {
+                        path: self.path.clone(),
+                        topic: topic(role, kind),
+                        at_s,
+                        source,
+                    });
+                }
+            };
+            return Ok(Some(Entry { role, row, log_ns }));
         }
+    }
+
+    /// Takes a sample of format 1; the block that it completes, and the time of its first.
+    fn gather(&mut self, sample: GaugeRow, log_ns: u64) -> Option<(Row, u64)> {
+        let (first_ns, samples) = &mut self.samples;
+        let follows = samples
+            .first()
+            .is_some_and(|first| first.block == sample.block);
+        if !follows {
+            samples.clear();
+            *first_ns = log_ns;
+        }
+        samples.push(sample);
+        if samples.len() < GAUGE_BLOCK {
+            return None;
+        }
+        let whole = block(samples);
+        samples.clear();
+        Some((Row::Gauges((&whole?).into()), *first_ns))
+    }
+
+    /// Rows of an older protocol that say nothing in this version's, so far.
+    pub const fn passed_over(&self) -> u64 {
+        self.passed_over
     }
 
     /// The configurations that the file told so far of boards that reported them in an earlier part.
@@ -240,7 +334,7 @@ impl Reader {
                             break;
                         }
                         Ok(record) => {
-                            self.note(&record);
+                            self.note(&record)?;
                             return Ok(Some(record));
                         }
                         Err(error) => error,
@@ -263,14 +357,34 @@ impl Reader {
         Ok(None)
     }
 
-    fn note(&mut self, record: &Record<'_>) {
+    fn note(&mut self, record: &Record<'_>) -> Result<(), ReadError> {
         match record {
+            Record::Schema { header, data } if header.encoding == "ros2msg" => {
+                let text = String::from_utf8_lossy(data).into_owned();
+                self.schemas.insert(header.id, (header.name.clone(), text));
+            }
             Record::Channel(found) => {
                 let known = CHANNELS
                     .into_iter()
                     .find(|&(role, kind)| topic(role, kind) == found.topic);
-                self.channels
-                    .extend(known.map(|channel| (found.id, channel)));
+                if let Some((role, kind)) = known {
+                    let schema = self.schemas.get(&found.schema_id);
+                    let schema = schema.filter(|_| found.message_encoding == "cdr");
+                    let definition = schema
+                        .map(|(name, text)| Definition::parse(name, text))
+                        .transpose()
+                        .map_err(|source| ReadError::Schema {
+                            path: self.path.clone(),
+                            topic: found.topic.clone(),
+                            source,
+                        })?;
+                    let channel = Channel {
+                        role,
+                        kind,
+                        definition,
+                    };
+                    self.channels.insert(found.id, channel);
+                }
             }
             Record::Metadata(metadata) => {
                 let configurations = [
@@ -282,12 +396,34 @@ impl Reader {
                     .find(|(role, _)| role.name() == metadata.name);
                 if let (Some((role, kind)), Some(json)) =
                     (told, metadata.metadata.get(CONFIGURATION))
-                    && let Ok(row) = kind.read(json.as_bytes())
+                    && let Ok(row) = serde_json::from_str(json).and_then(|json| kind.row(json))
                 {
                     self.told.push((role, row));
                 }
             }
             _ => {}
         }
+        Ok(())
+    }
+}
+
+/// What a message is.
+enum Read {
+    Row(Row),
+    /// Of format 1, which has a message for each.
+    Sample(GaugeRow),
+}
+
+impl Channel {
+    fn read(&self, data: &[u8]) -> Result<Read, RowError> {
+        let Some(definition) = &self.definition else {
+            return Ok(match self.kind {
+                Kind::Gauges => Read::Sample(serde_json::from_slice(data)?),
+                kind => Read::Row(kind.row(serde_json::from_slice(data)?)?),
+            });
+        };
+        let value = decode(definition, data)?;
+        let json = ros2::inward(self.kind.shape(), value);
+        Ok(Read::Row(self.kind.row(json)?))
     }
 }

@@ -1,23 +1,24 @@
 //! What is written down: rows, one kind a channel, made of plain numbers, booleans and texts.
 
-use std::io;
-
 use postcard_schema::Schema;
 use postcard_schema::schema::NamedType;
 use protocol::{Motion, PortCounters, Role};
+use serde_json::Value;
 
 mod configuration;
 mod estimate;
 mod gauges;
 mod link;
+mod log;
 mod number;
 mod status;
 mod text;
 
-pub use configuration::{DisplayConfigurationRow, SensorConfigurationRow};
+pub use configuration::{DisplayReportRow, SensorReportRow};
 pub use estimate::EstimateRow;
-pub use gauges::{GaugeRow, VOLTS_PER_CODE, block};
+pub use gauges::{GaugeRow, GaugesRow, SAMPLE_US, VOLTS_PER_CODE, block};
 pub use link::{ClockRow, HelloRow, LinkEvent, LinkRow, Lost, OtherRow};
+pub use log::{LEVELS, LogRow, Time};
 pub use status::{DisplayStatusRow, SafetyRow, SensorStatusRow, Stand, StandName};
 pub use text::Text;
 
@@ -54,9 +55,9 @@ macro_rules! rows {
             ///
             /// # Errors
             /// If it is none of this kind.
-            pub fn read(self, json: &[u8]) -> serde_json::Result<Row> {
+            pub fn row(self, json: Value) -> serde_json::Result<Row> {
                 match self {
-                    $(Self::$kind => serde_json::from_slice(json).map(Row::$kind),)*
+                    $(Self::$kind => serde_json::from_value(json).map(Row::$kind),)*
                 }
             }
         }
@@ -69,21 +70,11 @@ macro_rules! rows {
                 }
             }
 
-            /// Writes it as JSON.
-            ///
-            /// # Errors
-            /// If `out` does not take it.
-            pub fn write(&self, out: impl io::Write) -> serde_json::Result<()> {
-                match self {
-                    $(Self::$kind(row) => serde_json::to_writer(out, row),)*
-                }
-            }
-
             /// It as JSON.
             ///
             /// # Errors
             /// None: every row can be said in JSON.
-            pub fn value(&self) -> serde_json::Result<serde_json::Value> {
+            pub fn value(&self) -> serde_json::Result<Value> {
                 match self {
                     $(Self::$kind(row) => serde_json::to_value(row),)*
                 }
@@ -97,8 +88,8 @@ rows! {
     Estimate(EstimateRow): "estimate",
     /// The operator's hand.
     Motion(Motion): "motion",
-    /// A sample of the gauges.
-    Gauges(GaugeRow): "gauges",
+    /// Samples of the gauges.
+    Gauges(GaugesRow): "gauges",
     /// A sensor board's counters.
     SensorStatus(SensorStatusRow): "status",
     /// A display board's counters.
@@ -106,21 +97,23 @@ rows! {
     /// The supervisor has changed its state.
     Safety(SafetyRow): "safety",
     /// A sensor board's configuration, as reported.
-    SensorConfiguration(SensorConfigurationRow): "configuration",
+    SensorConfiguration(SensorReportRow): "configuration",
     /// A display board's configuration, as reported.
-    DisplayConfiguration(DisplayConfigurationRow): "configuration",
+    DisplayConfiguration(DisplayReportRow): "configuration",
     /// An answered ping: round trip and clock offset.
     Clock(ClockRow): "clock",
     /// The link to the board has changed, or something is missing.
     Link(LinkRow): "link",
     /// What this end of the line has counted.
     Line(PortCounters): "line",
+    /// A line of the firmware's log.
+    Log(LogRow): "log",
     /// Any other message.
     Other(OtherRow): "other",
 }
 
 /// Every channel of a recording: whose, and of what.
-pub const CHANNELS: [(Role, Kind); 16] = [
+pub const CHANNELS: [(Role, Kind); 18] = [
     (Role::Sensor, Kind::Estimate),
     (Role::Sensor, Kind::Gauges),
     (Role::Sensor, Kind::SensorStatus),
@@ -128,6 +121,7 @@ pub const CHANNELS: [(Role, Kind); 16] = [
     (Role::Sensor, Kind::Clock),
     (Role::Sensor, Kind::Link),
     (Role::Sensor, Kind::Line),
+    (Role::Sensor, Kind::Log),
     (Role::Sensor, Kind::Other),
     (Role::Display, Kind::Motion),
     (Role::Display, Kind::DisplayStatus),
@@ -136,6 +130,7 @@ pub const CHANNELS: [(Role, Kind); 16] = [
     (Role::Display, Kind::Clock),
     (Role::Display, Kind::Link),
     (Role::Display, Kind::Line),
+    (Role::Display, Kind::Log),
     (Role::Display, Kind::Other),
 ];
 

@@ -1,31 +1,34 @@
 //! From what a link tells to rows with their times; what is missing is found and written down, too.
 
 use protocol::{
-    ClockOffset, Configuration, GAUGE_BLOCK, Message, PortCounters, Role, RoleCounters,
+    ClockOffset, Configuration, GAUGE_BLOCK, Message, Pong, PortCounters, Role, RoleCounters,
 };
 
 use super::row::{
-    ClockRow, DisplayConfigurationRow, DisplayStatusRow, EstimateRow, GaugeRow, LinkRow, Lost,
-    OtherRow, Row, SensorConfigurationRow, SensorStatusRow,
+    CHANNELS, ClockRow, DisplayReportRow, DisplayStatusRow, EstimateRow, LinkRow, LogRow, Lost,
+    OtherRow, Row, SensorReportRow, SensorStatusRow, channel,
 };
 use crate::host_clock::unix_ns;
 use crate::link::Event;
 
 const SAMPLE_NS: u64 = 1_000_000;
+/// How far a clock may be from where its offset says, in µs, beyond the instants between which it was read:
+/// twice what two crystals 100 ppm apart drift over the eight exchanges that the offset is the best of.
+const DRIFT_US: u64 = 1_600;
 
-/// A row and its times.
+/// A row and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The board that it is of.
     pub role: Role,
     /// What is written down.
     pub row: Row,
-    /// When it was heard, in ns since 1970. Samples come eight at a time: theirs is when they were taken.
-    /// Never decreases on a channel.
+    /// When it was taken, in ns since 1970: the instant that the board gives, by its clock's offset to this
+    /// host's; when it was heard where the board gives none, or nothing is known of its clock yet. Of a block of
+    /// samples it is the first one's. Never later than when it was heard, and never decreases on a channel.
+    ///
+    /// Recordings of format 1 have the time at which it was heard here.
     pub log_ns: u64,
-    /// When it was said or taken, by the board's own clock mapped to this host's; when it was heard where
-    /// the board gives no instant, or nothing is known of its clock yet.
-    pub publish_ns: u64,
 }
 
 /// What has been counted.
@@ -49,16 +52,20 @@ pub struct RowBuilder {
     sensor: Board,
     display: Board,
     tally: Tally,
+    /// The last time on each channel.
+    last_ns: [u64; CHANNELS.len()],
 }
 
 /// What is known of a board.
 #[derive(Default)]
 struct Board {
     clock: ClockOffset,
+    /// Whether the last answer came from where the offset says: a clock that goes at another rate, such as that
+    /// of an emulator that can't keep up, tells nothing of this host's time.
+    keeps_time: bool,
     samples: Numbers,
     estimates: Numbers,
     motions: Numbers,
-    last_sample_ns: u64,
 }
 
 /// Numbers that count up by one.
@@ -81,17 +88,23 @@ impl Numbers {
 }
 
 impl Board {
-    /// Everything that a restart ends.
-    fn restart(&mut self) {
-        *self = Self {
-            last_sample_ns: self.last_sample_ns,
-            ..Self::default()
-        };
-    }
-
     /// An instant of the board's on the calendar.
     fn calendar_ns(&self, instant_us: u64) -> Option<u64> {
-        self.clock.to_own_us(instant_us).map(unix_ns)
+        let own_us = self.clock.to_own_us(instant_us);
+        own_us.filter(|_| self.keeps_time).map(unix_ns)
+    }
+
+    /// Takes an answer that was heard at `at_us`.
+    fn on_pong(&mut self, pong: &Pong, at_us: u64) {
+        let expected_us = self.clock.to_own_us(pong.answered_us);
+        self.keeps_time = expected_us.is_some_and(|own_us| {
+            (pong.sent_us.saturating_sub(DRIFT_US)..=at_us.saturating_add(DRIFT_US))
+                .contains(&own_us)
+        });
+        if !self.keeps_time {
+            self.clock.clear();
+        }
+        self.clock.on_pong(pong, at_us);
     }
 }
 
@@ -112,31 +125,23 @@ impl RowBuilder {
         at_us: u64,
         mut put: impl FnMut(Entry) -> Result<(), E>,
     ) -> Result<(), E> {
-        let log_ns = unix_ns(at_us);
+        let heard_ns = unix_ns(at_us);
         let board = match role {
             Role::Display => &mut self.display,
             Role::Sensor | Role::Host => &mut self.sensor,
         };
-        let tally = &mut self.tally;
-        let mut write = |row, publish_ns| {
-            put(Entry {
-                role,
-                row,
-                log_ns,
-                publish_ns,
-            })
-        };
         let message = match event {
             Event::StateChanged(state) => {
-                return write(Row::Link(LinkRow::turned(state)), log_ns);
+                return put(self.entry(role, Row::Link(LinkRow::turned(state)), heard_ns));
             }
             Event::Restarted => {
-                board.restart();
-                return write(Row::Link(LinkRow::restarted()), log_ns);
+                // It ends all that was known.
+                *board = Board::default();
+                return put(self.entry(role, Row::Link(LinkRow::restarted()), heard_ns));
             }
             Event::Heard { message, .. } => message,
         };
-        tally.messages += 1;
+        self.tally.messages += 1;
         let (lost, skipped) = match message {
             Message::Estimate(estimate) => {
                 (Lost::Estimates, board.estimates.take(estimate.sequence, 1))
@@ -151,38 +156,37 @@ impl RowBuilder {
             }
             _ => (Lost::Samples, 0),
         };
-        if skipped > 0 {
-            tally.gaps += 1;
-            tally.lost += u64::from(skipped);
-            write(Row::Link(LinkRow::gap(lost, skipped.into())), log_ns)?;
-        }
-        if let (Role::Sensor, Message::Gauges(gauges)) = (role, message) {
-            tally.samples += GAUGE_BLOCK as u64;
-            for (row, left) in GaugeRow::all(gauges)
-                .into_iter()
-                .zip((0..GAUGE_BLOCK as u64).rev())
-            {
-                let taken_ns = board
-                    .calendar_ns(row.instant_us)
-                    // A board whose time runs faster, as a simulator's may, was not ahead of its words.
-                    .filter(|&taken_ns| taken_ns <= log_ns)
-                    .unwrap_or_else(|| log_ns.saturating_sub(left * SAMPLE_NS))
-                    .max(board.last_sample_ns + 1);
-                board.last_sample_ns = taken_ns;
-                put(Entry {
-                    role,
-                    row: Row::Gauges(row),
-                    log_ns: taken_ns,
-                    publish_ns: taken_ns,
-                })?;
-            }
-            return Ok(());
-        }
-        let (row, instant_us) = row(role, message, at_us, &mut board.clock);
-        let publish_ns = instant_us
+        let (row, instant_us) = row(role, message, at_us, board);
+        // A block has waited for its last sample.
+        let latest_ns = match row {
+            Row::Gauges(_) => heard_ns.saturating_sub((GAUGE_BLOCK as u64 - 1) * SAMPLE_NS),
+            _ => heard_ns,
+        };
+        // A board whose time runs faster, as a simulator's may, was not ahead of its words.
+        let taken_ns = instant_us
             .and_then(|instant_us| board.calendar_ns(instant_us))
-            .map_or(log_ns, |said_ns| said_ns.min(log_ns));
-        write(row, publish_ns)
+            .map_or(latest_ns, |taken_ns| taken_ns.min(latest_ns));
+        if matches!(row, Row::Gauges(_)) {
+            self.tally.samples += GAUGE_BLOCK as u64;
+        }
+        if skipped > 0 {
+            self.tally.gaps += 1;
+            self.tally.lost += u64::from(skipped);
+            // Right before what came after what is missing.
+            let gap = Row::Link(LinkRow::gap(lost, skipped.into()));
+            put(self.entry(role, gap, taken_ns))?;
+        }
+        put(self.entry(role, row, taken_ns))
+    }
+
+    /// An entry, no earlier than the one before on its channel.
+    fn entry(&mut self, role: Role, row: Row, taken_ns: u64) -> Entry {
+        let mut log_ns = taken_ns;
+        if let Some(at) = channel(role, row.kind()) {
+            log_ns = log_ns.max(self.last_ns[at]);
+            self.last_ns[at] = log_ns;
+        }
+        Entry { role, row, log_ns }
     }
 
     /// Enters what this end of the line to the board of `role` has counted.
@@ -190,16 +194,32 @@ impl RowBuilder {
     /// # Errors
     /// Whatever `put` fails with.
     pub fn enter_counters<E>(
-        &self,
+        &mut self,
         role: Role,
         counters: PortCounters,
         at_us: u64,
         put: impl FnOnce(Entry) -> Result<(), E>,
     ) -> Result<(), E> {
-        put(now(role, Row::Line(counters), at_us))
+        put(self.entry(role, Row::Line(counters), unix_ns(at_us)))
     }
 
-    /// Enters that events of the board of `role` could not be taken.
+    /// Enters a line of the log of the board of `role`, with defmt's level.
+    ///
+    /// # Errors
+    /// Whatever `put` fails with.
+    pub fn enter_log<E>(
+        &mut self,
+        role: Role,
+        (level, text): (Option<&str>, &str),
+        at_us: u64,
+        put: impl FnOnce(Entry) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let at_ns = unix_ns(at_us);
+        let row = LogRow::new(role.name(), level, text, at_ns);
+        put(self.entry(role, Row::Log(row), at_ns))
+    }
+
+    /// Enters that events of the board of `role` could not be taken, from `at_us` on.
     ///
     /// # Errors
     /// Whatever `put` fails with.
@@ -212,28 +232,21 @@ impl RowBuilder {
     ) -> Result<(), E> {
         self.tally.unwritten += missing;
         let row = LinkRow::gap(Lost::Unwritten, missing);
-        put(now(role, Row::Link(row), at_us))
-    }
-}
-
-fn now(role: Role, row: Row, at_us: u64) -> Entry {
-    let log_ns = unix_ns(at_us);
-    Entry {
-        role,
-        row,
-        log_ns,
-        publish_ns: log_ns,
+        put(self.entry(role, Row::Link(row), unix_ns(at_us)))
     }
 }
 
 /// A message's row, and its instant of the board's clock if it has one. What that board never says goes
 /// to the channel for others.
-fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (Row, Option<u64>) {
+fn row(role: Role, message: &Message, at_us: u64, board: &mut Board) -> (Row, Option<u64>) {
     match (role, message) {
         (Role::Sensor, Message::Estimate(estimate)) => (
             Row::Estimate(EstimateRow::from(*estimate)),
             Some(estimate.instant_us),
         ),
+        (Role::Sensor, Message::Gauges(gauges)) => {
+            (Row::Gauges(gauges.into()), Some(gauges.instant_us))
+        }
         (Role::Display, Message::Motion(motion)) => (Row::Motion(*motion), Some(motion.instant_us)),
         (Role::Display, Message::Safety(safety)) => {
             (Row::Safety((*safety).into()), Some(safety.instant_us))
@@ -254,14 +267,14 @@ fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (R
             let (refused, hash) = (report.refused, report.hash);
             let row = match (role, report.configuration) {
                 (Role::Sensor, Configuration::Sensor(in_force)) => {
-                    Row::SensorConfiguration(SensorConfigurationRow {
+                    Row::SensorConfiguration(SensorReportRow {
                         refused,
                         hash,
                         in_force,
                     })
                 }
                 (Role::Display, Configuration::Display(in_force)) => {
-                    Row::DisplayConfiguration(DisplayConfigurationRow {
+                    Row::DisplayConfiguration(DisplayReportRow {
                         refused,
                         hash,
                         in_force,
@@ -272,17 +285,89 @@ fn row(role: Role, message: &Message, at_us: u64, clock: &mut ClockOffset) -> (R
             (row, None)
         }
         (_, Message::Pong(pong)) => {
-            clock.on_pong(pong, at_us);
+            board.on_pong(pong, at_us);
             let row = Row::Clock(ClockRow {
                 sent_us: pong.sent_us,
                 received_us: pong.received_us,
                 answered_us: pong.answered_us,
                 heard_us: at_us,
-                offset_us: clock.offset_us(),
-                round_trip_us: clock.round_trip_us(),
+                offset_us: board.clock.offset_us(),
+                round_trip_us: board.clock.round_trip_us(),
             });
             (row, Some(pong.answered_us))
         }
         _ => (Row::Other(OtherRow::new(message)), None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use protocol::Motion;
+
+    use super::*;
+
+    /// The times, in µs of this host's clock, of motions that a display said at those and that were heard 3 ms
+    /// later. Its clock is 7 s ahead and goes `rate` times as fast; a second lies between two pings.
+    fn motion_times_us(rate: f64, said_us: &[u64]) -> Vec<u64> {
+        let board_us = |own_us: u64| 7_000_000 + (own_us as f64 * rate) as u64;
+        let mut builder = RowBuilder::default();
+        let mut times = Vec::new();
+        let mut pinged_us = 0;
+        for &own_us in said_us {
+            while pinged_us + 1_000_000 < own_us {
+                pinged_us += 1_000_000;
+                let pong = Pong {
+                    sent_us: pinged_us,
+                    received_us: board_us(pinged_us + 500),
+                    answered_us: board_us(pinged_us + 520),
+                };
+                let event = Event::Heard {
+                    at_us: pinged_us + 1_020,
+                    message: Message::Pong(pong),
+                };
+                let entered = builder.enter(Role::Display, &event, pinged_us + 1_020, |_| {
+                    Ok::<_, Infallible>(())
+                });
+                assert_eq!(entered, Ok(()));
+            }
+            let motion = Motion {
+                sequence: times.len() as u32,
+                instant_us: board_us(own_us),
+                position_um: 0,
+                velocity_um_s: 0,
+            };
+            let event = Event::Heard {
+                at_us: own_us + 3_000,
+                message: Message::Motion(motion),
+            };
+            let entered = builder.enter(Role::Display, &event, own_us + 3_000, |entry| {
+                times.push((entry.log_ns - unix_ns(0)) / 1_000);
+                Ok::<_, Infallible>(())
+            });
+            assert_eq!(entered, Ok(()));
+        }
+        times
+    }
+
+    #[test]
+    fn a_row_has_the_time_at_which_it_was_taken_once_the_boards_clock_is_known() {
+        let times = motion_times_us(1.0, &[500_000, 1_500_000, 2_500_000, 2_502_000]);
+        // One answer says where the clock stands, the second that it keeps time.
+        assert_eq!(times[..2], [503_000, 1_503_000]);
+        for (time, taken) in times[2..].iter().zip([2_500_000, 2_502_000_u64]) {
+            // Half the round trip of 1 ms bounds the offset's error.
+            assert!(time.abs_diff(taken) <= 510, "{time} for {taken}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_goes_at_another_rate_dates_nothing() {
+        for rate in [0.5, 2.0] {
+            let said: Vec<u64> = (1..20).map(|at| at * 500_000 + 250_000).collect();
+            let heard: Vec<u64> = said.iter().map(|said_us| said_us + 3_000).collect();
+            assert_eq!(motion_times_us(rate, &said), heard, "{rate}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! A file on a disk that may fill up, fail or go away, and what of it is safe.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,12 @@ use super::error::RecordingError;
 
 /// A file that is being written.
 pub struct Sink {
+    /// Its name once it is kept.
     path: PathBuf,
+    /// What it is called as long as another file has its name.
+    beside: Option<PathBuf>,
+    /// It was made here, and nothing of it need stay.
+    fresh: bool,
     file: File,
     safe_bytes: u64,
     /// Nothing more may be written: a write has failed, or the file has been cut.
@@ -25,31 +30,60 @@ pub struct SinkWriter {
 }
 
 impl Sink {
-    /// Makes a file; `force` writes over one that is there.
+    /// Makes a file. With `force` it takes the place of one that is there at [`Sink::keep`], and writes to a
+    /// device or a pipe that is there at once. Dropping it before takes it away again.
     ///
     /// # Errors
     /// If there is one already, or it can't be made.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
+        let there = fs::metadata(path).ok().filter(|_| force);
+        let is_file = there.as_ref().is_some_and(fs::Metadata::is_file);
+        let beside = is_file.then(|| beside(path));
+        let made = beside.as_deref().unwrap_or(path);
         let mut options = OpenOptions::new();
-        if force {
-            options.write(true).create(true).truncate(true);
-        } else {
-            options.write(true).create_new(true);
-        }
+        options.write(true);
+        match (&there, &beside) {
+            (None, _) => options.create_new(true),
+            // One of an attempt that was cut off is in nobody's way.
+            (Some(_), Some(_)) => options.create(true).truncate(true),
+            (Some(_), None) => &mut options,
+        };
         let file = options
-            .open(path)
+            .open(made)
             .map_err(|source| RecordingError::not_made(path, source))?;
-        // Its name should outlast a loss of power as its bytes do; not every file system can promise it.
-        let folder = path.parent().filter(|folder| folder.as_os_str() != "");
-        if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
-            let _ = folder.sync_all();
-        }
-        Ok(Self {
+        let sink = Self {
             path: path.to_owned(),
+            fresh: there.is_none() || beside.is_some(),
+            beside,
             file,
             safe_bytes: 0,
             full: Arc::new(AtomicBool::new(false)),
-        })
+        };
+        sink.sync_folder();
+        Ok(sink)
+    }
+
+    /// A name should outlast a loss of power as bytes do; not every file system can promise it.
+    fn sync_folder(&self) {
+        let folder = self.path.parent().filter(|folder| folder.as_os_str() != "");
+        if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
+            let _ = folder.sync_all();
+        }
+    }
+
+    /// The file stays, under its own name.
+    ///
+    /// # Errors
+    /// If it can't get that name.
+    pub fn keep(&mut self) -> Result<(), RecordingError> {
+        if let Some(beside) = &self.beside {
+            fs::rename(beside, &self.path)
+                .map_err(|source| RecordingError::not_made(&self.path, source))?;
+            self.beside = None;
+            self.sync_folder();
+        }
+        self.fresh = false;
+        Ok(())
     }
 
     /// What writes to it.
@@ -90,7 +124,8 @@ impl Sink {
         self.safe_bytes
     }
 
-    /// Takes away what is not safe, and lets nothing more be written.
+    /// Takes away what is not safe, and lets nothing more be written. A file of which nothing is safe and that
+    /// was not kept goes when the sink does.
     pub fn cut(&self) {
         self.full.store(true, Ordering::Relaxed);
         // A device has no length.
@@ -106,6 +141,21 @@ impl Sink {
             source,
         }
     }
+}
+
+impl Drop for Sink {
+    fn drop(&mut self) {
+        if self.fresh {
+            let _ = fs::remove_file(self.beside.as_deref().unwrap_or(&self.path));
+        }
+    }
+}
+
+/// The name of a file that is to take another's place.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".new");
+    path.with_file_name(name)
 }
 
 impl Write for SinkWriter {

@@ -2,19 +2,17 @@
 
 use std::collections::VecDeque;
 
-use protocol::{GAUGE_BLOCK, Message, Role};
+use protocol::{Message, Role};
 
 use crate::host_clock::now_us;
 use crate::link::Event;
 use crate::recording::Entry;
 use crate::recording::reader::{ReadError, Reader};
-use crate::recording::row::{GaugeRow, Kind, LinkEvent, Row, block};
+use crate::recording::row::{Kind, LinkEvent, Row};
 
 /// The events of a recording, in order.
 pub struct Events {
     recording: Reader,
-    /// Samples of a message that is not whole yet.
-    samples: Vec<GaugeRow>,
     /// What was known before the part that is played.
     known: Vec<(Role, Kind, Event)>,
     due: VecDeque<(f64, Role, Event)>,
@@ -25,11 +23,14 @@ impl Events {
     pub fn new(recording: Reader) -> Self {
         Self {
             recording,
-            samples: Vec::with_capacity(GAUGE_BLOCK),
             known: Vec::new(),
             due: VecDeque::new(),
             begun: false,
         }
+    }
+
+    pub const fn passed_over(&self) -> u64 {
+        self.recording.passed_over()
     }
 
     pub fn is_cut(&self) -> bool {
@@ -64,7 +65,7 @@ impl Events {
                 );
             }
             let Entry { role, row, .. } = entry;
-            if let Some(event) = self.event(role, row) {
+            if let Some(event) = Self::event(role, row) {
                 self.due.push_back((at_s, role, event));
             }
         }
@@ -80,21 +81,18 @@ impl Events {
         if !lasting {
             return;
         }
-        if let Some(event) = self
-            .event(role, row)
-            .filter(|event| *event != Event::Restarted)
-        {
+        if let Some(event) = Self::event(role, row).filter(|event| *event != Event::Restarted) {
             self.known
                 .retain(|(of, what, _)| (*of, *what) != (role, kind));
             self.known.push((role, kind, event));
         }
     }
 
-    fn event(&mut self, role: Role, row: Row) -> Option<Event> {
+    fn event(role: Role, row: Row) -> Option<Event> {
         let message = match row {
             Row::Estimate(row) => Message::Estimate(row.into()),
             Row::Motion(motion) => Message::Motion(motion),
-            Row::Gauges(row) => Message::Gauges(self.gather(row)?),
+            Row::Gauges(row) => Message::Gauges((&row).into()),
             Row::SensorStatus(row) => Message::Status(row.status()),
             Row::DisplayStatus(row) => Message::Status(row.status()?),
             Row::Safety(row) => Message::Safety(row.safety()?),
@@ -109,29 +107,11 @@ impl Events {
                     LinkEvent::Gap => None,
                 };
             }
-            Row::Line(_) => return None,
+            Row::Line(_) | Row::Log(_) => return None,
         };
         Some(Event::Heard {
             at_us: now_us(),
             message,
         })
-    }
-
-    /// Takes a sample; the message that it completes.
-    fn gather(&mut self, row: GaugeRow) -> Option<protocol::Gauges> {
-        if self
-            .samples
-            .first()
-            .is_some_and(|first| first.block != row.block)
-        {
-            self.samples.clear();
-        }
-        self.samples.push(row);
-        if self.samples.len() < GAUGE_BLOCK {
-            return None;
-        }
-        let gauges = block(&self.samples);
-        self.samples.clear();
-        gauges
     }
 }

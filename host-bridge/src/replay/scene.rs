@@ -70,13 +70,8 @@ pub enum SceneError {
         at_s: f64,
     },
     /// It is too long.
-    #[error(
-        "{duration_s:.1} s are too long for a scene: give --from and --to-time, {LONGEST_S} s apart at most"
-    )]
-    TooLong {
-        /// How long.
-        duration_s: f64,
-    },
+    #[error("that is too long for a scene: give --from and --to-time, {LONGEST_S} s apart at most")]
+    TooLong,
     /// Nothing is known of the surface.
     #[error("no valid estimate tells what was rubbed: give its wavelength with --wavelength")]
     NoWavelength,
@@ -139,6 +134,8 @@ pub struct Made {
     pub estimates: (usize, usize),
     /// Whether the recording was cut off.
     pub cut: bool,
+    /// Rows of an older protocol that say nothing in this version's.
+    pub passed_over: u64,
 }
 
 /// Writes the scene of a recording.
@@ -159,9 +156,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         count,
     })?;
     if layout.duration_s > LONGEST_S {
-        return Err(SceneError::TooLong {
-            duration_s: layout.duration_s,
-        });
+        return Err(SceneError::TooLong);
     }
     let within: Vec<Estimate> = excerpt
         .estimates
@@ -180,7 +175,8 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         .flatten();
     let piece = Piece {
         recording: &recording_path,
-        logged_s: (settings.from_s, settings.to_s),
+        // The simulator is to begin with the same sample.
+        logged_s: (settings.from_s.max(excerpt.first_s), settings.to_s),
         start_s: layout.start_s(&excerpt.samples),
         offset_mm: HALF_COUNT_MM - excerpt.samples[layout.first].position_um as f64 / 1_000.0,
         duration_s: layout.duration_s,
@@ -197,6 +193,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         begin_us: layout.begin_us,
         estimates: (valid.len(), within.len()),
         cut: excerpt.cut,
+        passed_over: excerpt.passed_over,
     })
 }
 

@@ -108,9 +108,10 @@ fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
     let samples: Vec<u32> = read
         .iter()
         .filter_map(|entry| match entry.row {
-            Row::Gauges(row) => Some(row.sample),
+            Row::Gauges(row) => Some(row.first_sample),
             _ => None,
         })
+        .flat_map(|first| first..first + GAUGE_BLOCK as u32)
         .collect();
     assert!(samples.iter().copied().eq(0..samples.len() as u32));
     let safe = number_before(&ended.stderr, "samples,");
@@ -122,6 +123,33 @@ fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
     // What is safe is all that is there: the file ends with a whole chunk.
     let bytes = number_before(&ended.stderr, "bytes of it are safe");
     assert_eq!(fs::metadata(&path).expect("it is there").len(), bytes);
+}
+
+#[test]
+fn a_disk_that_takes_nothing_at_all_gets_no_empty_file_and_keeps_the_old_one() {
+    let folder = folder("nothing");
+    let old = folder.join("old.mcap");
+    fs::write(&old, "kept").expect("the file can be written");
+    for (name, words) in [("new.mcap", vec![]), ("old.mcap", vec!["--force"])] {
+        let mut limited = Command::new("sh");
+        limited
+            .args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\""])
+            .arg(bridge::path())
+            .env_remove("RIDGELINK_BENCH")
+            .env_remove("HOME")
+            .env_remove("XDG_CONFIG_HOME")
+            .arg("record")
+            .arg(folder.join(name))
+            .args(words)
+            .args(["--sensor", "/dev/null/s", "--display", "/dev/null/d"]);
+        let ended = limited.output().expect("a shell");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{said}");
+        assert!(said.contains("can't be written any further"), "{said}");
+    }
+    assert_eq!(fs::read(&old).expect("still there"), b"kept");
+    let left = fs::read_dir(&folder).expect("a folder").count();
+    assert_eq!(left, 1, "only the old one");
 }
 
 #[test]

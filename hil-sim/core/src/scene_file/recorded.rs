@@ -4,6 +4,7 @@
 //! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series, waveform
 //! ```
 
+mod block;
 mod inverse_filter;
 mod raster;
 mod resampler;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// A sensor board's [`ConfigurationReport`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub struct SensorConfigurationRow {
+pub struct SensorReportRow {
     /// [`ConfigurationReport::refused`]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused: Option<Refusal>,
@@ -20,7 +20,7 @@ pub struct SensorConfigurationRow {
 
 /// A display board's [`ConfigurationReport`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
-pub struct DisplayConfigurationRow {
+pub struct DisplayReportRow {
     /// [`ConfigurationReport::refused`]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub refused: Option<Refusal>,
@@ -30,8 +30,8 @@ pub struct DisplayConfigurationRow {
     pub in_force: DisplayConfiguration,
 }
 
-impl From<SensorConfigurationRow> for ConfigurationReport {
-    fn from(row: SensorConfigurationRow) -> Self {
+impl From<SensorReportRow> for ConfigurationReport {
+    fn from(row: SensorReportRow) -> Self {
         Self {
             refused: row.refused,
             hash: row.hash,
@@ -40,8 +40,8 @@ impl From<SensorConfigurationRow> for ConfigurationReport {
     }
 }
 
-impl From<DisplayConfigurationRow> for ConfigurationReport {
-    fn from(row: DisplayConfigurationRow) -> Self {
+impl From<DisplayReportRow> for ConfigurationReport {
+    fn from(row: DisplayReportRow) -> Self {
         Self {
             refused: row.refused,
             hash: row.hash,

@@ -1,4 +1,5 @@
-//! Samples of the gauges: a row each, in volts, so that a plot of them is one.
+//! Samples of the gauges: a block a row, as the board sends them, for a message a sample would make a
+//! recording's index alone larger than all that it holds.
 
 use postcard_schema::Schema;
 use protocol::{CHANNELS, GAUGE_BLOCK, GAUGES, GaugeSample, Gauges};
@@ -8,9 +9,38 @@ use serde::{Deserialize, Serialize};
 pub const VOLTS_PER_CODE: f64 = 3.3 / 65_536.0;
 /// Volts are written to 10 µV, a fifth of a step, so that the codes can be told from them.
 const PER_VOLT: f64 = 1e5;
-const SAMPLE_US: u64 = 1_000;
+/// From a sample to the next, in µs.
+pub const SAMPLE_US: u64 = 1_000;
 
-/// A sample, at 1 kHz, after the sensor's anti-aliasing filter.
+/// Eight samples of the gauges at 1 kHz, 1 ms apart, after the sensor's anti-aliasing filter.
+///
+/// Volts at the ADC's pin are code · 3.3 V / 65 536.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct GaugesRow {
+    /// [`Gauges::first_sample`]
+    pub first_sample: u32,
+    /// [`Gauges::instant_us`]
+    pub instant_us: u64,
+    /// [`Gauges::position_um`]
+    pub position_um: i64,
+    /// Travel of the arm in µm up to each sample from the one before.
+    pub travel_um: [i16; GAUGE_BLOCK],
+    /// Gauge 0 in steps of 3.3 V / 65 536.
+    pub g0: [u16; GAUGE_BLOCK],
+    /// Gauge 1 in steps of 3.3 V / 65 536.
+    pub g1: [u16; GAUGE_BLOCK],
+    /// Gauge 2 in steps of 3.3 V / 65 536.
+    pub g2: [u16; GAUGE_BLOCK],
+    /// Gauge 3 in steps of 3.3 V / 65 536.
+    pub g3: [u16; GAUGE_BLOCK],
+    /// Gauge 4 in steps of 3.3 V / 65 536.
+    pub g4: [u16; GAUGE_BLOCK],
+    /// The tangential force channel in steps of 3.3 V / 65 536.
+    pub tangential: [u16; GAUGE_BLOCK],
+}
+
+/// A sample, at 1 kHz, after the sensor's anti-aliasing filter: a line of CSV, and a row of recordings of
+/// format 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct GaugeRow {
     /// Its index since the sensor's start.
@@ -35,6 +65,39 @@ pub struct GaugeRow {
     pub g4_v: f64,
     /// The tangential force channel in V, to 10 µV.
     pub tangential_v: f64,
+}
+
+impl From<&Gauges> for GaugesRow {
+    fn from(gauges: &Gauges) -> Self {
+        let channel = |at: usize| gauges.samples.map(|sample| sample.codes[at]);
+        Self {
+            first_sample: gauges.first_sample,
+            instant_us: gauges.instant_us,
+            position_um: gauges.position_um,
+            travel_um: gauges.samples.map(|sample| sample.travel_um),
+            g0: channel(0),
+            g1: channel(1),
+            g2: channel(2),
+            g3: channel(3),
+            g4: channel(4),
+            tangential: channel(5),
+        }
+    }
+}
+
+impl From<&GaugesRow> for Gauges {
+    fn from(row: &GaugesRow) -> Self {
+        let channels = [row.g0, row.g1, row.g2, row.g3, row.g4, row.tangential];
+        Self {
+            first_sample: row.first_sample,
+            instant_us: row.instant_us,
+            position_um: row.position_um,
+            samples: std::array::from_fn(|at| GaugeSample {
+                codes: channels.map(|codes| codes[at]),
+                travel_um: row.travel_um[at],
+            }),
+        }
+    }
 }
 
 impl GaugeRow {

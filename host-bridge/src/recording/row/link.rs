@@ -15,7 +15,7 @@ pub struct LinkRow {
     pub event: LinkEvent,
     /// In words.
     pub text: Text,
-    /// [`State::word`], if it turned.
+    /// How it stands now, in a word, if it turned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<Text>,
     /// The port, or where the board is looked for.

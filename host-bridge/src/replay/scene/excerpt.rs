@@ -1,16 +1,23 @@
 //! What a scene is made of, taken out of a recording.
 
-use protocol::{DisplayConfiguration, Estimate, Role, SensorConfiguration};
+use protocol::{DisplayConfiguration, Estimate, Gauges, Role, SensorConfiguration};
 
-use super::SceneError;
+use super::{LONGEST_S, SceneError};
 use crate::recording::reader::Reader;
 use crate::recording::row::{GaugeRow, Row};
+
+/// More samples than any scene has.
+const MOST: usize = (LONGEST_S as usize + 1) * 1_000;
+/// How much later than its time something is heard at most, in s.
+const LATE_S: f64 = 10.0;
 
 /// A piece of a recording.
 #[derive(Default)]
 pub struct Excerpt {
     /// Samples without a gap.
     pub samples: Vec<GaugeRow>,
+    /// The time of the first of them, in s since the recording's start.
+    pub first_s: f64,
     /// The estimates within the piece.
     pub estimates: Vec<Estimate>,
     /// The sensor's configuration, if it was reported.
@@ -19,6 +26,8 @@ pub struct Excerpt {
     pub display: Option<DisplayConfiguration>,
     /// Whether the recording was cut off.
     pub cut: bool,
+    /// Rows of an older protocol that say nothing in this version's.
+    pub passed_over: u64,
 }
 
 /// A run of samples without a gap, by time in s.
@@ -38,16 +47,20 @@ impl Excerpt {
     /// Takes what lies between two times, in s since the recording's start.
     ///
     /// # Errors
-    /// If the recording can't be read, has no samples there or has a gap there, or if the sensor was
-    /// configured otherwise meanwhile.
+    /// If the recording can't be read, has no samples there, more than a scene holds or a gap there, or if the
+    /// sensor was configured otherwise meanwhile.
     pub fn take(mut recording: Reader, from_s: f64, to_s: f64) -> Result<Self, SceneError> {
         let mut excerpt = Self::default();
         let mut runs: Vec<Run> = Vec::new();
         let mut gap_s = None;
         while let Some(entry) = recording.next_entry()? {
             let at_s = recording.since_start_s(entry.log_ns);
-            if at_s > to_s {
+            // In the order in which they were heard, not taken.
+            if at_s > to_s + LATE_S {
                 break;
+            }
+            if at_s > to_s {
+                continue;
             }
             for (role, row) in recording.take_told() {
                 excerpt.configured(role, &row, None)?;
@@ -58,7 +71,7 @@ impl Excerpt {
                     let follows = excerpt
                         .samples
                         .last()
-                        .is_some_and(|last| row.sample == last.sample.wrapping_add(1));
+                        .is_some_and(|last| row.first_sample == last.sample.wrapping_add(1));
                     match runs.last_mut() {
                         Some(run) if follows => run.to_s = at_s,
                         last => {
@@ -70,9 +83,13 @@ impl Excerpt {
                                 from_s: at_s,
                                 to_s: at_s,
                             });
+                            excerpt.first_s = at_s;
                         }
                     }
-                    excerpt.samples.push(row);
+                    excerpt.samples.extend(GaugeRow::all(&Gauges::from(&row)));
+                    if excerpt.samples.len() > MOST {
+                        return Err(SceneError::TooLong);
+                    }
                 }
                 Row::Estimate(row) if within => excerpt.estimates.push(row.into()),
                 row => {
@@ -82,6 +99,7 @@ impl Excerpt {
             }
         }
         excerpt.cut = recording.is_cut();
+        excerpt.passed_over = recording.passed_over();
         if let Some(at_s) = gap_s {
             let longest = runs
                 .into_iter()

@@ -1,14 +1,17 @@
-//! Reads the messages of one topic of an MCAP file: JSON, numbers by the names of their fields.
+//! Reads the messages of one topic of an MCAP file: JSON, or messages of ROS 2; numbers by the names of their
+//! fields.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use mcap::McapError;
 use mcap::io::MessageReader;
 use mcap::sans_io::linear_reader::LinearReaderOptions;
+use mcap::{Channel, McapError};
+use ros2msg::{Definition, decode};
 use serde_json::Value;
 
+use super::block;
 use super::tape::Refusal;
 use crate::scene::SceneError;
 
@@ -54,6 +57,7 @@ pub fn each(
     let mut topics: Vec<String> = Vec::new();
     let mut count: u64 = 0;
     let (mut start_ns, mut first_ns, mut first) = (None, None, None);
+    let mut format: Option<Format> = None;
     let mut row = vec![0.0; fields.len()];
     for message in MessageReader::new_with_options(BufReader::new(file), options) {
         let message = match message {
@@ -76,46 +80,53 @@ pub fn each(
         if !(from_s..=to_s).contains(&logged_s) {
             continue;
         }
-        let key = |field: &str| format!("message {count} of {topic}{field}");
-        let encoding = &message.channel.message_encoding;
-        if encoding != "json" {
-            let message = format!(
-                "is encoded as {encoding:?}, and only JSON is read: convert it to JSON, or to CSV"
-            );
-            return Err(refuse(key(""), message));
-        }
-        let json: Value = serde_json::from_slice(&message.data)
-            .map_err(|error| refuse(key(""), format!("is no JSON: {error}: mend the recording")))?;
-        let number = |field: &str| {
-            number(&json, field).ok_or_else(|| {
-                let message = format!("is no number there: {}", known(&json));
-                refuse(key(&format!(", field {field}")), message)
-            })
-        };
-        for (value, field) in row.iter_mut().zip(fields) {
-            *value = number(field)?;
-        }
-        let at = match when {
-            // A difference of whole ns: an epoch in s would be rounded to 0.2 µs.
-            When::Logged => {
-                let first_ns = *first_ns.get_or_insert(message.log_time);
-                (i128::from(message.log_time) - i128::from(first_ns)) as f64 * 1e-9
-            }
-            When::Field(field, per_unit) => {
-                let raw = number(field)?;
-                let first = *first.get_or_insert(if is_place { 0.0 } else { raw });
-                (raw - first) * per_unit
-            }
-            When::Every(step) => count as f64 * step,
-        };
-        take(at, &row).map_err(|(column, message)| match column.checked_sub(1) {
-            None => refuse(key(""), format!("{at} {message}")),
-            Some(column) => refuse(
-                key(&format!(", field {}", fields[column])),
-                format!("{} {message}", row[column]),
+        let key = |count: u64, field: &str| format!("message {count} of {topic}{field}");
+        let format = match &mut format {
+            Some(format) => format,
+            none => none.insert(
+                Format::of(&message.channel).map_err(|message| refuse(key(count, ""), message))?,
             ),
-        })?;
-        count += 1;
+        };
+        let value = format
+            .read(&message.data)
+            .map_err(|message| refuse(key(count, ""), message))?;
+        // A block of samples is as many messages, 1 ms apart.
+        let (samples, step_ns) = match block::samples(&value).filter(|_| format.is_block) {
+            Some(samples) => (samples, 1_000_000),
+            None => (vec![value], 0),
+        };
+        for (log_time, value) in (message.log_time..).step_by(step_ns.max(1)).zip(samples) {
+            let number = |field: &str| {
+                number(&value, field).ok_or_else(|| {
+                    let message = format!("is no number there: {}", known(&value));
+                    refuse(key(count, &format!(", field {field}")), message)
+                })
+            };
+            for (value, field) in row.iter_mut().zip(fields) {
+                *value = number(field)?;
+            }
+            let at = match when {
+                // A difference of whole ns: an epoch in s would be rounded to 0.2 µs.
+                When::Logged => {
+                    let first_ns = *first_ns.get_or_insert(log_time);
+                    (i128::from(log_time) - i128::from(first_ns)) as f64 * 1e-9
+                }
+                When::Field(field, per_unit) => {
+                    let raw = number(field)?;
+                    let first = *first.get_or_insert(if is_place { 0.0 } else { raw });
+                    (raw - first) * per_unit
+                }
+                When::Every(step) => count as f64 * step,
+            };
+            take(at, &row).map_err(|(column, message)| match column.checked_sub(1) {
+                None => refuse(key(count, ""), format!("{at} {message}")),
+                Some(column) => refuse(
+                    key(count, &format!(", field {}", fields[column])),
+                    format!("{} {message}", row[column]),
+                ),
+            })?;
+            count += 1;
+        }
     }
     if count == 0 {
         topics.sort_unstable();
@@ -130,6 +141,51 @@ pub fn each(
         return Err(refuse(String::new(), message));
     }
     Ok(())
+}
+
+/// How the messages of a topic are written.
+struct Format {
+    /// None: JSON.
+    definition: Option<Definition>,
+    /// Each holds several samples of our gauges.
+    is_block: bool,
+}
+
+impl Format {
+    /// What a channel says of itself; words for a person if it is not read.
+    fn of(channel: &Channel<'_>) -> Result<Self, String> {
+        let schema = channel.schema.as_deref();
+        let definition = match (channel.message_encoding.as_str(), schema) {
+            ("json", _) => None,
+            ("cdr", Some(schema)) if schema.encoding == "ros2msg" => {
+                let text = String::from_utf8_lossy(&schema.data);
+                let definition = Definition::parse(&schema.name, &text);
+                Some(definition.map_err(|error| {
+                    format!("has a definition that can't be read: {error}: mend the recording")
+                })?)
+            }
+            (encoding, _) => {
+                return Err(format!(
+                    "is encoded as {encoding:?}, and only JSON and ROS 2's CDR with ros2msg are read: convert it \
+                     to one of them, or to CSV"
+                ));
+            }
+        };
+        Ok(Self {
+            definition,
+            is_block: schema.is_some_and(|schema| schema.name == block::SCHEMA),
+        })
+    }
+
+    fn read(&self, data: &[u8]) -> Result<Value, String> {
+        match &self.definition {
+            None => serde_json::from_slice(data)
+                .map_err(|error| format!("is no JSON: {error}: mend the recording")),
+            Some(definition) => decode(definition, data).map_err(|error| {
+                format!("is not as its definition says: {error}: mend the recording")
+            }),
+        }
+    }
 }
 
 /// The number at a path of fields with dots between them, indices of lists among them.
