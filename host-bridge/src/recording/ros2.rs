@@ -191,6 +191,10 @@ pub fn outward(named: &'static NamedType, value: &Value) -> Value {
                 let value = from.get(field.name);
                 let kind = match field.ty.ty {
                     DataModelType::Option(inner) => {
+                        // A number that is none is null, and yet there.
+                        let may_be_null =
+                            matches!(unwrapped(inner).ty, DataModelType::F32 | DataModelType::F64);
+                        let value = value.filter(|value| may_be_null || !value.is_null());
                         map.insert(format!("has_{}", field.name), value.is_some().into());
                         inner
                     }
