@@ -145,7 +145,7 @@ mod tests {
         );
         assert!(item("Motion").is_some_and(|text| text.starts_with("The operator's hand")));
         assert_eq!(item("NoSuchType"), None);
-        for ((name, of), _) in texts() {
+        for (name, of) in texts().keys() {
             let text = field(name, of).unwrap_or_default();
             assert!(
                 !text.contains("[`") && !text.contains('`'),

@@ -76,7 +76,7 @@ impl McapFile {
         let writer = BufWriter::new(sink.writer()?);
         let writer = WriteOptions::new()
             .profile(PROFILE)
-            .library(&format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
+            .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
             .compression(Some(Compression::Zstd))
             .compression_level(COMPRESSION_LEVEL)
             .compression_threads(0)
