@@ -12,10 +12,19 @@ pub const ST_VENDOR: u16 = 0x0483;
 /// The products with a virtual COM port: ST-LINK/V2-1 and V3 in their variants (UM2448, and usb.ids).
 pub const ST_LINK_PRODUCTS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x3757];
 
+/// In front of the name of a board at another site, e.g. `relay:bench.sensor`.
+pub const FAR: &str = "relay:";
+
+/// Whether a port's name is that of a board at another site.
+pub fn is_far(port: &Path) -> bool {
+    port.to_str().is_some_and(|name| name.starts_with(FAR))
+}
+
 /// Where a board's console is looked for, each time that it is to be opened.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Place {
-    /// A port by its name: a device, or a link to one.
+    /// A port by its name: a device, or a link to one; or, with [`FAR`] in front, a board at another site that a
+    /// relay shows here.
     Port(PathBuf),
     /// The ST-LINK of this serial number, whatever its port is called at the moment.
     Usb(String),
@@ -30,7 +39,7 @@ impl Place {
     /// The ports to try, in order; empty if there is none at the moment.
     pub fn candidates(&self) -> Vec<PathBuf> {
         match self {
-            Self::Port(path) if path.exists() => vec![path.clone()],
+            Self::Port(path) if path.exists() || is_far(path) => vec![path.clone()],
             Self::Port(_) => Vec::new(),
             Self::Among(ports) => ports.iter().filter(|path| path.exists()).cloned().collect(),
             Self::Usb(serial) => st_links()

@@ -15,6 +15,7 @@ pub mod age;
 pub mod credentials;
 pub mod endpoint;
 pub mod envelope;
+pub mod far_board;
 pub mod flow;
 pub mod gate;
 pub mod histogram;

@@ -4,17 +4,14 @@ use std::fs::{self, OpenOptions};
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
-use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use serialport::{ClearBuffer, ErrorKind, SerialPort, TTYPort};
 
-use crate::clock::SystemClock;
 use crate::line::BAUD;
-use crate::shared_port::SharedPorts;
 use crate::state::State;
-use crate::system::{Input, Opened, System};
+use crate::system::{Input, Opened};
 
 /// Longest wait for bytes; also how late a Hello or a ping may be.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
@@ -105,16 +102,6 @@ fn refused_port(path: &Path, error: &serialport::Error) -> State {
             port,
             reason: format!("can't be used as a serial port: {error}"),
         },
-    }
-}
-
-/// This computer.
-impl Default for System {
-    fn default() -> Self {
-        Self {
-            clock: Arc::new(SystemClock),
-            ports: Arc::new(SharedPorts),
-        }
     }
 }
 

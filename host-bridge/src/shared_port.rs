@@ -26,12 +26,13 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::RecvTimeoutError;
 use protocol::{Message, frame};
 
+use crate::clock::SystemClock;
 use crate::line::host_hello;
 use crate::lock::locked;
-use crate::place::Place;
+use crate::place::{Place, is_far};
 use crate::serial;
 use crate::state::State;
-use crate::system::{Input, Opened, Ports};
+use crate::system::{Input, Opened, Ports, System};
 use bus::{Guest, Host};
 use claim::{Claim, Device};
 use funnel::Funnel;
@@ -52,6 +53,16 @@ static OPEN: Mutex<BTreeMap<PathBuf, usize>> = Mutex::new(BTreeMap::new());
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPorts;
 
+/// This computer.
+impl Default for System {
+    fn default() -> Self {
+        Self {
+            clock: Arc::new(SystemClock),
+            ports: Arc::new(SharedPorts),
+        }
+    }
+}
+
 impl Ports for SharedPorts {
     fn candidates(&self, place: &Place) -> Vec<PathBuf> {
         place.candidates()
@@ -62,6 +73,12 @@ impl Ports for SharedPorts {
     }
 
     fn open(&self, path: &Path) -> Result<Opened, State> {
+        if is_far(path) {
+            let absent = State::Absent {
+                place: format!("{}: no relay that shows it runs here", path.display()),
+            };
+            return open_source(&path.to_string_lossy(), move || Err(absent.clone()));
+        }
         // What is no port is refused in the words of who knows ports.
         let Some(device) = Device::of(path) else {
             return serial::open(path);
@@ -90,6 +107,31 @@ pub fn open_source(
         open: Box::new(open),
     }
     .take()
+}
+
+/// A source of bytes that is not on this computer, for the programs that are.
+pub struct Outlet {
+    host: Host,
+    _claim: Claim,
+}
+
+impl Outlet {
+    /// Offers what is called `name`; `on_asked` is called with the frames that programs say to it. `None` if
+    /// another program offers it already.
+    pub fn open(name: &str, on_asked: impl Fn(&[u8]) + Send + Sync + 'static) -> Option<Self> {
+        let device = Device::named(name);
+        let claim = device.claim().ok().flatten()?;
+        Some(Self {
+            host: Host::open(device.socket(), on_asked),
+            _claim: claim,
+        })
+    }
+
+    /// Lets the programs hear something, maybe nothing, which tells them that it is still there: at least every
+    /// 100 ms.
+    pub fn say(&self, bytes: &[u8]) {
+        self.host.say(bytes);
+    }
 }
 
 /// Which port, and how it is opened.

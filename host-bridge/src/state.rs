@@ -138,9 +138,7 @@ impl State {
             Self::Absent { .. } => {
                 "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display"
             }
-            Self::Busy { .. } => {
-                "close the other program: monitor, record, relay, tio and screen all take the port for themselves"
-            }
+            Self::Busy { .. } => "close the other program (tio, screen, or one of another user's)",
             Self::Denied { .. } => {
                 "join the group that owns it (often dialout: `sudo usermod -aG dialout $USER`, then log in again)"
             }

@@ -51,6 +51,7 @@ impl VirtualSite {
             name: name(),
             network: Arc::new(network.clone()),
             max_age,
+            shows_far_board: false,
             system: bench.system(),
         })
         .unwrap_or_else(|error| panic!("{error}"));

@@ -378,6 +378,63 @@ fn a_key_stops_the_display_and_its_answer_is_shown() {
 }
 
 #[test]
+fn a_signal_stops_the_boards_although_nobody_reads_what_the_monitor_writes() {
+    let running = bench();
+    let mut child = monitor(&running)
+        .args(["--json", "--every", "0.001"])
+        .spawn()
+        .expect("the program can be started");
+    // A pipe that nobody reads is full soon: the one that writes waits for ever.
+    let stuck = format!("/proc/{}/task/{}/wchan", child.id(), child.id());
+    assert!(wait_until(LIMIT, || {
+        fs::read_to_string(&stuck).is_ok_and(|place| place.contains("pipe"))
+    }));
+    signal(&child, "USR1");
+    assert!(wait_until(LIMIT, || running.bench().stopped.is_some()));
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+#[test]
+fn stop_stops_both_boards_beside_a_monitor_that_has_their_ports() {
+    let running = bench();
+    let first = Lines::of(monitor(&running).arg("--plain"));
+    first.with(" known      known ");
+    let stop = |sensor: &Path, display: &Path, more: &[&str]| {
+        let mut command = bridge::command();
+        command.arg("stop").args(more);
+        command
+            .arg("--sensor")
+            .arg(sensor)
+            .arg("--display")
+            .arg(display);
+        bridge::Running::start(&mut command).wait(LIMIT)
+    };
+    let [sensor, display] = {
+        let bench = running.bench();
+        [&bench.sensor, &bench.display].map(|board| board.path().clone())
+    };
+    let done = stop(&sensor, &display, &[]);
+    assert_eq!(done.status.code(), Some(0), "{}", done.stderr);
+    for board in ["sensor", "display"] {
+        let words = format!("{board} has stopped: by the operator");
+        assert!(done.stderr.contains(&words), "{}", done.stderr);
+    }
+    assert!(running.bench().stopped.is_some());
+    first.with("display safety: stopped");
+    // A board that is not there is not stopped.
+    let absent = name_of_a_port("unstopped");
+    let done = stop(&absent, &display, &["--within", "1"]);
+    assert_eq!(done.status.code(), Some(1), "{}", done.stderr);
+    assert!(
+        done.stderr
+            .contains("NOT STOPPED as far as is known: sensor"),
+        "{}",
+        done.stderr
+    );
+}
+
+#[test]
 fn a_key_streams_the_gauges_and_changes_no_setting() {
     let mut bench = FakeBench::new();
     bench.sensing.window_ms = 123;

@@ -2,13 +2,17 @@
 //! limits are a hang's. What depends on time is in `bridge_relay`, by virtual time.
 
 use std::net::TcpListener;
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use protocol::{Message, Role, StopReason};
+use host_bridge::link::{Event, Link};
+use host_bridge::place::Place;
+use protocol::{Message, Question, Role, Stop, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::relay::{Relay, free_port, listen, sequences, talking_board};
+use tests::utterance::Speaker;
 use tests::weather::Weather;
 
 /// Only what hangs takes so long.
@@ -251,6 +255,50 @@ fn relay_stop_says_what_has_come_of_it() {
     ] {
         assert!(words.contains(part), "{words}");
     }
+}
+
+#[test]
+fn a_program_at_one_site_hears_all_that_the_other_sites_board_says_and_may_stop_it() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let _pair = Pair::new(&sensor, &display, &["--name", "far"]);
+    listen(&sensor, LIMIT, at_least(10));
+    let (events, told) = channel();
+    let place = Place::Port("relay:far.sensor".into());
+    let link = Link::open(Role::Sensor, place, move |event| {
+        let _ = events.send(event);
+    });
+    assert!(
+        wait_until(LIMIT, || link.state().is_known()),
+        "{}",
+        link.state()
+    );
+    // What no relay carries to the other board, and no program here would hear otherwise.
+    let block = Speaker::new(1).gauges(7);
+    assert!(wait_until(LIMIT, || {
+        sensor.say(block.clone());
+        let is_block = |event| matches!(event, Event::Heard { message, .. } if message == block);
+        told.try_iter().any(is_block)
+    }));
+    // It is for looking at: nothing else reaches the board.
+    sensor.take_heard();
+    link.post(&Message::Question(Question::Configuration))
+        .expect("it is said");
+    link.stop(Stop {
+        reason: StopReason::Operator,
+    })
+    .expect("it is said");
+    let mut heard = Vec::new();
+    assert!(wait_until(LIMIT, || {
+        heard.extend(sensor.take_heard());
+        heard.iter().any(is_stop)
+    }));
+    assert!(
+        !heard
+            .iter()
+            .any(|message| matches!(message, Message::Question(_)))
+    );
+    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    assert!(wait_until(LIMIT, || !link.is_stopping()));
 }
 
 #[test]

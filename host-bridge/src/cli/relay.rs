@@ -198,6 +198,7 @@ impl Bridge {
             name: self.meeting.name,
             network: Arc::new(network),
             max_age: Duration::from_millis(self.max_age.into()),
+            shows_far_board: true,
             system: System::default(),
         })?;
         let stop = bridge.stopper();

@@ -68,6 +68,12 @@ pub enum Content {
     },
     /// The bridge ends: another one may have its place.
     Leaving,
+    /// Somebody at this site watches the other site's board; repeated for as long as that is so.
+    Watch,
+    /// Who the board is, for who watches.
+    Greeting(Hello),
+    /// Anything that the board said, for who watches; in no way for the other board.
+    Shown(Message),
 }
 
 /// One thing said by one bridge to the other.
@@ -289,6 +295,9 @@ mod tests {
             of(Role::Sensor, Content::Stopped { id, trip: None }),
             of(Role::Display, Content::Stopping { id, is_told: true }),
             of(Role::Display, Content::Leaving),
+            of(Role::Display, Content::Watch),
+            of(Role::Sensor, Content::Greeting(host_hello())),
+            of(Role::Sensor, Content::Shown(Message::Estimate(estimate()))),
         ]
     }
 

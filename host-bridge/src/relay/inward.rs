@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::{Ping, Pong, Role, Stop, Trip};
+use protocol::{Hello, Message, Ping, Pong, Role, Stop, Trip};
 
 use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
@@ -32,6 +32,12 @@ pub enum Heard {
     Stop(u64, Stop),
     /// The Stop of this number is done at the other site: see [`Content::Stopped`].
     Stopped(u64, Option<Trip>),
+    /// Somebody there watches the board here.
+    Watched,
+    /// Who the board there is.
+    Greeting(Hello),
+    /// What the board there said, for who watches here.
+    Shown(Message),
 }
 
 /// The inward direction of a bridge.
@@ -104,6 +110,9 @@ impl Inward {
                 }
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
+            Content::Watch => Heard::Watched,
+            Content::Greeting(hello) if is_holder => Heard::Greeting(hello),
+            Content::Shown(message) if is_holder => Heard::Shown(message),
             // Only of the board that is held: anybody could say so.
             Content::Stopped { id, trip } if is_holder => Heard::Stopped(id, trip),
             Content::Leaving => {
@@ -111,7 +120,10 @@ impl Inward {
                 Heard::Nothing
             }
             // It is said again, until it is done.
-            Content::Stopped { .. } | Content::Stopping { .. } => Heard::Nothing,
+            Content::Stopped { .. }
+            | Content::Stopping { .. }
+            | Content::Greeting(_)
+            | Content::Shown(_) => Heard::Nothing,
         }
     }
 

@@ -50,6 +50,8 @@ pub enum Channel {
     Clock,
     /// Stops, and that they were heard.
     Stop,
+    /// All that the board says, for who watches.
+    Shown,
 }
 
 impl Name {
@@ -60,6 +62,7 @@ impl Name {
             Channel::Board => "board",
             Channel::Clock => "clock",
             Channel::Stop => "stop",
+            Channel::Shown => "shown",
         };
         format!("ridgelink/{self}/{}/{channel}", role.name())
     }

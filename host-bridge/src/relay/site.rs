@@ -11,7 +11,7 @@
 mod keeper;
 
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
@@ -24,6 +24,7 @@ use crate::link::{self, Event, Link, LinkSender, NotSent};
 use crate::lock::locked;
 use crate::place::Place;
 use crate::relay::envelope::{Content, Envelope, is_carried};
+use crate::relay::far_board::{self, FarBoard};
 use crate::relay::inward::{Heard, Inward};
 use crate::relay::name::{Channel, Name};
 use crate::relay::network::NetworkError;
@@ -53,6 +54,8 @@ pub struct Settings {
     pub network: Arc<dyn Transport>,
     /// How old something from the other site may be and still be passed on.
     pub max_age: Duration,
+    /// Whether programs on this computer may watch the other site's board.
+    pub shows_far_board: bool,
     /// The clock that it goes by, and the ports among which it looks for its board.
     pub system: System,
 }
@@ -79,6 +82,12 @@ struct Shared {
     inward: Mutex<Inward>,
     outbox: Outbox,
     board: OnceLock<LinkSender>,
+    /// Who the board here is, while it is there.
+    board_hello: Mutex<Option<Hello>>,
+    /// Until when the other site watches the board here, in µs.
+    shown_until_us: AtomicU64,
+    shows_far_board: bool,
+    far_board: OnceLock<FarBoard>,
     stops: Mutex<Stops>,
     told_rival: AtomicBool,
     notices: Sender<Notice>,
@@ -122,6 +131,7 @@ impl Site {
             name,
             network,
             max_age,
+            shows_far_board,
             system,
         } = settings;
         let clock = Arc::clone(&system.clock);
@@ -143,6 +153,10 @@ impl Site {
             inward: Mutex::new(Inward::new(other_role, session, max_age)),
             outbox: Outbox::new(clock.notify()),
             board: OnceLock::new(),
+            board_hello: Mutex::new(None),
+            shown_until_us: AtomicU64::new(0),
+            shows_far_board,
+            far_board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
             told_rival: AtomicBool::new(false),
             notices,
@@ -160,7 +174,13 @@ impl Site {
             Event::Heard { at_us, message } => carrier.carry(at_us, message),
             // What comes of it is told within two seconds.
             Event::StateChanged(State::Opened { .. }) => {}
-            Event::StateChanged(state) => carrier.tell(Notice::Board(state)),
+            Event::StateChanged(state) => {
+                *locked(&carrier.board_hello) = match &state {
+                    State::Known { hello, .. } => Some(*hello),
+                    _ => None,
+                };
+                carrier.tell(Notice::Board(state));
+            }
             // Its numbers tell the other site, and sooner.
             Event::Restarted => locked(&carrier.stops).on_restart(),
         });
@@ -309,6 +329,9 @@ impl Shared {
                 self.say(Channel::Stop, Content::Stop { id, stop });
             }
         }
+        if self.now_us() < self.shown_until_us.load(Ordering::Acquire) {
+            self.say(Channel::Shown, Content::Shown(message.clone()));
+        }
         if !is_carried(self.role, &message) {
             return;
         }
@@ -349,6 +372,27 @@ impl Shared {
             Heard::Stop(id, stop) => {
                 drop(inward);
                 self.on_stop(self.other_role, id, stop);
+            }
+            Heard::Watched => {
+                drop(inward);
+                let until_us = at_us.saturating_add(far_board::WATCH_US);
+                self.shown_until_us.store(until_us, Ordering::Release);
+                let hello = *locked(&self.board_hello);
+                if let Some(hello) = hello {
+                    self.say(Channel::Shown, Content::Greeting(hello));
+                }
+            }
+            Heard::Greeting(hello) => {
+                drop(inward);
+                if let Some(far_board) = self.far_board.get() {
+                    far_board.greet(hello);
+                }
+            }
+            Heard::Shown(message) => {
+                drop(inward);
+                if let Some(far_board) = self.far_board.get() {
+                    far_board.say(&message);
+                }
             }
             Heard::Stopped(id, trip) => {
                 drop(inward);
@@ -408,6 +452,21 @@ impl Shared {
                     Err(NotSent::Stuck) => locked(&self.inward).on_stuck(),
                 },
             }
+        }
+    }
+
+    /// Lets programs here watch the other site's board, unless another relay does.
+    fn show_far_board(self: &Arc<Self>) {
+        // It is in there.
+        let shared = Arc::downgrade(self);
+        let on_stop = move |stop| {
+            if let Some(shared) = shared.upgrade() {
+                shared.stop(stop);
+            }
+        };
+        let clock = Arc::clone(&self.system.clock);
+        if let Some(far_board) = FarBoard::open(&self.name, self.other_role, clock, on_stop) {
+            let _ = self.far_board.set(far_board);
         }
     }
 

@@ -17,6 +17,7 @@ pub struct Wire {
     board: Publisher<'static>,
     clock: Publisher<'static>,
     stop: Publisher<'static>,
+    shown: Publisher<'static>,
     _subscribers: Vec<Subscriber<()>>,
 }
 
@@ -76,6 +77,8 @@ impl Wire {
             clock: publisher(Channel::Clock, stream.0, stream.1)?,
             // It is said again until it is answered: whoever says it is never held up by a network that stands still.
             stop: publisher(Channel::Stop, Priority::RealTime, CongestionControl::Drop)?,
+            // After all that the boards need.
+            shown: publisher(Channel::Shown, Priority::DataLow, CongestionControl::Drop)?,
             session,
             _subscribers: subscribers,
         })
@@ -88,6 +91,7 @@ impl Connection for Wire {
             Channel::Board => &self.board,
             Channel::Clock => &self.clock,
             Channel::Stop => &self.stop,
+            Channel::Shown => &self.shown,
         };
         publisher.put(envelope.to_bytes()).wait().is_ok()
     }

@@ -35,7 +35,7 @@ fn each_state_of_a_port_is_named_with_advice() {
             State::Busy { port: port() },
             "busy",
             "sensor: /dev/ttyACM0: another program has it",
-            "close the other program: monitor, record, relay, tio and screen all take the port for themselves",
+            "close the other program (tio, screen, or one of another user's)",
         ),
         (
             State::Failed {

@@ -143,8 +143,7 @@ fn the_report_for_scripts_keeps_its_shape() {
             "board": "display",
             "kind": "busy",
             "what": "/dev/ttyACM1: another program has it",
-            "advice": "close the other program: monitor, record, relay, tio and screen all take the port \
-                       for themselves",
+            "advice": "close the other program (tio, screen, or one of another user's)",
         }])
     );
 }

@@ -12,7 +12,7 @@ use tests::bridge::{self, Running};
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::utterance::Speaker;
 
-use crate::{LIMIT, Pair, entries, folder, signal, succeeded};
+use crate::{LIMIT, Pair, entries, folder, messages, signal, succeeded};
 
 /// Waits until a board has been asked for its configuration: it is known.
 fn asked(board: &FakeBoard) -> bool {
@@ -210,4 +210,61 @@ fn a_recording_ends_by_itself_when_it_is_told_to() {
     let (entries, is_cut) = entries(&path);
     // Both are absent, and nothing was said.
     assert_eq!((entries.len(), is_cut), (2, false));
+}
+
+#[test]
+fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
+    let folder = folder("owner");
+    let path = folder.join("owner.mcap");
+    let mut pair = Pair::new();
+    let [sensor, display] = [&pair.sensor, &pair.display].map(FakeBoard::path);
+    let mut monitor = bridge::command();
+    monitor.args(["monitor", "--plain", "--every", "600"]);
+    monitor.arg("--sensor").arg(sensor);
+    monitor.arg("--display").arg(display);
+    let owner = Running::start(&mut monitor);
+    // It answers both boards: it has their ports.
+    pair.wait_until_heard_in_spite_of_losses();
+    let words = [path.to_str().expect("UTF-8"), "--json"];
+    let running = pair.record(&mut bridge::command(), &words);
+    pair.wait_for_questions();
+    let mut speakers = [
+        (Role::Sensor, Speaker::new(1)),
+        (Role::Display, Speaker::new(2)),
+    ];
+    let mut before = Vec::new();
+    for (role, speaker) in &mut speakers {
+        let message = speaker.message(*role);
+        pair.board(*role).say(message.clone());
+        before.push((*role, message));
+        // Both programs answer when both have heard it.
+        let board = pair.board(*role);
+        board.say(Message::Ping(Ping { sent_us: u64::MAX }));
+        let mut answers = 0;
+        assert!(wait_until(LIMIT, || {
+            let heard = board.take_heard();
+            let is_answer = |message: &&Message| matches!(message, Message::Pong(pong) if pong.sent_us == u64::MAX);
+            answers += heard.iter().filter(is_answer).count();
+            answers == 2
+        }));
+    }
+    signal(&owner, "-KILL");
+    drop(owner);
+    // Whoever is asked and answers has the port now.
+    pair.wait_until_heard_in_spite_of_losses();
+    let mut after = Vec::new();
+    for (role, speaker) in &mut speakers {
+        let message = speaker.message(*role);
+        pair.board(*role).say(message.clone());
+        after.push((*role, message));
+    }
+    pair.wait_until_heard();
+    signal(&running, "-INT");
+    succeeded(&running.wait(LIMIT));
+    let (_, is_cut) = entries(&path);
+    assert!(!is_cut);
+    let read = messages(&path);
+    for said in before.iter().chain(&after) {
+        assert!(read.contains(said), "{said:?}");
+    }
 }

@@ -18,6 +18,10 @@ const LOOK_US: u64 = 25_000;
 const KNOCK_US: u64 = 100_000;
 /// Between two repetitions of a Stop that the other site has not answered or the board has not been told, in µs.
 const STOP_US: u64 = 100_000;
+/// Between two times that the other site is told that its board is watched, in µs.
+const WATCH_US: u64 = 500_000;
+/// Between two tries to show the other site's board to programs here, in µs.
+const SHOW_AGAIN_US: u64 = 500_000;
 /// How long nobody is heard before it is found out why, in µs.
 const UNHEARD_US: u64 = 3_000_000;
 /// Between two such looks, in µs.
@@ -28,6 +32,7 @@ pub struct Keeper {
     shared: Arc<Shared>,
     pinged_us: Option<u64>,
     stopped_us: Option<u64>,
+    watched_us: Option<u64>,
     /// When the other site was last heard, or the bridge started.
     heard_us: u64,
     looked_us: Option<u64>,
@@ -42,6 +47,7 @@ impl Keeper {
             shared,
             pinged_us: None,
             stopped_us: None,
+            watched_us: None,
             looked_us: None,
             found: Arc::default(),
         }
@@ -57,6 +63,7 @@ impl Keeper {
             let at_us = self.shared.now_us();
             self.ping(at_us);
             self.repeat_stops(at_us);
+            self.watch(at_us);
             self.look(at_us);
         }
     }
@@ -88,6 +95,22 @@ impl Keeper {
         }
         for (id, stop) in unheard {
             self.shared.say(Channel::Stop, Content::Stop { id, stop });
+        }
+    }
+
+    /// Keeps the other site's board in view, if somebody here watches it.
+    fn watch(&mut self, at_us: u64) {
+        let Some(far_board) = self.shared.far_board.get() else {
+            if self.shared.shows_far_board && is_due(self.watched_us, SHOW_AGAIN_US, at_us) {
+                self.watched_us = Some(at_us);
+                self.shared.show_far_board();
+            }
+            return;
+        };
+        far_board.elapse();
+        if far_board.is_watched() && is_due(self.watched_us, WATCH_US, at_us) {
+            self.watched_us = Some(at_us);
+            self.shared.say(Channel::Clock, Content::Watch);
         }
     }
 

@@ -1,0 +1,120 @@
+//! The board at the other site, for programs at this one: they find it as `relay:NAME.ROLE`, hear all that it says,
+//! and may stop it. Nothing is carried for it while nobody listens.
+
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use protocol::{Hello, MAX_FRAME, Message, Role, Stop, frame};
+
+use crate::clock::Clock;
+use crate::lock::locked;
+use crate::place::FAR;
+use crate::relay::name::Name;
+use crate::shared_port::Outlet;
+
+/// A program that listens says something once a second; after so long, in µs, nobody does.
+pub const WATCH_US: u64 = 3_000_000;
+/// Between two signs of life, in µs.
+const BEAT_US: u64 = 100_000;
+
+/// The board at the other site.
+pub struct FarBoard {
+    outlet: Outlet,
+    asked: Arc<Asked>,
+    hello: Mutex<Option<Hello>>,
+    /// Of the next frame.
+    sequence: AtomicU16,
+    said_us: AtomicU64,
+    clock: Arc<dyn Clock>,
+}
+
+/// What programs have asked.
+#[derive(Default)]
+struct Asked {
+    /// When anything was said last, in µs; 0 for never.
+    at_us: AtomicU64,
+    wants_hello: AtomicBool,
+}
+
+impl FarBoard {
+    /// Shows the board of `role` of the bench called `name`. `on_stop` is called when a program says Stop to it.
+    /// `None` if another relay shows it already.
+    pub fn open(
+        name: &Name,
+        role: Role,
+        clock: Arc<dyn Clock>,
+        on_stop: impl Fn(Stop) + Send + Sync + 'static,
+    ) -> Option<Self> {
+        let asked = Arc::<Asked>::default();
+        let (theirs, time) = (Arc::clone(&asked), Arc::clone(&clock));
+        let outlet = Outlet::open(&port(name, role), move |frames| {
+            theirs.at_us.store(time.now_us().max(1), Ordering::Release);
+            for given in frames.split(|&byte| byte == 0) {
+                let mut content = given.to_vec();
+                let Ok((_, payload)) = frame::decode(&mut content) else {
+                    continue;
+                };
+                match frame::frozen(payload) {
+                    Some(Message::Hello(_)) => theirs.wants_hello.store(true, Ordering::Release),
+                    Some(Message::Stop(stop)) => on_stop(stop),
+                    _ => {}
+                }
+            }
+        })?;
+        Some(Self {
+            outlet,
+            asked,
+            hello: Mutex::new(None),
+            sequence: AtomicU16::new(0),
+            said_us: AtomicU64::new(0),
+            clock,
+        })
+    }
+
+    /// Whether a program listens.
+    pub fn is_watched(&self) -> bool {
+        let at_us = self.asked.at_us.load(Ordering::Acquire);
+        at_us > 0 && self.clock.now_us().saturating_sub(at_us) < WATCH_US
+    }
+
+    /// The board introduced itself.
+    pub fn greet(&self, hello: Hello) {
+        let is_other = locked(&self.hello).replace(hello) != Some(hello);
+        if is_other {
+            self.say(&Message::Hello(hello));
+        }
+    }
+
+    /// The board said something.
+    pub fn say(&self, message: &Message) {
+        let mut bytes = [0; MAX_FRAME];
+        let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);
+        if let Some(frame) = frame::encode(sequence, message, &mut bytes) {
+            self.put(frame);
+        }
+    }
+
+    /// Says what is due; to be called every 25 ms or so.
+    pub fn elapse(&self) {
+        let hello = *locked(&self.hello);
+        if let Some(hello) = hello
+            && self.asked.wants_hello.swap(false, Ordering::AcqRel)
+        {
+            self.say(&Message::Hello(hello.asking(false)));
+        }
+        let since_us = self.clock.now_us() - self.said_us.load(Ordering::Relaxed);
+        if since_us >= BEAT_US {
+            self.put(&[]);
+        }
+    }
+
+    fn put(&self, bytes: &[u8]) {
+        self.said_us.store(self.clock.now_us(), Ordering::Relaxed);
+        self.outlet.say(bytes);
+    }
+}
+
+/// What programs call the board of `role` of the bench called `name`.
+pub fn port(name: &Name, role: Role) -> String {
+    format!("{FAR}{name}.{}", role.name())
+}
