@@ -42,6 +42,8 @@ pub enum LiveError {
 /// A server that says everything to whoever asks, and hears nothing.
 pub struct FoxgloveServer {
     server: WebSocketServerHandle,
+    /// The channels are closed when it goes.
+    _context: Arc<Context>,
     encoder: CdrEncoder,
     channels: Vec<Arc<RawChannel>>,
     rows: RowBuilder,
@@ -82,6 +84,7 @@ impl FoxgloveServer {
             .map_err(refused)?;
         Ok(Self {
             server,
+            _context: context,
             encoder,
             channels,
             rows: RowBuilder::default(),
