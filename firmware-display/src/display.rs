@@ -153,9 +153,10 @@ impl Display {
     /// One output tick, with the hand encoder's counter and the board as it is.
     pub fn tick(&mut self, encoder: u16, senses: &Senses) -> Output {
         count(&mut self.counters.ticks, true);
-        // The words that a stopped display sent last are 0 V.
-        let is_zero = senses.is_clear || senses.transfer == Transfer::Done;
-        self.is_off = is_zero && matches!(self.state, DisplayState::Stopped(_));
+        if let DisplayState::Stopped(_) = self.state {
+            // The words that it sent last are 0 V.
+            self.is_off = senses.is_clear || senses.transfer == Transfer::Done;
+        }
         let quarters = per_tick(self.configuration.update_rate);
         let elapsed = quarters.saturating_mul(senses.missed_ticks.saturating_add(1));
         let travel = self.hand.read(encoder, elapsed);

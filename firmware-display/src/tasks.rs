@@ -144,7 +144,11 @@ async fn drive(
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
             unheard = OUTBOX.try_send(Message::Motion(motion)).is_err();
         }
-        announced.tell(display.state(), display.off());
+        let state = display.state();
+        announced.tell(state);
+        if let DisplayState::Stopped(_) = state {
+            announced.tell_off(display.off());
+        }
         COUNTERS.lock(|shared| shared.set(display.counters()));
     }
 }
@@ -186,14 +190,18 @@ struct Announced {
 }
 
 impl Announced {
-    /// Keeps why the display was stopped where a reset does not reach, says when its outputs are off, and tells
-    /// of each change as soon as there is room for the message.
-    fn tell(&mut self, state: DisplayState, off: Option<Trip>) {
+    /// Says once that a stopped display's outputs are off.
+    fn tell_off(&mut self, off: Option<Trip>) {
         if let Some(trip) = off
             && !core::mem::replace(&mut self.is_off, true)
         {
             stop::OFF.signal(trip);
         }
+    }
+
+    /// Keeps why the display was stopped where a reset does not reach, and tells of each change as soon
+    /// as there is room for the message.
+    fn tell(&mut self, state: DisplayState) {
         if state != self.kept {
             self.kept = state;
             if let DisplayState::Stopped(trip) = state {

@@ -64,24 +64,25 @@ pub fn encode<'a>(
     message: &Message,
     out: &'a mut [u8; MAX_FRAME],
 ) -> Option<&'a [u8]> {
-    let mut scratch = [0; MAX_PAYLOAD];
-    match message {
-        Message::Stop(stop) => encode_payload(sequence, &stop.to_bytes(), out),
-        Message::Stopped(stopped) => encode_payload(sequence, &stopped.to_bytes(), out),
-        message => {
-            let payload = postcard::to_slice(message, &mut scratch).ok()?;
-            encode_payload(sequence, payload, out)
-        }
-    }
+    let mut content = [0; SEQUENCE + MAX_PAYLOAD + CRC];
+    let length = match message {
+        Message::Stop(stop) => return encode_payload(sequence, &stop.to_bytes(), out),
+        Message::Stopped(stopped) => return encode_payload(sequence, &stopped.to_bytes(), out),
+        // Where it is to lie: nothing is copied.
+        message => postcard::to_slice(message, &mut content[SEQUENCE..SEQUENCE + MAX_PAYLOAD])
+            .ok()?
+            .len(),
+    };
+    seal(sequence, &mut content, length, out)
 }
 
 /// Reads a payload that every version says alike; None if it is of another kind.
 pub fn frozen(payload: &[u8]) -> Option<Message> {
-    let hello = payload.split_first().and_then(|(&first, fields)| {
-        let hello = Hello::from_bytes(fields)?;
-        (first == 0).then_some(Message::Hello(hello))
-    });
-    hello
+    let [0, fields @ ..] = payload else {
+        return None;
+    };
+    Hello::from_bytes(fields)
+        .map(Message::Hello)
         .or_else(|| Stop::from_bytes(payload).map(Message::Stop))
         .or_else(|| Stopped::from_bytes(payload).map(Message::Stopped))
 }
@@ -104,11 +105,23 @@ pub fn encode_payload<'a>(
     out: &'a mut [u8; MAX_FRAME],
 ) -> Option<&'a [u8]> {
     let mut content = [0; SEQUENCE + MAX_PAYLOAD + CRC];
-    let crc_at = SEQUENCE + payload.len();
-    let end = crc_at + CRC;
-    let content = content.get_mut(..end)?;
+    content
+        .get_mut(SEQUENCE..SEQUENCE + payload.len())
+        .filter(|_| payload.len() <= MAX_PAYLOAD)?
+        .copy_from_slice(payload);
+    seal(sequence, &mut content, payload.len(), out)
+}
+
+/// Puts number and CRC round the `length` bytes of payload that lie in `content`, and encodes it all.
+fn seal<'a>(
+    sequence: u16,
+    content: &mut [u8; SEQUENCE + MAX_PAYLOAD + CRC],
+    length: usize,
+    out: &'a mut [u8; MAX_FRAME],
+) -> Option<&'a [u8]> {
+    let crc_at = SEQUENCE + length;
+    let content = content.get_mut(..crc_at + CRC)?;
     content[..SEQUENCE].copy_from_slice(&sequence.to_le_bytes());
-    content[SEQUENCE..crc_at].copy_from_slice(payload);
     let crc = CRC_32.checksum(&content[..crc_at]);
     content[crc_at..].copy_from_slice(&crc.to_le_bytes());
 

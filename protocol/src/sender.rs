@@ -60,11 +60,12 @@ impl Sender {
         message: &Message,
         out: &'a mut [u8; MAX_FRAME],
     ) -> Option<&'a [u8]> {
-        let is_frozen = matches!(
-            message,
-            Message::Hello(_) | Message::Stop(_) | Message::Stopped(_)
-        );
-        if !self.greeted && !is_frozen {
+        if !self.greeted
+            && !matches!(
+                message,
+                Message::Hello(_) | Message::Stop(_) | Message::Stopped(_)
+            )
+        {
             return None;
         }
         let bytes = frame::encode(self.sequence, message, out)?;

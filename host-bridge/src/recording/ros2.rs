@@ -188,12 +188,13 @@ pub fn outward(named: &'static NamedType, value: &Value) -> Value {
         (DataModelType::Struct(fields), Value::Object(from)) => {
             let mut map = Map::new();
             for field in *fields {
-                let mut value = from.get(field.name);
+                let value = from.get(field.name);
                 let kind = match field.ty.ty {
                     DataModelType::Option(inner) => {
-                        // Of a number with a fraction null is NaN; of anything else it is nothing.
-                        let is_float = matches!(inner.ty, DataModelType::F32 | DataModelType::F64);
-                        value = value.filter(|value| is_float || !value.is_null());
+                        // A number that is none is null, and yet there.
+                        let may_be_null =
+                            matches!(unwrapped(inner).ty, DataModelType::F32 | DataModelType::F64);
+                        let value = value.filter(|value| may_be_null || !value.is_null());
                         map.insert(format!("has_{}", field.name), value.is_some().into());
                         inner
                     }

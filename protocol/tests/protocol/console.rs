@@ -390,12 +390,12 @@ fn a_stop_is_heard_and_answered_while_the_console_speaks_text_whatever_was_typed
         console
             .port()
             .receive(1_000, &bytes, |message| heard.push(message));
-        assert_eq!(heard, [stop.clone()], "{typed:?}");
+        assert_eq!(heard, std::slice::from_ref(&stop), "{typed:?}");
         console.say("lambda none");
         console.port().post(&stopped);
         let bytes = said(console.port());
         let mut answered = Vec::new();
         host.receive(2_000, &bytes, |message| answered.push(message));
-        assert_eq!(answered, [stopped.clone()]);
+        assert_eq!(answered, std::slice::from_ref(&stopped));
     }
 }
