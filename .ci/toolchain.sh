@@ -32,6 +32,13 @@ need_linker() {
         || fail "no C linker (cc), and apt-get could not install gcc: install it as root"
 }
 
+# A browser and its driver, for the tests of a page; without them they are skipped.
+want_browser() {
+    command -v chromedriver >/dev/null 2>&1 && return
+    { command -v apt-get && as_root apt-get update -qq && as_root apt-get install -y -qq chromium chromium-driver; } >/dev/null 2>&1 \
+        || say "ridgelink: no chromedriver, and apt-get could not install chromium-driver: no browser looks at the page of host-bridge live"
+}
+
 ordinary_world() {
     command -v rustc >/dev/null 2>&1 && command -v cargo >/dev/null 2>&1 && new_enough rustc || return 1
     add_target "$target"

@@ -11,6 +11,7 @@ use host_bridge::place::Place;
 mod completions;
 mod doctor;
 mod flash;
+mod live;
 mod man;
 mod monitor;
 mod output;
@@ -56,6 +57,9 @@ enum Command {
     /// Shows what the boards say, in the terminal or line by line
     #[command(long_about = monitor::ABOUT, after_long_help = monitor::EXAMPLES)]
     Monitor(monitor::Monitor),
+    /// Shows what the boards say to Foxglove, and on a page with a Stop
+    #[command(long_about = live::ABOUT, after_long_help = live::EXAMPLES)]
+    Live(live::Live),
     /// Writes everything that the boards say to MCAP or CSV
     #[command(long_about = record::ABOUT, after_long_help = record::EXAMPLES)]
     Record(record::Record),
@@ -134,6 +138,7 @@ impl Arguments {
         match self.command {
             Command::Flash(flash) => flash.execute(),
             Command::Monitor(monitor) => monitor.execute(),
+            Command::Live(live) => live.execute(),
             Command::Record(record) => record.execute(),
             Command::Replay(replay) => replay.execute(),
             Command::Relay(relay) => relay.execute(),

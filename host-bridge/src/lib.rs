@@ -6,6 +6,9 @@
 //!
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
+/// This program and its version.
+pub const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
+
 pub mod bench;
 pub mod clock;
 pub mod doctor;
@@ -14,6 +17,7 @@ pub mod host_clock;
 mod line;
 mod line_monitor;
 pub mod link;
+pub mod live;
 pub mod lock;
 pub mod monitor;
 pub mod place;

@@ -19,6 +19,7 @@ use crate::host_clock::now_us;
 use crate::link::Event;
 use crate::lock::locked;
 
+mod cdr_encoder;
 mod columns;
 mod csv_folder;
 mod descriptions;
@@ -33,13 +34,13 @@ pub mod row;
 mod row_builder;
 mod sink;
 
+pub use cdr_encoder::{CdrEncoder, ChannelSchema, SayError, SchemaError};
 pub use error::RecordingError;
 pub use files::part_path;
-pub use row_builder::{Entry, Tally};
+pub use row_builder::{Entry, RowBuilder, Tally};
 
 use files::RecordingFiles;
 use queue::{Input, Loss, Output, PATIENCE, Taken, queue};
-use row_builder::RowBuilder;
 
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);

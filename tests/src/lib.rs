@@ -5,6 +5,7 @@
 #[cfg(target_os = "linux")]
 pub mod bench;
 pub mod bridge;
+pub mod browser;
 pub mod elves;
 pub mod fake_bench;
 pub mod fake_board;

@@ -37,7 +37,13 @@ const FOLDERS: [&str; 9] = [
 /// Programs whose command lines are checked.
 const PROGRAMS: [&str; 2] = ["hil-sim", "host-bridge"];
 /// What pictures were made by, where it is not `hil-sim chart NAME`, `hil-sim map NAME` or `hil-sim NAME`.
-const MADE_BY: [(&str, &str); 2] = [("monitor", "host-bridge monitor"), ("report", "--report")];
+const MADE_BY: [(&str, &str); 5] = [
+    ("monitor", "host-bridge monitor"),
+    ("report", "--report"),
+    ("fig7", "host-bridge/doc/fig7.py"),
+    ("live-light", "host-bridge live"),
+    ("live-dark", "host-bridge live"),
+];
 /// The heading of a newcomer's questions, and how many there are.
 const QUESTIONS: &str = "Ten questions";
 const QUESTION_COUNT: usize = 10;

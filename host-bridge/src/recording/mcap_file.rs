@@ -12,11 +12,9 @@ use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions, Writer};
-use ros2msg::Definition;
 
+use super::cdr_encoder::CdrEncoder;
 use super::error::RecordingError;
-use super::ros2;
-use super::row::{CHANNELS, channel, topic};
 use super::row_builder::Entry;
 use super::sink::{Sink, SinkWriter};
 
@@ -39,14 +37,11 @@ const QOS: (&str, &str) = ("offered_qos_profiles", "");
 pub struct McapFile {
     sink: Sink,
     writer: Writer<BufWriter<SinkWriter>>,
-    channels: Vec<Channel>,
+    encoder: CdrEncoder,
+    /// The channels' numbers in the file.
+    ids: Vec<u16>,
     cdr: Vec<u8>,
     dirty: bool,
-}
-
-struct Channel {
-    id: u16,
-    definition: Definition,
 }
 
 fn reason(error: McapError) -> io::Error {
@@ -73,6 +68,7 @@ impl McapFile {
 
     /// What was made goes with the sink if this fails.
     fn begin(sink: Sink, about: BTreeMap<String, String>) -> Result<Self, RecordingError> {
+        let encoder = CdrEncoder::new().map_err(|error| sink.failed(io::Error::other(error)))?;
         let writer = BufWriter::new(sink.writer()?);
         let writer = WriteOptions::new()
             .profile(PROFILE)
@@ -88,7 +84,8 @@ impl McapFile {
         let mut mcap = Self {
             sink,
             writer,
-            channels: Vec::with_capacity(CHANNELS.len()),
+            encoder,
+            ids: Vec::new(),
             cdr: Vec::new(),
             dirty: true,
         };
@@ -102,16 +99,15 @@ impl McapFile {
 
     fn add_channels(&mut self) -> Result<(), McapError> {
         let keys = BTreeMap::from([(QOS.0.to_owned(), QOS.1.to_owned())]);
-        for (role, kind) in CHANNELS {
-            let shape = kind.shape();
-            let name = ros2::name(shape);
-            let text = ros2::schema(shape).map_err(io::Error::other)?;
-            let definition = Definition::parse(&name, &text).map_err(io::Error::other)?;
-            let schema = self.writer.add_schema(&name, "ros2msg", text.as_bytes())?;
+        for channel in self.encoder.channels() {
+            let text = channel.schema.as_bytes();
+            let schema = self
+                .writer
+                .add_schema(&channel.schema_name, "ros2msg", text)?;
             let id = self
                 .writer
-                .add_channel(schema, &topic(role, kind), "cdr", &keys)?;
-            self.channels.push(Channel { id, definition });
+                .add_channel(schema, &channel.topic, "cdr", &keys)?;
+            self.ids.push(id);
         }
         Ok(())
     }
@@ -146,28 +142,22 @@ impl McapFile {
     /// # Errors
     /// If the file does not take it.
     pub fn write(&mut self, entry: &Entry) -> Result<(), RecordingError> {
-        let Some(at) = channel(entry.role, entry.row.kind()) else {
+        self.cdr.clear();
+        let encoded = self.encoder.encode(entry, &mut self.cdr);
+        let Some(at) = encoded.map_err(|error| self.failed(io::Error::other(error)))? else {
             return Ok(());
         };
         self.dirty = true;
-        let written = self.append(at, entry);
-        written.map_err(|error| self.failed(error))
-    }
-
-    fn append(&mut self, at: usize, entry: &Entry) -> io::Result<()> {
-        let channel = &self.channels[at];
         let header = MessageHeader {
-            channel_id: channel.id,
+            channel_id: self.ids[at],
             // None: messages that can be lost carry their own, and this one would take 6 % of the file.
             sequence: 0,
             log_time: entry.log_ns,
             publish_time: entry.log_ns,
         };
-        let value = ros2::outward(entry.row.kind().shape(), &entry.row.value()?);
-        self.cdr.clear();
-        ros2msg::encode(&channel.definition, &value, &mut self.cdr).map_err(io::Error::other)?;
-        let written = self.writer.write_to_known_channel(&header, &self.cdr);
-        written.map_err(reason)
+        self.writer
+            .write_to_known_channel(&header, &self.cdr)
+            .map_err(|error| self.failed(reason(error)))
     }
 
     /// Closes the chunk and makes everything written so far safe.

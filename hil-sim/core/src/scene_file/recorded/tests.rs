@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use hound::{SampleFormat, WavSpec, WavWriter};
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
+use ros2msg::{Definition, encode};
 
 use crate::judge::outcome::Outcome;
 use crate::native;
@@ -70,6 +71,31 @@ fn wav(rate_hz: u32, samples: impl Iterator<Item = f64>) -> Vec<u8> {
 
 /// JSON messages on `topic`, logged at their times in ns.
 fn mcap(topic: &str, messages: impl Iterator<Item = (u64, String)>) -> Vec<u8> {
+    let messages = messages.map(|(log_time, json)| (log_time, json.into_bytes()));
+    mcap_as(topic, None, messages)
+}
+
+/// Messages of ROS 2 on `topic`, with the fields of these JSON objects.
+fn ros_mcap(
+    topic: &str,
+    (name, text): (&str, &str),
+    messages: impl Iterator<Item = (u64, String)>,
+) -> Vec<u8> {
+    let definition = Definition::parse(name, text).unwrap();
+    let messages = messages.map(|(log_time, json)| {
+        let mut cdr = Vec::new();
+        encode(&definition, &serde_json::from_str(&json).unwrap(), &mut cdr).unwrap();
+        (log_time, cdr)
+    });
+    mcap_as(topic, Some((name, text)), messages)
+}
+
+/// JSON, or messages of ROS 2 of a schema.
+fn mcap_as(
+    topic: &str,
+    schema: Option<(&str, &str)>,
+    messages: impl Iterator<Item = (u64, Vec<u8>)>,
+) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     // Small chunks, so that a file that is cut off has some whole ones.
     let mut writer = WriteOptions::new()
@@ -79,10 +105,17 @@ fn mcap(topic: &str, messages: impl Iterator<Item = (u64, String)>) -> Vec<u8> {
     let other = writer
         .add_channel(0, "/other", "json", &BTreeMap::new())
         .unwrap();
+    let (schema, encoding) = match schema {
+        None => (0, "json"),
+        Some((name, text)) => {
+            let schema = writer.add_schema(name, "ros2msg", text.as_bytes());
+            (schema.unwrap(), "cdr")
+        }
+    };
     let channel_id = writer
-        .add_channel(0, topic, "json", &BTreeMap::new())
+        .add_channel(schema, topic, encoding, &BTreeMap::new())
         .unwrap();
-    for (sequence, (log_time, json)) in (0..).zip(messages) {
+    for (sequence, (log_time, message)) in (0..).zip(messages) {
         for channel_id in [other, channel_id] {
             let header = MessageHeader {
                 channel_id,
@@ -90,10 +123,12 @@ fn mcap(topic: &str, messages: impl Iterator<Item = (u64, String)>) -> Vec<u8> {
                 log_time,
                 publish_time: log_time,
             };
-            let json = if channel_id == other { "{}" } else { &json };
-            writer
-                .write_to_known_channel(&header, json.as_bytes())
-                .unwrap();
+            let message = if channel_id == other {
+                b"{}"
+            } else {
+                &*message
+            };
+            writer.write_to_known_channel(&header, message).unwrap();
         }
     }
     writer.finish().unwrap();
@@ -102,7 +137,7 @@ fn mcap(topic: &str, messages: impl Iterator<Item = (u64, String)>) -> Vec<u8> {
 }
 
 /// A tone of 1 in each format, from 0.1 s before the scene to 0.1 s after it, and the section that reads it.
-fn tone(rate_hz: u32, tone_hz: f64) -> [(&'static str, String, Vec<u8>); 3] {
+fn tone(rate_hz: u32, tone_hz: f64) -> [(&'static str, String, Vec<u8>); 4] {
     let rate = f64::from(rate_hz);
     let count = (2.2 * rate) as u32;
     let samples = move || {
@@ -116,10 +151,18 @@ fn tone(rate_hz: u32, tone_hz: f64) -> [(&'static str, String, Vec<u8>); 3] {
         .map(|(t_s, x)| format!("{t_s:.7};{x:.6};idle\n"))
         .collect();
     let epoch_ns = 1_700_000_000_000_000_000_u64;
-    let messages = samples().map(|(t_s, x)| {
-        let ns = epoch_ns + ((t_s + 0.1) * 1e9).round() as u64;
-        (ns, format!("{{\"a\":{{\"v\":[0,{x}]}}}}"))
-    });
+    let messages = || {
+        samples().map(|(t_s, x)| {
+            let ns = epoch_ns + ((t_s + 0.1) * 1e9).round() as u64;
+            (ns, format!("{{\"a\":{{\"v\":[0,{x}]}}}}"))
+        })
+    };
+    let imu = "Pair a\n===\nMSG: test_msgs/Pair\nfloat64[2] v\n";
+    let section = |name: &str| {
+        format!(
+            "{kind}file = \"{name}\"\nstart_s = 0.1\ntopic = \"/imu\"\nchannels = [\"a.v.1\", \"a.v.1\", \"a.v.1\", \"a.v.1\", \"a.v.1\"]\n"
+        )
+    };
     [
         (
             "tone.csv",
@@ -131,12 +174,11 @@ fn tone(rate_hz: u32, tone_hz: f64) -> [(&'static str, String, Vec<u8>); 3] {
             format!("{kind}file = \"tone.wav\"\nstart_s = 0.1\n"),
             wav(rate_hz, samples().map(|(_, x)| x)),
         ),
+        ("tone.mcap", section("tone.mcap"), mcap("/imu", messages())),
         (
-            "tone.mcap",
-            format!(
-                "{kind}file = \"tone.mcap\"\nstart_s = 0.1\ntopic = \"/imu\"\nchannels = [\"a.v.1\", \"a.v.1\", \"a.v.1\", \"a.v.1\", \"a.v.1\"]\n"
-            ),
-            mcap("/imu", messages),
+            "ros.mcap",
+            section("ros.mcap"),
+            ros_mcap("/imu", ("test_msgs/msg/Imu", imu), messages()),
         ),
     ]
 }
