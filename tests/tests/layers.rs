@@ -25,7 +25,7 @@ const LAYERS: [(&str, &[&str]); 2] = [
 const CRATES: [&str; 10] = [
     "protocol",
     "protocol/nucleo",
-    "ros2msg",
+    "protocol/ros2msg",
     "firmware-sensor",
     "firmware-display",
     "host-bridge",
