@@ -12,6 +12,7 @@ use protocol::Role;
 use tests::bench::{ExclusiveBench, bench, until};
 use tests::bridge;
 use tests::browser::Browser;
+use tests::relay::free_port;
 
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(120);
@@ -25,6 +26,11 @@ struct Live {
 
 impl Live {
     fn start(alone: &ExclusiveBench, port: &str) -> Self {
+        Self::try_start(alone, port).expect("it says where")
+    }
+
+    /// The same; none if one of its ports is taken.
+    fn try_start(alone: &ExclusiveBench, port: &str) -> Option<Self> {
         let mut child = bridge::command()
             .args(["live", "--port", port, "--bench"])
             .arg(alone.bench.bench_file())
@@ -32,15 +38,20 @@ impl Live {
             .expect("the program can be started");
         let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
         let mut after = |start: &str| {
-            let line = lines.next().expect("it says where").expect("text");
+            let line = lines.next()?.expect("text");
             let rest = line.strip_prefix(start);
-            rest.unwrap_or_else(|| panic!("{line}")).to_owned()
+            Some(rest.unwrap_or_else(|| panic!("{line}")).to_owned())
         };
-        Self {
+        let (Some(foxglove), Some(page)) = (after("Foxglove: ws://"), after("page: http://"))
+        else {
+            assert_eq!(child.wait().expect("it ends").code(), Some(2));
+            return None;
+        };
+        Some(Self {
             child,
-            foxglove: after("Foxglove: ws://"),
-            page: after("page: http://").trim_end_matches('/').to_owned(),
-        }
+            foxglove,
+            page: page.trim_end_matches('/').to_owned(),
+        })
     }
 
     fn end(mut self) {
@@ -255,14 +266,15 @@ fn the_page_moves_stops_the_boards_and_comes_back() {
         browser.text("valid").eq("valid").then_some(())
     });
     // So does the program.
-    let port = live.foxglove.rsplit(':').next().expect("a port").to_owned();
     live.end();
     until("word of it", || {
         browser.text("said").contains("No connection").then_some(())
     });
     assert_eq!(browser.text("lambda"), "–");
-    // The ports beside each other: as a user has them.
-    let live = Live::start(&alone, &port);
+    // The ports beside each other: as a user has them. Another program may just have taken one.
+    let live = (0..100)
+        .find_map(|_| Live::try_start(&alone, &free_port().to_string()))
+        .expect("two ports beside each other are free");
     browser.open(&format!("http://{}/", live.page));
     until("λ again", || {
         browser.text("valid").eq("valid").then_some(())
