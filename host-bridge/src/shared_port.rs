@@ -188,10 +188,10 @@ impl Seat {
         loop {
             match Guest::open(&self.device.socket()) {
                 Ok(guest) => return Ok(Hearing::new(guest)),
-                Err(error) if Instant::now() >= until => {
+                Err(_) if Instant::now() >= until => {
                     let holder = self.device.holder();
                     return Err(self.failed(format!(
-                        "{holder} has it and does not answer ({error}): let it go on, or end it"
+                        "{holder} has it and stands still: let it go on, or end it"
                     )));
                 }
                 Err(_) => std::thread::park_timeout(READ_TIMEOUT),
