@@ -58,7 +58,12 @@ impl StopBoards {
                         ..
                     },
                 )) => {
+                    let before = waiting.len();
                     waiting.retain(|(waits, _)| *waits != role);
+                    if waiting.len() == before {
+                        // It answers each time that it was told.
+                        continue;
+                    }
                     say(&format!(
                         "{} has stopped: {}",
                         role.name(),
