@@ -327,12 +327,16 @@ impl<F: FnMut(Event)> Reader<F> {
                 _ => {}
             }
             let is_known = state.is_known();
+            // Of several ports, that behind which another board is, ends no Stop.
+            let is_wanted = !choosy || state.is_of(self.shared.role);
             if !choosy || is_known {
                 self.set_state(state);
             }
             for message in messages.drain(..) {
                 // What another board says is nobody's business here, but that it has stopped.
-                if let Message::Stopped(_) = message {
+                if let Message::Stopped(_) = message
+                    && is_wanted
+                {
                     locked(&self.shared.stop).take();
                     (self.tell)(Event::Heard { at_us, message });
                 } else if is_known {

@@ -81,6 +81,15 @@ impl State {
         matches!(self, Self::Known { .. })
     }
 
+    /// Whether the board of `role` is there, of whatever version.
+    pub const fn is_of(&self, role: Role) -> bool {
+        match self {
+            Self::Known { .. } => true,
+            Self::Foreign { hello, .. } => hello.role == role.byte(),
+            _ => false,
+        }
+    }
+
     /// The port, if one is or was to be opened.
     pub const fn port(&self) -> Option<&PathBuf> {
         match self {

@@ -1,6 +1,7 @@
 //! The bridge's way to a board, by virtual time: found, greeted, lost and found again, and named when
 //! something is wrong.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -10,8 +11,8 @@ use host_bridge::link::{Event, Link, NotSent};
 use host_bridge::place::Place;
 use host_bridge::state::State;
 use protocol::{
-    Hello, Message, Motion, PortCounters, ResetCause, Role, RoleCounters, SensorCounters, Status,
-    Stop, StopReason,
+    Hello, MAX_FRAME, Message, Motion, PortCounters, ResetCause, Role, RoleCounters,
+    SensorCounters, Status, Stop, StopReason, Stopped, Trip, frame,
 };
 use tests::fake_board::{FakeBoard, wait_by};
 use tests::virtual_clock::wait_until;
@@ -446,4 +447,35 @@ fn a_board_among_several_ports_is_found_again_behind_another_one() {
     let board = FakeBoard::on(&bench, Role::Sensor);
     bench.ports.link(board.path(), &other);
     assert_eq!(watched.turns_to("known").port(), Some(&other));
+}
+
+#[test]
+fn a_stop_among_several_ports_is_not_ended_by_the_answer_of_another_board() {
+    let bench = VirtualBench::default();
+    let (other, mut end) = bench.cable();
+    let sensor = FakeBoard::on(&bench, Role::Sensor);
+    let ports = vec![other, sensor.path().clone()];
+    // A board of another bench says so, and nothing else.
+    let mut frame = [0; MAX_FRAME];
+    let stopped = Message::Stopped(Stopped::by(Trip::Operator));
+    let said = frame::encode(0, &stopped, &mut frame).expect("it fits");
+    end.write_all(said).expect("there is room");
+    let watched = Watched::new(&bench, Role::Sensor, Place::Among(ports));
+    // Whether it could be said at once is no matter.
+    watched.link.stop(OPERATOR).ok();
+    assert!(hears_stop(&sensor));
+    let is_stopped = |event: &Event| {
+        matches!(
+            event,
+            Event::Heard {
+                message: Message::Stopped(_),
+                ..
+            }
+        )
+    };
+    assert!(watched.tells(is_stopped));
+    assert_eq!(watched.link.state().port(), Some(sensor.path()));
+    assert!(wait_until(&bench.clock, LIMIT, || !watched
+        .link
+        .is_stopping()));
 }
