@@ -39,6 +39,15 @@ want_browser() {
         || say "ridgelink: no chromedriver, and apt-get could not install chromium-driver: no browser looks at the page of host-bridge live"
 }
 
+# A second emulator of the Cortex-M4F, for a test of the libs; without it the test is skipped. Nothing that is
+# installed has to make room for it.
+want_qemu() {
+    command -v qemu-system-arm >/dev/null 2>&1 && return
+    { command -v apt-get && as_root apt-get update -qq \
+        && as_root apt-get install -y -qq --no-remove --no-install-recommends qemu-system-arm; } >/dev/null 2>&1 \
+        || say "ridgelink: no qemu-system-arm, and apt-get could not install it: the libs run on one emulated Cortex-M4F only"
+}
+
 ordinary_world() {
     command -v rustc >/dev/null 2>&1 && command -v cargo >/dev/null 2>&1 && new_enough rustc || return 1
     add_target "$target"
@@ -120,12 +129,25 @@ build_firmwares() {
     board_cargo build --release -p firmware-sensor -p firmware-display
 }
 
-# What hil-sim cost and hil-sim chart estimators count the instructions of.
-build_cost_examples() {
-    board_cargo build --release -p firmware-sensor --example filter_cost --example estimator_cost
+# What hil-sim cost and hil-sim chart estimators count the instructions of, and what watches the clock.
+build_examples() {
+    board_cargo build --release -p firmware-sensor --example filter_cost --example estimator_cost --example clock
 }
 
-# The libs without a HAL: in a program for no board of ours, linked for the boards' core and for another one.
+# The tests that run on a board, each as target/on-target/PACKAGE-TEST, without the hash that cargo gives it. Cargo
+# builds the packages' bins as well, with what only tests need in sight: build_firmwares comes after it.
+build_on_target() {
+    folder=${CARGO_TARGET_DIR:-target}/on-target
+    mkdir -p "$folder"
+    built=$(board_cargo test --release --no-run --message-format=json-render-diagnostics \
+        -p firmware-sensor -p firmware-display --test on_target --test restarts) || return
+    printf '%s\n' "$built" \
+        | sed -n 's|.*"package_id":"[^"]*\(firmware-[a-z]*\)[# ].*"executable":"\([^"]*/deps/\([a-z_]*\)-[0-9a-f]*\)".*|\2 \1-\3|p' \
+        | while read -r elf name; do cp "$elf" "$folder/$name"; done
+}
+
+# The libs without a HAL: in a program for no board of ours, linked for the boards' core and for another one,
+# and the same for the boards' own chip.
 link_plain_board() {
     manifest=tests/plain-board/Cargo.toml
     tree=$(cargo_of tree --locked --manifest-path $manifest --target all --edges normal,build --prefix none)

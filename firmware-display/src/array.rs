@@ -32,11 +32,18 @@ impl Array {
     /// Writes each actuator's word, 0 V + round(level · gain · its lane), but no further from what was there
     /// than `most` steps. True if any changed.
     ///
-    /// `lanes` are within ± [`ONE`]; a single one stands for all, and may as long as one has since all words
-    /// were 0 V. `level` is in Q16 DAC steps, [`FULL`] at most, so that no word is further than 32 767 steps
-    /// from 0 V. Nothing is rounded but the word itself, half up: the product has 42 bits behind the point, so
+    /// `lanes` are within ± [`ONE`], in the order of the first actuators that play them, and `lane_of` is which of them
+    /// each actuator plays; a single one stands for all, and may as long as one has since all words were 0 V. `level` is
+    /// in Q16 DAC steps, [`FULL`] at most, so that no word is further than 32 767 steps from 0 V. Nothing is rounded but the word itself, half up: the product has 42 bits behind the point, so
     /// that halves as such do not occur and rounding moves no mean.
-    pub fn draw(&self, level: u32, lanes: &[i32], most: i32, words: &mut [u16; ACTUATORS]) -> bool {
+    pub fn draw(
+        &self,
+        level: u32,
+        lanes: &[i32],
+        lane_of: &[u8; ACTUATORS],
+        most: i32,
+        words: &mut [u16; ACTUATORS],
+    ) -> bool {
         // The last two bits, which a gain of 1 would cut off, would do so downwards for either polarity.
         let level = (level & !0b11) as i32;
         if let &[lane] = lanes {
@@ -46,22 +53,58 @@ impl Array {
                 *words = [word; ACTUATORS];
                 return changed;
             }
-            return self.draw_each(level, core::iter::repeat(&lane), most, words);
+            return self.draw_each(level, core::iter::repeat(lane), most, words);
         }
-        self.draw_each(level, lanes.iter(), most, words)
+        if self.alike {
+            return self.draw_alike(level, lanes, lane_of, most, words);
+        }
+        // An actuator of no lane, which only a fault of memory makes, plays nothing.
+        let lane = |index: &u8| lanes.get(usize::from(*index)).copied().unwrap_or(0);
+        self.draw_each(level, lane_of.iter().map(lane), most, words)
+    }
+
+    /// Of equal gains those of a lane have had equal words since all were 0 V: each is worked out once, where it comes
+    /// first, which is in the lanes' order.
+    fn draw_alike(
+        &self,
+        level: i32,
+        lanes: &[i32],
+        lane_of: &[u8; ACTUATORS],
+        most: i32,
+        words: &mut [u16; ACTUATORS],
+    ) -> bool {
+        // A power of two, so that no index needs to be checked.
+        const ROOM: usize = 64;
+        const { assert!(ROOM >= ACTUATORS && ROOM.is_power_of_two()) };
+        let mut new = [ZERO_VOLT; ROOM];
+        let mut lanes = lanes.iter();
+        let mut next = 0;
+        let mut differences = 0;
+        for (word, &lane_of) in words.iter_mut().zip(lane_of) {
+            let new = &mut new[usize::from(lane_of) % ROOM];
+            if lane_of == next
+                && let Some(lane) = lanes.next()
+            {
+                *new = drawn(level, self.gains_q30[0], *lane, most, *word);
+                next += 1;
+            }
+            differences |= *new ^ *word;
+            *word = *new;
+        }
+        differences != 0
     }
 
     #[inline]
-    fn draw_each<'a>(
+    fn draw_each(
         &self,
         level: i32,
-        lanes: impl Iterator<Item = &'a i32>,
+        lanes: impl Iterator<Item = i32>,
         most: i32,
         words: &mut [u16; ACTUATORS],
     ) -> bool {
         let mut differences = 0;
         for ((word, gain), lane) in words.iter_mut().zip(&self.gains_q30).zip(lanes) {
-            let new = drawn(level, *gain, *lane, most, *word);
+            let new = drawn(level, *gain, lane, most, *word);
             differences |= new ^ *word;
             *word = new;
         }
@@ -104,10 +147,20 @@ mod tests {
 
     const QUARTER: u32 = 1 << 30;
     const NO_LIMIT: i32 = 65_536;
+    /// Each actuator plays a lane of its own.
+    const EACH: [u8; ACTUATORS] = {
+        let mut each = [0; ACTUATORS];
+        let mut actuator = 0;
+        while actuator < ACTUATORS {
+            each[actuator] = actuator as u8;
+            actuator += 1;
+        }
+        each
+    };
 
     fn offsets(array: &Array, level: u32, lanes: &[i32]) -> [i32; ACTUATORS] {
         let mut words = [ZERO_VOLT; ACTUATORS];
-        array.draw(level, lanes, NO_LIMIT, &mut words);
+        array.draw(level, lanes, &EACH, NO_LIMIT, &mut words);
         words.map(|word| i32::from(word) - 32_768)
     }
 
@@ -195,6 +248,24 @@ mod tests {
     }
 
     #[test]
+    fn each_actuator_plays_the_lane_that_is_its_own() {
+        let mut lane_of = [0; ACTUATORS];
+        lane_of[1] = 1;
+        // A fault of memory.
+        lane_of[2] = 7;
+        let mut unlike = DEFAULT_ACTUATORS;
+        unlike[4].gain_q15 = 0;
+        for (actuators, fourth) in [(DEFAULT_ACTUATORS, 32_767), (unlike, 0)] {
+            let array = Array::new(&actuators);
+            let mut words = [ZERO_VOLT; ACTUATORS];
+            assert!(array.draw(FULL, &[ONE, -ONE], &lane_of, NO_LIMIT, &mut words));
+            let offsets = words.map(|word| i32::from(word) - 32_768);
+            assert_eq!(offsets[..5], [32_767, -32_767, 0, 32_767, fourth]);
+            assert!(!array.draw(FULL, &[ONE, -ONE], &lane_of, NO_LIMIT, &mut words));
+        }
+    }
+
+    #[test]
     fn an_inverted_actuator_gets_exactly_the_opposite_voltage() {
         let mut actuators = DEFAULT_ACTUATORS;
         actuators[1].inverted = true;
@@ -211,10 +282,10 @@ mod tests {
         let array = Array::new(&DEFAULT_ACTUATORS);
         let mut words = [ZERO_VOLT; ACTUATORS];
         for expected in [10_000, 20_000, 30_000, 32_767, 32_767] {
-            array.draw(FULL, &[ONE], 10_000, &mut words);
+            array.draw(FULL, &[ONE], &EACH, 10_000, &mut words);
             assert_eq!(words, [ZERO_VOLT + expected; ACTUATORS]);
         }
-        array.draw(FULL, &[-ONE; ACTUATORS], 10_000, &mut words);
+        array.draw(FULL, &[-ONE; ACTUATORS], &EACH, 10_000, &mut words);
         assert_eq!(words, [ZERO_VOLT + 22_767; ACTUATORS]);
     }
 
@@ -223,7 +294,7 @@ mod tests {
         let array = Array::new(&DEFAULT_ACTUATORS);
         let mut words = [ZERO_VOLT; ACTUATORS];
         let mut lanes = [0; ACTUATORS];
-        let mut changed = |lanes: &[i32]| array.draw(FULL, lanes, NO_LIMIT, &mut words);
+        let mut changed = |lanes: &[i32]| array.draw(FULL, lanes, &EACH, NO_LIMIT, &mut words);
         assert!(!changed(&lanes));
         assert!(changed(&[ONE]));
         assert!(!changed(&[ONE]));

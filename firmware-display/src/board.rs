@@ -85,7 +85,7 @@ impl Board {
     pub fn take() -> Self {
         let started = nucleo::reset::cause();
         let trip = nucleo::trip::after(started.0);
-        let p = embassy_stm32::init(nucleo::clock::configuration());
+        let p = nucleo::clock::start();
         let vitals = Vitals::new(p.IWDG, p.PB0, started);
 
         let timer = Timer::new(p.TIM3);

@@ -2,7 +2,7 @@
 
 use protocol::actuators::{DEFAULT_PITCH_UM, FURTHEST_UM};
 use protocol::{
-    ACTUATORS, Capabilities, DisplayCapabilities, DisplayConfiguration, Mode, UpdateRate,
+    ACTUATORS, Capabilities, DisplayCapabilities, DisplayConfiguration, Mode, Rendering, UpdateRate,
 };
 
 use crate::limits::{MOST_ENERGY_V2, MOST_SLEW_V_PER_MS, MOST_STANDING_V};
@@ -15,6 +15,7 @@ pub const CAPABILITIES: Capabilities = Capabilities::Display(DisplayCapabilities
     furthest_um: FURTHEST_UM as u16,
     // The last one's number, and one for the first.
     modes: Mode::Travelling as u8 + 1,
+    renderings: Rendering::Texture as u8 + 1,
     update_rates_hz: [
         UpdateRate::Hz2000.hz() as u16,
         UpdateRate::Hz4000.hz() as u16,
@@ -39,7 +40,10 @@ mod tests {
         let Capabilities::Display(display) = CAPABILITIES else {
             panic!("it is a display's");
         };
-        assert_eq!((display.actuators, display.modes), (50, 2));
+        assert_eq!(
+            (display.actuators, display.modes, display.renderings),
+            (50, 2, 3)
+        );
         assert_eq!(display.update_rates_hz, [2_000, 4_000]);
         assert_eq!(
             (display.slew_mv_per_ms, display.standing_mv),

@@ -15,7 +15,7 @@ use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::Output;
-use embassy_stm32::interrupt::typelevel::{self, Handler};
+use embassy_stm32::interrupt::typelevel::{DMA2_STREAM3 as Interrupt, Handler, Interrupt as _};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac::dma::regs::{Cr, Fcr, Ixr, Ndtr};
 use embassy_stm32::pac::dma::vals::{Dir, Dmdis, Pl, Size};
@@ -116,10 +116,11 @@ fn with_line<R>(act: impl FnOnce(&mut Line) -> R) -> Option<R> {
 }
 
 /// Answers DMA2 stream 3: a frame is in SPI1, or something is wrong. Deadline: LDAC's edge, for the four;
-/// missed, they are sent again.
+/// missed, they are sent again. It comes before the tick, so it must not come for ever: an interrupt that
+/// cannot be ended is not heard until the way is set up anew.
 pub struct FrameHandler;
 
-impl Handler<typelevel::DMA2_STREAM3> for FrameHandler {
+impl Handler<Interrupt> for FrameHandler {
     #[allow(unsafe_code, reason = "the trait's signature")]
     unsafe fn on_interrupt() {
         with_line(Line::on_interrupt);
@@ -168,7 +169,7 @@ struct Line {
 }
 
 impl Line {
-    /// Sets the stream up, off, and SPI1 to ask it for words.
+    /// Sets the stream up, off, its interrupt heard, and SPI1 to ask it for words.
     fn open(&mut self) {
         let stream = DMA2.st(STREAM);
         let mut off = self.control;
@@ -179,6 +180,7 @@ impl Line {
         direct.set_dmdis(Dmdis::ENABLED);
         stream.fcr().write_value(direct);
         DMA2.ifcr(0).write_value(FLAGS);
+        hear();
         SPI1.cr2().modify(|w| w.set_txdmaen(true));
     }
 
@@ -206,12 +208,19 @@ impl Line {
     fn on_interrupt(&mut self) {
         let flags = DMA2.isr(0).read();
         DMA2.ifcr(0).write_value(FLAGS);
+        let has_failed = flags.teif(STREAM);
+        if !has_failed && !flags.tcif(STREAM) {
+            // Without a clock DMA2 neither says what it asks for nor hears the answer. It would ask for ever, and
+            // no tick would be served.
+            Interrupt::disable();
+            return;
+        }
         let State::Sending(chip) = self.state else {
             return;
         };
-        if flags.teif(STREAM) {
+        if has_failed {
             self.fail(chip);
-        } else if flags.tcif(STREAM) {
+        } else {
             self.on_sent(chip);
         }
     }
@@ -274,6 +283,20 @@ impl Line {
         self.bus.deselect(chip);
         self.look = None;
         self.open();
+    }
+}
+
+/// Lets the stream interrupt from now on. What its interrupt was for until now has been answered, and an interrupt
+/// without a flag would look like a DMA2 that is silent.
+fn hear() {
+    Interrupt::unpend();
+    #[allow(
+        unsafe_code,
+        reason = "unmasking an interrupt whose handler is bound in board.rs"
+    )]
+    // SAFETY: no critical section relies on this interrupt being masked.
+    unsafe {
+        Interrupt::enable();
     }
 }
 

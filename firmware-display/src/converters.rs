@@ -50,7 +50,15 @@ impl Converters {
         Ok(())
     }
 
-    fn exchange(&mut self, chip: usize, frame: look::Bytes) -> Result<look::Bytes, ConverterFault> {
+    /// Writes a frame to a chip and returns what came back meanwhile, with no update under way.
+    ///
+    /// # Errors
+    /// The frame did not get out.
+    pub fn exchange(
+        &mut self,
+        chip: usize,
+        frame: look::Bytes,
+    ) -> Result<look::Bytes, ConverterFault> {
         let fault = ConverterFault::Transfer { chip: chip as u8 };
         self.chain.exchange(chip, frame).ok_or(fault)
     }

@@ -1,7 +1,8 @@
 //! The display: estimates and encoder readings in, fifty DAC words out, and the supervisor over them.
 
 use protocol::{
-    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason, Trip,
+    DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason,
+    Texture, Trip,
 };
 
 use crate::endurance::Endurance;
@@ -11,6 +12,7 @@ use crate::limits::Limits;
 use crate::memory::Memory;
 use crate::pace::per_tick;
 use crate::plausibility::{Plausibility, Verdict};
+use crate::relief::{self, Relief};
 use crate::senses::{ConverterFault, Output, Readback, Senses, Transfer};
 use crate::settings::Settings;
 use crate::stimulus::Stimulus;
@@ -35,6 +37,7 @@ pub struct Display {
     asked: Option<Trip>,
     watch: Watch,
     plausibility: Plausibility,
+    relief: Relief,
     endurance: Endurance,
     hand: Hand,
     fade: Fade,
@@ -58,6 +61,7 @@ impl Display {
             asked: None,
             watch: Watch::default(),
             plausibility: Plausibility::new(),
+            relief: Relief::new(),
             endurance: Endurance::default(),
             hand: Hand::default(),
             fade: Fade::new(configuration.fade_in_ms, configuration.fade_out_ms),
@@ -134,6 +138,27 @@ impl Display {
         counters.implausible = counters
             .implausible
             .wrapping_add(self.plausibility.take_unconfirmed());
+        if self.plausibility.take_beginning() {
+            self.relief.begin_anew();
+        }
+    }
+
+    /// Takes what the sensor says of the surface besides λ: see [`crate::relief`].
+    pub fn on_texture(&mut self, texture: &Texture) {
+        let counters = &mut self.counters;
+        match self.relief.judge(texture) {
+            relief::Verdict::Taken => {
+                if texture.valid {
+                    self.stimulus.wear(texture);
+                }
+                if texture.friction.is_some() {
+                    self.stimulus.rub(texture.friction);
+                }
+            }
+            relief::Verdict::Late => count(&mut counters.refused_estimates, true),
+            relief::Verdict::Unsound => count(&mut counters.implausible, true),
+            relief::Verdict::Flooding => count(&mut counters.flooded, true),
+        }
     }
 
     /// 0 V from the next tick on, and for good.
@@ -226,12 +251,29 @@ impl Display {
     fn elapse(&mut self, quarters: u32) {
         let rests = self.stimulus.is_resting();
         self.plausibility.elapse(quarters, rests);
+        self.forget(quarters);
         self.endurance.elapse(
             quarters,
             self.state == DisplayState::Driving,
             rests,
             self.configuration.full_drive_s,
         );
+    }
+
+    /// Time passes, and what is known of the surface besides λ may become too old.
+    fn forget(&mut self, quarters: u32) {
+        let max_age_ms = self.configuration.max_age_ms;
+        let was_fresh = (
+            self.relief.wave_is_fresh(max_age_ms),
+            self.relief.friction_is_fresh(max_age_ms),
+        );
+        self.relief.elapse(quarters);
+        if was_fresh.0 && !self.relief.wave_is_fresh(max_age_ms) {
+            self.stimulus.wear_off();
+        }
+        if was_fresh.1 && !self.relief.friction_is_fresh(max_age_ms) {
+            self.stimulus.rub(None);
+        }
     }
 
     /// All that trips before a word is computed; the first one counts.
@@ -368,6 +410,37 @@ mod tests {
             );
         }
         panic!("never stopped");
+    }
+
+    #[test]
+    fn textures_of_a_sensor_that_starts_again_are_heard_whenever_its_arm_moves() {
+        let (mut display, _) = driving();
+        let estimate = |sequence: u32| Estimate {
+            sequence,
+            instant_us: 0,
+            wavelength_mm: None,
+            valid: false,
+            confidence: 0.0,
+            amplitude_lsb: 0.0,
+            counted_mm: None,
+            range: Range::T1,
+            contact: Contact::Unknown,
+            velocity_um_s: 0,
+            lag_um: None,
+            gauges_used: 1,
+            health: [GaugeHealth::Good; GAUGES],
+        };
+        let texture = |sequence: u32| Texture {
+            sequence,
+            ..Texture::default()
+        };
+        display.on_estimate(&estimate(371));
+        display.on_texture(&texture(370));
+        display.on_texture(&texture(60));
+        assert_eq!(display.counters().refused_estimates, 1, "late");
+        display.on_estimate(&estimate(0));
+        display.on_texture(&texture(60));
+        assert_eq!(display.counters().refused_estimates, 1, "a new beginning");
     }
 
     #[test]

@@ -128,4 +128,15 @@ mod tests {
         let half = fade.gain;
         assert_eq!(fade.step(Aim::Out, 2), half - 2 * FULL.div_ceil(40));
     }
+
+    #[test]
+    fn other_times_hold_from_the_gain_reached() {
+        let mut fade = Fade::new(1, 1);
+        ticks_to(&mut fade, Aim::In, UpdateRate::Hz4000, FULL);
+        fade.set_times(20, 50);
+        assert_eq!(fade.gain, FULL);
+        let out = ticks_to(&mut fade, Aim::Out, UpdateRate::Hz4000, 0);
+        let back = ticks_to(&mut fade, Aim::In, UpdateRate::Hz4000, FULL);
+        assert_eq!((out, back), (4 * 50, 4 * 20));
+    }
 }

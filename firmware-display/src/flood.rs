@@ -1,35 +1,42 @@
-//! Whether estimates come faster than a sensor sends them.
+//! Whether messages come faster than a sensor sends them.
 
 use crate::pace::quarters;
 
-/// Most estimates that may come at once: those of 400 ms, which is what a link that has stood still for
-/// a while may bring.
-const MOST: u32 = 40;
-/// They may go on coming four times as fast as a sensor sends them, every 2.5 ms.
-const QUARTERS_PER_ESTIMATE: u32 = quarters(10) / 4;
-
-/// A bucket that each estimate fills by one and that runs out at 400 Hz. It floods above 40, and until
-/// it is empty.
+/// A bucket that each message fills by one and that runs out at four times the sensor's rate. It floods when it is
+/// full, and until it is empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flood {
+    /// Most messages that may come at once: those of 400 ms, which is what a link that has stood still for a while
+    /// may bring.
+    most: u32,
+    /// They may go on coming so often, in quarters of a millisecond.
+    every: u32,
     /// In quarters of a millisecond until it is empty.
     level: u32,
     floods: bool,
 }
 
 impl Flood {
-    /// Nothing has come.
-    pub const NONE: Self = Self {
-        level: 0,
-        floods: false,
-    };
+    /// No estimate has come; a sensor sends one every 10 ms.
+    pub const OF_ESTIMATES: Self = Self::every_ms(10);
+    /// No texture has come; a sensor sends one every 50 ms.
+    pub const OF_TEXTURES: Self = Self::every_ms(50);
 
-    /// An estimate has come. False if it is one too many.
+    const fn every_ms(ms: u32) -> Self {
+        Self {
+            most: 400 / ms,
+            every: quarters(ms) / 4,
+            level: 0,
+            floods: false,
+        }
+    }
+
+    /// A message has come. False if it is one too many.
     pub fn take(&mut self) -> bool {
-        const FULL: u32 = MOST * QUARTERS_PER_ESTIMATE;
+        let full = self.most * self.every;
         // It takes as long to run out however many come.
-        self.level = (self.level + QUARTERS_PER_ESTIMATE).min(FULL + QUARTERS_PER_ESTIMATE);
-        self.floods |= self.level > FULL;
+        self.level = (self.level + self.every).min(full + self.every);
+        self.floods |= self.level > full;
         !self.floods
     }
 
@@ -49,9 +56,11 @@ impl Flood {
 mod tests {
     use super::*;
 
+    const EVERY: u32 = Flood::OF_ESTIMATES.every;
+
     /// Milliseconds until estimates that come every `quarters` of a millisecond are a flood.
     fn flooded_after(every: u32) -> Option<u32> {
-        let mut flood = Flood::NONE;
+        let mut flood = Flood::OF_ESTIMATES;
         (0..quarters(60_000)).find(|now| {
             if now % every == 0 {
                 flood.take();
@@ -64,8 +73,8 @@ mod tests {
     #[test]
     fn four_times_the_sensors_rate_is_never_a_flood_and_more_is() {
         assert_eq!(flooded_after(quarters(10)), None);
-        assert_eq!(flooded_after(QUARTERS_PER_ESTIMATE), None);
-        assert!(flooded_after(QUARTERS_PER_ESTIMATE - 1).is_some());
+        assert_eq!(flooded_after(EVERY), None);
+        assert!(flooded_after(EVERY - 1).is_some());
     }
 
     #[test]
@@ -78,14 +87,14 @@ mod tests {
 
     #[test]
     fn a_flood_ends_a_tenth_of_a_second_after_the_last_estimate() {
-        let mut flood = Flood::NONE;
+        let mut flood = Flood::OF_ESTIMATES;
         assert_eq!((0..100).filter(|_| flood.take()).count(), 40);
         let mut lasted = 0;
         while flood.floods() {
             flood.elapse(1);
             lasted += 1;
         }
-        assert_eq!(lasted, 41 * QUARTERS_PER_ESTIMATE);
+        assert_eq!(lasted, 41 * EVERY);
         assert!(flood.take());
     }
 }

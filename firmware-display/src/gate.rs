@@ -69,4 +69,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn shut_is_closed_at_once_and_opens_in_its_time_again() {
+        let rate = UpdateRate::Hz2000;
+        let mut gate = Gate::default();
+        for _ in 0..2 {
+            (0..ticks_at(rate, RAMP_MS)).for_each(|_| gate.tick(true, rate));
+            assert_eq!(gate.gain(), OPEN);
+            gate.shut();
+            assert_eq!(gate.gain(), 0);
+        }
+    }
 }

@@ -1,11 +1,11 @@
-//! How strong the stimulus is: the configured amplitude, the surface's, and none where the wave would
+//! How strong the stimulus is: the configured amplitude, the surface's, what it rubs like, and none where the wave would
 //! be too fast to be drawn.
 //!
 //! A wave of more than [`FALLS_FROM_HZ`] is beyond what skin and gel follow, and 5 V of it would slew
 //! by more than 8 V/ms. From there its amplitude falls linearly, to 0 at [`SILENT_FROM_HZ`]: f (500 − f)
 //! falls from 250 on, so that nothing slews faster than 5 V · 2π · 250 Hz = 7.9 V/ms.
 
-use protocol::{DisplayConfiguration, UpdateRate};
+use protocol::{DisplayConfiguration, Friction, UpdateRate};
 
 use crate::gate::OPEN;
 use crate::ticks_at;
@@ -30,8 +30,11 @@ const SHIFT: u32 = 3;
 pub struct Level {
     amplitude_mv: u32,
     reference_lsb: u16,
+    reference_mn: u16,
     /// The surface's, as last told.
     surface_lsb: f32,
+    /// How much the force fluctuates, if it is known.
+    fluctuation_mn: Option<u16>,
     /// In Q16 DAC steps, 0 to [`FULL`].
     value: u32,
     target: u32,
@@ -47,7 +50,9 @@ impl Level {
         let mut level = Self {
             amplitude_mv: 0,
             reference_lsb: 0,
+            reference_mn: 0,
             surface_lsb: 0.0,
+            fluctuation_mn: None,
             value: 0,
             target: 0,
             per_tick: 0,
@@ -59,10 +64,11 @@ impl Level {
         level
     }
 
-    /// Takes amplitude and reference of a checked configuration, to be reached in [`GLIDE_MS`].
+    /// Takes amplitude and references of a checked configuration, to be reached in [`GLIDE_MS`].
     pub fn configure(&mut self, configuration: &DisplayConfiguration) {
         self.amplitude_mv = u32::from(configuration.amplitude_mv).min(FULL_MV);
         self.reference_lsb = configuration.reference_lsb;
+        self.reference_mn = configuration.reference_mn;
         self.aim(configuration.update_rate);
     }
 
@@ -72,12 +78,26 @@ impl Level {
         self.aim(rate);
     }
 
+    /// Takes how the surface rubs; None if nothing is known of it, which takes nothing away.
+    pub fn rub(&mut self, friction: Option<Friction>, rate: UpdateRate) {
+        self.fluctuation_mn = friction.map(|friction| friction.fluctuation_mn);
+        self.aim(rate);
+    }
+
     fn aim(&mut self, rate: UpdateRate) {
         let configured = u64::from(FULL) * u64::from(self.amplitude_mv) / u64::from(FULL_MV);
         let part = if self.reference_lsb == 0 {
             1.0
         } else {
             self.surface_lsb / f32::from(self.reference_lsb)
+        };
+        let part = match self.fluctuation_mn {
+            Some(mn) if mn < self.reference_mn => {
+                // What is no number stays none.
+                let whole = if part >= 1.0 { 1.0 } else { part };
+                whole * (f32::from(mn) / f32::from(self.reference_mn))
+            }
+            _ => part,
         };
         let target = if part >= 1.0 {
             configured as u32
@@ -173,6 +193,37 @@ mod tests {
         }
         // An f32 has 24 bits, so half of 2⁻²³ of the value.
         assert!(at(5_000, 200, 50.0).abs_diff(FULL / 4) <= FULL >> 24);
+    }
+
+    #[test]
+    fn what_rubs_less_than_the_reference_is_played_weaker_if_the_force_is_known() {
+        let at = |reference_mn, fluctuation_mn: Option<u16>, surface_lsb| {
+            let mut level = Level::new(&DisplayConfiguration {
+                reference_lsb: 200,
+                reference_mn,
+                ..DisplayConfiguration::DEFAULT
+            });
+            level.follow(surface_lsb, UpdateRate::Hz2000);
+            let friction = fluctuation_mn.map(|fluctuation_mn| Friction {
+                mean_mn: 1_000,
+                fluctuation_mn,
+            });
+            level.rub(friction, UpdateRate::Hz2000);
+            level.settle();
+            level.amplitude()
+        };
+        for surface_lsb in [200.0, 1e9] {
+            assert_eq!(at(0, Some(0), surface_lsb), FULL);
+            assert_eq!(at(400, None, surface_lsb), FULL);
+            assert_eq!(at(400, Some(400), surface_lsb), FULL);
+            assert_eq!(at(400, Some(60_000), surface_lsb), FULL);
+            assert_eq!(at(400, Some(0), surface_lsb), 0);
+            assert!(at(400, Some(100), surface_lsb).abs_diff(FULL / 4) <= FULL >> 23);
+        }
+        // Both weaken it.
+        assert!(at(400, Some(100), 100.0).abs_diff(FULL / 8) <= FULL >> 23);
+        assert_eq!(at(400, Some(400), f32::NAN), 0);
+        assert_eq!(at(400, Some(300), f32::NAN), 0);
     }
 
     #[test]

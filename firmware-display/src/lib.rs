@@ -3,6 +3,7 @@
 //! ```text
 //! encoder ──> Hand ── travel ─────────────────────────┐
 //! Estimate ─> Plausibility ── λ, amplitude ────────────┼─> Stimulus ─> Limits ─> words
+//! Texture ──> Relief ── wave, friction ────────────────┤
 //! Senses ───> Watch, Memory, Endurance ─> supervisor ──┴── gain       CLR
 //! ```
 //!
@@ -29,23 +30,28 @@ pub mod endurance;
 pub mod fade;
 pub mod flood;
 pub mod gate;
+pub mod grain;
 pub mod hand;
 pub mod level;
 pub mod limits;
 pub mod line;
 pub mod look;
 pub mod memory;
+pub mod order;
 pub mod pace;
 pub mod pattern;
 pub mod phase;
 pub mod plausibility;
+pub mod relief;
 pub mod rest;
 pub mod senses;
 pub mod settings;
 pub mod sine;
+pub mod skin;
 pub mod stimulus;
 pub mod supervisor;
 pub mod watch;
+pub mod wave;
 
 pub use display::Display;
 pub use protocol::ACTUATORS;

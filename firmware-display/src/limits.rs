@@ -356,4 +356,69 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_first_of_several_broken_limits_is_named() {
+        for rate in RATES {
+            let most_v = f64::from(MOST_SLEW_V_PER_MS) * 1_000.0 / f64::from(rate.hz());
+            let most = (most_v * VOLT).round() as i32;
+            for (amplitude_mv, from, to, energy, expected) in [
+                (0, 0, 0, MOST_ENERGY, Breach::Standing),
+                (5_000, -9_000, most - 9_000, MOST_ENERGY, Breach::Standing),
+                (5_000, -9_000, most - 9_000, MOST_ENERGY + 1, Breach::Energy),
+                (5_000, -9_000, most - 8_999, MOST_ENERGY + 1, Breach::Slew),
+                (1_000, 32_766, 32_767, MOST_ENERGY + 1, Breach::Voltage),
+            ] {
+                for sign in [1, -1] {
+                    let at = |offset: i32| (i32::from(ZERO_VOLT) + sign * offset) as u16;
+                    let mut limits = Limits::new(rate, amplitude_mv);
+                    limits.energies[49] = energy;
+                    limits.before[0] = at(from);
+                    let mut words = [ZERO_VOLT; ACTUATORS];
+                    words[0] = at(to);
+                    assert_eq!(limits.breach(&words), expected, "{rate:?} {from} {to}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn limits_that_break_together_do_not_make_up_for_each_other() {
+        for rate in RATES {
+            // Of two channels; of energy and standing voltage; and of all of them.
+            for (channels, energetic, standing) in [
+                (2, true, false),
+                (2, false, true),
+                (1, true, true),
+                (HALF, true, true),
+            ] {
+                for start in [0, HALF] {
+                    let mut limits = Limits::new(rate, 5_000);
+                    for channel in start..start + channels {
+                        limits.energies[channel] = if energetic {
+                            MOST_ENERGY + 9_999_999
+                        } else {
+                            0
+                        };
+                        limits.standing[channel] = if standing {
+                            -MOST_STANDING - 9_999_999
+                        } else {
+                            0
+                        };
+                    }
+                    let words = [ZERO_VOLT; ACTUATORS];
+                    let found = (0..2).filter(|_| limits.means_within(&words) < 0);
+                    assert_eq!(found.count(), 1, "{rate:?} {channels} {start}");
+                }
+            }
+            for offset in [9_000, 20_000] {
+                let mut limits = Limits::new(rate, 1_000);
+                limits.before = [ZERO_VOLT - offset; ACTUATORS];
+                let mut words = limits.before;
+                assert!(limits.steps_within(&words) < 0, "voltage, of all");
+                words = [ZERO_VOLT + offset; ACTUATORS];
+                assert!(limits.steps_within(&words) < 0, "voltage and slew, of all");
+            }
+        }
+    }
 }

@@ -10,8 +10,8 @@ use crate::stimulus::Stimulus;
 const PER_TICK: usize = 3;
 
 /// Words that say all of a configuration, and of an actuator.
-const SETTINGS: usize = 5;
-const TRAITS: usize = 3;
+const SETTINGS: usize = 6;
+const TRAITS: usize = 4;
 
 /// The second copy.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -60,7 +60,8 @@ fn settings(c: &DisplayConfiguration) -> [u32; SETTINGS] {
         pair(c.max_age_ms, c.glide_ms),
         pair(c.fade_in_ms, c.fade_out_ms),
         pair(c.amplitude_mv, c.reference_lsb),
-        pair(c.full_drive_s, (c.mode as u16) << 8 | c.update_rate as u16),
+        pair(c.full_drive_s, c.reference_mn),
+        u32::from_le_bytes([c.mode as u8, c.rendering as u8, c.update_rate as u8, 0]),
         c.actuators,
     ]
 }
@@ -69,6 +70,7 @@ fn traits(actuator: &Actuator) -> [u32; TRAITS] {
     [
         pair(actuator.x_um as u16, actuator.y_um as u16),
         pair(actuator.gain_q15, actuator.phase),
+        pair(actuator.resonance_dhz, actuator.damping_percent),
         actuator.inverted.into(),
     ]
 }
@@ -80,7 +82,7 @@ fn pair(low: u16, high: u16) -> u32 {
 #[cfg(test)]
 mod tests {
     use protocol::actuators::DEFAULT_ACTUATORS;
-    use protocol::{Mode, UpdateRate};
+    use protocol::{Mode, Rendering, UpdateRate};
 
     use super::*;
 
@@ -103,8 +105,9 @@ mod tests {
 
     #[test]
     fn any_setting_that_changed_is_noticed_in_the_next_tick() {
-        let changes: [fn(&mut DisplayConfiguration); 10] = [
+        let changes: [fn(&mut DisplayConfiguration); 12] = [
             |c| c.mode = Mode::Travelling,
+            |c| c.rendering = Rendering::Texture,
             |c| c.update_rate = UpdateRate::Hz4000,
             |c| c.max_age_ms ^= 1,
             |c| c.fade_in_ms ^= 1 << 15,
@@ -112,6 +115,7 @@ mod tests {
             |c| c.glide_ms ^= 4,
             |c| c.amplitude_mv ^= 8,
             |c| c.reference_lsb ^= 16,
+            |c| c.reference_mn ^= 1 << 13,
             |c| c.full_drive_s ^= 32,
             |c| c.actuators ^= 64,
         ];
@@ -124,12 +128,14 @@ mod tests {
 
     #[test]
     fn any_trait_of_any_actuator_that_changed_is_noticed_within_nine_milliseconds() {
-        let changes: [fn(&mut Actuator); 5] = [
+        let changes: [fn(&mut Actuator); 7] = [
             |a| a.x_um ^= 1,
             |a| a.y_um ^= 1 << 14,
             |a| a.gain_q15 ^= 2,
             |a| a.phase ^= 4,
             |a| a.inverted ^= true,
+            |a| a.resonance_dhz ^= 1 << 10,
+            |a| a.damping_percent ^= 1,
         ];
         for change in changes {
             for index in 0..ACTUATORS {

@@ -12,10 +12,17 @@ use protocol::{ACTUATORS, Mode};
 
 use crate::sine::sine;
 
-/// Each actuator's phase ahead of the middle, on its way to where it is to be.
+/// The phase of each place ahead of the middle, on its way to where it is to be. Actuators that are at the same place
+/// along the scan and have the same trim are one place, which is worked out once: all actuators in uniform mode
+/// without trims, the columns of a grid in travelling mode.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     travelling: bool,
+    /// Which of the places below each actuator is at.
+    place_of: [u8; ACTUATORS],
+    /// So many of what follows are in use.
+    places: usize,
+    /// In µm from the fingertip's middle; 0 in uniform mode.
     places_um: [i16; ACTUATORS],
     /// Turns / 2¹⁶.
     trims: [u16; ACTUATORS],
@@ -33,24 +40,62 @@ impl Pattern {
     pub fn new(mode: Mode, actuators: &[Actuator; ACTUATORS]) -> Self {
         let mut pattern = Self {
             travelling: mode == Mode::Travelling,
-            places_um: actuators.map(|actuator| actuator.x_um),
-            trims: actuators.map(|actuator| actuator.phase),
+            place_of: [0; ACTUATORS],
+            places: 0,
+            places_um: [0; ACTUATORS],
+            trims: [0; ACTUATORS],
             ahead: [0; ACTUATORS],
             targets: [0; ACTUATORS],
             per_tick: [0; ACTUATORS],
             ticks_left: 0,
             flat: true,
         };
+        for (actuator, place_of) in actuators.iter().zip(0..) {
+            let place = pattern.place_for(actuator);
+            pattern.place_of[place_of] = place as u8;
+        }
         pattern.set_targets(0);
         pattern.settle();
         pattern
     }
 
+    /// The place of an actuator; a new one if none of those before has it.
+    fn place_for(&mut self, actuator: &Actuator) -> usize {
+        let (x_um, trim) = (self.place_um(actuator), actuator.phase);
+        let places = self.places_um.iter().zip(&self.trims);
+        let found = places
+            .take(self.places)
+            .position(|place| place == (&x_um, &trim));
+        found.unwrap_or_else(|| {
+            let place = self.places;
+            self.places_um[place] = x_um;
+            self.trims[place] = trim;
+            self.places += 1;
+            place
+        })
+    }
+
+    const fn place_um(&self, actuator: &Actuator) -> i16 {
+        if self.travelling { actuator.x_um } else { 0 }
+    }
+
+    /// How many places are worked out, 1 to [`ACTUATORS`].
+    pub const fn places(&self) -> usize {
+        self.places
+    }
+
+    /// Which of the places each actuator is at.
+    pub const fn place_of(&self) -> &[u8; ACTUATORS] {
+        &self.place_of
+    }
+
     /// Whether mode, place and trim of one actuator, of those there are, follow from its description.
     pub fn is_of(&self, index: usize, mode: Mode, actuator: &Actuator) -> bool {
+        let place = usize::from(self.place_of[index]);
         self.travelling == (mode == Mode::Travelling)
-            && self.places_um[index] == actuator.x_um
-            && self.trims[index] == actuator.phase
+            && place < self.places
+            && self.places_um.get(place) == Some(&self.place_um(actuator))
+            && self.trims.get(place) == Some(&actuator.phase)
     }
 
     /// Lies as a wave of `per_micrometre` (turns / 2³²) does after `ticks` ticks, one at least.
@@ -72,23 +117,19 @@ impl Pattern {
         let mut changed = false;
         let mut flat = true;
         let first = self.target(0, per_micrometre);
-        for actuator in 0..ACTUATORS {
-            let target = self.target(actuator, per_micrometre);
-            changed |= target != self.targets[actuator];
+        for place in 0..self.places {
+            let target = self.target(place, per_micrometre);
+            changed |= target != self.targets[place];
             flat &= target == first;
-            self.targets[actuator] = target;
+            self.targets[place] = target;
         }
         self.flat = flat;
         changed
     }
 
-    fn target(&self, actuator: usize, per_micrometre: u32) -> u32 {
-        let place = if self.travelling {
-            (i32::from(self.places_um[actuator]) as u32).wrapping_mul(per_micrometre)
-        } else {
-            0
-        };
-        place.wrapping_add(u32::from(self.trims[actuator]) << 16)
+    fn target(&self, place: usize, per_micrometre: u32) -> u32 {
+        let way = (i32::from(self.places_um[place]) as u32).wrapping_mul(per_micrometre);
+        way.wrapping_add(u32::from(self.trims[place]) << 16)
     }
 
     /// Is there at once: for when nobody feels it.
@@ -103,7 +144,8 @@ impl Pattern {
             0 => {}
             1 => self.settle(),
             _ => {
-                for (ahead, step) in self.ahead.iter_mut().zip(&self.per_tick) {
+                let places = self.ahead.iter_mut().zip(&self.per_tick);
+                for (ahead, step) in places.take(self.places) {
                     *ahead = ahead.wrapping_add_signed(*step);
                 }
                 self.ticks_left -= 1;
@@ -121,11 +163,20 @@ impl Pattern {
         self.flat && self.ticks_left == 0
     }
 
-    /// The actuators' sines in Q28, from the first one on, with `turns` / 2³² in the fingertip's middle.
+    /// The places' sines in Q28, from the first one on, with `turns` / 2³² in the fingertip's middle.
     pub fn sines(&self, turns: u32, lanes: &mut [i32]) {
         for (lane, ahead) in lanes.iter_mut().zip(&self.ahead) {
             *lane = sine(turns.wrapping_add(*ahead));
         }
+    }
+
+    /// Each place: its phase ahead of the middle, in turns / 2³², and where it is along the scan, in µm from the middle
+    /// (0 in uniform mode, where all are in the middle).
+    pub fn iter(&self) -> impl Iterator<Item = (u32, i32)> {
+        let places = self.ahead.iter().zip(&self.places_um);
+        places
+            .take(self.places)
+            .map(|(ahead, x_um)| (*ahead, i32::from(*x_um)))
     }
 }
 
@@ -150,7 +201,8 @@ mod tests {
                 let mut pattern = Pattern::new(mode, &actuators);
                 pattern.aim(per_micrometre(mm), 1);
                 pattern.glide();
-                for (ahead, actuator) in pattern.ahead.iter().zip(&actuators) {
+                for (place, actuator) in pattern.place_of.iter().zip(&actuators) {
+                    let ahead = &pattern.ahead[usize::from(*place)];
                     let place = far * f64::from(actuator.x_um) / 1_000.0 / f64::from(mm);
                     let off = f64::from(*ahead) / 2_f64.powi(32)
                         - f64::from(actuator.phase) / 65_536.0
@@ -165,6 +217,26 @@ mod tests {
     }
 
     #[test]
+    fn actuators_at_the_same_place_are_worked_out_once() {
+        let mut actuators = DEFAULT_ACTUATORS;
+        assert_eq!(Pattern::new(Mode::Uniform, &actuators).places(), 1);
+        assert_eq!(Pattern::new(Mode::Travelling, &actuators).places(), 10);
+        actuators[13].phase = 1;
+        let pattern = Pattern::new(Mode::Uniform, &actuators);
+        assert_eq!(pattern.places(), 2);
+        assert_eq!(pattern.place_of()[12..15], [0, 1, 0]);
+        for (index, actuator) in actuators.iter_mut().enumerate() {
+            actuator.phase = index as u16;
+        }
+        for mode in [Mode::Uniform, Mode::Travelling] {
+            let pattern = Pattern::new(mode, &actuators);
+            assert_eq!(pattern.places(), ACTUATORS);
+            assert!((0..ACTUATORS).all(|index| pattern.is_of(index, mode, &actuators[index])));
+            assert!(!pattern.is_of(7, mode, &actuators[8]));
+        }
+    }
+
+    #[test]
     fn each_actuator_glides_by_equal_steps_the_shorter_way_and_arrives_exactly() {
         for ticks in [1, 7, 40, 1_000] {
             let mut pattern = Pattern::new(Mode::Travelling, &DEFAULT_ACTUATORS);
@@ -175,7 +247,7 @@ mod tests {
             for tick in 1..=ticks {
                 assert!(pattern.is_gliding());
                 pattern.glide();
-                for i in 0..ACTUATORS {
+                for i in 0..pattern.places() {
                     let whole = i64::from(pattern.targets[i].wrapping_sub(before.ahead[i]) as i32);
                     let gone = i64::from(pattern.ahead[i].wrapping_sub(before.ahead[i]) as i32);
                     let even = whole * i64::from(tick) / i64::from(ticks);

@@ -15,16 +15,10 @@
 use protocol::{Estimate, GAUGES};
 
 use crate::flood::Flood;
+use crate::order::{Order, SENSORS, order};
 use crate::pace::quarters;
 use crate::phase::Wavelength;
 
-/// An estimate is late if it is behind the last by at most this many: 10 s.
-const LATE_AT_MOST: u32 = 1_000;
-/// A sensor that has just started sends sequences up to this; from it, one that is behind by more
-/// than [`REORDERED_AT_MOST`] is a new beginning and not late.
-const BEGINNING: u32 = 10;
-/// The link puts estimates out of order by no more than this many.
-const REORDERED_AT_MOST: u32 = 32;
 /// A λ that differs from the one held by more than this factor is a surprise. The paper's count is a
 /// whole number: from one estimate to the next it may go from 1 to 2 and back.
 const SURPRISE: f32 = 2.1;
@@ -68,6 +62,8 @@ pub enum Verdict {
 #[derive(Clone, Debug)]
 pub struct Plausibility {
     last_sequence: Option<u32>,
+    /// See [`Plausibility::take_beginning`].
+    began_anew: bool,
     held: Option<Wavelength>,
     surprise: Option<Wavelength>,
     /// Surprises that were not confirmed, to be counted by the caller.
@@ -84,11 +80,12 @@ impl Plausibility {
     pub const fn new() -> Self {
         Self {
             last_sequence: None,
+            began_anew: false,
             held: None,
             surprise: None,
             unconfirmed: 0,
             age: u32::MAX,
-            flood: Flood::NONE,
+            flood: Flood::OF_ESTIMATES,
             distrust: Distrust::NONE,
             contradiction: Contradiction::NONE,
         }
@@ -99,11 +96,14 @@ impl Plausibility {
         if !self.flood.take() {
             return Verdict::Flooding;
         }
-        match self.order(estimate.sequence) {
+        match order(self.last_sequence, estimate.sequence, &SENSORS) {
             Order::Late => return Verdict::Late,
             Order::Later => {}
             // Another surface, for all that is known.
-            Order::Anew => self.forget(),
+            Order::Anew => {
+                self.began_anew = true;
+                self.forget();
+            }
         }
         self.last_sequence = Some(estimate.sequence);
         if contradicts_itself(estimate) {
@@ -157,31 +157,22 @@ impl Plausibility {
         core::mem::replace(&mut self.unconfirmed, 0)
     }
 
-    fn order(&self, sequence: u32) -> Order {
-        let Some(last) = self.last_sequence else {
-            return Order::Later;
-        };
-        // A later one is behind by almost 2³².
-        let behind = last.wrapping_sub(sequence);
-        let begins_anew = sequence <= BEGINNING && behind > REORDERED_AT_MOST;
-        if behind <= LATE_AT_MOST && !begins_anew {
-            Order::Late
-        } else if behind <= i32::MAX as u32 {
-            Order::Anew
-        } else {
-            Order::Later
-        }
+    /// Nothing is known of the surface any more.
+    /// Whether the sensor has started again since this was asked last.
+    pub fn take_beginning(&mut self) -> bool {
+        core::mem::take(&mut self.began_anew)
     }
 
-    /// Nothing is known of the surface any more.
     fn forget(&mut self) {
         self.held = None;
         self.dismiss_surprise();
     }
 
     fn weigh(&mut self, wavelength: Wavelength) -> Verdict {
-        let surprises = |than: Wavelength| !are_within(wavelength, than, SURPRISE);
-        if self.held.is_some_and(surprises) {
+        if self
+            .held
+            .is_some_and(|held| is_another_surface(held, wavelength))
+        {
             let confirmed = self
                 .surprise
                 .is_some_and(|surprise| are_within(wavelength, surprise, CONFIRMATION));
@@ -212,12 +203,9 @@ impl Default for Plausibility {
     }
 }
 
-/// Where an estimate stands to the last one.
-enum Order {
-    Late,
-    Later,
-    /// The sensor has started again.
-    Anew,
+/// Whether λ has changed by so much that it is no drift, but another surface, or an error.
+pub fn is_another_surface(before: Wavelength, now: Wavelength) -> bool {
+    !are_within(now, before, SURPRISE)
 }
 
 /// Whether two wavelengths differ by no more than a factor.

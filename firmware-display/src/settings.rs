@@ -3,8 +3,14 @@
 use protocol::actuators::{self, ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS};
 use protocol::{
     Actuators, Configuration, ConfigurationReport, Configure, DisplayConfiguration, Refusal,
-    Setting,
+    Rendering, Setting,
 };
+
+use crate::pattern::Pattern;
+use crate::skin::any_is_modelled;
+
+/// Different places along the scan and phases that a wave, as opposed to a sine, is worked out for in time.
+pub const MOST_PLACES: usize = 16;
 
 /// What is in force, and the description of the actuators that is being sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,6 +101,7 @@ impl Settings {
         };
         request.check_replaces(self.report().hash)?;
         asked.check()?;
+        let mut actuators = &self.actuators;
         if asked.actuators != self.configuration.actuators {
             let sent = actuators::hash(&self.sent);
             if asked.actuators != sent {
@@ -105,8 +112,10 @@ impl Settings {
                 });
             }
             actuators::check(&self.sent)?;
-            self.actuators = self.sent;
+            actuators = &self.sent;
         }
+        check_effort(asked, actuators)?;
+        self.actuators = *actuators;
         self.configuration = *asked;
         Ok(())
     }
@@ -116,10 +125,31 @@ impl Settings {
     }
 }
 
+/// Checks that the words can be worked out in time.
+///
+/// # Errors
+/// If more than the sine is asked for, of actuators at more than [`MOST_PLACES`] different places and phases. In uniform
+/// mode all places are one.
+pub fn check_effort(
+    configuration: &DisplayConfiguration,
+    actuators: &[Actuator; ACTUATORS],
+) -> Result<(), Refusal> {
+    let is_sine = configuration.rendering == Rendering::Fundamental && !any_is_modelled(actuators);
+    if is_sine || Pattern::new(configuration.mode, actuators).places() <= MOST_PLACES {
+        return Ok(());
+    }
+    Err(Refusal {
+        setting: Setting::Rendering,
+        index: 0,
+        low: 1,
+        high: MOST_PLACES as i64,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use protocol::actuators::grid;
-    use protocol::{DisplayState, SensorConfiguration, Trip};
+    use protocol::{DisplayState, Mode, SensorConfiguration, Trip};
 
     use super::*;
     use crate::{Display, Senses};
@@ -176,6 +206,11 @@ mod tests {
         let report = settings.on_configure(&Configure::anyway(asking_for(&described)));
         let refused = report.refused.unwrap();
         assert_eq!(refused.setting, Setting::Actuators);
+        // With the hash of what was received.
+        let mut received = DEFAULT_ACTUATORS;
+        received[20..30].copy_from_slice(&described[20..30]);
+        let hash = i64::from(actuators::hash(&received));
+        assert_eq!((refused.low, refused.high), (hash, hash));
         let in_force = Configuration::Display(DisplayConfiguration::DEFAULT);
         assert_eq!(report.configuration, in_force);
         assert_eq!(report.hash, in_force.hash());
@@ -249,6 +284,42 @@ mod tests {
         assert_eq!(setting, Some(Setting::Replaces));
         assert_eq!(refused.configuration, taken.configuration);
         assert_eq!(settings.configuration().amplitude_mv, 4_000);
+    }
+
+    #[test]
+    fn more_than_a_sine_is_refused_for_too_many_places() {
+        let mut scattered = DEFAULT_ACTUATORS;
+        for (actuator, index) in scattered.iter_mut().zip(0..) {
+            actuator.x_um = 10 * index.min(16);
+        }
+        let take = |mode, rendering, actuators: &[Actuator; ACTUATORS]| {
+            let configuration = DisplayConfiguration {
+                mode,
+                rendering,
+                actuators: actuators::hash(actuators),
+                ..DisplayConfiguration::DEFAULT
+            };
+            Settings::new(configuration, actuators).map(|_| ())
+        };
+        let refusal = Err(Refusal {
+            setting: Setting::Rendering,
+            index: 0,
+            low: 1,
+            high: 16,
+        });
+        for rendering in [Rendering::Fundamental, Rendering::Shape, Rendering::Texture] {
+            let is_sine = rendering == Rendering::Fundamental;
+            let expected = if is_sine { Ok(()) } else { refusal };
+            assert_eq!(take(Mode::Travelling, rendering, &scattered), expected);
+            assert_eq!(take(Mode::Uniform, rendering, &scattered), Ok(()));
+            let mut modelled = scattered;
+            modelled[0].resonance_dhz = 500;
+            assert_eq!(take(Mode::Travelling, rendering, &modelled), refusal);
+            assert_eq!(take(Mode::Uniform, rendering, &modelled), Ok(()));
+            let mut sixteen = scattered;
+            sixteen[16..].fill(scattered[0]);
+            assert_eq!(take(Mode::Travelling, rendering, &sixteen), Ok(()));
+        }
     }
 
     #[test]

@@ -1,19 +1,21 @@
 //! The stimulus: the hand's travel and the surface's λ in, fifty DAC words out, each output tick.
 //!
 //! ```text
-//! travel ─┬─> Phase ──> Pattern: sines ──> Balance: − mean ──> Array: · gain, rounded ──> words
+//! travel ─┬─> Phase ─> Pattern ─> Wave ─> Skin ──> Balance: − mean ──> Array: · gain, rounded ──> words
 //!         └─> Rest ───> Gate ─┐                                  ▲
 //!             Level: roll-off ┴───────────── gain ───────────────┘
 //! ```
 //!
 //! y = 5 V · sin(2π (x + xᵢ)/λ) while all is well (equation (12) of Okamoto et al. 2009, accumulated), and
-//! exactly 0 V when the hand rests, within 19 ms of its last count.
+//! exactly 0 V when the hand rests, within 19 ms of its last count. With [`Rendering::Shape`] and
+//! [`Rendering::Texture`] the sine becomes the surface's [`Wave`], and with a model of the actuator that is what the
+//! skin gets ([`Skin`]).
 //!
 //! The last resort against steps, of a hand that cannot move so: no word changes by more than
 //! [`MOST_V_PER_MS`].
 
 use protocol::actuators::Actuator;
-use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use protocol::{DisplayConfiguration, Friction, Mode, Rendering, Texture, UpdateRate};
 
 use crate::array::Array;
 use crate::balance::Balance;
@@ -21,8 +23,11 @@ use crate::gate::Gate;
 use crate::level::Level;
 use crate::pattern::Pattern;
 use crate::phase::{Phase, Wavelength};
+use crate::plausibility::is_another_surface;
 use crate::rest::Rest;
-use crate::{ACTUATORS, ZERO_VOLT, ticks_at};
+use crate::skin::Skin;
+use crate::wave::{Scale, Wave};
+use crate::{ACTUATORS, MICROMETRES_PER_COUNT, ZERO_VOLT, ticks_at};
 
 /// The steepest that any voltage gets, in V/ms: a little more than 5 V at 250 Hz need.
 pub const MOST_V_PER_MS: i32 = 8;
@@ -42,7 +47,11 @@ pub struct Stimulus {
     wavelength: Option<Wavelength>,
     array: Array,
     pattern: Pattern,
+    skin: Skin,
+    wave: Wave,
     phase: Phase,
+    /// Where the hand is, from where it began, in µm; it wraps.
+    place_um: i32,
     level: Level,
     rest: Rest,
     gate: Gate,
@@ -58,24 +67,31 @@ pub struct Stimulus {
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Description {
     mode: Mode,
+    rendering: Rendering,
     actuators: [Actuator; ACTUATORS],
 }
 
 impl Stimulus {
     /// 0 V, a hand at rest and no λ yet. Configuration and actuators are checked.
     pub fn new(configuration: &DisplayConfiguration, actuators: &[Actuator; ACTUATORS]) -> Self {
+        let pattern = Pattern::new(configuration.mode, actuators);
+        let skin = Skin::new(configuration.rendering, actuators, &pattern);
         Self {
             rate: configuration.update_rate,
             glide_ms: configuration.glide_ms,
             description: Description {
                 mode: configuration.mode,
+                rendering: configuration.rendering,
                 actuators: *actuators,
             },
             waiting: None,
             wavelength: None,
             array: Array::new(actuators),
-            pattern: Pattern::new(configuration.mode, actuators),
+            wave: Wave::new(configuration.rendering, scale_behind(&skin)),
+            pattern,
+            skin,
             phase: Phase::default(),
+            place_um: 0,
             level: Level::new(configuration),
             rest: Rest::default(),
             gate: Gate::default(),
@@ -86,7 +102,7 @@ impl Stimulus {
         }
     }
 
-    /// Takes a checked configuration. A new amplitude is reached in 20 ms; a new mode, and new actuators,
+    /// Takes a checked configuration. A new amplitude is reached in 20 ms; a new mode or rendering, and new actuators,
     /// come into force when the gate has closed, which takes 6 ms, and it opens again in 6 ms. If nothing
     /// is to be heard all is in force with the next tick.
     pub fn configure(
@@ -99,6 +115,7 @@ impl Stimulus {
         self.level.configure(configuration);
         let asked = Description {
             mode: configuration.mode,
+            rendering: configuration.rendering,
             actuators: *actuators,
         };
         self.waiting = (asked != self.description).then_some(asked);
@@ -108,6 +125,12 @@ impl Stimulus {
     pub fn follow(&mut self, wavelength: Wavelength, amplitude_lsb: f32) {
         self.level.follow(amplitude_lsb, self.rate);
         if self.wavelength != Some(wavelength) {
+            if self
+                .wavelength
+                .is_some_and(|before| is_another_surface(before, wavelength))
+            {
+                self.wave.forget(self.rate);
+            }
             self.wavelength = Some(wavelength);
             let glide = ticks_at(self.rate, self.glide_ms);
             self.phase.follow(wavelength, glide);
@@ -119,26 +142,68 @@ impl Stimulus {
         }
     }
 
+    /// Goes over, in [`crate::wave::GLIDE_MS`], to the wave of a sound texture of the surface that is followed. Without a
+    /// λ nothing changes.
+    pub fn wear(&mut self, texture: &Texture) {
+        if let Some(wavelength) = self.wavelength {
+            self.wave.follow(texture, wavelength, self.rate);
+        }
+    }
+
+    /// Goes back to the fundamental alone: nothing is known of the surface but λ.
+    pub fn wear_off(&mut self) {
+        self.wave.forget(self.rate);
+    }
+
+    /// Plays what rubs like this, gliding; None if nothing is known of it.
+    pub fn rub(&mut self, friction: Option<Friction>) {
+        self.level.rub(friction, self.rate);
+    }
+
     /// One tick in which the hand moved by `travel` counts of 5 µm; `gain` is the supervisor's, in Q31,
     /// 0 to 2³¹. True if any of [`Stimulus::words`] changed.
     pub fn tick(&mut self, travel: i16, gain: u32) -> bool {
         let turned = self.phase.advance(travel);
+        self.place_um = self
+            .place_um
+            .wrapping_add(i32::from(travel) * MICROMETRES_PER_COUNT);
         let gain = self.gain(travel, turned, gain);
+        let is_sine = self.is_sine();
+        if !is_sine {
+            self.wave.tick(travel, self.level.turn(), self.rate);
+        }
         if self.silent && gain == 0 {
             self.settle();
             return false;
         }
         self.pattern.glide();
-        let shared = self.pattern.is_flat() && self.balance.is_shared();
+        // In phase they play the same sine, wherever they are.
+        let one = self.skin.lanes() == 1 || (is_sine && self.pattern.is_flat());
+        let shared = one && self.balance.is_shared();
         let most = self.most_steps();
-        let lanes = &mut self.lanes[..if shared { 1 } else { ACTUATORS }];
-        self.pattern.sines(self.phase.turns(), lanes);
+        let count = if shared { 1 } else { self.skin.lanes() };
+        let lanes = self.lanes.get_mut(..count).unwrap_or_default();
+        let turns = self.phase.turns();
+        if is_sine {
+            self.pattern.sines(turns, lanes);
+        } else {
+            self.skin
+                .play(&self.wave, &self.pattern, turns, self.place_um, lanes);
+        }
         self.balance
             .remove(lanes, gain, self.level.turn(), self.rate);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
-        let changed = self.array.draw(level as u32, lanes, most, &mut self.words);
+        let lane_of = self.skin.lane_of();
+        let changed = self
+            .array
+            .draw(level as u32, lanes, lane_of, most, &mut self.words);
         self.silent = gain == 0 && are_silent(&self.words);
         changed
+    }
+
+    /// Whether the words are the sine itself, and no wave has to be worked out.
+    fn is_sine(&self) -> bool {
+        self.description.rendering == Rendering::Fundamental && self.skin.is_bare()
     }
 
     /// What all lanes are multiplied with in this tick, in Q30.
@@ -162,6 +227,8 @@ impl Stimulus {
         if let Some(description) = self.waiting.take() {
             self.array = Array::new(&description.actuators);
             self.pattern = Pattern::new(description.mode, &description.actuators);
+            self.skin = Skin::new(description.rendering, &description.actuators, &self.pattern);
+            self.wave = Wave::new(description.rendering, scale_behind(&self.skin));
             if let Some(wavelength) = self.wavelength {
                 self.pattern.aim(wavelength.phase_per_micrometre(), 1);
             }
@@ -170,6 +237,7 @@ impl Stimulus {
         }
         self.phase.settle();
         self.level.settle();
+        self.wave.settle();
         if self.pattern.is_gliding() {
             self.pattern.settle();
         }
@@ -195,6 +263,7 @@ impl Stimulus {
             .is_some_and(|described| {
                 self.array.is_of(actuator, described)
                     && self.pattern.is_of(actuator, description.mode, described)
+                    && self.skin.is_of(actuator, described, &self.pattern)
             })
     }
 
@@ -209,6 +278,15 @@ impl Stimulus {
         self.gate.shut();
         self.balance.clear();
         self.silent = true;
+    }
+}
+
+/// Behind the wave its voltage may get larger where there is a model.
+const fn scale_behind(skin: &Skin) -> Scale {
+    if skin.is_bare() {
+        Scale::Whole
+    } else {
+        Scale::Calm
     }
 }
 

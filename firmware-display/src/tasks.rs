@@ -22,7 +22,7 @@ use nucleo::stop;
 use nucleo::supervision::supervise;
 use protocol::{
     DisplayCounters, DisplayState, Estimate, Hello, Message, Question, RoleCounters, Safety, Stop,
-    Trip,
+    Texture, Trip,
 };
 use static_cell::StaticCell;
 
@@ -34,6 +34,8 @@ use crate::ticks::Ticks;
 /// From the ports to the output task. More estimates than a tick brings at a line's full speed, so that
 /// those of a flood are seen.
 static ESTIMATES: Channel<CriticalSectionRawMutex, Estimate, 8> = Channel::new();
+/// The same for textures, which are fewer.
+static TEXTURES: Channel<CriticalSectionRawMutex, Texture, 2> = Channel::new();
 static STOP: Signal<CriticalSectionRawMutex, Stop> = Signal::new();
 static CONFIGURE: Signal<CriticalSectionRawMutex, Settings> = Signal::new();
 /// What is in force, whichever port it came from.
@@ -141,6 +143,9 @@ async fn drive(
         while let Ok(estimate) = ESTIMATES.try_receive() {
             display.on_estimate(&estimate);
         }
+        while let Ok(texture) = TEXTURES.try_receive() {
+            display.on_texture(&texture);
+        }
         if let Some(motion) = display.motion(Instant::now().as_micros()) {
             unheard = OUTBOX.try_send(Message::Motion(motion)).is_err();
         }
@@ -226,6 +231,9 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
             Message::Estimate(estimate) => {
                 // Full only in a flood, of which those that fit tell enough.
                 let _ = ESTIMATES.try_send(estimate);
+            }
+            Message::Texture(texture) => {
+                let _ = TEXTURES.try_send(texture);
             }
             Message::Stop(stop) => STOP.signal(stop),
             Message::Actuators(block) => {

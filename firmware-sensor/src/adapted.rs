@@ -11,6 +11,7 @@ use crate::SAMPLE_RATE_HZ;
 use crate::amplitude::MAX_WINDOW_MS;
 use crate::counting::CountedGauge;
 use crate::estimator::{Estimator, Finding, Touch};
+use crate::root::sqrt;
 use crate::stroke::Stroke;
 use crate::travel::Travel;
 
@@ -70,7 +71,7 @@ impl Estimator for AdaptedCounting {
 /// A^(5/2) · (1 + 7x²/30 + …) = 3σ / (λπ²fv²√(2πfs)): the root of the right-hand side, less two fifths of
 /// 7x²/30.
 pub fn best_window_s(wavelength_mm: f32, strokes_hz: f32) -> f32 {
-    let noise = libm::sqrtf(2.0 * PI * SAMPLE_RATE_HZ as f32);
+    let noise = sqrt(2.0 * PI * SAMPLE_RATE_HZ as f32);
     let curvature = wavelength_mm * PI * PI * strokes_hz * strokes_hz;
     let first_s = libm::powf(3.0 * SIGMA_MM / (curvature * noise), 0.4);
     let x = PI * first_s * strokes_hz;

@@ -1,5 +1,7 @@
 //! How strong the band-passed signal was over the window.
 
+use crate::root::sqrt;
+
 /// The longest window that a configuration can ask for, in ms.
 pub const MAX_WINDOW_MS: usize = 200;
 
@@ -34,7 +36,7 @@ impl Amplitude {
         let (newer, older) = self.samples.split_at(self.next.min(MAX_WINDOW_MS));
         let newest_first = newer.iter().rev().chain(older.iter().rev());
         let energy: f32 = newest_first.take(window_ms).map(|x| x * x).sum();
-        libm::sqrtf(2.0 * energy / window_ms as f32)
+        sqrt(2.0 * energy / window_ms as f32)
     }
 }
 

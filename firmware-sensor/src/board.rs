@@ -104,7 +104,7 @@ impl Board {
         static ADC_RING: StaticCell<[u16; RING]> = StaticCell::new();
         let started = nucleo::reset::cause();
         let trip = nucleo::trip::kept_after(started.0);
-        let p = embassy_stm32::init(nucleo::clock::configuration());
+        let p = nucleo::clock::start();
         let vitals = Vitals::new(p.IWDG, p.PB0, started);
 
         let encoder = Encoder::new(p.TIM4, p.PD12, p.PD13);
@@ -116,6 +116,9 @@ impl Board {
             p.PF5.degrade_adc(),
             p.PF10.degrade_adc(),
         ];
+        // The converters' common registers, which hold their prescaler, may hang on ADC1's clock; the manual does not say.
+        // If they do, and it is off, ADC3 runs at 42 MHz, of 36 MHz at most.
+        pac::RCC.apb2enr().modify(|w| w.set_adc1en(true));
         let adc = Adc::<ADC3>::new(p.ADC3).into_ring_buffered(
             p.DMA2_CH0,
             ADC_RING.init([0; RING]),

@@ -22,6 +22,7 @@ use protocol::{GAUGES, SensorConfiguration};
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
 use crate::hum::Pickup;
 use crate::landmarks::{LONGEST, Landmarks, MARKS};
+use crate::root::sqrt;
 use crate::travel::Travel;
 use crate::travel::{MIN_SPEED_MM_S, PLACES_PER_MM, Place};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
@@ -206,7 +207,7 @@ impl Estimator for Crossings {
                 ..Finding::default()
             };
         }
-        let amplitude_lsb = libm::sqrtf(2.0 * powers / agreeing as f32);
+        let amplitude_lsb = sqrt(2.0 * powers / agreeing as f32);
         let half_wave = sum / agreeing as f32;
         let frequency_hz = travel.velocity_mm_s(0).abs() * PLACES_PER_MM as f32 / (2.0 * half_wave);
         self.wavenumber = PI / half_wave;

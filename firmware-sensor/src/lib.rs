@@ -37,11 +37,13 @@ pub mod line;
 pub mod method;
 pub mod noise;
 pub mod phasor;
+pub mod root;
 pub mod sensor;
 pub mod settings;
 pub mod slip;
 pub mod spectrum;
 pub mod stroke;
+pub mod texture;
 pub mod travel;
 
 pub use arm::Drive;

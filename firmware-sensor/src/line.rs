@@ -89,6 +89,7 @@ mod tests {
             uptime_us,
             reset: ResetCause::Power,
             watchdog_resets: 0,
+            stack_free_bytes: 0,
             peer: PortCounters::new(),
             console: PortCounters::new(),
             role: RoleCounters::Sensor(SensorCounters::ZERO),

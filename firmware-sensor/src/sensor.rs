@@ -2,7 +2,8 @@
 //! drive out.
 
 use protocol::{
-    ArmState, Contact, Estimate, GAUGES, Gauges, Motion, SensorConfiguration, StreamGauges, Trip,
+    ArmState, Contact, Estimate, GAUGES, Gauges, Motion, SensorConfiguration, StreamGauges,
+    Texture, Trip,
 };
 
 use crate::arm::{Arm, Drive};
@@ -17,6 +18,7 @@ use crate::method::Running;
 use crate::noise::Noise;
 use crate::slip::Slip;
 use crate::spectrum::Spectrum;
+use crate::texture::{Surface, TEXTURE_RATE_HZ};
 use crate::travel::Travel;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
@@ -28,6 +30,10 @@ const SETTLING_SAMPLES: u32 = (3.0 * core::f64::consts::SQRT_2
 /// Speed of the arm from which on it moves, in mm/s.
 const MOVING_MM_S: f32 = 2.0;
 const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
+const SAMPLES_PER_TEXTURE: u32 = SAMPLE_RATE_HZ / TEXTURE_RATE_HZ;
+const _: () = assert!(SAMPLES_PER_TEXTURE.is_multiple_of(SAMPLES_PER_ESTIMATE));
+/// Samples after an estimate in which there is little to do.
+const QUIET_SAMPLES: u32 = 3;
 const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
 
 /// What a millisecond brought.
@@ -35,6 +41,8 @@ const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
 pub struct Output {
     /// Every tenth time.
     pub estimate: Option<Estimate>,
+    /// Every fiftieth time, while the arm moves, from the first estimate on.
+    pub texture: Option<Texture>,
     /// Every eighth time, while they are asked for.
     pub gauges: Option<Gauges>,
     /// For the arm, at once.
@@ -57,6 +65,7 @@ pub struct Sensor {
     health: Health,
     slip: Slip,
     estimator: Running,
+    surface: Surface,
     arm: Arm,
     block: Block,
     /// Samples that are still to be sent.
@@ -90,6 +99,7 @@ impl Sensor {
             health: Health::default(),
             slip: Slip::new(&configuration),
             estimator: Running::new(&configuration),
+            surface: Surface::new(),
             arm: Arm::default(),
             block: Block::default(),
             streaming: 0,
@@ -113,6 +123,7 @@ impl Sensor {
         self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
         self.estimator = Running::new(&configuration);
+        self.surface = Surface::new();
     }
 
     /// The default estimator, if that is the one that runs.
@@ -194,6 +205,11 @@ impl Sensor {
             self.estimator.push(&touch);
         }
         self.settling = self.settling.saturating_sub(1);
+        self.surface.push(&touch, self.slip.force_n(sample[GAUGES]));
+        // The estimator begins its work later.
+        if self.samples % SAMPLES_PER_ESTIMATE < QUIET_SAMPLES {
+            self.surface.work();
+        }
 
         let arm_um = started.travel.position_um(0);
         let number = self.samples;
@@ -201,6 +217,7 @@ impl Sensor {
         let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
             let finding = self.estimator.find(&started.travel);
             let contact = contact(&self.slip, &started.travel, &finding);
+            self.surface.hear(&finding);
             // Gauges that may not take part are witnesses nevertheless.
             let witnesses = self.health.good();
             self.hum.renew(
@@ -236,6 +253,15 @@ impl Sensor {
         } else {
             None
         };
+        let moves = started.travel.velocity_mm_s(0).abs() >= MOVING_MM_S;
+        // Halfway between two estimates, so that neither waits for the other on the line.
+        let due = self.samples % SAMPLES_PER_TEXTURE == SAMPLES_PER_ESTIMATE / 2;
+        let texture = (due && moves && self.estimates > 0).then(|| {
+            let contact = self.slip.contact(&started.travel, decimate::DELAY_MS);
+            let sequence = self.estimates.wrapping_sub(1);
+            self.surface
+                .say(sequence, instant_us, contact == Contact::Slip)
+        });
         let gauges = if self.streaming > 0 {
             self.streaming -= 1;
             self.block.push(started.place(number, instant_us), &sample)
@@ -248,6 +274,7 @@ impl Sensor {
             .step(arm_um, self.configuration.arm_full_scale_um_s);
         Output {
             estimate,
+            texture,
             gauges,
             drive,
         }

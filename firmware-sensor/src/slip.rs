@@ -129,6 +129,11 @@ impl Slip {
         self.stiffness_n_per_m = Some(k);
     }
 
+    /// The tangential force in N of the channel's sample, in ADC steps from mid-rail; none without the channel.
+    pub fn force_n(&self, force_lsb: f32) -> Option<f32> {
+        self.present.then_some(force_lsb * self.newtons_per_lsb)
+    }
+
     /// The contact's lag behind the arm at the last sample, in µm; none without a force channel or as
     /// long as k is unknown.
     pub fn lag_um(&self) -> Option<i32> {

@@ -23,6 +23,7 @@ use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
+use crate::root::sqrt;
 use crate::travel::Travel;
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM};
 
@@ -441,12 +442,12 @@ impl Spectrum {
             travelled_waves: self.travelled_mm / line_mm,
             held_waves: self.line.held_waves,
             shares: [share_over(1), share_over(2), share_over(4)],
-            wander: self.line.squares.map(libm::sqrtf),
+            wander: self.line.squares.map(sqrt),
             agreement: self.line.agreement,
             distance: off(wavelength_mm, here_mm),
             presence: self.survey.presence,
             sharpness: self.survey.sharpness,
-            spread: libm::sqrtf(self.line.variance),
+            spread: sqrt(self.line.variance),
             kept_shares: self.line.shares,
         };
         self.weighed.line = Some((wavelength_mm, evidence));
@@ -568,7 +569,7 @@ impl Spectrum {
         let usable = self.touch.usable;
         let count = usable.count_ones().max(1) as f32;
         let fitted = said.fitted.unwrap_or_default();
-        let amplitude_lsb = libm::sqrtf(2.0 * fitted.explained / count);
+        let amplitude_lsb = sqrt(2.0 * fitted.explained / count);
         let hz = self.speed_mm_s / said.wavelength_mm;
         let noise: f32 = (0..GAUGES)
             .filter(|gauge| usable >> gauge & 1 == 1)

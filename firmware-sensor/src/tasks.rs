@@ -127,16 +127,17 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>
             let taken = OUTBOX.try_send(Message::Estimate(estimate)).is_ok();
             counters.estimates = counters.estimates.wrapping_add(u32::from(taken));
         }
+        if let Some(texture) = output.texture {
+            // The next one says as much.
+            let _ = OUTBOX.try_send(Message::Texture(texture));
+        }
         if let Some(gauges) = output.gauges {
             // A block that finds no room shows as a gap in `first_sample`.
             let _ = OUTBOX.try_send(Message::Gauges(gauges));
         }
-        // Saturating: on the emulator the clock was seen to step back where the time driver's half period
-        // ends, and a board must not stop for that.
-        let took = Instant::now().saturating_duration_since(begun);
         counters.deadline_misses = counters
             .deadline_misses
-            .wrapping_add(u32::from(took > SAMPLE_PERIOD));
+            .wrapping_add(u32::from(begun.elapsed() > SAMPLE_PERIOD));
         COUNTERS.lock(|shared| shared.set(counters));
     }
 }

@@ -24,6 +24,7 @@ mod init;
 mod jury;
 mod map;
 mod models;
+mod on_target;
 mod paper;
 mod people;
 mod run;
@@ -90,6 +91,9 @@ enum Command {
     /// console as a pseudo-terminal, until it is told to quit
     #[cfg(target_os = "linux")]
     Serve(serve::Serve),
+    /// Runs a program of tests for a board on an emulated one, with the jumper wires that it asks for, and prints what
+    /// it logs: exit status 1 if a test fails. cargo takes it for a runner
+    OnTarget(on_target::OnTarget),
     /// The paper, figure by figure: Tables I to IV and Figs 4 to 8, ours beside the paper's, as one HTML page
     /// with a CSV for each
     Paper(paper::Paper),
@@ -119,6 +123,9 @@ struct Cost {
         default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost"
     )]
     elf: PathBuf,
+    /// Estimates the processor's cycles of the whole sensor as well, instruction by instruction: some minutes
+    #[arg(long)]
+    cycles: bool,
 }
 
 /// Where the boards' firmwares are.
@@ -180,6 +187,7 @@ impl Arguments {
             Command::Timing(timing) => timing.execute(),
             #[cfg(target_os = "linux")]
             Command::Serve(serve) => serve.execute(),
+            Command::OnTarget(tests) => tests.execute(),
             Command::Paper(paper) => paper.execute(),
             Command::People(people) => people.execute(),
             Command::Soak(soak) => soak.execute(),

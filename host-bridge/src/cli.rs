@@ -6,10 +6,14 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueHint};
 use host_bridge::bench::{Bench, BenchError, Seat};
+use host_bridge::link::{Event, Link};
 use host_bridge::place::Place;
+use protocol::Role;
 
+mod bringup;
 mod completions;
 mod doctor;
+mod export;
 mod flash;
 mod live;
 mod man;
@@ -66,6 +70,9 @@ enum Command {
     /// Plays a recording into a monitor, a board or the simulator
     #[command(long_about = replay::ABOUT, after_long_help = replay::EXAMPLES)]
     Replay(replay::Replay),
+    /// Takes a recording or a scene out to .hjif (ISO/IEC 23090-31) or WAV
+    #[command(long_about = export::ABOUT, after_long_help = export::EXAMPLES)]
+    Export(export::Export),
     /// Carries the link between two sites over a network
     #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
@@ -74,6 +81,9 @@ enum Command {
     Stop(stop::StopBoards),
     /// Looks at what is attached, and says what is wrong and what to do
     Doctor(doctor::Doctor),
+    /// Brings a bench up, step by step: what to wire, what is measured, what to try
+    #[command(long_about = bringup::ABOUT, after_long_help = bringup::EXAMPLES)]
+    Bringup(bringup::Bringup),
     /// Prints completions for a shell
     #[command(after_long_help = completions::EXAMPLES)]
     Completions(completions::Completions),
@@ -105,6 +115,23 @@ impl Where {
         put(&mut bench.display, self.display.as_ref());
         bench.checked()
     }
+}
+
+/// The links to the boards that the bench has, which look for them at once. `tell` is called from their
+/// threads with what happens.
+fn links(
+    bench: &Bench,
+    tell: impl FnMut(Role, Event) + Clone + Send + 'static,
+) -> Vec<(Role, Link)> {
+    let open = |role| {
+        let place = bench.seat(role)?.place();
+        let mut tell = tell.clone();
+        Some((
+            role,
+            Link::open(role, place, move |event| tell(role, event)),
+        ))
+    };
+    bench.roles().into_iter().filter_map(open).collect()
 }
 
 /// A time above 0 s, and short enough to be waited for: a hundred years.
@@ -141,9 +168,11 @@ impl Arguments {
             Command::Live(live) => live.execute(),
             Command::Record(record) => record.execute(),
             Command::Replay(replay) => replay.execute(),
+            Command::Export(export) => export.execute(),
             Command::Relay(relay) => relay.execute(),
             Command::Stop(stop) => stop.execute(),
             Command::Doctor(doctor) => doctor.execute(),
+            Command::Bringup(bringup) => bringup.execute(),
             Command::Completions(completions) => completions.execute(),
             Command::Man(man) => man.execute(),
         }

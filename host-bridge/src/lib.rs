@@ -10,9 +10,13 @@
 pub const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
 
 pub mod bench;
+pub mod bringup;
 pub mod clock;
 pub mod doctor;
+mod engine;
+pub mod export;
 pub mod flash;
+pub mod hand;
 pub mod host_clock;
 mod line;
 mod line_monitor;

@@ -1,7 +1,7 @@
 //! What is said on an open serial line: whole frames or nothing, without ever waiting.
 
 use std::collections::VecDeque;
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 
 use protocol::{Hello, MAX_FRAME, Message, Port, PortCounters, Role};
 
@@ -20,6 +20,46 @@ pub enum NotSent {
     /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
     #[error("the line takes no bytes")]
     Stuck,
+}
+
+/// Frames that were not heard because the port changed hands between programs: among the counters of this end, and
+/// no fault of the line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Missed {
+    /// Never came.
+    pub lost: u32,
+    /// Came without their beginning, or their end.
+    pub corrupt: u32,
+}
+
+/// Tells what is missed at changes of hands from what the line loses.
+#[derive(Default)]
+pub struct Handovers {
+    changes: u32,
+    /// What had been counted before a change after which nothing has been understood yet.
+    before: Option<PortCounters>,
+    missed: Missed,
+}
+
+impl Handovers {
+    /// The port has changed hands `changes` times, and no more than this had been counted before the last.
+    pub fn begin(&mut self, changes: u32, counters: &PortCounters) {
+        if std::mem::replace(&mut self.changes, changes) != changes && self.before.is_none() {
+            self.before = Some(*counters);
+        }
+    }
+
+    /// What has been missed so far, by what is counted now.
+    pub fn missed(&mut self, counters: &PortCounters) -> Missed {
+        if let Some(before) = self.before
+            && counters.received != before.received
+        {
+            self.before = None;
+            self.missed.lost += counters.lost.saturating_sub(before.lost);
+            self.missed.corrupt += counters.corrupt.saturating_sub(before.corrupt);
+        }
+        self.missed
+    }
 }
 
 /// How a host introduces itself.
@@ -103,7 +143,7 @@ impl Line {
         while let count @ 1.. = self.port.take(&mut part) {
             bytes.extend_from_slice(&part[..count]);
         }
-        let (taken, result) = write(&mut self.output, &bytes);
+        let (taken, result) = write_some(&mut self.output, &bytes);
         let left = &bytes[taken..];
         let is_within_frame = taken < begun || (taken > 0 && bytes[taken - 1] != 0);
         let kept = match left.iter().position(|&byte| byte == 0) {
@@ -117,7 +157,11 @@ impl Line {
         bytes.truncate(taken + kept);
         bytes.drain(..taken);
         self.rest = bytes;
-        result
+        result.map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => NotSent::Stuck,
+            // Unplugged: the reader finds out as well.
+            _ => NotSent::NotKnown,
+        })
     }
 
     /// What this end of the line has counted.
@@ -135,19 +179,18 @@ impl Line {
     }
 }
 
-/// Writes as many bytes as are taken at once.
-fn write(tty: &mut impl Write, bytes: &[u8]) -> (usize, Result<(), NotSent>) {
+/// Writes as many bytes as `output` takes at once, and says how many.
+///
+/// # Errors
+/// [`ErrorKind::WouldBlock`] if those are not all; else what broke the line.
+pub fn write_some(output: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     let mut taken = 0;
     while taken < bytes.len() {
-        match tty.write(&bytes[taken..]) {
-            Ok(0) => return (taken, Err(NotSent::Stuck)),
+        match output.write(&bytes[taken..]) {
+            Ok(0) => return (taken, Err(ErrorKind::WouldBlock.into())),
             Ok(count) => taken += count,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                return (taken, Err(NotSent::Stuck));
-            }
-            // Unplugged: the reader finds out as well.
-            Err(_) => return (taken, Err(NotSent::NotKnown)),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return (taken, Err(error)),
         }
     }
     (taken, Ok(()))
@@ -163,7 +206,7 @@ mod tests {
     impl Write for Narrow {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
             if self.0 == 0 {
-                return Err(io::ErrorKind::WouldBlock.into());
+                return Err(ErrorKind::WouldBlock.into());
             }
             let count = bytes.len().min(self.0).min(3);
             self.0 -= count;
@@ -177,10 +220,37 @@ mod tests {
     }
 
     #[test]
+    fn what_is_missed_at_a_change_of_hands_is_told_from_what_the_line_loses() {
+        let counted = |received, lost, corrupt| PortCounters {
+            received,
+            lost,
+            corrupt,
+            ..PortCounters::new()
+        };
+        let mut handovers = Handovers::default();
+        let mut missed = |changes, before: &PortCounters, after: &PortCounters| {
+            handovers.begin(changes, before);
+            let Missed { lost, corrupt } = handovers.missed(after);
+            (lost, corrupt)
+        };
+        // The line's own.
+        assert_eq!(missed(0, &counted(5, 1, 1), &counted(6, 3, 1)), (0, 0));
+        // A guest is heir, then owner, before it understands anything: a torn frame, then one that is whole.
+        assert_eq!(missed(1, &counted(6, 3, 1), &counted(6, 3, 1)), (0, 0));
+        assert_eq!(missed(2, &counted(6, 3, 1), &counted(6, 3, 2)), (0, 0));
+        assert_eq!(missed(2, &counted(6, 3, 2), &counted(7, 12, 2)), (9, 1));
+        assert_eq!(missed(2, &counted(7, 12, 2), &counted(8, 13, 3)), (9, 1));
+        assert_eq!(missed(3, &counted(8, 13, 3), &counted(9, 14, 3)), (10, 1));
+    }
+
+    #[test]
     fn a_line_takes_what_it_can_and_says_so() {
         let mut tty = Narrow(7, Vec::new());
-        assert_eq!(write(&mut tty, b"0123456789"), (7, Err(NotSent::Stuck)));
+        let (taken, result) = write_some(&mut tty, b"0123456789");
+        let refused = result.map_err(|error| error.kind());
+        assert_eq!((taken, refused), (7, Err(ErrorKind::WouldBlock)));
         assert_eq!(tty.1, b"0123456");
-        assert_eq!(write(&mut Narrow(9, Vec::new()), b"012"), (3, Ok(())));
+        let (taken, result) = write_some(&mut Narrow(9, Vec::new()), b"012");
+        assert!(taken == 3 && result.is_ok());
     }
 }

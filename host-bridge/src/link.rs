@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role, Stop};
+use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role, Stop, StopReason};
 
 use crate::clock::{Notify, micros};
-use crate::line::Line;
-pub use crate::line::{BAUD, NotSent, host_hello};
+pub use crate::line::{BAUD, Missed, NotSent, host_hello};
+use crate::line::{Handovers, Line};
 use crate::line_monitor::{LineMonitor, Verdict};
 use crate::lock::locked;
 use crate::place::Place;
@@ -30,6 +30,11 @@ pub const RETRY: Duration = Duration::from_millis(100);
 const STOP_AGAIN_US: u64 = 40_000;
 /// Longest read: what comes in some 40 ms at full speed.
 const READ_BYTES: usize = 4_096;
+
+/// What a person says who wants the boards to stop.
+pub const OPERATOR_STOP: Stop = Stop {
+    reason: StopReason::Operator,
+};
 
 /// What a link tells its owner.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,6 +79,8 @@ struct Shared {
     clock: Mutex<ClockOffset>,
     /// Of the line before, while there is none.
     counters: Mutex<PortCounters>,
+    /// On the line, or the one before.
+    missed: Mutex<Missed>,
     /// A Stop that the board has not answered, and when it was said last.
     stop: Mutex<Option<(Stop, u64)>>,
     ended: AtomicBool,
@@ -109,6 +116,7 @@ impl Link {
             }),
             clock: Mutex::new(ClockOffset::new()),
             counters: Mutex::new(PortCounters::new()),
+            missed: Mutex::default(),
             stop: Mutex::new(None),
             ended: AtomicBool::new(false),
             woken: system.clock.notify(),
@@ -169,6 +177,11 @@ impl Link {
         }
     }
 
+    /// What of [`Link::counters`] was missed because the port changed hands between programs.
+    pub fn missed(&self) -> Missed {
+        *locked(&self.shared.missed)
+    }
+
     /// The board's clock; none before the first exchange since it started.
     pub fn clocks(&self) -> Option<Clocks> {
         let clock = locked(&self.shared.clock);
@@ -211,6 +224,14 @@ impl LinkSender {
     /// If it could not be said yet.
     pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
         self.shared.stop(stop)
+    }
+}
+
+/// Stops all of these boards for the operator, as [`LinkSender::stop`] does: never waits.
+pub fn stop_all(boards: &[LinkSender]) {
+    for board in boards {
+        // What can't be said yet is said as soon as it can, and again until the board answers.
+        let _ = board.stop(OPERATOR_STOP);
     }
 }
 
@@ -301,6 +322,8 @@ impl<F: FnMut(Event)> Reader<F> {
         }
         let mut bytes = vec![0; READ_BYTES];
         let mut messages = Vec::new();
+        let mut handovers = Handovers::default();
+        *locked(&self.shared.missed) = Missed::default();
         let mut end = None;
         while !self.shared.is_ended() && end.is_none() {
             let count = match input.read(&mut bytes) {
@@ -310,6 +333,9 @@ impl<F: FnMut(Event)> Reader<F> {
                 Err(_) => break,
             };
             let at_us = self.shared.now_us();
+            if let Some(line) = &*locked(&self.shared.line) {
+                handovers.begin(input.changes(), &line.counters());
+            }
             let state = self.hear(
                 path,
                 &mut line_monitor,
@@ -317,6 +343,9 @@ impl<F: FnMut(Event)> Reader<F> {
                 at_us,
                 &mut messages,
             );
+            if let Some(line) = &*locked(&self.shared.line) {
+                *locked(&self.shared.missed) = handovers.missed(&line.counters());
+            }
             match &state {
                 State::Known { .. } => self.search.remember(path, true),
                 State::Opened { .. } => {}

@@ -14,4 +14,4 @@ mod picture;
 mod viewer;
 
 pub use foxglove_server::LiveError;
-pub use viewer::{Settings, Viewer};
+pub use viewer::{PORT, Settings, Viewer};

@@ -9,7 +9,7 @@ const STEP_US: u64 = 100_000;
 /// The latest instant of the board's clock in each kind of message that bears one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BoardClock {
-    latest_us: [Option<u64>; 6],
+    latest_us: [Option<u64>; 7],
 }
 
 impl BoardClock {
@@ -22,6 +22,7 @@ impl BoardClock {
             Message::Status(status) => (3, status.uptime_us),
             Message::Pong(pong) => (4, pong.received_us),
             Message::Safety(safety) => (5, safety.instant_us),
+            Message::Texture(texture) => (6, texture.instant_us),
             _ => return false,
         };
         let is_restart = self.latest_us[kind]

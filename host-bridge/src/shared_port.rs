@@ -14,7 +14,7 @@
 //! Nothing listens beyond this computer, nor to other users: the sockets lie in a folder of the user's own.
 
 mod bus;
-mod claim;
+pub mod claim;
 mod funnel;
 
 use std::collections::BTreeMap;
@@ -156,6 +156,7 @@ impl Seat {
                 seat: self,
                 part,
                 way: Arc::clone(&way),
+                changes: 0,
             }),
             output: Box::new(SharedOutput {
                 way,
@@ -296,6 +297,7 @@ struct SharedInput {
     seat: Seat,
     part: Part,
     way: Arc<Mutex<Way>>,
+    changes: u32,
 }
 
 impl Input for SharedInput {
@@ -315,6 +317,10 @@ impl Input for SharedInput {
             }
             Part::Nobody => Err(ErrorKind::BrokenPipe.into()),
         }
+    }
+
+    fn changes(&self) -> u32 {
+        self.changes
     }
 
     fn close(self: Box<Self>, discards: bool) {
@@ -345,6 +351,7 @@ impl SharedInput {
     fn become_part(&mut self, part: Part) {
         *locked(&self.way) = part.way();
         self.part = part;
+        self.changes = self.changes.wrapping_add(1);
     }
 
     /// A guest hears nothing: is the owner still there?

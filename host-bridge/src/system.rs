@@ -48,6 +48,12 @@ pub trait Input: Send {
     /// If nothing came, or nothing will: the port is gone.
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize>;
 
+    /// How often the port has changed hands between programs since it was opened: some of what the board said
+    /// then is missing.
+    fn changes(&self) -> u32 {
+        0
+    }
+
     /// Closes the port. What was written last, maybe a Stop, has a moment to leave, unless `discards`.
     fn close(self: Box<Self>, discards: bool);
 }

@@ -47,7 +47,9 @@ fn shells_get_their_completions() {
         assert_eq!(output.status.code(), Some(0), "{shell}");
         let script = text(&output.stdout);
         assert!(script.contains(mark), "{shell}: {script}");
-        for command in ["flash", "monitor", "record", "replay", "relay", "doctor"] {
+        for command in [
+            "flash", "monitor", "record", "replay", "export", "relay", "doctor",
+        ] {
             assert!(script.contains(command), "{shell} has no {command}");
         }
     }
@@ -76,6 +78,7 @@ fn man_pages_are_written_for_the_program_and_each_command() {
         "host-bridge-monitor",
         "host-bridge-record",
         "host-bridge-replay",
+        "host-bridge-export",
         "host-bridge-relay",
         "host-bridge-doctor",
     ] {

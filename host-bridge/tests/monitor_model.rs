@@ -11,9 +11,10 @@ use host_bridge::monitor::trace::{Trace, column_us};
 use host_bridge::state::State;
 use protocol::actuators::{self, grid};
 use protocol::{
-    Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration, DisplayState,
-    Estimate, GAUGES, GaugeHealth, Hello, Message, Mode, Question, Range, Refusal, Role, Safety,
-    SensorConfiguration, Setting, Stopped, Trip,
+    Arm, ArmState, Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration,
+    DisplayState, Estimate, GAUGES, GaugeHealth, Hello, Message, Mode, PortCounters, Question,
+    Range, Refusal, ResetCause, Role, RoleCounters, Safety, SensorConfiguration, SensorCounters,
+    Setting, Status, Stopped, Trip,
 };
 
 fn connected() -> Dashboard {
@@ -127,7 +128,7 @@ fn a_change_is_made_of_what_is_in_force_and_again_if_another_comes_in_between() 
 #[test]
 fn a_refusal_is_shown_by_name_and_range() {
     let mut dashboard = connected();
-    let setting = &settings::DISPLAY[6];
+    let setting = &settings::DISPLAY[7];
     assert_eq!(setting.name, "amplitude_mv");
     dashboard.change(Role::Display, setting, "6000");
     dashboard.elapse(1);
@@ -216,6 +217,58 @@ fn each_change_of_the_supervisor_happens_once() {
             LogEvent::Safety(DisplayState::Ready),
         ]
     );
+}
+
+#[test]
+fn an_arm_that_stops_happens_once_for_each_start_of_its_board() {
+    let mut dashboard = connected();
+    dashboard.take_log_entries();
+    let arm = |state| {
+        Message::Arm(Arm {
+            instant_us: 0,
+            state,
+        })
+    };
+    let status = |stopped| {
+        Message::Status(Status {
+            uptime_us: 0,
+            reset: ResetCause::Watchdog,
+            watchdog_resets: 1,
+            stack_free_bytes: 0,
+            peer: PortCounters::new(),
+            console: PortCounters::new(),
+            role: RoleCounters::Sensor(SensorCounters {
+                stopped,
+                ..SensorCounters::ZERO
+            }),
+        })
+    };
+    let mut hear = |events: Vec<Event>| -> (Vec<LogEvent>, Option<Trip>) {
+        for event in events {
+            dashboard.on(5, Role::Sensor, event);
+        }
+        let told = dashboard.take_log_entries().into_iter();
+        (
+            told.map(|log_entry| log_entry.what).collect(),
+            dashboard.sensor.arm_stopped,
+        )
+    };
+    let heard = |message| Event::Heard { at_us: 5, message };
+    let trip = Trip::Operator;
+    let stopped = LogEvent::ArmStopped(trip);
+    assert_eq!(stopped.to_string(), "arm stopped: by the operator");
+    let told = hear(vec![
+        heard(arm(ArmState::Following)),
+        heard(arm(ArmState::Stopped(trip))),
+        heard(status(Some(trip))),
+    ]);
+    assert_eq!(told, (vec![stopped.clone()], Some(trip)));
+    // Its watchdog's reset leaves it stopped.
+    let told = hear(vec![Event::Restarted, heard(status(Some(trip)))]);
+    assert_eq!(told, (vec![LogEvent::Restarted, stopped], Some(trip)));
+    let told = hear(vec![Event::Restarted]);
+    assert_eq!(told, (vec![LogEvent::Restarted], None));
+    assert_eq!(hear(vec![heard(status(None))]), (vec![], None));
 }
 
 #[test]

@@ -18,6 +18,12 @@ pub const ACTUATOR_BLOCK: usize = 10;
 pub const UNITY_GAIN: u16 = 1 << 15;
 /// The furthest that an actuator may be from the fingertip's middle along either axis, in µm.
 pub const FURTHEST_UM: i16 = 20_000;
+/// The lowest natural frequency of an actuator that can be made up for, in 0.1 Hz.
+pub const LOWEST_RESONANCE_DHZ: u16 = 200;
+/// The highest natural frequency that is told from an infinite one, in 0.1 Hz.
+pub const HIGHEST_RESONANCE_DHZ: u16 = 20_000;
+/// The least and the largest damping, in percent.
+pub const DAMPING_PERCENT: (u16, u16) = (20, 1_000);
 /// Distance between neighbours of the default grid, in µm: a guess, the paper gives none.
 pub const DEFAULT_PITCH_UM: u16 = 1_500;
 
@@ -39,6 +45,13 @@ pub struct Actuator {
     pub phase: u16,
     /// Whether a positive voltage bends it away from the skin: it then gets the opposite voltage.
     pub inverted: bool,
+    /// Natural frequency f₀ in 0.1 Hz of the actuator on the skin, as a second-order system
+    /// H(s) = ω₀²/(s² + 2ζω₀s + ω₀²) from voltage to displacement, [`LOWEST_RESONANCE_DHZ`] to
+    /// [`HIGHEST_RESONANCE_DHZ`]: the voltage is then such that the displacement is in step. 0: not known, the voltage
+    /// itself is in step.
+    pub resonance_dhz: u16,
+    /// Its damping ζ in percent, 20 to 1 000; without meaning where `resonance_dhz` is 0.
+    pub damping_percent: u16,
 }
 
 impl Actuator {
@@ -50,6 +63,8 @@ impl Actuator {
             gain_q15: UNITY_GAIN,
             phase: 0,
             inverted: false,
+            resonance_dhz: 0,
+            damping_percent: 100,
         }
     }
 }
@@ -84,10 +99,10 @@ pub const fn grid(pitch_um: u16) -> [Actuator; ACTUATORS] {
 /// What a display board starts with.
 pub const DEFAULT_ACTUATORS: [Actuator; ACTUATORS] = grid(DEFAULT_PITCH_UM);
 
-/// Names a description: the CRC-32 over each actuator's x, y, gain, phase (little-endian) and 1 if it
-/// is inverted, else 0.
+/// Names a description: the CRC-32 over each actuator's x, y, gain, phase, resonance, damping
+/// (little-endian) and 1 if it is inverted, else 0.
 pub const fn hash(actuators: &[Actuator; ACTUATORS]) -> u32 {
-    const LENGTH: usize = 9;
+    const LENGTH: usize = 13;
     let mut bytes = [0; LENGTH * ACTUATORS];
     let mut index = 0;
     while index < ACTUATORS {
@@ -97,6 +112,8 @@ pub const fn hash(actuators: &[Actuator; ACTUATORS]) -> u32 {
             actuator.y_um as u16,
             actuator.gain_q15,
             actuator.phase,
+            actuator.resonance_dhz,
+            actuator.damping_percent,
         ];
         let mut word = 0;
         while word < words.len() {
@@ -145,6 +162,20 @@ pub fn check(actuators: &[Actuator; ACTUATORS]) -> Result<(), Refusal> {
             UNITY_GAIN.into(),
             Setting::ActuatorGain,
         )?;
+        if actuator.resonance_dhz != 0 {
+            within(
+                actuator.resonance_dhz.into(),
+                LOWEST_RESONANCE_DHZ.into(),
+                HIGHEST_RESONANCE_DHZ.into(),
+                Setting::ActuatorResonance,
+            )?;
+            within(
+                actuator.damping_percent.into(),
+                DAMPING_PERCENT.0.into(),
+                DAMPING_PERCENT.1.into(),
+                Setting::ActuatorDamping,
+            )?;
+        }
     }
     Ok(())
 }

@@ -102,6 +102,8 @@ pub struct DisplayCapabilities {
     pub furthest_um: u16,
     /// Ways for the actuators to share the stimulus: each number below it is a [`crate::Mode`]'s.
     pub modes: u8,
+    /// How much of the surface can be played: each number below it is a [`crate::Rendering`]'s.
+    pub renderings: u8,
     /// New voltages in a second: one for each [`crate::UpdateRate`].
     pub update_rates_hz: [u16; 2],
     /// Motions in a second.
@@ -117,7 +119,7 @@ pub struct DisplayCapabilities {
     /// The largest mean of an actuator's voltage, either way, in mV.
     pub standing_mv: u16,
     /// The ranges of all settings that are numbers.
-    pub ranges: [SettingRange; 7],
+    pub ranges: [SettingRange; 8],
 }
 
 /// What a board can do.

@@ -81,6 +81,18 @@ pub enum Mode {
     Travelling,
 }
 
+/// How much of the surface the actuators play.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Rendering {
+    /// The fundamental alone: the paper's sine, equation (12).
+    #[default]
+    Fundamental,
+    /// The fundamental and its partials ([`crate::Texture::partials`]).
+    Shape,
+    /// These, and a random part with the levels of [`crate::Texture::bands`] that is the same at the same place.
+    Texture,
+}
+
 /// How often the actuators get new voltages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum UpdateRate {
@@ -106,6 +118,9 @@ impl UpdateRate {
 pub struct DisplayConfiguration {
     /// How the actuators share the stimulus.
     pub mode: Mode,
+    /// How much of the surface they play.
+    #[serde(default)] // Recordings of protocol 5 and before have none.
+    pub rendering: Rendering,
     /// How often they get new voltages.
     pub update_rate: UpdateRate,
     /// Age of the last valid estimate, in ms, at which the stimulus fades out, 20 to 5 000.
@@ -121,6 +136,11 @@ pub struct DisplayConfiguration {
     /// The surface's amplitude ([`crate::Estimate::amplitude_lsb`]) that is played at `amplitude_mv`, in
     /// ADC steps, 1 to 2 000; weaker surfaces are played weaker in proportion. 0: all surfaces alike.
     pub reference_lsb: u16,
+    /// The fluctuation of the tangential force ([`crate::Friction::fluctuation_mn`]) that is played at
+    /// `amplitude_mv`, in mN, 1 to 60 000; what fluctuates less is played weaker in proportion. 0: the force counts for
+    /// nothing. It counts only as far as the sensor tells it.
+    #[serde(default)]
+    pub reference_mn: u16,
     /// Longest time in s that the hand may rub without a rest, 10 to 3 600.
     pub full_drive_s: u16,
     /// [`crate::actuators::hash`] of the actuators' description: that of the one in force, or of the
@@ -132,6 +152,7 @@ impl DisplayConfiguration {
     /// What a board starts with: safe, and the paper's numbers where it gives some.
     pub const DEFAULT: Self = Self {
         mode: Mode::Uniform,
+        rendering: Rendering::Fundamental,
         update_rate: UpdateRate::Hz2000,
         max_age_ms: 500,
         fade_in_ms: 20,
@@ -139,6 +160,7 @@ impl DisplayConfiguration {
         glide_ms: 20,
         amplitude_mv: 5_000,
         reference_lsb: 0,
+        reference_mn: 0,
         full_drive_s: 600,
         actuators: actuators::hash(&DEFAULT_ACTUATORS),
     };
@@ -261,13 +283,14 @@ impl DisplayConfiguration {
     pub const MOST_AMPLITUDE_MV: u16 = 5_000;
 
     /// The ranges of all settings that are numbers.
-    pub const RANGES: [SettingRange; 7] = [
+    pub const RANGES: [SettingRange; 8] = [
         SettingRange::new(Setting::MaxAgeMs, 20, 5_000),
         SettingRange::new(Setting::FadeInMs, 1, 1_000),
         SettingRange::new(Setting::FadeOutMs, 1, 1_000),
         SettingRange::new(Setting::GlideMs, 0, 500),
         SettingRange::new(Setting::AmplitudeMv, 0, Self::MOST_AMPLITUDE_MV as u32),
         SettingRange::new(Setting::ReferenceLsb, 0, 2_000),
+        SettingRange::new(Setting::ReferenceMn, 0, 60_000),
         SettingRange::new(Setting::FullDriveS, 10, 3_600),
     ];
 
@@ -280,6 +303,7 @@ impl DisplayConfiguration {
             self.glide_ms,
             self.amplitude_mv,
             self.reference_lsb,
+            self.reference_mn,
             self.full_drive_s,
         ];
         check(&Self::RANGES, &values.map(u32::from))

@@ -23,6 +23,7 @@ pub mod sender;
 mod sequence;
 pub mod status;
 pub mod stop;
+pub mod texture;
 
 pub use actuators::{
     ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators, DEFAULT_ACTUATORS, UNITY_GAIN,
@@ -32,7 +33,7 @@ pub use capabilities::{
 };
 pub use clock::ClockOffset;
 pub use configuration::{
-    Configuration, ConfigurationReport, Configure, DisplayConfiguration, Method, Mode,
+    Configuration, ConfigurationReport, Configure, DisplayConfiguration, Method, Mode, Rendering,
     SensorConfiguration, UpdateRate,
 };
 pub use console::{Console, Key, Line};
@@ -50,3 +51,4 @@ pub use safety::{Arm, ArmState, DisplayState, Hold, Safety, Trip};
 pub use sender::Sender;
 pub use status::{DisplayCounters, PortCounters, ResetCause, RoleCounters, SensorCounters, Status};
 pub use stop::{STOP_LENGTH, Stop, StopReason, Stopped};
+pub use texture::{Friction, Partial, Texture};

@@ -230,6 +230,7 @@ mod tests {
             uptime_us: 0,
             reset: ResetCause::Watchdog,
             watchdog_resets: 3,
+            stack_free_bytes: 0,
             peer: PortCounters::new(),
             console: PortCounters::new(),
             role: RoleCounters::Sensor(SensorCounters::ZERO),
@@ -237,7 +238,7 @@ mod tests {
         let hello = Hello::new(Role::Display, "test", [0, 1, 0]);
         assert_eq!(
             banner(&hello, "display", &status),
-            "ridgelink display 0.1.0, protocol 5, started by watchdog, watchdog 3: ? for help"
+            "ridgelink display 0.1.0, protocol 6, started by watchdog, watchdog 3: ? for help"
         );
         let status = Status {
             reset: ResetCause::Pin,
@@ -246,7 +247,7 @@ mod tests {
         };
         assert_eq!(
             banner(&hello, "display", &status),
-            "ridgelink display 0.1.0, protocol 5, started by reset pin: ? for help"
+            "ridgelink display 0.1.0, protocol 6, started by reset pin: ? for help"
         );
     }
 }

@@ -4,6 +4,7 @@
 //! | --- | --- | --- | --- |
 //! | [`Hello`] | all | at start, on request, once a second until answered; from a [`console`](crate::console) only when spoken to | who is there, and do we understand each other |
 //! | [`Estimate`] | sensor | 100 Hz | the surface, the contact with it, the gauges' health |
+//! | [`Texture`] | sensor | 20 Hz, while the arm moves | what the surface is besides λ |
 //! | [`Motion`] | display | 500 Hz | where the operator's hand is, for the arm |
 //! | [`Gauges`] | sensor | 125 Hz, while asked for | samples, for recording |
 //! | [`Status`] | boards | 1 Hz | every counter |
@@ -32,9 +33,10 @@ use crate::hello::{Hello, MAGIC, Role};
 use crate::safety::{Arm, Safety};
 use crate::status::Status;
 use crate::stop::{Stop, Stopped};
+use crate::texture::Texture;
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 5;
+pub const PROTOCOL_VERSION: u16 = 6;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.
@@ -92,6 +94,8 @@ pub enum Message {
     StreamGauges(StreamGauges),
     /// What the sensor does with the arm has changed.
     Arm(Arm),
+    /// The surface besides its wavelength.
+    Texture(Texture),
 }
 
 /// Which of the paper's ranges an instant is in, equation (8): T1 while v(t)·v(t−A) ≥ 0.

@@ -40,12 +40,21 @@ impl core::fmt::Display for Refusal {
                     "no block of actuators begins at {index}: give a multiple of ten up to {high}"
                 )
             }
-            Setting::ActuatorX | Setting::ActuatorY | Setting::ActuatorGain => {
+            Setting::ActuatorX
+            | Setting::ActuatorY
+            | Setting::ActuatorGain
+            | Setting::ActuatorResonance
+            | Setting::ActuatorDamping => {
                 write!(
                     f,
                     "{setting:?} of actuator {index} is out of range: give {low} to {high}"
                 )
             }
+            Setting::Rendering => write!(
+                f,
+                "Rendering is too much with these actuators: more than the fundamental, or a resonance, is worked out \
+                 for at most {high} different places and phases"
+            ),
             _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
         }
     }
@@ -84,6 +93,8 @@ pub enum Setting {
     AmplitudeMv,
     /// [`crate::DisplayConfiguration::reference_lsb`]
     ReferenceLsb,
+    /// [`crate::DisplayConfiguration::reference_mn`]
+    ReferenceMn,
     /// [`crate::DisplayConfiguration::full_drive_s`]
     FullDriveS,
     /// [`crate::DisplayConfiguration::actuators`]: neither the description in force nor the one sent.
@@ -96,6 +107,13 @@ pub enum Setting {
     ActuatorY,
     /// [`crate::Actuator::gain_q15`]
     ActuatorGain,
+    /// [`crate::Actuator::resonance_dhz`]
+    ActuatorResonance,
+    /// [`crate::Actuator::damping_percent`]
+    ActuatorDamping,
     /// [`crate::Configure::replaces`]: another configuration is in force.
     Replaces,
+    /// [`crate::DisplayConfiguration::rendering`]: more than the fundamental, or a resonance of an actuator, is asked for
+    /// of actuators at more different places and phases than are worked out in time.
+    Rendering,
 }

@@ -195,4 +195,7 @@ pub struct Status {
     pub console: PortCounters,
     /// What the role counts.
     pub role: RoleCounters,
+    /// The least room that the stack has ever had since the start, in bytes, as of four seconds ago at most; 0 where
+    /// nobody knows: in the first four, and in a simulator without a processor.
+    pub stack_free_bytes: u32,
 }

@@ -200,6 +200,7 @@ fn said_at(role: Role, now_ms: u64, speaker: &mut Speaker) -> Vec<Message> {
             uptime_us: instant_us,
             reset: ResetCause::Power,
             watchdog_resets: 0,
+            stack_free_bytes: 0,
             peer: PortCounters::new(),
             console: PortCounters::new(),
             role: match role {

@@ -1,8 +1,13 @@
-//! Two boards for bridges that are started by hand, be it in two network namespaces.
+//! Two boards for bridges that are started by hand, be it in two network namespaces; or with bridges of its own, over
+//! a network with weather.
 //!
 //! `cargo run --example relay_boards -- 60` prints the two ports, and then once a second what
 //! each board has heard: how much, how old, and how often something came that was not newer than what
 //! came before, which must never be. Exit status 1 if it was.
+//!
+//! `cargo build --workspace --bins && cargo run --example relay_boards -- 60 udp 500 50 5` starts two bridges that meet by
+//! `udp/`, over 500 ms each way, up to 50 ms more, and 5 % loss; `tcp` in its place by a stream alone, which sends again
+//! what is lost. Ten seconds later the gaps of each board are counted, for 60 s, and told at the end.
 
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,7 +16,18 @@ use std::time::{Duration, Instant};
 
 use host_bridge::relay::histogram::Histogram;
 use protocol::{Message, Role};
+use rustix::process::Signal;
+use tests::relay::{Relay, free_port};
 use tests::swift_board::SwiftBoard;
+use tests::weather::datagrams::DatagramWeather;
+use tests::weather::{Sky, Weather};
+
+/// How long nothing may come on a bad network, in µs.
+const GOAL_US: u64 = 600_000;
+/// How long bridges have to get used to a network.
+const WARMING_UP: Duration = Duration::from_secs(10);
+/// Far more than it takes two bridges to meet.
+const LIMIT: Duration = Duration::from_secs(60);
 
 /// What a board has heard.
 #[derive(Default)]
@@ -23,6 +39,8 @@ struct Heard {
     not_newer: u64,
     ages_us: Histogram,
     stops: u64,
+    /// Gaps longer than [`GOAL_US`] that have ended, and the longest of all.
+    gaps: (u64, u64),
 }
 
 impl Heard {
@@ -38,7 +56,10 @@ impl Heard {
         };
         if let Some(newest) = self.newest.replace(sequence) {
             self.not_newer += u64::from(sequence <= newest);
-            self.longest_gap_us = self.longest_gap_us.max(at_us - self.last_us);
+            let gap_us = at_us - self.last_us;
+            self.longest_gap_us = self.longest_gap_us.max(gap_us);
+            self.gaps.0 += u64::from(gap_us > GOAL_US);
+            self.gaps.1 = self.gaps.1.max(gap_us);
         }
         self.count += 1;
         self.last_us = at_us;
@@ -80,18 +101,80 @@ fn board(role: Role) -> std::io::Result<(SwiftBoard, Arc<Mutex<Heard>>)> {
     Ok((board, heard))
 }
 
+/// Two bridges that meet over a network with weather.
+struct Bridges {
+    bridges: [Relay; 2],
+    stream: Weather,
+    datagrams: DatagramWeather,
+}
+
+impl Bridges {
+    fn new(carrier: &str, sensor: &SwiftBoard, display: &SwiftBoard) -> Self {
+        let port = free_port();
+        let stream = Weather::over(port);
+        let through = stream.port();
+        let datagrams = DatagramWeather::over(through, port);
+        let [listen, connect] = [port, through].map(|port| format!("{carrier}/127.0.0.1:{port}"));
+        // Whatever comes is passed on, so that gaps are the network's.
+        let start = |role, board: &SwiftBoard, end, at: &str| {
+            Relay::bridge(role, &board.path, &[end, at, "--max-age", "60000"])
+        };
+        let listening = start(Role::Sensor, sensor, "--listen", &listen);
+        listening.says("listening", LIMIT);
+        let connecting = start(Role::Display, display, "--connect", &connect);
+        connecting.says("the sensor's site: host-bridge", LIMIT);
+        Self {
+            bridges: [listening, connecting],
+            stream,
+            datagrams,
+        }
+    }
+
+    fn turn(&self, sky: Sky) {
+        self.stream.turn(sky);
+        self.datagrams.turn(sky);
+    }
+}
+
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
-    let seconds = std::env::args()
-        .nth(1)
-        .map_or(Ok(60), |given| given.parse())?;
-    let (_sensor, sensor) = board(Role::Sensor)?;
-    let (_display, display) = board(Role::Display)?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let number = |at: usize, or: u64| arguments.get(at).map_or(Ok(or), |given| given.parse());
+    let seconds = number(0, 60)?;
+    let (sensor_board, sensor) = board(Role::Sensor)?;
+    let (display_board, display) = board(Role::Display)?;
+    let bridges = arguments
+        .get(1)
+        .map(|carrier| Bridges::new(carrier, &sensor_board, &display_board));
+    if let Some(bridges) = &bridges {
+        bridges.turn(Sky {
+            delay: Duration::from_millis(number(2, 0)?),
+            jitter: Duration::from_millis(number(3, 0)?),
+            loss: number(4, 0)? as f64 / 100.0,
+        });
+        thread::sleep(WARMING_UP);
+        for heard in [&sensor, &display] {
+            locked(heard).take();
+            locked(heard).gaps = (0, 0);
+        }
+    }
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(seconds) {
         thread::sleep(Duration::from_secs(1));
         let now_s = began.elapsed().as_secs_f64();
         println!("{now_s:6.1} s  sensor: {}", locked(&sensor).take());
         println!("          display: {}", locked(&display).take());
+    }
+    for (role, heard) in [("sensor", &sensor), ("display", &display)] {
+        let (count, longest_us) = locked(heard).gaps;
+        println!(
+            "{role}: {count} gaps above {} ms, the longest {} ms",
+            GOAL_US / 1_000,
+            longest_us / 1_000
+        );
+    }
+    for bridge in bridges.into_iter().flat_map(|bridges| bridges.bridges) {
+        bridge.signal(Signal::INT);
+        println!("{}", bridge.wait(LIMIT).1.last().ok_or("no report")?);
     }
     let not_newer = locked(&sensor).not_newer + locked(&display).not_newer;
     Ok(ExitCode::from(u8::from(not_newer > 0)))

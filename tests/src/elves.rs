@@ -17,9 +17,22 @@ pub fn path(role: Role) -> PathBuf {
     folder().join(format!("firmware-{}", role.name()))
 }
 
+/// Where a program of `tests/plain-board` is, for the boards' core.
+pub fn plain(name: &str) -> PathBuf {
+    let built = "../target/plain-board/thumbv7em-none-eabihf/debug";
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(built).join(name)
+}
+
 /// Where the ELF of an example of the sensor's is.
 pub fn example(name: &str) -> PathBuf {
     folder().join("examples").join(name)
+}
+
+/// Where a program of tests for a board is: its package, and its own name.
+pub fn on_target(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../target/on-target")
+        .join(name)
 }
 
 fn folder() -> PathBuf {

@@ -114,6 +114,7 @@ impl FakeBench {
             uptime_us: self.elapsed_ms * 1_000,
             reset: ResetCause::Power,
             watchdog_resets: 0,
+            stack_free_bytes: 0,
             peer: PortCounters {
                 sent: 4_711,
                 ..PortCounters::new()

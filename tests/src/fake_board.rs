@@ -32,6 +32,7 @@ enum Order {
     Bytes(Vec<u8>),
     Mute(bool),
     Deafen(bool),
+    Miss(bool),
     Disobey(bool),
     Restart,
     Patience,
@@ -149,6 +150,11 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Deafen(is_deaf));
     }
 
+    /// Has all that is said to the board be lost on its way, for as long as it misses it.
+    pub fn miss(&self, misses: bool) {
+        let _ = self.orders.send(Order::Miss(misses));
+    }
+
     /// Has the board take no notice of a Stop, for as long as it disobeys; it obeys otherwise, and says so.
     pub fn disobey(&self, disobeys: bool) {
         let _ = self.orders.send(Order::Disobey(disobeys));
@@ -197,7 +203,7 @@ fn run(
     // As at a board: text for a person until a program says Hello.
     let mut console = Console::new(hello);
     let mut line_us = 0;
-    let (mut is_mute, mut is_deaf, mut is_patient) = (false, false, false);
+    let (mut is_mute, mut is_deaf, mut misses, mut is_patient) = (false, false, false, false);
     let is_display = hello.role == Role::Display.byte();
     let mut obeys = true;
     let mut bytes = [0; 4_096];
@@ -208,6 +214,7 @@ fn run(
             0
         } else {
             match master.read(&mut bytes) {
+                Ok(_) if misses => 0,
                 Ok(count) => count,
                 Err(error) if is_pause(&error) => 0,
                 Err(_) => return,
@@ -249,6 +256,7 @@ fn run(
                 }
                 Ok(Order::Mute(now)) => is_mute = now,
                 Ok(Order::Deafen(now)) => is_deaf = now,
+                Ok(Order::Miss(now)) => misses = now,
                 Ok(Order::Disobey(now)) => obeys = !now,
                 Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {

@@ -11,6 +11,7 @@ pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
 pub mod pty;
+pub mod recorded;
 pub mod relay;
 pub mod run;
 pub mod sensing;

@@ -4,8 +4,8 @@ use protocol::{
     ACTUATOR_BLOCK, Actuator, Actuators, CHANNELS, Configuration, ConfigurationReport, Configure,
     Contact, DisplayConfiguration, DisplayCounters, DisplayState, Estimate, GAUGES, GaugeHealth,
     GaugeSample, Gauges, Hold, Message, Method, Mode, Motion, Pong, PortCounters, Range, Refusal,
-    ResetCause, Role, RoleCounters, Safety, SensorConfiguration, SensorCounters, Setting, Status,
-    Stop, StopReason, Trip, UpdateRate,
+    Rendering, ResetCause, Role, RoleCounters, Safety, SensorConfiguration, SensorCounters,
+    Setting, Status, Stop, StopReason, Trip, UpdateRate,
 };
 
 /// Says things, each different.
@@ -214,6 +214,7 @@ impl Speaker {
                 ResetCause::Software,
             ]),
             watchdog_resets: self.u32(),
+            stack_free_bytes: self.sequence,
             peer: self.port(),
             console: self.port(),
             role,
@@ -302,6 +303,7 @@ impl Speaker {
     fn display_report(&mut self) -> Message {
         let configuration = DisplayConfiguration {
             mode: self.one(&[Mode::Uniform, Mode::Travelling]),
+            rendering: self.one(&[Rendering::Fundamental, Rendering::Shape, Rendering::Texture]),
             update_rate: self.one(&[UpdateRate::Hz2000, UpdateRate::Hz4000]),
             max_age_ms: self.u32() as u16,
             fade_in_ms: self.u32() as u16,
@@ -309,6 +311,7 @@ impl Speaker {
             glide_ms: self.u32() as u16,
             amplitude_mv: self.u32() as u16,
             reference_lsb: self.u32() as u16,
+            reference_mn: self.u32() as u16,
             full_drive_s: self.u32() as u16,
             actuators: self.u32(),
         };

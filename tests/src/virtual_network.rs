@@ -1,5 +1,5 @@
 //! A network in memory, which goes by virtual time: bytes come later, or not for a while, or not at all. Their
-//! order is kept, as by TCP.
+//! order is kept, as by TCP; or, for what may be lost, not, as by datagrams.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,10 +13,11 @@ use host_bridge::relay::envelope::Envelope;
 use host_bridge::relay::name::{Channel, Name};
 use host_bridge::relay::network::NetworkError;
 use host_bridge::relay::reach::Reach;
-use host_bridge::relay::transport::{Connection, OnBytes, Subscription, Transport};
+use host_bridge::relay::transport::{Connection, Subscription, Transport};
 use protocol::Role;
 
 use crate::virtual_clock::VirtualClock;
+use crate::weather::{Chance, Sky};
 
 /// A network to which any number of programs can connect.
 #[derive(Clone)]
@@ -33,9 +34,11 @@ struct Shared {
 
 #[derive(Default)]
 struct State {
-    delay_us: u64,
-    jitter_us: u64,
-    random: u64,
+    sky: Sky,
+    chance: Chance,
+    has_datagrams: bool,
+    /// All that was said, if somebody wants to know.
+    tape: Option<Vec<(String, Vec<u8>)>>,
     is_still: bool,
     is_cut: bool,
     /// What is on its way: when it comes, and in which order it went.
@@ -55,8 +58,7 @@ struct Flying {
 #[derive(Clone)]
 struct Listener {
     owner: u64,
-    keys: String,
-    on_bytes: Arc<OnBytes>,
+    subscription: Arc<Subscription>,
 }
 
 impl VirtualNetwork {
@@ -77,8 +79,41 @@ impl VirtualNetwork {
 
     /// From now on bytes take `delay`, and some of them up to `jitter` longer.
     pub fn delay(&self, delay: Duration, jitter: Duration) {
+        let loss = 0.0;
+        self.turn(Sky {
+            delay,
+            jitter,
+            loss,
+        });
+    }
+
+    /// From now on the network is like that.
+    pub fn turn(&self, sky: Sky) {
+        locked(&self.0.state).sky = sky;
+    }
+
+    /// Whether what may be lost goes by datagrams from now on, or by a stream as all the rest.
+    pub fn use_datagrams(&self, has_datagrams: bool) {
+        locked(&self.0.state).has_datagrams = has_datagrams;
+    }
+
+    /// Begins to keep all that is said, with its key.
+    pub fn listen_in(&self) {
+        locked(&self.0.state).tape = Some(Vec::new());
+    }
+
+    /// Says again what was said, as a stranger who has listened.
+    pub fn replay(&self) {
         let mut state = locked(&self.0.state);
-        (state.delay_us, state.jitter_us) = (micros(delay), micros(jitter));
+        let at_us = self.0.clock.now_us();
+        for (key, bytes) in state.tape.take().unwrap_or_default() {
+            state.sent += 1;
+            let place = (at_us, state.sent);
+            let from = u64::MAX;
+            state.flying.insert(place, Flying { from, key, bytes });
+        }
+        drop(state);
+        self.0.changed.notify();
     }
 
     /// Holds everything up, and lets all of it go on again: a network that is stuck.
@@ -106,7 +141,7 @@ impl Shared {
         while !self.is_ended.load(Ordering::Acquire) {
             let (due, until_us) = self.due();
             for (listener, bytes) in due {
-                (listener.on_bytes)(&bytes);
+                (listener.subscription.on_bytes)(&bytes);
             }
             self.changed.wait_until(until_us);
         }
@@ -125,7 +160,8 @@ impl Shared {
                 return (due, first.key().0);
             }
             let Flying { from, key, bytes } = first.remove();
-            let hears = |listener: &&Listener| listener.owner != from && listener.hears(&key);
+            let hears =
+                |listener: &&Listener| listener.owner != from && listener.subscription.hears(&key);
             due.extend(
                 state
                     .listeners
@@ -135,15 +171,6 @@ impl Shared {
             );
         }
         (due, u64::MAX)
-    }
-}
-
-impl Listener {
-    fn hears(&self, key: &str) -> bool {
-        match self.keys.strip_suffix('*') {
-            Some(start) => key.starts_with(start),
-            None => self.keys == key,
-        }
     }
 }
 
@@ -157,8 +184,7 @@ impl Transport for VirtualNetwork {
         let owner = self.0.connected.fetch_add(1, Ordering::Relaxed);
         let listeners = subscriptions.into_iter().map(|subscription| Listener {
             owner,
-            keys: subscription.keys,
-            on_bytes: Arc::new(subscription.on_bytes),
+            subscription: Arc::new(subscription),
         });
         locked(&self.0.state).listeners.extend(listeners);
         Ok(Box::new(Program {
@@ -191,20 +217,27 @@ impl Connection for Program {
         let now_us = self.shared.clock.now_us();
         let mut state = locked(&self.shared.state);
         if !state.is_cut {
-            // Never the same twice in a row, and the same in every run.
-            state.random = (state.random + 1) * 48_271 % 0x7fff_ffff;
-            let jitter_us = state.jitter_us * state.random / 0x7fff_ffff;
-            let last_us = state.last_us.get(&self.owner).copied().unwrap_or(0);
-            let comes_us = (now_us + state.delay_us + jitter_us).max(last_us);
-            state.last_us.insert(self.owner, comes_us);
+            let sky = state.sky;
+            let key = self.name.key(self.role, channel);
+            let bytes = envelope.to_bytes();
+            if let Some(tape) = &mut state.tape {
+                tape.push((key.clone(), bytes.clone()));
+            }
+            let is_datagram = state.has_datagrams && channel.is_fleeting();
+            if is_datagram && state.chance.loses(&sky) {
+                return true;
+            }
+            let mut comes_us = now_us + micros(state.chance.delay(&sky));
+            if !is_datagram {
+                comes_us += micros(state.chance.repair(&sky));
+                let last_us = state.last_us.entry(self.owner).or_default();
+                comes_us = comes_us.max(*last_us);
+                *last_us = comes_us;
+            }
             state.sent += 1;
             let place = (comes_us, state.sent);
-            let flying = Flying {
-                from: self.owner,
-                key: self.name.key(self.role, channel),
-                bytes: envelope.to_bytes(),
-            };
-            state.flying.insert(place, flying);
+            let from = self.owner;
+            state.flying.insert(place, Flying { from, key, bytes });
         }
         drop(state);
         self.shared.changed.notify();

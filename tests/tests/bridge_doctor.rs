@@ -89,6 +89,7 @@ fn well(uptime_us: u64, role: RoleCounters) -> Status {
         uptime_us,
         reset: ResetCause::Power,
         watchdog_resets: 0,
+        stack_free_bytes: 80_000,
         peer: port,
         console: PortCounters::new(),
         role,

@@ -210,9 +210,9 @@ fn a_wrong_baud_rate_is_garbage_and_named(bench: &Bench) {
 fn two_doctors_at_once_find_the_same(bench: &Bench) {
     let both = [start(bench), start(bench)];
     pass(bench, 1.2);
-    let [owner, guest] = both.map(|doctor| document(&end(doctor)));
-    assert_eq!(findings(&owner).0, [], "{owner:#}");
-    // What is said while the port changes hands, the guest misses, and says so.
-    let (found, _) = findings(&guest);
-    assert!(found.iter().all(|(_, kind)| kind == "counter"), "{guest:#}");
+    // What is said while the port changes hands, the guest misses: no fault of the line.
+    for doctor in both {
+        let document = document(&end(doctor));
+        assert_eq!(findings(&document).0, [], "{document:#}");
+    }
 }

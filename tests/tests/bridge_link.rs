@@ -111,6 +111,7 @@ fn status(uptime_us: u64) -> Message {
         uptime_us,
         reset: ResetCause::Power,
         watchdog_resets: 0,
+        stack_free_bytes: 0,
         peer: PortCounters::new(),
         console: PortCounters::new(),
         role: RoleCounters::Sensor(SensorCounters::ZERO),
@@ -259,6 +260,50 @@ fn a_stop_is_said_again_to_a_board_that_does_not_answer_and_to_one_that_comes_la
     board.take_heard();
     bench.ports.link(board.path(), name);
     assert!(hears_stop(&board));
+}
+
+#[test]
+fn a_stop_on_a_line_that_carries_one_way_is_said_until_it_is_answered() {
+    let bench = VirtualBench::default();
+    let stops = |board: &FakeBoard| {
+        let heard = board.take_heard();
+        heard.iter().filter(|&message| *message == STOP).count()
+    };
+    // What the board says is lost: it obeys, and whoever said it doesn't know.
+    let board = FakeBoard::on(&bench, Role::Display);
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.turned(State::is_known);
+    board.mute(true);
+    pass(&bench, S);
+    watched.link.stop(OPERATOR).expect("there is a line");
+    pass(&bench, 10 * S);
+    assert!(stops(&board) > 200, "every 40 ms");
+    assert!(watched.link.is_stopping());
+    assert!(!watched.link.state().is_known());
+    board.mute(false);
+    let is_answered = || !watched.link.is_stopping();
+    assert!(wait_until(&bench.clock, LIMIT, is_answered));
+    drop(watched);
+
+    // What is said to it is lost: it goes on, and says so for as long as it speaks in frames.
+    let board = FakeBoard::on(&bench, Role::Display);
+    let watched = Watched::at(&bench, Role::Display, &board);
+    watched.turned(State::is_known);
+    board.miss(true);
+    pass(&bench, S);
+    stops(&board);
+    watched.link.stop(OPERATOR).expect("there is a line");
+    board.say(motion(7));
+    let goes_on =
+        |event: &Event| matches!(event, Event::Heard { message, .. } if *message == motion(7));
+    assert!(watched.tells(goes_on));
+    pass(&bench, 10 * S);
+    assert_eq!(stops(&board), 0);
+    assert!(watched.link.is_stopping());
+    board.miss(false);
+    assert!(hears_stop(&board));
+    let is_answered = || !watched.link.is_stopping();
+    assert!(wait_until(&bench.clock, LIMIT, is_answered));
 }
 
 #[test]

@@ -9,10 +9,12 @@ use std::time::Duration;
 
 use hil_sim_boards::bench::Command as Order;
 use protocol::Role;
+use serde_json::Value;
 use tests::bench::{ExclusiveBench, bench, until};
 use tests::bridge;
 use tests::browser::Browser;
-use tests::relay::free_port;
+use tests::fake_board::FakeBoard;
+use tests::relay::{Relay, free_port};
 
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(120);
@@ -31,9 +33,15 @@ impl Live {
 
     /// The same; none if one of its ports is taken.
     fn try_start(alone: &ExclusiveBench, port: &str) -> Option<Self> {
+        let file = alone.bench.bench_file();
+        let file = file.to_str().expect("UTF-8");
+        Self::of(&["--port", port, "--bench", file])
+    }
+
+    fn of(words: &[&str]) -> Option<Self> {
         let mut child = bridge::command()
-            .args(["live", "--port", port, "--bench"])
-            .arg(alone.bench.bench_file())
+            .arg("live")
+            .args(words)
             .spawn()
             .expect("the program can be started");
         let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
@@ -127,7 +135,7 @@ fn foxglove_gets_the_topics_and_the_bytes_of_a_recording() {
     while channels.is_empty() {
         let (is_text, bytes) = frame(&mut reader);
         if is_text {
-            let said: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+            let said: Value = serde_json::from_slice(&bytes).expect("JSON");
             if said["op"] == "serverInfo" {
                 // Nobody can publish, set or call anything.
                 assert_eq!(said["capabilities"], serde_json::json!([]), "{said}");
@@ -190,6 +198,60 @@ fn others_pages_are_not_answered() {
     until("outputs at 0 V", || {
         alone.bench.outputs().is_clear.then_some(())
     });
+    live.end();
+}
+
+#[test]
+fn the_page_says_who_moves_the_arm() {
+    let boards = [Role::Sensor, Role::Display].map(FakeBoard::new);
+    let name = format!("live-{}", std::process::id());
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let relay = |role, board: &FakeBoard, end| {
+        Relay::bridge(role, board.path(), &[end, &at, "--name", &name])
+    };
+    let sensor = relay(Role::Sensor, &boards[0], "--listen");
+    let display = relay(Role::Display, &boards[1], "--connect");
+    let words = [
+        "--port",
+        "0",
+        "--sensor",
+        "/dev/null/sensor",
+        "--display",
+        "/dev/null/display",
+    ];
+    let live = Live::of(&words).expect("it says where");
+    let mut stream = TcpStream::connect(&live.page).expect("it listens");
+    stream.set_read_timeout(Some(LIMIT)).expect("above 0");
+    write!(
+        stream,
+        "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
+        live.page
+    )
+    .expect("it reads");
+    let mut pictures = BufReader::new(stream).lines().filter_map(|line| {
+        let line = line.expect("it goes on");
+        let picture: Value = serde_json::from_str(line.strip_prefix("data: ")?).expect("JSON");
+        Some(picture)
+    });
+    let mut told = |wanted: &[&str]| {
+        let begin = format!("relay of bench {name}: ");
+        let is_told = pictures.by_ref().take(2_000).any(|picture| {
+            let hands = picture["hands"].as_array().expect("a list");
+            let hands = hands
+                .iter()
+                .filter_map(|hand| hand.as_str()?.strip_prefix(&begin));
+            hands.eq(wanted.iter().copied())
+        });
+        assert!(is_told, "{wanted:?}");
+    };
+    told(&[
+        "the hand here moves the arm at the sensor's site",
+        "the hand at the display's site moves the arm here",
+    ]);
+    drop(sensor);
+    told(&["nobody moves the arm by it: the sensor's site: silent"]);
+    drop(display);
+    told(&[]);
     live.end();
 }
 

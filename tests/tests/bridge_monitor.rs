@@ -468,7 +468,7 @@ fn the_form_changes_a_setting_and_shows_a_refusal() {
     terminal.type_keys("c");
     assert!(terminal.shows(LIMIT, "uniform"));
     // Down to max_age_ms.
-    terminal.type_keys("jj77\r");
+    terminal.type_keys("jjj77\r");
     assert!(
         terminal.shows(LIMIT, "max_age_ms is 77 ms now"),
         "{}",

@@ -13,8 +13,10 @@ use host_bridge::relay::operator::{self, Progress, Stopping};
 use protocol::{Message, Role, Stop, StopReason, Stopped, Trip};
 use tests::fake_board::{FakeBoard, wait_by};
 use tests::relay::{ESTIMATE_US, MOTION_US, listen, motion, sequences, talking_board_on};
+use tests::virtual_network::VirtualNetwork;
 use tests::virtual_ports::VirtualBench;
 use tests::virtual_relay::{VirtualPair, VirtualSite, name};
+use tests::weather::Sky;
 
 /// Far more of virtual time than anything here takes.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -43,6 +45,19 @@ impl Sites {
             pair,
         }
     }
+}
+
+/// A second bridge of the display's site, with a board of its own.
+fn rival(pair: &VirtualPair, board: &FakeBoard) -> VirtualSite {
+    let bridge = VirtualSite::new(
+        &pair.bench,
+        &pair.network,
+        Role::Display,
+        board.path(),
+        MAX_AGE,
+    );
+    pair.sensor.says("a second bridge is there", LIMIT);
+    bridge
 }
 
 fn at_least(count: usize) -> impl FnMut(&[Message]) -> bool {
@@ -233,14 +248,7 @@ fn a_second_bridge_watches_while_the_first_one_speaks_and_leaves_no_trace() {
     } = Sites::new(MAX_AGE);
     let mut motions = listen(&sensor, LIMIT, at_least(100));
     let other_board = talking_board_on(&pair.bench, Role::Display);
-    let rival = VirtualSite::new(
-        &pair.bench,
-        &pair.network,
-        Role::Display,
-        other_board.path(),
-        MAX_AGE,
-    );
-    pair.sensor.says("a second bridge is there", LIMIT);
+    let rival = rival(&pair, &other_board);
     rival.says("another bridge calls itself the display's site", LIMIT);
     pass(&pair.bench, Duration::from_secs(3));
     drop(rival);
@@ -264,14 +272,7 @@ fn the_bench_is_taken_by_who_waits_when_its_holder_is_silent() {
     } = Sites::new(MAX_AGE);
     listen(&sensor, LIMIT, at_least(100));
     let other_board = talking_board_on(&pair.bench, Role::Display);
-    let waiting = VirtualSite::new(
-        &pair.bench,
-        &pair.network,
-        Role::Display,
-        other_board.path(),
-        MAX_AGE,
-    );
-    pair.sensor.says("a second bridge is there", LIMIT);
+    let waiting = rival(&pair, &other_board);
     drop(display);
     sensor.take_heard();
     // The board is gone, and its bridge still there: the bench stays with it.
@@ -279,6 +280,157 @@ fn the_bench_is_taken_by_who_waits_when_its_holder_is_silent() {
     assert_eq!(sequences(&sensor.take_heard()), [] as [u32; 0]);
     drop(std::mem::replace(&mut pair.display, waiting));
     listen(&sensor, Duration::from_millis(500), at_least(100));
+}
+
+#[test]
+fn the_bench_is_handed_over_by_who_holds_it_and_by_nobody_else() {
+    let Sites {
+        sensor,
+        display: _display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(100));
+    pair.display.says("this bridge holds the bench", LIMIT);
+    // With nobody there who could have it, it stays.
+    pair.display.site.hand_over();
+    pair.display.says("nobody waits for the bench", LIMIT);
+
+    let other_board = FakeBoard::on(&pair.bench, Role::Display);
+    let waiting = rival(&pair, &other_board);
+    waiting.says("another bridge of this site holds the bench", LIMIT);
+    waiting.site.hand_over();
+    waiting.says("this bridge does not hold the bench", LIMIT);
+    let hands = || [&pair.display, &waiting].map(|bridge| bridge.site.report(true).hand);
+    assert_eq!(hands(), ["held", "watched"]);
+    sensor.take_heard();
+    // A number that the other board does not come to: whose motions come shows by it.
+    let far = 1_000_000;
+    other_board.say(motion(far, 0));
+    pass(&pair.bench, Duration::from_secs(1));
+    assert!(
+        sequences(&sensor.take_heard())
+            .iter()
+            .all(|&number| number < far)
+    );
+
+    pair.display.site.hand_over();
+    pair.sensor.says("the bench is handed over", LIMIT);
+    waiting.says("this bridge holds the bench", LIMIT);
+    pair.display
+        .says("another bridge of this site holds the bench", LIMIT);
+    assert_eq!(hands(), ["watched", "held"]);
+    sensor.take_heard();
+    other_board.say(motion(far + 1, 0));
+    pass(&pair.bench, Duration::from_secs(1));
+    assert_eq!(sequences(&sensor.take_heard()), [far + 1]);
+
+    // And back: who gave it waits for it.
+    waiting.site.hand_over();
+    let is_back = || hands() == ["held", "watched"];
+    assert!(wait_by(&sensor, LIMIT, is_back), "{:?}", hands());
+    listen(&sensor, LIMIT, at_least(100));
+}
+
+#[test]
+fn what_a_bridge_said_before_it_left_moves_nothing_whoever_says_it_again() {
+    let bench = VirtualBench::default();
+    let [sensor, display] =
+        [Role::Sensor, Role::Display].map(|role| talking_board_on(&bench, role));
+    let network = VirtualNetwork::new(&bench.clock);
+    // Long enough for what was said a moment ago.
+    let max_age = Duration::from_secs(60);
+    let site =
+        |role, board: &FakeBoard| VirtualSite::new(&bench, &network, role, board.path(), max_age);
+    let sensors = site(Role::Sensor, &sensor);
+    for leaves in [true, false] {
+        let displays = site(Role::Display, &display);
+        let before = listen(&sensor, LIMIT, at_least(100));
+        network.listen_in();
+        let heard = listen(&sensor, LIMIT, at_least(500));
+        let newest = sequences(&heard).last().copied();
+        assert!(sequences(&before).last() < sequences(&heard).first());
+        if !leaves {
+            // Nor where it just falls silent.
+            network.cut(true);
+        }
+        drop(displays);
+        pass(
+            &bench,
+            Duration::from_millis(if leaves { 5 } else { 1_500 }),
+        );
+        network.cut(false);
+        sensor.take_heard();
+        network.replay();
+        pass(&bench, Duration::from_secs(1));
+        let again = sequences(&sensor.take_heard());
+        assert!(
+            again.iter().all(|&number| Some(number) > newest),
+            "after {newest:?}: {again:?}"
+        );
+    }
+    drop(sensors);
+    network.end();
+}
+
+/// The longest time in which a board heard no motion or estimate, over `time`.
+fn longest_gap(bench: &VirtualBench, board: &FakeBoard, time: Duration) -> Duration {
+    const STEP: Duration = Duration::from_millis(5);
+    let (mut gap, mut longest) = (Duration::ZERO, Duration::ZERO);
+    for _ in 0..time.as_millis() / STEP.as_millis() {
+        pass(bench, STEP);
+        gap += STEP;
+        longest = longest.max(gap);
+        if !sequences(&board.take_heard()).is_empty() {
+            gap = Duration::ZERO;
+        }
+    }
+    longest
+}
+
+#[test]
+fn a_network_that_loses_makes_no_gap_in_what_goes_by_datagrams() {
+    let sky = Sky {
+        delay: Duration::from_millis(500),
+        jitter: Duration::from_millis(50),
+        loss: 0.05,
+    };
+    let goal = Duration::from_millis(600);
+    for has_datagrams in [false, true] {
+        let Sites {
+            sensor,
+            display,
+            pair,
+        } = Sites::new(Duration::from_secs(2));
+        pair.network.use_datagrams(has_datagrams);
+        listen(&sensor, LIMIT, at_least(100));
+        pair.network.turn(sky);
+        pass(&pair.bench, Duration::from_secs(10));
+        for board in [&sensor, &display] {
+            board.take_heard();
+            let gap = longest_gap(&pair.bench, board, Duration::from_secs(60));
+            // By a stream, everything waits for what is lost.
+            assert_eq!(gap <= goal, has_datagrams, "{gap:?}");
+        }
+        // What has to come does come.
+        pair.sensor.site.stop(STOP);
+        listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
+    }
+}
+
+#[test]
+fn a_relay_on_loopback_adds_no_millisecond() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(5_000));
+    listen(&display, LIMIT, at_least(1_000));
+    // On a network that takes nothing: all that the relay itself makes a message wait, from line to line.
+    for site in [&pair.sensor, &pair.display] {
+        let age = site.site.report(true).age.expect("messages have passed");
+        assert!(age.p99_us <= 1_000, "{age:?}");
+    }
 }
 
 #[test]

@@ -13,7 +13,8 @@ use serde_json::Value;
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::relay::{Relay, free_port, listen, sequences, talking_board};
 use tests::utterance::Speaker;
-use tests::weather::Weather;
+use tests::weather::datagrams::DatagramWeather;
+use tests::weather::{Sky, Weather};
 
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(120);
@@ -129,6 +130,38 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
         "{report}"
     );
     assert!(report["age"]["p99_us"].is_u64(), "{report}");
+}
+
+#[test]
+fn what_goes_by_datagrams_goes_on_while_the_stream_stands_still_and_what_is_lost_is_not_sent_again()
+{
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let port = free_port();
+    let stream = Weather::over(port);
+    let datagrams = DatagramWeather::over(stream.port(), port);
+    datagrams.turn(Sky {
+        loss: 0.1,
+        ..Sky::default()
+    });
+    let [listening, connecting] = [port, stream.port()].map(|port| format!("udp/127.0.0.1:{port}"));
+    let listener = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &listening]);
+    let bridge = Relay::bridge(Role::Display, display.path(), &["--connect", &connecting]);
+    // At first both carry everything; then only datagrams do, as soon as each end hears them.
+    let lost = || {
+        let lines = listener.lines();
+        let report: Value = serde_json::from_str(lines.last()?).ok()?;
+        report["incoming"]["lost"].as_u64()
+    };
+    assert!(wait_until(LIMIT, || lost() > Some(200)), "{:?}", lost());
+    stream.hold_still(true);
+    sensor.take_heard();
+    display.take_heard();
+    assert_rising(&listen(&sensor, LIMIT, at_least(1_000)));
+    assert_rising(&listen(&display, LIMIT, at_least(200)));
+    stream.hold_still(false);
+    // What has to come goes by the stream, and is said again until it comes.
+    bridge.signal(Signal::USR1);
+    listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
 }
 
 #[test]

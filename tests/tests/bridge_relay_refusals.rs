@@ -121,10 +121,8 @@ fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
     let (ours, theirs) = (Authority::new("ours"), Authority::new("theirs"));
     let sensor = talking_board(Role::Sensor);
     let port = free_port();
-    let (tls, tcp) = (
-        format!("tls/localhost:{port}"),
-        format!("tcp/localhost:{port}"),
-    );
+    let [tls, tcp, udp] =
+        ["tls", "tcp", "udp"].map(|carrier| format!("{carrier}/localhost:{port}"));
     let good = ours.proofs("sensor", Kind::Good, &ours);
     let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &good);
     listening.says("listening", LIMIT);
@@ -136,6 +134,7 @@ fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
         (&tls, stranger, "our certificate is rejected there"),
         (&tls, distrustful, "not made by the CA given with --ca"),
         (&tcp, Vec::new(), "nobody there speaks to us"),
+        (&udp, Vec::new(), "nobody there speaks to us"),
     ] {
         let board = talking_board(Role::Display);
         let bridge = start(Role::Display, &board, ["--connect", at], &proofs);
@@ -226,6 +225,23 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
         "{}",
         listening.words()
     );
+    // Each of them is named, and what it wanted, once; who belongs to no bench here by the engine's name for it.
+    for words in [
+        "REFUSED: bench.sensor may not speak on ridgelink/bench/display/clock",
+        "REFUSED: bench.operator may not speak on ridgelink/bench/display/stop",
+        "may not speak on any key",
+    ] {
+        assert!(
+            wait_until(LIMIT, || {
+                forge();
+                listening.words().contains(words)
+            }),
+            "{words}: {}",
+            listening.words()
+        );
+    }
+    let refusals = listening.words().matches("REFUSED: ").count();
+    assert_eq!(refusals, 5, "{}", listening.words());
     // Only what the real one has said has come.
     let said = listening.words().matches("the display's site: ").count();
     assert_eq!(said, 1, "{}", listening.words());
@@ -234,15 +250,19 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
 #[test]
 fn listening_beyond_this_computer_without_tls_is_to_be_asked_for() {
     let sensor = talking_board(Role::Sensor);
-    let at = format!("tcp/0.0.0.0:{}", free_port());
     let path = sensor.path().to_string_lossy();
-    assert_refused(
-        &["sensor", "--sensor", &path, "--listen", &at],
-        &[
-            "would let anybody who reaches it move the arm",
-            "--insecure",
-        ],
-    );
+    let port = free_port();
+    let [at, datagrams] = ["tcp", "udp"].map(|carrier| format!("{carrier}/0.0.0.0:{port}"));
+    for at in [&at, &datagrams] {
+        assert_refused(
+            &["sensor", "--sensor", &path, "--listen", at],
+            &[
+                "would let anybody who reaches it move the arm",
+                "tls/0.0.0.0",
+                "--insecure",
+            ],
+        );
+    }
     let bridge = Relay::bridge(
         Role::Sensor,
         sensor.path(),
@@ -392,7 +412,7 @@ fn assert_refused(arguments: &[&str], words: &[&str]) {
 fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
     assert_refused(&["sensor"], &["--listen", "--connect"]);
     assert_refused(&["sensor", "--listen", "7447"], &["tcp/HOST:PORT"]);
-    assert_refused(&["display", "--connect", "udp/x:1"], &["tcp/HOST:PORT"]);
+    assert_refused(&["display", "--connect", "ws/x:1"], &["tcp/HOST:PORT"]);
     assert_refused(&["sensor", "--listen", "tcp/x:y"], &["no port"]);
     assert_refused(
         &["sensor", "--listen", "tcp/x:1", "--name", "a/b"],
@@ -461,7 +481,9 @@ fn credentials_that_cannot_be_used_are_named() {
     let servers = ours.proofs("servers", Kind::ForServersOnly, &ours);
     refused(&servers, &["servers.pem", "clientAuth"]);
 
-    let mut arguments = vec!["router", "--listen", "tcp/localhost:7447"];
-    arguments.extend(good.iter().map(String::as_str));
-    assert_refused(&arguments, &["let anybody in", "tls/localhost:7447"]);
+    for open in ["tcp/localhost:7447", "udp/localhost:7447"] {
+        let mut arguments = vec!["router", "--listen", open];
+        arguments.extend(good.iter().map(String::as_str));
+        assert_refused(&arguments, &["let anybody in", "tls/localhost:7447"]);
+    }
 }

@@ -6,26 +6,20 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
-use hil_sim_core::run::recording::ScanRecord;
 use hil_sim_core::scene::Scene;
 use host_bridge::clock::Clock;
-use host_bridge::host_clock::now_us;
-use host_bridge::link::{Event, Link};
+use host_bridge::link::Link;
 use host_bridge::place::Place;
 use host_bridge::recording::reader::Reader;
-use host_bridge::recording::{Recorder, Settings};
 use host_bridge::replay::scene::{self, Made};
 use host_bridge::replay::stand_in::StandIn;
 use host_bridge::replay::{Pace, play};
-use protocol::{
-    Configuration, ConfigurationReport, Estimate, Message, Motion, Role, SensorConfiguration,
-    StreamGauges,
-};
+use protocol::{Estimate, Message, Motion, Role};
 use tests::bridge::{self, Running};
 use tests::fake_board::{FakeBoard, wait_until};
+use tests::recorded::{record, said_of};
 use tests::run::scene as scene_of;
 use tests::utterance::Speaker;
 use tests::virtual_clock;
@@ -42,21 +36,6 @@ fn folder(test: &str) -> PathBuf {
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a folder can be made");
     folder
-}
-
-/// Records what was heard, each at its time in µs after the first.
-fn record(path: &Path, said: impl IntoIterator<Item = (u64, Role, Message)>) {
-    let recorder = Recorder::start(Settings {
-        mcap: Some(path.to_owned()),
-        ..Settings::default()
-    })
-    .expect("a file can be made");
-    let start_us = now_us();
-    for (after_us, role, message) in said {
-        let at_us = start_us + after_us;
-        recorder.on_event(role, &Event::Heard { at_us, message });
-    }
-    recorder.stop().expect("a whole file");
 }
 
 fn motion(at: u32) -> Motion {
@@ -259,31 +238,6 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
         assert_eq!(ended.status.code(), Some(2), "{words:?}: {}", ended.stderr);
         assert!(ended.stderr.contains(want), "{words:?}: {}", ended.stderr);
     }
-}
-
-/// What a sensor board says that reads these scans, its gauges streamed, and how it is set.
-fn said_of(scans: &[ScanRecord], configuration: SensorConfiguration) -> Vec<(u64, Role, Message)> {
-    let report = ConfigurationReport::of(Configuration::Sensor(configuration), None);
-    let mut said = vec![(0, Role::Sensor, Message::Configuration(report))];
-    let mut sensor = Sensor::new(configuration);
-    let (samples, _) = scans.as_chunks::<SCANS_PER_SAMPLE>();
-    for scans in samples {
-        sensor.stream_gauges(&StreamGauges { for_ms: 1_000 });
-        let last = &scans[SCANS_PER_SAMPLE - 1];
-        let at_us = last.at_ns / 1_000;
-        let output = sensor.step(at_us, &scans.map(|scan| scan.codes), last.encoder);
-        let estimate = output.estimate.map(Message::Estimate);
-        // A board dates the samples of its first 4 ms by its start, and does not stream so soon.
-        let gauges = output.gauges.filter(|gauges| gauges.instant_us > 0);
-        let gauges = gauges.map(Message::Gauges);
-        said.extend(
-            estimate
-                .into_iter()
-                .chain(gauges)
-                .map(|message| (at_us, Role::Sensor, message)),
-        );
-    }
-    said
 }
 
 /// A scene that was recorded and made a scene of again.

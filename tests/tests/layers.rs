@@ -10,6 +10,7 @@ const LAYERS: [(&str, &[&str]); 2] = [
         "hil-sim/core",
         &[
             "scene",
+            "hjif",
             "plant",
             "link",
             "run",

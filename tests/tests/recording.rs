@@ -229,7 +229,7 @@ fn the_reference_library_reads_it_with_a_schema_for_each_channel() {
     let summary = Summary::read(&bytes)
         .expect("well-formed")
         .expect("there is one");
-    assert_eq!(summary.channels.len(), 18);
+    assert_eq!(summary.channels.len(), 19);
     for schema in summary.schemas.values() {
         let text = str::from_utf8(&schema.data).expect("UTF-8");
         let definition = Definition::parse(&schema.name, text)

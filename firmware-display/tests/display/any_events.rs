@@ -4,11 +4,12 @@ use firmware_display::pace::{per_tick, quarters};
 use firmware_display::{Display, Readback, Senses, Transfer, ZERO_VOLT};
 use proptest::prelude::*;
 use protocol::{
-    Contact, DisplayConfiguration, DisplayState, Estimate, GAUGES, GaugeHealth, Hold, Mode, Range,
-    StopReason, Trip, UpdateRate,
+    Actuator, Contact, DEFAULT_ACTUATORS, DisplayConfiguration, DisplayState, Estimate, Friction,
+    GAUGES, GaugeHealth, Hold, Mode, Partial, Range, Rendering, StopReason, Texture, Trip,
+    UpdateRate,
 };
 
-use crate::rig::{SILENCE, configured};
+use crate::rig::{SILENCE, settings};
 
 const LIVES: u32 = 1_000;
 const EVENTS: std::ops::Range<usize> = 20..200;
@@ -27,10 +28,60 @@ enum Event {
     /// The hand's encoder is somewhere else.
     Jump(u16),
     Estimate(Estimate),
-    Configure(DisplayConfiguration),
+    Texture(Texture),
+    Configure(DisplayConfiguration, Models),
     Stop(StopReason),
     Senses(Senses),
     Started,
+}
+
+/// Resonance and damping of the actuators with even and with odd numbers.
+type Models = [(u16, u16); 2];
+
+fn models() -> impl Strategy<Value = Models> {
+    let model = || {
+        prop_oneof![
+            2 => Just((0, 100)),
+            1 => (200..=20_000_u16, 20..=1_000_u16),
+        ]
+    };
+    [model(), model()]
+}
+
+fn modelled(models: &Models) -> [Actuator; 50] {
+    let mut actuators = DEFAULT_ACTUATORS;
+    for (index, actuator) in actuators.iter_mut().enumerate() {
+        (actuator.resonance_dhz, actuator.damping_percent) = models[index % 2];
+    }
+    actuators
+}
+
+/// Numbers in their range, or any.
+fn thousandths() -> impl Strategy<Value = u16> {
+    prop_oneof![10 => 0..=1_500_u16, 5 => 0..=10_000_u16, 1 => any::<u16>()]
+}
+
+prop_compose! {
+    fn texture()(
+        sequence in prop_oneof![0..400_u32, any::<u32>()],
+        instant_us in any::<u64>(),
+        valid in prop::bool::weighted(0.8),
+        ratios in [thousandths(), thousandths()],
+        phases in any::<[u16; 2]>(),
+        repeating_percent in prop_oneof![9 => 0..=100_u8, 1 => any::<u8>()],
+        bands in [thousandths(), thousandths(), thousandths(), thousandths()],
+        friction in any::<Option<(u16, u16)>>(),
+    ) -> Texture {
+        Texture {
+            sequence,
+            instant_us,
+            valid,
+            partials: std::array::from_fn(|n| Partial { ratio: ratios[n], phase: phases[n] }),
+            repeating_percent,
+            bands,
+            friction: friction.map(|(mean_mn, fluctuation_mn)| Friction { mean_mn, fluctuation_mn }),
+        }
+    }
 }
 
 fn wavelength() -> impl Strategy<Value = Option<f32>> {
@@ -76,6 +127,9 @@ prop_compose! {
 prop_compose! {
     fn configuration()(
         travelling in any::<bool>(),
+        rendering in prop::sample::select(vec![
+            Rendering::Fundamental, Rendering::Shape, Rendering::Texture,
+        ]),
         fast in any::<bool>(),
         max_age_ms in 20..=5_000_u16,
         fade_in_ms in 1..=1_000_u16,
@@ -83,10 +137,12 @@ prop_compose! {
         glide_ms in 0..=500_u16,
         amplitude_mv in 0..=5_000_u16,
         reference_lsb in 0..=2_000_u16,
+        reference_mn in prop_oneof![Just(0), 0..=60_000_u16],
         full_drive_s in 10..=3_600_u16,
     ) -> DisplayConfiguration {
         DisplayConfiguration {
             mode: if travelling { Mode::Travelling } else { Mode::Uniform },
+            rendering,
             update_rate: if fast { UpdateRate::Hz4000 } else { UpdateRate::Hz2000 },
             max_age_ms,
             fade_in_ms,
@@ -94,6 +150,7 @@ prop_compose! {
             glide_ms,
             amplitude_mv,
             reference_lsb,
+            reference_mn,
             full_drive_s,
             ..DisplayConfiguration::DEFAULT
         }
@@ -125,7 +182,10 @@ fn event() -> impl Strategy<Value = Event> {
         400 => (-100..=100_i16, 1..60_u8).prop_map(|(counts, times)| Event::Ticks { counts, times }),
         100 => (-8..=8_i16, 1..60_u8).prop_map(|(counts, times)| Event::Ticks { counts, times }),
         300 => estimate().prop_map(Event::Estimate),
-        50 => configuration().prop_map(Event::Configure),
+        100 => texture().prop_map(Event::Texture),
+        50 => (configuration(), models()).prop_map(|(configuration, models)| {
+            Event::Configure(configuration, models)
+        }),
         50 => senses().prop_map(Event::Senses),
         20 => Just(Event::Started),
         2 => any::<u16>().prop_map(Event::Jump),
@@ -155,9 +215,9 @@ struct Watched {
 }
 
 impl Watched {
-    fn new(start: &DisplayConfiguration) -> Self {
+    fn new(start: &DisplayConfiguration, models: &Models) -> Self {
         Self {
-            display: Display::new(&configured(start), None),
+            display: Display::new(&settings(start, &modelled(models)), None),
             encoder: 0,
             stop_asked: false,
             before_mv: start.amplitude_mv,
@@ -174,12 +234,13 @@ impl Watched {
     fn undergo(&mut self, event: &Event) -> Result<(), TestCaseError> {
         match event {
             Event::Estimate(estimate) => self.display.on_estimate(estimate),
+            Event::Texture(texture) => self.display.on_texture(texture),
             Event::Started => self.display.started(Ok(())),
             Event::Stop(reason) => {
                 self.display.stop(*reason);
                 self.stop_asked = true;
             }
-            Event::Configure(configuration) => {
+            Event::Configure(configuration, models) => {
                 // Until a change is through, the largest of those under way counts.
                 let now_mv = self.display.configuration().amplitude_mv;
                 let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
@@ -189,7 +250,8 @@ impl Watched {
                     now_mv
                 };
                 self.since_change = 0;
-                self.display.configure(&configured(configuration));
+                self.display
+                    .configure(&settings(configuration, &modelled(models)));
             }
             Event::Jump(counter) => {
                 self.encoder = *counter;
@@ -267,9 +329,10 @@ proptest! {
     #[test]
     fn no_promise_is_broken(
         start in configuration(),
+        models in models(),
         events in prop::collection::vec(event(), EVENTS),
     ) {
-        let mut watched = Watched::new(&start);
+        let mut watched = Watched::new(&start, &models);
         watched.undergo(&Event::Started)?;
         for event in &events {
             watched.undergo(event)?;
@@ -281,9 +344,10 @@ proptest! {
     #[test]
     fn the_same_calls_give_the_same_words(
         start in configuration(),
+        models in models(),
         events in prop::collection::vec(event(), EVENTS),
     ) {
-        let mut watched = [Watched::new(&start), Watched::new(&start)];
+        let mut watched = [Watched::new(&start, &models), Watched::new(&start, &models)];
         for event in &events {
             for watched in &mut watched {
                 watched.undergo(event)?;

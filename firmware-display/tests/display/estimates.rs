@@ -82,6 +82,20 @@ fn an_estimate_that_contradicts_itself_is_implausible_valid_or_not() {
         contradict(&mut estimate);
         assert_eq!(after(5, estimate), Verdict::Implausible, "{index}");
     }
+    // Just possible.
+    let possible: [fn(&mut Estimate); 6] = [
+        |e| e.confidence = 0.0,
+        |e| e.confidence = 1.0,
+        |e| e.amplitude_lsb = 2_608.0,
+        |e| e.velocity_um_s = 20_000_000,
+        |e| e.velocity_um_s = -20_000_000,
+        |e| e.gauges_used = 0b1_1111,
+    ];
+    for (index, change) in possible.iter().enumerate() {
+        let mut estimate = sound(6, 2.0);
+        change(&mut estimate);
+        assert_eq!(after(5, estimate), trusted(2.0), "{index}");
+    }
     // Without a gauge that may take part there is an estimate nevertheless, which nobody stands by.
     let blind = Estimate {
         valid: false,
@@ -98,6 +112,9 @@ fn an_estimate_that_is_not_later_than_the_last_is_late() {
         (500, 499),
         (5_000, 4_000),
         (8, 3),
+        // A restart begins further behind than a network reorders.
+        (42, 10),
+        (1_043, 43),
         (u32::MAX, u32::MAX - 9),
     ] {
         let verdict = after(last, sound(next, 2.0));
@@ -123,6 +140,8 @@ fn a_sensor_that_restarts_is_followed_at_once_on_whatever_surface() {
         (5_000, 3_999),
         (50, 0),
         (50, 10),
+        (43, 10),
+        (1_044, 43),
         (1_000_000, 17),
     ] {
         let verdict = after(last, sound(next, 9.0));

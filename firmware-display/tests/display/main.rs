@@ -3,9 +3,11 @@
 
 mod any_events;
 mod estimates;
+mod finger;
 mod link;
 mod rig;
 mod stimulus;
 mod strokes;
 mod supervisor;
+mod textures;
 mod zero_volt;

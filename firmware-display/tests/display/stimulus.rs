@@ -3,7 +3,9 @@
 mod amplitude;
 mod following;
 mod purity;
+mod rendering;
 mod rest;
 mod rig;
+mod skin;
 mod standing;
 mod steps;

@@ -2,6 +2,8 @@
 
 use protocol::GAUGES;
 
+use crate::root::sqrt;
+
 /// A complex amplitude in ADC steps.
 pub(super) type Amplitude = [f32; 2];
 /// One for each gauge.
@@ -39,7 +41,7 @@ pub(super) fn is_common(amplitudes: &Amplitudes, usable: u8) -> bool {
     let mut magnitudes = 0.0;
     for (gauge, z) in amplitudes.iter().enumerate() {
         if usable >> gauge & 1 == 1 {
-            magnitudes += libm::sqrtf(square(*z));
+            magnitudes += sqrt(square(*z));
         }
     }
     together >= ALIGNED * magnitudes * magnitudes
@@ -47,7 +49,7 @@ pub(super) fn is_common(amplitudes: &Amplitudes, usable: u8) -> bool {
 
 /// A phase: z / |z|.
 pub(super) fn unit(z: Amplitude) -> Amplitude {
-    let magnitude = libm::sqrtf(square(z)).max(f32::MIN_POSITIVE);
+    let magnitude = sqrt(square(z)).max(f32::MIN_POSITIVE);
     z.map(|part| part / magnitude)
 }
 

@@ -20,6 +20,7 @@ use super::common::{Amplitudes, conjugate_product, is_common, power, square, sum
 use super::own::Own;
 use super::steady::Steady;
 use crate::phasor::phasor;
+use crate::root::sqrt;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
 /// Samples that a difference is taken over, half a cycle of 50 Hz: offset, drift and the even harmonics of
@@ -233,7 +234,7 @@ impl Follower {
         let slow = self.steady.slow();
         let open = self.steady.is_open() || self.newly > 0;
         let lsb = if open && is_common(slow, usable) {
-            libm::sqrtf(square(sum(slow, usable))) / usable.count_ones() as f32
+            sqrt(square(sum(slow, usable))) / usable.count_ones() as f32
         } else {
             0.0
         };

@@ -14,6 +14,7 @@ use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
 use crate::phasor::phasor;
+use crate::root::sqrt;
 use crate::travel::{PLACES_PER_MM, Place};
 
 /// The lengths that a pass is solved at, in waves.
@@ -297,8 +298,7 @@ impl Sums {
         let rest = (rest - along * along / curvature).max(1e-9 * fitted.total);
         let free = self.knots * count;
         let unknowns = LINEAR as u16 * count + 2;
-        fitted.sigma =
-            libm::sqrtf(rest / curvature / f32::from(free.saturating_sub(unknowns).max(1)));
+        fitted.sigma = sqrt(rest / curvature / f32::from(free.saturating_sub(unknowns).max(1)));
         fitted.wavelength_mm = wavelength_mm / (1.0 + step);
         Some(fitted)
     }

@@ -5,6 +5,7 @@ use protocol::GAUGES;
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::Touch;
 use crate::phasor::phasor;
+use crate::root::sqrt;
 use crate::travel::PLACES_PER_UM;
 
 /// Gain in power of the first and of the second difference for white noise behind the anti-aliasing filter.
@@ -137,7 +138,7 @@ impl Jerk {
         let first = self.first - FIRST_DIFFERENCE_NOISE_GAIN * noise;
         // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
         let sine = if second < 4.0 * first {
-            0.5 * libm::sqrtf(second / first)
+            0.5 * sqrt(second / first)
         } else {
             1.0
         };

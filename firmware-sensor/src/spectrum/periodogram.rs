@@ -9,6 +9,7 @@ use protocol::GAUGES;
 use super::knots::{Completed, Knot, SPACINGS, spacing_for};
 use crate::estimator::MIN_AMPLITUDE_LSB;
 use crate::phasor::phasor;
+use crate::root::sqrt;
 use crate::travel::PLACES_PER_MM;
 
 /// Candidates: six an octave, so that a ratio of 2 lies on the grid, and one beyond either end.
@@ -235,7 +236,7 @@ pub(super) fn vertex_mm(spectrum: &Spectrum, number: usize, both_poles: bool) ->
     let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
         let power = spectrum[i].max(least).max(f32::MIN_POSITIVE);
         if both_poles {
-            1.0 / libm::sqrtf(power)
+            1.0 / sqrt(power)
         } else {
             1.0 / power
         }

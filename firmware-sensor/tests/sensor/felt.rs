@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use firmware_sensor::{
     MICROMETRES_PER_COUNT, MID_RAIL_CODE, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan, Sensor,
 };
-use protocol::{Estimate, GAUGES, SensorConfiguration};
+use protocol::{Estimate, GAUGES, SensorConfiguration, Texture};
 
 /// Gains and phases of the gauges and their places along the scan, those of the project's study.
 pub const GAINS: [f64; GAUGES] = [1.0, 0.8, 1.1, 0.6, 0.9];
@@ -22,6 +22,10 @@ pub struct Bench {
     pub x_mm: f64,
     /// Deviation of a scan's white noise in ADC steps.
     pub noise_lsb: f64,
+    /// All textures so far.
+    pub textures: Vec<Texture>,
+    /// The tangential force in mN, of x in mm and whether the arm goes on.
+    pub force_mn: Option<Box<dyn Fn(f64, bool) -> f64>>,
     random: u64,
 }
 
@@ -33,6 +37,8 @@ impl Bench {
             scans: 0,
             x_mm: 0.0,
             noise_lsb: NOISE_20_DB,
+            textures: vec![],
+            force_mn: None,
             random: 1,
         }
     }
@@ -54,7 +60,8 @@ impl Bench {
         for _ in 0..ms {
             let scans = std::array::from_fn(|_| {
                 let t_s = self.t_s();
-                self.x_mm += velocity_mm_s(t_s - began_s) / f64::from(SCAN_RATE_HZ);
+                let speed_mm_s = velocity_mm_s(t_s - began_s);
+                self.x_mm += speed_mm_s / f64::from(SCAN_RATE_HZ);
                 self.scans += 1;
                 let mut scan: Scan = [MID_RAIL_CODE; 6];
                 for (gauge, code) in scan.iter_mut().enumerate().take(GAUGES) {
@@ -63,11 +70,19 @@ impl Bench {
                         .round()
                         .clamp(0.0, 4_095.0) as u16;
                 }
+                if let Some(force_mn) = &self.force_mn {
+                    let volts = force_mn(self.x_mm, speed_mm_s > 0.0)
+                        / f64::from(self.sensor.configuration().force_mn_per_v);
+                    let code = f64::from(MID_RAIL_CODE) + volts / 3.3 * 4_096.0;
+                    scan[GAUGES] = code.round().clamp(0.0, 4_095.0) as u16;
+                }
                 scan
             });
             let counts = (1_000.0 * self.x_mm / f64::from(MICROMETRES_PER_COUNT)).floor() as i64;
             let instant_us = self.scans / SCANS_PER_SAMPLE as u64 * 1_000;
-            estimates.extend(self.sensor.step(instant_us, &scans, counts as u16).estimate);
+            let output = self.sensor.step(instant_us, &scans, counts as u16);
+            estimates.extend(output.estimate);
+            self.textures.extend(output.texture);
         }
         estimates
     }

@@ -8,3 +8,4 @@ mod garbage;
 mod methods;
 mod paper;
 mod rubbing;
+mod texture;

@@ -195,6 +195,12 @@ pub enum ServeError {
          [link] and the link's faults to the bridges, or the boards joined"
     )]
     Impairments,
+    /// The wire is not there.
+    #[error("{mistake}: there is no wire between the boards of a bench that is --apart")]
+    NoWire {
+        /// The mistake.
+        mistake: &'static str,
+    },
     /// The scene has a host do wrong.
     #[error(
         "the scene's fault \"{kind}\" needs the console, which is yours on a bench: take it out"
@@ -391,6 +397,17 @@ impl Bench {
             Command::Hand { speed_mm_s } => self.hand.go(speed_mm_s),
             Command::Reset(role) => self.shared.order(role, command),
             Command::Stop | Command::Release => self.shared.order(Role::Display, command),
+            Command::Wrong(mistake) | Command::Right(mistake) => {
+                if self.shared.is_apart && mistake.is_of_link() {
+                    let mistake = mistake.name();
+                    return Err(ServeError::NoWire { mistake });
+                }
+                for role in [Role::Sensor, Role::Display] {
+                    if mistake.is_at(role) {
+                        self.shared.order(role, command);
+                    }
+                }
+            }
             Command::Quit => self.shared.stops.store(true, Ordering::Relaxed),
         }
         Ok(())

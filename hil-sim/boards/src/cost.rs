@@ -1,9 +1,11 @@
-//! Counts the instructions between marks that a firmware leaves: no model of time, no cycles.
+//! Counts the instructions between marks that a firmware leaves, and estimates their cycles if it is asked to.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
+use rigless::emulator::{
+    self, Access, AccessKind, Driver, Hit, HitKind, Host, Settled, Start, Stop, Watch,
+};
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::soc::stm32f427::Stm32f427;
@@ -11,6 +13,8 @@ use rigless::time::VirtualNanos;
 
 use super::nucleo::{Nucleo, Pins};
 use super::{ElfError, FirmwareError};
+use crate::cycles::{CycleMeter, Estimate};
+use crate::instructions::instructions;
 
 /// Where a firmware writes its marks: the data register of the CRC unit, which nothing else uses.
 const MARKS: u64 = 0x4002_3000;
@@ -23,7 +27,7 @@ const LIMIT: VirtualNanos = VirtualNanos(60_000_000_000);
 
 /// Nothing on the pins.
 #[derive(Debug)]
-struct Bare;
+pub(super) struct Bare;
 
 impl Pins for Bare {
     fn on_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) -> u16 {
@@ -40,22 +44,44 @@ pub struct Taken {
     pub largest: u64,
     /// How many pieces.
     pub pieces: u64,
+    /// Processor cycles of all pieces, estimated; 0 if nobody asked for them.
+    pub cycles: u64,
+    /// Those of the piece with the most.
+    pub largest_cycles: u64,
 }
 
 #[derive(Default)]
 struct Marks {
-    begun: BTreeMap<u64, u64>,
+    /// Instructions and cycles at the beginning of each part's last piece.
+    begun: BTreeMap<u64, (u64, u64)>,
     taken: BTreeMap<u64, Taken>,
     done: bool,
+    /// Where each instruction begins, until they are watched.
+    code: Vec<u64>,
+    /// The parts whose cycles are wanted begin with this one.
+    metered_from: u64,
+    meter: Option<CycleMeter>,
 }
 
 impl Driver<Nucleo<Bare>> for Marks {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<Bare>>,
-        _host: &mut dyn Host,
+        host: &mut dyn Host,
         settled: Settled,
     ) {
+        if let (
+            Some(meter),
+            Settled::Hit(Hit {
+                kind: HitKind::Instruction,
+                address,
+                ..
+            }),
+        ) = (&mut self.meter, settled)
+        {
+            meter.retire(address);
+            return;
+        }
         let Settled::Access {
             access:
                 Access {
@@ -71,20 +97,29 @@ impl Driver<Nucleo<Bare>> for Marks {
         else {
             return;
         };
+        let cycles = self.meter.as_ref().map_or(0, CycleMeter::cycles);
+        if (self.metered_from..END).contains(&value) {
+            for address in std::mem::take(&mut self.code) {
+                host.watch(Watch::Instruction(address));
+            }
+        }
         if value == DONE {
             self.done = true;
             session.pause_at(Some(virtual_time));
-        } else if let Some(begun) = value
+        } else if let Some((begun, cycles_before)) = value
             .checked_sub(END)
             .and_then(|part| self.begun.get(&part))
         {
             let piece = instruction_count - begun;
+            let piece_cycles = cycles - cycles_before;
             let taken = self.taken.entry(value - END).or_default();
             taken.total += piece;
             taken.largest = taken.largest.max(piece);
             taken.pieces += 1;
+            taken.cycles += piece_cycles;
+            taken.largest_cycles = taken.largest_cycles.max(piece_cycles);
         } else {
-            self.begun.insert(value, instruction_count);
+            self.begun.insert(value, (instruction_count, cycles));
         }
     }
 
@@ -118,6 +153,14 @@ pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
     measure_example(path, "firmware-sensor --example filter_cost")
 }
 
+/// The same, with the cycles of the parts from `from` on, instruction by instruction: slow.
+///
+/// # Errors
+/// As [`count`].
+pub fn meter(path: &Path, from: u64) -> Result<BTreeMap<u64, Taken>, ElfError> {
+    run(path, "firmware-sensor --example filter_cost", Some(from))
+}
+
 /// The same of any ELF that leaves marks. `package` is what it is built with, behind `cargo build -p`.
 ///
 /// # Errors
@@ -125,6 +168,14 @@ pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
 pub fn measure_example(
     path: &Path,
     package: &'static str,
+) -> Result<BTreeMap<u64, Taken>, ElfError> {
+    run(path, package, None)
+}
+
+fn run(
+    path: &Path,
+    package: &'static str,
+    metered_from: Option<u64>,
 ) -> Result<BTreeMap<u64, Taken>, ElfError> {
     let board = |reason: String| ElfError::Board {
         board: "bare",
@@ -137,11 +188,19 @@ pub fn measure_example(
             source,
         })
     })?;
+    let mut marks = Marks::default();
+    if let Some(from) = metered_from {
+        let code = instructions(&elf)
+            .ok_or_else(|| board("its code can't be read: it has no mapping symbols".to_owned()))?;
+        marks.meter = Some(CycleMeter::new(&code, Estimate::Most));
+        marks.metered_from = from;
+        marks.code = code.into_iter().map(|(address, _)| address).collect();
+    }
     let image = Image::new(path, elf, None).map_err(|error| board(error.to_string()))?;
     let nucleo = Nucleo::new(Bare, |_| {}).map_err(|error| board(error.to_string()))?;
     let session =
         Session::new(Box::new(nucleo), 0, LIMIT).map_err(|error| board(error.to_string()))?;
-    let finished = emulator::run(session, &Start::new(&[image]), Marks::default())
+    let finished = emulator::run(session, &Start::new(&[image]), marks)
         .map_err(|error| board(error.to_string()))?;
     if finished.driver.done {
         Ok(finished.driver.taken)

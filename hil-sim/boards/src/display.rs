@@ -16,6 +16,7 @@ use rigless::time::VirtualNanos;
 
 use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
 use crate::dac81416::{Dac81416, Defects};
+use crate::wiring::{CHIP, EncoderWires, Mistake};
 use hil_sim_core::plant::fault::hand::HandFault;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::plant::world::World;
@@ -40,6 +41,8 @@ const TIM3_INDEX: usize = 1;
 const TIM3_SIZE: u64 = 0x400;
 const CCR1: u64 = 0x34;
 const EIGHT_BITS: u8 = 8;
+/// What an open line is pulled to.
+const ONES: u8 = 0xFF;
 
 /// A pin with a wire on it: the port's index and the pin's.
 #[derive(Clone, Copy, Debug)]
@@ -71,11 +74,22 @@ struct OnBus {
     chip: Dac81416,
     volts: [f64; CHANNELS_PER_CHIP],
     changed_ns: Option<u64>,
+    /// Whether its SDI hears nothing but ones.
+    sdi_open: bool,
+    /// Whether nothing of its SDO is heard but ones.
+    sdo_open: bool,
 }
 
 impl Store for OnBus {}
 
 impl OnBus {
+    /// A byte over its wires, both ways.
+    fn byte(&mut self, mosi: u8) -> u8 {
+        let heard = if self.sdi_open { ONES } else { mosi };
+        let said = self.chip.transfer(heard);
+        if self.sdo_open { ONES } else { said }
+    }
+
     /// Does something to the chip at `at_ns` and sees what comes of it.
     fn drive<R>(&mut self, at_ns: u64, act: impl FnOnce(&mut Dac81416) -> R) -> R {
         let result = act(&mut self.chip);
@@ -92,9 +106,9 @@ impl Peer for OnBus {
     fn transfer(&mut self, mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {
         let [low, high, ..] = mosi.to_le_bytes();
         if bits == EIGHT_BITS {
-            return self.chip.transfer(low).into();
+            return self.byte(low).into();
         }
-        u32::from(self.chip.transfer(high)) << 8 | u32::from(self.chip.transfer(low))
+        u32::from(self.byte(high)) << 8 | u32::from(self.byte(low))
     }
 
     fn select(&mut self, _context: &mut Timeline<'_, '_>) {
@@ -133,6 +147,8 @@ pub struct DisplayPins {
     clear_stuck: bool,
     button_open: bool,
     alarm: bool,
+    alarm_stuck: bool,
+    encoder: EncoderWires,
     /// When the encoder was read last.
     ticked_ns: u64,
     records: DisplayRecords,
@@ -150,6 +166,8 @@ impl DisplayPins {
             clear_stuck: false,
             button_open: false,
             alarm: false,
+            alarm_stuck: false,
+            encoder: EncoderWires::Sound,
             ticked_ns: 0,
             records: DisplayRecords::default(),
         }
@@ -191,6 +209,31 @@ impl DisplayPins {
     pub fn set_load_stuck(&mut self, part: &mut Stm32f427, at_ns: u64, level: Option<Level>) {
         self.load_stuck = level;
         self.follow_load(part, at_ns);
+    }
+
+    /// Puts a wire of these pins wrong, or right.
+    pub fn miswire(&mut self, part: &mut Stm32f427, at_ns: u64, mistake: Mistake, wrong: bool) {
+        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
+        match mistake {
+            Mistake::HandSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
+            Mistake::HandOpen => self.encoder = or_sound(EncoderWires::Open),
+            Mistake::StopOpen => self.set_stop_button(part, at_ns, wrong),
+            Mistake::LoadHigh => self.set_load_stuck(part, at_ns, wrong.then_some(Level::High)),
+            Mistake::ClearLow => {
+                self.clear_stuck = wrong;
+                self.follow_clear(part, at_ns);
+            }
+            Mistake::AlarmLow => {
+                self.alarm_stuck = wrong;
+                self.follow_alarm(part, at_ns);
+            }
+            Mistake::SelectOpen => {
+                self.with_chip(part, at_ns, CHIP, |dac| dac.defects.deaf = wrong);
+            }
+            Mistake::SdiOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdi_open = wrong),
+            Mistake::SdoOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdo_open = wrong),
+            _ => {}
+        }
     }
 
     /// `fault` of a scene begins, or ends: what of it is at the pins.
@@ -312,7 +355,7 @@ impl DisplayPins {
 
     /// The chips' alarm outputs pull one wire low together.
     fn follow_alarm(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let alarm = (0..CHIPS).any(|chip| on_bus(part, chip).chip.alarm());
+        let alarm = self.alarm_stuck || (0..CHIPS).any(|chip| on_bus(part, chip).chip.alarm());
         if alarm != self.alarm {
             self.alarm = alarm;
             ALARM.drive(part, at_ns, alarm.then_some(Level::Low));
@@ -365,6 +408,7 @@ impl Pins for DisplayPins {
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
         let counted = self.hand.counts(at_ns, encoder(position_mm));
+        let counted = self.encoder.counts(counted);
         self.ticked_ns = at_ns;
         self.records.ticks.push(TickRecord {
             at_ns,

@@ -15,6 +15,7 @@ use protocol::actuators::{ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS
 use protocol::{
     Actuators, Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration,
     Estimate, GaugeHealth, Hello, MAX_FRAME, Message, Peer, Port, Range, Role, Safety, Status,
+    Texture,
 };
 use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
 use rigless::session::Session;
@@ -32,12 +33,16 @@ use hil_sim_core::plant::world::World;
 use hil_sim_core::run::decoder::MessageDecoder;
 use hil_sim_core::run::digest::Digest;
 use hil_sim_core::run::fault_evidence::FaultEvidence;
-use hil_sim_core::run::recording::{Engine, EstimateRecord, Recording, TickRecord};
+use hil_sim_core::run::recording::{
+    Arrival, Arrivals, Engine, EstimateRecord, Recording, TickRecord,
+};
 use hil_sim_core::scene::{Link, Motion, Scene};
 
 /// How often the far end looks at what it has heard and has to say.
 const LOOK_NS: u64 = 1_000_000;
 const ESTIMATE_NS: u64 = 1_000_000_000 / firmware_sensor::ESTIMATE_RATE_HZ as u64;
+/// Estimates to a texture.
+const ESTIMATES_PER_TEXTURE: usize = 5;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_NS: u64 = 10_000_000;
 /// How long the far end waits for an answer before it asks again.
@@ -104,6 +109,9 @@ pub struct DisplayBench {
     pub hand: Motion,
     /// What the estimates say. They are valid while the hand moves at 5 mm/s or more.
     pub surface: Surface,
+    /// What else the sensor tells of the surface, 20 times a second while the hand moves: sequence and instant are its
+    /// own.
+    pub texture: Option<Texture>,
     /// What becomes of the estimates on their way.
     pub link: Link,
     /// All randomness of the link comes from it.
@@ -120,6 +128,7 @@ impl DisplayBench {
             actuators: DEFAULT_ACTUATORS,
             hand,
             surface: Box::new(move |_| SensorMessage::of(wavelength_mm)),
+            texture: None,
             link: Link::default(),
             seed: 1,
             duration_s,
@@ -271,6 +280,7 @@ pub(super) fn run_before<W: BoardHook>(
             scans: Vec::new(),
             ticks: left.ticks,
             estimates: far.estimates,
+            arrived: far.arrived,
             outputs: left.outputs,
             sensor_status: None,
             display_status: far.statuses.last().map(|&(_, status)| status),
@@ -309,6 +319,8 @@ struct ScriptedSensor {
     free_ns: u64,
     heard: MessageDecoder,
     estimates: Vec<EstimateRecord>,
+    arrived: Vec<Arrival>,
+    arrivals: Arrivals,
     statuses: Vec<(u64, Status)>,
     safety: Vec<Safety>,
     motions: u64,
@@ -327,6 +339,8 @@ impl ScriptedSensor {
             free_ns: 0,
             heard: MessageDecoder::default(),
             estimates: Vec::new(),
+            arrived: Vec::new(),
+            arrivals: Arrivals::default(),
             statuses: Vec::new(),
             safety: Vec::new(),
             motions: 0,
@@ -415,6 +429,14 @@ impl ScriptedSensor {
             estimate,
         });
         self.port.post(&Message::Estimate(estimate));
+        let due = self.estimates.len().is_multiple_of(ESTIMATES_PER_TEXTURE) && estimate.valid;
+        if let Some(texture) = self.alone.texture.filter(|_| due) {
+            self.port.post(&Message::Texture(Texture {
+                sequence,
+                instant_us: now_ns / 1_000,
+                ..texture
+            }));
+        }
     }
 
     fn speak(&mut self, board: &mut Nucleo<DisplayPins>, now_ns: u64) {
@@ -441,10 +463,13 @@ impl ScriptedSensor {
         }
         self.heard.hear(&arrived);
         for said in self.heard.take() {
-            if let Message::Estimate(estimate) = said.message
-                && let Some(record) = self.estimates.get_mut(estimate.sequence as usize)
-            {
-                record.received_ns = Some(said.at_ns);
+            if let Message::Estimate(estimate) = said.message {
+                let arrival = Arrival {
+                    at_ns: said.at_ns,
+                    estimate,
+                };
+                self.arrivals.note(&mut self.estimates, &arrival);
+                self.arrived.push(arrival);
             }
         }
     }

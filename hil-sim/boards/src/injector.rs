@@ -181,7 +181,7 @@ impl Injector {
     }
 
     /// Turns a bit of a setting where the output task holds them: their 16-bit numbers lie in the order of
-    /// their declaration. Places behind the first are copies that the task's start has left.
+    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
         let Some(traps) = &self.traps else {
             return false;
@@ -194,19 +194,19 @@ impl Injector {
             set.glide_ms,
             set.amplitude_mv,
             set.reference_lsb,
+            set.reference_mn,
             set.full_drive_s,
         ];
         let pattern: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
         let places = traps.places(&[OUTPUT_TASK], &pattern, host);
-        let Some(place) = places.first() else {
-            return false;
-        };
         let [setting, bit] = fault.values.map(|value| value as u64);
-        let address = place + 2 * setting;
-        let turned = host
-            .read(address, Width::W16)
-            .and_then(|word| host.write(address, Width::W16, word ^ 1 << bit));
-        turned.is_ok()
+        let turn = |place: &u64, host: &mut dyn Host| {
+            let address = place + 2 * setting;
+            host.read(address, Width::W16)
+                .and_then(|word| host.write(address, Width::W16, word ^ 1 << bit))
+                .is_ok()
+        };
+        !places.is_empty() && places.iter().all(|place| turn(place, host))
     }
 }
 

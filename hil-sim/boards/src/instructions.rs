@@ -11,9 +11,10 @@ use std::collections::{BTreeMap, HashMap};
 
 use addr2line::gimli::{self, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
-use rigless::emulator::{Access, Hit, HitKind, Host, Settled, Watch};
+use rigless::emulator::{Access, AccessKind, Hit, HitKind, Host, Settled, Watch};
 
 use super::{ElfError, Firmware};
+use crate::cycles::{CycleMeter, Estimate};
 use crate::display_alone;
 use crate::display_alone::{BoardHook, DisplayBench};
 
@@ -36,6 +37,22 @@ pub struct Counted {
     pub ticks: u64,
     /// The time that it was counted for, in s.
     pub counted_s: f64,
+    /// What it would take on silicon: the least, the most, and that without the flash's accelerator.
+    pub cycles: [Cycles; 3],
+    /// From the start of a tick's words to the arming of LDAC once they are out, the longest, in ns of the
+    /// emulated board's time.
+    pub transfer_ns: u64,
+}
+
+/// Processor cycles, estimated: see [`crate::cycles`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cycles {
+    /// In all.
+    pub total: u64,
+    /// Of the output tick with the most, to the next one.
+    pub worst_tick: u64,
+    /// From a tick's interrupt to the start of its words' transfer, of the tick with the most.
+    pub worst_start: u64,
 }
 
 /// Counts for the last `counted_s` of the run that `alone` describes, in whole ms.
@@ -53,7 +70,14 @@ pub fn count(
     let from_ns = end_ns - (counted_s * 1e3).round() as u64 * 1_000_000;
     let functions = functions(&firmware.elf);
     let watched = WatchedCode {
-        code,
+        timings: ESTIMATES.map(|estimate| Timing {
+            meter: CycleMeter::new(&code, estimate),
+            tick: None,
+            cycles: Cycles::default(),
+        }),
+        started_ns: None,
+        transfer_ns: 0,
+        code: code.into_iter().map(|(address, _)| address).collect(),
         routines: routines(&functions),
         caller: None,
         by_caller: HashMap::new(),
@@ -79,6 +103,11 @@ pub fn count(
         *by_function.entry(name.to_owned()).or_default() += count;
     }
     Ok(Counted {
+        transfer_ns: watched.transfer_ns,
+        cycles: watched.timings.map(|timing| Cycles {
+            total: timing.meter.cycles(),
+            ..timing.cycles
+        }),
         by_function,
         total: watched.counts.values().sum(),
         by_place,
@@ -102,6 +131,10 @@ fn unreadable(reason: &str) -> ElfError {
 
 /// Counts how often each instruction is come to.
 struct WatchedCode {
+    timings: [Timing; 3],
+    /// When the last tick's words went on their way.
+    started_ns: Option<u64>,
+    transfer_ns: u64,
     code: Vec<u64>,
     /// Where the compiler's routines begin and end.
     routines: Vec<std::ops::Range<u64>>,
@@ -129,12 +162,24 @@ impl BoardHook for WatchedCode {
 
     fn on_settled(&mut self, settled: &Settled) {
         if let Settled::Access {
-            access: Access { address, .. },
+            access:
+                Access {
+                    address,
+                    kind,
+                    virtual_time,
+                    ..
+                },
             ..
         } = *settled
             && self.running.is_some()
         {
             *self.accesses.entry(peripheral(address)).or_default() += 1;
+            for timing in &mut self.timings {
+                timing.meter.access(address);
+            }
+            if kind == AccessKind::Write {
+                self.time(address, virtual_time.0);
+            }
         }
         let Settled::Hit(Hit {
             kind: HitKind::Instruction,
@@ -145,6 +190,9 @@ impl BoardHook for WatchedCode {
         else {
             return;
         };
+        for timing in &mut self.timings {
+            timing.meter.retire(address);
+        }
         if let Some((before, count)) = self.running {
             let retired = instruction_count - count;
             *self.counts.entry(before).or_default() += retired;
@@ -162,9 +210,61 @@ impl BoardHook for WatchedCode {
     }
 }
 
-/// Where each instruction of an ELF begins: Thumb code between the mapping symbols $t and $d, in which
+impl WatchedCode {
+    /// The register at `address` was written: the tick's interrupt takes its flag back, or its words start, or
+    /// they are out.
+    fn time(&mut self, address: u64, at_ns: u64) {
+        if address == TICK_FLAGS {
+            self.started_ns = None;
+            for Timing {
+                meter,
+                tick,
+                cycles,
+            } in &mut self.timings
+            {
+                if let Some(before) = tick.replace(meter.cycles()) {
+                    cycles.worst_tick = cycles.worst_tick.max(meter.cycles() - before);
+                }
+            }
+        } else if let Some(started_ns) = self.started_ns {
+            if address == LOAD_MODE {
+                self.transfer_ns = self.transfer_ns.max(at_ns - started_ns);
+            }
+        } else if WORDS_DMA.contains(&address) {
+            self.started_ns = Some(at_ns);
+            for Timing {
+                meter,
+                tick,
+                cycles,
+            } in &mut self.timings
+            {
+                if let Some(tick) = tick {
+                    cycles.worst_start = cycles.worst_start.max(meter.cycles() - *tick);
+                }
+            }
+        }
+    }
+}
+
+/// In this order.
+const ESTIMATES: [Estimate; 3] = [Estimate::Least, Estimate::Most, Estimate::Unaccelerated];
+
+/// One estimate.
+struct Timing {
+    meter: CycleMeter,
+    /// The cycles before the last tick's interrupt.
+    tick: Option<u64>,
+    cycles: Cycles,
+}
+
+/// TIM3_SR, TIM3_CCMR1, and the registers of DMA2's streams.
+const TICK_FLAGS: u64 = 0x4000_0410;
+const LOAD_MODE: u64 = 0x4000_0418;
+const WORDS_DMA: std::ops::Range<u64> = 0x4002_6410..0x4002_64D0;
+
+/// Each instruction of an ELF, with its first two halfwords: Thumb code between the mapping symbols $t and $d, in which
 /// one whose first halfword begins with 0b11101, 0b11110 or 0b11111 has two.
-fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
+pub(super) fn instructions(elf: &[u8]) -> Option<Vec<(u64, [u16; 2])>> {
     let file = object::File::parse(elf).ok()?;
     let mut marks: BTreeMap<u64, bool> = BTreeMap::new();
     for symbol in file.symbols() {
@@ -173,7 +273,7 @@ fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
             marks.insert(symbol.address(), name.starts_with("$t"));
         }
     }
-    let mut addresses = Vec::new();
+    let mut found = Vec::new();
     for section in file.sections().filter(|s| s.kind() == SectionKind::Text) {
         let (from, data) = (section.address(), section.data().ok()?);
         let to = from + data.len() as u64;
@@ -185,14 +285,19 @@ fn instructions(elf: &[u8]) -> Option<Vec<u64>> {
             let end = inside.get(index + 1).map_or(to, |next| next.0);
             let mut at = start;
             while is_code && at + 1 < end {
-                addresses.push(at);
                 let offset = (at - from) as usize;
-                let first = u16::from_le_bytes([data[offset], data[offset + 1]]);
+                let halfword = |at: usize| match data.get(at..at + 2) {
+                    Some(&[low, high]) => u16::from_le_bytes([low, high]),
+                    _ => 0,
+                };
+                let first = halfword(offset);
+                found.push((at, [first, halfword(offset + 2)]));
                 at += if first >> 11 >= 0b11101 { 4 } else { 2 };
             }
         }
     }
-    (!addresses.is_empty()).then_some(addresses)
+    found.sort_unstable();
+    (!found.is_empty()).then_some(found)
 }
 
 /// Where the compiler's own routines begin and end.

@@ -6,23 +6,28 @@ pub mod bench;
 mod board_pins;
 mod console;
 pub mod cost;
+pub mod cycles;
 pub mod dac81416;
 mod display;
 pub mod display_alone;
 mod firmware;
 mod injector;
 pub mod instructions;
+pub mod jig;
 mod lockstep;
 mod nucleo;
 mod pair;
 mod processor_pool;
 mod recorder;
 mod rtt;
+pub mod semihosted;
 mod sensor;
 pub mod soak;
+pub mod stack;
 mod terminal;
 mod traps;
 mod wire;
+pub mod wiring;
 
 use std::time::Instant;
 
@@ -38,7 +43,9 @@ use display::DisplayRecords;
 use hil_sim_core::run::decoder::{MessageDecoder, TimedMessage};
 use hil_sim_core::run::digest::Digest;
 use hil_sim_core::run::fault_evidence::FaultEvidence;
-use hil_sim_core::run::recording::{Engine, EstimateRecord, Recording, ScanRecord};
+use hil_sim_core::run::recording::{
+    Arrival, Arrivals, Engine, EstimateRecord, Recording, ScanRecord,
+};
 use hil_sim_core::scene::{Scene, SceneError};
 use pair::Finished;
 use recorder::Recorder;
@@ -201,18 +208,16 @@ fn record(
             });
         }
     }
-    // Estimates come in their order but for a few.
-    const REORDERED: usize = 256;
-    let mut last: usize = 0;
+    let mut arrived = Vec::new();
+    let mut arrivals = Arrivals::default();
     for TimedMessage { at_ns, message } in heard.messages() {
-        let from = last.saturating_sub(REORDERED);
-        if let Message::Estimate(received) = message
-            && let Some(found) = estimates[from..]
-                .iter()
-                .position(|record| record.estimate == *received && record.received_ns.is_none())
-        {
-            last = from + found;
-            estimates[last].received_ns = Some(*at_ns);
+        if let Message::Estimate(estimate) = *message {
+            let arrival = Arrival {
+                at_ns: *at_ns,
+                estimate,
+            };
+            arrivals.note(&mut estimates, &arrival);
+            arrived.push(arrival);
         }
     }
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
@@ -239,6 +244,7 @@ fn record(
         scans: sensor.records,
         ticks: display.records.ticks,
         estimates,
+        arrived,
         outputs: display.records.outputs,
         sensor_status,
         display_status,

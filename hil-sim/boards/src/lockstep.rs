@@ -256,7 +256,8 @@ impl<P: BoardPins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
                 now_ns,
                 is_on: !self.injector.is_off,
             });
-            if self.witness.is_over(now_ns) {
+            // By the quantum's end, not by the stop, which comes an instruction later on one board or the other.
+            if self.witness.is_over(self.next_quantum_ns) {
                 self.is_done = true;
                 return None;
             }

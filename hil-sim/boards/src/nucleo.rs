@@ -37,11 +37,11 @@ const PRIORITY_BITS: u8 = 4;
 pub const PEER_UART: usize = 1;
 /// Index of USART3, the console.
 pub const CONSOLE_UART: usize = 2;
-const TIM3: usize = 1;
-const TIM4_INDEX: usize = 2;
+pub(super) const TIM3: usize = 1;
+pub(super) const TIM4_INDEX: usize = 2;
 /// The internal trigger by which TIM4 hears TIM3.
-const ITR_OF_TIM3: u8 = 2;
-const CNT: u64 = 0x24;
+pub(super) const ITR_OF_TIM3: u8 = 2;
+pub(super) const CNT: u64 = 0x24;
 
 /// The emulation stops for an event at the end of the instruction that it falls into, within two of them.
 pub const LATE_NS: u64 = 20;

@@ -13,6 +13,7 @@ use rigless::soc::stm32f427::peripherals::tim;
 use rigless::time::VirtualNanos;
 
 use super::nucleo::Pins;
+use crate::wiring::{EncoderWires, GAUGE, Mistake};
 use hil_sim_core::plant::arm::Arm;
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::plant::fault::gauges::GaugeFaults;
@@ -30,6 +31,8 @@ const DIRECTION_PIN: u8 = 13;
 /// The model converts ⌊input · 4095 / reference⌋; microvolts resolve every code.
 const REFERENCE_UV: u32 = 3_300_000;
 const FULL_SCALE: u32 = 4_095;
+const HIGHEST_CODE: u16 = 4_095;
+const MID_RAIL: u16 = 2_048;
 const CR2: u64 = 0x08;
 const CR2_SWSTART: u64 = 1 << 30;
 const CR2_EXTEN: u64 = 0b11 << 28;
@@ -46,6 +49,11 @@ pub struct SensorPins {
     position_mm: f64,
     gauges: GaugeFaults,
     clock: Clock,
+    encoder: EncoderWires,
+    /// The level that the pin of gauge [`GAUGE`] is held at by its wire.
+    held: Option<u16>,
+    /// What the arm makes of the speed that it is asked for: 1, unless its wires are wrong.
+    drive_sign: f64,
     /// Every scan converted so far.
     pub scans: Vec<ScanRecord>,
 }
@@ -67,6 +75,9 @@ impl SensorPins {
             position_mm: 0.0,
             gauges: GaugeFaults::new(faults),
             clock: Clock::new(faults),
+            encoder: EncoderWires::Sound,
+            held: None,
+            drive_sign: 1.0,
             scans: Vec::new(),
         }
     }
@@ -74,6 +85,20 @@ impl SensorPins {
     /// The true wavelength under the fingertip at the last scan, in mm.
     pub fn wavelength_mm(&self) -> f64 {
         self.world.wavelength_mm(self.position_mm)
+    }
+
+    /// Puts a wire of these pins wrong, or right.
+    pub fn miswire(&mut self, mistake: Mistake, wrong: bool) {
+        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
+        match mistake {
+            Mistake::ArmSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
+            Mistake::ArmOpen => self.encoder = or_sound(EncoderWires::Open),
+            Mistake::PwmOpen => self.drive_sign = if wrong { 0.0 } else { 1.0 },
+            Mistake::ArmBackwards => self.drive_sign = if wrong { -1.0 } else { 1.0 },
+            Mistake::GaugeOpen => self.held = wrong.then_some(HIGHEST_CODE),
+            Mistake::GaugeShort => self.held = wrong.then_some(MID_RAIL),
+            _ => {}
+        }
     }
 
     /// Wires up what the part itself has to know.
@@ -94,13 +119,17 @@ impl SensorPins {
         let t_s = at_ns as f64 * 1e-9;
         self.position_mm = self.arm.position_mm(t_s);
         let codes = self.world.codes(t_s, self.position_mm);
-        let codes = self.gauges.apply(at_ns, codes);
+        let mut codes = self.gauges.apply(at_ns, codes);
+        if let Some(held) = self.held {
+            codes[GAUGE] = held;
+        }
         for (code, channel) in codes.into_iter().zip(ADC_CHANNELS) {
             if let Some(channel) = Channel::new(channel) {
                 part.adc[ADC].set_input(channel, microvolts(code));
             }
         }
         let encoder = self.world.arm_encoder(t_s, self.position_mm);
+        let encoder = self.encoder.counts(encoder);
         self.scans.push(ScanRecord {
             at_ns,
             codes,
@@ -124,7 +153,7 @@ impl SensorPins {
         } else {
             -1.0
         };
-        sign * duty * self.arm_full_scale_mm_s
+        self.drive_sign * sign * duty * self.arm_full_scale_mm_s
     }
 }
 
@@ -142,17 +171,20 @@ impl Pins for SensorPins {
         self.present(part, at_ns)
     }
 
-    /// The emulator does not pass a timer's trigger to a converter: starts the scan that the converter
-    /// is set up to start.
     fn after_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let at = VirtualNanos(at_ns);
-        let Ok(cr2) = part.peek(at, ADC3.base + CR2, Width::W32) else {
-            return;
-        };
-        if cr2 & CR2_EXTEN != 0 && cr2 & CR2_EXTSEL == EXTSEL_TIM3_TRGO {
-            // A converter whose clock is off refuses the write, as it would ignore the trigger.
-            let _ = part.write(at, ADC3.base + CR2, Width::W32, cr2 | CR2_SWSTART);
-        }
+        start_scan(part, at_ns);
+    }
+}
+
+/// The emulator does not pass a timer's trigger to a converter: starts the scan that the converter is set up to start.
+pub(super) fn start_scan(part: &mut Stm32f427, at_ns: u64) {
+    let at = VirtualNanos(at_ns);
+    let Ok(cr2) = part.peek(at, ADC3.base + CR2, Width::W32) else {
+        return;
+    };
+    if cr2 & CR2_EXTEN != 0 && cr2 & CR2_EXTSEL == EXTSEL_TIM3_TRGO {
+        // A converter whose clock is off refuses the write, as it would ignore the trigger.
+        let _ = part.write(at, ADC3.base + CR2, Width::W32, cr2 | CR2_SWSTART);
     }
 }
 

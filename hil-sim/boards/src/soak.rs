@@ -7,7 +7,7 @@
 mod strokes;
 mod tally;
 
-use protocol::{Configuration, DisplayConfiguration, Mode, SensorConfiguration, Status};
+use protocol::{Configuration, DisplayConfiguration, Mode, Rendering, SensorConfiguration, Status};
 use rigless::emulator::Host;
 
 pub use tally::Check;
@@ -41,6 +41,8 @@ pub struct Soak {
     pub duration_s: f64,
     /// All randomness comes from it.
     pub seed: u64,
+    /// How much of the surface the display plays.
+    pub rendering: Rendering,
     /// What becomes of both boards' frames on their way.
     pub link: Link,
 }
@@ -88,6 +90,7 @@ pub fn run(
     let scene = scene(soak, end_ns, strokes.hand());
     let travelling = Configuration::Display(DisplayConfiguration {
         mode: Mode::Travelling,
+        rendering: soak.rendering,
         ..DisplayConfiguration::DEFAULT
     });
     let half = |wanted, firmware: &Firmware| Half {
@@ -177,7 +180,7 @@ struct Half {
 impl<P: Drained> BoardHook<P> for Half {
     fn sent(&mut self, board: &mut Nucleo<P>, sent: &[TimedByte]) {
         P::drain(board, &mut self.outputs);
-        self.side.sent(sent, &self.outputs);
+        self.side.sent(sent, &self.outputs, self.quiet_ns);
     }
 
     fn is_joined(&self, now_ns: u64) -> bool {

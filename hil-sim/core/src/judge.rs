@@ -1,7 +1,6 @@
 //! Judging a run: what the estimates and the actuators did, in numbers.
 
 pub mod actuators;
-mod channels;
 mod cycles;
 pub mod edges;
 pub mod estimates;
@@ -11,23 +10,27 @@ pub mod fault;
 pub mod felt;
 pub mod mean;
 mod middle;
+pub mod needed;
 pub mod outcome;
 pub mod phase;
 mod phase_error;
 pub mod reaction;
 pub mod spectrum;
+mod standing;
 mod stimulus;
 pub mod synthetic;
 pub mod track;
+pub mod trust;
 pub mod truth;
 mod voltage;
 pub mod words;
 
-use protocol::Estimate;
+use protocol::{Estimate, Role};
 
 use crate::judge::truth::Truth;
+use crate::run::decoder::TimedMessage;
 use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
+use crate::run::recording::{Arrival, OutputRecord, Recording, ScanRecord, TickRecord};
 
 pub use actuators::{Actuators, Held};
 pub use estimates::{JudgedEstimate, Summary};
@@ -57,6 +60,7 @@ pub struct Judge<'a> {
     estimates: estimates::Judge<'a>,
     actuators: actuators::Judge,
     felt: felt::Judge,
+    needed: needed::Judge,
 }
 
 impl<'a> Judge<'a> {
@@ -66,6 +70,7 @@ impl<'a> Judge<'a> {
             estimates: estimates::Judge::new(truth),
             actuators: actuators::Judge::new(truth),
             felt: felt::Judge::default(),
+            needed: needed::Judge::default(),
         }
     }
 
@@ -78,6 +83,7 @@ impl<'a> Judge<'a> {
             summary: Summary {
                 felt_right_share: felt.right_share,
                 felt_wrong_share: felt.wrong_share,
+                rendering_needed: self.needed.finish(),
                 ..summary
             },
             actuators: self.actuators.finish(),
@@ -101,7 +107,6 @@ impl RunObserver for Judge<'_> {
 
     fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
         self.estimates.on_estimate(made_ns, estimate);
-        self.actuators.on_estimate(made_ns, estimate);
     }
 
     fn tick(&mut self, tick: &TickRecord) {
@@ -111,6 +116,7 @@ impl RunObserver for Judge<'_> {
             under_mm: self.estimates.under_mm(),
         };
         self.felt.tick(tick, waves);
+        self.needed.tick(tick);
     }
 
     fn output(&mut self, output: &OutputRecord) {
@@ -118,9 +124,13 @@ impl RunObserver for Judge<'_> {
         self.felt.output(output);
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        self.estimates.received(number, received_ns);
-        self.actuators.received(number, received_ns);
+    fn received(&mut self, arrival: &Arrival) {
+        self.estimates.received(arrival);
+        self.actuators.received(arrival);
+    }
+
+    fn said(&mut self, role: Role, said: &TimedMessage) {
+        self.needed.said(role, said);
     }
 }
 

@@ -2,9 +2,11 @@
 //! libraries in it, and what is judged of a run.
 //!
 //! Layers, the lowest first; imports go downwards only (`tests/tests/layers.rs` checks it):
-//! [`scene`] (data) ← [`plant`] (surface, contact, gauges, hand) ← [`link`] (what happens between the boards) ←
-//! [`run`] (what a run leaves behind) ← [`scene_file`] (TOML, CSV, WAV, MCAP) ← [`native`] ← [`judge`].
+//! [`scene`] (data) ← [`hjif`] (textures in the field's own format) ← [`plant`] (surface, contact, gauges, hand) ←
+//! [`link`] (what happens between the boards) ← [`run`] (what a run leaves behind) ← [`scene_file`] (TOML, CSV, WAV, MCAP,
+//! `.hjif`) ← [`native`] ← [`judge`].
 
+pub mod hjif;
 pub mod judge;
 pub mod link;
 pub mod native;

@@ -23,7 +23,7 @@ use crate::run::digest::Digest;
 use crate::run::fault_evidence::FaultEvidence;
 use crate::run::observer::RunObserver;
 use crate::run::recording::{
-    Engine, EstimateRecord, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
+    Arrival, Arrivals, Engine, EstimateRecord, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
 };
 use crate::scene::fault::Fault;
 use crate::scene::fault::catalogue::Needs;
@@ -223,10 +223,13 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             now_ns,
             |due_ns, message| match message {
                 Message::Estimate(estimate) => {
-                    // The sensor counts its estimates from its start.
-                    onlooker.received(estimate.sequence as usize, due_ns);
+                    onlooker.received(&Arrival {
+                        at_ns: due_ns,
+                        estimate,
+                    });
                     display.on_estimate(&estimate);
                 }
+                Message::Texture(texture) => display.on_texture(&texture),
                 Message::Stop(stop) => display.stop(stop.reason),
                 _ => {}
             },
@@ -266,6 +269,11 @@ impl<'o, O: RunObserver> Pair<'o, O> {
                 .send(now_ns, &Message::Estimate(estimate), &mut self.digest);
             self.sensor_counters.estimates =
                 self.sensor_counters.estimates.wrapping_add(u32::from(sent));
+        }
+        if let Some(texture) = output.texture {
+            let message = Message::Texture(texture);
+            self.say(Role::Sensor, now_ns, message.clone());
+            self.sensor_end.send(now_ns, &message, &mut self.digest);
         }
         if let Some(gauges) = output.gauges {
             self.sensor_end
@@ -319,6 +327,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             uptime_us: now_ns / 1_000,
             reset: ResetCause::Power,
             watchdog_resets: 0,
+            stack_free_bytes: 0,
             peer: end.port.counters(),
             console: PortCounters::default(),
             role,
@@ -429,6 +438,8 @@ struct Tape {
     scans: Vec<ScanRecord>,
     ticks: Vec<TickRecord>,
     estimates: Vec<EstimateRecord>,
+    arrived: Vec<Arrival>,
+    arrivals: Arrivals,
     outputs: Vec<OutputRecord>,
     signs: FaultEvidence,
 }
@@ -441,6 +452,8 @@ impl Tape {
             scans: Vec::with_capacity(room(firmware_sensor::SCAN_RATE_HZ)),
             ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
+            arrived: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
+            arrivals: Arrivals::default(),
             outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
             signs: FaultEvidence::default(),
         }
@@ -456,6 +469,7 @@ impl Tape {
             scans: self.scans,
             ticks: self.ticks,
             estimates: self.estimates,
+            arrived: self.arrived,
             outputs: self.outputs,
             sensor_status: ran.sensor_status,
             display_status: ran.display_status,
@@ -486,10 +500,9 @@ impl RunObserver for Tape {
         self.outputs.push(*output);
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        if let Some(record) = self.estimates.get_mut(number) {
-            record.received_ns.get_or_insert(received_ns);
-        }
+    fn received(&mut self, arrival: &Arrival) {
+        self.arrivals.note(&mut self.estimates, arrival);
+        self.arrived.push(*arrival);
     }
 
     fn said(&mut self, role: Role, said: &TimedMessage) {

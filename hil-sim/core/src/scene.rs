@@ -129,9 +129,11 @@ pub enum Profile {
     Sine,
     /// A grating with ridges as wide as its grooves and ramps of 0.1 λ.
     Trapezoid,
-    /// Measured heights over x, in any unit, from CSV, WAV or MCAP: see `docs/src/how-to/recordings.md`. The specimens are
-    /// then only the truth to judge against.
+    /// Measured heights over x, in any unit, from CSV, WAV, MCAP or `.hjif`: see `docs/src/how-to/recordings.md`. The
+    /// specimens are then only the truth to judge against.
     Recorded(Arc<Series>),
+    /// The same, but what a gauge feels there, 1 being a fundamental's amplitude: neither blurred nor scaled.
+    Felt(Arc<Series>),
 }
 
 /// `[arm]`: how the remote fingertip follows the hand.

@@ -1,4 +1,4 @@
-//! Scene files: TOML, CSV, WAV and MCAP in, a checked [`Scene`](crate::scene::Scene) out.
+//! Scene files: TOML, CSV, WAV, MCAP and `.hjif` in, a checked [`Scene`](crate::scene::Scene) out.
 
 pub mod bounds;
 pub mod contact;

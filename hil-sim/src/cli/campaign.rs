@@ -13,6 +13,9 @@ use hil_sim_boards::ElfError;
 use hil_sim_core::run::batch;
 use hil_sim_core::scene::fault::Kind;
 use hil_sim_studies::campaign::{Plan, Shift, Tally, Trial, unmet};
+use hil_sim_studies::display::rendering_of_word;
+
+use protocol::Rendering;
 
 use super::say::say;
 use super::{Elves, number, progress};
@@ -28,6 +31,9 @@ pub(super) struct Campaign {
     /// Decides the instants, and what the kinds leave to chance
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// How much of the surface the display plays: fundamental, shape or texture
+    #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
+    rendering: Rendering,
     /// Runs at a time; each takes up to two processors
     #[arg(long, value_name = "RUNS", default_value_t = jobs())]
     jobs: usize,
@@ -53,6 +59,7 @@ impl Campaign {
             kinds: self.kinds()?,
             instants: self.instants,
             seed: self.seed,
+            rendering: self.rendering,
         };
         let firmwares = self.elves.read()?;
         let json = self.json.as_deref().map(create).transpose()?;
@@ -138,7 +145,7 @@ impl Campaign {
 }
 
 const HEADER: &str = "\
-kind                    expected  tried   on  seen  first sign ms       0 V in time  0 V after ms     stuck  resets  again  against";
+kind                    expected  tried   on  seen  first sign ms       0 V in time  0 V after ms     stuck  resets  again  against  unmet";
 
 fn line(tally: &Tally) -> String {
     let times = |times: Option<[f64; 2]>| {
@@ -149,7 +156,7 @@ fn line(tally: &Tally) -> String {
         )
     };
     format!(
-        "{:<23} {:<8} {:>6} {:>4} {:>5}  {}  {:>12}  {}  {:>5}  {:>6}  {:>5}  {:>7}",
+        "{:<23} {:<8} {:>6} {:>4} {:>5}  {}  {:>12}  {}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
         tally.kind,
         tally.expected,
         tally.injected,
@@ -165,6 +172,7 @@ fn line(tally: &Tally) -> String {
         tally.resets,
         tally.drove_again,
         tally.restarts,
+        tally.unmet,
     )
 }
 

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Subcommand;
 use hil_sim_core::scene::Scene;
+use hil_sim_studies::display::texture;
 use hil_sim_studies::estimators::bank;
 use hil_sim_studies::estimators::benchmark;
 use hil_sim_studies::estimators::benchmark::contestants;
@@ -15,7 +16,7 @@ use hil_sim_studies::estimators::result::{BenchmarkResult, Entry};
 use hil_sim_studies::estimators::score::Score;
 
 use super::files::{create_folder, keep};
-use super::{confidence, display, models, progress};
+use super::{Elves, confidence, display, models, progress};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -44,8 +45,13 @@ enum What {
     /// status 1 if a channel takes longer than 20 ms to 0 V. Writes stop.csv and stop.svg
     Stop(display::Stop),
     /// The stimulus' phase error against the motion over the link's delay, from the display's ELF, beside a
-    /// stimulus that is relayed over the network. Writes delay.csv and delay.svg
+    /// stimulus that is relayed over the network. Exit status 1 if ours is more than 0.01 cycles off or 1 ms late
+    /// at any delay. Writes delay.csv and delay.svg
     Delay(display::Delay),
+    /// Whether partials and a random part carry more of a surface than λ: coherence and spectral distance of what is
+    /// played with the surface under the hand, and which surfaces of one λ a simulated observer tells apart. Exit
+    /// status 1 if partials or the random part bring a family of surfaces no nearer. Writes texture.csv, texture-pairs.csv and texture.svg
+    Texture(Texture),
     /// Speed against accuracy of the contact models: every rung, every integrator, steps of many lengths,
     /// against the reference. Writes models.csv and models.svg
     Models(models::Models),
@@ -59,6 +65,18 @@ struct Bound {
     /// Where to write CSV and SVG
     #[arg(long, value_name = "FOLDER", default_value = "target/chart")]
     out: PathBuf,
+}
+
+#[derive(Debug, clap::Args)]
+struct Texture {
+    /// Where to write CSV and SVG
+    #[arg(long, value_name = "FOLDER", default_value = "target/chart")]
+    out: PathBuf,
+    /// A little of it only, to see that it works
+    #[arg(long)]
+    quick: bool,
+    #[command(flatten)]
+    elves: Elves,
 }
 
 #[derive(Debug, clap::Args)]
@@ -91,6 +109,7 @@ impl Chart {
             What::Purity(purity) => purity.execute(),
             What::Stop(stop) => stop.execute(),
             What::Delay(delay) => delay.execute(),
+            What::Texture(texture) => texture.execute(),
             What::Models(models) => models.execute(),
             What::Stability(stability) => stability.execute(),
         }
@@ -132,6 +151,17 @@ impl Estimators {
         entries.extend(running);
         let result = BenchmarkResult { families, entries };
         keep(&result, &self.out)
+    }
+}
+
+impl Texture {
+    fn execute(self) -> anyhow::Result<ExitCode> {
+        let firmwares = self.elves.read()?;
+        create_folder(&self.out)?;
+        let progress = progress(texture::runs(self.quick), "runs");
+        let measured = texture::measure(&firmwares, self.quick, || progress.inc(1))?;
+        progress.finish_and_clear();
+        keep(&measured, &self.out)
     }
 }
 

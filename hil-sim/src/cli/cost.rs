@@ -2,7 +2,8 @@
 
 use std::process::ExitCode;
 
-use hil_sim_boards::cost::measure;
+use hil_sim_boards::cost::{measure, meter};
+use hil_sim_boards::cycles::CLOCK_HZ;
 use hil_sim_studies::study::Table;
 
 use super::Cost;
@@ -10,6 +11,10 @@ use super::say::say;
 
 /// Milliseconds of samples that each part works through.
 const MILLISECONDS: u64 = 1_000;
+/// What a board has in a millisecond, in cycles.
+const GIVEN: u64 = CLOCK_HZ / 1_000;
+/// The parts from this one on are the whole sensor.
+const WHOLE: u64 = 5;
 /// The parts, by number.
 const PARTS: [(u64, &str); 13] = [
     (1, "band-pass and crossings of five gauges"),
@@ -29,12 +34,19 @@ const PARTS: [(u64, &str); 13] = [
 
 impl Cost {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let taken = measure(&self.elf)?;
-        let heads = [
+        let taken = if self.cycles {
+            meter(&self.elf, WHOLE)?
+        } else {
+            measure(&self.elf)?
+        };
+        let mut heads = vec![
             "part",
             "instructions a millisecond:",
             "the longest millisecond:",
         ];
+        if self.cycles {
+            heads.extend(["cycles:", "the longest:", "of a millisecond:"]);
+        }
         let mut table = Table::new(&heads);
         let or_dash =
             |count: Option<u64>| count.map_or("–".to_owned(), |count| count.to_string());
@@ -45,7 +57,19 @@ impl Cost {
             let largest = taken
                 .filter(|taken| taken.pieces > 1)
                 .map(|taken| taken.largest);
-            table.row([name.to_owned(), or_dash(mean), or_dash(largest)]);
+            let mut row = vec![name.to_owned(), or_dash(mean), or_dash(largest)];
+            if self.cycles {
+                let metered = taken.filter(|taken| taken.cycles > 0);
+                row.push(or_dash(
+                    metered.map(|taken| taken.cycles.div_ceil(MILLISECONDS)),
+                ));
+                row.push(or_dash(metered.map(|taken| taken.largest_cycles)));
+                row.push(metered.map_or("–".to_owned(), |taken| {
+                    let share = taken.largest_cycles as f64 / GIVEN as f64;
+                    format!("{:.1} %", 100.0 * share)
+                }));
+            }
+            table.row(row);
         }
         say!("{table}");
         Ok(ExitCode::SUCCESS)

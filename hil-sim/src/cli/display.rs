@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use hil_sim_boards::{Firmware, FirmwareError};
 use hil_sim_studies::display::purity;
 use hil_sim_studies::display::purity::Extent;
+use hil_sim_studies::display::rendering_of_word;
 use hil_sim_studies::display::{delay, stop, timing};
-use protocol::Role;
+use protocol::{Rendering, Role};
 
 use super::files::{create_folder, keep};
 use super::progress;
@@ -54,6 +55,9 @@ impl Measured {
 pub(super) struct Purity {
     #[command(flatten)]
     measured: Measured,
+    /// How much of the surface is played: fundamental, shape or texture, of a surface that is a sine
+    #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
+    rendering: Rendering,
 }
 
 impl Purity {
@@ -61,7 +65,9 @@ impl Purity {
         let measured = &self.measured;
         let firmware = measured.begin()?;
         let progress = progress(purity::runs(measured.extent()), "runs");
-        let rows = purity::measure(&firmware, measured.extent(), || progress.inc(1))?;
+        let rows = purity::measure(&firmware, self.rendering, measured.extent(), || {
+            progress.inc(1)
+        })?;
         progress.finish_and_clear();
         keep(&rows[..], &measured.out)
     }

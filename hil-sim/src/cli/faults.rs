@@ -36,10 +36,10 @@ fn entry(row: &Row) -> String {
     };
     let _ = writeln!(text, "    engine    {engine}");
     let _ = writeln!(text, "    expected  {}", row.expected);
-    let sign = if row.is_to_be_seen {
-        "to be seen"
-    } else {
-        "no sign of it"
+    let sign = match (row.signs, row.seen_within_ms) {
+        ([], _) => "no sign of it".to_owned(),
+        (_, Some(ms)) => format!("seen within {ms} ms"),
+        (_, None) => "seen when what arrives is a reason to hold".to_owned(),
     };
     let safe = row
         .safe_within_ms
@@ -50,10 +50,10 @@ fn entry(row: &Row) -> String {
         0 => "no reset of the display",
         _ => "one reset of the display at most",
     };
-    let again = if row.class.may_drive_again() {
-        "may drive again"
-    } else {
-        "never drives again until its power goes"
+    let again = match (row.class.may_drive_again(), row.again_within_ms) {
+        (false, _) => "never drives again until its power goes".to_owned(),
+        (true, Some(ms)) => format!("drives again within {ms} ms of its end"),
+        (true, None) => "drives on".to_owned(),
     };
     let _ = writeln!(
         text,

@@ -65,7 +65,10 @@ impl Paper {
             folder.display(),
             started.elapsed().as_secs_f64(),
         );
-        Ok(ExitCode::SUCCESS)
+        for line in &report.contradicted {
+            say!("not borne out by these runs: {line}");
+        }
+        Ok(ExitCode::from(u8::from(!report.contradicted.is_empty())))
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
-use hil_sim_core::judge::expectation::key_of;
+use hil_sim_core::judge::expectation::keys_of;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::run::batch;
 use hil_sim_core::run::recording::Engine;
@@ -28,7 +28,7 @@ use super::scene_files::scene_files;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Exit status:
-  0  every scene is as it expects, and as its golden hash says
+  0  every scene is as it expects, its faults as `hil-sim faults` says, and as its golden hash says
   1  one is not
   2  a scene or a file cannot be used; scenes are all read before one runs")]
 pub(super) struct Run {
@@ -175,7 +175,7 @@ impl Books<'_> {
         // Each line with the file and the line of it that it is about.
         let mut places: Vec<(&Path, Option<usize>)> = unmet
             .iter()
-            .map(|line| (path.as_path(), line_of(&text, &["expect", key_of(line)])))
+            .map(|line| (path.as_path(), line_of(&text, &keys_of(line))))
             .collect();
         if let Some(golden) = &self.golden {
             let name = golden.name(path)?;

@@ -35,6 +35,11 @@ On standard input that is no terminal, a line each:
   reset sensor, reset display
   hand SPEED                          in mm/s, −1000 to 1000
   stop, release                       the emergency stop's contact opens, closes
+  wrong MISTAKE, right MISTAKE        a wire is put wrong, and right again: link-straight,
+                                      sensor-tx-open, display-tx-open, no-ground, hand-swapped,
+                                      hand-open, arm-swapped, arm-open, pwm-open, arm-backwards,
+                                      gauge-open, gauge-short, stop-open, sdi-open, sdo-open,
+                                      select-open, alarm-low, ldac-high or clr-low
   quit
 
 A wrong baud rate garbles what goes through a console or a link, as on a wire. Boards are set as the scene

@@ -5,6 +5,8 @@ use std::time::Instant;
 
 use hil_sim_boards::soak;
 use hil_sim_boards::soak::SHORTEST_S;
+use hil_sim_studies::display::rendering_of_word;
+use protocol::Rendering;
 
 use super::say::say;
 use super::{Elves, progress};
@@ -20,6 +22,9 @@ pub(super) struct Soak {
     /// All randomness comes from it
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// How much of the surface the display plays: fundamental, shape or texture
+    #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
+    rendering: Rendering,
     #[command(flatten)]
     elves: Elves,
 }
@@ -41,6 +46,7 @@ impl Soak {
             &soak::Soak {
                 duration_s,
                 seed: self.seed,
+                rendering: self.rendering,
                 link: soak::Soak::WEATHER,
             },
             &firmwares,

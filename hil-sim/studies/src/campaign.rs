@@ -13,7 +13,7 @@ mod tally;
 
 pub use tally::{Tally, unmet};
 
-use protocol::{DisplayConfiguration, Mode};
+use protocol::{DisplayConfiguration, Mode, Rendering};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -22,7 +22,7 @@ use hil_sim_boards::{ElfError, Firmwares};
 use hil_sim_core::judge::fault::{Finding, finding};
 use hil_sim_core::scene::fault::catalogue::{Class, Lasts};
 use hil_sim_core::scene::fault::{Fault, Kind, nanoseconds};
-use hil_sim_core::scene::{Display, Motion, Scene};
+use hil_sim_core::scene::{Display, Motion, Scene, Specimen, Surface};
 
 /// From power on until the stimulus can be driving, in s: of both boards, and of the display alone.
 const STARTS_S: f64 = 0.3;
@@ -37,7 +37,12 @@ const IN_MOTION_S: f64 = 0.25;
 const IN_MOTION: f64 = 0.5;
 /// Runs are about so long, in s: the translation of the firmware at their start is then a small part.
 const RUN_S: f64 = 60.0;
-const WAVELENGTH_MM: f64 = 2.0;
+/// In turn along the surface, in mm: one wavelength, or two, so that an estimate that is out of date is wrong.
+const PLAIN: [f64; 2] = [2.0; 2];
+const VARIED: [f64; 2] = [2.0, 3.0];
+/// The first piece of a surface, in the middle of what a swinging hand goes over, and all others, in mm.
+const FIRST_MM: f64 = 13.0;
+const PIECE_MM: f64 = 40.0;
 /// The paper's hand (section V): 70 mm/s at most, 0.83 Hz.
 const SWINGING: Motion = Motion::Sinusoid {
     amplitude_mm_s: 70.0,
@@ -54,6 +59,8 @@ pub struct Plan {
     pub instants: usize,
     /// Decides the instants, and what the kinds leave to chance.
     pub seed: u64,
+    /// How much of the surface the display plays.
+    pub rendering: Rendering,
 }
 
 /// A run of many windows.
@@ -83,20 +90,21 @@ impl Plan {
     /// uniform and travelling.
     pub fn shifts(&self) -> Vec<Shift> {
         let variants = [
-            (STEADY, Mode::Uniform),
-            (SWINGING, Mode::Travelling),
-            (STEADY, Mode::Travelling),
-            (SWINGING, Mode::Uniform),
+            (STEADY, Mode::Uniform, PLAIN),
+            (SWINGING, Mode::Travelling, PLAIN),
+            (STEADY, Mode::Travelling, VARIED),
+            (SWINGING, Mode::Uniform, VARIED),
         ];
         let mut draws = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let mut shifts = Vec::new();
-        for (variant, (motion, mode)) in variants.into_iter().enumerate() {
+        for (variant, (motion, mode, wavelengths_mm)) in variants.into_iter().enumerate() {
             let mut open: Option<Shift> = None;
             for (place, &kind) in self.kinds.iter().enumerate() {
                 let turns = (0..self.instants).filter(|turn| (turn + place) % 4 == variant);
                 for _ in turns {
-                    let shift =
-                        open.get_or_insert_with(|| self.shift(shifts.len(), motion.clone(), mode));
+                    let shift = open.get_or_insert_with(|| {
+                        self.shift(shifts.len(), motion.clone(), mode, wavelengths_mm)
+                    });
                     shift.add(kind, &mut draws);
                     if shift.scene.duration_s >= RUN_S {
                         shifts.extend(open.take());
@@ -108,9 +116,10 @@ impl Plan {
         shifts
     }
 
-    fn shift(&self, number: usize, motion: Motion, mode: Mode) -> Shift {
+    fn shift(&self, number: usize, motion: Motion, mode: Mode, wavelengths_mm: [f64; 2]) -> Shift {
         let configuration = DisplayConfiguration {
             mode,
+            rendering: self.rendering,
             ..DisplayConfiguration::DEFAULT
         };
         Shift {
@@ -123,10 +132,32 @@ impl Plan {
                     configuration,
                     ..Display::default()
                 },
-                ..Scene::constant(WAVELENGTH_MM, 50.0)
+                surface: surface(wavelengths_mm),
+                ..Scene::constant(wavelengths_mm[0], 50.0)
             },
             tried: Vec::new(),
         }
+    }
+}
+
+/// Two wavelengths in turn, further than a run goes.
+fn surface(wavelengths_mm: [f64; 2]) -> Surface {
+    const PIECES: usize = 100;
+    let piece = |number: usize| Specimen {
+        wavelength_mm: wavelengths_mm[number % 2],
+        length_mm: match number {
+            0 => FIRST_MM,
+            PIECES => f64::INFINITY,
+            _ => PIECE_MM,
+        },
+    };
+    let plain = Scene::constant(wavelengths_mm[0], 50.0).surface;
+    if wavelengths_mm[0] == wavelengths_mm[1] {
+        return plain;
+    }
+    Surface {
+        specimens: (0..=PIECES).map(piece).collect(),
+        ..plain
     }
 }
 
@@ -186,9 +217,10 @@ impl Shift {
     /// If the boards can't be run.
     pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
         let (recording, _) = hil_sim_boards::run(&self.scene, firmwares)?;
-        let tried = self.tried.iter().map(|&(index, until_s)| {
-            finding(&self.scene.faults[index], nanoseconds(until_s), &recording)
-        });
+        let tried = self
+            .tried
+            .iter()
+            .map(|&(index, until_s)| finding(&self.scene, index, nanoseconds(until_s), &recording));
         Ok(tried
             .map(|finding| Trial {
                 motion: match self.scene.motion {
@@ -217,6 +249,7 @@ mod tests {
             kinds: Kind::all().collect(),
             instants: 6,
             seed: 3,
+            rendering: Rendering::Fundamental,
         }
     }
 

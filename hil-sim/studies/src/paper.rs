@@ -60,6 +60,8 @@ pub struct Report {
     pub html: String,
     /// The CSVs: names and texts.
     pub files: Vec<(String, String)>,
+    /// Conclusions that these runs do not bear out.
+    pub contradicted: Vec<String>,
 }
 
 /// Makes the report of what [`plan::jobs`] left, in its order. The page links its CSVs in `folder`, which lies
@@ -87,6 +89,7 @@ pub fn report(
         people_tables::table_4(&study),
     ];
     let html = page::html(&exhibits, &study, recordings, folder);
+    let contradicted = exhibits.iter().flat_map(Exhibit::contradicted).collect();
     let own = exhibits.into_iter().flat_map(|exhibit| exhibit.csvs);
     let of_people = crate::psychophysics::record::csvs(&study)?;
     let of_people = of_people
@@ -95,5 +98,6 @@ pub fn report(
     Ok(Report {
         html,
         files: own.chain(of_people).collect(),
+        contradicted,
     })
 }

@@ -69,6 +69,12 @@ fn the_link_s_delay_leaves_the_stimulus_in_step() {
 }
 
 #[test]
+fn partials_and_the_random_part_carry_more_of_a_surface() {
+    let sensor = elf("sensor").display().to_string();
+    assert_drawn("texture", &["chart", "texture", "--sensor-elf", &sensor]);
+}
+
+#[test]
 fn outputs_come_in_time() {
     assert_drawn("timing", &["timing"]);
 }

@@ -30,7 +30,7 @@ fn what_needs_no_board_comes_out_as_the_table_says() {
     for kind in kinds {
         let scene = scene(Fault::new(kind, AT_S));
         let recording = native::run(&scene).unwrap();
-        let finding = judge(&scene.faults, &recording).remove(0);
+        let finding = judge(&scene, &recording).remove(0);
         assert!(finding.was_driving, "{kind:?}");
         if !finding.unmet().is_empty() {
             unmet.push(format!(
@@ -111,6 +111,34 @@ fn the_json_lists_every_fault_in_the_order_of_the_scene() {
         faults[0]
     );
     assert_eq!(faults[1]["kind"], "nothing");
+}
+
+#[test]
+fn a_fault_that_nothing_noticed_is_not_as_the_scene_expects() {
+    let scene = scene(Fault::new(Kind::LinkDown, AT_S));
+    let recording = native::run(&scene).unwrap();
+    let unmet = |recording| {
+        Outcome::new(scene.clone(), recording)
+            .judgement(false)
+            .unmet
+    };
+    assert_eq!(unmet(recording.clone()), [""; 0]);
+    let mut unsaid = recording.clone();
+    unsaid.signs.display.clear();
+    let lines = unmet(unsaid);
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    assert!(lines[0].starts_with("fault[0] link-down: does not say that it holds, Stale, at 49"));
+    // Without the hold, the last words would have stood.
+    let mut driven = recording;
+    let cut_ns = ((AT_S + 0.4) * 1e9) as u64;
+    driven.outputs.retain(|output| output.at_ns < cut_ns);
+    let lines = unmet(driven);
+    assert!(
+        lines
+            .iter()
+            .any(|line| line.starts_with("fault[0] link-down: drives at ")),
+        "{lines:?}"
+    );
 }
 
 fn hil_sim(arguments: &[&str]) -> Output {

@@ -15,7 +15,7 @@ use host_bridge::system::System;
 #[command(after_help = "\
 Exit status: 0 if all is well, 1 if something is wrong, 2 if it can't be looked at.
 A bench that names one board only has only that one, as at one end of a relay.
-The ports have to be free: close monitor, record and relay first.")]
+Other programs of ours may have the ports meanwhile.")]
 pub struct Doctor {
     #[command(flatten)]
     boards: super::Where,

@@ -5,8 +5,7 @@ use std::process::ExitCode;
 use std::sync::mpsc::channel;
 
 use anyhow::bail;
-use host_bridge::link::Link;
-use host_bridge::live::{Settings, Viewer};
+use host_bridge::live::{PORT, Settings, Viewer};
 
 use super::output;
 use super::signals::{self, Again};
@@ -32,9 +31,10 @@ Exit status: 0 ended by a signal; 2 it can't show anything.";
 /// What `live` is asked for.
 #[derive(Debug, clap::Args)]
 pub struct Live {
-    /// The port for Foxglove; the page has the next one. 0: any that are free
-    #[arg(long, default_value_t = 8_765, value_parser = clap::value_parser!(u16).range(..65_535))]
-    port: u16,
+    /// The port for Foxglove; the page has the next one. 0: any that are free; without it 8765, or 8767 and so
+    /// on if another program has that
+    #[arg(long, value_parser = clap::value_parser!(u16).range(..65_535))]
+    port: Option<u16>,
     /// The address to listen on
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
@@ -60,18 +60,10 @@ impl Live {
         let bench = self.boards.find()?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let (events, told) = channel();
-        let links: Vec<_> = bench
-            .roles()
-            .into_iter()
-            .filter_map(|role| {
-                let events = events.clone();
-                let link = Link::open(role, bench.seat(role)?.place(), move |event| {
-                    // Nobody listens any more at the end.
-                    let _ = events.send((role, event));
-                });
-                Some((role, link))
-            })
-            .collect();
+        let links = super::links(&bench, move |role, event| {
+            // Nobody listens any more at the end.
+            let _ = events.send((role, event));
+        });
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let settings = Settings {
             address: self.listen,
@@ -79,6 +71,12 @@ impl Live {
             gauges: !self.no_gauges,
         };
         let viewer = Viewer::start(settings, links, told)?;
+        if self.port.is_none() && viewer.foxglove_port() != PORT {
+            eprintln!(
+                "host-bridge: another program has port {PORT} or {}: this one is shown on others",
+                PORT + 1
+            );
+        }
         output::print(&format!(
             "Foxglove: ws://{}\npage: http://{}/",
             std::net::SocketAddr::new(self.listen, viewer.foxglove_port()),

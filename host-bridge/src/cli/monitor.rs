@@ -8,7 +8,6 @@ use std::time::Duration;
 use anyhow::Context;
 use clap::ValueHint;
 use host_bridge::bench::Bench;
-use host_bridge::link::Link;
 use host_bridge::monitor::firmware_log::{Logs, Origin};
 use host_bridge::monitor::plain::Format;
 use host_bridge::monitor::{self, Options, Source};
@@ -130,19 +129,10 @@ impl Monitor {
 /// The links to the boards that the bench has.
 fn open(bench: &Bench) -> Source {
     let (events, told) = channel();
-    let links = bench
-        .roles()
-        .into_iter()
-        .filter_map(|role| {
-            let place = bench.seat(role)?.place();
-            let events = events.clone();
-            let link = Link::open(role, place, move |event| {
-                // A monitor that has ended listens no more.
-                let _ = events.send((role, event));
-            });
-            Some((role, link))
-        })
-        .collect();
+    let links = super::links(bench, move |role, event| {
+        // A monitor that has ended listens no more.
+        let _ = events.send((role, event));
+    });
     Source {
         events: told,
         links,

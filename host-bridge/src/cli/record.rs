@@ -114,22 +114,14 @@ impl Record {
         let started = Instant::now();
         let (events, told) = channel();
         let roles = bench.roles();
-        let links: Vec<(Role, Link)> = roles
-            .iter()
-            .filter_map(|&role| {
-                let recorder = Arc::clone(&recorder);
-                let events = events.clone();
-                let link = Link::open(role, bench.seat(role)?.place(), move |event| {
-                    recorder.on_event(role, &event);
-                    if concerns(&event) {
-                        // Nobody listens any more when the recording ends.
-                        let _ = events.send((role, event));
-                    }
-                });
-                Some((role, link))
-            })
-            .collect();
-        drop(events);
+        let recording = Arc::clone(&recorder);
+        let links = super::links(&bench, move |role, event| {
+            recording.on_event(role, &event);
+            if concerns(&event) {
+                // Nobody listens any more when the recording ends.
+                let _ = events.send((role, event));
+            }
+        });
         let (logs, lines) = Logs::new();
         follow(&bench, &roles, &logs)?;
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;

@@ -11,16 +11,21 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueHint};
+use host_bridge::hand::Hand;
+use host_bridge::link::OPERATOR_STOP;
 use host_bridge::relay::credentials::Credentials;
 use host_bridge::relay::endpoint::Endpoint;
 use host_bridge::relay::name::Name;
 use host_bridge::relay::network::{Ends, Network};
 use host_bridge::relay::operator::{self, Progress};
+use host_bridge::relay::refused;
 use host_bridge::relay::remote::site;
-use host_bridge::relay::report::Report;
+use host_bridge::relay::report::{Notice, Report};
 use host_bridge::relay::site::{Settings, Site, opposite};
 use host_bridge::system::System;
-use protocol::{Role, Stop, StopReason};
+use protocol::Role;
+use signal_hook::consts::SIGUSR2;
+use signal_hook::iterator::Signals;
 
 use super::output;
 use super::signals::{self, Again};
@@ -38,13 +43,16 @@ At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
 With a router in between, both connect to it:
                 host-bridge relay router --listen tcp/0.0.0.0:7447
 
+udp/ in place of tcp/ sends estimates and motions as datagrams, at the same port: on a network that loses, nothing \
+waits for what is lost.
+
 With tls/ in place of tcp/, all of them want --ca, --certificate and --key. Whoever has no certificate of that CA \
 is refused, and the certificate's common name decides for whom it may speak: NAME.sensor, NAME.display, \
 NAME.router, or NAME.operator for `relay stop`, where NAME is what --name says. Without TLS, listening beyond this \
 computer wants --insecure.
 
 Ctrl-C ends a bridge. `relay stop`, or SIGUSR1 to a bridge, says Stop to the boards until the display says \
-that it has stopped. Once a second a bridge \
+that it has stopped. SIGUSR2 to a bridge that holds the bench hands it over to one of its site that waits. Once a second a bridge \
 says on standard error how it goes; --json says it on standard output, and leaves nothing out.";
 
 /// What `relay` is asked for.
@@ -192,6 +200,7 @@ impl Bridge {
         )?;
         // Leaving a network that is stuck may take a while.
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
+        let mut hand = Hand::new(self.meeting.name.clone(), role);
         let (bridge, notices) = Site::open(Settings {
             role,
             place: seat.place(),
@@ -202,18 +211,20 @@ impl Bridge {
             system: System::default(),
         })?;
         let stop = bridge.stopper();
-        signals::on_stop(move || {
-            stop(Stop {
-                reason: StopReason::Operator,
-            });
-        })?;
+        signals::on_stop(move || stop(OPERATOR_STOP))?;
+        let hand_over = bridge.hander_over();
+        let mut orders = Signals::new([SIGUSR2])?;
+        thread::spawn(move || orders.forever().for_each(|_| hand_over()));
         let far = opposite(role).map_or("the other site", site);
         say(&format!("host-bridge: {words}, waiting for {far}"));
         let mut before = None;
         let mut due = Instant::now() + REPORT;
         while !ended.load(Ordering::Relaxed) {
             match notices.recv_timeout(LOOK.min(due.saturating_duration_since(Instant::now()))) {
-                Ok(notice) => say(&format!("host-bridge: {notice}")),
+                Ok(notice) => {
+                    hand.on_notice(&notice);
+                    say(&format!("host-bridge: {notice}"));
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => bail!("the bridge has ended by itself"),
             }
@@ -237,12 +248,18 @@ impl Router {
         let words = in_words(&ends);
         warn_of(&ends, self.insecure);
         let network = Network::new(ends, self.proofs.credentials(), self.names, self.insecure)?;
-        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
+        let wait_for_end = signals::wait_for(&signals::USUAL)?;
         let session = network.open_router()?;
         say(&format!("host-bridge: router, {words}"));
-        while !ended.load(Ordering::Relaxed) {
-            thread::sleep(LOOK);
-        }
+        thread::spawn(|| {
+            loop {
+                thread::sleep(LOOK);
+                for refused in refused::take() {
+                    say(&format!("host-bridge: {}", Notice::Refused(refused)));
+                }
+            }
+        });
+        wait_for_end();
         // Dropped, it leaves the network; whoever is connected sees it at once.
         drop(session);
         Ok(ExitCode::SUCCESS)
@@ -261,12 +278,15 @@ impl Stopping {
             let network = Network::new(ends, credentials.clone(), vec![name.clone()], false)?;
             let (outcomes, name) = (outcomes.clone(), name.clone());
             thread::spawn(move || {
-                let stop = Stop {
-                    reason: StopReason::Operator,
-                };
                 let clock = System::default().clock;
                 // Nobody waits any more once one has come through.
-                let _ = outcomes.send(operator::stop(&network, &clock, &name, stop, within));
+                let _ = outcomes.send(operator::stop(
+                    &network,
+                    &clock,
+                    &name,
+                    OPERATOR_STOP,
+                    within,
+                ));
             });
         }
         drop(outcomes);

@@ -4,8 +4,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use host_bridge::link::LinkSender;
-use protocol::{Stop, StopReason};
+use host_bridge::link::{LinkSender, stop_all};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
@@ -18,14 +17,7 @@ pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 /// # Errors
 /// If the system does not let one listen to signals.
 pub fn stop_boards(boards: Vec<LinkSender>) -> io::Result<()> {
-    on_stop(move || {
-        for board in &boards {
-            // What can't be said yet is said as soon as it can.
-            let _ = board.stop(Stop {
-                reason: StopReason::Operator,
-            });
-        }
-    })
+    on_stop(move || stop_all(&boards))
 }
 
 /// Has SIGUSR1 call `stop`, on a thread of its own.
@@ -60,4 +52,16 @@ pub fn flag_set_by(signals: &[i32], again: Again) -> io::Result<Arc<AtomicBool>>
         flag::register(signal, Arc::clone(&ended))?;
     }
     Ok(ended)
+}
+
+/// A wait for the first of these signals; the second one ends the program at once.
+///
+/// # Errors
+/// If the system does not let one listen to signals.
+pub fn wait_for(signals: &[i32]) -> io::Result<impl FnOnce()> {
+    let mut first = Signals::new(signals)?;
+    flag_set_by(signals, Again::EndsAtOnce)?;
+    Ok(move || {
+        first.forever().next();
+    })
 }

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use host_bridge::link::{Event, Link};
-use protocol::{Message, Role, Stop, StopReason};
+use host_bridge::link::{Event, stop_all};
+use protocol::Message;
 
 /// How it is used.
 pub const EXAMPLES: &str = "\
@@ -32,22 +32,12 @@ impl StopBoards {
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
         let (events, told) = channel();
-        let mut waiting: Vec<(Role, Link)> = Vec::new();
-        for role in bench.roles() {
-            let Some(seat) = bench.seat(role) else {
-                continue;
-            };
-            let events = events.clone();
-            let link = Link::open(role, seat.place(), move |event| {
-                // Nobody listens any more at the end.
-                let _ = events.send((role, event));
-            });
-            // What can't be said yet is said as soon as it can.
-            let _ = link.stop(Stop {
-                reason: StopReason::Operator,
-            });
-            waiting.push((role, link));
-        }
+        let mut waiting = super::links(&bench, move |role, event| {
+            // Nobody listens any more at the end.
+            let _ = events.send((role, event));
+        });
+        let boards: Vec<_> = waiting.iter().map(|(_, link)| link.sender()).collect();
+        stop_all(&boards);
         let end = Instant::now() + Duration::from_secs(self.within.into());
         while !waiting.is_empty() {
             match told.recv_timeout(end.saturating_duration_since(Instant::now())) {

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use protocol::{GAUGES, GaugeHealth, Hello, PortCounters, Role, Status};
+use protocol::{ArmState, GAUGES, GaugeHealth, Hello, PortCounters, Role, RoleCounters, Status};
 
 use super::clock::ClockFacts;
 use super::permission::Permission;
+use crate::link::Missed;
 use crate::place::StLink;
 use crate::state::State;
 
@@ -66,6 +67,8 @@ pub struct BoardFacts {
     pub clock: Option<ClockFacts>,
     /// What this computer's end of the line has counted.
     pub counters: PortCounters,
+    /// What of that was missed because the port changed hands between programs.
+    pub missed: Missed,
     /// The firmware that the bench has for it.
     pub elf: Option<ElfFacts>,
 }
@@ -95,6 +98,7 @@ impl BoardFacts {
             health: None,
             clock: None,
             counters: PortCounters::new(),
+            missed: Missed::default(),
             elf: None,
         }
     }
@@ -102,6 +106,29 @@ impl BoardFacts {
     /// The latest status.
     pub fn status(&self) -> Option<&Status> {
         self.last.as_ref().or(self.first.as_ref())
+    }
+
+    /// What the line itself has done to this end's counters.
+    pub const fn line_counters(&self) -> PortCounters {
+        let Self {
+            counters, missed, ..
+        } = self;
+        PortCounters {
+            lost: counters.lost.saturating_sub(missed.lost),
+            corrupt: counters.corrupt.saturating_sub(missed.corrupt),
+            ..*counters
+        }
+    }
+
+    /// What a sensor board's arm is kept by, in words: "free", or "stopped: by the operator".
+    pub fn arm(&self) -> Option<String> {
+        match &self.status()?.role {
+            RoleCounters::Sensor(counters) => Some(counters.stopped.map_or_else(
+                || "free".to_owned(),
+                |trip| ArmState::Stopped(trip).to_string(),
+            )),
+            RoleCounters::Display(_) => None,
+        }
     }
 
     /// How often it is to say what its role says: [`protocol::Estimate`]s or [`protocol::Motion`]s.

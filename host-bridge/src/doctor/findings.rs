@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use protocol::{
-    DisplayState, GaugeHealth, Hello, PROTOCOL_VERSION, ResetCause, Role, RoleCounters,
+    ArmState, DisplayState, GaugeHealth, Hello, PROTOCOL_VERSION, ResetCause, Role, RoleCounters,
     SCHEMA_HASH, Status,
 };
 
@@ -21,6 +21,8 @@ const CRYSTAL_PPM: f64 = 500.0;
 const ROUND_TRIP_US: u64 = 50_000;
 /// A board says what its role says at least at this share of its rate.
 const LEAST_RATE: f64 = 0.9;
+/// A stack that once had less room than this was nearly full, in bytes.
+const LITTLE_STACK_BYTES: u32 = 2_048;
 /// Longest start of the converters, in µs.
 const START_US: u64 = 2_000_000;
 
@@ -213,7 +215,7 @@ impl Findings<'_> {
         if let Some(clock) = &board.clock {
             self.of_clock(clock);
         }
-        for count in counters::of_this_end(&board.counters) {
+        for count in counters::of_this_end(&board.line_counters()) {
             self.of_count("this end of the console", &count);
         }
     }
@@ -302,6 +304,16 @@ impl Findings<'_> {
                 "its firmware hung or panicked: keep its log, report it; power takes the count back",
             );
         }
+        if (1..LITTLE_STACK_BYTES).contains(&status.stack_free_bytes) {
+            self.add(
+                "stack",
+                format!(
+                    "its stack had no more than {} bytes left",
+                    status.stack_free_bytes
+                ),
+                "report it with its log: a board whose stack is full stops",
+            );
+        }
         let (Some(first), last) = (&board.first, board.last.as_ref()) else {
             return;
         };
@@ -324,8 +336,17 @@ impl Findings<'_> {
                 self.of_count(place, &count);
             }
         }
-        if let RoleCounters::Display(display) = &status.role {
-            self.of_supervisor(display.state, status.uptime_us);
+        match &status.role {
+            RoleCounters::Display(display) => self.of_supervisor(display.state, status.uptime_us),
+            RoleCounters::Sensor(sensor) => {
+                if let Some(trip) = sensor.stopped {
+                    self.add(
+                        "arm-stopped",
+                        format!("arm {}", ArmState::Stopped(trip)),
+                        "press the sensor board's reset button when the arm may move again",
+                    );
+                }
+            }
         }
     }
 

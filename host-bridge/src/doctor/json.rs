@@ -81,6 +81,8 @@ struct Board<'a> {
     losses: u32,
     /// The supervisor's state, as "ready" or "stopped: emergency stop"; a display's.
     supervisor: Option<String>,
+    /// "free", or what stopped it, as "stopped: by the operator"; a sensor's.
+    arm: Option<String>,
     /// "good", "dead", "stuck", "saturated", "noisy" or "hum" for each; a sensor's.
     gauges: Option<Vec<String>>,
     /// Estimates or motions a second.
@@ -92,6 +94,8 @@ struct Board<'a> {
     counters: Option<Counters>,
     /// Those of this computer's end of the console.
     this_end: Value,
+    /// Frames among `this_end.lost` that were missed because the port changed hands between programs.
+    missed_at_handover: u32,
     elf: Option<Elf<'a>>,
 }
 
@@ -202,6 +206,7 @@ impl<'a> From<&'a BoardFacts> for Board<'a> {
                 RoleCounters::Display(display) => Some(display.state.to_string()),
                 RoleCounters::Sensor(_) => None,
             }),
+            arm: board.arm(),
             gauges: board.health.map(|health| {
                 health
                     .iter()
@@ -218,6 +223,7 @@ impl<'a> From<&'a BoardFacts> for Board<'a> {
             peer_frames: peer_grown(board),
             counters: status.map(Counters::from),
             this_end: value(&board.counters),
+            missed_at_handover: board.missed.lost,
             elf: board.elf.as_ref().map(Elf::from),
         }
     }
@@ -229,9 +235,10 @@ impl From<&Status> for Counters {
             RoleCounters::Sensor(counters) => value(counters),
             RoleCounters::Display(counters) => value(counters),
         };
-        // It counts nothing, and is told as `supervisor`.
+        // They count nothing, and are told as `supervisor` and `arm`.
         if let Value::Object(fields) = &mut role {
             fields.remove("state");
+            fields.remove("stopped");
         }
         Self {
             peer: value(&status.peer),

@@ -30,9 +30,48 @@ const PING_EVERY_US: u64 = 100_000;
 /// What a link tells.
 type Told = (Role, Event);
 
+/// Who listens along while a bench is looked at.
+pub trait Observer {
+    /// The board of `role` has said this.
+    fn hear(&mut self, role: Role, message: &Message);
+
+    /// What is to be said to the boards now; asked some ten times a second.
+    fn say(&mut self) -> Vec<(Role, Message)>;
+
+    /// Whether enough has been seen of the boards that are there.
+    fn has_enough(&self, present: &[&BoardFacts]) -> bool;
+}
+
+/// Hears nothing, says nothing, and has never enough.
+struct Nobody;
+
+impl Observer for Nobody {
+    fn hear(&mut self, _role: Role, _message: &Message) {}
+
+    fn say(&mut self) -> Vec<(Role, Message)> {
+        Vec::new()
+    }
+
+    fn has_enough(&self, _present: &[&BoardFacts]) -> bool {
+        false
+    }
+}
+
 /// Looks at everything, and listens for `span` to the boards that are there. If the bench names the place
 /// of one board only, it has only that one, as at one end of a relay. It ends early once `ended` is set.
 pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) -> Examination {
+    look_with(system, bench, span, ended, &mut Nobody)
+}
+
+/// The same, with somebody who listens along once the boards are known, and who ends it when enough has been
+/// seen, which is after `span` at the latest.
+pub fn look_with(
+    system: &System,
+    bench: &Bench,
+    span: Duration,
+    ended: &AtomicBool,
+    observer: &mut dyn Observer,
+) -> Examination {
     let now_us = || system.clock.now_us();
     let goes_on = || !ended.load(Ordering::Acquire);
     let (tell, told) = channel(&system.clock);
@@ -44,7 +83,7 @@ pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) 
     let probes = probes::attached().iter().map(ProbeFacts::from).collect();
     let settled_us = now_us() + SETTLING_US;
     while watches.iter().any(|watch| !watch.is_settled()) && now_us() < settled_us && goes_on() {
-        hear(&mut watches, &told, now_us() + LOOK_US);
+        hear(&mut watches, &told, now_us() + LOOK_US, &mut Nobody);
     }
     let began_us = now_us();
     let end_us = began_us.saturating_add(micros(span));
@@ -52,12 +91,17 @@ pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) 
     // A bench without a board needs no patience.
     if watches.iter().any(|watch| watch.facts.state.is_known()) {
         let mut next_ping_us = began_us;
-        while now_us() < end_us && goes_on() {
+        while now_us() < end_us && goes_on() && !has_enough(&watches, observer) {
             if now_us() >= next_ping_us {
                 next_ping_us += PING_EVERY_US;
                 watches.iter().for_each(Watch::ping);
+                for (role, message) in observer.say() {
+                    // A board that is not there is asked again.
+                    let asked = watches.iter().filter(|watch| watch.facts.role == role);
+                    asked.for_each(|watch| _ = watch.link.post(&message));
+                }
             }
-            hear(&mut watches, &told, next_ping_us.min(end_us));
+            hear(&mut watches, &told, next_ping_us.min(end_us), observer);
         }
     }
     let looked = Duration::from_micros(now_us() - began_us);
@@ -70,12 +114,24 @@ pub fn look(system: &System, bench: &Bench, span: Duration, ended: &AtomicBool) 
     }
 }
 
+fn has_enough(watches: &[Watch], observer: &dyn Observer) -> bool {
+    let present: Vec<&BoardFacts> = watches
+        .iter()
+        .map(|watch| &watch.facts)
+        .filter(|facts| facts.state.is_known())
+        .collect();
+    observer.has_enough(&present)
+}
+
 /// Takes what is told until `until_us`, at least one thing or none.
-fn hear(watches: &mut [Watch], told: &Receiver<Told>, until_us: u64) {
+fn hear(watches: &mut [Watch], told: &Receiver<Told>, until_us: u64, observer: &mut dyn Observer) {
     let Some(first) = told.recv_until(until_us) else {
         return;
     };
     for (role, event) in std::iter::once(first).chain(told.try_iter()) {
+        if let Event::Heard { message, .. } = &event {
+            observer.hear(role, message);
+        }
         if let Some(watch) = watches.iter_mut().find(|watch| watch.facts.role == role) {
             watch.note(event);
         }
@@ -197,6 +253,7 @@ impl Watch {
             ..
         } = self;
         facts.counters = link.counters();
+        facts.missed = link.missed();
         facts.clock = ClockFacts::new(&exchanges);
         facts.rate_hz = (facts.state.is_known() && looked >= Duration::from_secs(1))
             .then(|| f64::from(said) / looked.as_secs_f64());

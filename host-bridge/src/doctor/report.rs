@@ -107,6 +107,9 @@ fn of_board(out: &mut String, board: &BoardFacts, style: Style) {
         if let RoleCounters::Display(display) = &status.role {
             fact("supervisor", display.state.to_string());
         }
+        if let Some(arm) = board.arm() {
+            fact("arm", arm);
+        }
     }
     if let Some(health) = board.health {
         let words = health.map(|health| format!("{health:?}").to_lowercase());
@@ -131,6 +134,13 @@ fn of_board(out: &mut String, board: &BoardFacts, style: Style) {
     }
     if let Some(rate_hz) = board.rate_hz {
         fact("says", format!("{rate_hz:.0} {} a second", board.speech()));
+    }
+    if board.missed.lost > 0 {
+        let missed = board.missed.lost;
+        fact(
+            "handed over",
+            format!("{missed} frames missed while its port changed hands between programs"),
+        );
     }
     if let Some(frames) = peer_grown(board) {
         fact("other board", format!("{frames} frames heard from it"));

@@ -52,20 +52,20 @@ struct Shared {
     connections: AtomicUsize,
 }
 
-/// Serves the page for as long as the program runs; `stop` is called at each Stop. Returns where it listens.
+/// Takes a port, and says where.
 ///
 /// # Errors
-/// If the port can't be had.
-pub fn serve(
-    address: IpAddr,
-    port: u16,
-    newest: Arc<Newest>,
-    stop: Box<dyn Fn() + Send + Sync>,
-) -> Result<SocketAddr, LiveError> {
+/// If it can't be had.
+pub fn listen(address: IpAddr, port: u16) -> Result<(TcpListener, SocketAddr), LiveError> {
     let listener = TcpListener::bind((address, port));
-    let listener = listener.map_err(|source| LiveError::Page { port, source })?;
-    let here = listener.local_addr();
-    let here = here.map_err(|source| LiveError::Page { port, source })?;
+    listener
+        .and_then(|listener| Ok((listener.local_addr()?, listener)))
+        .map(|(here, listener)| (listener, here))
+        .map_err(|source| LiveError::Page { port, source })
+}
+
+/// Serves the page for as long as the program runs; `stop` is called at each Stop.
+pub fn serve(listener: TcpListener, newest: Arc<Newest>, stop: Box<dyn Fn() + Send + Sync>) {
     let shared = Arc::new(Shared {
         newest,
         stop,
@@ -82,7 +82,6 @@ pub fn serve(
             });
         }
     });
-    Ok(here)
 }
 
 impl Shared {

@@ -23,6 +23,8 @@ pub struct Picture {
     stopped: bool,
     /// Each actuator's place in mm, and its largest voltage of the last 50 to 100 ms.
     actuators: Vec<[f32; 3]>,
+    /// What the relays here say of who moves the arm.
+    hands: Vec<String>,
     /// What happened last, the newest first.
     log: Vec<String>,
 }
@@ -46,8 +48,8 @@ struct EstimatePicture {
 }
 
 impl Picture {
-    /// Of a dashboard.
-    pub fn of(dashboard: &Dashboard) -> Self {
+    /// Of a dashboard, and of what the relays say.
+    pub fn of(dashboard: &Dashboard, hands: Vec<String>) -> Self {
         let now_us = dashboard.now_us;
         let is_fresh = |at_us: u64| now_us.saturating_sub(at_us) < FRESH_US;
         let board = |role: Role| {
@@ -92,6 +94,7 @@ impl Picture {
                     })
                     .collect()
             }),
+            hands,
             log: dashboard
                 .log_entries
                 .iter()

@@ -1,31 +1,40 @@
 //! Both servers, fed by the links to the boards.
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-use protocol::{Role, Stop, StopReason};
+use protocol::Role;
 
 use super::foxglove_server::{FoxgloveServer, LiveError};
 use super::page::{self, Newest};
 use super::picture::Picture;
+use crate::hand;
 use crate::host_clock::now_us;
-use crate::link::{Event, Link};
+use crate::link::{Event, Link, stop_all};
 use crate::monitor::dashboard::Dashboard;
 use crate::recording::gauge_stream::GaugeStream;
 
 /// Between two pictures for the page.
 const PICTURE: Duration = Duration::from_millis(50);
 
+/// Between two looks at who moves the arm.
+const HANDS: Duration = Duration::from_millis(500);
+/// The port for Foxglove unless another is asked for.
+pub const PORT: u16 = 8_765;
+/// Pairs of ports that are tried then: each program that shows a bench takes one.
+const PAIRS: u16 = 16;
+
 /// Where it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The address to listen on.
     pub address: IpAddr,
-    /// The port for Foxglove; the page has the next one. 0: any that are free.
-    pub port: u16,
+    /// The port for Foxglove; the page has the next one. 0: any that are free; none: [`PORT`], or the next pair
+    /// that is free.
+    pub port: Option<u16>,
     /// Whether the sensor board is asked for its gauges meanwhile.
     pub gauges: bool,
 }
@@ -56,19 +65,11 @@ impl Viewer {
             port,
             gauges,
         } = settings;
-        let foxglove = FoxgloveServer::start(address, port)?;
+        let (foxglove, (listener, page)) = take_ports(address, port)?;
         let newest = Arc::<Newest>::default();
         let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
-        let stop = move || {
-            for board in &boards {
-                // What can't be said yet is said as soon as it can, and again until the board answers.
-                let _ = board.stop(Stop {
-                    reason: StopReason::Operator,
-                });
-            }
-        };
-        let beside = if port == 0 { 0 } else { port.saturating_add(1) };
-        let page = page::serve(address, beside, Arc::clone(&newest), Box::new(stop))?;
+        let stop = move || stop_all(&boards);
+        page::serve(listener, Arc::clone(&newest), Box::new(stop));
         Ok(Self {
             foxglove,
             page,
@@ -93,6 +94,7 @@ impl Viewer {
     /// Shows until `ended`.
     pub fn run(mut self, ended: &AtomicBool) {
         let mut due = Instant::now();
+        let (mut hands, mut hands_due) = (Vec::new(), due);
         while !ended.load(Ordering::Relaxed) {
             match self
                 .told
@@ -111,7 +113,12 @@ impl Viewer {
             if Instant::now() >= due {
                 due = Instant::now() + PICTURE;
                 self.dashboard.elapse(now_us());
-                if let Ok(json) = serde_json::to_string(&Picture::of(&self.dashboard)) {
+                if Instant::now() >= hands_due {
+                    hands_due = Instant::now() + HANDS;
+                    hands = hand::hands();
+                }
+                let picture = Picture::of(&self.dashboard, hands.clone());
+                if let Ok(json) = serde_json::to_string(&picture) {
                     self.newest.put(json);
                 }
             }
@@ -128,5 +135,41 @@ impl Viewer {
         };
         self.foxglove.on_event(role, &event, at_us);
         self.dashboard.on(now_us, role, event);
+    }
+}
+
+type Taken = (FoxgloveServer, (TcpListener, SocketAddr));
+
+/// Takes the pair of ports that is asked for, or the first one that is free.
+fn take_ports(address: IpAddr, port: Option<u16>) -> Result<Taken, LiveError> {
+    let take = |port: u16| {
+        let beside = if port == 0 { 0 } else { port.saturating_add(1) };
+        let page = page::listen(address, beside)?;
+        Ok((FoxgloveServer::start(address, port)?, page))
+    };
+    let first = take(port.unwrap_or(PORT));
+    if first.is_ok() || port.is_some() {
+        return first;
+    }
+    let mut next = (1..PAIRS).map(|pair| take(PORT + 2 * pair));
+    next.find(Result::is_ok).unwrap_or(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_program_takes_other_ports_unless_these_are_asked_for() {
+        let here = IpAddr::from([127, 0, 0, 1]);
+        // Another program may have it already: all the better.
+        let taken = TcpListener::bind((here, PORT + 1));
+        let (foxglove, (_, page)) = take_ports(here, None).expect("others are free");
+        assert_ne!(foxglove.port(), PORT);
+        assert_eq!(page.port(), foxglove.port() + 1);
+        let refused = take_ports(here, Some(PORT)).map(|_| ());
+        let words = refused.expect_err("it is taken").to_string();
+        assert!(words.contains("give another one with --port"), "{words}");
+        drop(taken);
     }
 }

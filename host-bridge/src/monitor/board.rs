@@ -1,6 +1,6 @@
 //! What is known of one board.
 
-use protocol::{Configuration, PortCounters, Role, Status};
+use protocol::{Configuration, PortCounters, Role, Status, Trip};
 
 use crate::link::Clocks;
 use crate::state::State;
@@ -14,6 +14,8 @@ pub struct Board {
     pub state: Option<State>,
     /// What it said of itself last, and when, in µs of [`crate::host_clock::now_us`].
     pub status: Option<(u64, Status)>,
+    /// What has stopped a sensor board's arm for good; none while it may follow, or is not known.
+    pub arm_stopped: Option<Trip>,
     /// Its configuration, once it was asked for.
     pub configuration: Option<Configuration>,
     /// What this program's end of the line counts; none where a recording is watched.
@@ -31,6 +33,7 @@ impl Board {
             role,
             state: None,
             status: None,
+            arm_stopped: None,
             configuration: None,
             counters: None,
             clocks: None,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use protocol::{
     ACTUATORS, DisplayState, Estimate, GAUGES, Gauges, Message, Motion, PortCounters, Role,
-    RoleCounters,
+    RoleCounters, Trip,
 };
 
 use super::board::Board;
@@ -148,7 +148,9 @@ impl Dashboard {
                 self.hear(role, at_us, &message);
             }
             Event::Restarted => {
-                self.board_mut(role).clocks = None;
+                let board = self.board_mut(role);
+                board.clocks = None;
+                board.arm_stopped = None;
                 self.fingertip.restart();
                 self.orders(role).read();
                 self.log(role, LogEvent::Restarted);
@@ -350,11 +352,14 @@ impl Dashboard {
             (Role::Sensor, Message::Gauges(gauges)) => self.on_gauges(at_us, gauges),
             (Role::Display, Message::Motion(motion)) => self.on_motion(at_us, motion),
             (Role::Display, Message::Safety(safety)) => self.turn(safety.state),
+            (Role::Sensor, Message::Arm(arm)) => self.on_arm(arm.state.trip()),
             (_, Message::Stopped(_)) => self.on_stopped(role),
             (_, Message::Status(status)) => {
                 self.board_mut(role).status = Some((at_us, *status));
-                if let (Role::Display, RoleCounters::Display(counters)) = (role, &status.role) {
-                    self.turn(counters.state);
+                match (role, &status.role) {
+                    (Role::Display, RoleCounters::Display(counters)) => self.turn(counters.state),
+                    (Role::Sensor, RoleCounters::Sensor(counters)) => self.on_arm(counters.stopped),
+                    _ => {}
                 }
             }
             (_, Message::Configuration(report)) => {
@@ -426,10 +431,19 @@ impl Dashboard {
         self.log(Role::Display, LogEvent::Safety(state));
     }
 
+    /// The sensor board says what has stopped its arm, be it news or not.
+    fn on_arm(&mut self, stopped: Option<Trip>) {
+        let before = std::mem::replace(&mut self.sensor.arm_stopped, stopped);
+        if let Some(trip) = stopped.filter(|_| stopped != before) {
+            self.log(Role::Sensor, LogEvent::ArmStopped(trip));
+        }
+    }
+
     /// The board is not there, or not understood.
     fn lose(&mut self, role: Role) {
         let board = self.board_mut(role);
         board.clocks = None;
+        board.arm_stopped = None;
         board.configuration = None;
         self.orders(role).lost();
         if role == Role::Display {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use protocol::{GaugeHealth, PortCounters, RoleCounters};
+use protocol::{GaugeHealth, PortCounters, RoleCounters, Trip};
 use serde_json::{Value, json};
 
 use super::board::Board;
@@ -122,6 +122,7 @@ pub fn second_json(dashboard: &Dashboard) -> Value {
         "display": board_json(&dashboard.display, dashboard.now_us),
         "estimate": estimate,
         "motion": motion,
+        "arm_stopped": dashboard.sensor.arm_stopped.map(Trip::name),
         "supervisor": supervisor,
         "ports": ports,
     })
@@ -145,6 +146,7 @@ pub fn happening_json(log_entry: &LogEntry) -> Value {
             object["state"] = state.name().into();
             object["reason"] = state.reason().into();
         }
+        LogEvent::ArmStopped(trip) => object["reason"] = trip.name().into(),
         LogEvent::Log { level, text } => {
             object["level"] = (*level).into();
             object["text"] = text.as_str().into();

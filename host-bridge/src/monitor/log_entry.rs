@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use protocol::{DisplayState, Role};
+use protocol::{ArmState, DisplayState, Role, Trip};
 
 use crate::state::State;
 
@@ -24,6 +24,8 @@ pub enum LogEvent {
     Link(State),
     /// The supervisor's state is another.
     Safety(DisplayState),
+    /// The sensor board's arm drive is off for good.
+    ArmStopped(Trip),
     /// The board has started anew.
     Restarted,
     /// The board's firmware has logged a line.
@@ -46,6 +48,7 @@ impl LogEvent {
         match self {
             Self::Link(_) => "link",
             Self::Safety(_) => "safety",
+            Self::ArmStopped(_) => "arm-stopped",
             Self::Restarted => "restarted",
             Self::Log { .. } => "log",
             Self::LogLost { .. } => "log-lost",
@@ -57,7 +60,7 @@ impl LogEvent {
         match self {
             Self::Link(state) => state.advice().is_some(),
             Self::Safety(state) => matches!(state, DisplayState::Stopped(_)),
-            Self::Restarted | Self::LogLost { .. } => true,
+            Self::ArmStopped(_) | Self::Restarted | Self::LogLost { .. } => true,
             Self::Log { level, .. } => matches!(level, Some("error" | "warn")),
         }
     }
@@ -75,6 +78,7 @@ impl fmt::Display for LogEvent {
                 }
             }
             Self::Safety(state) => write!(f, "{state}"),
+            Self::ArmStopped(trip) => write!(f, "arm {}", ArmState::Stopped(*trip)),
             Self::Restarted => f.write_str("has started anew"),
             Self::Log { level, text } => match level {
                 Some(level) => write!(f, "{level}: {text}"),

@@ -11,8 +11,6 @@ use std::time::{Duration, Instant};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event as Typed, KeyEventKind};
 
-use protocol::{Stop, StopReason};
-
 use super::MonitorError;
 use super::dashboard::Dashboard;
 use super::draw::draw;
@@ -21,7 +19,7 @@ use super::live_recording::LiveRecording;
 use super::session::Session;
 use super::theme::Theme;
 use super::view::{Kept, View};
-use crate::link::LinkSender;
+use crate::link::{LinkSender, stop_all};
 
 /// Between two pictures: 30 a second.
 const FRAME: Duration = Duration::from_nanos(1_000_000_000 / 30);
@@ -146,12 +144,7 @@ fn listen(boards: Vec<LinkSender>) -> Receiver<Typed> {
                 && key.kind != KeyEventKind::Release
                 && is_stop(*key)
             {
-                for board in &boards {
-                    // What can't be said yet is said as soon as it can.
-                    let _ = board.stop(Stop {
-                        reason: StopReason::Operator,
-                    });
-                }
+                stop_all(&boards);
             }
             if events.send(event).is_err() {
                 return;

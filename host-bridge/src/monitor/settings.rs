@@ -2,7 +2,7 @@
 
 use protocol::{Configuration, DisplayConfiguration, Refusal, Role, SensorConfiguration};
 
-use super::words::{METHODS, MODES, RATES, SWITCH, word};
+use super::words::{METHODS, MODES, RATES, RENDERINGS, SWITCH, word};
 
 /// How a setting is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -200,8 +200,9 @@ pub static SENSOR: [Setting; 10] = [
 ];
 
 /// The display board's settings, but for its array, which takes more than a line to describe.
-pub static DISPLAY: [Setting; 9] = [
+pub static DISPLAY: [Setting; 11] = [
     choice!(display, display_mut, mode, "", MODES),
+    choice!(display, display_mut, rendering, "", RENDERINGS),
     choice!(display, display_mut, update_rate, "Hz", RATES),
     number!(display, display_mut, max_age_ms, "ms"),
     number!(display, display_mut, fade_in_ms, "ms"),
@@ -209,6 +210,7 @@ pub static DISPLAY: [Setting; 9] = [
     number!(display, display_mut, glide_ms, "ms"),
     number!(display, display_mut, amplitude_mv, "mV"),
     number!(display, display_mut, reference_lsb, "LSB"),
+    number!(display, display_mut, reference_mn, "mN"),
     number!(display, display_mut, full_drive_s, "s"),
 ];
 

@@ -1,6 +1,6 @@
 //! The wire's words in those of the field.
 
-use protocol::{Configuration, Contact, Method, Mode, Range, UpdateRate};
+use protocol::{Configuration, Contact, Method, Mode, Range, Rendering, UpdateRate};
 
 /// The paper's range.
 pub const fn range(range: Range) -> &'static str {
@@ -30,6 +30,13 @@ pub const METHODS: [(&str, Method); 4] = [
 
 /// Every mode, by its word.
 pub const MODES: [(&str, Mode); 2] = [("uniform", Mode::Uniform), ("travelling", Mode::Travelling)];
+
+/// Every rendering, by its word.
+pub const RENDERINGS: [(&str, Rendering); 3] = [
+    ("fundamental", Rendering::Fundamental),
+    ("shape", Rendering::Shape),
+    ("texture", Rendering::Texture),
+];
 
 /// Every rate of updates, by its word.
 pub const RATES: [(&str, UpdateRate); 2] =

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// Every file with a type that a row is made of.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 16] = [
     include_str!("row/configuration.rs"),
     include_str!("row/estimate.rs"),
     include_str!("row/gauges.rs"),
     include_str!("row/link.rs"),
     include_str!("row/log.rs"),
     include_str!("row/status.rs"),
+    include_str!("row/texture.rs"),
     include_str!("../../../protocol/src/actuators.rs"),
     include_str!("../../../protocol/src/configuration.rs"),
     include_str!("../../../protocol/src/hello.rs"),
@@ -20,6 +21,7 @@ const SOURCES: [&str; 14] = [
     include_str!("../../../protocol/src/refusal.rs"),
     include_str!("../../../protocol/src/safety.rs"),
     include_str!("../../../protocol/src/status.rs"),
+    include_str!("../../../protocol/src/texture.rs"),
 ];
 /// How many descriptions may refer to each other in a row.
 const DEEPEST: usize = 4;

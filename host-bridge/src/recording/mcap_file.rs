@@ -212,3 +212,122 @@ impl McapFile {
         self.sink.failed(source)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use protocol::{
+        CHANNELS, Contact, Estimate, GAUGE_BLOCK, GaugeHealth, GaugeSample, Gauges, Message,
+        Motion, Range, Role,
+    };
+
+    use super::super::row_builder::RowBuilder;
+    use super::*;
+    use crate::link::Event;
+
+    const MINUTE_US: u64 = 60_000_000;
+    /// Of the gauges' noise, in sixteenths.
+    const ADC_STEP: f64 = 16.0;
+
+    /// Numbers as noise has them, the same each time: a generator of Lehmer's, twelve draws a number.
+    struct Noise(u64);
+
+    impl Noise {
+        fn of(&mut self, deviation: f64) -> f64 {
+            let sum: f64 = (0..12)
+                .map(|_| {
+                    self.0 = self.0 * 48_271 % 0x7fff_ffff;
+                    self.0 as f64 / f64::from(0x7fff_ffff_u32)
+                })
+                .sum();
+            (sum - 6.0) * deviation
+        }
+    }
+
+    /// What both boards say at `at_us` of a minute of rubbing: 50 mm/s at 0.5 Hz over 2 mm.
+    fn said(at_us: u64, noise: &mut Noise) -> Vec<(Role, Message)> {
+        let place_um = |us: u64| 16_000.0 * (TAU * 0.5 * us as f64 / 1e6).sin();
+        let speed_um_s = TAU * 0.5 * 16_000.0 * (TAU * 0.5 * at_us as f64 / 1e6).cos();
+        let mut said = Vec::new();
+        if at_us.is_multiple_of(2_000) {
+            let motion = Motion {
+                sequence: (at_us / 2_000) as u32,
+                instant_us: 7_000_000 + at_us,
+                // The encoder's steps.
+                position_um: (place_um(at_us) / 5.0) as i64 * 5,
+                velocity_um_s: (speed_um_s + noise.of(300.0)) as i32,
+            };
+            said.push((Role::Display, Message::Motion(motion)));
+        }
+        if at_us.is_multiple_of(8_000) {
+            let samples = std::array::from_fn(|sample| {
+                let us = at_us + sample as u64 * 1_000;
+                let codes = std::array::from_fn::<_, CHANNELS, _>(|gauge| {
+                    let turn = TAU * (place_um(us) / 2_000.0 + gauge as f64 / 5.0);
+                    (32_768.0 + 3_000.0 * turn.sin() + noise.of(ADC_STEP)) as u16
+                });
+                GaugeSample {
+                    codes,
+                    travel_um: (place_um(us) - place_um(us.saturating_sub(1_000))) as i16,
+                }
+            });
+            let gauges = Gauges {
+                first_sample: (at_us / 8_000) as u32 * GAUGE_BLOCK as u32,
+                instant_us: 9_000_000 + at_us,
+                position_um: place_um(at_us) as i64,
+                samples,
+            };
+            said.push((Role::Sensor, Message::Gauges(gauges)));
+        }
+        if at_us.is_multiple_of(10_000) {
+            let estimate = Estimate {
+                sequence: (at_us / 10_000) as u32,
+                instant_us: 9_000_000 + at_us,
+                wavelength_mm: Some(2.0 + noise.of(0.01) as f32),
+                confidence: 0.9 + noise.of(0.02) as f32,
+                valid: true,
+                range: Range::T1,
+                contact: Contact::Slip,
+                counted_mm: Some(2.0 + noise.of(0.1) as f32),
+                amplitude_lsb: 90.0 + noise.of(5.0) as f32,
+                velocity_um_s: speed_um_s as i32,
+                lag_um: Some(noise.of(50.0) as i32),
+                gauges_used: 0b1_1111,
+                health: [GaugeHealth::Good; 5],
+            };
+            said.push((Role::Sensor, Message::Estimate(estimate)));
+        }
+        said
+    }
+
+    #[test]
+    fn an_hour_of_everything_is_no_larger_than_it_was() {
+        // Not kept: it goes with its end.
+        let path = std::env::temp_dir().join(format!("minute-{}.mcap", std::process::id()));
+        let made = McapFile::create(&path, true, BTreeMap::new());
+        let mut file = made.unwrap_or_else(|error| panic!("{error}"));
+        let once = file.safe_bytes();
+        let mut rows = RowBuilder::default();
+        let mut noise = Noise(1);
+        for at_us in (0..MINUTE_US).step_by(1_000) {
+            for (role, message) in said(at_us, &mut noise) {
+                let event = Event::Heard { at_us, message };
+                rows.enter(role, &event, at_us, |entry| file.write(&entry))
+                    .unwrap_or_else(|error| panic!("{error}"));
+            }
+            // As often as a recording makes safe what it has.
+            if at_us % 1_000_000 == 999_000 {
+                file.sync().unwrap_or_else(|error| panic!("{error}"));
+            }
+        }
+        assert_eq!(rows.tally().messages, 60 * (500 + 125 + 100));
+        let bytes = file.finish().unwrap_or_else(|error| panic!("{error}"));
+        let hour_mb = (bytes - once) as f64 * 60.0 / 1e6;
+        println!("{hour_mb:.1} MB an hour");
+        assert!(
+            (100.0..=136.0).contains(&hour_mb),
+            "{hour_mb:.1} MB an hour"
+        );
+    }
+}

@@ -13,6 +13,7 @@ mod log;
 mod number;
 mod status;
 mod text;
+mod texture;
 
 pub use configuration::{DisplayReportRow, SensorReportRow};
 pub use estimate::EstimateRow;
@@ -21,6 +22,7 @@ pub use link::{ClockRow, HelloRow, LinkEvent, LinkRow, Lost, OtherRow};
 pub use log::{LEVELS, LogRow, Time};
 pub use status::{DisplayStatusRow, SafetyRow, SensorStatusRow, Stand, StandName};
 pub use text::Text;
+pub use texture::TextureRow;
 
 macro_rules! rows {
     ($($(#[$doc:meta])* $kind:ident($row:ty): $name:literal),* $(,)?) => {
@@ -86,6 +88,8 @@ macro_rules! rows {
 rows! {
     /// The surface, as the sensor sees it.
     Estimate(EstimateRow): "estimate",
+    /// The surface besides its wavelength.
+    Texture(TextureRow): "texture",
     /// The operator's hand.
     Motion(Motion): "motion",
     /// Samples of the gauges.
@@ -113,8 +117,9 @@ rows! {
 }
 
 /// Every channel of a recording: whose, and of what.
-pub const CHANNELS: [(Role, Kind); 18] = [
+pub const CHANNELS: [(Role, Kind); 19] = [
     (Role::Sensor, Kind::Estimate),
+    (Role::Sensor, Kind::Texture),
     (Role::Sensor, Kind::Gauges),
     (Role::Sensor, Kind::SensorStatus),
     (Role::Sensor, Kind::SensorConfiguration),

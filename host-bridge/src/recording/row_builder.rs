@@ -244,6 +244,9 @@ fn row(role: Role, message: &Message, at_us: u64, board: &mut Board) -> (Row, Op
             Row::Estimate(EstimateRow::from(*estimate)),
             Some(estimate.instant_us),
         ),
+        (Role::Sensor, Message::Texture(texture)) => {
+            (Row::Texture((*texture).into()), Some(texture.instant_us))
+        }
         (Role::Sensor, Message::Gauges(gauges)) => {
             (Row::Gauges(gauges.into()), Some(gauges.instant_us))
         }

@@ -26,6 +26,8 @@ pub struct Sink {
 /// What writes to it: nothing more once a write has failed, so that what is safe stays as it is.
 pub struct SinkWriter {
     file: File,
+    /// How far it has come: a pipe can't tell.
+    at: u64,
     full: Arc<AtomicBool>,
 }
 
@@ -94,6 +96,7 @@ impl Sink {
         let file = self.file.try_clone();
         Ok(SinkWriter {
             file: file.map_err(|source| RecordingError::not_made(&self.path, source))?,
+            at: 0,
             full: Arc::clone(&self.full),
         })
     }
@@ -164,10 +167,10 @@ impl Write for SinkWriter {
             return Err(io::Error::other("an earlier write has failed"));
         }
         let written = self.file.write(bytes);
-        if let Err(error) = &written
-            && error.kind() != io::ErrorKind::Interrupted
-        {
-            self.full.store(true, Ordering::Relaxed);
+        match &written {
+            Ok(count) => self.at += *count as u64,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(_) => self.full.store(true, Ordering::Relaxed),
         }
         written
     }
@@ -178,7 +181,11 @@ impl Write for SinkWriter {
 }
 
 impl Seek for SinkWriter {
+    /// Where it stands, and nowhere else: what is in the file is never touched again.
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
+        match to {
+            SeekFrom::Current(0) => Ok(self.at),
+            _ => Err(io::ErrorKind::Unsupported.into()),
+        }
     }
 }

@@ -1,24 +1,41 @@
-//! Where a bridge listens or connects: `tcp/HOST:PORT` or `tls/HOST:PORT`.
+//! Where a bridge listens or connects: `tcp/HOST:PORT`, `udp/HOST:PORT`, or with certificates `tls/HOST:PORT`.
 
 use std::fmt;
 use std::io;
-use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, TcpListener, ToSocketAddrs, UdpSocket};
 use std::str::FromStr;
 
 /// How bytes travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Security {
-    /// Open: whoever reaches the port takes part.
+pub enum Carrier {
+    /// One stream, open: whoever reaches the port takes part.
     Tcp,
-    /// Encrypted, with certificates on both ends.
+    /// One stream, encrypted, with certificates on both ends.
     Tls,
+    /// The same, and beside it UDP datagrams at the same port for what only the newest of matters: what is lost holds
+    /// up nothing.
+    Udp,
+}
+
+impl Carrier {
+    /// All.
+    const ALL: [Self; 3] = [Self::Tcp, Self::Tls, Self::Udp];
+
+    /// What endpoints of it begin with.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tcp => "tcp",
+            Self::Tls => "tls",
+            Self::Udp => "udp",
+        }
+    }
 }
 
 /// One end of a connection, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Endpoint {
     /// How bytes travel.
-    pub security: Security,
+    pub carrier: Carrier,
     /// A name, an IPv4 address, or an IPv6 address in brackets.
     pub host: String,
     /// The port, 1 or above.
@@ -28,8 +45,10 @@ pub struct Endpoint {
 /// Why a word is no endpoint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum EndpointError {
-    /// There is no `tcp/` or `tls/` in front.
-    #[error("say tcp/HOST:PORT, or tls/HOST:PORT with certificates, e.g. tcp/192.168.1.20:7447")]
+    /// None of `tcp/`, `udp/` and `tls/` is in front.
+    #[error(
+        "say tcp/HOST:PORT or udp/HOST:PORT, or tls/HOST:PORT with certificates, e.g. tcp/192.168.1.20:7447"
+    )]
     Transport,
     /// There is no port behind the last colon.
     #[error("no port from 1 to 65535 behind the host, e.g. tcp/192.168.1.20:7447")]
@@ -46,11 +65,11 @@ impl FromStr for Endpoint {
     type Err = EndpointError;
 
     fn from_str(given: &str) -> Result<Self, EndpointError> {
-        let (security, rest) = match given.split_once('/') {
-            Some(("tcp", rest)) => (Security::Tcp, rest),
-            Some(("tls", rest)) => (Security::Tls, rest),
-            _ => return Err(EndpointError::Transport),
-        };
+        let (name, rest) = given.split_once('/').ok_or(EndpointError::Transport)?;
+        let carrier = Carrier::ALL
+            .into_iter()
+            .find(|carrier| carrier.name() == name)
+            .ok_or(EndpointError::Transport)?;
         let (host, port) = rest.rsplit_once(':').ok_or(EndpointError::Port)?;
         let port = port.parse().map_err(|_| EndpointError::Port)?;
         if port == 0 {
@@ -72,7 +91,7 @@ impl FromStr for Endpoint {
             });
         }
         Ok(Self {
-            security,
+            carrier,
             host: host.to_owned(),
             port,
         })
@@ -92,15 +111,20 @@ impl Endpoint {
 
 impl fmt::Display for Endpoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let security = match self.security {
-            Security::Tcp => "tcp",
-            Security::Tls => "tls",
-        };
-        write!(f, "{security}/{}:{}", self.host, self.port)
+        write!(f, "{}/{}:{}", self.carrier.name(), self.host, self.port)
     }
 }
 
 impl Endpoint {
+    /// Where its stream goes, in the engine's words.
+    pub fn locator(&self) -> String {
+        let stream = match self.carrier {
+            Carrier::Udp => Carrier::Tcp,
+            stream => stream,
+        };
+        format!("{}/{}:{}", stream.name(), self.host, self.port)
+    }
+
     /// The addresses behind the name, at this moment.
     ///
     /// # Errors
@@ -115,7 +139,11 @@ impl Endpoint {
     /// # Errors
     /// The system's.
     pub fn try_listening(&self) -> io::Result<()> {
-        TcpListener::bind(&self.resolve()?[..]).map(drop)
+        let addresses = &self.resolve()?[..];
+        if self.carrier == Carrier::Udp {
+            UdpSocket::bind(addresses)?;
+        }
+        TcpListener::bind(addresses).map(drop)
     }
 }
 
@@ -125,7 +153,12 @@ mod tests {
 
     #[test]
     fn endpoints_are_read_and_written_alike() {
-        for good in ["tcp/localhost:7447", "tls/10.0.0.7:1", "tcp/[::1]:65535"] {
+        for good in [
+            "tcp/localhost:7447",
+            "tls/10.0.0.7:1",
+            "tcp/[::1]:65535",
+            "udp/localhost:7447",
+        ] {
             let endpoint: Endpoint = good.parse().expect("an endpoint");
             assert_eq!(endpoint.to_string(), good);
         }
@@ -135,7 +168,7 @@ mod tests {
     fn what_is_wrong_with_an_endpoint_is_named() {
         let error = |given: &str| given.parse::<Endpoint>().expect_err("no endpoint");
         assert_eq!(error("localhost:7447"), EndpointError::Transport);
-        assert_eq!(error("udp/localhost:7447"), EndpointError::Transport);
+        assert_eq!(error("ws/localhost:7447"), EndpointError::Transport);
         assert_eq!(error("tcp/localhost"), EndpointError::Port);
         assert_eq!(error("tcp/localhost:0"), EndpointError::Port);
         assert_eq!(error("tcp/localhost:65536"), EndpointError::Port);
@@ -150,10 +183,13 @@ mod tests {
 
     #[test]
     fn a_port_in_use_is_noticed_before_the_engine_is_started() {
-        let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let port = taken.local_addr().expect("an address").port();
-        let endpoint: Endpoint = format!("tcp/127.0.0.1:{port}").parse().expect("one");
-        let error = endpoint.try_listening().expect_err("it is taken");
-        assert_eq!(error.kind(), io::ErrorKind::AddrInUse);
+        let tcp = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let udp = UdpSocket::bind("127.0.0.1:0").expect("a port");
+        for (name, taken) in [("tcp", tcp.local_addr()), ("udp", udp.local_addr())] {
+            let taken = taken.expect("an address");
+            let endpoint: Endpoint = format!("{name}/{taken}").parse().expect("one");
+            let error = endpoint.try_listening().expect_err("it is taken");
+            assert_eq!(error.kind(), io::ErrorKind::AddrInUse);
+        }
     }
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::relay::gate::SequenceNumber;
 
 /// The version of everything in this file.
-pub const ENVELOPE_VERSION: u8 = 3;
+pub const ENVELOPE_VERSION: u8 = 4;
 
 /// Bytes in front of the content.
 const HEADER: usize = HELLO_LENGTH + 1 + 3 * size_of::<u64>();
@@ -33,7 +33,7 @@ pub enum Content {
     Board {
         /// Counts the starts of the board, as its bridge sees them.
         start: u32,
-        /// An estimate from a sensor, a motion from a display.
+        /// An estimate or a texture from a sensor, a motion from a display.
         message: Message,
     },
     /// Asks for a pong.
@@ -44,6 +44,8 @@ pub enum Content {
         to: u64,
         /// The answer.
         pong: Pong,
+        /// Whether who asked holds the bench.
+        holds: bool,
     },
     /// An operator's Stop; repeated until it is heard.
     Stop {
@@ -74,6 +76,8 @@ pub enum Content {
     Greeting(Hello),
     /// Anything that the board said, for who watches; in no way for the other board.
     Shown(Message),
+    /// Who holds the bench hands it over to who waits for it.
+    HandOver,
 }
 
 /// One thing said by one bridge to the other.
@@ -186,15 +190,17 @@ fn number(bytes: &[u8]) -> Result<(u64, &[u8]), EnvelopeError> {
 pub fn is_carried(role: Role, message: &Message) -> bool {
     match (role, message) {
         (Role::Sensor, Message::Estimate(estimate)) => is_finite(estimate),
+        (Role::Sensor, Message::Texture(texture)) => texture.is_sound(),
         (Role::Display, Message::Motion(_)) => true,
         _ => false,
     }
 }
 
-/// What its board says of the place of a message that is carried.
+/// What its board says of the place of a message that is carried: a texture comes after the estimate that it was made with.
 pub const fn sequence_number(start: u32, message: &Message) -> Option<SequenceNumber> {
     let sequence = match message {
-        Message::Estimate(estimate) => estimate.sequence,
+        Message::Estimate(estimate) => estimate.sequence.wrapping_mul(2),
+        Message::Texture(texture) => texture.sequence.wrapping_mul(2).wrapping_add(1),
         Message::Motion(motion) => motion.sequence,
         _ => return None,
     };
@@ -282,6 +288,7 @@ mod tests {
                         received_us: id,
                         answered_us: id,
                     },
+                    holds: true,
                 },
             ),
             of(Role::Host, Content::Stop { id, stop }),
@@ -298,6 +305,7 @@ mod tests {
             of(Role::Display, Content::Watch),
             of(Role::Sensor, Content::Greeting(host_hello())),
             of(Role::Sensor, Content::Shown(Message::Estimate(estimate()))),
+            of(Role::Display, Content::HandOver),
         ]
     }
 

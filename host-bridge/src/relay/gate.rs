@@ -1,9 +1,14 @@
 //! Nothing old after something newer: which envelopes of a stream may pass, and what became of the rest.
 
+use std::collections::VecDeque;
+
 /// How far back a late envelope is told from one that came twice.
 const WINDOW: u64 = 128;
 /// Whoever holds a stream keeps it for so long after it was heard last, in µs; then another may have it.
 pub const LEASE_US: u64 = 1_000_000;
+
+/// How many that held the stream before are remembered.
+const PAST: usize = 8;
 
 /// What an envelope's place says about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,11 +49,9 @@ pub struct SequenceNumber {
     pub sequence: u32,
 }
 
-/// The order of one stream.
-#[derive(Clone, Debug, Default)]
-pub struct Gate {
-    /// Who holds the stream, and when it was heard last, in µs.
-    holder: Option<(u64, u64)>,
+/// How far one bridge's stream has come.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stream {
     /// The newest envelope's number, once there is one.
     newest: Option<u64>,
     /// Bit b set: number `newest - b` was skipped and is still missing.
@@ -56,6 +59,32 @@ pub struct Gate {
     /// How many numbers before the newest belong to this session, below [`WINDOW`].
     depth: u64,
     last: Option<SequenceNumber>,
+}
+
+/// A bridge, and when it was heard last, in µs.
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    session: u64,
+    at_us: u64,
+}
+
+impl Heard {
+    const fn is_silent(self, now_us: u64) -> bool {
+        now_us.saturating_sub(self.at_us) >= LEASE_US
+    }
+}
+
+/// The order of one stream, and whose it is.
+#[derive(Clone, Debug, Default)]
+pub struct Gate {
+    /// Who holds the stream.
+    holder: Option<Heard>,
+    /// Who would have it next.
+    waiting: Option<Heard>,
+    stream: Stream,
+    /// Those that held it before, the newest first, and how far they came; none for one that has left for good. So
+    /// nothing that they said before passes again, whoever repeats it.
+    past: VecDeque<(u64, Option<Stream>)>,
     arrivals: Arrivals,
 }
 
@@ -72,42 +101,68 @@ impl Gate {
             Order::Newer => {}
             other => return other,
         }
-        let repeats = self.last.is_some_and(|last| {
+        let repeats = self.stream.last.is_some_and(|last| {
             sequence_number.start == last.start && !follows(sequence_number, last)
         });
         if repeats {
             self.arrivals.superseded += 1;
             return Order::Repeated;
         }
-        self.last = Some(sequence_number);
+        self.stream.last = Some(sequence_number);
         Order::Newer
     }
 
     /// Whether the bridge of `session` holds the stream.
     pub fn is_holder(&self, session: u64) -> bool {
-        self.holder.is_some_and(|(holder, _)| holder == session)
+        self.holder.is_some_and(|holder| holder.session == session)
     }
 
     /// The bridge of `session` was heard at `now_us`. It gets the stream if nobody holds it, or if who holds it
-    /// has not been heard for [`LEASE_US`]: true if it got it just now.
+    /// has not been heard for [`LEASE_US`]: true if it got it just now. Who has left never gets it again.
     pub fn ask(&mut self, session: u64, now_us: u64) -> bool {
-        match &mut self.holder {
-            Some((holder, heard_us)) if *holder == session => {
-                *heard_us = now_us;
-                false
+        let heard = Heard {
+            session,
+            at_us: now_us,
+        };
+        match self.holder {
+            Some(holder) if holder.session == session => {
+                self.holder = Some(heard);
+                return false;
             }
-            Some((_, heard_us)) if now_us.saturating_sub(*heard_us) < LEASE_US => false,
+            _ if self.has_left(session) => return false,
+            Some(holder) if !holder.is_silent(now_us) => {}
             _ => {
-                self.begin(session, now_us);
+                self.begin(heard);
+                return true;
+            }
+        }
+        let is_next = self
+            .waiting
+            .is_none_or(|waiting| waiting.session == session || waiting.is_silent(now_us));
+        if is_next {
+            self.waiting = Some(heard);
+        }
+        false
+    }
+
+    /// The bridge of `session` hands the stream over to who waits for it, at `now_us`: true if it was its own to
+    /// hand over, and somebody waits.
+    pub fn hand_over(&mut self, session: u64, now_us: u64) -> bool {
+        let next = self.waiting.filter(|waiting| !waiting.is_silent(now_us));
+        match next {
+            Some(next) if self.is_holder(session) => {
+                self.begin(next);
                 true
             }
+            _ => false,
         }
     }
 
-    /// The bridge of `session` leaves: another may have the stream at once.
+    /// The bridge of `session` leaves for good: another may have the stream at once.
     pub fn leave(&mut self, session: u64) {
         if self.is_holder(session) {
             self.holder = None;
+            self.remember(session, None);
         }
     }
 
@@ -117,17 +172,30 @@ impl Gate {
     }
 
     /// Another bridge speaks from now on.
-    fn begin(&mut self, session: u64, now_us: u64) {
-        self.holder = Some((session, now_us));
-        self.newest = None;
-        self.missing = 0;
-        self.depth = 0;
-        self.last = None;
+    fn begin(&mut self, next: Heard) {
+        if let Some(before) = self.holder.replace(next) {
+            self.remember(before.session, Some(self.stream));
+        }
+        self.waiting = None;
+        let known = self.past.iter().find(|(past, _)| *past == next.session);
+        self.stream = known.and_then(|(_, stream)| *stream).unwrap_or_default();
+    }
+
+    fn remember(&mut self, session: u64, stream: Option<Stream>) {
+        self.past.retain(|(past, _)| *past != session);
+        self.past.truncate(PAST - 1);
+        self.past.push_front((session, stream));
+    }
+
+    fn has_left(&self, session: u64) -> bool {
+        self.past
+            .iter()
+            .any(|(past, stream)| *past == session && stream.is_none())
     }
 
     fn place(&mut self, counter: u64) -> Order {
-        let Some(newest) = self.newest else {
-            self.newest = Some(counter);
+        let Some(newest) = self.stream.newest else {
+            self.stream.newest = Some(counter);
             return Order::Newer;
         };
         if let Some(ahead @ 1..) = counter.checked_sub(newest) {
@@ -135,24 +203,24 @@ impl Gate {
             // The skipped ones are bits 1 to ahead - 1.
             let moved = u32::try_from(ahead)
                 .ok()
-                .and_then(|ahead| self.missing.checked_shl(ahead))
+                .and_then(|ahead| self.stream.missing.checked_shl(ahead))
                 .unwrap_or(0);
             let skipped = 1_u128
                 .checked_shl(u32::try_from(ahead).unwrap_or(u32::MAX))
                 .map_or(u128::MAX, |bit| bit - 1);
-            self.missing = moved | (skipped & !1);
-            self.newest = Some(counter);
-            self.depth = self.depth.saturating_add(ahead).min(WINDOW - 1);
+            self.stream.missing = moved | (skipped & !1);
+            self.stream.newest = Some(counter);
+            self.stream.depth = self.stream.depth.saturating_add(ahead).min(WINDOW - 1);
             return Order::Newer;
         }
         let behind = newest - counter;
         let bit = 1_u128 << behind.min(WINDOW - 1);
-        if behind < WINDOW && self.missing & bit != 0 {
-            self.missing &= !bit;
+        if behind < WINDOW && self.stream.missing & bit != 0 {
+            self.stream.missing &= !bit;
             self.arrivals.lost -= 1;
             self.arrivals.late += 1;
             Order::Late
-        } else if behind > self.depth {
+        } else if behind > self.stream.depth {
             // Older than can be remembered, or than the first that was heard.
             self.arrivals.late += 1;
             Order::Late
@@ -279,6 +347,38 @@ mod tests {
         gate.leave(2);
         assert!(gate.ask(1, 6 + LEASE_US));
         assert_eq!(gate.judge(1, 9, said(9)), Order::Newer);
+    }
+
+    #[test]
+    fn a_stream_is_handed_over_by_its_holder_to_who_waits_and_by_nobody_else() {
+        let mut gate = held(1);
+        assert!(!gate.hand_over(1, 1), "nobody waits");
+        assert!(!gate.ask(2, 2));
+        assert!(!gate.ask(3, 3));
+        assert!(!gate.hand_over(2, 4), "it is not its own");
+        assert!(!gate.hand_over(3, 4), "nor this one's");
+        assert!(gate.hand_over(1, 4));
+        assert!(gate.is_holder(2), "who waits longest has it");
+        assert!(!gate.ask(1, 5), "it waits now");
+        assert!(!gate.hand_over(2, 5 + LEASE_US), "who waited is silent");
+    }
+
+    #[test]
+    fn nothing_that_a_bridge_said_passes_again_when_it_has_left_or_was_silent() {
+        let mut gate = held(1);
+        assert_eq!(gate.judge(1, 9, said(9)), Order::Newer);
+        assert!(gate.ask(2, LEASE_US), "the first one is silent");
+        assert!(gate.ask(1, 2 * LEASE_US), "and is back");
+        assert_eq!(gate.judge(1, 9, said(9)), Order::Duplicate);
+        assert_eq!(gate.judge(1, 10, said(10)), Order::Newer);
+        gate.leave(1);
+        assert!(!gate.ask(1, 9 * LEASE_US), "it has left for good");
+        assert_eq!(gate.judge(1, 11, said(11)), Order::Rival);
+        // However many there were, no more is kept of them.
+        for session in 3..1_000 {
+            assert!(gate.ask(session, session * LEASE_US * 2));
+            assert!(gate.past.len() <= PAST);
+        }
     }
 
     #[test]

@@ -24,10 +24,22 @@ pub enum Heard {
     Nothing,
     /// The board is to be told.
     Pass(Waiting),
-    /// A ping of this session is to be answered.
-    Asked(u64, Ping),
+    /// A ping is to be answered.
+    Asked {
+        /// Whose.
+        session: u64,
+        /// The ping.
+        ping: Ping,
+        /// Whether that one holds the bench.
+        holds: bool,
+    },
     /// A ping of one's own was answered.
-    Answered(Answer),
+    Answered {
+        /// The answer.
+        answer: Answer,
+        /// Whether this bridge holds the bench, as the other site sees it.
+        holds: bool,
+    },
     /// The board is to be told, and then the sender.
     Stop(u64, Stop),
     /// The Stop of this number is done at the other site: see [`Content::Stopped`].
@@ -100,14 +112,15 @@ impl Inward {
         let is_holder = self.gate.is_holder(envelope.session);
         match envelope.content {
             Content::Board { .. } => self.weigh(envelope, now_us, tell),
-            Content::Ping(ping) => Heard::Asked(envelope.session, ping),
-            Content::Pong { to, pong } => {
+            Content::Ping(ping) => Heard::Asked {
+                session: envelope.session,
+                ping,
+                holds: is_holder,
+            },
+            Content::Pong { to, pong, holds } => {
                 let is_ours = to == self.session && self.remote.is_session(envelope.session);
-                if is_ours {
-                    self.on_pong(&pong, now_us)
-                } else {
-                    Heard::Nothing
-                }
+                let answer = is_ours.then(|| self.on_pong(&pong, now_us)).flatten();
+                answer.map_or(Heard::Nothing, |answer| Heard::Answered { answer, holds })
             }
             Content::Stop { id, stop } => Heard::Stop(id, stop),
             Content::Watch => Heard::Watched,
@@ -117,6 +130,13 @@ impl Inward {
             Content::Stopped { id, trip } if is_holder => Heard::Stopped(id, trip),
             Content::Leaving => {
                 self.gate.leave(envelope.session);
+                Heard::Nothing
+            }
+            Content::HandOver => {
+                if self.gate.hand_over(envelope.session, now_us) {
+                    self.ages.forget();
+                    tell(Notice::HandedOver(self.role));
+                }
                 Heard::Nothing
             }
             // It is said again, until it is done.
@@ -200,12 +220,10 @@ impl Inward {
         }
     }
 
-    fn on_pong(&mut self, pong: &Pong, now_us: u64) -> Heard {
-        let Some(round_trip_us) = self.ages.on_pong(pong, now_us) else {
-            return Heard::Nothing;
-        };
+    fn on_pong(&mut self, pong: &Pong, now_us: u64) -> Option<Answer> {
+        let round_trip_us = self.ages.on_pong(pong, now_us)?;
         self.round_trip_us = round_trip_us;
-        Heard::Answered(Answer {
+        Some(Answer {
             sent_us: pong.sent_us,
             there_us: i128::from(pong.received_us) - i128::from(pong.sent_us),
             round_trip_us,

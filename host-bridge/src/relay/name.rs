@@ -48,10 +48,17 @@ pub enum Channel {
     Board,
     /// Pings and pongs.
     Clock,
-    /// Stops, and that they were heard.
+    /// What has to come: Stops, that they were heard, who leaves and who hands the bench over.
     Stop,
     /// All that the board says, for who watches.
     Shown,
+}
+
+impl Channel {
+    /// Whether only the newest on it matters: what the network loses of it is not sent again, and holds up nothing.
+    pub const fn is_fleeting(self) -> bool {
+        matches!(self, Self::Board | Self::Clock)
+    }
 }
 
 impl Name {

@@ -7,13 +7,16 @@ use std::time::Duration;
 use protocol::Role;
 use rustls::ClientConfig;
 use serde_json::json;
-use zenoh::{Config, Session, Wait};
+use zenoh::Session;
 
+use crate::engine::Setup;
 use crate::relay::access;
 use crate::relay::credentials::Credentials;
-use crate::relay::endpoint::{Endpoint, Security};
+use crate::relay::datagrams::Datagrams;
+use crate::relay::endpoint::{Carrier, Endpoint};
 use crate::relay::name::Name;
 use crate::relay::reach::Reach;
+use crate::relay::refused;
 pub use crate::relay::transport::NetworkError;
 use crate::relay::transport::{Connection, Subscription, Transport};
 use crate::relay::wire::Wire;
@@ -27,10 +30,6 @@ const RETRY_LONGEST: Duration = Duration::from_millis(300);
 pub const LEASE: Duration = Duration::from_secs(4);
 /// What may be sent at once, in bytes: far more than any of ours.
 const BATCH_BYTES: u16 = 4_096;
-/// Messages of a stream that may wait to be sent, 1 to 16; one that finds no room within a millisecond is
-/// lost. As many as are said while a busy computer does not get round to sending, 32 ms of motions: the
-/// engine's own two hold out for 4 ms. When a network is stuck, as little that is old comes out of it later.
-const STREAM_MESSAGES: usize = 16;
 /// Longest message that is taken from the network, in bytes: far more than any of ours.
 const MAX_MESSAGE_BYTES: u32 = 65_536;
 
@@ -60,7 +59,27 @@ impl Transport for Network {
         role: Role,
         subscriptions: Vec<Subscription>,
     ) -> Result<Box<dyn Connection>, NetworkError> {
-        let wire = Wire::new(self.open()?, name, role, subscriptions)?;
+        let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &self.ends;
+        let by_datagrams: Vec<&Endpoint> = endpoints
+            .iter()
+            .filter(|endpoint| endpoint.carrier == Carrier::Udp)
+            .collect();
+        let is_listening = matches!(self.ends, Ends::Listening(_));
+        let subscriptions = Arc::new(subscriptions);
+        let heard = Arc::clone(&subscriptions);
+        let on_datagram = move |key: &str, bytes: &[u8]| {
+            for subscription in heard.iter() {
+                if subscription.hears(key) {
+                    (subscription.on_bytes)(bytes);
+                }
+            }
+        };
+        let session = self.open()?;
+        let datagrams = Datagrams::open(&by_datagrams, is_listening, Box::new(on_datagram))
+            .map_err(|error| NetworkError::Engine {
+                reason: format!("datagrams: {error}"),
+            })?;
+        let wire = Wire::new(session, datagrams, name, role, &subscriptions)?;
         Ok(Box::new(wire))
     }
 
@@ -73,12 +92,6 @@ impl Transport for Network {
 
     fn reach(&self, endpoint: &Endpoint) -> Reach {
         Reach::of(endpoint, self.tls.as_ref())
-    }
-}
-
-fn engine(error: zenoh::Error) -> NetworkError {
-    NetworkError::Engine {
-        reason: error.to_string(),
     }
 }
 
@@ -98,19 +111,19 @@ impl Network {
         let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &ends;
         for endpoint in endpoints {
             let endpoint = endpoint.clone();
-            match (endpoint.security, &credentials) {
-                (Security::Tls, None) => {
+            match (endpoint.carrier == Carrier::Tls, &credentials) {
+                (true, None) => {
                     return Err(NetworkError::WithoutCertificates { endpoint });
                 }
-                (Security::Tcp, Some(_)) => return Err(NetworkError::Open { endpoint }),
-                (Security::Tcp, None)
+                (false, Some(_)) => return Err(NetworkError::Open { endpoint }),
+                (false, None)
                     if matches!(ends, Ends::Listening(_))
                         && !endpoint.is_loopback()
                         && !is_insecure =>
                 {
                     return Err(NetworkError::Insecure { endpoint });
                 }
-                (Security::Tls, Some(_))
+                (true, Some(_))
                     if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
                 {
                     return Err(NetworkError::Unmatched { endpoint });
@@ -148,9 +161,7 @@ impl Network {
             Ends::Connecting(_) => "client",
             Ends::Listening(_) => "peer",
         };
-        zenoh::open(self.configuration(mode)?)
-            .wait()
-            .map_err(engine)
+        self.take_part(mode)
     }
 
     /// Takes part as a router: carries on what bridges say.
@@ -158,32 +169,18 @@ impl Network {
     /// # Errors
     /// If one can't listen.
     pub fn open_router(&self) -> Result<Session, NetworkError> {
-        zenoh::open(self.configuration("router")?)
-            .wait()
-            .map_err(engine)
+        self.take_part("router")
     }
 
-    fn configuration(&self, mode: &str) -> Result<Config, NetworkError> {
-        let words = |endpoints: &[Endpoint]| -> Vec<String> {
-            endpoints.iter().map(Endpoint::to_string).collect()
+    fn take_part(&self, mode: &str) -> Result<Session, NetworkError> {
+        let locators = |endpoints: &[Endpoint]| -> Vec<String> {
+            endpoints.iter().map(Endpoint::locator).collect()
         };
         let (listen, connect) = match &self.ends {
-            Ends::Listening(endpoints) => (words(endpoints), Vec::new()),
-            Ends::Connecting(endpoints) => (Vec::new(), words(endpoints)),
+            Ends::Listening(endpoints) => (locators(endpoints), Vec::new()),
+            Ends::Connecting(endpoints) => (Vec::new(), locators(endpoints)),
         };
-        let transport = if self.credentials.is_some() {
-            "tls"
-        } else {
-            "tcp"
-        };
-        let mut settings = vec![
-            ("mode", json!(mode)),
-            ("listen/endpoints", json!(listen)),
-            ("listen/timeout_ms", json!(0)),
-            ("listen/exit_on_failure", json!(true)),
-            ("connect/endpoints", json!(connect)),
-            ("connect/timeout_ms", json!(0)),
-            ("connect/exit_on_failure", json!(true)),
+        let mut more = vec![
             (
                 "connect/retry",
                 json!({
@@ -192,24 +189,16 @@ impl Network {
                     "period_increase_factor": 1.5,
                 }),
             ),
-            ("scouting/multicast/enabled", json!(false)),
-            ("scouting/gossip/enabled", json!(false)),
-            ("scouting/delay", json!(0)),
-            ("timestamping/enabled", json!(false)),
-            ("transport/link/protocols", json!([transport])),
             ("transport/link/tx/lease", json!(LEASE.as_millis())),
             ("transport/link/tx/batch_size", json!(BATCH_BYTES)),
-            (
-                "transport/link/tx/queue/size/interactive_high",
-                json!(STREAM_MESSAGES),
-            ),
             (
                 "transport/link/rx/max_message_size",
                 json!(MAX_MESSAGE_BYTES),
             ),
         ];
         if let Some(credentials) = &self.credentials {
-            settings.extend([
+            refused::watch();
+            more.extend([
                 (
                     "transport/link/tls/root_ca_certificate",
                     json!(credentials.ca),
@@ -242,12 +231,14 @@ impl Network {
                 ("transport/link/tls/close_link_on_expiration", json!(true)),
             ]);
         }
-        let mut configuration = Config::default();
-        for (key, value) in settings {
-            configuration
-                .insert_json5(key, &value.to_string())
-                .map_err(engine)?;
-        }
-        Ok(configuration)
+        let setup = Setup {
+            mode,
+            listen,
+            connect,
+            more,
+        };
+        setup.open().map_err(|error| NetworkError::Engine {
+            reason: error.to_string(),
+        })
     }
 }

@@ -9,6 +9,7 @@ use crate::relay::endpoint::Endpoint;
 use crate::relay::gate::Arrivals;
 use crate::relay::histogram::Percentiles;
 use crate::relay::reach::Reach;
+use crate::relay::refused::Refused;
 use crate::relay::remote::{RemoteState, site};
 use crate::state::State;
 
@@ -45,6 +46,29 @@ pub struct Outgoing {
     pub failed: u64,
 }
 
+/// Whether a bridge holds the bench, as the other site sees it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Holding {
+    /// The other site has not said.
+    #[default]
+    Unknown,
+    /// It does.
+    Held,
+    /// Another bridge of its site does, and this one watches.
+    Watched,
+}
+
+impl Holding {
+    /// One word for it, for scripts; never changes.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Held => "held",
+            Self::Watched => "watched",
+        }
+    }
+}
+
 /// A bridge at one moment. All counts are since its start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -56,6 +80,8 @@ pub struct Report {
     pub board: &'static str,
     /// [`RemoteState::word`] of the other site.
     pub far: &'static str,
+    /// Whether this bridge holds the bench: [`Holding::word`].
+    pub hand: &'static str,
     /// To the other bridge and back, in µs.
     pub round_trip_us: Option<u64>,
     /// From the other site.
@@ -185,6 +211,16 @@ pub enum Notice {
     Watcher(Role),
     /// Another bridge has one's own role and name, and may hold the bench.
     Rival(Role),
+    /// Whether this bridge holds the bench.
+    Hand(Holding),
+    /// At that site, who held the bench has handed it over to who waited.
+    HandedOver(Role),
+    /// The bench can't be handed over from here: this bridge does not hold it.
+    NotHeld,
+    /// The bench was to be handed over, but nobody waits for it.
+    NobodyWaits,
+    /// A program was refused something by its certificate's name.
+    Refused(Refused),
     /// This many µs the network takes: longer than anything may be old.
     Slow {
         /// One way, in µs.
@@ -231,9 +267,37 @@ impl fmt::Display for Notice {
             ),
             Self::Rival(role) => write!(
                 f,
-                "another bridge calls itself {} under this name: whichever was first holds the bench, the other one watches; to hand it over, end the first",
+                "another bridge calls itself {} under this name: whichever was first holds the bench, the other one watches; to hand it over, send SIGUSR2 to who holds it, or end that one",
                 site(*role)
             ),
+            Self::Hand(Holding::Held) => f.write_str("this bridge holds the bench"),
+            Self::Hand(Holding::Watched) => f.write_str(
+                "another bridge of this site holds the bench: this one watches",
+            ),
+            Self::Hand(Holding::Unknown) => {
+                f.write_str("who holds the bench is not known")
+            }
+            Self::HandedOver(role) => write!(
+                f,
+                "{}: the bench is handed over to the bridge that waited for it",
+                site(*role)
+            ),
+            Self::NotHeld => f.write_str(
+                "this bridge does not hold the bench, and can't hand it over: tell the one that does",
+            ),
+            Self::NobodyWaits => {
+                f.write_str("nobody waits for the bench: this bridge keeps it")
+            }
+            Self::Refused(Refused::Named { peer, key }) => {
+                let key = key.as_deref().unwrap_or("any key");
+                write!(
+                    f,
+                    "REFUSED: {peer} may not speak on {key}: its certificate is for something else"
+                )
+            }
+            Self::Refused(Refused::More(count)) => {
+                write!(f, "REFUSED: {count} more of the last minute")
+            }
             Self::Slow { age_us, max_age_us } => write!(
                 f,
                 "the network takes {} ms, longer than the {} ms of --max-age: nothing is passed on; give a longer one if such a delay is meant",

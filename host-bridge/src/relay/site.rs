@@ -25,6 +25,7 @@ use crate::lock::locked;
 use crate::place::Place;
 use crate::relay::envelope::{Content, Envelope, is_carried};
 use crate::relay::far_board::{self, FarBoard};
+use crate::relay::hand::Hand;
 use crate::relay::inward::{Heard, Inward};
 use crate::relay::name::{Channel, Name};
 use crate::relay::network::NetworkError;
@@ -89,6 +90,7 @@ struct Shared {
     shows_far_board: bool,
     far_board: OnceLock<FarBoard>,
     stops: Mutex<Stops>,
+    hand: Mutex<Hand>,
     told_rival: AtomicBool,
     notices: Sender<Notice>,
     is_ended: AtomicBool,
@@ -158,6 +160,7 @@ impl Site {
             shows_far_board,
             far_board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
+            hand: Mutex::new(Hand::default()),
             told_rival: AtomicBool::new(false),
             notices,
             is_ended: AtomicBool::new(false),
@@ -210,6 +213,17 @@ impl Site {
         self.shared.stop(stop);
     }
 
+    /// A way to hand the bench over that can be handed to other threads: see [`Site::hand_over`].
+    pub fn hander_over(&self) -> impl Fn() + Send + Sync + 'static {
+        let shared = Arc::clone(&self.shared);
+        move || shared.hand_over()
+    }
+
+    /// Hands the bench over to the bridge of this site that waits for it. What comes of it is told.
+    pub fn hand_over(&self) {
+        self.shared.hand_over();
+    }
+
     /// How the bridge stands. Ages are of the time since this was last asked, or of all of it.
     pub fn report(&self, total: bool) -> Report {
         let shared = &self.shared;
@@ -222,6 +236,7 @@ impl Site {
             uptime_s: (shared.now_us() - shared.started_us) as f64 / 1e6,
             board: self.link.state().word(),
             far: inward.remote().state().word(),
+            hand: locked(&shared.hand).holding().word(),
             round_trip_us,
             incoming: inward.counts(),
             outgoing,
@@ -246,7 +261,7 @@ impl Drop for Site {
         {
             self.shared.system.clock.join(thread);
         }
-        self.shared.say(Channel::Board, Content::Leaving);
+        self.shared.say(Channel::Stop, Content::Leaving);
         if let Some(wire) = self.shared.wire.get() {
             wire.close();
         }
@@ -356,18 +371,26 @@ impl Shared {
                     inward.on_replaced();
                 }
             }
-            Heard::Asked(to, Ping { sent_us }) => {
+            Heard::Asked {
+                session: to,
+                ping: Ping { sent_us },
+                holds,
+            } => {
                 drop(inward);
                 let pong = Pong {
                     sent_us,
                     received_us: at_us,
                     answered_us: self.now_us(),
                 };
-                self.say(Channel::Clock, Content::Pong { to, pong });
+                self.say(Channel::Clock, Content::Pong { to, pong, holds });
             }
-            Heard::Answered(answer) => {
+            Heard::Answered { answer, holds } => {
                 drop(inward);
                 locked(&self.outward).on_answer(answer);
+                let news = locked(&self.hand).on_word(holds);
+                if let Some(news) = news {
+                    self.tell(news);
+                }
             }
             Heard::Stop(id, stop) => {
                 drop(inward);
@@ -468,6 +491,10 @@ impl Shared {
         if let Some(far_board) = FarBoard::open(&self.name, self.other_role, clock, on_stop) {
             let _ = self.far_board.set(far_board);
         }
+    }
+
+    fn hand_over(&self) {
+        locked(&self.hand).hand_over(self.now_us());
     }
 
     fn stop(&self, stop: Stop) {

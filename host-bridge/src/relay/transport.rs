@@ -82,6 +82,16 @@ pub struct Subscription {
     pub on_bytes: OnBytes,
 }
 
+impl Subscription {
+    /// Whether it is for what is said on `key`.
+    pub fn hears(&self, key: &str) -> bool {
+        match self.keys.strip_suffix('*') {
+            Some(start) => key.starts_with(start),
+            None => self.keys == key,
+        }
+    }
+}
+
 /// A way to the other site.
 pub trait Transport: Send + Sync {
     /// Takes part as the bridge of `role` at the bench called `name`. Where it connects, this returns when

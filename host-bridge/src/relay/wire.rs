@@ -1,5 +1,7 @@
 //! The keys on the network that a bridge speaks on and listens to, over the engine.
 
+use std::sync::{Arc, Weak};
+
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::{Locality, Sample};
@@ -7,6 +9,7 @@ use zenoh::{Session, Wait};
 
 use protocol::Role;
 
+use crate::relay::datagrams::Datagrams;
 use crate::relay::envelope::{Envelope, MAX_ENVELOPE};
 use crate::relay::name::{Channel, Name};
 use crate::relay::transport::{Connection, NetworkError, Subscription};
@@ -14,6 +17,7 @@ use crate::relay::transport::{Connection, NetworkError, Subscription};
 /// A bridge's, or an operator's, place on the network. Dropping it leaves the network.
 pub struct Wire {
     session: Session,
+    datagrams: Option<Arc<Datagrams>>,
     board: Publisher<'static>,
     clock: Publisher<'static>,
     stop: Publisher<'static>,
@@ -34,13 +38,29 @@ impl Wire {
     /// If the engine refuses.
     pub fn new(
         session: Session,
+        datagrams: Option<Datagrams>,
         name: &Name,
         role: Role,
-        subscriptions: Vec<Subscription>,
+        subscriptions: &Arc<Vec<Subscription>>,
     ) -> Result<Self, NetworkError> {
-        let subscribe = |subscription: Subscription| {
-            let Subscription { keys, on_bytes } = subscription;
+        let datagrams = datagrams.map(Arc::new);
+        let fleeting: Vec<String> = [Role::Sensor, Role::Display]
+            .into_iter()
+            .flat_map(|role| {
+                [Channel::Board, Channel::Clock].map(|channel| name.key(role, channel))
+            })
+            .collect();
+        let subscribe = |at: usize| {
+            let subscriptions = Arc::clone(subscriptions);
+            let keys = subscriptions[at].keys.clone();
+            let (datagrams, fleeting) = (datagrams.as_ref().map(Arc::downgrade), fleeting.clone());
             let callback = move |sample: Sample| {
+                let on_bytes = &subscriptions[at].on_bytes;
+                if let Some(datagrams) = datagrams.as_ref().and_then(Weak::upgrade)
+                    && fleeting.iter().any(|key| key == sample.key_expr().as_str())
+                {
+                    datagrams.on_stream();
+                }
                 // What is longer than any envelope is not even put together; it counts as malformed.
                 let payload = sample.payload();
                 if payload.len() <= MAX_ENVELOPE {
@@ -56,30 +76,30 @@ impl Wire {
                 .wait()
                 .map_err(engine)
         };
-        let subscribers = subscriptions
-            .into_iter()
+        let subscribers = (0..subscriptions.len())
             .map(subscribe)
             .collect::<Result<_, _>>()?;
-        let publisher = |channel, priority, congestion| {
+        let publisher = |channel: Channel, priority| {
             session
                 .declare_publisher(name.key(role, channel))
                 .priority(priority)
-                .congestion_control(congestion)
+                // Whoever speaks is never held up by a network that stands still: what has to come is said again
+                // until it is answered.
+                .congestion_control(CongestionControl::Drop)
                 // Each message leaves at once instead of waiting for company.
                 .express(true)
                 .allowed_destination(Locality::Remote)
                 .wait()
                 .map_err(engine)
         };
-        let stream = (Priority::InteractiveHigh, CongestionControl::Drop);
         Ok(Self {
-            board: publisher(Channel::Board, stream.0, stream.1)?,
-            clock: publisher(Channel::Clock, stream.0, stream.1)?,
-            // It is said again until it is answered: whoever says it is never held up by a network that stands still.
-            stop: publisher(Channel::Stop, Priority::RealTime, CongestionControl::Drop)?,
+            board: publisher(Channel::Board, Priority::InteractiveHigh)?,
+            clock: publisher(Channel::Clock, Priority::InteractiveHigh)?,
+            stop: publisher(Channel::Stop, Priority::RealTime)?,
             // After all that the boards need.
-            shown: publisher(Channel::Shown, Priority::DataLow, CongestionControl::Drop)?,
+            shown: publisher(Channel::Shown, Priority::DataLow)?,
             session,
+            datagrams,
             _subscribers: subscribers,
         })
     }
@@ -93,7 +113,14 @@ impl Connection for Wire {
             Channel::Stop => &self.stop,
             Channel::Shown => &self.shown,
         };
-        publisher.put(envelope.to_bytes()).wait().is_ok()
+        let bytes = envelope.to_bytes();
+        if channel.is_fleeting()
+            && let Some(datagrams) = &self.datagrams
+            && datagrams.send(publisher.key_expr(), &bytes)
+        {
+            return true;
+        }
+        publisher.put(bytes).wait().is_ok()
     }
 
     /// Who connects as a client is not counted.

@@ -91,6 +91,7 @@ impl Events {
     fn event(role: Role, row: Row) -> Option<Event> {
         let message = match row {
             Row::Estimate(row) => Message::Estimate(row.into()),
+            Row::Texture(row) => Message::Texture(row.into()),
             Row::Motion(motion) => Message::Motion(motion),
             Row::Gauges(row) => Message::Gauges((&row).into()),
             Row::SensorStatus(row) => Message::Status(row.status()),

@@ -18,7 +18,7 @@ use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::GaugeRow;
 
 mod document;
-mod excerpt;
+pub(crate) mod excerpt;
 mod expectation;
 
 use excerpt::Excerpt;
@@ -51,7 +51,7 @@ pub enum SceneError {
     },
     /// Samples are missing.
     #[error(
-        "samples are missing at {at_s:.3} s, and a scene has no gaps: the longest piece without is --from {from_s:.3} --to-time {to_s:.3}"
+        "samples are missing at {at_s:.3} s, and what is made of them has no gaps: the longest piece without is --from {from_s:.3} --to-time {to_s:.3}"
     )]
     Gap {
         /// Where the first gap is.
@@ -63,14 +63,14 @@ pub enum SceneError {
     },
     /// The sensor was configured otherwise in the middle of it.
     #[error(
-        "the sensor was configured anew at {at_s:.3} s, and a scene has one configuration: end before it or begin after it, with --from and --to-time"
+        "the sensor was configured anew at {at_s:.3} s, and what is made of it has one configuration: end before it or begin after it, with --from and --to-time"
     )]
     Reconfigured {
         /// When.
         at_s: f64,
     },
     /// It is too long.
-    #[error("that is too long for a scene: give --from and --to-time, {LONGEST_S} s apart at most")]
+    #[error("that is too long: give --from and --to-time, {LONGEST_S} s apart at most")]
     TooLong,
     /// Nothing is known of the surface.
     #[error("no valid estimate tells what was rubbed: give its wavelength with --wavelength")]

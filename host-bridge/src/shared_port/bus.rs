@@ -10,7 +10,9 @@ use serde_json::json;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::Sample;
-use zenoh::{Config, Session, Wait};
+use zenoh::{Session, Wait};
+
+use crate::engine::Setup;
 
 /// What the board says.
 const SAID: &str = "ridgelink/port/said";
@@ -19,8 +21,6 @@ const ASKED: &str = "ridgelink/port/asked";
 /// Reads that may wait for a guest, some seconds of everything; one that is slower misses some, and sees that
 /// it does.
 const WAITING: usize = 8_192;
-/// Reads that may wait to be sent to a guest.
-const QUEUE: usize = 16;
 /// How long an owner may take to answer, in ms: one that is halted never does.
 const ANSWER_MS: u64 = 1_000;
 
@@ -31,37 +31,19 @@ fn failed(error: zenoh::Error) -> io::Error {
 fn open(mode: &str, end: &str, socket: &Path) -> io::Result<Session> {
     let socket = format!("unixsock-stream/{}", socket.display());
     let (listen, connect) = match end {
-        "listen" => (vec![&socket], Vec::new()),
-        _ => (Vec::new(), vec![&socket]),
+        "listen" => (vec![socket], Vec::new()),
+        _ => (Vec::new(), vec![socket]),
     };
-    let settings = [
-        ("mode", json!(mode)),
-        ("listen/endpoints", json!(listen)),
-        ("listen/timeout_ms", json!(0)),
-        ("listen/exit_on_failure", json!(true)),
-        ("connect/endpoints", json!(connect)),
-        ("connect/timeout_ms", json!(0)),
-        ("connect/exit_on_failure", json!(true)),
-        ("scouting/multicast/enabled", json!(false)),
-        ("scouting/gossip/enabled", json!(false)),
-        ("scouting/delay", json!(0)),
-        ("timestamping/enabled", json!(false)),
-        ("transport/unicast/open_timeout", json!(ANSWER_MS)),
-        ("transport/unicast/accept_timeout", json!(ANSWER_MS)),
-        ("transport/link/protocols", json!(["unixsock-stream"])),
-        (
-            "transport/link/tx/queue/size/interactive_high",
-            json!(QUEUE),
-        ),
-        ("transport/shared_memory/enabled", json!(false)),
-    ];
-    let mut configuration = Config::default();
-    for (key, value) in settings {
-        configuration
-            .insert_json5(key, &value.to_string())
-            .map_err(failed)?;
-    }
-    zenoh::open(configuration).wait().map_err(failed)
+    let setup = Setup {
+        mode,
+        listen,
+        connect,
+        more: vec![
+            ("transport/unicast/open_timeout", json!(ANSWER_MS)),
+            ("transport/unicast/accept_timeout", json!(ANSWER_MS)),
+        ],
+    };
+    setup.open().map_err(failed)
 }
 
 fn publisher(session: &Session, key: &'static str) -> io::Result<Publisher<'static>> {

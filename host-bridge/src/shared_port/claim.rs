@@ -1,8 +1,8 @@
 //! Who owns a port: a lock in a folder of the user's own, which the system gives up when its holder ends.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError};
-use std::io::{self, ErrorKind, Read, Write};
-use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::io::{self, ErrorKind, Read};
+use std::os::unix::fs::{DirBuilderExt, FileExt, FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -21,6 +21,15 @@ impl Claim {
     /// The same claim once more.
     pub fn again(&self) -> Self {
         Self(Arc::clone(&self.0))
+    }
+
+    /// Has `words` stand where its holder is told.
+    ///
+    /// # Errors
+    /// If they can't be written.
+    pub fn tell(&self, words: &str) -> io::Result<()> {
+        self.0.write_all_at(words.as_bytes(), 0)?;
+        self.0.set_len(words.len() as u64)
     }
 }
 
@@ -55,7 +64,7 @@ impl Device {
     /// # Errors
     /// If there is no folder to do so in.
     pub fn claim(&self) -> io::Result<Option<Claim>> {
-        let mut file = OpenOptions::new()
+        let file = OpenOptions::new()
             .read(true)
             .write(true)
             .create(true)
@@ -64,10 +73,10 @@ impl Device {
             .open(self.file("lock")?)?;
         match file.try_lock() {
             Ok(()) => {
+                let claim = Claim(Arc::new(file));
                 // For people and messages: who it is.
-                file.set_len(0)?;
-                write!(file, "{}", own_name())?;
-                Ok(Some(Claim(Arc::new(file))))
+                claim.tell(&own_name())?;
+                Ok(Some(claim))
             }
             Err(TryLockError::WouldBlock) => Ok(None),
             Err(TryLockError::Error(error)) => Err(error),
@@ -98,6 +107,33 @@ impl Device {
             Err(error) => Err(io::Error::new(error.kind(), error.to_string())),
         }
     }
+}
+
+/// What stands in each lock that is held and whose name begins with `prefix`, by their names' order.
+pub fn held(prefix: &str) -> Vec<String> {
+    let files = folder().and_then(fs::read_dir);
+    let mut paths: Vec<PathBuf> = files
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with(prefix) && name.ends_with(".lock")
+        })
+        .collect();
+    paths.sort();
+    let words = |path: PathBuf| {
+        let mut file = File::open(path).ok()?;
+        // Shared, so that two who look at once don't take each other for its holder.
+        if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+            return None;
+        }
+        let mut words = String::new();
+        file.read_to_string(&mut words).ok()?;
+        Some(words)
+    };
+    paths.into_iter().filter_map(words).collect()
 }
 
 /// This program and its number, e.g. `host-bridge record (process 4711)`.

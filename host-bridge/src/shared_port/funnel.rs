@@ -1,8 +1,10 @@
 //! What several programs say, on its way to one board: whole frames, numbered in one row.
 
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 
 use protocol::frame::{self, MAX_FRAME};
+
+use crate::line::write_some;
 
 /// The way to a board for frames of any number of programs.
 pub struct Funnel {
@@ -26,7 +28,7 @@ impl Funnel {
     /// Says `frames`, each ended by a 0x00. What is no frame is left out: nobody would understand it.
     ///
     /// # Errors
-    /// [`ErrorKind::WouldBlock`] if the line took none of a frame: that and those after it are not said. What
+    /// [`io::ErrorKind::WouldBlock`] if the line took none of a frame: that and those after it are not said. What
     /// it took a part of is said to its end as soon as it takes more.
     pub fn put(&mut self, frames: &[u8]) -> io::Result<()> {
         let mut content = [0; MAX_FRAME];
@@ -46,9 +48,9 @@ impl Funnel {
                 continue;
             };
             self.write_rest()?;
-            let taken = write(&mut self.output, frame)?;
+            let (taken, result) = write_some(&mut self.output, frame);
             if taken == 0 {
-                return Err(ErrorKind::WouldBlock.into());
+                return result;
             }
             self.rest.extend_from_slice(&frame[taken..]);
             self.sequence = self.sequence.wrapping_add(1);
@@ -57,33 +59,15 @@ impl Funnel {
     }
 
     fn write_rest(&mut self) -> io::Result<()> {
-        let taken = write(&mut self.output, &self.rest)?;
+        let (taken, result) = write_some(&mut self.output, &self.rest);
         self.rest.drain(..taken);
-        if self.rest.is_empty() {
-            Ok(())
-        } else {
-            Err(ErrorKind::WouldBlock.into())
-        }
+        result
     }
-}
-
-/// Writes as many bytes as are taken at once.
-fn write(output: &mut dyn Write, bytes: &[u8]) -> io::Result<usize> {
-    let mut taken = 0;
-    while taken < bytes.len() {
-        match output.write(&bytes[taken..]) {
-            Ok(0) => break,
-            Ok(count) => taken += count,
-            Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(taken)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::ErrorKind;
     use std::sync::{Arc, Mutex};
 
     use protocol::{Message, Ping, Stop, StopReason};

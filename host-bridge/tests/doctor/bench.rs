@@ -29,6 +29,7 @@ pub fn status(role: Role, uptime_us: u64, frames: u32) -> Status {
         uptime_us,
         reset: ResetCause::Power,
         watchdog_resets: 0,
+        stack_free_bytes: 80_000,
         peer: port,
         console: port,
         role: match role {

@@ -6,7 +6,9 @@ use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::state::State;
 use protocol::{DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, Trip};
 
-use crate::bench::{display_counters, display_spoiled, hello, one, peer, sensor_spoiled, spoiled};
+use crate::bench::{
+    display_counters, display_spoiled, hello, one, peer, sensor_counters, sensor_spoiled, spoiled,
+};
 
 #[test]
 fn boards_of_another_version_are_named_by_what_differs() {
@@ -29,7 +31,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
         &found,
         "foreign",
         &format!(
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 5, this program speaks 5 too, \
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 6, this program speaks 6 too, \
              but of schema 0000000000000007, not {ours}"
         ),
         "flash the firmware of this build: `host-bridge flash`",
@@ -48,9 +50,9 @@ fn boards_of_another_version_are_named_by_what_differs() {
         [
             format!(
                 "the boards do not understand each other: sensor protocol 9 schema {ours}, \
-                 display protocol 5 schema {ours}"
+                 display protocol 6 schema {ours}"
             ),
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 5"
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 6"
                 .to_owned(),
         ]
     );
@@ -73,8 +75,8 @@ fn a_firmware_that_is_not_the_benchs_is_told_from_one_that_cant_be_read() {
         }),
         "elf-differs",
         &format!(
-            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 5 schema {ours}, but firmware-sensor \
-             is sensor 0.2.0 on stm32f429zi with protocol 5 schema {ours}"
+            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 6 schema {ours}, but firmware-sensor \
+             is sensor 0.2.0 on stm32f429zi with protocol 6 schema {ours}"
         ),
         "flash what the bench names: `host-bridge flash sensor`",
     );
@@ -163,6 +165,24 @@ fn watchdog_resets_are_named() {
 }
 
 #[test]
+fn a_stack_that_was_nearly_full_is_named_and_one_that_nobody_measured_is_not() {
+    let room = |bytes| {
+        sensor_spoiled(|board| {
+            if let Some(status) = &mut board.last {
+                status.stack_free_bytes = bytes;
+            }
+        })
+    };
+    one(
+        &room(2_047),
+        "stack",
+        "sensor: its stack had no more than 2047 bytes left",
+        "report it with its log: a board whose stack is full stops",
+    );
+    assert_eq!(room(0), []);
+}
+
+#[test]
 fn a_supervisor_that_keeps_the_stimulus_away_says_why_and_what_to_do() {
     let state = |state, uptime_us| {
         display_spoiled(|board| {
@@ -192,6 +212,18 @@ fn a_supervisor_that_keeps_the_stimulus_away_says_why_and_what_to_do() {
     );
     assert_eq!(state(DisplayState::Boot, 1_999_999), []);
     assert_eq!(state(DisplayState::Driving, 9_000_000), []);
+}
+
+#[test]
+fn an_arm_that_was_stopped_is_told_of_until_reset() {
+    one(
+        &sensor_spoiled(|board| {
+            sensor_counters(board, |counters| counters.stopped = Some(Trip::Operator));
+        }),
+        "arm-stopped",
+        "sensor: arm stopped: by the operator",
+        "press the sensor board's reset button when the arm may move again",
+    );
 }
 
 #[test]

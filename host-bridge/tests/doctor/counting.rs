@@ -1,6 +1,7 @@
 //! Counters that count what should not be.
 
 use host_bridge::doctor::counters;
+use host_bridge::link::Missed;
 use protocol::{DisplayCounters, DisplayState, PortCounters, RoleCounters, SensorCounters};
 
 use crate::bench::{display_counters, display_spoiled, one, sensor_counters, sensor_spoiled};
@@ -105,6 +106,19 @@ fn what_this_end_counts_while_it_looks_is_a_finding() {
         "sensor: this end of the console: 7 frames that never came (lost), all of them while it was looked at",
         "see USB cable and hub, and whether this computer is too busy",
     );
+    // What was said while the port changed hands.
+    let handed_over = sensor_spoiled(|board| {
+        board.counters = PortCounters {
+            lost: 7,
+            corrupt: 2,
+            ..PortCounters::new()
+        };
+        board.missed = Missed {
+            lost: 7,
+            corrupt: 1,
+        };
+    });
+    assert_eq!(handed_over, []);
     // The frame in whose middle the line was opened, and those before the board's Hello.
     assert_eq!(
         counted(PortCounters {

@@ -26,7 +26,7 @@ fn the_report_for_people_reads_well_in_eighty_columns() {
     let findings = findings::of(&bench);
     let expected = format!(
         "\
-host-bridge 0.1.0, protocol 5, schema {:016x}
+host-bridge 0.1.0, protocol 6, schema {:016x}
 
 attached
   ST-LINK 066C: /dev/tty-sensor
@@ -36,6 +36,7 @@ sensor
   port         /dev/tty-sensor: sensor 0.1.0 on stm32f429zi
   bench's ELF  /elves/firmware-sensor: sensor 0.1.0 on stm32f429zi
   up           1 min 32 s, started by power, no watchdog reset
+  arm          free
   gauges 0-4   good, good, good, good, good
   clock        -1.500000 s to this program's, drifts +30 ± 40 ppm
   round trip   0.9 ms
@@ -100,12 +101,14 @@ fn the_report_for_scripts_keeps_its_shape() {
     assert_eq!(
         keys(sensor),
         [
+            "arm",
             "clock",
             "counters",
             "elf",
             "gauges",
             "hello",
             "losses",
+            "missed_at_handover",
             "peer_frames",
             "port",
             "rate_hz",
@@ -129,6 +132,8 @@ fn the_report_for_scripts_keeps_its_shape() {
     assert_eq!(sensor["reset"], "power");
     assert_eq!(sensor["gauges"][4], "good");
     assert_eq!(sensor["supervisor"], Value::Null);
+    assert_eq!(sensor["arm"], "free");
+    assert_eq!(sensor["counters"]["role"]["stopped"], Value::Null);
     assert_eq!(sensor["peer_frames"], 1_000);
     assert_eq!(sensor["counters"]["peer"]["received"], 5_000);
     assert_eq!(sensor["counters"]["role"]["adc_overruns"], 0);

@@ -57,6 +57,7 @@ fn status(role: RoleCounters) -> Status {
         uptime_us: 61_000_000,
         reset: ResetCause::Watchdog,
         watchdog_resets: 2,
+        stack_free_bytes: 0,
         peer: PortCounters {
             sent: 1_234_567,
             lost: 3,
@@ -396,7 +397,7 @@ fn without_colours_there_are_none() {
 fn the_form_shows_values_units_and_the_range_of_the_one_chosen() {
     let mut view = view();
     let mut form = Form::new(Role::Display);
-    for _ in 0..2 {
+    for _ in 0..3 {
         form.step(true);
     }
     form.type_digit('7');

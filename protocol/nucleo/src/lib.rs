@@ -13,6 +13,7 @@ pub mod reset;
 pub mod serial;
 pub mod side;
 pub mod spawn;
+pub mod stack;
 pub mod stop;
 pub mod supervision;
 pub mod trip;

@@ -10,6 +10,7 @@ use protocol::{Message, ResetCause, RoleCounters, Status};
 use crate::console::ConsoleOutput;
 use crate::ports::Ports;
 use crate::side::Side;
+use crate::stack::StackWatch;
 
 /// Between two looks: eight in a watchdog's time.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -22,6 +23,7 @@ pub struct Vitals {
     link_led: Output<'static>,
     reset: ResetCause,
     watchdog_resets: u32,
+    stack: StackWatch,
 }
 
 impl Vitals {
@@ -40,6 +42,7 @@ impl Vitals {
             link_led: Output::new(link_led, Level::Low, Speed::Low),
             reset,
             watchdog_resets,
+            stack: StackWatch::default(),
         }
     }
 
@@ -51,6 +54,7 @@ impl Vitals {
             peer: ports.counters(Side::Peer),
             console: ports.counters(Side::Console),
             role,
+            stack_free_bytes: self.stack.free_bytes(),
         }
     }
 }
@@ -83,6 +87,7 @@ pub async fn supervise(
         if work_before.replace(work) != Some(work) {
             vitals.watchdog.pet();
         }
+        vitals.stack.look();
         let typed = ports.poll();
         let known = ports.is_known(Side::Peer);
         vitals

@@ -93,6 +93,9 @@ fn each_of_the_displays_settings_is_taken_in_its_range_and_refused_beside_it() {
     assert_range(Setting::ReferenceLsb, 0, 2_000, |n| {
         display(|c| c.reference_lsb = n as u16)
     });
+    assert_range(Setting::ReferenceMn, 0, 60_000, |n| {
+        display(|c| c.reference_mn = n as u16)
+    });
     assert_range(Setting::FullDriveS, 10, 3_600, |n| {
         display(|c| c.full_drive_s = n as u16)
     });
@@ -129,6 +132,8 @@ fn every_change_of_a_configuration_gives_it_another_hash() {
         of(|c| c.glide_ms += 1),
         of(|c| c.actuators ^= 1),
         of(|c| c.mode = protocol::Mode::Travelling),
+        of(|c| c.rendering = protocol::Rendering::Shape),
+        of(|c| c.reference_mn += 1),
     ];
     for (at, hash) in hashes.iter().enumerate() {
         assert!(!hashes[..at].contains(hash), "{at}");
@@ -175,12 +180,14 @@ fn the_default_grid_is_centred_and_its_neighbours_are_a_pitch_apart() {
 fn every_property_of_every_actuator_shows_in_the_hash() {
     let before = actuators::hash(&DEFAULT_ACTUATORS);
     for index in 0..DEFAULT_ACTUATORS.len() {
-        let changes: [fn(&mut protocol::Actuator); 5] = [
+        let changes: [fn(&mut protocol::Actuator); 7] = [
             |a| a.x_um += 1,
             |a| a.y_um -= 1,
             |a| a.gain_q15 -= 1,
             |a| a.phase += 1,
             |a| a.inverted = true,
+            |a| a.resonance_dhz += 200,
+            |a| a.damping_percent += 1,
         ];
         for change in changes {
             let mut actuators = DEFAULT_ACTUATORS;

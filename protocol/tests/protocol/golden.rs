@@ -4,7 +4,7 @@
 //! raises [`protocol::PROTOCOL_VERSION`].
 
 use crate::messages::{
-    CONTACTS, HEALTHS, METHODS, SETTINGS, events, greeted_receiver, hello, samples,
+    CONTACTS, HEALTHS, METHODS, RENDERINGS, SETTINGS, events, greeted_receiver, hello, samples,
 };
 use protocol::{
     Event, HELLO_LENGTH, Hello, Hold, MAX_FRAME, Message, PROTOCOL_VERSION, Peer, Receiver, Stop,
@@ -20,8 +20,8 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c0515c0f95cab61e6b3bc7353544d3332463432395a49010101010102010601a0\
-         2c671700",
+        "030201065244474c06153d54fc71a8843a127353544d3332463432395a490101010101020106017\
+         1b454ef00",
     ),
     (
         "estimate",
@@ -44,12 +44,12 @@ const GOLDEN: &[(&str, &str)] = &[
     (
         "sensor's status",
         "31020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
-         07f107f207f307f4070b8827010203f403c4130105037520d600",
+         07f107f207f307f4070b8827010203f403c413010890bf05ee34057a00",
     ),
     (
         "display's status",
-        "49020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
-         07f107f207f307f40701904ea84601f40302030405060708090a0b04021658282500",
+        "4c020104c096b10202010102030405060708090a0b0c0de807e907ea07eb07ec07ed07ee07ef07f0\
+         07f107f207f307f40701904ea84601f40302030405060708090a0b040290bf055b87194e00",
     ),
     (
         "configure a sensor",
@@ -57,7 +57,7 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configure a display",
-        "200201050184868808010101f4031432148827ac02d804f8acd19101ffd3826200",
+        "23020105018486880801010201f4031432148827ac02fa01d804f8acd191018297359900",
     ),
     (
         "configuration taken",
@@ -65,8 +65,8 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "configuration refused",
-        "28020106011225bfb802c0b80284868808010101f4031432148827ac02d804f8acd19101bd07c38c\
-         00",
+        "2b020106011325bfb802c0b8028486880801010201f4031432148827ac02fa01d804f8acd19101e9\
+         ee262a00",
     ),
     ("ping", "0a020107e807da39d20900"),
     ("pong", "0e020108e807d00f82102723874600"),
@@ -74,10 +74,10 @@ const GOLDEN: &[(&str, &str)] = &[
     ("stop by the host", "0302010a53544f50017159d60c00"),
     (
         "actuators",
-        "0502010a1409f80a80800280800116b717f80a80800280800101ef2ef80a80800280800116a746f8\
-         0a80800280800101df5df80a808002808001179775f80a80800280800101cf8c01f80a8080028080\
-         011887a401f80a80800280800101bfbb01f80a80800280800111f7d201f80a808002808001017c31\
-         6d4000",
+        "0502010a1409f80a8080028080011c840746b717f80a80800280800101840746ef2ef80a80800280\
+         80011c840746a746f80a80800280800101840746df5df80a8080028080011d8407469775f80a8080\
+         0280800101840746cf8c01f80a8080028080011e84074687a401f80a80800280800101840746bfbb\
+         01f80a80800280800117840746f7d201f80a80800280800101840746600ca0c100",
     ),
     ("safety: driving", "0d02010bc08db70102a61d952a00"),
     ("safety: stopped", "0e02010bc08db7010404d21faabc00"),
@@ -94,13 +94,17 @@ const GOLDEN: &[(&str, &str)] = &[
     ),
     (
         "a display's capabilities",
-        "1e02010e0132dc0ba09c0102d00fa01ff403058827904e14ac1b09148827050a01e807050b01e807\
-         020c03f403020d038827020e03d00f050f0a901c056385df7700",
+        "1f02010e0132dc0ba09c010203d00fa01ff403058827904e14ac1b09148827050a01e807050b01e8\
+         07020c03f403020d038827020e03d00f020f04e0d40305100a901c05cd55ed6b00",
     ),
     ("stream the gauges", "0a02010fe8076268c10700"),
     (
         "arm: stopped by the operator",
         "09020110c08db701020579b4448800",
+    ),
+    (
+        "texture",
+        "220201113cc08db701019003808001fa01808003570c1e84025f01f40347e23f75de00",
     ),
 ];
 
@@ -150,7 +154,7 @@ fn every_golden_frame_is_received_as_its_message() {
 
 #[test]
 fn the_golden_frames_show_every_variant() {
-    // Variant bytes 0 to 16, the largest of them the number of variants less one.
+    // Variant bytes 0 to 17, the largest of them the number of variants less one.
     let mut variants: Vec<u8> = samples()
         .iter()
         .map(|(_, message)| postcard::to_stdvec(message).expect("it encodes")[0])
@@ -158,7 +162,7 @@ fn the_golden_frames_show_every_variant() {
     variants.dedup();
     assert_eq!(
         variants,
-        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]
+        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
     );
 }
 
@@ -169,10 +173,11 @@ fn every_choice_within_a_message_has_its_byte() {
     }
     assert_eq!(bytes(&METHODS), [0, 1, 2, 3]);
     assert_eq!(bytes(&CONTACTS), [0, 1, 2, 3]);
+    assert_eq!(bytes(&RENDERINGS), [0, 1, 2]);
     assert_eq!(bytes(&HEALTHS), [0, 1, 2, 3, 4, 5]);
     assert_eq!(
         bytes(&SETTINGS),
-        std::array::from_fn::<u8, 22, _>(|n| n as u8)
+        std::array::from_fn::<u8, 26, _>(|n| n as u8)
     );
     assert_eq!(bytes(&Hold::ALL), [0, 1, 2, 3, 4, 5]);
     assert_eq!(bytes(&Trip::ALL), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
@@ -180,8 +185,8 @@ fn every_choice_within_a_message_has_its_byte() {
 
 #[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 5);
-    assert_eq!(SCHEMA_HASH, 0xbcb3_e661_ab5c_f9c0);
+    assert_eq!(PROTOCOL_VERSION, 6);
+    assert_eq!(SCHEMA_HASH, 0x123a_84a8_71fc_543d);
 }
 
 #[test]

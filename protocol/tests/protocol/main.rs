@@ -1,5 +1,6 @@
 //! The wire: messages, frames, receiver, handshake, clock offset.
 
+mod billion;
 mod clock;
 mod configuration;
 mod console;

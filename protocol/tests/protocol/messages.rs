@@ -9,6 +9,7 @@ mod longest;
 mod samples;
 
 use proptest::prelude::*;
+use protocol::texture::{BANDS, PARTIALS};
 use protocol::*;
 
 pub use longest::longest_like;
@@ -117,7 +118,7 @@ pub fn content() -> impl Strategy<Value = Message> {
         any::<u8>().prop_map(|cause| Message::Stopped(Stopped { cause })),
         (
             any::<u8>(),
-            any::<[(i16, i16, u16, u16, bool); ACTUATOR_BLOCK]>()
+            any::<[(i16, i16, [u16; 4], bool); ACTUATOR_BLOCK]>()
         )
             .prop_map(|(first, actuators)| {
                 Message::Actuators(Actuators {
@@ -133,6 +134,7 @@ pub fn content() -> impl Strategy<Value = Message> {
         any::<u16>().prop_map(|for_ms| Message::StreamGauges(StreamGauges { for_ms })),
         (any::<u64>(), arm_state())
             .prop_map(|(instant_us, state)| Message::Arm(Arm { instant_us, state })),
+        texture().prop_map(Message::Texture),
     ]
 }
 
@@ -171,8 +173,12 @@ pub const HEALTHS: [GaugeHealth; 6] = [
     GaugeHealth::Hum,
 ];
 
+/// Every [`Rendering`], in the wire's order.
+pub const RENDERINGS: [Rendering; 3] =
+    [Rendering::Fundamental, Rendering::Shape, Rendering::Texture];
+
 /// Every [`Setting`], in the wire's order.
-pub const SETTINGS: [Setting; 22] = [
+pub const SETTINGS: [Setting; 26] = [
     Setting::Role,
     Setting::WindowMs,
     Setting::CountedGauge,
@@ -188,13 +194,17 @@ pub const SETTINGS: [Setting; 22] = [
     Setting::GlideMs,
     Setting::AmplitudeMv,
     Setting::ReferenceLsb,
+    Setting::ReferenceMn,
     Setting::FullDriveS,
     Setting::Actuators,
     Setting::ActuatorsFirst,
     Setting::ActuatorX,
     Setting::ActuatorY,
     Setting::ActuatorGain,
+    Setting::ActuatorResonance,
+    Setting::ActuatorDamping,
     Setting::Replaces,
+    Setting::Rendering,
 ];
 
 fn finite() -> impl Strategy<Value = f32> {
@@ -236,6 +246,30 @@ fn estimate() -> impl Strategy<Value = Estimate> {
                     lag_um,
                     gauges_used,
                     health,
+                }
+            },
+        )
+}
+
+fn texture() -> impl Strategy<Value = Texture> {
+    (
+        any::<(u32, u64, bool, u8, [u16; BANDS])>(),
+        any::<[(u16, u16); PARTIALS]>(),
+        any::<Option<(u16, u16)>>(),
+    )
+        .prop_map(
+            |((sequence, instant_us, valid, repeating_percent, bands), partials, friction)| {
+                Texture {
+                    sequence,
+                    instant_us,
+                    valid,
+                    partials: partials.map(|(ratio, phase)| Partial { ratio, phase }),
+                    repeating_percent,
+                    bands,
+                    friction: friction.map(|(mean_mn, fluctuation_mn)| Friction {
+                        mean_mn,
+                        fluctuation_mn,
+                    }),
                 }
             },
         )
@@ -293,11 +327,12 @@ fn status() -> impl Strategy<Value = Status> {
         Just(ResetCause::Watchdog),
         Just(ResetCause::Software)
     ];
-    (any::<(u64, u32, [u32; 13], [u32; 13])>(), reset, role).prop_map(
-        |((uptime_us, watchdog_resets, peer, console), reset, role)| Status {
+    (any::<(u64, [u32; 2], [u32; 13], [u32; 13])>(), reset, role).prop_map(
+        |((uptime_us, [watchdog_resets, stack_free_bytes], peer, console), reset, role)| Status {
             uptime_us,
             reset,
             watchdog_resets,
+            stack_free_bytes,
             peer: port(peer),
             console: port(console),
             role,
@@ -371,12 +406,14 @@ fn configuration() -> impl Strategy<Value = Configuration> {
             ),
         (
             prop_oneof![Just(Mode::Uniform), Just(Mode::Travelling)],
+            proptest::sample::select(RENDERINGS.to_vec()),
             prop_oneof![Just(UpdateRate::Hz2000), Just(UpdateRate::Hz4000)],
-            any::<([u16; 7], u32)>()
+            any::<([u16; 8], u32)>()
         )
             .prop_map(
                 |(
                     mode,
+                    rendering,
                     update_rate,
                     (
                         [
@@ -386,6 +423,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                             glide_ms,
                             amplitude_mv,
                             reference_lsb,
+                            reference_mn,
                             full_drive_s,
                         ],
                         actuators,
@@ -393,6 +431,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                 )| {
                     Configuration::Display(DisplayConfiguration {
                         mode,
+                        rendering,
                         update_rate,
                         max_age_ms,
                         fade_in_ms,
@@ -400,6 +439,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                         glide_ms,
                         amplitude_mv,
                         reference_lsb,
+                        reference_mn,
                         full_drive_s,
                         actuators,
                     })
@@ -418,13 +458,16 @@ fn refusal() -> impl Strategy<Value = Refusal> {
     })
 }
 
-fn actuator((x_um, y_um, gain_q15, phase, inverted): (i16, i16, u16, u16, bool)) -> Actuator {
+fn actuator((x_um, y_um, numbers, inverted): (i16, i16, [u16; 4], bool)) -> Actuator {
+    let [gain_q15, phase, resonance_dhz, damping_percent] = numbers;
     Actuator {
         x_um,
         y_um,
         gain_q15,
         phase,
         inverted,
+        resonance_dhz,
+        damping_percent,
     }
 }
 
@@ -453,6 +496,7 @@ pub fn display_capabilities() -> DisplayCapabilities {
         pitch_um: 1_500,
         furthest_um: 20_000,
         modes: 2,
+        renderings: 3,
         update_rates_hz: [2_000, 4_000],
         motion_rate_hz: 500,
         count_um: 5,
@@ -494,13 +538,14 @@ fn capabilities() -> impl Strategy<Value = Capabilities> {
                 })
             }
         ),
-        any::<([u8; 2], [u16; 8], [u16; 2], [(u32, u32, bool); 7])>().prop_map(
-            |([actuators, modes], n, update_rates_hz, ranges)| {
+        any::<([u8; 3], [u16; 8], [u16; 2], [(u32, u32, bool); 8])>().prop_map(
+            |([actuators, modes, renderings], n, update_rates_hz, ranges)| {
                 Capabilities::Display(DisplayCapabilities {
                     actuators,
                     pitch_um: n[0],
                     furthest_um: n[1],
                     modes,
+                    renderings,
                     update_rates_hz,
                     motion_rate_hz: n[2],
                     count_um: n[3],

@@ -224,7 +224,7 @@ fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
     monitor.arg("--display").arg(display);
     let owner = Running::start(&mut monitor);
     // It answers both boards: it has their ports.
-    pair.wait_until_heard_in_spite_of_losses();
+    pair.wait_until_heard();
     let words = [path.to_str().expect("UTF-8"), "--json"];
     let running = pair.record(&mut bridge::command(), &words);
     pair.wait_for_questions();
@@ -251,7 +251,7 @@ fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
     signal(&owner, "-KILL");
     drop(owner);
     // Whoever is asked and answers has the port now.
-    pair.wait_until_heard_in_spite_of_losses();
+    pair.wait_until_heard();
     let mut after = Vec::new();
     for (role, speaker) in &mut speakers {
         let message = speaker.message(*role);

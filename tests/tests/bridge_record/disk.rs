@@ -6,7 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use host_bridge::recording::row::Row;
-use protocol::{GAUGE_BLOCK, Message};
+use protocol::{GAUGE_BLOCK, Message, Role};
+use rustix::fs::{CWD, FileType, Mode, OFlags, mknodat, open};
+use rustix::io::ioctl_fionread;
 use tests::bridge;
 use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
@@ -123,6 +125,47 @@ fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
     // What is safe is all that is there: the file ends with a whole chunk.
     let bytes = number_before(&ended.stderr, "bytes of it are safe");
     assert_eq!(fs::metadata(&path).expect("it is there").len(), bytes);
+}
+
+#[test]
+fn a_disk_that_stands_still_holds_up_no_stop() {
+    let path = folder("hung").join("hung.mcap");
+    mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("it can be made");
+    // Somebody has it open who reads nothing: as soon as it is full, a write waits for ever.
+    let reader = open(&path, OFlags::RDONLY | OFlags::NONBLOCK, Mode::empty());
+    let reader = reader.expect("it can be opened");
+    let pair = Pair::new();
+    let words = [path.to_str().expect("UTF-8"), "--force", "--no-gauges"];
+    let mut running = pair.record(&mut bridge::command(), &words);
+    pair.wait_for_questions();
+    let mut speaker = Speaker::new(5);
+    let mut first = 0;
+    let (mut held, mut unchanged) = (0, 0);
+    let is_hung = wait_until(LIMIT, || {
+        pair.sensor.say(speaker.gauges(first));
+        first += GAUGE_BLOCK as u32;
+        let now = ioctl_fionread(&reader).expect("a pipe says what it holds");
+        unchanged = if now == held && now > 0 {
+            unchanged + 1
+        } else {
+            0
+        };
+        held = now;
+        // Chunks are written once a second at least, of some 700 kB each.
+        let is_over = running.child.try_wait().expect("it can be asked").is_some();
+        assert!(!is_over, "it ends by itself");
+        unchanged > 1_500
+    });
+    assert!(is_hung, "the pipe holds {held} bytes");
+    signal(&running, "-USR1");
+    for role in [Role::Sensor, Role::Display] {
+        let board = pair.board(role);
+        let is_stop = |message: &Message| matches!(message, Message::Stop(_));
+        let is_told = wait_until(LIMIT, || board.take_heard().iter().any(is_stop));
+        assert!(is_told, "the {}", role.name());
+    }
+    signal(&running, "-KILL");
+    running.wait(LIMIT);
 }
 
 #[test]

@@ -42,7 +42,7 @@ fn rubbing(method: &str, duration_s: f64) -> Scene {
 }
 
 /// Ten seconds and a bit, so that ten are left once the boards know each other.
-static RUBBED: LazyLock<Run> = LazyLock::new(|| Run::of(rubbing("default", 10.5)));
+pub(crate) static RUBBED: LazyLock<Run> = LazyLock::new(|| Run::of(rubbing("default", 10.5)));
 
 #[test]
 fn the_sensors_estimates_are_those_of_the_library_fed_with_the_same_codes() {

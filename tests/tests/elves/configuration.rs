@@ -2,7 +2,7 @@
 
 use hil_sim_boards::ElfError;
 use protocol::{
-    Configuration, ConfigurationReport, DisplayConfiguration, Mode, SensorConfiguration,
+    Configuration, ConfigurationReport, DisplayConfiguration, Mode, Rendering, SensorConfiguration,
     UpdateRate, actuators,
 };
 use tests::elves;
@@ -134,6 +134,7 @@ fn every_setting_of_a_scene_becomes_the_display_boards_and_is_acknowledged_with_
     let answer = display_asked(|display| {
         display.configuration = DisplayConfiguration {
             mode: Mode::Travelling,
+            rendering: Rendering::Texture,
             update_rate: UpdateRate::Hz4000,
             max_age_ms: 300,
             fade_in_ms: 10,
@@ -141,11 +142,14 @@ fn every_setting_of_a_scene_becomes_the_display_boards_and_is_acknowledged_with_
             glide_ms: 15,
             amplitude_mv: 4_000,
             reference_lsb: 250,
+            reference_mn: 300,
             full_drive_s: 60,
             actuators: 0,
         };
         *display.actuators = actuators::grid(700);
         display.actuators[49].inverted = true;
+        display.actuators[49].resonance_dhz = 1_200;
+        display.actuators[49].damping_percent = 70;
     });
     assert_eq!(answer, Ok(()));
 }

@@ -323,7 +323,8 @@ fn a_hello_is_answered_within_milliseconds_although_a_key_was_typed_before() {
 
 #[test]
 fn while_a_program_listens_the_port_speaks_frames_only() {
-    for (seen, frames_per_s) in [(&PROGRAM.sensor, 100), (&PROGRAM.display, 500)] {
+    // Estimates and textures; motions.
+    for (seen, frames_per_s) in [(&PROGRAM.sensor, 120), (&PROGRAM.display, 500)] {
         let frames = CAME_NS + 5 * MS..LAST_WORD_NS + 5 * S;
         let lines = seen.lines();
         let line = lines.iter().find(|(at_ns, _)| frames.contains(at_ns));

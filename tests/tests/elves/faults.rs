@@ -1,11 +1,14 @@
 //! Faults on the ELFs: one of every sort, and the instant.
 
+use std::ops::Range;
 use std::thread;
 
+use hil_sim_core::judge;
+use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_studies::campaign::{Plan, Tally, Trial, unmet};
-use protocol::Role;
+use protocol::{Mode, Rendering, Role};
 use tests::elves;
 
 /// An instruction takes 8.3 ns.
@@ -37,6 +40,7 @@ fn faults_of_every_sort_come_out_as_the_table_says() {
         kinds: KINDS.to_vec(),
         instants: 1,
         seed: 20,
+        rendering: Rendering::Fundamental,
     };
     let firmwares = elves::both();
     let trials: Vec<Trial> = thread::scope(|scope| {
@@ -100,4 +104,48 @@ fn power_goes_at_the_very_instant_and_the_board_comes_back() {
         .iter()
         .filter(|tick| (begins_ns..back_ns).contains(&tick.at_ns));
     assert_eq!(off.count(), 0);
+}
+
+/// In the middle of a frame, too: the emulated DMA ends it and asks for an interrupt, which nothing can end without
+/// DMA2's clock. On silicon, so it is between a frame's end and the answer to its interrupt.
+#[test]
+fn a_dma_that_stalls_in_the_middle_of_an_update_is_named() {
+    const FROM_S: f64 = 0.32;
+    const WATCH_S: f64 = 0.1;
+    /// From a tick until its words are out.
+    const UPDATE_NS: Range<u64> = 0..90_000;
+    /// Less than a frame takes, 5.1 µs, so that each of the four is met.
+    const STEP_NS: usize = 4_000;
+    let mut healthy = Scene {
+        duration_s: FROM_S + 0.01,
+        ..Scene::constant(2.0, 50.0)
+    };
+    // A uniform stimulus is one frame for all chips.
+    healthy.display.configuration.mode = Mode::Travelling;
+    let firmwares = elves::both();
+    let (recording, _) = hil_sim_boards::run(&healthy, firmwares).unwrap();
+    let from_ns = (FROM_S * 1e9) as u64;
+    let mut ticks = recording.ticks.iter().map(|tick| tick.at_ns);
+    let tick_ns = ticks.find(|&at_ns| at_ns > from_ns).unwrap();
+    // One after the other, so that all have the same two processors.
+    let findings: Vec<(u64, Finding)> = UPDATE_NS
+        .step_by(STEP_NS)
+        .map(|after_ns| {
+            let stall = Fault::new(Kind::DmaStall, (tick_ns + after_ns) as f64 * 1e-9);
+            let scene = Scene {
+                duration_s: stall.at_s + WATCH_S,
+                faults: vec![stall],
+                ..healthy.clone()
+            };
+            let (recording, _) = hil_sim_boards::run(&scene, firmwares).unwrap();
+            (after_ns, judge::fault::judge(&scene, &recording).remove(0))
+        })
+        .collect();
+    let unmet: Vec<(u64, Vec<String>)> = findings
+        .iter()
+        .map(|(after_ns, finding)| (*after_ns, finding.unmet()))
+        .filter(|(_, unmet)| !unmet.is_empty())
+        .collect();
+    assert!(unmet.is_empty(), "ns after the tick: {unmet:#?}");
+    assert!(findings.iter().all(|(_, finding)| finding.was_driving));
 }

@@ -1,8 +1,11 @@
 //! What the boards say of themselves: log lines by defmt, counters by Status.
 
+use hil_sim_boards::stack;
 use protocol::{PortCounters, ResetCause, RoleCounters, Status};
+use tests::elves;
 
 use crate::PLAIN;
+use crate::bit_for_bit::RUBBED;
 
 /// Time after the clock's start by which a board has set up its peripherals, in s.
 const START_UP_S: f64 = 0.1;
@@ -38,7 +41,7 @@ fn assert_rate(count: u32, rate_hz: f64, status: &Status) {
 #[test]
 fn both_boards_log_that_they_started_and_why() {
     for (board, status) in [("sensor", sensor()), ("display", display())] {
-        let [major, minor, patch] = tests::elves::both().sensor.hello.version;
+        let [major, minor, patch] = elves::both().sensor.hello.version;
         let lines = lines(board);
         assert_eq!(
             lines,
@@ -63,6 +66,32 @@ fn nothing_was_reset_cleared_or_garbled() {
     for status in [sensor(), display()] {
         assert_eq!(status.reset, ResetCause::Power);
         assert_eq!(status.watchdog_resets, 0);
+    }
+}
+
+#[test]
+fn both_say_how_much_of_their_stack_was_never_used() {
+    // What memory.x leaves it.
+    const STACK_BYTES: u32 = 96 << 10;
+    let recording = &RUBBED.recording;
+    for (status, firmware) in [
+        (recording.sensor_status, &elves::both().sensor),
+        (recording.display_status, &elves::both().display),
+    ] {
+        let status = status.unwrap();
+        let used = STACK_BYTES.checked_sub(status.stack_free_bytes).unwrap();
+        let bound = stack::bound(&firmware.elf).unwrap();
+        println!(
+            "{used} bytes used, of {} at most: {bound:#?}",
+            bound.total_bytes()
+        );
+        assert_eq!(bound.unknown, [""; 0]);
+        assert!(
+            (used..STACK_BYTES).contains(&bound.total_bytes()),
+            "{bound:#?}"
+        );
+        // No task runs in a kilobyte; half of it is more than any needs.
+        assert!((1_024..STACK_BYTES / 2).contains(&used), "{used} used");
     }
 }
 

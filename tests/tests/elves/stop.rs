@@ -6,8 +6,8 @@ use hil_sim_boards::{QUANTUM_NS, Terminal, Terminals};
 use hil_sim_core::link::impairments::BYTE_NS;
 use hil_sim_core::run::recording::{Recording, volts};
 use protocol::{
-    DisplayState, Hello, MAX_FRAME, Message, Peer, Port, Receiver, Role, RoleCounters, Stop,
-    StopReason, Trip, frame, receiver,
+    DisplayState, Hello, MAX_FRAME, Message, Peer, Port, Receiver, ResetCause, Role, RoleCounters,
+    Stop, StopReason, Trip, frame, receiver,
 };
 use tests::elves;
 use tests::run::scene;
@@ -135,9 +135,14 @@ struct Stopped {
 
 impl Stopped {
     fn by(speech: Speech, told: Role) -> Self {
+        Self::amid(speech, told, 1.8, "")
+    }
+
+    /// The same in a run with `faults`, in a scene's words.
+    fn amid(speech: Speech, told: Role, duration_s: f64, faults: &str) -> Self {
         let scene = scene(&format!(
             r#"
-            duration_s = 1.8
+            duration_s = {duration_s}
 
             [surface]
             specimens = [{{ wavelength_mm = 2.0 }}]
@@ -149,6 +154,8 @@ impl Stopped {
             [arm]
             follows = "link"
             lag_ms = {}
+
+            {faults}
             "#,
             LAG_S * 1e3
         ));
@@ -319,4 +326,63 @@ fn a_stop_is_the_same_bytes_whoever_makes_it() {
     let mut said = [0; MAX_FRAME];
     let count = port.take(&mut said);
     assert_eq!(said[..count], stop_frame());
+}
+
+#[test]
+fn a_stop_that_the_link_loses_is_said_again_until_the_other_board_has_stopped_too() {
+    const BACK_NS: u64 = 1_400 * MS;
+    const AGAIN_NS: u64 = 50 * MS;
+    let down = "[[fault]]\nat_s = 1.19\nkind = \"link-down\"\nfor_s = 0.21";
+    let by_ns = BACK_NS + AGAIN_NS + PASSED_ON_NS;
+    for told in [Role::Display, Role::Sensor] {
+        let run = Stopped::amid(Speech::StopAlone, told, 2.6, down);
+        let outputs = &run.recording.outputs;
+        let sounding = |ns: std::ops::Range<u64>| {
+            let mut within = outputs.iter().filter(|output| ns.contains(&output.at_ns));
+            within.any(|output| output.words.iter().any(|&word| volts(word) != 0.0))
+        };
+        // The link is down for less time than an estimate is held: only the Stop ends the stimulus.
+        let is_lost = sounding(run.stop_ns + LIMIT_NS + QUANTUM_NS..BACK_NS);
+        assert_eq!(is_lost, told == Role::Sensor, "{told:?}: lost on its way");
+        assert!(!sounding(by_ns..u64::MAX), "{told:?}: 0 V for good");
+        let end_mm = run.position_mm(u64::MAX);
+        let crept_mm = end_mm - run.position_mm(by_ns + (10e9 * LAG_S) as u64);
+        assert!(crept_mm.abs() < 0.01, "{told:?}: {crept_mm} mm");
+        let [sensor, display] = [run.recording.sensor_status, run.recording.display_status]
+            .map(|status| status.map(|status| status.role));
+        assert!(
+            matches!(sensor, Some(RoleCounters::Sensor(sensor)) if sensor.stopped == Some(Trip::Operator)),
+            "{told:?}: {sensor:?}"
+        );
+        assert!(
+            matches!(display, Some(RoleCounters::Display(display))
+                if display.state == DisplayState::Stopped(Trip::Operator)),
+            "{told:?}: {display:?}"
+        );
+    }
+}
+
+#[test]
+fn an_arm_that_was_stopped_stays_so_when_the_watchdog_restarts_its_board() {
+    let hang = "[[fault]]\nat_s = 1.4\nkind = \"sensor-hang\"";
+    // Told by the display alone, the sensor's board is stopped by its word, and keeps that as well.
+    for told in [Role::Sensor, Role::Display] {
+        let run = Stopped::amid(Speech::StopAlone, told, 3.4, hang);
+        let [reset] = run.recording.signs.resets[..] else {
+            panic!("one reset, not {:?}", run.recording.signs.resets);
+        };
+        assert!(reset.at_ns > 1_400 * MS, "{reset:?}");
+        let settled_ns = run.stop_ns + run.limit_ns(Role::Sensor) + (10e9 * LAG_S) as u64;
+        let crept_mm = run.position_mm(u64::MAX) - run.position_mm(settled_ns);
+        assert!(crept_mm.abs() < 0.01, "{told:?}: {crept_mm} mm");
+        // It is up again, hears the hand, and knows why it does not follow.
+        let status = run.recording.sensor_status.expect("it says how it is");
+        assert_eq!(status.reset, ResetCause::Watchdog, "{told:?}");
+        assert!(status.peer.received > 0, "{told:?}: it hears the display");
+        assert!(
+            matches!(status.role, RoleCounters::Sensor(sensor) if sensor.stopped == Some(Trip::Operator)),
+            "{told:?}: {:?}",
+            status.role
+        );
+    }
 }

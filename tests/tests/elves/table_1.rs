@@ -117,10 +117,10 @@ fn the_actuators_vibrate_at_speed_over_estimated_wavelength_within_a_thousandth(
 }
 
 #[test]
-fn every_channels_mean_over_whole_cycles_is_below_five_millivolts() {
+fn every_channels_mean_over_time_is_below_fifteen_millivolts() {
     in_every_cell(|_, run| {
         let mean_v = run.verdict.actuators.mean_v.unwrap_or(f64::NAN);
-        hold(mean_v.abs() <= 5e-3, format!("{mean_v} V"))
+        hold(mean_v.abs() <= 15e-3, format!("{mean_v} V"))
     });
 }
 

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use protocol::Role;
 
 use super::PortName;
+use crate::wiring::Mistake;
 
 /// Something to be done to a bench.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +25,10 @@ pub enum Command {
     Stop,
     /// `release`: it is released.
     Release,
+    /// `wrong MISTAKE`: a wire is put wrong, and stays so.
+    Wrong(Mistake),
+    /// `right MISTAKE`: it is put right.
+    Right(Mistake),
     /// `quit`: the bench is taken down.
     Quit,
 }
@@ -38,6 +43,8 @@ impl std::fmt::Display for Command {
             Self::Hand { speed_mm_s } => write!(formatter, "hand {speed_mm_s}"),
             Self::Stop => formatter.write_str("stop"),
             Self::Release => formatter.write_str("release"),
+            Self::Wrong(mistake) => write!(formatter, "wrong {}", mistake.name()),
+            Self::Right(mistake) => write!(formatter, "right {}", mistake.name()),
             Self::Quit => formatter.write_str("quit"),
         }
     }
@@ -72,6 +79,12 @@ impl FromStr for Command {
                 refuse(&format!("give one of {names}"))
             })
         };
+        let mistake = || {
+            object.and_then(Mistake::from_name).ok_or_else(|| {
+                let names = Mistake::ALL.map(Mistake::name).join(", ");
+                refuse(&format!("give one of {names}"))
+            })
+        };
         match (verb, object) {
             ("pull", _) => Ok(Self::Pull(port()?)),
             ("plug", _) => Ok(Self::Plug(port()?)),
@@ -84,9 +97,11 @@ impl FromStr for Command {
             },
             ("stop", None) => Ok(Self::Stop),
             ("release", None) => Ok(Self::Release),
+            ("wrong", _) => Ok(Self::Wrong(mistake()?)),
+            ("right", _) => Ok(Self::Right(mistake()?)),
             ("quit", None) => Ok(Self::Quit),
             _ => Err(refuse(
-                "is no command: give pull, plug, reset, hand, stop, release or quit",
+                "is no command: give pull, plug, reset, hand, stop, release, wrong, right or quit",
             )),
         }
     }
@@ -108,6 +123,8 @@ mod tests {
             ("hand -12.5", Command::Hand { speed_mm_s: -12.5 }),
             ("stop", Command::Stop),
             ("release", Command::Release),
+            ("wrong sdi-open", Command::Wrong(Mistake::SdiOpen)),
+            ("right sdi-open", Command::Right(Mistake::SdiOpen)),
             ("quit", Command::Quit),
         ] {
             assert_eq!(line.parse(), Ok(command));
@@ -125,6 +142,8 @@ mod tests {
             ("hand fast", "\"hand fast\": give a speed of −1000 to 1000"),
             ("hand 1001", "\"hand 1001\": give a speed of −1000 to 1000"),
             ("hand nan", "\"hand nan\": give a speed of −1000 to 1000"),
+            ("wrong", "\"wrong\": give one of link-straight, "),
+            ("right way", "\"right way\": give one of link-straight, "),
             ("stop it", "\"stop it\": is no command: give pull"),
             ("jump", "\"jump\": is no command: give pull"),
         ] {

@@ -22,6 +22,7 @@ use crate::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
 use crate::rtt::Channel;
 use crate::sensor::SensorPins;
 use crate::wire::TimedByte;
+use crate::wiring::Mistake;
 use hil_sim_core::run::recording::{ACTUATORS, volts};
 use hil_sim_core::scene::Scene;
 
@@ -136,6 +137,11 @@ pub trait BenchPins: BoardPins {
         Self: Sized,
     {
     }
+
+    /// A wire at the pins is put wrong, or right. Those between the boards are not at the pins.
+    fn miswire(board: &mut Nucleo<Self>, at_ns: u64, mistake: Mistake, wrong: bool)
+    where
+        Self: Sized;
 }
 
 impl BenchPins for SensorPins {
@@ -143,6 +149,10 @@ impl BenchPins for SensorPins {
         let (pins, _) = board.pins();
         pins.scans.clear();
         lock(&shared.sensed).wavelength_mm = pins.wavelength_mm();
+    }
+
+    fn miswire(board: &mut Nucleo<Self>, _at_ns: u64, mistake: Mistake, wrong: bool) {
+        board.pins().0.miswire(mistake, wrong);
     }
 }
 
@@ -159,6 +169,11 @@ impl BenchPins for DisplayPins {
     fn press_stop(board: &mut Nucleo<Self>, at_ns: u64, pressed: bool) {
         let (pins, part) = board.pins();
         pins.set_stop_button(part, at_ns, pressed);
+    }
+
+    fn miswire(board: &mut Nucleo<Self>, at_ns: u64, mistake: Mistake, wrong: bool) {
+        let (pins, part) = board.pins();
+        pins.miswire(part, at_ns, mistake, wrong);
     }
 }
 
@@ -178,6 +193,8 @@ pub struct PortServer {
     sent: Vec<TimedByte>,
     /// Whether the scene breaks the boards.
     is_broken: bool,
+    /// Whether the wire from the other board's TX is not where it should be.
+    is_cut: bool,
     /// The wall clock, beside the one board that the other waits for.
     pacer: Option<Pacer>,
 }
@@ -202,6 +219,7 @@ impl PortServer {
             said: Receiver::new(),
             sent: Vec::new(),
             is_broken: !scene.faults.is_empty(),
+            is_cut: false,
             pacer,
         }
     }
@@ -242,6 +260,23 @@ impl PortServer {
             let _ = ready.send(Ok(()));
         }
         true
+    }
+
+    /// Puts a wire wrong, or right.
+    fn miswire<P: BenchPins>(
+        &mut self,
+        board: &mut Nucleo<P>,
+        at_ns: u64,
+        mistake: Mistake,
+        wrong: bool,
+    ) {
+        match mistake {
+            Mistake::LinkStraight | Mistake::SensorTxOpen | Mistake::DisplayTxOpen => {
+                self.is_cut = wrong;
+            }
+            Mistake::NoGround => board.break_line(wrong),
+            _ => P::miswire(board, at_ns, mistake, wrong),
+        }
     }
 
     /// Lets a port's bytes go both ways.
@@ -293,7 +328,7 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
     }
 
     fn is_joined(&self, _now_ns: u64) -> bool {
-        !self.shared.is_apart
+        !self.shared.is_apart && !self.is_cut
     }
 
     fn heard(&mut self, _due_ns: u64, _byte: u8) {}
@@ -329,6 +364,12 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
                 Command::Reset(_) => session.reset_by_pin(stop.at, stop.instruction_count, host),
                 Command::Stop => P::press_stop(session.board_mut(), stop.at.0, true),
                 Command::Release => P::press_stop(session.board_mut(), stop.at.0, false),
+                Command::Wrong(mistake) => {
+                    self.miswire(session.board_mut(), stop.at.0, mistake, true);
+                }
+                Command::Right(mistake) => {
+                    self.miswire(session.board_mut(), stop.at.0, mistake, false);
+                }
                 _ => {}
             }
         }

@@ -19,8 +19,8 @@ const LARGEST_STEP_V: f64 = 4.001;
 /// Between a status' making and its last byte the ticks go on: its 200 bytes, and what waits before it.
 const TICKS_ON_THE_WIRE: u64 = 40;
 /// Frames that may be lost at the end without any frame after them to show it: those on their way when
-/// the link falls silent, and a burst of losses.
-const UNSEEN_AT_THE_END: u64 = 120;
+/// the link falls silent, 50 ms of 500 motions a second, and a burst of losses.
+const UNSEEN_AT_THE_END: u64 = 60;
 
 /// A condition, and whether it held.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +51,8 @@ pub(super) struct Side {
     last: Option<Status>,
     /// The frames said before the last status.
     before_last: u64,
+    /// The frames said before the quiet end.
+    before_quiet: u64,
     /// Statuses whose count of sent frames is not that of the wire.
     miscounted_frames: u64,
     /// Statuses whose count of ticks is not that of the timer.
@@ -132,14 +134,17 @@ fn ended(counters: &PortCounters) -> u64 {
 
 impl Side {
     /// The board put these on the wire.
-    pub(super) fn sent(&mut self, bytes: &[TimedByte], outputs: &Outputs) {
-        for &(_, byte) in bytes {
+    pub(super) fn sent(&mut self, bytes: &[TimedByte], outputs: &Outputs, quiet_ns: u64) {
+        for &(at_ns, byte) in bytes {
             let mut message = None;
             self.said.receive(&[byte], |event| {
                 if let Event::Message(said) = event {
                     message = Some(said);
                 }
             });
+            if at_ns < quiet_ns {
+                self.before_quiet = ended(&self.said.counters());
+            }
             match message {
                 Some(Message::Estimate(_)) => self.said_estimates += 1,
                 Some(Message::Motion(_)) => self.said_motions += 1,
@@ -326,26 +331,16 @@ fn of_link(checks: &mut Checks, board: &Left, peer: &Left) {
     ] {
         checks.equal(format!("{name}: frames {what}"), seen.into(), due.into());
     }
-    // What was sent came, came late, or left a gap; after silence nothing more shows a gap. Two statuses
-    // and all other frames of the quiet end are among those.
-    let sent = peer.side.before_last;
+    // What was sent came, came late, or left a gap; after silence nothing more shows a gap.
+    let sent = peer.side.before_quiet;
     let [received, late, lost, unheralded] =
         [twin.received, twin.late, twin.lost, twin.unheralded].map(u64::from);
-    let quiet = peer.side.said_in_quiet();
     let accounted = received + late + lost + unheralded;
     checks.within(
         format!("{name}: of the peer's frames received, late, lost or unheralded"),
         accounted,
-        (sent.saturating_sub(quiet + UNSEEN_AT_THE_END), sent),
+        (sent.saturating_sub(UNSEEN_AT_THE_END), sent),
     );
-}
-
-impl Side {
-    /// The most frames that a board says in the quiet end: 500 motions and 100 estimates a second.
-    fn said_in_quiet(&self) -> u64 {
-        let rate_hz = if self.said_motions > 0 { 500 } else { 100 };
-        (super::QUIET_S * rate_hz as f64) as u64
-    }
 }
 
 fn of_sensor(checks: &mut Checks, sensor: &Left, counters: &SensorCounters) {

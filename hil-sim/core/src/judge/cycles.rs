@@ -1,7 +1,5 @@
 //! The whole cycles of a stimulus: from one upward crossing of its middle to the next.
 
-use crate::judge::channels::{Cycle, Means};
-use crate::judge::finite;
 use crate::judge::middle::Point;
 
 /// Share of the usual amplitude from which on a cycle counts as at full amplitude.
@@ -28,14 +26,13 @@ pub struct Stretch {
 }
 
 /// The cycles of each stroke's voltage about its middle, half a cycle or more away from where the hand turned:
-/// their crossings are kept, of their voltages only sums.
+/// their crossings are kept.
 #[derive(Clone, Debug, Default)]
 pub struct Cycles {
     crossings: Vec<Crossing>,
     /// The last point, and its voltage about the middle; none where a stroke begins.
     before: Option<(f64, Point)>,
     open: Option<Open>,
-    means: Means,
 }
 
 /// A cycle that has not ended.
@@ -46,10 +43,6 @@ struct Open {
     square: f64,
     /// Where that has come to, in cycles, and the squared voltage there, in V².
     before: (f64, f64),
-    /// The voltages of all channels.
-    cycle: Cycle,
-    /// The amplitude of the cycle that it follows, in V.
-    follows_v: Option<f64>,
 }
 
 impl Open {
@@ -86,11 +79,7 @@ impl Cycles {
             let length_s = point.edge.t_s - before.edge.t_s;
             let t_s = before.edge.t_s + length_s * before_v / (before_v - volts);
             let cycles = travelled_cycles(&before, point, t_s);
-            self.cross(t_s, cycles, &before, point);
-        } else if let Some(open) = &mut self.open {
-            let from = (before.edge.t_s, before.travelled_cycles);
-            let to = (point.edge.t_s, point.travelled_cycles);
-            open.cycle.add((&before.edge, &point.edge), from, to);
+            self.cross(t_s, cycles);
         }
         if let Some(open) = &mut self.open {
             open.add(point.travelled_cycles, volts);
@@ -98,40 +87,20 @@ impl Cycles {
     }
 
     /// A cycle ends between two points, and the next one begins.
-    fn cross(&mut self, t_s: f64, travelled_cycles: f64, before: &Point, point: &Point) {
-        let edges = (&before.edge, &point.edge);
-        let here = (t_s, travelled_cycles);
-        let ended = self.open.take().map(|mut open| {
-            let from = (before.edge.t_s, before.travelled_cycles);
+    fn cross(&mut self, t_s: f64, travelled_cycles: f64) {
+        let amplitude_v = self.open.take().map(|mut open| {
             open.add(travelled_cycles, 0.0);
-            open.cycle.add(edges, from, here);
-            open
+            open.amplitude_v()
         });
-        let amplitude_v = ended.as_ref().map(Open::amplitude_v);
-        if let Some(Open {
-            cycle,
-            follows_v: Some(follows_v),
-            ..
-        }) = ended
-            && let Some(amplitude_v) = amplitude_v
-        {
-            // Counts if it is at full amplitude, and the one before too.
-            self.means
-                .add(follows_v.min(amplitude_v), cycle, &point.edge);
-        }
         self.crossings.push(Crossing {
             t_s,
             travelled_cycles,
             amplitude_v,
         });
-        let mut cycle = Cycle::default();
-        cycle.add(edges, here, (point.edge.t_s, point.travelled_cycles));
         self.open = Some(Open {
             begins_cycles: travelled_cycles,
             square: 0.0,
             before: (travelled_cycles, 0.0),
-            cycle,
-            follows_v: amplitude_v,
         });
     }
 
@@ -170,18 +139,9 @@ impl Cycles {
         .max_by(|one, other| one.length_s.total_cmp(&other.length_s))
     }
 
-    /// The mean of the channel for which it is farthest from 0, in V, over the full cycles that follow another
-    /// one: the first after a fade may still have grown by a few percent, which gives it a mean of its own.
-    pub fn worst_mean_v(&self) -> Option<f64> {
-        let means_v = self.means.from(self.full_v()).into_iter();
-        means_v
-            .filter_map(finite)
-            .max_by(|one, other| one.abs().total_cmp(&other.abs()))
-    }
-
-    /// How many crossings are held, and how many sums.
-    pub fn held(&self) -> (usize, usize) {
-        (self.crossings.len(), self.means.held())
+    /// How many crossings are held.
+    pub fn held(&self) -> usize {
+        self.crossings.len()
     }
 }
 
@@ -216,7 +176,7 @@ mod tests {
     use crate::scene::Expect;
 
     /// What a display's balance works off with, in s.
-    const TIME_CONSTANT_S: f64 = firmware_display::balance::TIME_CONSTANT_S;
+    const TIME_CONSTANT_S: f64 = 0.256;
     /// What a reversal leaves in these tests, in V.
     const LEFT_V: f64 = 1.0;
     /// The amplitude in them, in V: both are within the range.

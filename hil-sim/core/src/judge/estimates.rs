@@ -1,13 +1,16 @@
 //! The estimates beside the truth.
 
+use std::collections::VecDeque;
+
 use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range};
 use serde::Serialize;
 
+use crate::judge::needed::Rendering;
 use crate::judge::track::interpolate;
 use crate::judge::truth::Truth;
 use crate::judge::{finite, mean, seconds, words};
 use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{Recording, ScanRecord};
+use crate::run::recording::{Arrival, EstimateRecord, Recording, ScanRecord};
 
 /// Speed from which on the arm counts as in motion, in mm/s.
 pub const MOTION_MM_S: f64 = 5.0;
@@ -18,6 +21,8 @@ const BOUNDARY: f64 = 1e-3;
 /// How long an estimate speaks for the surface, in s, if no other follows: one and a half of the
 /// 10 ms between two, so that a little jitter leaves no gap.
 const ESTIMATE_LASTS_S: f64 = 15e-3;
+/// Estimates on their way at most: 40 s, twice what the longest delay and jitter of a scene may come to.
+const TRAVELLING: usize = 4_096;
 
 /// An estimate and the truth at its instant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -81,6 +86,9 @@ pub struct Summary {
     /// Share of the time in which the hand moves, in which the display drives at a λ more than [`SETTLED`] off,
     /// or at any where there is none, 0 to 1. None without motion, or if only the estimates were judged.
     pub felt_wrong_share: Option<f64>,
+    /// The rendering that the surface needs: see [`crate::judge::needed`]. None if no texture was told, or if only the
+    /// estimates were judged.
+    pub rendering_needed: Option<Rendering>,
 }
 
 impl JudgedEstimate {
@@ -119,8 +127,8 @@ pub struct Judge<'a> {
     estimates: Vec<JudgedEstimate>,
     /// Estimates before this one are beside the truth: that takes the scan after them.
     placed: usize,
-    /// When each was made, in ns, until it has arrived.
-    travelling_ns: Vec<Option<u64>>,
+    /// The last few that have not arrived, until they do.
+    travelling: VecDeque<EstimateRecord>,
     /// Of the time from an estimate to its arrival, in ms, and how many arrived.
     latency_ms: (f64, usize),
     /// The arm at the last scan, in s and mm.
@@ -144,7 +152,7 @@ impl<'a> Judge<'a> {
             truth: *truth,
             estimates: Vec::new(),
             placed: 0,
-            travelling_ns: Vec::new(),
+            travelling: VecDeque::new(),
             latency_ms: (0.0, 0),
             arm: None,
             made: 0,
@@ -183,6 +191,7 @@ impl<'a> Judge<'a> {
             latency_ms: finite(latency_ms / arrived as f64),
             felt_right_share: None,
             felt_wrong_share: None,
+            rendering_needed: None,
         };
         (estimates, summary)
     }
@@ -250,7 +259,14 @@ impl RunObserver for Judge<'_> {
 
     fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
         let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
-        self.travelling_ns.push(Some(made_ns));
+        self.travelling.push_back(EstimateRecord {
+            made_ns,
+            received_ns: None,
+            estimate: *estimate,
+        });
+        if self.travelling.len() > TRAVELLING {
+            self.travelling.pop_front();
+        }
         self.estimates.push(JudgedEstimate {
             t_s: seconds(made_ns),
             truth_mm: None,
@@ -267,9 +283,12 @@ impl RunObserver for Judge<'_> {
         });
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        if let Some(made_ns) = self.travelling_ns.get_mut(number).and_then(Option::take) {
-            self.latency_ms.0 += (received_ns as f64 - made_ns as f64) * 1e-6;
+    fn received(&mut self, arrival: &Arrival) {
+        let is_it = |record: &EstimateRecord| record.is(&arrival.estimate);
+        if let Some(place) = self.travelling.iter().position(is_it)
+            && let Some(record) = self.travelling.remove(place)
+        {
+            self.latency_ms.0 += (arrival.at_ns as f64 - record.made_ns as f64) * 1e-6;
             self.latency_ms.1 += 1;
         }
     }
@@ -477,9 +496,7 @@ mod tests {
             summary(&run)
         );
         let mut recording = run.record();
-        for record in &mut recording.estimates {
-            record.received_ns = None;
-        }
+        recording.arrived.clear();
         let (_, summary) = judge(&Truth::new("", "", &*run.surface_mm), &recording);
         assert_eq!(summary.latency_ms, None);
     }

@@ -3,7 +3,7 @@
 use crate::judge::Verdict;
 use crate::scene::Expect;
 
-/// A line for each expectation that the verdict does not meet, its key first ([`key_of`]). What could not be measured meets none.
+/// A line for each expectation that the verdict does not meet, its key first ([`keys_of`]). What could not be measured meets none.
 pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
     let (summary, actuators) = (&verdict.summary, &verdict.actuators);
     let frequency_percent = match (actuators.frequency_hz, actuators.truth_hz) {
@@ -87,9 +87,17 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
     lines
 }
 
-/// The key in `[expect]` that a line of [`unmet`]'s is about.
-pub fn key_of(line: &str) -> &str {
-    line.split(':').next().unwrap_or(line)
+/// The keys of a scene's file that a line is about, as [`crate::scene_file::line::line_of`] takes them: what stands
+/// before its colon, a key of `[expect]` or `fault[0] kind`.
+pub fn keys_of(line: &str) -> Vec<&str> {
+    let key = line.split(':').next().unwrap_or(line);
+    match key
+        .strip_prefix("fault[")
+        .and_then(|rest| rest.split(']').next())
+    {
+        Some(number) => vec!["fault", number, "kind"],
+        None => vec!["expect", key],
+    }
 }
 
 #[cfg(test)]
@@ -155,7 +163,7 @@ mod tests {
             e.felt_wrong_share_max = Some(0.009);
             e.frequency_percent = Some(0.3);
         });
-        let keys: Vec<&str> = unmet.iter().map(|line| key_of(line)).collect();
+        let keys: Vec<&str> = unmet.iter().map(|line| keys_of(line)[1]).collect();
         assert_eq!(
             keys,
             [
@@ -168,6 +176,15 @@ mod tests {
                 "felt_wrong_share_max",
                 "frequency_percent"
             ]
+        );
+    }
+
+    #[test]
+    fn a_line_leads_to_its_place_in_the_file() {
+        assert_eq!(keys_of("mean_mm: 1 is not"), ["expect", "mean_mm"]);
+        assert_eq!(
+            keys_of("fault[3] link-down: no sign"),
+            ["fault", "3", "kind"]
         );
     }
 

@@ -7,10 +7,8 @@
 //!
 //! [`DuePhase`]: crate::judge::phase::DuePhase
 
-use firmware_display::ZERO_VOLT;
-
 use crate::judge::estimates::{MOTION_MM_S, SETTLED};
-use crate::run::recording::{OutputRecord, TickRecord};
+use crate::run::recording::{OutputRecord, TickRecord, ZERO_VOLT};
 
 /// Relative error of λ within which what is driven is right.
 pub const RIGHT: f64 = 0.05;

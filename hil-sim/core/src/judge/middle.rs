@@ -151,14 +151,12 @@ impl AboutMiddle {
 
 #[cfg(test)]
 mod tests {
-    use protocol::Estimate;
-
     use super::*;
     use crate::judge::stimulus::{Stimulus, Told};
     use crate::judge::synthetic::Run;
     use crate::judge::truth::Truth;
     use crate::run::observer::{RunObserver, replay_to};
-    use crate::run::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V, volts};
+    use crate::run::recording::{ACTUATORS, Arrival, OutputRecord, TickRecord, WORD_V, volts};
 
     /// For each stroke, the instants in s and the voltage of actuator 0 about its middle.
     struct Strokes {
@@ -168,10 +166,6 @@ mod tests {
     }
 
     impl RunObserver for Strokes {
-        fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-            self.stimulus.on_estimate(made_ns, estimate);
-        }
-
         fn tick(&mut self, tick: &TickRecord) {
             self.stimulus.tick(tick);
             self.follow();
@@ -181,8 +175,8 @@ mod tests {
             self.stimulus.output(output);
         }
 
-        fn received(&mut self, number: usize, received_ns: u64) {
-            self.stimulus.received(number, received_ns);
+        fn received(&mut self, arrival: &Arrival) {
+            self.stimulus.received(arrival);
         }
     }
 

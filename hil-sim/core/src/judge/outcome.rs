@@ -14,7 +14,7 @@ use crate::plant::surface::Surface;
 use crate::run::decoder::TimedMessage;
 use crate::run::fault_evidence::Reset;
 use crate::run::observer::RunObserver;
-use crate::run::recording::{OutputRecord, Ran, Recording, ScanRecord, TickRecord};
+use crate::run::recording::{Arrival, OutputRecord, Ran, Recording, ScanRecord, TickRecord};
 use crate::scene::{Scene, SceneError};
 
 /// A run and what came of it.
@@ -25,7 +25,7 @@ pub struct Outcome {
     pub recording: Recording,
     /// The recording, judged.
     pub verdict: Verdict,
-    /// A line for each expectation of the scene that was not met.
+    /// A line for each expectation that was not met: the scene's, and of its faults what the table of kinds says.
     pub unmet: Vec<String>,
     /// What became of the scene's faults, in their order.
     pub findings: Vec<Finding>,
@@ -38,8 +38,8 @@ impl Outcome {
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = Box::new(move |x_mm| surface.wavelength_mm(x_mm));
         let verdict = judge::judge(&truth(&scene, &*wavelength_mm), &recording);
-        let unmet = expectation::unmet(&scene.expect, &verdict);
-        let findings = judge(&scene.faults, &recording);
+        let findings = judge(&scene, &recording);
+        let unmet = unmet(&scene, &verdict, &findings);
         Self {
             scene,
             recording,
@@ -78,7 +78,7 @@ pub struct Judgement {
     pub ran: Ran,
     /// The run, judged.
     pub verdict: Verdict,
-    /// A line for each expectation of the scene that was not met.
+    /// A line for each expectation that was not met: the scene's, and of its faults what the table of kinds says.
     pub unmet: Vec<String>,
     /// What became of the scene's faults, in their order.
     pub findings: Vec<Finding>,
@@ -97,16 +97,17 @@ impl Judgement {
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
         let mut judges = Judges {
             run: judge::Judge::new(&truth(scene, &wavelength_mm)),
-            faults: fault::Judge::new(&scene.faults, scene.duration_s),
+            faults: fault::Judge::new(scene),
             events: with_events.then(|| Events::new(scene)),
         };
         let ran = native::run_before(scene, &mut judges)?;
         let verdict = judges.run.finish();
+        let findings = judges.faults.finish();
         Ok(Self {
             ran,
-            unmet: expectation::unmet(&scene.expect, &verdict),
+            unmet: unmet(scene, &verdict, &findings),
             verdict,
-            findings: judges.faults.finish(),
+            findings,
             events: judges.events.map(Events::finish).unwrap_or_default(),
         })
     }
@@ -133,6 +134,7 @@ impl RunObserver for Judges<'_> {
 
     fn tick(&mut self, tick: &TickRecord) {
         self.run.tick(tick);
+        self.faults.tick(tick);
     }
 
     fn output(&mut self, output: &OutputRecord) {
@@ -140,11 +142,13 @@ impl RunObserver for Judges<'_> {
         self.faults.output(output);
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        self.run.received(number, received_ns);
+    fn received(&mut self, arrival: &Arrival) {
+        self.run.received(arrival);
+        self.faults.received(arrival);
     }
 
     fn said(&mut self, role: Role, said: &TimedMessage) {
+        self.run.said(role, said);
         self.faults.said(role, said);
     }
 
@@ -155,6 +159,16 @@ impl RunObserver for Judges<'_> {
     fn cleared(&mut self, at_ns: u64) {
         self.faults.cleared(at_ns);
     }
+}
+
+fn unmet(scene: &Scene, verdict: &Verdict, findings: &[Finding]) -> Vec<String> {
+    let mut unmet = expectation::unmet(&scene.expect, verdict);
+    for (number, finding) in findings.iter().enumerate() {
+        let kind = finding.fault.kind.name();
+        let lines = finding.unmet().into_iter();
+        unmet.extend(lines.map(|line| format!("fault[{number}] {kind}: {line}")));
+    }
+    unmet
 }
 
 fn truth<'a>(scene: &'a Scene, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Truth<'a> {

@@ -2,23 +2,21 @@
 
 use std::collections::VecDeque;
 
-use firmware_display::ZERO_VOLT;
-use firmware_display::pace::per_tick;
-use firmware_display::plausibility::{Plausibility, Verdict};
-use protocol::{DisplayConfiguration, Estimate};
+use protocol::DisplayConfiguration;
 
 use crate::judge::seconds;
+use crate::judge::trust::Trust;
 use crate::judge::truth::Truth;
 use crate::run::observer::RunObserver;
-use crate::run::recording::{OutputRecord, TickRecord};
+use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
 
 /// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
 const TICKS_KEPT: usize = 8;
-/// Estimates kept for their arrival: 40 s, twice what the longest delay and jitter of a scene may come to.
-const ESTIMATES_KEPT: usize = 4_096;
+/// Ticks at 0 V that are no wave's crossing.
+const CROSSING_TICKS: u32 = 3;
 
 /// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
-/// in which each estimate that the display trusts (its own [`Plausibility`] says which) takes
+/// in which each estimate that is to be trusted ([`Trust`] says which) takes
 /// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
 /// heard. 0 until there is one.
 ///
@@ -34,14 +32,13 @@ pub struct DuePhase {
     cycles: f64,
     travelled: f64,
     shortest_mm: Option<f64>,
-    made: Made,
-    /// What has arrived and was not followed yet, with its arrival in ns.
-    arrived: VecDeque<(u64, Estimate)>,
+    /// What has arrived and was not followed yet.
+    arrived: VecDeque<Arrival>,
     last_tick_ns: Option<u64>,
-    /// Whether the last two outputs were other than 0 V. A wave crosses 0 V; silence stays there.
-    loud: [bool; 2],
-    /// The same at the last tick.
-    heard: bool,
+    /// Whether the last output was other than 0 V.
+    loud: bool,
+    /// Ticks since then. A wave crosses 0 V; silence stays there.
+    silent_ticks: u32,
 }
 
 /// The phase due at an instant.
@@ -68,11 +65,10 @@ impl DuePhase {
             cycles: 0.0,
             travelled: 0.0,
             shortest_mm: None,
-            made: Made::default(),
             arrived: VecDeque::new(),
             last_tick_ns: None,
-            loud: [false; 2],
-            heard: false,
+            loud: false,
+            silent_ticks: CROSSING_TICKS,
         }
     }
 
@@ -114,6 +110,10 @@ impl DuePhase {
         self.followed.per_mm
     }
 
+    fn is_heard(&self) -> bool {
+        self.silent_ticks < CROSSING_TICKS
+    }
+
     /// The shortest λ̂ that has been in force, in mm.
     pub fn shortest_mm(&self) -> Option<f64> {
         self.shortest_mm
@@ -121,27 +121,19 @@ impl DuePhase {
 }
 
 impl RunObserver for DuePhase {
-    fn on_estimate(&mut self, _made_ns: u64, estimate: &Estimate) {
-        self.made.add(*estimate);
-    }
-
-    fn received(&mut self, number: usize, received_ns: u64) {
-        let Some(estimate) = self.made.take(number) else {
-            return;
-        };
+    fn received(&mut self, arrival: &Arrival) {
         if self
             .last_tick_ns
-            .is_some_and(|tick_ns| received_ns <= tick_ns)
+            .is_some_and(|tick_ns| arrival.at_ns <= tick_ns)
         {
-            self.followed.hear(&estimate, self.heard);
+            self.followed.hear(arrival, self.is_heard());
         } else {
-            self.arrived.push_back((received_ns, estimate));
+            self.arrived.push_back(*arrival);
         }
     }
 
     fn output(&mut self, output: &OutputRecord) {
-        let is_loud = output.words.iter().any(|&word| word != ZERO_VOLT);
-        self.loud = [self.loud[1], is_loud];
+        self.loud = output.words.iter().any(|&word| word != ZERO_VOLT);
     }
 
     fn tick(&mut self, tick: &TickRecord) {
@@ -165,36 +157,18 @@ impl RunObserver for DuePhase {
             self.ticks.pop_front();
         }
         self.last_tick_ns = Some(tick.at_ns);
-        self.heard = self.loud.contains(&true);
-        while let Some((_, estimate)) = self
+        self.silent_ticks = if self.loud {
+            0
+        } else {
+            self.silent_ticks.saturating_add(1)
+        };
+        while let Some(arrival) = self
             .arrived
-            .pop_front_if(|&mut (received_ns, _)| received_ns <= tick.at_ns)
+            .pop_front_if(|arrival| arrival.at_ns <= tick.at_ns)
         {
-            self.followed.hear(&estimate, self.heard);
+            let heard = self.is_heard();
+            self.followed.hear(&arrival, heard);
         }
-    }
-}
-
-/// The last estimates made that have not arrived yet.
-#[derive(Clone, Debug, Default)]
-struct Made {
-    kept: VecDeque<Option<Estimate>>,
-    /// The number of the first one kept.
-    first: usize,
-}
-
-impl Made {
-    fn add(&mut self, estimate: Estimate) {
-        self.kept.push_back(Some(estimate));
-        if self.kept.len() > ESTIMATES_KEPT {
-            self.kept.pop_front();
-            self.first += 1;
-        }
-    }
-
-    /// The one that was made after `number` others, once.
-    fn take(&mut self, number: usize) -> Option<Estimate> {
-        self.kept.get_mut(number.checked_sub(self.first)?)?.take()
     }
 }
 
@@ -202,7 +176,7 @@ impl Made {
 #[derive(Clone, Debug)]
 struct Followed {
     configuration: DisplayConfiguration,
-    plausibility: Plausibility,
+    trust: Trust,
     /// In cycles per mm.
     per_mm: f64,
     target_per_mm: f64,
@@ -213,7 +187,7 @@ impl Followed {
     fn new(configuration: DisplayConfiguration) -> Self {
         Self {
             configuration,
-            plausibility: Plausibility::new(),
+            trust: Trust::new(configuration.max_age_ms),
             per_mm: 0.0,
             target_per_mm: 0.0,
             ticks_left: 0,
@@ -221,15 +195,14 @@ impl Followed {
     }
 
     /// An estimate has come, while something was `heard` or nothing.
-    fn hear(&mut self, estimate: &Estimate, heard: bool) {
+    fn hear(&mut self, arrival: &Arrival, heard: bool) {
         let DisplayConfiguration {
-            max_age_ms,
             glide_ms,
             update_rate,
             ..
         } = self.configuration;
-        if let Verdict::Trusted(wavelength) = self.plausibility.judge(estimate, max_age_ms) {
-            let target_per_mm = 1.0 / f64::from(wavelength.mm());
+        if let Some(wavelength_mm) = self.trust.hear(arrival.at_ns, &arrival.estimate) {
+            let target_per_mm = 1.0 / wavelength_mm;
             if target_per_mm != self.target_per_mm {
                 self.target_per_mm = target_per_mm;
                 let glide_ms = if heard { u32::from(glide_ms) } else { 0 };
@@ -240,9 +213,6 @@ impl Followed {
 
     /// The wavenumber of a tick's travel.
     fn tick(&mut self) -> f64 {
-        // Whether the hand rests matters to what the sensor says of the arm, not to λ.
-        self.plausibility
-            .elapse(per_tick(self.configuration.update_rate), false);
         let left = f64::from(self.ticks_left.max(1));
         self.per_mm += (self.target_per_mm - self.per_mm) / left;
         self.ticks_left = self.ticks_left.saturating_sub(1);
@@ -265,10 +235,6 @@ mod tests {
     }
 
     impl RunObserver for Asking {
-        fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-            self.due.on_estimate(made_ns, estimate);
-        }
-
         fn tick(&mut self, tick: &TickRecord) {
             self.due.tick(tick);
             if seconds(tick.at_ns) > self.t_s && self.answer.is_none() {
@@ -280,8 +246,8 @@ mod tests {
             self.due.output(output);
         }
 
-        fn received(&mut self, number: usize, received_ns: u64) {
-            self.due.received(number, received_ns);
+        fn received(&mut self, arrival: &Arrival) {
+            self.due.received(arrival);
         }
     }
 
@@ -350,23 +316,13 @@ mod tests {
     fn an_estimate_overtaken_by_a_newer_one_is_not_in_force() {
         let late = |wavelength_mm: f32| {
             let mut recording = Run::steady(50.0, 2.0).record();
-            recording.estimates[30].received_ns = Some(500_000_000);
-            recording.estimates[30].estimate.wavelength_mm = Some(wavelength_mm);
+            let mut late = recording.arrived.remove(30);
+            late.at_ns = 500_000_000;
+            late.estimate.wavelength_mm = Some(wavelength_mm);
+            recording.arrived.push(late);
+            recording.arrived.sort_by_key(|arrival| arrival.at_ns);
             due_at(1.9, &recording).0
         };
         assert_eq!(late(2.2), late(2.0));
-    }
-
-    #[test]
-    fn what_arrives_twice_is_heard_once() {
-        let recording = Run::steady(50.0, 2.0).record();
-        let surface = |_| 2.0;
-        let mut due = DuePhase::new(&Truth::new("", "", &surface));
-        due.on_estimate(0, &recording.estimates[0].estimate);
-        due.received(0, 1_000);
-        due.received(0, 2_000);
-        assert_eq!(due.arrived.len(), 1);
-        due.received(1, 2_000);
-        assert_eq!(due.arrived.len(), 1);
     }
 }

@@ -66,21 +66,35 @@ impl Demodulator {
 
     /// The errors of the windows at full amplitude, of a voltage of which `peak_v` is the highest; none if the
     /// stimulus never was at full amplitude for a cycle.
-    pub fn finish(mut self, peak_v: f64) -> Option<PhaseError> {
+    pub fn finish(self, peak_v: f64) -> Option<PhaseError> {
+        let errors = self.errors(peak_v);
+        Some(PhaseError {
+            rms_cycles: mean(errors.iter().map(|error| error * error))?.sqrt(),
+            mean_cycles: mean(errors.iter().copied())?,
+        })
+    }
+
+    /// The errors' mean on the circle, so that it tells what stands anywhere, with `peak_v` as in
+    /// [`Demodulator::finish`]; none if there is none.
+    pub fn standing(self, peak_v: f64) -> Option<f64> {
+        let (mut s, mut c) = (0.0, 0.0);
+        for error in self.errors(peak_v) {
+            s += (TAU * error).sin();
+            c += (TAU * error).cos();
+        }
+        (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
+    }
+
+    /// The errors of the windows at full amplitude.
+    fn errors(mut self, peak_v: f64) -> Vec<f64> {
         if let Some((last, _)) = self.last {
             self.weigh(last.travelled_cycles);
         }
         self.demodulated.extend(self.window.demodulated());
         let full_v = FULL * peak_v;
         let full = |window: &&Demodulated| window.square >= full_v * full_v * window.whole;
-        let errors = || {
-            let windows = self.demodulated.iter().filter(full);
-            windows.map(|window| window.error_cycles)
-        };
-        Some(PhaseError {
-            rms_cycles: mean(errors().map(|error| error * error))?.sqrt(),
-            mean_cycles: mean(errors())?,
-        })
+        let windows = self.demodulated.iter().filter(full);
+        windows.map(|window| window.error_cycles).collect()
     }
 
     /// How many windows are held.

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use firmware_display::ZERO_VOLT;
 use serde::Serialize;
 
-use crate::judge::track::COUNT_MM;
-use crate::run::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V};
+use crate::plant::motion::MM_PER_COUNT;
+use crate::run::recording::{ACTUATORS, OutputRecord, TickRecord, WORD_V, ZERO_VOLT};
 
 /// Time from a movement of the hand to the LDAC edge that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -121,7 +120,7 @@ impl Reactions {
             self.moved.push(Moved {
                 from_ns: before.at_ns,
                 to_ns: tick.at_ns,
-                travel_mm: (tick.position_mm - before.position_mm).abs() + COUNT_MM,
+                travel_mm: (tick.position_mm - before.position_mm).abs() + MM_PER_COUNT,
             });
         }
     }

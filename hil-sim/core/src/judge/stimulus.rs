@@ -1,13 +1,11 @@
 //! The stimulus as it goes on: each point of the outputs beside the phase due then, and where the hand turned.
 
-use protocol::Estimate;
-
 use crate::judge::phase::{Due, DuePhase};
 use crate::judge::track::Turns;
 use crate::judge::truth::Truth;
 use crate::judge::voltage::{Edge, Edges};
 use crate::run::observer::RunObserver;
-use crate::run::recording::{OutputRecord, TickRecord};
+use crate::run::recording::{Arrival, OutputRecord, TickRecord};
 
 /// What a tick tells of the stimulus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,10 +70,6 @@ impl Stimulus {
 }
 
 impl RunObserver for Stimulus {
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.due.on_estimate(made_ns, estimate);
-    }
-
     fn tick(&mut self, tick: &TickRecord) {
         if self.turns.turned(tick.position_mm) {
             self.turned_cycles = self.due.last().map(|due| due.travelled_cycles);
@@ -89,7 +83,7 @@ impl RunObserver for Stimulus {
         self.edges.add(output);
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        self.due.received(number, received_ns);
+    fn received(&mut self, arrival: &Arrival) {
+        self.due.received(arrival);
     }
 }

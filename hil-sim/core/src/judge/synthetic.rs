@@ -3,10 +3,10 @@
 
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
-use crate::judge::track::COUNT_MM;
+use crate::plant::motion::MM_PER_COUNT;
 use crate::run::fault_evidence::FaultEvidence;
 use crate::run::recording::{
-    ACTUATORS, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
+    ACTUATORS, Arrival, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
 
 /// From one output tick to the next, in s.
@@ -112,6 +112,7 @@ impl Run {
                 .collect(),
             outputs: self.outputs(&ticks, &estimates),
             ticks,
+            arrived: Arrival::of(&estimates),
             estimates,
             sensor_status: None,
             display_status: None,
@@ -121,7 +122,7 @@ impl Run {
     }
 
     fn counts(&self, t_s: f64) -> i64 {
-        ((self.position_mm)(t_s) / COUNT_MM).floor() as i64
+        ((self.position_mm)(t_s) / MM_PER_COUNT).floor() as i64
     }
 
     fn scan(&self, t_s: f64) -> ScanRecord {
@@ -194,7 +195,7 @@ impl Run {
                 ticks_left -= 1.0;
             }
             let counts = pair[1].encoder.wrapping_sub(pair[0].encoder) as i16;
-            cycles += f64::from(counts) * COUNT_MM * per_mm;
+            cycles += f64::from(counts) * MM_PER_COUNT * per_mm;
             let on_s = t_s - *on_since_s.get_or_insert(t_s);
             let amplitude_v = self.amplitude_v * (on_s / FADE_IN_S).min(1.0);
             let mut words = [0; ACTUATORS];

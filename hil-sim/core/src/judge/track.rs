@@ -3,8 +3,6 @@
 use crate::judge::seconds;
 use crate::run::recording::Recording;
 
-/// One count of either encoder, in mm.
-pub const COUNT_MM: f64 = firmware_sensor::MICROMETRES_PER_COUNT as f64 * 1e-3;
 /// Half the time over which a velocity is taken, in s: two scans of the ADC.
 const VELOCITY_REACH_S: f64 = 0.5e-3;
 

@@ -1,9 +1,11 @@
 //! What a scene knows and the firmware does not: the ground on which a recording is judged.
 
-use firmware_sensor::counting::PAPERS_WINDOW_MS;
 use protocol::{
     ACTUATORS, Actuator, DEFAULT_ACTUATORS, DisplayConfiguration, Method, Mode, SensorConfiguration,
 };
+
+/// The paper's counting window A, in ms (Okamoto et al. 2009, section V).
+const PAPERS_WINDOW_MS: f64 = 80.0;
 
 /// The truth behind a [`crate::run::recording::Recording`], lent by the scene that was run.
 ///
@@ -53,15 +55,13 @@ impl<'a> Truth<'a> {
     pub fn window_s(&self) -> f64 {
         1e-3 * match self.sensor.method {
             Method::Counting => f64::from(self.sensor.window_ms),
-            Method::Spectrum | Method::AdaptedCounting | Method::Crossings => {
-                PAPERS_WINDOW_MS as f64
-            }
+            Method::Spectrum | Method::AdaptedCounting | Method::Crossings => PAPERS_WINDOW_MS,
         }
     }
 
     /// Whether the paper's count and the estimate are two things.
     pub fn counts_beside(&self) -> bool {
-        let paper_s = PAPERS_WINDOW_MS as f64 * 1e-3;
+        let paper_s = PAPERS_WINDOW_MS * 1e-3;
         self.sensor.method != Method::Counting || self.window_s() != paper_s
     }
 

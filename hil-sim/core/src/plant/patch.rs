@@ -126,7 +126,7 @@ impl Patch {
             sections,
             gauges,
             is_periodic: surface.irregularity.is_none()
-                && !matches!(surface.profile, Profile::Recorded(_)),
+                && !matches!(surface.profile, Profile::Recorded(_) | Profile::Felt(_)),
         }
     }
 }

@@ -51,7 +51,8 @@ struct Patch {
     period: Box<Period>,
 }
 
-/// Measured heights, blurred, on an even grid, without their mean, RMS 1/√2 as a sine of amplitude 1.
+/// Measured heights on an even grid, blurred, without their mean, RMS 1/√2 as a sine of amplitude 1; or what is felt
+/// there, as it is.
 #[derive(Clone, Debug)]
 struct Recorded {
     start_mm: f64,
@@ -102,6 +103,7 @@ impl Surface {
         }
         let recorded = match &surface.profile {
             Profile::Recorded(heights) => Some(Recorded::new(heights, blur_mm)),
+            Profile::Felt(felt) => Some(Recorded::felt(felt)),
             Profile::Sine | Profile::Trapezoid => None,
         };
         Self {
@@ -183,18 +185,31 @@ pub(crate) fn feel(period: &Period, cycles: f64, advance: u32) -> f32 {
     from + (to - from) * fraction
 }
 
+/// Rows on the grid that begins with the first of them.
+fn on_grid(rows: &Series) -> Vec<f64> {
+    let (first, last) = rows.extent();
+    let points = ((last - first) / GRID_MM).floor() as usize + 1;
+    let mut row = 0;
+    (0..points)
+        .map(|point| {
+            let x_mm = first + point as f64 * GRID_MM;
+            row = rows.row(x_mm, row);
+            rows.value(row, 0, x_mm)
+        })
+        .collect()
+}
+
 impl Recorded {
+    fn felt(rows: &Series) -> Self {
+        Self {
+            start_mm: rows.extent().0,
+            heights: on_grid(rows).into_iter().map(|felt| felt as f32).collect(),
+        }
+    }
+
     fn new(profile: &Series, blur_mm: f64) -> Self {
-        let (first, last) = profile.extent();
-        let points = ((last - first) / GRID_MM).floor() as usize + 1;
-        let mut row = 0;
-        let raw: Vec<f64> = (0..points)
-            .map(|point| {
-                let x_mm = first + point as f64 * GRID_MM;
-                row = profile.row(x_mm, row);
-                profile.value(row, 0, x_mm)
-            })
-            .collect();
+        let raw = on_grid(profile);
+        let points = raw.len();
         let mean = raw.iter().sum::<f64>() / points as f64;
 
         let reach = (4.0 * blur_mm / GRID_MM).ceil() as i64;
@@ -227,7 +242,7 @@ impl Recorded {
             .map(|height| (height * scale) as f32)
             .collect();
         Self {
-            start_mm: first,
+            start_mm: profile.extent().0,
             heights,
         }
     }

@@ -9,7 +9,8 @@ use crate::plant::motion::coarse_encoder;
 use crate::plant::patch::Patch;
 use crate::plant::skew::Skew;
 use crate::plant::surface::Surface;
-use crate::scene::{ENCODER_COUNT_UM, Gauges, Motion, Scene, SceneError};
+use crate::scene;
+use crate::scene::{ENCODER_COUNT_UM, Gauges, Motion, Profile, Scene, SceneError};
 
 /// The world of a scene.
 #[derive(Clone, Debug)]
@@ -46,10 +47,7 @@ impl World {
             Gauges::Kinematic(kinematic) => {
                 let fingertip = Fingertip {
                     contact: Contact::new(scene.contact, scene.force.stiffness_n_per_m),
-                    patch: scene
-                        .contact
-                        .rung
-                        .has_patch()
+                    patch: (scene.contact.rung.has_patch() && !is_felt(&scene.surface))
                         .then(|| Box::new(Patch::new(&scene.surface, kinematic.second_harmonic))),
                     gauges: KinematicGauges::new(kinematic, scene.seed),
                     force: ForceChannel::new(&scene.force, kinematic.snr_db.is_some(), scene.seed),
@@ -126,10 +124,14 @@ impl World {
     }
 }
 
+/// Whether the surface says what a gauge feels: nothing is averaged over the contact once more.
+const fn is_felt(surface: &scene::Surface) -> bool {
+    matches!(surface.profile, Profile::Felt(_))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene;
     use crate::scene::{ArmDrive, Force, Friction, Kinematic};
 
     const SCAN_S: f64 = 250e-6;

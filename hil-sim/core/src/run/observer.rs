@@ -13,7 +13,7 @@ use protocol::{Estimate, Role};
 
 use crate::run::decoder::TimedMessage;
 use crate::run::fault_evidence::{FaultEvidence, Reset};
-use crate::run::recording::{OutputRecord, Recording, ScanRecord, TickRecord};
+use crate::run::recording::{Arrival, OutputRecord, Recording, ScanRecord, TickRecord};
 
 /// Is told of a run, in the order of time. Of one instant, what is further up here comes first. Nobody needs
 /// to listen to everything.
@@ -30,10 +30,9 @@ pub trait RunObserver {
     /// The outputs have changed.
     fn output(&mut self, _output: &OutputRecord) {}
 
-    /// The estimate that was made after `number` others has arrived at the display, at an instant in ns since
-    /// the scene's start: told then, or as late as at the display's next tick. What arrives more than once
-    /// counts the first time.
-    fn received(&mut self, _number: usize, _received_ns: u64) {}
+    /// An estimate has arrived at the display, be it the sensor's or a forged one: told then, or as late as at
+    /// the display's next tick.
+    fn received(&mut self, _arrival: &Arrival) {}
 
     /// What a board sent, in which a fault may show.
     fn said(&mut self, _role: Role, _said: &TimedMessage) {}
@@ -51,17 +50,11 @@ impl RunObserver for () {}
 /// Tells of a run as it was recorded; what shows of faults comes at the end.
 pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
     let made = &recording.estimates;
-    let mut arrivals: Vec<(u64, usize)> = made
-        .iter()
-        .enumerate()
-        .filter_map(|(number, record)| Some((record.received_ns?, number)))
-        .collect();
-    arrivals.sort_by_key(|&(received_ns, _)| received_ns);
     let mut scans = recording.scans.iter().peekable();
     let mut made = made.iter().peekable();
     let mut ticks = recording.ticks.iter().peekable();
     let mut outputs = recording.outputs.iter().peekable();
-    let mut arrivals = arrivals.into_iter().peekable();
+    let mut arrivals = recording.arrived.iter().peekable();
     // What is over comes last.
     const OVER_NS: u64 = u64::MAX;
     loop {
@@ -69,7 +62,7 @@ pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
         let made_ns = made.peek().map_or(OVER_NS, |record| record.made_ns);
         let tick_ns = ticks.peek().map_or(OVER_NS, |tick| tick.at_ns);
         let output_ns = outputs.peek().map_or(OVER_NS, |output| output.at_ns);
-        let arrival_ns = arrivals.peek().map_or(OVER_NS, |&(at_ns, _)| at_ns);
+        let arrival_ns = arrivals.peek().map_or(OVER_NS, |arrival| arrival.at_ns);
         let next_ns = [scan_ns, made_ns, tick_ns, output_ns, arrival_ns]
             .into_iter()
             .fold(OVER_NS, u64::min);
@@ -91,8 +84,8 @@ pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
             if let Some(output) = outputs.next() {
                 to.output(output);
             }
-        } else if let Some((received_ns, number)) = arrivals.next() {
-            to.received(number, received_ns);
+        } else if let Some(arrival) = arrivals.next() {
+            to.received(arrival);
         }
     }
     retell_signs(&recording.signs, to);

@@ -61,6 +61,69 @@ pub struct EstimateRecord {
     pub estimate: Estimate,
 }
 
+impl EstimateRecord {
+    /// Whether what arrived is this estimate, by whatever number.
+    pub fn is(&self, arrived: &Estimate) -> bool {
+        let sequence = self.estimate.sequence;
+        self.estimate
+            == Estimate {
+                sequence,
+                ..*arrived
+            }
+    }
+}
+
+/// An estimate in a frame that has reached the display whole: the sensor's, or what was made of it on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// When its last byte came, in ns since the scene's start.
+    pub at_ns: u64,
+    /// The estimate, as the display hears it.
+    pub estimate: Estimate,
+}
+
+impl Arrival {
+    /// All that arrived, in order, if it was nothing but what the sensor made, and whole.
+    pub fn of(estimates: &[EstimateRecord]) -> Vec<Self> {
+        let mut arrived: Vec<Self> = estimates
+            .iter()
+            .filter_map(|record| {
+                Some(Self {
+                    at_ns: record.received_ns?,
+                    estimate: record.estimate,
+                })
+            })
+            .collect();
+        arrived.sort_by_key(|arrival| arrival.at_ns);
+        arrived
+    }
+}
+
+/// Finds what arrives among what was made: both come in their order, but for a few.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Arrivals {
+    last: usize,
+}
+
+impl Arrivals {
+    /// So far may the link put them out of order.
+    const REORDERED: usize = 4_096;
+
+    /// Notes at the estimate that this is when it was received. What comes again, and what the sensor has not
+    /// made so, is none.
+    pub fn note(&mut self, estimates: &mut [EstimateRecord], arrival: &Arrival) {
+        let from = self.last.saturating_sub(Self::REORDERED);
+        let until = estimates.len().min(self.last + Self::REORDERED);
+        let made = estimates.get_mut(from..until).unwrap_or_default();
+        let waits =
+            |record: &EstimateRecord| record.received_ns.is_none() && record.is(&arrival.estimate);
+        if let Some(place) = made.iter().position(waits) {
+            made[place].received_ns = Some(arrival.at_ns);
+            self.last = from + place;
+        }
+    }
+}
+
 /// The voltages after one LDAC edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutputRecord {
@@ -72,12 +135,15 @@ pub struct OutputRecord {
     pub skew_ns: u64,
 }
 
+/// The DAC word of 0 V (DAC81416 data sheet, straight binary of a bipolar range).
+pub const ZERO_VOLT: u16 = 0x8000;
+
 /// One step of a DAC word of the ±5 V range, in V.
 pub const WORD_V: f64 = 10.0 / 65_536.0;
 
 /// Converts a DAC word of the ±5 V range to volts.
 pub fn volts(word: u16) -> f64 {
-    (f64::from(word) - 32_768.0) * WORD_V
+    (f64::from(word) - f64::from(ZERO_VOLT)) * WORD_V
 }
 
 /// What is known of a run once it is over, whether it was recorded or not.
@@ -127,6 +193,8 @@ pub struct Recording {
     pub ticks: Vec<TickRecord>,
     /// Every estimate, 100 Hz, in the order they were made.
     pub estimates: Vec<EstimateRecord>,
+    /// Every estimate that arrived at the display, in the order of arrival.
+    pub arrived: Vec<Arrival>,
     /// Every change of the outputs, at most 2 kHz.
     pub outputs: Vec<OutputRecord>,
     /// The sensor's last counters, if it got to send any.

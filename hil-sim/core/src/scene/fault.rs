@@ -12,7 +12,7 @@
 pub mod catalogue;
 mod kind;
 
-pub use catalogue::{Class, Key, Lasts, Row};
+pub use catalogue::{Class, Key, Lasts, Row, Sign};
 pub use kind::Kind;
 
 use protocol::Role;

@@ -1,20 +1,44 @@
 //! `[display]` of a scene file, its description of the actuators included.
 
-use protocol::actuators::{self, ACTUATORS, Actuator, FURTHEST_UM, UNITY_GAIN};
-use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use protocol::actuators::{
+    self, ACTUATORS, Actuator, DAMPING_PERCENT, FURTHEST_UM, HIGHEST_RESONANCE_DHZ,
+    LOWEST_RESONANCE_DHZ, UNITY_GAIN,
+};
+use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
 use super::series::series;
 use super::table::Table;
 use crate::scene::{Display, SceneError};
 
-/// Columns of a description of the actuators.
-const HEADER: &str = "actuator,x_um,y_um,gain,phase_turns,inverted";
+/// Columns of a description of the actuators, and with their models.
+const HEADERS: [&str; 2] = [
+    "actuator,x_um,y_um,gain,phase_turns,inverted",
+    "actuator,x_um,y_um,gain,phase_turns,inverted,resonance_hz,damping",
+];
+
+/// What may be told of an actuator's resonance, in Hz, and of its damping.
+const RESONANCE_HZ: [f64; 2] = [
+    LOWEST_RESONANCE_DHZ as f64 / 10.0,
+    HIGHEST_RESONANCE_DHZ as f64 / 10.0,
+];
+const DAMPING: [f64; 2] = [
+    DAMPING_PERCENT.0 as f64 / 100.0,
+    DAMPING_PERCENT.1 as f64 / 100.0,
+];
 
 pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
     let defaults = DisplayConfiguration::DEFAULT;
     let mode = table.choice(
         "mode",
         &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
+    )?;
+    let rendering = table.choice(
+        "rendering",
+        &[
+            ("fundamental", Rendering::Fundamental),
+            ("shape", Rendering::Shape),
+            ("texture", Rendering::Texture),
+        ],
     )?;
     let update_rate = match table.whole("update_rate_hz", 2_000, 4_000)? {
         None | Some(2_000) => UpdateRate::Hz2000,
@@ -28,6 +52,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
     // The ranges are the board's own.
     let configuration = DisplayConfiguration {
         mode,
+        rendering,
         update_rate,
         max_age_ms: whole("max_age_ms", defaults.max_age_ms, 20, 5_000)?,
         fade_in_ms: whole("fade_in_ms", defaults.fade_in_ms, 1, 1_000)?,
@@ -35,6 +60,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
         glide_ms: whole("glide_ms", defaults.glide_ms, 0, 500)?,
         amplitude_mv: whole("amplitude_mv", defaults.amplitude_mv, 0, 5_000)?,
         reference_lsb: whole("reference_lsb", defaults.reference_lsb, 0, 2_000)?,
+        reference_mn: whole("reference_mn", defaults.reference_mn, 0, 60_000)?,
         full_drive_s: whole("full_drive_s", defaults.full_drive_s, 10, 3_600)?,
         actuators: defaults.actuators,
     };
@@ -44,6 +70,14 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
         let pitch_um = table.whole("pitch_um", 100, 4_000)?;
         actuators::grid(pitch_um.map_or(actuators::DEFAULT_PITCH_UM, |um| um as u16))
     };
+    if firmware_display::settings::check_effort(&configuration, &described).is_err() {
+        let message = format!(
+            "is too much with these actuators: more than the fundamental, or a resonance, is worked out for at most \
+             {} different places and phases",
+            firmware_display::settings::MOST_PLACES
+        );
+        return Err(table.refuse("rendering", message));
+    }
     table.finish("")?;
     let mut display = Display::with_actuators(described);
     display.configuration = DisplayConfiguration {
@@ -56,7 +90,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
 /// The actuators of a CSV file: one row each, in their order.
 fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError> {
     let furthest_um = f64::from(FURTHEST_UM);
-    let rows = series(table, &[HEADER], |before, row| {
+    let rows = series(table, &HEADERS, |before, row| {
         let expected = before.map_or(0.0, |before| before[0] + 1.0);
         let whole = |value: f64| value.fract() == 0.0 && value.abs() <= furthest_um;
         let place = || {
@@ -78,6 +112,21 @@ fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError>
         if row[5] != 0.0 && row[5] != 1.0 {
             return Err((5, "is neither: give 1 if inverted, else 0".to_owned()));
         }
+        if let [.., hz, damping] = *row
+            && row.len() > 6
+            && hz != 0.0
+        {
+            let [low, high] = RESONANCE_HZ;
+            if !(low..=high).contains(&hz) {
+                let message =
+                    format!("is no resonance: give {low} to {high} Hz, or 0 if it is not known");
+                return Err((6, message));
+            }
+            let [low, high] = DAMPING;
+            if !(low..=high).contains(&damping) {
+                return Err((7, format!("is no damping: give {low} to {high}")));
+            }
+        }
         Ok(())
     })?;
     if rows.at.len() != ACTUATORS {
@@ -95,6 +144,20 @@ fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError>
             gain_q15: (row[2] * f64::from(UNITY_GAIN)).round() as u16,
             phase: (row[3] * 65_536.0).round() as u32 as u16,
             inverted: row[4] == 1.0,
+            ..modelled(row.get(5).copied(), row.get(6).copied())
         }
     }))
+}
+
+/// An actuator with this resonance in Hz and damping, if they are told and known.
+fn modelled(hz: Option<f64>, damping: Option<f64>) -> Actuator {
+    let bare = Actuator::at(0, 0);
+    match (hz, damping) {
+        (Some(hz), Some(damping)) if hz != 0.0 => Actuator {
+            resonance_dhz: (hz * 10.0).round() as u16,
+            damping_percent: (damping * 100.0).round() as u16,
+            ..bare
+        },
+        _ => bare,
+    }
 }

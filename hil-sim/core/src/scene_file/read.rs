@@ -58,7 +58,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let display = display::read(root.table("display")?)?;
     let faults = fault::read(root.tables("fault")?, duration_s)?;
     let expect = expect(root.table("expect")?)?;
-    if let Profile::Recorded(heights) = &surface.profile {
+    if let Profile::Recorded(heights) | Profile::Felt(heights) = &surface.profile {
         covers_travel(&root, heights, &motion, duration_s)?;
     }
     root.finish("")?;
@@ -137,7 +137,7 @@ fn surface(mut table: Table<'_>, seed: u64) -> Result<Surface, SceneError> {
     let profile = match kind {
         't' => Profile::Trapezoid,
         's' => Profile::Sine,
-        _ => Profile::Recorded(recorded::profile(&mut table)?),
+        _ => recorded::profile(&mut table)?,
     };
     let irregularity = match kind {
         'r' => Irregularity::NONE,

@@ -1,7 +1,8 @@
-//! `kind = "recorded"` and `profile = "recorded"`: CSV, WAV and MCAP, at whatever rate they are.
+//! `kind = "recorded"` and `profile = "recorded"`: CSV, WAV, MCAP and, for a profile, `.hjif`, at
+//! whatever rate they are.
 //!
 //! ```text
-//! section ─> source: file, columns, scale ─> rows of CSV, WAV, MCAP ─> tape ─> raster, resampler ─> series, waveform
+//! section ─> source: file, columns, scale ─> rows of the file ─> tape ─> raster, resampler ─> series, waveform
 //! ```
 
 mod block;
@@ -24,6 +25,7 @@ use super::bounds::{FILE_INSTANT, OFFSET_V, PLACE, RATE, SCALE, SPACING};
 use super::table::{Column, Table};
 use crate::plant::gauges::{MID_RAIL_VOLTS, SCAN_RATE_HZ};
 use crate::plant::surface::GRID_MM;
+use crate::scene::Profile;
 use crate::scene::SceneError;
 use crate::scene::Series;
 use crate::scene::Waveform;
@@ -170,7 +172,8 @@ pub(super) fn gauges(
                 "is missing: name the messages' fields for the five gauges",
             ));
         }
-        (Format::Csv(..), None) => Vec::new(),
+        // A texture is refused as a source of voltages.
+        (Format::Csv(..) | Format::Hjif(_), None) => Vec::new(),
     };
     let window = (-AROUND_S, duration_s + AROUND_S);
     let own_time = (GAUGE_TOPIC, GAUGE_TIME);
@@ -234,15 +237,20 @@ pub(super) fn motion(
     laid(table, rows, adc).map(Arc::new)
 }
 
-/// The heights of `[surface]`, one column.
-pub(super) fn profile(table: &mut Table<'_>) -> Result<Arc<Series>, SceneError> {
+/// The heights of `[surface]`, one column; or with `felt_per_unit` what is felt there.
+pub(super) fn profile(table: &mut Table<'_>) -> Result<Profile, SceneError> {
     let source = Source::of(table, &LENGTH, &["x_mm,height"])?;
     let shift_mm = table.number("shift_mm", &PLACE)?.unwrap_or(0.0);
+    let felt_per_unit = table.number("felt_per_unit", &SCALE)?;
+    let profile = match felt_per_unit {
+        None => Profile::Recorded,
+        Some(_) => Profile::Felt,
+    };
     let lines = on_lines(table)?;
     let columns = single(table, &source, None)?;
     let conversion = Conversion {
         shift: shift_mm,
-        scale: 1.0,
+        scale: felt_per_unit.unwrap_or(1.0),
         offset: 0.0,
     };
     let nothing_else: Check<'_> = &|_, _| Ok(());
@@ -250,13 +258,13 @@ pub(super) fn profile(table: &mut Table<'_>) -> Result<Arc<Series>, SceneError> 
     let (rows, _) = source.read(table, columns, own, EVERYWHERE, conversion, nothing_else)?;
     // Coarser heights are points of a surface, not samples of a wave: straight lines make no ripples of an edge.
     if lines == Some(true) || !is_denser(&rows, GRID_MM.recip()) {
-        return Ok(Arc::new(rows));
+        return Ok(profile(Arc::new(rows)));
     }
     let grid = Raster {
         per_unit: GRID_MM.recip(),
         through_zero: false,
     };
-    laid(table, rows, grid).map(Arc::new)
+    laid(table, rows, grid).map(|rows| profile(Arc::new(rows)))
 }
 
 /// The one column of a section that needs one.
@@ -273,6 +281,21 @@ fn single<'t>(
         }
         (None, Format::Csv(..), _) => Ok(Vec::new()),
         (None, Format::Wav(wav), _) if wav.channels() == 1 => Ok(vec![Column::Numbered(0)]),
+        (None, Format::Hjif(file), _) => match file.texture().map(|texture| texture.channels()) {
+            Ok([only]) => Ok(vec![Column::Numbered(only.id as usize)]),
+            Ok(several) => {
+                let names: Vec<String> = several
+                    .iter()
+                    .map(|channel| format!("{} ({:?})", channel.id, channel.description))
+                    .collect();
+                let message = format!(
+                    "is missing: name one by its id or its description, of {}",
+                    names.join(", ")
+                );
+                Err(table.refuse("channels", message))
+            }
+            Err(error) => Err(source.refuse(error)),
+        },
         (None, Format::Mcap, Some(own)) => Ok(vec![Column::Named(own)]),
         (None, ..) => Err(table.refuse(
             "channels",

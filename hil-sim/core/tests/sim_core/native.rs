@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
+use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_core::scene::{Gauges, Kinematic, Scene};
 
 /// All but the `estimation` scenes, which have a test of their own.
@@ -97,4 +98,32 @@ fn a_link_that_is_down_leaves_the_display_at_zero_volt() {
             .iter()
             .all(|estimate| estimate.received_ns.is_none())
     );
+}
+
+#[test]
+fn after_a_flood_each_estimate_is_matched_with_what_arrived_of_it() {
+    let flood = Fault::new(Kind::LinkFlood, 1.0);
+    let over_ns = flood.ends_ns().unwrap();
+    let scene = Scene {
+        duration_s: 2.0,
+        faults: vec![flood],
+        ..Scene::constant(2.0, 50.0)
+    };
+    let recording = native::run(&scene).unwrap();
+    let arrived: Vec<_> = recording
+        .estimates
+        .iter()
+        .filter_map(|record| Some((record.made_ns, record.received_ns?)))
+        .collect();
+    // Of nothing between the two but the line, each takes less than a millisecond and a display's tick.
+    for &(made_ns, received_ns) in &arrived {
+        let took_ns = received_ns - made_ns;
+        assert!(took_ns < 1_500_000, "made at {made_ns}, took {took_ns} ns");
+    }
+    let made_later = |&&(made_ns, _): &&(u64, u64)| made_ns > over_ns + 10_000_000;
+    let made = recording.estimates.iter();
+    let due = made.filter(|record| (over_ns + 10_000_000..1_990_000_000).contains(&record.made_ns));
+    assert!(arrived.iter().filter(made_later).count() >= due.count());
+    // Those of the flood were nobody's.
+    assert!(recording.arrived.len() > arrived.len() + 100);
 }

@@ -6,7 +6,7 @@ use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::judge::{Held, Judge};
 use hil_sim_core::native;
 use hil_sim_core::run::observer::RunObserver;
-use hil_sim_core::run::recording::{OutputRecord, ScanRecord, TickRecord};
+use hil_sim_core::run::recording::{Arrival, OutputRecord, ScanRecord, TickRecord};
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_core::scene::{
     ArmDrive, Contact, Display, Follows, Friction, Gauges, Kinematic, Link, Motion, Scene, Specimen,
@@ -179,8 +179,8 @@ impl RunObserver for Weighing<'_> {
         self.judge.output(output);
     }
 
-    fn received(&mut self, number: usize, received_ns: u64) {
-        self.judge.received(number, received_ns);
+    fn received(&mut self, arrival: &Arrival) {
+        self.judge.received(arrival);
     }
 }
 

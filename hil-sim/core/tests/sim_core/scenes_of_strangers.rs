@@ -199,6 +199,10 @@ const GRAMMAR: &[(&str, Keys)] = &[
         "display",
         &[
             ("mode", &["\"uniform\"", "\"travelling\""]),
+            (
+                "rendering",
+                &["\"fundamental\"", "\"shape\"", "\"texture\""],
+            ),
             ("update_rate_hz", &["2000", "4000", "3000"]),
             ("max_age_ms", &["20...5000"]),
             ("fade_in_ms", &["1...1000"]),
@@ -206,6 +210,7 @@ const GRAMMAR: &[(&str, Keys)] = &[
             ("glide_ms", &["0...500"]),
             ("amplitude_mv", &["0...5000"]),
             ("reference_lsb", &["0...2000"]),
+            ("reference_mn", &["0...60000"]),
             ("full_drive_s", &["10...3600"]),
             ("pitch_um", &["100...4000"]),
         ],

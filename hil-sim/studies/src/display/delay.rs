@@ -18,7 +18,7 @@ use protocol::DisplayConfiguration;
 use serde::Serialize;
 
 use super::timing::{STROKE, WAVELENGTH_MM};
-use crate::study::{Fixed, Short, Study, Table, csv_text, number};
+use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::{ElfError, Firmware};
@@ -35,6 +35,10 @@ const DELAYS_MS: [f64; 8] = [0.0, 10.0, 20.0, 50.0, 100.0, 200.0, 350.0, 500.0];
 pub const SHOWN_MS: f64 = 100.0;
 /// What of it is drawn, in s: about a reversal of the hand.
 const SHOWN_S: std::ops::Range<f64> = 5.2..5.75;
+/// The most that our phase may be off at any delay, in cycles rms, and our outputs behind the hand, in ms: a
+/// hundredth of a cycle, two ticks.
+const GOAL_CYCLES: f64 = 0.01;
+const GOAL_MS: f64 = 1.0;
 /// The amplitude of both, in V.
 const AMPLITUDE_V: f64 = 5.0;
 
@@ -49,7 +53,7 @@ pub struct Row {
     pub ours_ms: Option<f64>,
     /// From a tick to its edge, in ms: what of it is not the wait for the tick.
     pub edge_ms: Option<f64>,
-    /// Root mean square of the relayed stimulus' phase error, in cycles, not wrapped.
+    /// Root mean square of the relayed stimulus' phase error about its mean, in cycles, not wrapped.
     pub relayed_cycles: f64,
     /// How late the relayed stimulus is, in ms.
     pub relayed_ms: f64,
@@ -157,18 +161,20 @@ fn about_mean(rms: Option<f64>, mean: Option<f64>) -> Option<f64> {
     Some((rms * rms - mean * mean).max(0.0).sqrt())
 }
 
-/// The phase error of a relayed stimulus, in cycles: root mean square over the time after its first
-/// round trip.
+/// The phase error of a relayed stimulus, in cycles: root mean square about its mean, over the time after its
+/// first round trip.
 fn relayed_cycles(hand: &Motion, wavelength_mm: f64, delay_s: f64, duration_s: f64) -> f64 {
     const STEP_S: f64 = 0.5e-3;
     let trip_s = 2.0 * delay_s;
     let steps = ((duration_s - trip_s) / STEP_S).floor().max(1.0) as u32;
-    let sum: f64 = (0..steps)
-        .map(|step| trip_s + f64::from(step) * STEP_S)
-        .map(|t_s| (hand.position_mm(t_s) - hand.position_mm(t_s - trip_s)) / wavelength_mm)
-        .map(|error| error * error)
-        .sum();
-    (sum / f64::from(steps)).sqrt()
+    let errors = || {
+        (0..steps)
+            .map(|step| trip_s + f64::from(step) * STEP_S)
+            .map(|t_s| (hand.position_mm(t_s) - hand.position_mm(t_s - trip_s)) / wavelength_mm)
+    };
+    let square: f64 = errors().map(|error| error * error).sum::<f64>() / f64::from(steps);
+    let mean = errors().sum::<f64>() / f64::from(steps);
+    (square - mean * mean).max(0.0).sqrt()
 }
 
 /// How much a voltage (s, V) is ahead of sin 2π x/λ on the whole, in cycles.
@@ -202,6 +208,12 @@ struct Record {
 }
 
 impl Row {
+    /// Whether our stimulus is in step, and in time.
+    fn is_met(&self) -> bool {
+        self.ours_cycles.is_some_and(|cycles| cycles <= GOAL_CYCLES)
+            && self.ours_ms.is_some_and(|ms| ms <= GOAL_MS)
+    }
+
     /// Cycles and ms of the relayed stimulus, which is modelled with the delay alone.
     fn relayed(&self) -> (Option<f64>, Option<f64>) {
         let modelled = (self.link.loss == 0.0).then_some((self.relayed_cycles, self.relayed_ms));
@@ -224,7 +236,7 @@ impl Study for [Row] {
         ]);
         for row in self {
             let (cycles, ms) = row.relayed();
-            table.row([
+            let cells = [
                 row.link.delay_ms.to_string(),
                 row.link.jitter_ms.to_string(),
                 number(100.0 * row.link.loss, 0),
@@ -232,7 +244,8 @@ impl Study for [Row] {
                 number(row.ours_ms, 3),
                 number(cycles, 3),
                 number(ms, 0),
-            ]);
+            ];
+            table.row_with(cells, remark(row.is_met()));
         }
         Some(table)
     }
@@ -257,6 +270,10 @@ impl Study for [Row] {
     fn picture(&self) -> String {
         picture::draw(self)
     }
+
+    fn is_met(&self) -> bool {
+        self.iter().all(Row::is_met)
+    }
 }
 
 #[cfg(test)]
@@ -274,6 +291,35 @@ mod tests {
             assert!((cycles / due - 1.0).abs() < 1e-3, "{cycles} {due}");
         }
         assert_eq!(relayed_cycles(&STROKE, 2.0, 0.0, 4.0), 0.0);
+    }
+
+    #[test]
+    fn a_stimulus_that_is_late_or_out_of_step_does_not_meet_the_claim() {
+        let row = Row {
+            link: Link::default(),
+            ours_cycles: Some(0.004),
+            ours_ms: Some(0.345),
+            edge_ms: None,
+            relayed_cycles: 0.0,
+            relayed_ms: 0.0,
+            begins_cycles: 0.0,
+            drawn: Vec::new(),
+        };
+        let is_met = |row: Row| [row].is_met();
+        assert!(is_met(row.clone()));
+        // Relayed over 1 ms, 50 mm/s over 2 mm are off by 0.05 cycles.
+        for (ours_cycles, ours_ms) in [
+            (Some(0.05), Some(0.3)),
+            (Some(0.004), Some(2.0)),
+            (None, Some(0.3)),
+        ] {
+            let late = Row {
+                ours_cycles,
+                ours_ms,
+                ..row.clone()
+            };
+            assert!(!is_met(late));
+        }
     }
 
     #[test]

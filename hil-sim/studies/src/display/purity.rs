@@ -8,9 +8,10 @@
 pub mod picture;
 mod stretch;
 
-use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 use serde::Serialize;
 
+use crate::display::PLAIN_TEXTURE;
 use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
 use hil_sim_boards::display_alone;
 use hil_sim_boards::display_alone::DisplayBench;
@@ -107,18 +108,20 @@ struct Plan {
     hands: Vec<Hand>,
 }
 
-/// Measures all rows, on all cores. `done` is told after each of [`runs`].
+/// Measures all rows, on all cores. With another rendering than the fundamental the surface is told to be a sine and
+/// nothing else, so that what is not the sine is still the display's own. `done` is told after each of [`runs`].
 ///
 /// # Errors
 /// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
+    rendering: Rendering,
     extent: Extent,
     done: impl Fn() + Sync,
 ) -> Result<Vec<Row>, ElfError> {
     let plans = plans(extent);
     let rows = on_all_cores(&plans, |plan| {
-        let rows = run(plan, firmware, extent);
+        let rows = run(plan, firmware, rendering, extent);
         done();
         rows
     })?;
@@ -162,7 +165,12 @@ fn plans(extent: Extent) -> Vec<Plan> {
     plans
 }
 
-fn run(plan: &Plan, firmware: &Firmware, extent: Extent) -> Result<Vec<Row>, ElfError> {
+fn run(
+    plan: &Plan,
+    firmware: &Firmware,
+    rendering: Rendering,
+    extent: Extent,
+) -> Result<Vec<Row>, ElfError> {
     let frequencies: &[f64] = match extent {
         Extent::Whole => &FREQUENCIES_HZ,
         // The second comes with what the first has left behind.
@@ -186,9 +194,11 @@ fn run(plan: &Plan, firmware: &Firmware, extent: Extent) -> Result<Vec<Row>, Elf
     let alone = DisplayBench {
         configuration: DisplayConfiguration {
             mode: plan.mode,
+            rendering,
             update_rate: plan.rate,
             ..DisplayConfiguration::DEFAULT
         },
+        texture: (rendering != Rendering::Fundamental).then_some(PLAIN_TEXTURE),
         surface: course.surface(),
         ..DisplayBench::new(course.hand(), 2.0, course.ends_s() + 0.01)
     };
@@ -527,6 +537,7 @@ mod tests {
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),
+            arrived: Vec::new(),
             outputs,
             sensor_status: None,
             display_status: None,

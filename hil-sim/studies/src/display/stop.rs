@@ -354,6 +354,7 @@ mod tests {
             scans: Vec::new(),
             ticks,
             estimates: Vec::new(),
+            arrived: Vec::new(),
             outputs,
             sensor_status: None,
             display_status: None,

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hil_sim_core::scene::{Contact, Gauges, Motion, Scene, SceneError};
+use hil_sim_core::scene::{Contact, Gauges, Kinematic, Motion, Scene, SceneError};
 
 use super::bound::Tone;
 
@@ -151,15 +151,13 @@ fn tone(scene: &Scene) -> Option<Tone<'static>> {
     else {
         return None;
     };
-    let sound = kinematic.hum_50_hz == 0.0
-        && kinematic.hum_60_hz == 0.0
-        && kinematic.second_harmonic == 0.0
-        && scene.contact == Contact::KINEMATIC
-        && !kinematic
-            .dead
-            .iter()
-            .chain(&kinematic.saturated)
-            .any(|bad| *bad);
+    let noise_alone = Kinematic {
+        snr_db: kinematic.snr_db,
+        ..Kinematic::default()
+    };
+    let sound = *kinematic == noise_alone
+        && scene.surface.irregularity.is_none()
+        && scene.contact == Contact::KINEMATIC;
     sound.then_some(Tone {
         wavelength_mm: specimen.wavelength_mm,
         speed_mm_s: *speed_mm_s,
@@ -175,6 +173,43 @@ mod tests {
 
     fn root() -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/estimation")
+    }
+
+    #[test]
+    fn the_bound_is_of_noise_alone() {
+        let with = |spoil: fn(&mut Kinematic)| {
+            let mut scene = Scene::constant(2.0, 50.0);
+            let mut kinematic = Kinematic {
+                snr_db: Some(20.0),
+                ..Kinematic::default()
+            };
+            spoil(&mut kinematic);
+            scene.gauges = Gauges::Kinematic(kinematic);
+            tone(&scene).is_some()
+        };
+        assert!(with(|_| {}));
+        let spoils: [fn(&mut Kinematic); 14] = [
+            |gauges| gauges.hum_50_hz = 1.0,
+            |gauges| gauges.hum_60_hz = 1.0,
+            |gauges| gauges.second_harmonic = 0.1,
+            |gauges| gauges.dead[0] = true,
+            |gauges| gauges.saturated[0] = true,
+            |gauges| gauges.stuck[0] = true,
+            |gauges| gauges.noisy[0] = true,
+            |gauges| gauges.humming[0] = true,
+            |gauges| gauges.pink = 1.0,
+            |gauges| gauges.drift = 1.0,
+            |gauges| gauges.offset = 1.0,
+            |gauges| gauges.skew_us = 100.0,
+            |gauges| gauges.snr_db = None,
+            |gauges| gauges.hum_off_hz = 0.1,
+        ];
+        for (number, spoil) in spoils.into_iter().enumerate() {
+            assert!(!with(spoil), "{number}");
+        }
+        let mut worn = Scene::constant(2.0, 50.0);
+        worn.surface.irregularity.worn = 0.1;
+        assert!(tone(&worn).is_none());
     }
 
     #[test]

@@ -28,8 +28,8 @@ const LOOKS: [(&str, Symbol); 13] = [
     ("YIN", Symbol::new(OCHRE, Shape::Circle)),
     ("McLeod", Symbol::new(OCHRE, Shape::Diamond)),
 ];
-/// The most that the default estimator may cost, in instructions a ms: 5 % of 168 MHz.
-const BUDGET: f64 = 8_000.0;
+/// The most that the default estimator may cost, in instructions a ms: 5 % of 168 MHz, one each cycle.
+const BUDGET: f64 = 8_400.0;
 const BUDGET_LINE: Stroke = Stroke::new(SOFT, 1.2).dashed("1 3");
 const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 /// Words beside marks.

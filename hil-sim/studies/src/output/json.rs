@@ -91,6 +91,8 @@ pub struct Fault {
     pub detected_ms: Option<f64>,
     /// Until the outputs were harmless, in ms.
     pub safe_ms: Option<f64>,
+    /// What is not as the table of kinds has it.
+    pub unmet: Vec<String>,
 }
 
 impl From<&Finding> for Fault {
@@ -100,6 +102,7 @@ impl From<&Finding> for Fault {
             at_s: finding.fault.at_s,
             detected_ms: finding.detected_ms(),
             safe_ms: finding.safe_ms(),
+            unmet: finding.unmet(),
         }
     }
 }
@@ -248,6 +251,7 @@ mod tests {
             "latency_ms",
             "felt_right_share",
             "felt_wrong_share",
+            "rendering_needed",
         ] {
             assert!(summary.contains(&name), "{name}");
         }

@@ -83,6 +83,7 @@ pub(super) fn exhibit() -> Result<Exhibit, PaperError> {
              the paper's 0.080 s. Nothing here comes from a run; a hand of 2 Hz instead of 1 would want windows \
              from {of_1_mm:.3} s (1 mm) to {of_4_mm:.3} s (4 mm)."
         ),
+        conclusions: Vec::new(),
         csvs: vec![("equation-11.csv".into(), csv_text_under(&header, rows)?)],
         parts: vec![chart, table],
         shared: &[],

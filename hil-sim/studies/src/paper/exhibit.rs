@@ -24,12 +24,35 @@ pub struct Exhibit {
     pub paper: String,
     /// Two sentences: what is seen, and where ours differs.
     pub seen: String,
+    /// What of that a run could also have contradicted.
+    pub conclusions: Vec<Conclusion>,
     /// What is shown.
     pub parts: Vec<Part>,
     /// Its CSVs: names and texts.
     pub csvs: Vec<(String, String)>,
     /// CSVs of the experiments with people that belong to it.
     pub shared: &'static [&'static str],
+}
+
+/// A conclusion, and whether these runs bear it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Conclusion {
+    /// In a sentence.
+    pub claim: &'static str,
+    /// Whether it holds.
+    pub holds: bool,
+}
+
+impl Exhibit {
+    /// What these runs do not bear out, with the exhibit's name before it.
+    pub fn contradicted(&self) -> impl Iterator<Item = String> {
+        let name = self.title.split(':').next().unwrap_or_default();
+        let lost = self
+            .conclusions
+            .iter()
+            .filter(|conclusion| !conclusion.holds);
+        lost.map(move |conclusion| format!("{name}: {}", conclusion.claim))
+    }
 }
 
 /// Something shown.
@@ -162,6 +185,13 @@ impl Exhibit {
             escape(paper),
             escape(seen),
         );
+        for line in self.contradicted() {
+            let _ = writeln!(
+                page,
+                "<p class=warning>Not borne out by these runs: {}</p>",
+                escape(&line)
+            );
+        }
         *page += "<div class=card>\n";
         for part in &self.parts {
             part.write(page);
@@ -180,4 +210,34 @@ pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("–".into(), |value| {
         format!("{value:.decimals$}").replace('-', "−")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_conclusion_that_the_runs_contradict_stands_on_the_page() {
+        let exhibit = |holds| Exhibit {
+            id: "fig-6",
+            title: "Fig. 6: accuracy".into(),
+            paper: String::new(),
+            seen: String::new(),
+            conclusions: vec![Conclusion {
+                claim: "the count is worse",
+                holds,
+            }],
+            parts: Vec::new(),
+            csvs: Vec::new(),
+            shared: &[],
+        };
+        let written = |holds| {
+            let mut page = String::new();
+            exhibit(holds).write(&mut page, "paper");
+            page
+        };
+        assert!(!written(true).contains("borne out"));
+        assert!(written(false).contains("Not borne out by these runs: Fig. 6: the count is worse"));
+        assert_eq!(exhibit(false).contradicted().count(), 1);
+    }
 }

@@ -76,6 +76,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             impulses.len() as f64 / (2.0 * shown_s),
             cell.frequency_hz(),
         ),
+        conclusions: Vec::new(),
         csvs: vec![(
             "fig-4.csv".into(),
             csv_text_under(&["t_s", "signal_lsb", "impulse"], rows)?,

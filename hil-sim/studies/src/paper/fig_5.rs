@@ -144,6 +144,7 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
              without steps.",
             RUB.approximation_mm(),
         ),
+        conclusions: Vec::new(),
         csvs: vec![("fig-5.csv".into(), csv_text_under(&header, rows)?)],
         parts: vec![velocity, frequency, wavelength],
         shared: &[],

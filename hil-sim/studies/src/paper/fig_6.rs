@@ -4,7 +4,7 @@ use crate::output::plot::axis::Axis;
 use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, INK, QUIET, REFUSED, SECOND};
 use crate::paper::PaperError;
-use crate::paper::exhibit::{Exhibit, Part};
+use crate::paper::exhibit::{Conclusion, Exhibit, Part};
 use crate::paper::plan::Runs;
 use crate::paper::published::PAPER_MM;
 use crate::paper::table_1::{measured, predicted_mm};
@@ -80,6 +80,16 @@ pub(super) fn exhibit(runs: &Runs) -> Result<Exhibit, PaperError> {
             spread(&paper, 65.0, 75.0),
             spread(&default, 0.0, 75.0),
         ),
+        conclusions: vec![
+            Conclusion {
+                claim: "the count is further off below 15 Hz than above",
+                holds: spread(&counted, 0.0, 15.0) > spread(&counted, 15.0, 75.0),
+            },
+            Conclusion {
+                claim: "the default estimator is nearer to the truth than the count is at its best",
+                holds: spread(&default, 0.0, 75.0) < spread(&counted, 15.0, 75.0),
+            },
+        ],
         csvs: vec![("fig-6.csv".into(), csv_text_under(&header, rows)?)],
         parts: vec![chart],
         shared: &[],

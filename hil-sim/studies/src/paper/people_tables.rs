@@ -28,6 +28,7 @@ pub(super) fn table_2(study: &Study) -> Exhibit {
              put in came out, through real voltages; the rest of the difference is the method's, in which the first \
              answer of its kind decides."
         ),
+        conclusions: Vec::new(),
         parts: vec![tables::limens(study).into()],
         csvs: Vec::new(),
         shared: &["table-2.csv"],
@@ -61,6 +62,7 @@ pub(super) fn table_3(study: &Study) -> Exhibit {
             share("default"),
             number(Some(100.0 * mean_share(&TABLE_3)), 1),
         ),
+        conclusions: Vec::new(),
         parts: vec![
             tables::shares(study).into(),
             tables::felt(study).into(),
@@ -90,6 +92,7 @@ pub(super) fn table_4(study: &Study) -> Exhibit {
             100.0 * recount.rejected_though_true,
             recount.simulated.p,
         ),
+        conclusions: Vec::new(),
         parts: vec![tables::scores(study).into(), tables::mosteller(study).into()],
         csvs: Vec::new(),
         shared: &["table-4.csv", "mosteller.csv"],

@@ -126,6 +126,7 @@ fn empty(duration_s: f64) -> Recording {
         scans: Vec::new(),
         ticks: Vec::new(),
         estimates: Vec::new(),
+        arrived: Vec::new(),
         outputs: Vec::new(),
         sensor_status: None,
         display_status: None,
@@ -137,7 +138,7 @@ fn empty(duration_s: f64) -> Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hil_sim_core::judge::track::COUNT_MM;
+    use hil_sim_core::plant::motion::MM_PER_COUNT;
 
     #[test]
     fn the_display_presents_each_given_wavelength_to_a_count_of_the_encoder_at_either_end() {
@@ -148,7 +149,7 @@ mod tests {
             let felt = felt.unwrap();
             // Also, at 4 mm and above, what a reversal leaves under the sine is worked off over a few waves:
             // 0.5 % of one.
-            let bound_mm = 2.0 * COUNT_MM + 0.005 * given_mm;
+            let bound_mm = 2.0 * MM_PER_COUNT + 0.005 * given_mm;
             let error_mm = felt.mean_mm() - given_mm;
             assert!(error_mm.abs() < bound_mm, "{given_mm}: {error_mm}");
             let scatter_mm = 0.01 * felt.scatter_percent() * given_mm;

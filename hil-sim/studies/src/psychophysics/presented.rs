@@ -238,11 +238,11 @@ fn of_stroke(points: &[(f64, f64)], hand: &Track, stroke: usize) -> Vec<Wave> {
 mod tests {
     use super::*;
     use hil_sim_core::judge::synthetic::Run;
-    use hil_sim_core::judge::track::COUNT_MM;
+    use hil_sim_core::plant::motion::MM_PER_COUNT;
 
     /// A stimulus follows the hand's encoder: a count, 5 µm, at either end of a wave. What straight lines
     /// between ticks miss is far less: of a crossing (2π · 35 Hz · 0.5 ms)³/16π = 2.6e-5 of a wave.
-    const WAVE_MM: f64 = 2.0 * COUNT_MM;
+    const WAVE_MM: f64 = 2.0 * MM_PER_COUNT;
 
     fn felt(run: &Run) -> Felt {
         Felt::of(&run.record(), ACTUATOR, 0.0, f64::INFINITY).unwrap()

@@ -1,6 +1,6 @@
 //! What is known of each board besides what it measures or does.
 
-use protocol::{Role, RoleCounters, Status};
+use protocol::{ArmState, Role, RoleCounters, Status};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -61,26 +61,29 @@ pub fn facts(board: &Board, now_us: u64, theme: Theme) -> Vec<Fact> {
     let plain = Style::new();
     if let Some(clocks) = board.clocks {
         let offset_s = clocks.offset_us as f64 / 1e6;
-        add(2, "rtt", text::short(clocks.round_trip_us), plain);
-        add(5, "clock", format!("{offset_s:+.4} s"), plain);
+        add(3, "rtt", text::short(clocks.round_trip_us), plain);
+        add(6, "clock", format!("{offset_s:+.4} s"), plain);
     }
     if let Some(uptime_us) = board.uptime_us(now_us) {
-        add(3, "up", text::duration(uptime_us), plain);
+        add(4, "up", text::duration(uptime_us), plain);
+    }
+    if let Some(trip) = board.arm_stopped {
+        add(0, "arm", ArmState::Stopped(trip).to_string(), theme.bad());
     }
     if let Some((_, status)) = &board.status {
         let style = |count: u32, if_any| if count > 0 { if_any } else { plain };
         let (misses, resets) = (missed(status), status.watchdog_resets);
         let few = style(misses, theme.warning());
-        add(0, "misses", text::brief(misses), few);
+        add(1, "misses", text::brief(misses), few);
         let none = style(resets, theme.bad());
-        add(1, "watchdog", text::brief(resets), none);
-        add(4, "by", status.reset.name().to_owned(), plain);
+        add(2, "watchdog", text::brief(resets), none);
+        add(5, "by", status.reset.name().to_owned(), plain);
     }
     if let Some(State::Known { hello, .. }) = &board.state {
         let [major, minor, patch] = hello.version;
         let version = format!("{major}.{minor}.{patch}");
-        add(6, "", version, theme.quiet());
-        add(7, "", hello.chip_name().to_owned(), theme.quiet());
+        add(7, "", version, theme.quiet());
+        add(8, "", hello.chip_name().to_owned(), theme.quiet());
     }
     facts
 }

@@ -22,6 +22,8 @@ pub struct SensorStatusRow {
     pub console: PortCounters,
     /// [`Status::role`]
     pub sensor: SensorCounters,
+    /// [`Status::stack_free_bytes`]
+    pub stack_free_bytes: u32,
 }
 
 /// A display board's [`Status`].
@@ -41,6 +43,8 @@ pub struct DisplayStatusRow {
     pub display: DisplayCountersRow,
     /// [`DisplayCounters::state`]
     pub supervisor: Stand,
+    /// [`Status::stack_free_bytes`]
+    pub stack_free_bytes: u32,
 }
 
 /// [`DisplayCounters`] without the state.
@@ -158,6 +162,7 @@ impl SensorStatusRow {
             watchdog_resets: status.watchdog_resets,
             peer: status.peer,
             console: status.console,
+            stack_free_bytes: status.stack_free_bytes,
             sensor,
         }
     }
@@ -170,6 +175,7 @@ impl SensorStatusRow {
             watchdog_resets: self.watchdog_resets,
             peer: self.peer,
             console: self.console,
+            stack_free_bytes: self.stack_free_bytes,
             role: RoleCounters::Sensor(self.sensor),
         }
     }
@@ -184,6 +190,7 @@ impl DisplayStatusRow {
             watchdog_resets: status.watchdog_resets,
             peer: status.peer,
             console: status.console,
+            stack_free_bytes: status.stack_free_bytes,
             display: display.into(),
             supervisor: display.state.into(),
         }
@@ -197,6 +204,7 @@ impl DisplayStatusRow {
             watchdog_resets: self.watchdog_resets,
             peer: self.peer,
             console: self.console,
+            stack_free_bytes: self.stack_free_bytes,
             role: RoleCounters::Display(self.display.with(self.supervisor.state()?)),
         })
     }

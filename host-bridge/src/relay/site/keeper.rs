@@ -9,7 +9,9 @@ use super::Shared;
 use crate::lock::locked;
 use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::Content;
+use crate::relay::hand::Due;
 use crate::relay::name::Channel;
+use crate::relay::refused;
 use crate::relay::report::Notice;
 
 /// How often the keeper looks round, in µs; also the time between two pings while they are answered.
@@ -63,13 +65,20 @@ impl Keeper {
             let at_us = self.shared.now_us();
             self.ping(at_us);
             self.repeat_stops(at_us);
+            self.hand_over(at_us);
             self.watch(at_us);
             self.look(at_us);
+            self.tell_refused();
         }
     }
 
     fn ping(&mut self, at_us: u64) {
-        locked(&self.shared.inward).elapse(at_us, |notice| self.shared.tell(notice));
+        let mut inward = locked(&self.shared.inward);
+        inward.elapse(at_us, |notice| self.shared.tell(notice));
+        if inward.remote().state().word() != "known" {
+            locked(&self.shared.hand).on_silence();
+        }
+        drop(inward);
         let is_answered = locked(&self.shared.outward).flow().is_answered(at_us);
         if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
@@ -95,6 +104,23 @@ impl Keeper {
         }
         for (id, stop) in unheard {
             self.shared.say(Channel::Stop, Content::Stop { id, stop });
+        }
+    }
+
+    fn hand_over(&self, at_us: u64) {
+        let due = locked(&self.shared.hand).due(at_us);
+        match due {
+            Due::Nothing => {}
+            Due::Say => {
+                self.shared.say(Channel::Stop, Content::HandOver);
+            }
+            Due::Tell(notice) => self.shared.tell(notice),
+        }
+    }
+
+    fn tell_refused(&self) {
+        for refused in refused::take() {
+            self.shared.tell(Notice::Refused(refused));
         }
     }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use protocol::{DisplayConfiguration, GAUGES, Method, Mode, SensorConfiguration};
+use protocol::{DisplayConfiguration, GAUGES, Method, Mode, Rendering, SensorConfiguration};
 
 use super::excerpt::Excerpt;
 use super::expectation::Expectation;
@@ -168,6 +168,11 @@ fn display(lines: &mut String, display: &DisplayConfiguration) {
         Mode::Uniform => "uniform",
         Mode::Travelling => "travelling",
     };
+    let rendering = match display.rendering {
+        Rendering::Fundamental => "fundamental",
+        Rendering::Shape => "shape",
+        Rendering::Texture => "texture",
+    };
     line(lines, "[display]");
     if display.actuators != DisplayConfiguration::DEFAULT.actuators {
         line(
@@ -176,6 +181,7 @@ fn display(lines: &mut String, display: &DisplayConfiguration) {
         );
     }
     line(lines, &format!("mode = \"{mode}\""));
+    line(lines, &format!("rendering = \"{rendering}\""));
     for (key, value) in [
         ("update_rate_hz", display.update_rate.hz()),
         ("max_age_ms", display.max_age_ms.into()),
@@ -184,6 +190,7 @@ fn display(lines: &mut String, display: &DisplayConfiguration) {
         ("glide_ms", display.glide_ms.into()),
         ("amplitude_mv", display.amplitude_mv.into()),
         ("reference_lsb", display.reference_lsb.into()),
+        ("reference_mn", display.reference_mn.into()),
         ("full_drive_s", display.full_drive_s.into()),
     ] {
         line(lines, &format!("{key} = {value}"));

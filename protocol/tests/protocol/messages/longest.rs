@@ -1,5 +1,6 @@
 //! The longest message of each kind.
 
+use protocol::texture::{BANDS, PARTIALS};
 use protocol::*;
 
 use super::{actuator, display_counters, port, sensor_capabilities, setting_range};
@@ -43,6 +44,7 @@ pub fn longest_like(message: &Message) -> Message {
             uptime_us: u64::MAX,
             reset: ResetCause::Software,
             watchdog_resets: u32::MAX,
+            stack_free_bytes: u32::MAX,
             peer: port([u32::MAX; 13]),
             console: port([u32::MAX; 13]),
             role: RoleCounters::Display(display_counters([u32::MAX; 14])),
@@ -72,7 +74,7 @@ pub fn longest_like(message: &Message) -> Message {
         }),
         Message::Actuators(_) => Message::Actuators(Actuators {
             first: u8::MAX,
-            actuators: [actuator((i16::MIN, i16::MIN, u16::MAX, u16::MAX, true)); ACTUATOR_BLOCK],
+            actuators: [actuator((i16::MIN, i16::MIN, [u16::MAX; 4], true)); ACTUATOR_BLOCK],
         }),
         Message::Safety(_) => Message::Safety(Safety {
             instant_us: u64::MAX,
@@ -98,6 +100,21 @@ pub fn longest_like(message: &Message) -> Message {
         Message::Arm(_) => Message::Arm(Arm {
             instant_us: u64::MAX,
             state: ArmState::Stopped(Trip::StackOverflow),
+        }),
+        Message::Texture(_) => Message::Texture(Texture {
+            sequence: u32::MAX,
+            instant_us: u64::MAX,
+            valid: true,
+            partials: [Partial {
+                ratio: u16::MAX,
+                phase: u16::MAX,
+            }; PARTIALS],
+            repeating_percent: u8::MAX,
+            bands: [u16::MAX; BANDS],
+            friction: Some(Friction {
+                mean_mn: u16::MAX,
+                fluctuation_mn: u16::MAX,
+            }),
         }),
     }
 }

@@ -23,6 +23,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
     });
     let display = Configuration::Display(DisplayConfiguration {
         mode: Mode::Travelling,
+        rendering: Rendering::Texture,
         update_rate: UpdateRate::Hz4000,
         max_age_ms: 500,
         fade_in_ms: 20,
@@ -30,6 +31,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
         glide_ms: 20,
         amplitude_mv: 5_000,
         reference_lsb: 300,
+        reference_mn: 250,
         full_drive_s: 600,
         actuators: 0x1234_5678,
     });
@@ -38,6 +40,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
             uptime_us: 5_000_000,
             reset: ResetCause::Watchdog,
             watchdog_resets: 1,
+            stack_free_bytes: 90_000,
             peer: port(core::array::from_fn(|i| 1 + i as u32)),
             console: port(core::array::from_fn(|i| 1_000 + i as u32)),
             role,
@@ -179,7 +182,7 @@ pub fn samples() -> Vec<(&'static str, Message)> {
                 first: 20,
                 actuators: core::array::from_fn(|i| {
                     let i = i as i16;
-                    actuator((-1_500 * i, 700, 0x8000, 0x4000, i % 2 == 1))
+                    actuator((-1_500 * i, 700, [0x8000, 0x4000, 900, 70], i % 2 == 1))
                 }),
             }),
         ),
@@ -226,6 +229,30 @@ pub fn samples() -> Vec<(&'static str, Message)> {
             Message::Arm(Arm {
                 instant_us: 3_000_000,
                 state: ArmState::Stopped(Trip::Operator),
+            }),
+        ),
+        (
+            "texture",
+            Message::Texture(Texture {
+                sequence: 60,
+                instant_us: 3_000_000,
+                valid: true,
+                partials: [
+                    Partial {
+                        ratio: 400,
+                        phase: 16_384,
+                    },
+                    Partial {
+                        ratio: 250,
+                        phase: 49_152,
+                    },
+                ],
+                repeating_percent: 87,
+                bands: [12, 30, 260, 95],
+                friction: Some(Friction {
+                    mean_mn: 500,
+                    fluctuation_mn: 71,
+                }),
             }),
         ),
     ]

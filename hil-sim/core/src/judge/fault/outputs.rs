@@ -1,18 +1,22 @@
 //! What the outputs did about a fault.
 
-use firmware_display::ZERO_VOLT;
+use protocol::DisplayConfiguration;
 
-use crate::run::recording::{ACTUATORS, OutputRecord};
+use crate::run::recording::{ACTUATORS, OutputRecord, WORD_V, ZERO_VOLT};
 use crate::scene::fault::{Class, Fault};
 
 /// Longest time in ns that an output may stand at one voltage that is not 0: as long as any fault's
 /// outputs have to be at 0 V.
 const STANDING_NS: u64 = 20_000_000;
+/// The same at the end of the range: there a crest is cut flat while a charge is worked off under it.
+const CREST_NS: u64 = 100_000_000;
 /// How long before a fault an output has to have been driven for the stimulus to be called on: half a
 /// cycle of 25 Hz passes 0 V once.
 const DRIVEN_NS: u64 = 20_000_000;
 /// All outputs at 0 V for so long, in ns, is no wave's passing: ten ticks.
 const SILENCE_NS: u64 = 5_000_000;
+/// Steepest that an output may rise or fall, in V/ms.
+const SLEW_V_PER_MS: f64 = 10.0;
 
 /// What the outputs did about a fault, from what held when it began on.
 #[derive(Clone, Debug)]
@@ -36,6 +40,41 @@ pub(super) struct Outputs {
     /// Whether they were at 0 V for longer than a wave that passes it.
     answered: bool,
     drives_again: bool,
+    limits: Limits,
+    last_ns: u64,
+    beyond: Option<u64>,
+}
+
+/// What no voltage may go beyond, whatever is broken.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    /// Highest voltage of either sign, in steps of the DAC.
+    words: u16,
+    /// Steps of the DAC in a nanosecond.
+    words_per_ns: f64,
+    tick_ns: u64,
+}
+
+impl Limits {
+    /// Ticks after which CLR falls: what is then at another voltage did not come there by a step.
+    const HELD_TICKS: u64 = 4;
+
+    fn of(configuration: &DisplayConfiguration) -> Self {
+        let volts = f64::from(configuration.amplitude_mv) * 1e-3;
+        Self {
+            words: (volts / WORD_V).ceil() as u16 + 1,
+            words_per_ns: SLEW_V_PER_MS * 1e-6 / WORD_V,
+            tick_ns: 1_000_000_000 / u64::from(configuration.update_rate.hz()),
+        }
+    }
+
+    /// Whether an output may go from one word to another, `after_ns` later. To 0 V it always may.
+    fn allow(&self, from: u16, to: u16, after_ns: u64) -> bool {
+        let after_ns = after_ns.clamp(self.tick_ns, Self::HELD_TICKS * self.tick_ns);
+        to == ZERO_VOLT
+            || (to.abs_diff(ZERO_VOLT) <= self.words
+                && f64::from(from.abs_diff(to)) <= self.words_per_ns * after_ns as f64 + 1.0)
+    }
 }
 
 /// The same, in short.
@@ -48,10 +87,12 @@ pub(super) struct Answer {
     pub stuck: usize,
     /// Whether any was driven after the fault had been answered by 0 V.
     pub drives_again: bool,
+    /// When an output went beyond the amplitude, or faster than any may, in ns since the scene's start.
+    pub beyond_ns: Option<u64>,
 }
 
 impl Outputs {
-    pub fn new(fault: &Fault, until_ns: u64) -> Self {
+    pub fn new(fault: &Fault, until_ns: u64, configuration: &DisplayConfiguration) -> Self {
         let from_ns = fault.begins_ns();
         let rest_ns = match fault.kind.row().class {
             // What is over stays answered.
@@ -73,6 +114,9 @@ impl Outputs {
             silent_ns: None,
             answered: false,
             drives_again: false,
+            limits: Limits::of(configuration),
+            last_ns: 0,
+            beyond: None,
         }
     }
 
@@ -89,6 +133,7 @@ impl Outputs {
             self.was_driving = !is_silent || (self.was_driving && !is_held);
         }
         self.words = Some(output.words);
+        self.last_ns = at_ns;
         self.safe_ns = is_silent.then_some(self.from_ns);
         self.silent_ns = self.safe_ns;
     }
@@ -117,7 +162,14 @@ impl Outputs {
             self.since_ns = [at_ns; ACTUATORS];
             return;
         };
+        let after_ns = at_ns - std::mem::replace(&mut self.last_ns, at_ns);
         for actuator in 0..ACTUATORS {
+            if !self
+                .limits
+                .allow(before[actuator], words[actuator], after_ns)
+            {
+                self.beyond.get_or_insert(at_ns);
+            }
             if before[actuator] != words[actuator] {
                 self.stand(actuator, before[actuator], at_ns);
                 self.since_ns[actuator] = at_ns;
@@ -128,7 +180,9 @@ impl Outputs {
     /// An output has been at this word until now.
     fn stand(&mut self, actuator: usize, word: u16, until_ns: u64) {
         let stood_ns = until_ns.saturating_sub(self.since_ns[actuator]);
-        self.stuck[actuator] |= word != ZERO_VOLT && stood_ns > STANDING_NS;
+        let is_cut = word.abs_diff(ZERO_VOLT) + 2 >= self.limits.words;
+        let most_ns = if is_cut { CREST_NS } else { STANDING_NS };
+        self.stuck[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
     }
 
     /// Now all have to be at 0 V.
@@ -158,6 +212,7 @@ impl Outputs {
             safe_ns: self.safe_ns,
             stuck: self.stuck.iter().filter(|&&stuck| stuck).count(),
             drives_again: self.drives_again,
+            beyond_ns: self.beyond,
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Recordings of displays that answer a fault well, or badly.
 
-use firmware_display::ZERO_VOLT;
-use protocol::{Safety, Trip};
+use protocol::{DisplayState, Hold, Message, Safety, Trip};
 
 use super::*;
-use crate::judge::synthetic::Run;
-use crate::run::fault_evidence::{FaultEvidence, Reset};
-use crate::run::recording::ACTUATORS;
+use crate::judge::synthetic::{Run, word_of};
+use crate::run::fault_evidence::FaultEvidence;
+use crate::run::recording::{ACTUATORS, ZERO_VOLT};
+use crate::scene::fault::{Fault, Kind};
 
 const MS: u64 = 1_000_000;
 const AT_MS: u64 = 100;
@@ -42,8 +42,12 @@ fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: FaultEvidence) -> Findi
         signs,
         ..Run::steady(50.0, 2.0).record()
     };
-    let fault = Fault::new(kind, AT_MS as f64 * 1e-3);
-    finding(&fault, END_MS * MS, &recording)
+    let scene = Scene {
+        duration_s: END_MS as f64 * 1e-3,
+        faults: vec![Fault::new(kind, AT_MS as f64 * 1e-3)],
+        ..Scene::constant(2.0, 50.0)
+    };
+    finding(&scene, 0, END_MS * MS, &recording)
 }
 
 fn stopped() -> FaultEvidence {
@@ -70,6 +74,26 @@ fn a_display_that_stops_late_is_found() {
         finding.unmet(),
         ["0 V after 25.00 ms of 20", "50 outputs stuck"]
     );
+}
+
+#[test]
+fn a_display_that_says_late_that_it_has_stopped_is_found() {
+    for kind in [Kind::SpiStall, Kind::DacAlarm] {
+        let trip = kind.row().trips[0];
+        let says_at = |after_ms| FaultEvidence {
+            clears_ns: vec![(AT_MS + 2) * MS],
+            display: vec![said(AT_MS + after_ms, DisplayState::Stopped(trip))],
+            ..FaultEvidence::default()
+        };
+        let found = |after_ms| {
+            judged(kind, driven(0, AT_MS + 2, ZERO_VOLT), says_at(after_ms))
+                .unmet()
+                .into_iter()
+                .any(|unmet| unmet.starts_with("says that it has stopped after"))
+        };
+        assert!(!found(20), "{kind:?}");
+        assert!(found(127), "{kind:?}");
+    }
 }
 
 #[test]
@@ -114,11 +138,20 @@ fn more_resets_than_the_kind_has_are_against_the_table() {
     };
     let signs = |resets| FaultEvidence {
         resets,
-        ..stopped()
+        display: vec![said(AT_MS + 600, DisplayState::Stopped(Trip::Panic))],
+        clears_ns: vec![(AT_MS + 1) * MS],
+        ..FaultEvidence::default()
     };
     let outputs = || driven(0, AT_MS, ZERO_VOLT);
-    let once = vec![reset(400, Role::Display), reset(450, Role::Sensor)];
+    let once = vec![reset(400, Role::Display)];
     assert_eq!(judged(Kind::Panic, outputs(), signs(once)).unmet(), [""; 0]);
+    let beside = vec![reset(400, Role::Display), reset(450, Role::Sensor)];
+    let finding = judged(Kind::Panic, outputs(), signs(beside));
+    assert!(!finding.is_restart_against_the_table());
+    assert_eq!(
+        finding.unmet(),
+        ["not to be expected: sensor reset, at 350.00 ms"]
+    );
     let twice = vec![reset(400, Role::Display), reset(800, Role::Display)];
     let finding = judged(Kind::Panic, outputs(), signs(twice));
     assert!(finding.is_restart_against_the_table());
@@ -136,7 +169,13 @@ fn what_was_said_before_the_fault_or_after_its_time_is_no_sign_of_it() {
         ..FaultEvidence::default()
     };
     let finding = judged(Kind::DacAlarm, driven(0, AT_MS + 2, ZERO_VOLT), signs);
-    assert_eq!(finding.unmet(), ["no sign of it"]);
+    assert_eq!(
+        finding.unmet(),
+        [
+            "no sign of it",
+            "does not say that it has stopped: [Converter]"
+        ]
+    );
 }
 
 #[test]
@@ -146,5 +185,144 @@ fn a_sign_of_what_is_no_fault_is_a_false_alarm() {
         ..FaultEvidence::default()
     };
     let finding = judged(Kind::Nothing, driven(0, END_MS, ZERO_VOLT), signs);
-    assert_eq!(finding.unmet(), ["a sign of what is no fault: CLR fell"]);
+    assert_eq!(
+        finding.unmet(),
+        ["not to be expected: CLR fell, at 5.00 ms"]
+    );
+}
+
+/// The link is cut for 0.7 s from 0.5 s on, in 2 s; the last estimate that counts has come at 0.491 s.
+const CUT_NS: std::ops::Range<u64> = 500 * MS..1_200 * MS;
+const STALE_NS: u64 = 991 * MS;
+
+/// A display that hears nothing meanwhile, and what it does in `silent_ms`, of which it says `says`.
+fn cut(silent_ms: std::ops::Range<u64>, says: Option<u64>) -> Vec<String> {
+    let mut recording = Run::steady(50.0, 2.0).record();
+    recording
+        .arrived
+        .retain(|arrival| !CUT_NS.contains(&arrival.at_ns));
+    for output in &mut recording.outputs {
+        if (silent_ms.start * MS..silent_ms.end * MS).contains(&output.at_ns) {
+            output.words = [ZERO_VOLT; ACTUATORS];
+        }
+    }
+    let holds = says.map(|at_ms| said(at_ms, DisplayState::Fading(Hold::Stale)));
+    recording.signs.display = holds.into_iter().collect();
+    let mut fault = Fault::new(Kind::LinkDown, 0.5);
+    fault.for_s = Some(0.7);
+    let scene = Scene {
+        duration_s: 2.0,
+        faults: vec![fault],
+        ..Scene::constant(2.0, 50.0)
+    };
+    finding(&scene, 0, 2_000 * MS, &recording).unmet()
+}
+
+#[test]
+fn a_display_that_fades_when_estimates_are_too_old_and_drives_again_meets_everything() {
+    assert_eq!(cut(1_030..1_210, Some(992)), [""; 0]);
+}
+
+#[test]
+fn a_display_that_never_fades_is_found() {
+    let stale_ms = (STALE_NS - CUT_NS.start) / MS;
+    let unmet = cut(0..0, None);
+    assert_eq!(unmet.len(), 2, "{unmet:?}");
+    assert!(unmet[0].starts_with(&format!("does not say that it holds, Stale, at {stale_ms}")));
+    // It has 50 ms to fade, and 3 ms to notice.
+    assert!(unmet[1].starts_with("drives at 54"), "{unmet:?}");
+}
+
+#[test]
+fn a_display_that_fades_too_early_or_for_another_reason_or_for_ever_is_found() {
+    let early = cut(800..1_210, Some(800));
+    assert_eq!(early, ["silent from 300.00 ms on, without a reason"]);
+    let for_ever = cut(1_030..2_000, Some(992));
+    assert_eq!(
+        for_ever,
+        [
+            "silent from 530.00 ms on, without a reason",
+            "does not drive again within 300 ms of its end"
+        ]
+    );
+}
+
+#[test]
+fn a_display_that_follows_what_it_must_not_is_out_of_step() {
+    let judged = |ahead: fn(f64) -> f64| {
+        let run = Run {
+            ahead_cycles: Box::new(ahead),
+            ..Run::steady(50.0, 2.0)
+        };
+        let scene = Scene {
+            duration_s: 2.0,
+            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            ..Scene::constant(2.0, 50.0)
+        };
+        finding(&scene, 0, 2_000 * MS, &run.record()).unmet()
+    };
+    // Wherever its phase began, and not where it goes then.
+    assert_eq!(judged(|_| 0.3), [""; 0]);
+    let lost = judged(|t_s| if t_s < 0.6 { 0.3 } else { 0.4 });
+    assert!(lost[0].starts_with("out of step by 0.09"), "{lost:?}");
+}
+
+#[test]
+fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
+    let spoiled = |amplitude_mv: u16, words: &[u16]| {
+        let run = Run {
+            amplitude_v: f64::from(amplitude_mv) * 1e-3,
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut recording = run.record();
+        let late = recording
+            .outputs
+            .iter_mut()
+            .filter(|output| output.at_ns > 700 * MS);
+        for (output, &word) in late.zip(words) {
+            output.words[3] = word;
+        }
+        let mut scene = Scene {
+            duration_s: 2.0,
+            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            ..Scene::constant(2.0, 50.0)
+        };
+        scene.display.configuration.amplitude_mv = amplitude_mv;
+        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+    };
+    assert_eq!(spoiled(5_000, &[]), [""; 0]);
+    // 0 V at once is always right, and the way back has its limit: 5 V in half a millisecond.
+    assert_eq!(spoiled(5_000, &[ZERO_VOLT]), [""; 0]);
+    assert_eq!(spoiled(3_000, &[]), [""; 0]);
+    let beyond = ["beyond the limits of voltage and slew at 200.50 ms"];
+    assert_eq!(spoiled(3_000, &[word_of(3.01)]), beyond);
+    let steep = ["beyond the limits of voltage and slew at 201.50 ms"];
+    assert_eq!(
+        spoiled(5_000, &[ZERO_VOLT, word_of(-3.0), word_of(2.1)]),
+        steep
+    );
+}
+
+#[test]
+fn what_is_too_short_or_too_small_need_not_be_seen() {
+    let judged = |fault: Fault| {
+        let scene = Scene {
+            duration_s: 2.0,
+            faults: vec![fault],
+            ..Scene::constant(2.0, 50.0)
+        };
+        finding(&scene, 0, 2_000 * MS, &Run::steady(50.0, 2.0).record()).unmet()
+    };
+    let jump = |counts: f64| {
+        let mut jump = Fault::new(Kind::HandEncoderJump, 0.5);
+        jump.values[0] = counts;
+        judged(jump)
+    };
+    // 2 m/s are 200 counts of 5 µm a tick.
+    assert_eq!(jump(400.0), [""; 0]);
+    assert_eq!(jump(401.0)[0], "no sign of it");
+    let mut alarm = Fault::new(Kind::DacAlarm, 0.5);
+    assert_eq!(judged(alarm)[0], "no sign of it");
+    alarm.for_s = Some(0.001);
+    assert_eq!(judged(alarm), [""; 0]);
 }

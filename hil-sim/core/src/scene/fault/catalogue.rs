@@ -4,6 +4,8 @@ mod table;
 
 pub use table::rows;
 
+use protocol::{Hold, Role, Trip};
+
 use super::Kind;
 
 /// A kind of fault.
@@ -23,14 +25,26 @@ pub struct Row {
     pub keys: &'static [Key],
     /// Where it can be done.
     pub needs: Needs,
-    /// Time in ms in which all outputs have to be at 0 V; none if it can't put out a wrong voltage.
-    pub safe_within_ms: Option<f64>,
-    /// Whether a board has to say so, or its hardware to show it.
-    pub is_to_be_seen: bool,
     /// What the display is to do.
     pub class: Class,
+    /// Time in ms in which all outputs have to be at 0 V; none if it can't put out a wrong voltage.
+    pub safe_within_ms: Option<f64>,
+    /// For which reasons the display may say that it has stopped: for one of them if it has to stop, and for
+    /// nothing else.
+    pub trips: &'static [Trip],
+    /// What shows it: one of these has to. Without any it must not show.
+    pub signs: &'static [Sign],
+    /// In which time in ms; none if that depends on what arrives: then when that is a reason to hold.
+    pub seen_within_ms: Option<f64>,
+    /// What else may show. Anything else must not.
+    pub also: &'static [Sign],
     /// Resets of the display board that may come of it.
     pub resets: usize,
+    /// In which time in ms after its end the display drives again while the hand moves; none if it must not, or
+    /// never ceases to.
+    pub again_within_ms: Option<f64>,
+    /// Boards that it keeps from talking. The others go on: the sensor with estimates, the display with motions.
+    pub silences: &'static [Role],
     /// What is expected, for a person.
     pub expected: &'static str,
     /// How long a campaign looks on after it has begun, in s.
@@ -68,6 +82,29 @@ pub enum Class {
     Holds,
     /// The sensor board's: the display holds, or fades if it lasts.
     Sensor,
+}
+
+/// What shows from outside that something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// The display says that it is on its way to 0 V, and why.
+    Fading(Hold),
+    /// The display says that it has stopped, and why.
+    Stopped(Trip),
+    /// A counter of a board's port, or of the board itself, has gone up; its name as in `Status`.
+    Counted(Role, &'static str),
+    /// The converters' clear line fell.
+    ClearFell,
+    /// A board was reset, and not by the scene.
+    Reset(Role),
+    /// A board greets as one that has just started.
+    Greets(Role),
+    /// The display refuses a setting.
+    Refuses,
+    /// The sensor says that the gauge is not well.
+    GaugeNotGood,
+    /// The sensor stands by no estimate.
+    NoValidEstimate,
 }
 
 /// A number that a kind takes.
@@ -158,11 +195,31 @@ mod tests {
     fn what_can_put_out_a_wrong_voltage_is_to_be_seen_and_leads_to_zero() {
         for row in rows() {
             if row.safe_within_ms.is_some() {
-                assert!(row.is_to_be_seen, "{}", row.name);
+                assert!(!row.signs.is_empty(), "{}", row.name);
                 let ends = matches!(row.class, Class::Stops | Class::Fades);
                 assert!(ends, "{}", row.name);
             }
             assert!(row.watch_s >= row.lasts.default_s().unwrap_or(0.0));
+        }
+    }
+
+    #[test]
+    fn every_row_says_how_it_ends_and_a_campaign_looks_on_until_then() {
+        for row in rows() {
+            assert_eq!(
+                row.class == Class::Stops,
+                !row.trips.is_empty(),
+                "{}",
+                row.name
+            );
+            let ends_ms = row.lasts.default_s().unwrap_or(0.0) * 1e3;
+            if let Some(again_ms) = row.again_within_ms {
+                assert!(row.class.may_drive_again(), "{}", row.name);
+                assert!(row.watch_s * 1e3 > ends_ms + again_ms, "{}", row.name);
+            }
+            if let Some(seen_ms) = row.seen_within_ms {
+                assert!(row.watch_s * 1e3 > seen_ms, "{}", row.name);
+            }
         }
     }
 }

@@ -11,6 +11,7 @@ use super::tape::{Check, Conversion, Tape};
 use super::topic;
 use super::topic::When;
 use super::wav::Wav;
+use crate::hjif::{Channel, Experience, HjifError};
 use crate::scene::SceneError;
 use crate::scene::Series;
 
@@ -35,6 +36,8 @@ pub enum Format {
     Csv(Vec<u8>),
     Wav(Wav),
     Mcap,
+    /// The whole file.
+    Hjif(Experience),
 }
 
 /// What a section says of its file.
@@ -63,8 +66,13 @@ impl<'t> Source<'t> {
     ) -> Result<Self, SceneError> {
         let Some(name) = table.text("file")? else {
             let message = format!(
-                "is missing: give a CSV file with the columns {}, or a WAV or MCAP file",
-                headers[0]
+                "is missing: give a CSV file with the columns {}, or a WAV or MCAP{} file",
+                headers[0],
+                if words.every == "rate_hz" {
+                    ""
+                } else {
+                    " or .hjif"
+                }
             );
             return Err(table.refuse("file", message));
         };
@@ -124,6 +132,18 @@ impl<'t> Source<'t> {
                 return Err(table.refuse(words.every, message));
             }
         }
+        if matches!(self.format, Format::Hjif(_)) {
+            if words.every == "rate_hz" {
+                let message = "a texture is a function of place, not of time: give it to [surface], or a CSV, WAV or MCAP file here";
+                return Err(table.refuse("file", message));
+            }
+            for key in [words.column, words.scale, words.every] {
+                if table.contains(key) {
+                    let message = "an .hjif file has places of its own: take it out";
+                    return Err(table.refuse(key, message));
+                }
+            }
+        }
         if self.per_unit.is_some() && self.column.is_none() {
             let message = format!("is no column's: give {} too", words.column);
             return Err(table.refuse(words.scale, message));
@@ -141,6 +161,11 @@ impl<'t> Source<'t> {
             && self.channels.is_none()
             && self.column.is_none()
             && self.every.is_none()
+    }
+
+    /// What is wrong with a texture, as a scene says it.
+    pub fn refuse(&self, error: HjifError) -> SceneError {
+        refuse(&self.path, error)
     }
 
     /// The topic, `default` if none is named; none if the file is no MCAP.
@@ -188,6 +213,30 @@ impl<'t> Source<'t> {
                     // As many steps as samples: times in s would be rounded.
                     tape.take((t_s * rate_hz).round() * step, row, check)
                 })?;
+                tape
+            }
+            Format::Hjif(ref file) => {
+                let texture = file.texture().map_err(|error| self.refuse(error))?;
+                let channels = texture.channels();
+                let [column] = distinct[..] else {
+                    return Err(table.refuse("channels", "names several: name one"));
+                };
+                let is_named = |channel: &Channel| match column {
+                    Column::Numbered(id) => channel.id as usize == id,
+                    Column::Named(name) => channel.description == name,
+                };
+                let Some(at) = channels.iter().position(is_named) else {
+                    let message = format!("{column} is the id or the description of no channel");
+                    return Err(table.refuse("channels", message));
+                };
+                let heights = texture.heights(at).map_err(|error| self.refuse(error))?;
+                let mut tape = tape(1);
+                for (x_mm, height) in heights {
+                    tape.take(x_mm, &[height], check).map_err(|(_, message)| {
+                        let place = format!("channel {column} at {x_mm} mm");
+                        refuse(&self.path, HjifError::at(place, message))
+                    })?;
+                }
                 tape
             }
             Format::Mcap => {
@@ -340,9 +389,9 @@ impl<'t> Source<'t> {
     }
 }
 
-/// What the file is, by its first bytes; CSV is read as a whole.
+/// What the file is, by its first bytes; text is read as a whole.
 fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
-    let refuse = |error: std::io::Error| {
+    let refuse_file = |error: std::io::Error| {
         let message = format!(
             "{} cannot be read: {error}: names are relative to the scene's own folder",
             path.display()
@@ -352,13 +401,34 @@ fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
     let mut first = Vec::new();
     fs::File::open(path)
         .and_then(|file| file.take(8).read_to_end(&mut first))
-        .map_err(refuse)?;
+        .map_err(refuse_file)?;
     if first.starts_with(b"RIFF") {
         Wav::open(path).map(Format::Wav)
     } else if first.starts_with(b"\x89MCAP") {
         Ok(Format::Mcap)
     } else {
-        fs::read(path).map(Format::Csv).map_err(refuse)
+        let text = fs::read(path).map_err(refuse_file)?;
+        if is_json(&text) {
+            let file = Experience::parse(&text).map_err(|error| refuse(path, error))?;
+            return Ok(Format::Hjif(file));
+        }
+        Ok(Format::Csv(text))
+    }
+}
+
+/// Whether a text is a JSON object, whatever blanks are before it: no table begins so.
+fn is_json(text: &[u8]) -> bool {
+    let text = text.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(text);
+    text.trim_ascii_start().starts_with(b"{")
+}
+
+/// A file that is no texture.
+fn refuse(path: &Path, error: HjifError) -> SceneError {
+    SceneError {
+        file: path.display().to_string(),
+        line: error.line,
+        key: error.place,
+        message: error.message,
     }
 }
 

@@ -1,7 +1,7 @@
 //! `[display]`: what is taken, and what is refused with which words.
 
 use protocol::actuators::{self, grid};
-use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Mode, UpdateRate};
+use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Mode, Rendering, UpdateRate};
 
 use super::recorded::Folder;
 use super::*;
@@ -44,11 +44,12 @@ fn without_the_section_the_board_is_as_it_starts() {
 #[test]
 fn every_setting_becomes_the_boards() {
     let scene = taken(
-        "[display]\nmode = \"travelling\"\nupdate_rate_hz = 4000\nmax_age_ms = 300\nfade_in_ms = 10\n\
-         fade_out_ms = 30\nglide_ms = 0\namplitude_mv = 4000\nreference_lsb = 250\nfull_drive_s = 60\npitch_um = 700\n",
+        "[display]\nmode = \"travelling\"\nrendering = \"texture\"\nupdate_rate_hz = 4000\nmax_age_ms = 300\nfade_in_ms = 10\n\
+         fade_out_ms = 30\nglide_ms = 0\namplitude_mv = 4000\nreference_lsb = 250\nreference_mn = 900\nfull_drive_s = 60\npitch_um = 700\n",
     );
     let expected = DisplayConfiguration {
         mode: Mode::Travelling,
+        rendering: Rendering::Texture,
         update_rate: UpdateRate::Hz4000,
         max_age_ms: 300,
         fade_in_ms: 10,
@@ -56,6 +57,7 @@ fn every_setting_becomes_the_boards() {
         glide_ms: 0,
         amplitude_mv: 4_000,
         reference_lsb: 250,
+        reference_mn: 900,
         full_drive_s: 60,
         actuators: actuators::hash(&grid(700)),
     };
@@ -73,6 +75,7 @@ fn the_ranges_are_the_boards_own() {
         ("glide_ms", 0, 500),
         ("amplitude_mv", 0, 5_000),
         ("reference_lsb", 0, 2_000),
+        ("reference_mn", 0, 60_000),
         ("full_drive_s", 10, 3_600),
         ("pitch_um", 100, 4_000),
     ] {
@@ -119,8 +122,76 @@ fn a_described_array_is_taken_actuator_by_actuator() {
         gain_q15: 1 << 14,
         phase: 1 << 14,
         inverted: true,
+        ..protocol::Actuator::at(100, -700)
     };
     assert_eq!(actuators[10], tenth);
+}
+
+/// The same fifty with two more columns, one of the rows another.
+fn modelled_rows(change: usize, columns: &str) -> String {
+    let header = HEADER.trim_end();
+    let rows = (0..50).map(|index| {
+        let columns = if index == change {
+            columns
+        } else {
+            "35.5,0.71"
+        };
+        format!("{index},{},-700,0.5,0.25,1,{columns}\n", 100 * (index % 10))
+    });
+    format!(
+        "{header},resonance_hz,damping\n{}",
+        rows.collect::<String>()
+    )
+}
+
+#[test]
+fn an_array_may_be_described_with_its_resonances() {
+    let scene = described("modelled", &modelled_rows(7, "0,0")).unwrap();
+    let actuators = &scene.display.actuators;
+    assert_eq!(
+        (actuators[6].resonance_dhz, actuators[6].damping_percent),
+        (355, 71)
+    );
+    assert_eq!(actuators[7].resonance_dhz, 0);
+    assert_eq!(actuators::check(actuators), Ok(()));
+    for (columns, want) in [
+        (
+            "19.9,0.7",
+            "data.csv:9: column 7 (resonance_hz): \"19.9\" is no resonance: give 20 to 2000 Hz",
+        ),
+        (
+            "2001,0.7",
+            "data.csv:9: column 7 (resonance_hz): \"2001\" is no resonance",
+        ),
+        (
+            "50,0.19",
+            "data.csv:9: column 8 (damping): \"0.19\" is no damping: give 0.2 to 10",
+        ),
+        (
+            "50,10.1",
+            "data.csv:9: column 8 (damping): \"10.1\" is no damping",
+        ),
+    ] {
+        let refusal = described("modelled-badly", &modelled_rows(7, columns));
+        let refusal = refusal.unwrap_err().to_string();
+        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+    }
+}
+
+#[test]
+fn more_than_the_fundamental_is_refused_for_more_places_than_are_worked_out_in_time() {
+    let scattered = |section: &str| {
+        let rows = (0..50).map(|index| format!("{index},{},0,1,0,0\n", 10 * index));
+        let csv = format!("{HEADER}{}", rows.collect::<String>());
+        let section = format!("[display]\nmode = \"travelling\"\nfile = \"data.csv\"\n{section}");
+        Folder::new("display-scattered").load(&section, &csv)
+    };
+    assert!(scattered("rendering = \"fundamental\"\n").is_ok());
+    let refusal = scattered("rendering = \"shape\"\n")
+        .unwrap_err()
+        .to_string();
+    let want = "display.rendering: is too much with these actuators";
+    assert!(refusal.contains(want), "{refusal}");
 }
 
 #[test]

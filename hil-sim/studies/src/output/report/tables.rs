@@ -83,6 +83,12 @@ pub fn summary(chapter: &Chapter) -> String {
             number(s.felt_wrong_share.map(|share| 100.0 * share), 2, " %"),
         ),
         (
+            "rendering that the surface needs",
+            s.rendering_needed
+                .map_or("–", |rendering| rendering.name())
+                .to_owned(),
+        ),
+        (
             "RMS error of the paper's count in T1",
             number(s.counted_rms_percent, 2, " %"),
         ),

@@ -1,8 +1,10 @@
 //! The converters and the way to them.
 
+use protocol::{Role, Trip};
+
 use super::DANGEROUS;
 use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Key, Lasts, Row};
+use crate::scene::fault::catalogue::{Key, Lasts, Row, Sign};
 
 const CHIP: Key = Key {
     name: "chip",
@@ -22,6 +24,12 @@ pub(super) static ROWS: [Row; 7] = [
         injected: "the chip hears no frame and says nothing on SDO: its outputs stay as they are",
         lasts: Lasts::ForGood,
         keys: &[CHIP],
+        trips: &[Trip::Converter],
+        signs: &[Sign::Stopped(Trip::Converter), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "converter_faults"),
+            Sign::Counted(Role::Display, "clears"),
+        ],
         expected: "readback differs; stopped: converter, by CLR, which the chip still obeys",
         ..DANGEROUS
     },
@@ -31,6 +39,12 @@ pub(super) static ROWS: [Row; 7] = [
         meaning: "a converter loses its power for a moment and its settings with it",
         injected: "the chip is reset to its power-on state",
         keys: &[CHIP],
+        trips: &[Trip::Converter],
+        signs: &[Sign::Stopped(Trip::Converter), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "converter_faults"),
+            Sign::Counted(Role::Display, "clears"),
+        ],
         expected: "its own outputs at 0 V at once; readback differs; stopped: converter",
         ..DANGEROUS
     },
@@ -41,6 +55,12 @@ pub(super) static ROWS: [Row; 7] = [
         injected: "the chip is too hot: its STATUS says so and it pulls ALMOUT (D3) low",
         lasts: Lasts::For(0.05),
         keys: &[CHIP],
+        trips: &[Trip::Converter],
+        signs: &[Sign::Stopped(Trip::Converter), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "converter_faults"),
+            Sign::Counted(Role::Display, "clears"),
+        ],
         expected: "stopped: converter",
         ..DANGEROUS
     },
@@ -50,6 +70,18 @@ pub(super) static ROWS: [Row; 7] = [
         meaning: "LDAC's wire is held high: the chips take words and don't play them",
         injected: "LDAC (D16) is high whatever TIM3 drives, at the chips and at the pin",
         lasts: Lasts::ForGood,
+        trips: &[Trip::Transfer, Trip::Converter],
+        signs: &[
+            Sign::Stopped(Trip::Transfer),
+            Sign::Stopped(Trip::Converter),
+            Sign::ClearFell,
+        ],
+        also: &[
+            Sign::Counted(Role::Display, "converter_faults"),
+            Sign::Counted(Role::Display, "spi_errors"),
+            Sign::Counted(Role::Display, "clears"),
+            Sign::Counted(Role::Display, "deadline_misses"),
+        ],
         expected: "stopped: transfer or converter",
         ..DANGEROUS
     },
@@ -59,6 +91,12 @@ pub(super) static ROWS: [Row; 7] = [
         meaning: "CLR's wire is at ground",
         injected: "CLR is low at the chips whatever the pin says",
         lasts: Lasts::ForGood,
+        trips: &[Trip::Converter],
+        signs: &[Sign::Stopped(Trip::Converter), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "converter_faults"),
+            Sign::Counted(Role::Display, "clears"),
+        ],
         expected: "0 V at once; readback differs; stopped: converter",
         ..DANGEROUS
     },
@@ -68,6 +106,13 @@ pub(super) static ROWS: [Row; 7] = [
         meaning: "SPI1 sends no more",
         injected: "its clock is taken away (RCC_APB2ENR, SPI1EN)",
         lasts: Lasts::ForGood,
+        trips: &[Trip::Transfer],
+        signs: &[Sign::Stopped(Trip::Transfer), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "spi_errors"),
+            Sign::Counted(Role::Display, "clears"),
+            Sign::Counted(Role::Display, "deadline_misses"),
+        ],
         expected: "stopped: transfer",
         ..DANGEROUS
     },
@@ -75,8 +120,15 @@ pub(super) static ROWS: [Row; 7] = [
         kind: Kind::DmaStall,
         name: "dma-stall",
         meaning: "DMA2 moves no more",
-        injected: "its clock is taken away (RCC_AHB1ENR, DMA2EN)",
+        injected: "its clock is taken away (RCC_AHB1ENR, DMA2EN); a frame that is under way ends, and its interrupt stays",
         lasts: Lasts::ForGood,
+        trips: &[Trip::Transfer],
+        signs: &[Sign::Stopped(Trip::Transfer), Sign::ClearFell],
+        also: &[
+            Sign::Counted(Role::Display, "spi_errors"),
+            Sign::Counted(Role::Display, "clears"),
+            Sign::Counted(Role::Display, "deadline_misses"),
+        ],
         expected: "stopped: transfer",
         ..DANGEROUS
     },

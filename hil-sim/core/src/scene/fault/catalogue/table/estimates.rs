@@ -1,14 +1,24 @@
 //! What the sensor says, forged.
 
-use super::{BASE, LINK};
+use protocol::{Hold, Role};
+
+use super::{BASE, FADED, LINK};
 use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row};
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row, Sign};
 
 const FORGED: Row = Row {
     needs: Needs::Nothing,
     class: Class::Fades,
     lasts: Lasts::For(0.3),
-    watch_s: 0.5,
+    signs: &[Sign::Fading(Hold::Distrust)],
+    also: &[
+        FADED,
+        Sign::Counted(Role::Display, "refused_estimates"),
+        Sign::Counted(Role::Display, "implausible"),
+    ],
+    // Half a second without one that can't be true, and the way up.
+    again_within_ms: Some(600.0),
+    watch_s: 1.0,
     ..BASE
 };
 

@@ -1,8 +1,10 @@
 //! The link between the boards.
 
-use super::{LINK, PAST_STATUS_S};
+use protocol::{Hold, Role};
+
+use super::{COUNTED_MS, FADED, LINE, LINK, PAST_STATUS_S};
 use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Class, Key, Lasts, Row};
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Row, Sign};
 
 pub(super) static ROWS: [Row; 7] = [
     Row {
@@ -18,6 +20,9 @@ pub(super) static ROWS: [Row; 7] = [
         name: "link-garbage",
         meaning: "noise on the link in place of what is said",
         injected: "random bytes at line rate in place of every byte, either way",
+        signs: &LINE,
+        seen_within_ms: COUNTED_MS,
+        also: &[Sign::Fading(Hold::Stale), FADED],
         expected: "corrupt and overlong frames counted; as link-down once the last λ is too old",
         watch_s: PAST_STATUS_S,
         ..LINK
@@ -38,6 +43,9 @@ pub(super) static ROWS: [Row; 7] = [
             drawn: None,
         }],
         class: Class::Holds,
+        signs: &LINE,
+        seen_within_ms: COUNTED_MS,
+        also: &[Sign::Fading(Hold::Stale), FADED],
         expected: "corrupt frames counted and none followed; drives on as long as good ones come",
         watch_s: PAST_STATUS_S,
         ..LINK
@@ -49,8 +57,16 @@ pub(super) static ROWS: [Row; 7] = [
         injected: "the last estimate again and again, each with the next number and a right CRC, at \
                    line rate, in place of all that the sensor says",
         lasts: Lasts::For(0.3),
+        signs: &[Sign::Fading(Hold::Flood)],
+        seen_within_ms: Some(110.0),
+        also: &[
+            FADED,
+            Sign::Counted(Role::Display, "corrupt"),
+            Sign::Counted(Role::Display, "flooded"),
+            Sign::Counted(Role::Display, "refused_estimates"),
+        ],
         expected: "fades out within 110 ms, counted; drives again when it is over",
-        watch_s: 0.6,
+        watch_s: 0.7,
         ..LINK
     },
     Row {
@@ -67,6 +83,13 @@ pub(super) static ROWS: [Row; 7] = [
             whole: false,
             drawn: None,
         }],
+        signs: &LINE,
+        seen_within_ms: COUNTED_MS,
+        also: &[
+            Sign::Fading(Hold::Stale),
+            FADED,
+            Sign::Counted(Role::Display, "refused_estimates"),
+        ],
         expected: "late and repeated frames counted and not followed; as link-down once the last λ is \
                    too old",
         watch_s: PAST_STATUS_S,
@@ -97,6 +120,9 @@ pub(super) static ROWS: [Row; 7] = [
         meaning: "the wire into the display is held low: a break that does not end",
         injected: "zero bytes at line rate, on the boards each with a framing error, in place of all \
                    that the sensor says",
+        signs: &LINE,
+        seen_within_ms: COUNTED_MS,
+        also: &[Sign::Fading(Hold::Stale), FADED],
         expected: "line errors counted; as link-down once the last λ is too old",
         watch_s: PAST_STATUS_S,
         ..LINK

@@ -1,8 +1,10 @@
 //! What is tried beside the faults themselves.
 
-use super::{BASE, DANGEROUS, PAST_STATUS_S};
+use protocol::Role;
+
+use super::{BASE, BOTH_RESTARTED, DANGEROUS, PAST_STATUS_S};
 use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row};
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row, Sign};
 
 pub(super) static ROWS: [Row; 2] = [
     Row {
@@ -11,7 +13,6 @@ pub(super) static ROWS: [Row; 2] = [
         meaning: "nothing breaks: a campaign's control",
         injected: "nothing",
         needs: Needs::Nothing,
-        is_to_be_seen: false,
         class: Class::Holds,
         expected: "no sign of a fault, no change of the supervisor's state",
         watch_s: PAST_STATUS_S,
@@ -35,8 +36,16 @@ pub(super) static ROWS: [Row; 2] = [
         }],
         class: Class::Fades,
         resets: 1,
+        signs: &[
+            Sign::ClearFell,
+            Sign::Greets(Role::Display),
+            Sign::Reset(Role::Display),
+        ],
+        also: &BOTH_RESTARTED,
+        again_within_ms: Some(1_200.0),
+        silences: &[Role::Display, Role::Sensor],
         expected: "0 V at once; the boards start, and drive when there is a fresh estimate",
-        watch_s: 0.7,
+        watch_s: 1.3,
         ..DANGEROUS
     },
 ];

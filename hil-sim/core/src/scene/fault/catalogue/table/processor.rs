@@ -1,12 +1,14 @@
 //! The display board's processor.
 
-use super::DANGEROUS;
-use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Class, Key, Lasts, Row};
+use protocol::{Role, Trip};
 
-/// Until a watchdog that is no longer fed has bitten (0.5 s at most) and the board has started again
-/// and had the time to drive, which it must not.
-const PAST_WATCHDOG_S: f64 = 0.85;
+use super::{DANGEROUS, RESTARTED, WATCHDOG_MS};
+use crate::scene::fault::Kind;
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Row, Sign};
+
+/// Until a watchdog that is no longer fed has bitten (0.5 s at most), the board has started again and had the
+/// time to drive, which it must not, and has told why: once a second.
+const PAST_WATCHDOG_S: f64 = 1.8;
 
 pub(super) static ROWS: [Row; 9] = [
     Row {
@@ -16,6 +18,10 @@ pub(super) static ROWS: [Row; 9] = [
         injected: "TIM3_CR1 is written 0",
         lasts: Lasts::ForGood,
         resets: 1,
+        trips: &[Trip::Watchdog],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::Watchdog)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls after four ticks, the watchdog bites; stopped: watchdog",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -26,6 +32,10 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the output task never ends",
         injected: "its entry in RAM, by which its executor calls it, leads to an endless loop",
         resets: 1,
+        trips: &[Trip::Watchdog],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::Watchdog)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls after four ticks, the watchdog bites; stopped: watchdog",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -36,6 +46,15 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "a task of the thread never ends, so that nobody hears a Stop",
         injected: "the reporting task's entry in RAM leads to an endless loop",
         resets: 1,
+        trips: &[Trip::Watchdog],
+        signs: &[
+            Sign::ClearFell,
+            Sign::Stopped(Trip::Watchdog),
+            Sign::Reset(Role::Display),
+        ],
+        seen_within_ms: WATCHDOG_MS,
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "fades out within 20 ms, the watchdog bites; stopped: watchdog",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -46,6 +65,10 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the display's processor hangs",
         injected: "the output task's entry leads to an endless loop with interrupts disabled",
         resets: 1,
+        trips: &[Trip::Watchdog],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::Watchdog)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls after four ticks, the watchdog bites; stopped: watchdog",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -56,6 +79,10 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the firmware panics",
         injected: "the output task's entry leads to core's panic for an index out of bounds",
         resets: 1,
+        trips: &[Trip::Panic],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::Panic)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls; stopped: panic, also after the reset",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -66,6 +93,10 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the processor meets an instruction that is none",
         injected: "the output task's entry leads to UDF",
         resets: 1,
+        trips: &[Trip::Fault],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::Fault)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls; stopped: fault, also after the reset",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -76,6 +107,10 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "a recursion without an end",
         injected: "the output task's entry leads to code that pushes registers and calls itself",
         resets: 1,
+        trips: &[Trip::StackOverflow],
+        signs: &[Sign::ClearFell, Sign::Stopped(Trip::StackOverflow)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
         expected: "CLR falls; stopped: stack overflow, also after the reset",
         watch_s: PAST_WATCHDOG_S,
         ..DANGEROUS
@@ -90,12 +125,13 @@ pub(super) static ROWS: [Row; 9] = [
             Key {
                 name: "setting",
                 meaning: "which: 0 max_age_ms, 1 fade_in_ms, 2 fade_out_ms, 3 glide_ms, 4 amplitude_mv, \
-                          5 reference_lsb, 6 full_drive_s",
+                          5 reference_lsb, \
+                          6 reference_mn, 7 full_drive_s",
                 default: 4.0,
                 low: 0.0,
-                high: 6.0,
+                high: 7.0,
                 whole: true,
-                drawn: Some((0.0, 6.0)),
+                drawn: Some((0.0, 7.0)),
             },
             Key {
                 name: "bit",
@@ -107,6 +143,9 @@ pub(super) static ROWS: [Row; 9] = [
                 drawn: Some((0.0, 15.0)),
             },
         ],
+        trips: &[Trip::Memory],
+        signs: &[Sign::Stopped(Trip::Memory), Sign::ClearFell],
+        also: &[Sign::Counted(Role::Display, "clears")],
         expected: "stopped: memory",
         ..DANGEROUS
     },
@@ -118,6 +157,10 @@ pub(super) static ROWS: [Row; 9] = [
         lasts: Lasts::For(0.02),
         class: Class::Fades,
         resets: 1,
+        signs: &[Sign::ClearFell, Sign::Greets(Role::Display)],
+        also: &RESTARTED,
+        silences: &[Role::Display],
+        again_within_ms: Some(500.0),
         expected: "CLR is pulled low at once; the board starts and drives when there is a fresh estimate",
         watch_s: 0.7,
         ..DANGEROUS

@@ -1,8 +1,10 @@
 //! The sensor board.
 
-use super::{BASE, PAST_STALE_S, PAST_STATUS_S, STALE_S};
+use protocol::{Hold, Role};
+
+use super::{BASE, COUNTED_MS, FADED, LINE, PAST_STATUS_S, SENSOR_RESTARTED, STALE_S, WATCHDOG_MS};
 use crate::scene::fault::Kind;
-use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row};
+use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row, Sign};
 
 const GAUGE: Key = Key {
     name: "gauge",
@@ -22,6 +24,11 @@ pub(super) static ROWS: [Row; 9] = [
         injected: "as brown-out, of the sensor board",
         lasts: Lasts::For(0.02),
         class: Class::Sensor,
+        signs: &[Sign::Greets(Role::Sensor)],
+        seen_within_ms: Some(500.0),
+        also: &SENSOR_RESTARTED,
+        silences: &[Role::Sensor],
+        again_within_ms: Some(1_000.0),
         expected: "the sensor greets anew; the display drives on, or fades until it hears from it",
         watch_s: PAST_STATUS_S,
         ..BASE
@@ -32,6 +39,11 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the sensor's processor hangs",
         injected: "the sampling task's entry leads to an endless loop with interrupts disabled",
         class: Class::Sensor,
+        signs: &[Sign::Reset(Role::Sensor)],
+        seen_within_ms: WATCHDOG_MS,
+        also: &SENSOR_RESTARTED,
+        silences: &[Role::Sensor],
+        again_within_ms: Some(1_350.0),
         expected: "the watchdog restarts the sensor; the display fades out after max_age_ms, and drives \
                    again",
         watch_s: 1.4,
@@ -43,6 +55,11 @@ pub(super) static ROWS: [Row; 9] = [
         meaning: "the sensor's firmware panics",
         injected: "the sampling task's entry leads to core's panic for an index out of bounds",
         class: Class::Sensor,
+        signs: &[Sign::Reset(Role::Sensor)],
+        seen_within_ms: WATCHDOG_MS,
+        also: &SENSOR_RESTARTED,
+        silences: &[Role::Sensor],
+        again_within_ms: Some(1_350.0),
         expected: "as sensor-hang",
         watch_s: 1.4,
         ..BASE
@@ -56,8 +73,10 @@ pub(super) static ROWS: [Row; 9] = [
         keys: &[GAUGE],
         needs: Needs::Nothing,
         class: Class::Sensor,
+        signs: &[Sign::GaugeNotGood],
+        seen_within_ms: Some(300.0),
         expected: "the gauge is called saturated or stuck and left out; the display drives on",
-        watch_s: PAST_STALE_S,
+        watch_s: 1.4,
         ..BASE
     },
     Row {
@@ -69,8 +88,10 @@ pub(super) static ROWS: [Row; 9] = [
         keys: &[GAUGE],
         needs: Needs::Nothing,
         class: Class::Sensor,
+        signs: &[Sign::GaugeNotGood],
+        seen_within_ms: Some(300.0),
         expected: "the gauge is called dead and left out; the display drives on",
-        watch_s: PAST_STALE_S,
+        watch_s: 1.4,
         ..BASE
     },
     Row {
@@ -81,8 +102,16 @@ pub(super) static ROWS: [Row; 9] = [
         lasts: Lasts::For(STALE_S),
         needs: Needs::Nothing,
         class: Class::Sensor,
+        signs: &[Sign::NoValidEstimate],
+        seen_within_ms: Some(300.0),
+        also: &[
+            Sign::Fading(Hold::Stale),
+            FADED,
+            Sign::Counted(Role::Display, "implausible"),
+        ],
+        again_within_ms: Some(600.0),
         expected: "no valid estimate; the display fades out when the last one is too old",
-        watch_s: PAST_STALE_S,
+        watch_s: 1.4,
         ..BASE
     },
     Row {
@@ -92,6 +121,11 @@ pub(super) static ROWS: [Row; 9] = [
         injected: "ADC3_CR2's ADON is cleared",
         lasts: Lasts::ForGood,
         class: Class::Sensor,
+        signs: &[Sign::Reset(Role::Sensor)],
+        seen_within_ms: WATCHDOG_MS,
+        also: &SENSOR_RESTARTED,
+        silences: &[Role::Sensor],
+        again_within_ms: Some(1_350.0),
         expected: "the watchdog restarts the sensor; the display fades out, and drives again",
         watch_s: 1.4,
         ..BASE
@@ -103,6 +137,10 @@ pub(super) static ROWS: [Row; 9] = [
         injected: "DMA1's clock is taken away (RCC_AHB1ENR, DMA1EN), and given back",
         lasts: Lasts::For(0.02),
         class: Class::Sensor,
+        signs: &LINE,
+        also: &[Sign::Counted(Role::Sensor, "dma_overruns")],
+        seen_within_ms: COUNTED_MS,
+        silences: &[Role::Sensor],
         expected: "overruns, line errors or corrupt frames counted; the sensor hears and talks again",
         watch_s: PAST_STATUS_S,
         ..BASE
@@ -123,7 +161,6 @@ pub(super) static ROWS: [Row; 9] = [
             drawn: Some((-200.0, 200.0)),
         }],
         needs: Needs::Nothing,
-        is_to_be_seen: false,
         class: Class::Holds,
         expected: "nothing: the display goes by its own clock",
         watch_s: 0.5,

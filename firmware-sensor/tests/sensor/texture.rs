@@ -1,0 +1,257 @@
+//! What the sensor says of a surface besides λ.
+
+use std::f64::consts::TAU;
+
+use protocol::texture::BANDS;
+use protocol::{SensorConfiguration, Texture};
+
+use crate::felt::{Bench, CODES, GAINS, NOISE_20_DB, PHASES_RAD, PLACES_MM};
+
+/// A wave's shape: of the second and third partial ratio and phase in turns.
+type Shape = [(f64, f64); 2];
+
+const PLAIN: Shape = [(0.0, 0.0); 2];
+/// λ in mm and speed in mm/s of what is rubbed.
+const RUBS: [(f64, f64); 6] = [
+    (0.7, 30.0),
+    (1.0, 40.0),
+    (2.0, 20.0),
+    (2.0, 70.0),
+    (4.0, 70.0),
+    (7.5, 100.0),
+];
+
+fn wave(shape: Shape, theta: f64) -> f64 {
+    let partial = |n: f64, (ratio, turns): (f64, f64)| ratio * (n * theta + TAU * turns).sin();
+    theta.sin() + partial(2.0, shape[0]) + partial(3.0, shape[1])
+}
+
+/// A sum of forty sines of scattered phases in an octave of wavenumber, RMS 1, at x in mm.
+fn random(band: usize, x_mm: f64) -> f64 {
+    let sine = |n: f64| {
+        let per_mm = 0.125 * 2_f64.powf(band as f64 + (n + 0.5) / 40.0);
+        (TAU * (per_mm * x_mm + (n * n * 0.618_034).fract())).sin()
+    };
+    (0..40).map(|n| sine(f64::from(n))).sum::<f64>() / 20_f64.sqrt()
+}
+
+/// What there is to feel of a wavelength in mm, a shape, and a random part in a band.
+#[derive(Clone, Copy)]
+struct Ground {
+    wavelength_mm: f64,
+    shape: Shape,
+    random: Option<(usize, f64)>,
+}
+
+impl Ground {
+    fn felt(&self, gauge: usize, x_mm: f64) -> f64 {
+        let theta = TAU * (x_mm + PLACES_MM[gauge]) / self.wavelength_mm + PHASES_RAD[gauge];
+        let irregular = self.random.map_or(0.0, |(band, rms)| {
+            rms * random(band, x_mm + PLACES_MM[gauge])
+        });
+        CODES * GAINS[gauge] * (wave(self.shape, theta) + irregular)
+    }
+}
+
+/// A bench that has made strokes of half a second over `ground` for `ms`, with noise of so many dB below it.
+fn rubbed(ground: Ground, snr_db: f64, speed_mm_s: f64, ms: u64) -> Bench {
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
+    rub(&mut bench, ground, speed_mm_s, ms);
+    bench
+}
+
+fn rub(bench: &mut Bench, ground: Ground, speed_mm_s: f64, ms: u64) {
+    let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
+    bench.rub(
+        ms,
+        |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
+        |gauge, x_mm, _| ground.felt(gauge, x_mm),
+    );
+}
+
+/// By how much the partials that are told are off, at worst: in dB, and in degrees.
+fn off(texture: &Texture, shape: Shape) -> (f64, f64) {
+    let pairs = texture.partials.iter().zip(shape);
+    pairs.fold((0.0, 0.0), |(db, degrees), (partial, (ratio, turns))| {
+        let ratio_db = 20.0 * (f64::from(partial.ratio) / 1_000.0 / ratio).log10();
+        let phase = f64::from(partial.phase) / 65_536.0 - turns;
+        let phase = 360.0 * (phase - phase.round());
+        (f64::max(db, ratio_db.abs()), f64::max(degrees, phase.abs()))
+    })
+}
+
+fn last_valid(bench: &Bench) -> Texture {
+    let valid = bench.textures.iter().rev().find(|told| told.valid);
+    *valid.unwrap_or_else(|| panic!("none is valid: {:?}", bench.textures))
+}
+
+#[test]
+fn partials_are_within_a_db_and_five_degrees_at_20_db_and_three_db_at_0_db() {
+    let shapes = [
+        [(0.4, 0.1), (0.25, 0.7)],
+        [(0.25, 0.55), (0.3, 0.0)],
+        [(0.3, 0.9), (0.5, 0.3)],
+    ];
+    for (snr_db, most_db, most_degrees) in [(20.0, 1.0, 5.0), (0.0, 3.0, 30.0)] {
+        let (mut worst_db, mut worst_degrees) = (0.0, 0.0);
+        for (wavelength_mm, speed_mm_s) in RUBS {
+            for shape in shapes {
+                let ground = Ground {
+                    wavelength_mm,
+                    shape,
+                    random: None,
+                };
+                let textures = rubbed(ground, snr_db, speed_mm_s, 4_000).textures;
+                let late: Vec<_> = textures.iter().skip(30).filter(|told| told.valid).collect();
+                assert!(
+                    late.len() >= 20,
+                    "{snr_db} dB {wavelength_mm} mm: {} valid of {}",
+                    late.len(),
+                    textures.len()
+                );
+                for texture in late {
+                    let (db, degrees) = off(texture, shape);
+                    let what = format!("{snr_db} dB {wavelength_mm} mm {shape:?}: {texture:?}");
+                    assert!(db <= most_db, "{db} dB: {what}");
+                    assert!(degrees <= most_degrees, "{degrees}°: {what}");
+                    worst_db = f64::max(worst_db, db);
+                    worst_degrees = f64::max(worst_degrees, degrees);
+                }
+            }
+        }
+        println!("{snr_db} dB: {worst_db:.2} dB, {worst_degrees:.1}° at worst");
+    }
+}
+
+#[test]
+fn what_does_not_repeat_is_told_in_its_band_whatever_the_speed() {
+    let told_db = |told: u16| 20.0 * (f64::from(told).max(1.0) / 300.0).log10();
+    for (wavelength_mm, speed_mm_s) in [(1.0, 40.0), (2.0, 20.0), (2.0, 70.0), (4.0, 70.0)] {
+        for band in 0..BANDS {
+            let ground = Ground {
+                wavelength_mm,
+                shape: PLAIN,
+                random: Some((band, 0.3)),
+            };
+            let told = last_valid(&rubbed(ground, 20.0, speed_mm_s, 6_000));
+            let what = format!("{wavelength_mm} mm, {speed_mm_s} mm/s, band {band}: {told:?}");
+            // Of the lowest band, a block of 12 mm has one line, of which the fitted slope takes its share.
+            let least_db = if (band, wavelength_mm) == (0, 4.0) {
+                -9.0
+            } else {
+                -6.5
+            };
+            let own_db = told_db(told.bands[band]);
+            assert!((least_db..1.0).contains(&own_db), "{own_db} dB: {what}");
+            for (other, &level) in told.bands.iter().enumerate() {
+                assert!(
+                    other == band || told_db(level) < own_db - 2.5,
+                    "band {other}: {what}"
+                );
+            }
+            assert!((75..=97).contains(&told.repeating_percent), "{what}");
+        }
+    }
+}
+
+#[test]
+fn noise_is_no_texture() {
+    let plain = |wavelength_mm| Ground {
+        wavelength_mm,
+        shape: PLAIN,
+        random: None,
+    };
+    for (wavelength_mm, speed_mm_s) in RUBS {
+        for (snr_db, most, least_percent) in [(20.0, 30, 99), (0.0, 150, 94)] {
+            let bench = rubbed(plain(wavelength_mm), snr_db, speed_mm_s, 4_000);
+            let told = last_valid(&bench);
+            let what = format!("{wavelength_mm} mm, {speed_mm_s} mm/s, {snr_db} dB: {told:?}");
+            assert!(told.bands.iter().all(|&band| band <= most), "{what}");
+            let ratios = told.partials.map(|partial| partial.ratio);
+            assert!(ratios.iter().all(|&ratio| ratio <= most / 3), "{what}");
+            assert!(told.repeating_percent >= least_percent, "{what}");
+        }
+    }
+}
+
+#[test]
+fn another_surface_is_not_told_of_by_what_was_felt_of_the_one_before() {
+    let [one, other] = [(2.0, 0.5), (3.0, 0.2)].map(|(wavelength_mm, ratio)| Ground {
+        wavelength_mm,
+        shape: [(ratio, 0.25), (0.2, 0.5)],
+        random: None,
+    });
+    let mut bench = rubbed(one, 20.0, 60.0, 3_000);
+    assert!(off(&last_valid(&bench), one.shape).0 < 1.0);
+    bench.textures.clear();
+    rub(&mut bench, other, 60.0, 3_000);
+    let of_other = bench
+        .textures
+        .iter()
+        .filter(|told| told.valid && off(told, other.shape).0 < 1.0);
+    let of_one = bench
+        .textures
+        .iter()
+        .filter(|told| told.valid && off(told, one.shape).0 < 1.0);
+    assert!(of_other.count() > 30, "{:?}", bench.textures);
+    // Until λ̂ is the new one's.
+    assert!(of_one.count() <= 6, "{:?}", bench.textures);
+    // Some ms in a dozen belong to both.
+    let neither = bench.textures.iter().filter(|told| {
+        told.valid && off(told, other.shape).0 > 3.0 && off(told, one.shape).0 > 3.0
+    });
+    assert!(neither.count() <= 1, "{:?}", bench.textures);
+}
+
+#[test]
+fn textures_bear_their_estimates_number_and_come_every_50_ms_while_the_arm_moves() {
+    let ground = Ground {
+        wavelength_mm: 2.0,
+        shape: PLAIN,
+        random: None,
+    };
+    let mut bench = rubbed(ground, 20.0, 60.0, 1_000);
+    assert!((18..=20).contains(&bench.textures.len()));
+    let numbered = bench.textures.windows(2).all(|pair| {
+        pair[1].sequence == pair[0].sequence + 5 && pair[1].instant_us > pair[0].instant_us
+    });
+    assert!(numbered, "{:?}", bench.textures);
+    assert!(bench.textures.iter().all(Texture::is_sound));
+    bench.textures.clear();
+    bench.rub(1_000, |_| 0.0, |gauge, x_mm, _| ground.felt(gauge, x_mm));
+    assert!(bench.textures.len() <= 1, "{:?}", bench.textures);
+}
+
+#[test]
+fn the_force_is_told_by_its_mean_and_fluctuation_against_the_movement() {
+    let configuration = SensorConfiguration {
+        force_channel: true,
+        force_mn_per_v: 1_000,
+        stiffness_n_per_m: 60_000,
+        ..SensorConfiguration::DEFAULT
+    };
+    let ground = Ground {
+        wavelength_mm: 2.0,
+        shape: PLAIN,
+        random: None,
+    };
+    let mut bench = Bench::new(configuration);
+    // 0.5 N against the movement, and a sine of 0.1 N over place.
+    let (mean_mn, swing_mn) = (500.0, 100.0);
+    bench.force_mn = Some(Box::new(move |x_mm, forwards| {
+        let against = mean_mn + swing_mn * (TAU * x_mm / 2.0).sin();
+        if forwards { against } else { -against }
+    }));
+    rub(&mut bench, ground, 60.0, 3_000);
+    let friction = last_valid(&bench)
+        .friction
+        .expect("there is a force channel");
+    assert!(friction.mean_mn.abs_diff(500) <= 10, "{friction:?}");
+    // A sine's RMS.
+    assert!(friction.fluctuation_mn.abs_diff(71) <= 4, "{friction:?}");
+    assert_eq!(
+        last_valid(&rubbed(ground, 20.0, 60.0, 3_000)).friction,
+        None
+    );
+}

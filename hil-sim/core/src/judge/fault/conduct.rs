@@ -1,0 +1,239 @@
+//! Whether the display drives when it is to, and only then: by the estimates that arrived and the hand's true
+//! movement.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use protocol::{DisplayConfiguration, Hold};
+
+use crate::judge::trust::Trust;
+use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
+use crate::scene::fault::{Class, Fault, Kind, nanoseconds};
+
+/// From an arrival to the outputs: the tick that hears it, the next one, and its edge, at 2 kHz.
+const HEARD_NS: u64 = 3_000_000;
+/// In which every reason to hold but age brings the outputs to 0 V.
+const QUICKLY_NS: u64 = 8_000_000;
+/// All outputs at 0 V for so long are no wave's passing.
+const SILENCE_NS: u64 = 5_000_000;
+/// From which speed on a hand moves, in mm/s, and for how long it has to until the display must drive: it takes a
+/// hand without a count for 19 ms for one at rest.
+const MOVES_MM_S: f64 = 10.0;
+const MOVES_NS: u64 = 40_000_000;
+/// Up to which a wave is played in full.
+const PLAYED_HZ: f64 = 250.0;
+/// A display that has lost its power starts again within so long.
+const STARTS_S: f64 = 0.3;
+const MS: u64 = 1_000_000;
+
+/// What of it was not as it should be, each with its instant in ns since the scene's start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Misconduct {
+    /// The outputs were not at 0 V though there was a reason to hold.
+    pub loud: Option<(Hold, u64)>,
+    /// They were at 0 V though the hand moved and nothing held it.
+    pub silent_ns: Option<u64>,
+    /// A reason to hold came up while it drove: the first.
+    pub held: Option<(Hold, u64)>,
+    /// They were driven for the first time after the fault was over.
+    pub again_ns: Option<u64>,
+    /// Of the time in which they have to be, for how long the hand moved, in ns.
+    pub moved_ns: u64,
+}
+
+/// Looks on from the scene's start, and judges while the fault is the only one.
+#[derive(Clone, Debug)]
+pub(super) struct Conduct {
+    /// When it is judged, in ns.
+    judged_ns: Range<u64>,
+    /// When it need not drive, whatever arrives.
+    excused_ns: Range<u64>,
+    /// When it has to drive again.
+    again_ns: Range<u64>,
+    /// When its memory of estimates goes.
+    forgets_ns: Option<u64>,
+    must_drive: bool,
+    max_age_ms: u16,
+    fade_out_ns: u64,
+    trust: Trust,
+    /// The last one to be followed; not finite before the first.
+    wavelength_mm: f64,
+    /// Not heard yet.
+    arrived: VecDeque<Arrival>,
+    hand: Option<(u64, f64)>,
+    moves_since_ns: Option<u64>,
+    silent_since_ns: Option<u64>,
+    held_since: Option<(Hold, u64)>,
+    free_since_ns: u64,
+    seen: Misconduct,
+}
+
+impl Conduct {
+    /// Judges until `until_ns`; a display that has stopped for good before need not drive.
+    pub fn new(
+        fault: &Fault,
+        until_ns: u64,
+        configuration: &DisplayConfiguration,
+        has_stopped: bool,
+    ) -> Self {
+        let row = fault.kind.row();
+        let from_ns = fault.begins_ns();
+        let over_ns = fault.ends_ns().unwrap_or(from_ns);
+        let cuts_power = matches!(fault.kind, Kind::PowerCycle | Kind::BrownOut);
+        let excused_ns = match row.class {
+            Class::Stops => from_ns..u64::MAX,
+            _ if cuts_power => from_ns..over_ns + nanoseconds(STARTS_S),
+            _ if row.safe_within_ms.is_some() => from_ns..over_ns,
+            _ => from_ns..from_ns,
+        };
+        let again_ms = row.again_within_ms.unwrap_or(0.0);
+        Self {
+            judged_ns: from_ns..until_ns,
+            excused_ns,
+            again_ns: over_ns..over_ns + nanoseconds(again_ms * 1e-3),
+            forgets_ns: cuts_power.then_some(over_ns),
+            must_drive: !has_stopped,
+            max_age_ms: configuration.max_age_ms,
+            fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
+            trust: Trust::new(configuration.max_age_ms),
+            wavelength_mm: f64::INFINITY,
+            arrived: VecDeque::new(),
+            hand: None,
+            moves_since_ns: None,
+            silent_since_ns: Some(0),
+            held_since: None,
+            free_since_ns: 0,
+            seen: Misconduct::default(),
+        }
+    }
+
+    /// An estimate has arrived at the display.
+    pub fn received(&mut self, arrival: &Arrival) {
+        self.arrived.push_back(*arrival);
+        self.hear();
+    }
+
+    /// What has come by the last tick is heard once that is over, whenever it is told.
+    fn hear(&mut self) {
+        let heard_ns = self.hand.map_or(0, |(at_ns, _)| at_ns);
+        while let Some(arrival) = self
+            .arrived
+            .pop_front_if(|arrival| arrival.at_ns <= heard_ns)
+        {
+            if let Some(mm) = self.trust.hear(arrival.at_ns, &arrival.estimate) {
+                self.wavelength_mm = mm;
+            }
+        }
+    }
+
+    /// The outputs have changed.
+    pub fn output(&mut self, output: &OutputRecord) {
+        if output.words.iter().all(|&word| word == ZERO_VOLT) {
+            self.silent_since_ns.get_or_insert(output.at_ns);
+            return;
+        }
+        self.silent_since_ns = None;
+        if output.at_ns > self.again_ns.start {
+            self.seen.again_ns.get_or_insert(output.at_ns);
+        }
+    }
+
+    /// A tick of the display's.
+    pub fn tick(&mut self, tick: &TickRecord) {
+        let at_ns = tick.at_ns;
+        if self
+            .forgets_ns
+            .take_if(|forgets_ns| at_ns > *forgets_ns)
+            .is_some()
+        {
+            self.trust = Trust::new(self.max_age_ms);
+        }
+        self.follow_hand(tick);
+        match self.trust.holds(at_ns).next() {
+            None => {
+                if self.held_since.take().is_some() {
+                    self.free_since_ns = at_ns;
+                }
+            }
+            Some(hold) => {
+                // A reason that comes on top of age hastens it.
+                let goes_on = |(before, _): &(Hold, u64)| *before == hold || *before != Hold::Stale;
+                if !self.held_since.as_ref().is_some_and(goes_on) {
+                    self.held_since = Some((hold, at_ns));
+                }
+            }
+        }
+        if self.judged_ns.contains(&at_ns) {
+            self.judge(at_ns);
+        }
+        self.hear();
+    }
+
+    fn follow_hand(&mut self, tick: &TickRecord) {
+        let Some((before_ns, before_mm)) = self.hand.replace((tick.at_ns, tick.position_mm)) else {
+            return;
+        };
+        let step_ns = tick.at_ns.saturating_sub(before_ns);
+        let speed_mm_s = (tick.position_mm - before_mm).abs() / (step_ns as f64 * 1e-9);
+        if speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
+            self.moves_since_ns.get_or_insert(before_ns);
+            if self.again_ns.contains(&tick.at_ns) {
+                self.seen.moved_ns += step_ns;
+            }
+        } else {
+            self.moves_since_ns = None;
+        }
+    }
+
+    fn judge(&mut self, at_ns: u64) {
+        if let Some((hold, since_ns)) = self.held_since
+            && !self.excused_ns.contains(&since_ns)
+            && self.silent_since_ns.is_none()
+        {
+            // One that is over with the next estimate may be the judge's alone: it knows no ticks.
+            if since_ns >= self.judged_ns.start && at_ns > since_ns + HEARD_NS {
+                self.seen.held.get_or_insert((hold, since_ns));
+            }
+            let fades_ns = match hold {
+                Hold::Stale => self.fade_out_ns,
+                _ => QUICKLY_NS,
+            };
+            if at_ns > since_ns + fades_ns + HEARD_NS {
+                self.seen.loud.get_or_insert((hold, at_ns));
+            }
+        }
+        // It has to have been driving once: what it waits for at first is not known here.
+        let may_rest = !self.must_drive
+            || self.held_since.is_some()
+            || self.excused_ns.contains(&at_ns)
+            || self.seen.again_ns.is_none() && self.excused_ns.end > self.judged_ns.start;
+        let Some((silent_ns, moves_ns)) = self.silent_since_ns.zip(self.moves_since_ns) else {
+            return;
+        };
+        let free_ns = self.free_since_ns.max(self.judged_ns.start);
+        if !may_rest
+            && silent_ns > self.judged_ns.start
+            && at_ns > silent_ns + SILENCE_NS
+            && at_ns > moves_ns + MOVES_NS
+            && at_ns > free_ns + self.fade_out_ns + HEARD_NS + SILENCE_NS
+        {
+            self.seen.silent_ns.get_or_insert(silent_ns);
+        }
+    }
+
+    /// What was not as it should be.
+    pub fn finish(self) -> Misconduct {
+        self.seen
+    }
+
+    /// Until when the display has to drive again, if that is to be judged: it can be seen, and the hand moves for
+    /// half of the time.
+    pub fn due_again_ns(&self) -> Option<u64> {
+        let length_ns = self.again_ns.end - self.again_ns.start;
+        (length_ns > 0
+            && self.must_drive
+            && self.again_ns.end <= self.judged_ns.end
+            && 2 * self.seen.moved_ns >= length_ns)
+            .then_some(self.again_ns.end)
+    }
+}

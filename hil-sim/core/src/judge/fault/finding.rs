@@ -1,0 +1,96 @@
+//! What became of a fault, beside its row of the table.
+
+use crate::scene::fault::Fault;
+
+/// What became of one fault.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The fault.
+    pub fault: Fault,
+    /// Whether the stimulus was on when it began.
+    pub was_driving: bool,
+    /// From its beginning to the first sign of it, in ns.
+    pub detected_ns: Option<u64>,
+    /// What the sign was; empty if there was none.
+    pub sign: String,
+    /// From its beginning until all outputs were at 0 V and stayed there for the rest of it, in ns.
+    pub safe_ns: Option<u64>,
+    /// Outputs that were not at 0 V when they had to be, or stood at another voltage.
+    pub stuck: usize,
+    /// Whether any output was driven after the fault had been answered by 0 V.
+    pub drives_again: bool,
+    /// From its end until the display drove again, in ns.
+    pub again_ns: Option<u64>,
+    /// Resets of the display board that came of it.
+    pub resets: usize,
+    /// Whether it is one that has to be seen and answered: long enough, and great enough.
+    pub(super) must_show: bool,
+    /// What else is not as the table of kinds has it.
+    pub(super) otherwise: Vec<String>,
+}
+
+impl Finding {
+    /// What is not as the table of kinds has it.
+    pub fn unmet(&self) -> Vec<String> {
+        if !self.must_show {
+            return self.otherwise.clone();
+        }
+        let row = self.fault.kind.row();
+        let mut unmet = Vec::new();
+        if let Some(within_ms) = row.seen_within_ms {
+            match self.detected_ms() {
+                None => unmet.push("no sign of it".to_owned()),
+                Some(ms) if ms > within_ms => {
+                    unmet.push(format!("{} after {ms:.2} ms of {within_ms}", self.sign));
+                }
+                Some(_) => {}
+            }
+        }
+        if let Some(within_ms) = row.safe_within_ms {
+            match self.safe_ms() {
+                None => unmet.push("outputs not at 0 V".to_owned()),
+                Some(ms) if ms > within_ms => {
+                    unmet.push(format!("0 V after {ms:.2} ms of {within_ms}"));
+                }
+                Some(_) => {}
+            }
+        }
+        if self.stuck > 0 {
+            unmet.push(format!("{} outputs stuck", self.stuck));
+        }
+        if self.is_restart_against_the_table() {
+            unmet.push(format!(
+                "restarted against the table: {} resets{}",
+                self.resets,
+                if self.drives_again {
+                    ", drives again"
+                } else {
+                    ""
+                }
+            ));
+        }
+        unmet.extend_from_slice(&self.otherwise);
+        unmet
+    }
+
+    /// [`Finding::detected_ns`] in ms.
+    pub fn detected_ms(&self) -> Option<f64> {
+        self.detected_ns.map(|ns| ns as f64 * 1e-6)
+    }
+
+    /// [`Finding::safe_ns`] in ms.
+    pub fn safe_ms(&self) -> Option<f64> {
+        self.safe_ns.map(|ns| ns as f64 * 1e-6)
+    }
+
+    /// [`Finding::again_ns`] in ms.
+    pub fn again_ms(&self) -> Option<f64> {
+        self.again_ns.map(|ns| ns as f64 * 1e-6)
+    }
+
+    /// Whether the display drove again where it must not, or was reset more often than it may.
+    pub fn is_restart_against_the_table(&self) -> bool {
+        let row = self.fault.kind.row();
+        self.resets > row.resets || (self.drives_again && !row.class.may_drive_again())
+    }
+}

@@ -1,0 +1,398 @@
+//! Looks on a fault.
+
+use std::ops::Range;
+
+use protocol::{Hold, Message, Role};
+
+use super::conduct::Conduct;
+use super::finding::Finding;
+use super::outputs::Outputs;
+use super::signs::Voice;
+use super::step::Step;
+use crate::judge::truth::Truth;
+use crate::plant::motion::MM_PER_COUNT;
+use crate::run::decoder::TimedMessage;
+use crate::run::fault_evidence::Reset;
+use crate::run::observer::RunObserver;
+use crate::run::recording::{Arrival, OutputRecord, TickRecord};
+use crate::scene::fault::{Class, Fault, Kind, Sign};
+use crate::scene::{Follows, Scene};
+
+/// From a reason to hold until the display says so, in ns: its next tick, and the message's way.
+const SAID_NS: u64 = 5_000_000;
+/// How far the stimulus may be from its due phase, in cycles rms, while something is broken that must not reach it.
+const IN_STEP_CYCLES: f64 = 0.05;
+/// What a fault leaves shows so much later still: counters are told once a second.
+const LINGERS_NS: u64 = 1_050_000_000;
+/// So long does a board that goes on never say nothing, in ns: five estimates, ten motions.
+const ESTIMATES_NS: u64 = 50_000_000;
+const MOTIONS_NS: u64 = 20_000_000;
+/// A stop is told of so long after it has to show, in ms: the words may wait for others.
+const NAMED_MS: f64 = 50.0;
+/// No hand is faster (docs' safety page).
+const FASTEST_HAND_MM_S: f64 = 2_000.0;
+/// Share of the bytes from which on a corrupt frame is certain: one in ten frames.
+const CORRUPT_SHARE: f64 = 1e-3;
+
+/// Looks on a run from its start, for one fault.
+#[derive(Clone, Debug)]
+pub(super) struct FaultMonitor {
+    fault: Fault,
+    /// Until its window ends, or the display's power goes.
+    due_ns: Range<u64>,
+    /// Until the next fault begins.
+    alone_ns: Range<u64>,
+    /// What other faults may show meanwhile.
+    of_others: Vec<Sign>,
+    has_stopped: bool,
+    must_show: bool,
+    outputs: Outputs,
+    conduct: Conduct,
+    /// If it is to keep in step.
+    step: Option<Step>,
+    resets: usize,
+    display: Voice,
+    sensor: Voice,
+    /// The first of each, with its instant in ns and in words.
+    seen: Vec<(Sign, u64, String)>,
+    estimates: Beat,
+    motions: Beat,
+}
+
+/// What a board says again and again.
+#[derive(Clone, Debug)]
+struct Beat {
+    most_ns: u64,
+    last_ns: Option<u64>,
+    /// When nothing had come for too long.
+    missed_ns: Option<u64>,
+}
+
+impl Beat {
+    fn new(most_ns: u64) -> Self {
+        Self {
+            most_ns,
+            last_ns: None,
+            missed_ns: None,
+        }
+    }
+
+    fn heard(&mut self, at_ns: u64, alone_ns: &Range<u64>) {
+        let last_ns = self.last_ns.replace(at_ns);
+        if let Some(last_ns) = last_ns.filter(|&last_ns| at_ns > last_ns + self.most_ns) {
+            let missed_ns = last_ns + self.most_ns;
+            if alone_ns.contains(&missed_ns) && at_ns > alone_ns.start {
+                self.missed_ns.get_or_insert(missed_ns);
+            }
+        }
+    }
+
+    /// When it went missing, if it was there at all before `alone_ns` ended.
+    fn finish(mut self, alone_ns: &Range<u64>) -> Option<u64> {
+        if self.last_ns.is_some_and(|last_ns| last_ns < alone_ns.end) {
+            self.heard(alone_ns.end, alone_ns);
+        }
+        self.missed_ns
+    }
+}
+
+/// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
+/// a sound board.
+fn must_show(fault: &Fault, scene: &Scene) -> bool {
+    let row = fault.kind.row();
+    let usual_s = row.lasts.default_s().unwrap_or(row.watch_s);
+    let is_long = fault.for_s.is_none_or(|for_s| for_s >= usual_s);
+    let value = fault.values[0];
+    is_long
+        && match fault.kind {
+            // Two ticks' travel of the fastest hand that is taken for one.
+            Kind::HandEncoderJump => {
+                let tick_s = 1.0 / f64::from(scene.display_configuration().update_rate.hz());
+                value * MM_PER_COUNT > 2.0 * FASTEST_HAND_MM_S * tick_s
+            }
+            Kind::HandEncoderDead => scene.arm.follows == Follows::Motion,
+            Kind::LinkCorrupt => value >= CORRUPT_SHARE,
+            _ => true,
+        }
+}
+
+impl FaultMonitor {
+    /// Before a run of `scene`, for one of its faults until `until_ns`.
+    pub fn new(scene: &Scene, number: usize, until_ns: u64) -> Self {
+        let fault = scene.faults[number];
+        let row = fault.kind.row();
+        let from_ns = fault.begins_ns();
+        let others = || {
+            let others = scene.faults.iter().enumerate();
+            others
+                .filter(move |&(place, _)| place != number)
+                .map(|(_, other)| other)
+        };
+        let next_ns = |is_next: fn(&Fault) -> bool| {
+            let later = others().filter(|other| is_next(other) && other.begins_ns() > from_ns);
+            later.map(Fault::begins_ns).min().unwrap_or(u64::MAX)
+        };
+        let due_ns = from_ns..until_ns.min(next_ns(|other| other.kind == Kind::PowerCycle));
+        let alone_ns = from_ns..until_ns.min(next_ns(|_| true));
+        let last_power_ns = others()
+            .filter(|other| other.kind == Kind::PowerCycle && other.begins_ns() <= from_ns)
+            .map(Fault::begins_ns)
+            .max();
+        let stops = |other: &&Fault| {
+            other.kind.row().class == Class::Stops
+                && other.begins_ns() <= from_ns
+                && last_power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns)
+        };
+        let has_stopped = others().any(|other| stops(&other));
+        let shows = |other: &&Fault| {
+            let over_ns = other.ends_ns().unwrap_or(other.begins_ns());
+            stops(other) || (over_ns + LINGERS_NS > from_ns && other.begins_ns() < alone_ns.end)
+        };
+        let of_others = others()
+            .filter(|other| shows(other))
+            .flat_map(|other| [other.kind.row().signs, other.kind.row().also])
+            .flatten()
+            .copied()
+            .collect();
+        let configuration = scene.display_configuration();
+        // Of a flood, which estimates find room is chance.
+        let tires = f64::from(configuration.full_drive_s) < scene.duration_s;
+        let keeps_step = row.class != Class::Stops
+            && row.safe_within_ms.is_none()
+            && fault.kind != Kind::LinkFlood
+            && !has_stopped;
+        let truth = Truth {
+            display: configuration,
+            actuators: *scene.display.actuators,
+            ..Truth::new("", "", &|_| 1.0)
+        };
+        Self {
+            fault,
+            outputs: Outputs::new(&fault, due_ns.end, &configuration),
+            // When it has been driven for too long is not followed here.
+            conduct: Conduct::new(&fault, alone_ns.end, &configuration, has_stopped || tires),
+            step: keeps_step.then(|| Step::new(&truth, alone_ns.clone())),
+            due_ns,
+            alone_ns,
+            of_others,
+            has_stopped,
+            must_show: must_show(&fault, scene),
+            resets: 0,
+            display: Voice::new(Role::Display),
+            sensor: Voice::new(Role::Sensor),
+            seen: Vec::new(),
+            estimates: Beat::new(ESTIMATES_NS),
+            motions: Beat::new(MOTIONS_NS),
+        }
+    }
+
+    /// What became of it.
+    pub fn finish(self) -> Finding {
+        let Self {
+            fault,
+            alone_ns,
+            of_others,
+            has_stopped,
+            must_show,
+            seen,
+            ..
+        } = self;
+        let row = fault.kind.row();
+        let from_ns = alone_ns.start;
+        let ms = |at_ns: u64| at_ns.saturating_sub(from_ns) as f64 * 1e-6;
+        let first = seen
+            .iter()
+            .filter(|(sign, ..)| row.signs.contains(sign))
+            .min_by_key(|&(_, at_ns, words)| (at_ns, words));
+        let outputs = self.outputs.finish();
+        // At rest there is nothing that a gauge or an encoder could be missed by.
+        let must_show = must_show && (row.class == Class::Stops || outputs.was_driving);
+        let due_again_ns = self.conduct.due_again_ns();
+        let conduct = self.conduct.finish();
+        let mut otherwise = Vec::new();
+
+        if row.class == Class::Stops && must_show && !has_stopped {
+            let named = |(sign, ..): &&(Sign, u64, String)| matches!(sign, Sign::Stopped(trip) if row.trips.contains(trip));
+            let due_ms = |within_ms: f64| within_ms + NAMED_MS;
+            match seen
+                .iter()
+                .filter(named)
+                .map(|&(_, at_ns, _)| ms(at_ns))
+                .reduce(f64::min)
+            {
+                None => {
+                    otherwise.push(format!("does not say that it has stopped: {:?}", row.trips))
+                }
+                // A board that is silenced, or has to start again first, says it when it can.
+                Some(named_ms) if row.resets == 0 && !row.silences.contains(&Role::Display) => {
+                    let within_ms = row.seen_within_ms.into_iter().chain(row.safe_within_ms);
+                    if let Some(due_ms) = within_ms.reduce(f64::max).map(due_ms)
+                        && named_ms > due_ms
+                    {
+                        otherwise.push(format!(
+                            "says that it has stopped after {named_ms:.2} ms of {due_ms}"
+                        ));
+                    }
+                }
+                Some(_) => {}
+            }
+        }
+        // A reason to hold that arrived has to be said.
+        let is_due = |hold: Hold, at_ns: u64| {
+            let said = conduct.held.is_some_and(|(due, due_ns)| {
+                due == hold && (due_ns..=due_ns + SAID_NS).contains(&at_ns)
+            });
+            said || row.signs.contains(&Sign::Fading(hold))
+                || row.also.contains(&Sign::Fading(hold))
+        };
+        if let Some((hold, due_ns)) = conduct.held
+            && row.class != Class::Stops
+            && !has_stopped
+            && due_ns + SAID_NS < alone_ns.end
+            && !seen
+                .iter()
+                .any(|&(sign, at_ns, _)| sign == Sign::Fading(hold) && at_ns <= due_ns + SAID_NS)
+        {
+            otherwise.push(format!(
+                "does not say that it holds, {hold:?}, at {:.2} ms",
+                ms(due_ns)
+            ));
+        }
+        for (sign, at_ns, words) in &seen {
+            let may = row.signs.contains(sign)
+                || row.also.contains(sign)
+                || of_others.contains(sign)
+                || matches!(sign, Sign::Fading(hold) if is_due(*hold, *at_ns));
+            if alone_ns.contains(at_ns) && !may {
+                otherwise.push(format!(
+                    "not to be expected: {words}, at {:.2} ms",
+                    ms(*at_ns)
+                ));
+            }
+        }
+        if let Some((hold, at_ns)) = conduct.loud {
+            otherwise.push(format!("drives at {:.2} ms, {hold:?}", ms(at_ns)));
+        }
+        if let Some(at_ns) = conduct.silent_ns {
+            otherwise.push(format!(
+                "silent from {:.2} ms on, without a reason",
+                ms(at_ns)
+            ));
+        }
+        let over_ns = fault.ends_ns().unwrap_or(from_ns);
+        if let Some(due_ns) = due_again_ns
+            && conduct.again_ns.is_none_or(|again_ns| again_ns > due_ns)
+        {
+            let within_ms = (due_ns - over_ns) as f64 * 1e-6;
+            otherwise.push(format!(
+                "does not drive again within {within_ms:.0} ms of its end"
+            ));
+        }
+        for (role, beat, what) in [
+            (Role::Sensor, self.estimates, "estimates"),
+            (Role::Display, self.motions, "motions"),
+        ] {
+            if let Some(at_ns) = beat.finish(&alone_ns)
+                && !row.silences.contains(&role)
+            {
+                otherwise.push(format!("no {what} from {:.2} ms on", ms(at_ns)));
+            }
+        }
+        if let Some(off) = self.step.and_then(Step::finish)
+            && off > IN_STEP_CYCLES
+        {
+            otherwise.push(format!("out of step by {off:.3} cycles rms"));
+        }
+        if let Some(at_ns) = outputs.beyond_ns {
+            otherwise.push(format!(
+                "beyond the limits of voltage and slew at {:.2} ms",
+                ms(at_ns)
+            ));
+        }
+        Finding {
+            fault,
+            was_driving: outputs.was_driving,
+            detected_ns: first.map(|&(_, at_ns, _)| at_ns - from_ns),
+            sign: first.map(|(.., words)| words.clone()).unwrap_or_default(),
+            safe_ns: outputs.safe_ns.map(|at_ns| at_ns - from_ns),
+            stuck: outputs.stuck,
+            drives_again: outputs.drives_again,
+            again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
+            resets: self.resets,
+            must_show,
+            otherwise,
+        }
+    }
+
+    fn see(&mut self, at_ns: u64, sign: Sign, words: String) {
+        match self.seen.iter_mut().find(|(seen, ..)| *seen == sign) {
+            Some(seen) if seen.1 <= at_ns => {}
+            Some(seen) => *seen = (sign, at_ns, words),
+            None => self.seen.push((sign, at_ns, words)),
+        }
+    }
+}
+
+impl RunObserver for FaultMonitor {
+    fn tick(&mut self, tick: &TickRecord) {
+        self.conduct.tick(tick);
+        if let Some(step) = &mut self.step {
+            step.tick(tick);
+        }
+    }
+
+    fn output(&mut self, output: &OutputRecord) {
+        self.outputs.add(output);
+        self.conduct.output(output);
+        if let Some(step) = &mut self.step {
+            step.output(output);
+        }
+    }
+
+    fn received(&mut self, arrival: &Arrival) {
+        self.conduct.received(arrival);
+        if let Some(step) = &mut self.step {
+            step.received(arrival);
+        }
+    }
+
+    fn said(&mut self, role: Role, said: &TimedMessage) {
+        match said.message {
+            Message::Estimate(_) if role == Role::Sensor => {
+                self.estimates.heard(said.at_ns, &self.alone_ns);
+            }
+            Message::Motion(_) if role == Role::Display => {
+                self.motions.heard(said.at_ns, &self.alone_ns);
+            }
+            _ => {}
+        }
+        let voice = match role {
+            Role::Display => &mut self.display,
+            Role::Sensor => &mut self.sensor,
+            Role::Host => return,
+        };
+        if said.at_ns < self.due_ns.start {
+            voice.note(said);
+        } else if self.due_ns.contains(&said.at_ns) {
+            for (sign, words) in voice.signs(&self.fault, &said.message) {
+                self.see(said.at_ns, sign, format!("{}: {words}", role.name()));
+            }
+        }
+    }
+
+    fn reset(&mut self, reset: &Reset) {
+        if self.due_ns.contains(&reset.at_ns) {
+            self.resets += usize::from(reset.role == Role::Display);
+            if !reset.is_injected {
+                let words = format!("{} reset", reset.role.name());
+                self.see(reset.at_ns, Sign::Reset(reset.role), words);
+            }
+        }
+    }
+
+    fn cleared(&mut self, at_ns: u64) {
+        if self.due_ns.contains(&at_ns) {
+            self.see(at_ns, Sign::ClearFell, "CLR fell".to_owned());
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! Which estimates a display is to trust, and when it must not drive at all: the rules of docs' safety page,
+//! written down a second time. Nothing here comes from the firmware, so that an error there shows.
+
+use std::collections::VecDeque;
+
+use protocol::{Estimate, GAUGES, Hold};
+
+/// λ that can be played, in mm.
+const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
+/// A λ that differs by more than this factor from the one held has to be confirmed by the next one.
+const SURPRISE: f32 = 2.1;
+/// It is if that differs from it by no more than this factor.
+const CONFIRMATION: f32 = 1.1;
+/// So many that can't be true within [`DISTRUST_NS`] are a reason not to drive, until so long has passed without.
+const DISTRUSTED: usize = 5;
+const DISTRUST_NS: u64 = 500_000_000;
+/// So many estimates may come at once, and so many a second for longer.
+const FLOOD: f64 = 40.0;
+const FLOOD_HZ: f64 = 400.0;
+/// A number that is behind the last by no more than this is an old one.
+const OLD: u32 = 1_000;
+/// Behind by more than [`REORDERED`], one of these numbers is a sensor's first.
+const FIRST: u32 = 10;
+const REORDERED: u32 = 32;
+/// The fundamental of a square wave from end to end of the converter, in its steps.
+const LARGEST_AMPLITUDE_LSB: f32 = 2_608.0;
+/// In µm/s.
+const FASTEST_ARM_UM_S: u32 = 20_000_000;
+
+/// What the estimates that arrived so far ask of a display. Instants are in ns since the scene's start, and fall by
+/// no more than a tick.
+#[derive(Clone, Debug)]
+pub struct Trust {
+    max_age_ns: u64,
+    sequence: Option<u32>,
+    held_mm: Option<f32>,
+    surprise_mm: Option<f32>,
+    trusted_ns: Option<u64>,
+    /// Estimates that have come and have not run out, and when.
+    bucket: (f64, u64),
+    floods: bool,
+    /// When what can't be true came.
+    untrue_ns: VecDeque<u64>,
+    distrusts: bool,
+}
+
+impl Trust {
+    /// Before the first estimate; an estimate counts for `max_age_ms`.
+    pub fn new(max_age_ms: u16) -> Self {
+        Self {
+            max_age_ns: u64::from(max_age_ms) * 1_000_000,
+            sequence: None,
+            held_mm: None,
+            surprise_mm: None,
+            trusted_ns: None,
+            bucket: (0.0, 0),
+            floods: false,
+            untrue_ns: VecDeque::new(),
+            distrusts: false,
+        }
+    }
+
+    /// An estimate has arrived: the λ to be followed from now on, in mm, if it is one to follow.
+    pub fn hear(&mut self, at_ns: u64, estimate: &Estimate) -> Option<f64> {
+        self.elapse(at_ns);
+        self.bucket.0 = (self.bucket.0 + 1.0).min(FLOOD + 1.0);
+        self.floods |= self.bucket.0 > FLOOD;
+        if self.floods || !self.is_next(estimate.sequence) {
+            return None;
+        }
+        self.sequence = Some(estimate.sequence);
+        if is_absurd(estimate) {
+            self.distrust(at_ns);
+            return None;
+        }
+        if !estimate.valid {
+            return None;
+        }
+        let Some(mm) = estimate.wavelength_mm.filter(|mm| PLAYABLE_MM.contains(mm)) else {
+            self.distrust(at_ns);
+            return None;
+        };
+        if self.is_stale(at_ns) {
+            self.forget(at_ns);
+        }
+        if self
+            .held_mm
+            .is_some_and(|held_mm| differ(mm, held_mm, SURPRISE))
+        {
+            let confirmed = self
+                .surprise_mm
+                .take_if(|surprise_mm| !differ(mm, *surprise_mm, CONFIRMATION));
+            if confirmed.is_none() {
+                self.dismiss(at_ns);
+                self.surprise_mm = Some(mm);
+                return None;
+            }
+        }
+        self.dismiss(at_ns);
+        self.held_mm = Some(mm);
+        self.trusted_ns = Some(at_ns);
+        Some(f64::from(mm))
+    }
+
+    /// The reasons not to drive that there are at an instant. Before the first estimate that is trusted, there is
+    /// no more than [`Hold::Stale`].
+    pub fn holds(&mut self, at_ns: u64) -> impl Iterator<Item = Hold> {
+        self.elapse(at_ns);
+        let stale = self.is_stale(at_ns).then_some(Hold::Stale);
+        let distrust = self.distrusts.then_some(Hold::Distrust);
+        let flood = self.floods.then_some(Hold::Flood);
+        [flood, distrust, stale].into_iter().flatten()
+    }
+
+    /// When the last estimate that was trusted came.
+    pub fn trusted_ns(&self) -> Option<u64> {
+        self.trusted_ns
+    }
+
+    fn elapse(&mut self, at_ns: u64) {
+        let (level, since_ns) = self.bucket;
+        let run_out = FLOOD_HZ * at_ns.saturating_sub(since_ns) as f64 * 1e-9;
+        self.bucket = ((level - run_out).max(0.0), at_ns.max(since_ns));
+        self.floods &= self.bucket.0 > 0.0;
+        self.distrusts &= self
+            .untrue_ns
+            .back()
+            .is_some_and(|&last_ns| at_ns <= last_ns + DISTRUST_NS);
+    }
+
+    fn is_stale(&self, at_ns: u64) -> bool {
+        self.trusted_ns
+            .is_none_or(|trusted_ns| at_ns > trusted_ns + self.max_age_ns)
+    }
+
+    /// Whether it was sent after the last one. Of a sensor that has started again, everything is forgotten.
+    fn is_next(&mut self, sequence: u32) -> bool {
+        let Some(last) = self.sequence else {
+            return true;
+        };
+        let behind = last.wrapping_sub(sequence);
+        if behind > i32::MAX as u32 {
+            return true;
+        }
+        let begins = behind > OLD || (sequence <= FIRST && behind > REORDERED);
+        if begins {
+            self.held_mm = None;
+            if self.surprise_mm.take().is_some() {
+                self.distrust(self.bucket.1);
+            }
+        }
+        begins
+    }
+
+    fn forget(&mut self, at_ns: u64) {
+        self.held_mm = None;
+        self.dismiss(at_ns);
+    }
+
+    /// A surprise that was not confirmed.
+    fn dismiss(&mut self, at_ns: u64) {
+        if self.surprise_mm.take().is_some() {
+            self.distrust(at_ns);
+        }
+    }
+
+    fn distrust(&mut self, at_ns: u64) {
+        self.untrue_ns.push_back(at_ns);
+        if self.untrue_ns.len() > DISTRUSTED {
+            self.untrue_ns.pop_front();
+        }
+        let oldest_ns = self.untrue_ns.front().copied().unwrap_or(at_ns);
+        self.distrusts |= self.untrue_ns.len() == DISTRUSTED && at_ns <= oldest_ns + DISTRUST_NS;
+    }
+}
+
+/// Whether one is more than a factor of the other.
+fn differ(one_mm: f32, other_mm: f32, factor: f32) -> bool {
+    one_mm > other_mm * factor || other_mm > one_mm * factor
+}
+
+/// Whether no sensor can have said this.
+fn is_absurd(estimate: &Estimate) -> bool {
+    !(0.0..=1.0).contains(&estimate.confidence)
+        || !(0.0..=LARGEST_AMPLITUDE_LSB).contains(&estimate.amplitude_lsb)
+        || estimate.velocity_um_s.unsigned_abs() > FASTEST_ARM_UM_S
+        || u32::from(estimate.gauges_used) >= 1 << GAUGES
+        || (estimate.valid && estimate.gauges_used == 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::synthetic::Run;
+
+    const MS: u64 = 1_000_000;
+
+    /// An estimate of `mm` every 10 ms, from 0 on: what is followed.
+    fn followed(trust: &mut Trust, from: u32, wavelengths_mm: &[f32]) -> Vec<Option<f64>> {
+        let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        let heard = wavelengths_mm.iter().zip(from..).map(|(&mm, sequence)| {
+            let mut estimate = plain;
+            estimate.sequence = sequence;
+            estimate.wavelength_mm = Some(mm);
+            trust.hear(u64::from(sequence) * 10 * MS, &estimate)
+        });
+        heard.collect()
+    }
+
+    fn holds(trust: &mut Trust, at_ms: u64) -> Vec<Hold> {
+        trust.holds(at_ms * MS).collect()
+    }
+
+    #[test]
+    fn a_jump_is_followed_once_it_is_confirmed() {
+        let mut trust = Trust::new(500);
+        let heard = followed(&mut trust, 0, &[2.0, 4.2, 2.0, 5.0, 5.4, 11.0, 5.5]);
+        let expected = [2.0, 4.2, 2.0, 0.0, 5.4, 11.0, 5.5].map(|mm: f32| f64::from(mm));
+        let expected = expected.map(|mm| (mm > 0.0).then_some(mm));
+        assert_eq!(heard, expected);
+        assert_eq!(
+            followed(&mut trust, 7, &[20.0, 5.0, 20.0]),
+            [None, Some(5.0), None]
+        );
+    }
+
+    #[test]
+    fn five_in_half_a_second_that_cannot_be_true_are_distrusted_for_half_a_second() {
+        let mut trust = Trust::new(500);
+        followed(&mut trust, 0, &[2.0, 0.05, 0.05, f32::NAN, 2_000.0]);
+        assert_eq!(holds(&mut trust, 45), []);
+        followed(&mut trust, 5, &[0.0]);
+        assert_eq!(holds(&mut trust, 50), [Hold::Distrust]);
+        followed(&mut trust, 6, &[2.0]);
+        assert_eq!(holds(&mut trust, 550), [Hold::Distrust]);
+        assert_eq!(holds(&mut trust, 551), []);
+    }
+
+    #[test]
+    fn an_estimate_counts_for_its_time_and_an_old_one_for_nothing() {
+        let mut trust = Trust::new(500);
+        assert_eq!(holds(&mut trust, 0), [Hold::Stale]);
+        followed(&mut trust, 5, &[2.0]);
+        assert_eq!(holds(&mut trust, 550), []);
+        assert_eq!(holds(&mut trust, 551), [Hold::Stale]);
+        // What was sent before it, or is sent again, changes nothing; a sensor's first does.
+        let mut late = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        late.sequence = 5;
+        assert_eq!(trust.hear(560 * MS, &late), None);
+        late.sequence = 4;
+        assert_eq!(trust.hear(560 * MS, &late), None);
+        assert_eq!(followed(&mut trust, 100, &[2.0]), [Some(2.0)]);
+        late.sequence = 0;
+        assert_eq!(trust.hear(1_001 * MS, &late), Some(2.0));
+    }
+
+    #[test]
+    fn more_than_forty_at_once_are_a_flood_for_a_tenth_of_a_second() {
+        let mut trust = Trust::new(500);
+        let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        for sequence in 0..41 {
+            assert!(!holds(&mut trust, 10).contains(&Hold::Flood));
+            trust.hear(10 * MS, &Estimate { sequence, ..plain });
+        }
+        assert_eq!(holds(&mut trust, 112), [Hold::Flood]);
+        assert_eq!(holds(&mut trust, 113), []);
+    }
+}

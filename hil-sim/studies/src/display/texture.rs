@@ -1,0 +1,689 @@
+//! Whether partials and a random part carry more of a surface than λ alone, by what the actuators play.
+//!
+//! ```text
+//! surface ─> arm at one speed ─> sensor ── Estimate, Texture ──> link's delay ──> display ─> volts y(t)
+//!    └──────────────────────────────> under the hand at another speed: s(t) = surface(x(t) + δ) ──┐
+//!                                                              coherence, spectral distance, limens
+//! ```
+//!
+//! | what | how |
+//! | --- | --- |
+//! | coherence | share of the power of s in 5–200 Hz that is a linear function of y: Σ γ² S_ss / Σ S_ss by Welch's method, the chance of so few segments taken off |
+//! | shift δ | the display's place begins anywhere, and nobody can feel where: the best of a wavelength |
+//! | spectral distance | RMS over third octaves of 5–200 Hz of the two spectra's difference in dB, each over its own total, nothing below [`FLOOR_DB`] |
+//! | told apart | by [`observer`] |
+//!
+//! Boards are the firmware's libraries, or its ELFs in one scene, in which arm and hand move alike. The random part cannot be coherent: where the remote surface has a grain, the
+//! display has one of its own; only its spectrum is the surface's.
+
+pub mod observer;
+pub mod picture;
+pub mod surfaces;
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+use std::sync::Arc;
+
+use firmware_display::{Display, Senses, Settings};
+use hil_sim_boards::{ElfError, Firmwares};
+use hil_sim_core::native;
+use hil_sim_core::plant::motion::encoder;
+use hil_sim_core::plant::surface;
+use hil_sim_core::run::batch::on_all_cores;
+use hil_sim_core::run::decoder::TimedMessage;
+use hil_sim_core::run::observer::RunObserver;
+use hil_sim_core::run::recording::{Engine, volts};
+use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError, Series};
+use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+use serde::Serialize;
+
+use crate::psychophysics::bench::BenchError;
+use crate::study::{Fixed, Short, Study, Table, csv_text, number};
+use observer::{Pair, pairs};
+use surfaces::{Ground, known, unseen};
+
+/// All renderings, the simplest first.
+pub const RENDERINGS: [Rendering; 3] =
+    [Rendering::Fundamental, Rendering::Shape, Rendering::Texture];
+/// Highest speed of the arm and of the hand, in mm/s, and their strokes a second.
+pub const SPEEDS: [(Stroke, Stroke); 2] = [
+    (Stroke(60.0, 0.8), Stroke(40.0, 0.5)),
+    (Stroke(30.0, 0.4), Stroke(80.0, 0.83)),
+];
+/// Delays of the link, in ms, one way.
+pub const DELAYS_MS: [f64; 3] = [0.0, 100.0, 500.0];
+/// Signal to noise of the gauges, in dB.
+const SNR_DB: f64 = 20.0;
+/// The sensor rubs for so long, in s, and the display's voltages are looked at from then on, until then.
+const RUBS_S: f64 = 8.5;
+const LOOKS_S: (f64, f64) = (4.0, 8.0);
+/// What is looked at, in Hz.
+pub const BAND_HZ: (f64, f64) = (5.0, 200.0);
+/// Third octaves in it.
+pub const THIRDS: usize = 16;
+/// A third octave so far below the whole counts as that far.
+pub const FLOOR_DB: f64 = -30.0;
+const DRIFT_MM_S: f64 = 3.0;
+/// Rows of a motion, in s.
+const ROW_S: f64 = 1e-3;
+/// What partials may cost of a family's coherence in the mean, what they have to give where there is no grain, and by how
+/// many dB the random part may take a rough family's spectrum further away.
+const GOAL_LOSS: f64 = 0.02;
+/// See [`GOAL_LOSS`].
+const GOAL_COHERENCE: f64 = 0.95;
+/// See [`GOAL_LOSS`].
+const GOAL_DB: f64 = 0.3;
+const TICK_NS: u64 = 500_000;
+const TICKS_HZ: f64 = 2_000.0;
+/// Samples in a segment, and from one to the next.
+const SEGMENT: usize = 1_024;
+const HOP: usize = SEGMENT / 2;
+/// Shifts of place that are tried.
+const SHIFTS: usize = 48;
+
+/// v = peak · sin 2π f t, and [`DRIFT_MM_S`] on top, so that no two strokes turn at the same place: mm/s and Hz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stroke(pub f64, pub f64);
+
+impl Stroke {
+    fn motion(self) -> Motion {
+        let rows = (RUBS_S / ROW_S) as u32;
+        let at: Vec<f64> = (0..=rows).map(|row| f64::from(row) * ROW_S).collect();
+        let values = at.iter().map(|&t_s| self.position_mm(t_s)).collect();
+        Motion::Recorded(Arc::new(Series {
+            at,
+            values,
+            width: 1,
+        }))
+    }
+
+    /// The speed at an instant over the highest.
+    fn relative_speed(self, t_s: f64) -> f64 {
+        (TAU * self.1 * t_s).sin().abs()
+    }
+
+    fn position_mm(self, t_s: f64) -> f64 {
+        let swing_mm = self.0 / (TAU * self.1) * (1.0 - (TAU * self.1 * t_s).cos());
+        swing_mm + DRIFT_MM_S * t_s
+    }
+}
+
+/// A surface, rubbed and played.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The surface's name, and its family's.
+    pub surface: String,
+    /// See `surface`.
+    pub family: &'static str,
+    /// Whether nobody looked at it while this was made.
+    pub unseen: bool,
+    /// Who ran it.
+    pub engine: Engine,
+    /// Highest speeds in mm/s of arm and hand.
+    pub speeds_mm_s: (f64, f64),
+    /// The link's delay in ms.
+    pub delay_ms: f64,
+    /// How it was played.
+    pub rendering: Rendering,
+    /// Share of the surface's power that is coherent with what is played, 0 to 1.
+    pub coherence: f64,
+    /// Between the spectra, in dB.
+    pub distance_db: f64,
+}
+
+/// All that is measured.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Every surface.
+    pub rows: Vec<Row>,
+    /// Pairs of surfaces of one λ.
+    pub pairs: Vec<Pair>,
+}
+
+/// A surface, how it is rubbed, and what is said of it.
+struct Case {
+    ground: Ground,
+    arm: Stroke,
+    hand: Stroke,
+    seed: u64,
+}
+
+/// Measures everything, or a little of it.
+///
+/// # Errors
+/// If a scene can't be run.
+pub fn measure(
+    firmwares: &Firmwares,
+    quick: bool,
+    done: impl Fn() + Sync,
+) -> Result<Measured, BenchError> {
+    let cases = cases(quick);
+    let rows = on_all_cores(&cases, |case| {
+        let rows = rows(case, quick);
+        done();
+        rows
+    })?;
+    let scenes = scenes(quick);
+    let on_boards = on_all_cores(&scenes, |(case, rendering)| {
+        let row = row_on_boards(case, *rendering, firmwares);
+        done();
+        row
+    })?;
+    let pairs = pairs(quick, &done)?;
+    Ok(Measured {
+        rows: rows.into_iter().flatten().chain(on_boards).collect(),
+        pairs,
+    })
+}
+
+/// What is run on the ELFs: the surfaces that this was made with, one speed for arm and hand, the middle delay.
+fn scenes(quick: bool) -> Vec<(Case, Rendering)> {
+    let (arm, _) = SPEEDS[0];
+    let grounds = known().into_iter().take(if quick { 1 } else { usize::MAX });
+    grounds
+        .flat_map(|ground| {
+            RENDERINGS.map(|rendering| {
+                let ground = ground.clone();
+                let case = Case {
+                    ground,
+                    arm,
+                    hand: arm,
+                    seed: 1,
+                };
+                (case, rendering)
+            })
+        })
+        .collect()
+}
+
+fn row_on_boards(
+    case: &Case,
+    rendering: Rendering,
+    firmwares: &Firmwares,
+) -> Result<Row, ElfError> {
+    let delay_ms = DELAYS_MS[1];
+    let mut scene = scene(case);
+    scene.link.delay_ms = delay_ms;
+    scene.display.configuration.rendering = rendering;
+    let (recording, _) = hil_sim_boards::run(&scene, firmwares)?;
+    let mut edges = recording.outputs.iter().peekable();
+    let mut held = 0.0;
+    let played: Vec<f64> = ticks()
+        .map(|tick| {
+            // The middle of what holds from one edge to the next.
+            let at_ns = tick * TICK_NS + TICK_NS / 2;
+            while let Some(edge) = edges.next_if(|edge| edge.at_ns <= at_ns) {
+                held = volts(edge.words[0]);
+            }
+            held
+        })
+        .collect();
+    Ok(row(case, Engine::Elf, rendering, delay_ms, &played))
+}
+
+fn row(case: &Case, engine: Engine, rendering: Rendering, delay_ms: f64, played: &[f64]) -> Row {
+    Row {
+        surface: case.ground.name.clone(),
+        family: case.ground.family,
+        unseen: case.ground.unseen,
+        engine,
+        speeds_mm_s: (case.arm.0, case.hand.0),
+        delay_ms,
+        rendering,
+        coherence: coherence_at_best(case, played),
+        distance_db: distance_db(&thirds_db(played), &thirds_db(&under_the_hand(case, 0.0))),
+    }
+}
+
+/// How often `done` is told.
+pub fn runs(quick: bool) -> u64 {
+    (cases(quick).len() + scenes(quick).len()) as u64 + observer::runs(quick)
+}
+
+fn cases(quick: bool) -> Vec<Case> {
+    let grounds = if quick {
+        known().into_iter().take(2).collect()
+    } else {
+        known().into_iter().chain(unseen()).collect::<Vec<_>>()
+    };
+    let speeds = &SPEEDS[..if quick { 1 } else { 2 }];
+    grounds
+        .iter()
+        .flat_map(|ground| {
+            speeds.iter().map(|&(arm, hand)| Case {
+                ground: ground.clone(),
+                arm,
+                hand,
+                seed: 1,
+            })
+        })
+        .collect()
+}
+
+fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
+    let said = said(case)?;
+    let delays = if quick || case.ground.unseen {
+        &DELAYS_MS[..1]
+    } else {
+        &DELAYS_MS[..]
+    };
+    let mut rows = Vec::new();
+    for &delay_ms in delays {
+        for rendering in RENDERINGS {
+            let played = played(&said, case.hand, rendering, delay_ms);
+            rows.push(row(case, Engine::Native, rendering, delay_ms, &played));
+        }
+    }
+    Ok(rows)
+}
+
+/// What the sensor says, and when, in ns.
+type Said = Vec<TimedMessage>;
+
+#[derive(Default)]
+struct Ear(Said);
+
+impl RunObserver for Ear {
+    fn said(&mut self, role: Role, said: &TimedMessage) {
+        if role == Role::Sensor
+            && matches!(said.message, Message::Estimate(_) | Message::Texture(_))
+        {
+            self.0.push(said.clone());
+        }
+    }
+}
+
+fn said(case: &Case) -> Result<Said, SceneError> {
+    let mut ear = Ear::default();
+    native::run_before(&scene(case), &mut ear)?;
+    Ok(ear.0)
+}
+
+/// The surface, rubbed by the arm.
+fn scene(case: &Case) -> Scene {
+    Scene {
+        seed: case.seed,
+        duration_s: RUBS_S,
+        surface: case.ground.surface(),
+        motion: case.arm.motion(),
+        gauges: Gauges::Kinematic(Kinematic {
+            snr_db: Some(SNR_DB),
+            ..Kinematic::default()
+        }),
+        ..Scene::constant(case.ground.wavelength_mm, 50.0)
+    }
+}
+
+/// The voltages of an actuator at each tick of [`LOOKS_S`].
+fn played(said: &Said, hand: Stroke, rendering: Rendering, delay_ms: f64) -> Vec<f64> {
+    let configuration = DisplayConfiguration {
+        rendering,
+        ..DisplayConfiguration::DEFAULT
+    };
+    let settings =
+        Settings::new(configuration, &DEFAULT_ACTUATORS).expect("the settings are in their ranges");
+    let mut display = Display::new(&settings, None);
+    display.started(Ok(()));
+    let delay_ns = (delay_ms * 1e6) as u64;
+    let mut due = said.iter().peekable();
+    let looked_at = ticks();
+    let mut played = Vec::new();
+    for tick in 0..looked_at.end {
+        let at_ns = tick * TICK_NS;
+        while let Some(said) = due.next_if(|said| said.at_ns + delay_ns <= at_ns) {
+            match &said.message {
+                Message::Estimate(estimate) => display.on_estimate(estimate),
+                Message::Texture(texture) => display.on_texture(texture),
+                _ => {}
+            }
+        }
+        let t_s = at_ns as f64 * 1e-9;
+        display.tick(encoder(hand.position_mm(t_s)), &Senses::default());
+        if looked_at.contains(&tick) {
+            played.push(volts(display.words()[0]));
+        }
+    }
+    played
+}
+
+/// The ticks that are looked at.
+fn ticks() -> Range<u64> {
+    let (from_s, to_s) = LOOKS_S;
+    (from_s * TICKS_HZ) as u64..(to_s * TICKS_HZ) as u64
+}
+
+/// What a point under the operator's hand would feel of the surface, at each tick of [`LOOKS_S`].
+fn under_the_hand(case: &Case, shift_mm: f64) -> Vec<f64> {
+    let surface = surface::Surface::new(&case.ground.surface(), 0.0);
+    ticks()
+        .map(|tick| case.hand.position_mm(tick as f64 / TICKS_HZ) + shift_mm)
+        .map(|x_mm| f64::from(surface.feel(x_mm, 0)))
+        .collect()
+}
+
+fn coherence_at_best(case: &Case, played: &[f64]) -> f64 {
+    let played = segments(played);
+    (0..SHIFTS)
+        .map(|shift| {
+            let shift_mm = case.ground.wavelength_mm * shift as f64 / SHIFTS as f64;
+            coherence(&segments(&under_the_hand(case, shift_mm)), &played)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// The spectra of half-overlapping segments under a Hann window.
+fn segments(signal: &[f64]) -> Vec<Vec<Complex<f64>>> {
+    let transform = RealFftPlanner::new().plan_fft_forward(SEGMENT);
+    signal
+        .windows(SEGMENT)
+        .step_by(HOP)
+        .map(|segment| {
+            let mut windowed: Vec<f64> = segment
+                .iter()
+                .enumerate()
+                .map(|(n, x)| x * (0.5 - 0.5 * (TAU * n as f64 / SEGMENT as f64).cos()))
+                .collect();
+            let mut lines = transform.make_output_vec();
+            let transformed = transform.process(&mut windowed, &mut lines);
+            debug_assert!(transformed.is_ok(), "the lengths agree");
+            lines
+        })
+        .collect()
+}
+
+/// Lines of [`BAND_HZ`].
+fn lines() -> impl Iterator<Item = usize> {
+    let per_hz = SEGMENT as f64 / TICKS_HZ;
+    (BAND_HZ.0 * per_hz).ceil() as usize..=(BAND_HZ.1 * per_hz).floor() as usize
+}
+
+/// The share of `of`'s power that is coherent with `with`. So many segments show a coherence of 1/n where there is
+/// none.
+fn coherence(of: &[Vec<Complex<f64>>], with: &[Vec<Complex<f64>>]) -> f64 {
+    let chance = 1.0 / of.len() as f64;
+    let (mut coherent, mut all) = (0.0, 0.0);
+    for line in lines() {
+        let (mut own, mut others, mut common) = (0.0, 0.0, Complex::new(0.0, 0.0));
+        for (one, other) in of.iter().zip(with) {
+            own += one[line].norm_sqr();
+            others += other[line].norm_sqr();
+            common += one[line] * other[line].conj();
+        }
+        let share = if own * others > 0.0 {
+            common.norm_sqr() / (own * others)
+        } else {
+            0.0
+        };
+        coherent += own * ((share - chance) / (1.0 - chance)).max(0.0);
+        all += own;
+    }
+    coherent / all
+}
+
+/// Third octaves of [`BAND_HZ`], in dB over their sum.
+fn thirds_db(signal: &[f64]) -> [f64; THIRDS] {
+    thirds_where(signal, |_| true)
+}
+
+/// The same of the segments about such instants alone, in s.
+fn thirds_where(signal: &[f64], counts: impl Fn(f64) -> bool) -> [f64; THIRDS] {
+    let per_hz = SEGMENT as f64 / TICKS_HZ;
+    let mut powers = [0.0; THIRDS];
+    let middle_s = |n: usize| LOOKS_S.0 + (n * HOP + SEGMENT / 2) as f64 / TICKS_HZ;
+    let counted = segments(signal)
+        .into_iter()
+        .enumerate()
+        .filter(|(n, _)| counts(middle_s(*n)));
+    for (_, segment) in counted {
+        for line in lines() {
+            let octaves = (line as f64 / per_hz / BAND_HZ.0).log2();
+            powers[((3.0 * octaves) as usize).min(THIRDS - 1)] += segment[line].norm_sqr();
+        }
+    }
+    let all: f64 = powers.iter().sum();
+    powers.map(|power| (10.0 * (power / all).log10()).max(FLOOR_DB))
+}
+
+/// RMS of the difference, in dB.
+fn distance_db(one: &[f64; THIRDS], other: &[f64; THIRDS]) -> f64 {
+    let squares: f64 = one
+        .iter()
+        .zip(other)
+        .map(|(one, other)| (one - other).powi(2))
+        .sum();
+    (squares / THIRDS as f64).sqrt()
+}
+
+/// What a rendering is called in tables and files.
+pub const fn word(rendering: Rendering) -> &'static str {
+    match rendering {
+        Rendering::Fundamental => "fundamental",
+        Rendering::Shape => "shape",
+        Rendering::Texture => "texture",
+    }
+}
+
+/// Families in the order of their first row, the unseen ones last.
+fn families(rows: &[Row]) -> Vec<&'static str> {
+    let mut families = Vec::new();
+    for row in rows {
+        if !families.contains(&row.family) {
+            families.push(row.family);
+        }
+    }
+    families
+}
+
+/// Mean, least and largest of a family's rows of one rendering.
+pub fn spread(
+    rows: &[Row],
+    engine: Engine,
+    family: &str,
+    rendering: Rendering,
+    value: impl Fn(&Row) -> f64,
+) -> Option<(f64, f64, f64)> {
+    let values: Vec<f64> = rows
+        .iter()
+        .filter(|row| row.engine == engine && row.family == family && row.rendering == rendering)
+        .map(value)
+        .collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let least = values.iter().copied().reduce(f64::min)?;
+    let most = values.iter().copied().reduce(f64::max)?;
+    Some((mean, least, most))
+}
+
+/// Whether a family is played the better the more of it is: partials cost no coherence, where there is no grain they give
+/// nearly all of it, and where there is one the random part brings the spectrum no further away.
+fn is_carried(rows: &[Row], engine: Engine, family: &str) -> bool {
+    let of = |value: fn(&Row) -> f64| {
+        RENDERINGS.map(|rendering| spread(rows, engine, family, rendering, value))
+    };
+    let ([Some(fundamental), Some(shape), _], [_, Some(plain), Some(rough)]) =
+        (of(|row| row.coherence), of(|row| row.distance_db))
+    else {
+        // Not every family is run on the ELFs.
+        return engine == Engine::Elf;
+    };
+    let has_grain = family.contains("rough");
+    shape.0 >= fundamental.0 - GOAL_LOSS
+        && (has_grain || shape.0 >= GOAL_COHERENCE)
+        && (!has_grain || rough.0 <= plain.0 + GOAL_DB)
+}
+
+#[derive(Serialize)]
+struct Record<'a> {
+    surface: &'a str,
+    family: &'a str,
+    unseen: bool,
+    engine: &'static str,
+    arm_mm_s: Short,
+    hand_mm_s: Short,
+    delay_ms: Short,
+    rendering: &'static str,
+    coherence: Fixed<3>,
+    distance_db: Fixed<2>,
+}
+
+impl Study for Measured {
+    const NAME: &'static str = "texture";
+
+    fn table(&self) -> Option<Table> {
+        let mut table = Table::new(&[
+            "surfaces",
+            "engine",
+            "rendering",
+            "coherence:",
+            "least to most:",
+            "spectral distance, dB:",
+        ]);
+        let engines = [Engine::Native, Engine::Elf];
+        let families = families(&self.rows);
+        for (family, engine) in families
+            .iter()
+            .flat_map(|family| engines.map(|engine| (*family, engine)))
+        {
+            for rendering in RENDERINGS {
+                let of =
+                    |value: fn(&Row) -> f64| spread(&self.rows, engine, family, rendering, value);
+                let (Some((mean, least, most)), Some((distance, ..))) =
+                    (of(|row| row.coherence), of(|row| row.distance_db))
+                else {
+                    continue;
+                };
+                table.row([
+                    family.to_owned(),
+                    engine.name().to_owned(),
+                    word(rendering).to_owned(),
+                    number(mean, 2),
+                    format!("{least:.2} to {most:.2}"),
+                    number(distance, 1),
+                ]);
+            }
+        }
+        for pair in &self.pairs {
+            for (rendering, answer) in RENDERINGS.iter().zip(&pair.answers) {
+                table.row([
+                    format!("{} or {}", pair.one, pair.other),
+                    Engine::Native.name().to_owned(),
+                    word(*rendering).to_owned(),
+                    format!("told apart {:.0} %", 100.0 * answer.right),
+                    format!(
+                        "{:.0} to {:.0} %",
+                        100.0 * answer.interval.low,
+                        100.0 * answer.interval.high
+                    ),
+                    "–".to_owned(),
+                ]);
+            }
+        }
+        Some(table)
+    }
+
+    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+        let records = self.rows.iter().map(|row| Record {
+            surface: &row.surface,
+            family: row.family,
+            unseen: row.unseen,
+            engine: row.engine.name(),
+            arm_mm_s: Short(row.speeds_mm_s.0),
+            hand_mm_s: Short(row.speeds_mm_s.1),
+            delay_ms: Short(row.delay_ms),
+            rendering: word(row.rendering),
+            coherence: row.coherence.into(),
+            distance_db: row.distance_db.into(),
+        });
+        Ok(vec![
+            ("", csv_text(records)?),
+            ("-pairs", observer::csv(&self.pairs)?),
+        ])
+    }
+
+    fn picture(&self) -> String {
+        picture::draw(self)
+    }
+
+    fn is_met(&self) -> bool {
+        let families = families(&self.rows);
+        families.into_iter().all(|family| {
+            [Engine::Native, Engine::Elf]
+                .into_iter()
+                .all(|engine| is_carried(&self.rows, engine, family))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    /// As good as white.
+    fn grain(seed: u64) -> Vec<f64> {
+        let mut draws = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..8_192).map(|_| draws.random::<f64>() - 0.5).collect()
+    }
+
+    #[test]
+    fn a_signal_is_coherent_with_itself_and_with_what_it_is_filtered_of_and_not_with_another() {
+        let (one, other) = (grain(1), grain(2));
+        let late: Vec<f64> = one.iter().skip(3).map(|x| -2.0 * x).collect();
+        let of = segments(&one);
+        assert!(coherence(&of, &of) > 0.999);
+        assert!(coherence(&of, &segments(&late)) > 0.95);
+        assert!(coherence(&of, &segments(&other)) < 0.1);
+        let half: Vec<f64> = one.iter().zip(&other).map(|(x, y)| x + y).collect();
+        let share = coherence(&of, &segments(&half));
+        assert!((0.4..0.6).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn third_octaves_hold_what_is_in_them_and_a_level_is_no_distance() {
+        let tone = |hz: f64, volts: f64| -> Vec<f64> {
+            (0..8_192)
+                .map(|n| volts * (TAU * hz * f64::from(n) / TICKS_HZ).sin())
+                .collect()
+        };
+        // 5 Hz · 2^(10/3) = 50.4 Hz begins the eleventh.
+        let levels = thirds_db(&tone(56.0, 5.0));
+        assert!(levels[10] > -0.1, "{levels:?}");
+        assert_eq!((levels[8], levels[12]), (FLOOR_DB, FLOOR_DB));
+        assert!(distance_db(&levels, &thirds_db(&tone(56.0, 0.1))) < 1e-6);
+        assert!(distance_db(&levels, &thirds_db(&tone(112.0, 5.0))) > 8.0);
+    }
+
+    #[test]
+    fn a_family_that_partials_make_worse_or_the_random_part_misses_is_not_carried() {
+        let rows = |family: &'static str, coherences: [f64; 3], distances: [f64; 3]| -> Vec<Row> {
+            (0..3)
+                .map(|at| Row {
+                    surface: String::new(),
+                    family,
+                    unseen: false,
+                    engine: Engine::Native,
+                    speeds_mm_s: (60.0, 40.0),
+                    delay_ms: 0.0,
+                    rendering: RENDERINGS[at],
+                    coherence: coherences[at],
+                    distance_db: distances[at],
+                })
+                .collect()
+        };
+        for (family, coherences, distances, expected) in [
+            ("weave", [0.75, 0.98, 0.98], [8.0, 1.0, 1.0], true),
+            ("weave", [0.75, 0.90, 0.98], [8.0, 1.0, 1.0], false),
+            ("rough", [0.75, 0.85, 0.80], [6.0, 3.0, 1.5], true),
+            ("rough", [0.75, 0.70, 0.80], [6.0, 3.0, 1.5], false),
+            ("rough", [0.75, 0.85, 0.80], [6.0, 3.0, 3.5], false),
+        ] {
+            let rows = rows(family, coherences, distances);
+            let carried = is_carried(&rows, Engine::Native, family);
+            assert_eq!(carried, expected, "{family} {coherences:?}");
+            assert!(is_carried(&rows, Engine::Elf, family), "not run");
+        }
+    }
+}

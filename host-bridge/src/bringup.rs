@@ -1,0 +1,17 @@
+//! Brings a bench up, one step at a time: what to wire, what is measured then, what it has to be, and what to
+//! try if it is not.
+//!
+//! ```text
+//! steps ──> step: what to do, figures with their limits
+//!             ^
+//! look ─> sight ─> judged ─> progress: the state file, JSON ─> report: HTML
+//! ```
+//!
+//! The steps are data. What they measure is what the boards say of themselves, as `doctor` hears it, and what a
+//! person reads off an instrument.
+
+pub mod progress;
+pub mod report;
+pub mod sight;
+pub mod step;
+pub mod steps;

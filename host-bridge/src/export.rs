@@ -1,0 +1,241 @@
+//! Takes a recording or a scene out to what others read: textures in ISO/IEC 23090-31's `.hjif`, signals in WAV.
+//!
+//! ```text
+//! recording ─> samples without a gap ─┬─> groups of channels over time ──────────────────┬─> WAV, a file a group
+//! scene ─> surface, run by `native` ──┘                                                  │
+//!      └─────> a stretch in one direction, the surface: channels over place ─> texture ──┴─> .hjif
+//! ```
+//!
+//! What is written is what is there: nothing is filtered, and codes and words keep their steps.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use hil_sim_core::scene::{Scene, SceneError};
+
+use crate::recording::reader::{ReadError, Reader};
+use crate::replay::scene::SceneError as ExcerptError;
+use crate::replay::scene::excerpt::Excerpt;
+
+mod group;
+mod of_recording;
+mod of_scene;
+mod texture;
+mod wav;
+
+pub use group::{Along, Group, Samples};
+
+/// Why nothing is exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The recording can't be read.
+    #[error(transparent)]
+    Unread(#[from] ReadError),
+    /// Nothing can be taken out of the recording.
+    #[error(transparent)]
+    Excerpt(#[from] ExcerptError),
+    /// The scene can't be used.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The target's name says no format.
+    #[error("{path}: give a name that ends in .hjif or in .wav")]
+    Format {
+        /// The target.
+        path: PathBuf,
+    },
+    /// A part of a scene was asked for.
+    #[error("--from and --to-time are a recording's: a scene is as long as its duration_s says")]
+    Part,
+    /// There are too few samples.
+    #[error(
+        "{path}: {count} samples of the gauges there: record without --no-gauges, and give --from and --to-time that leave some"
+    )]
+    NoSamples {
+        /// The recording.
+        path: PathBuf,
+        /// How many there are.
+        count: usize,
+    },
+    /// The arm rests.
+    #[error(
+        "{path}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
+    )]
+    AtRest {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// The texture is too long.
+    #[error("the way is {length_mm:.0} mm: a texture has {most_mm:.0} mm at most: {advice}")]
+    TooLong {
+        /// Its length in mm.
+        length_mm: f64,
+        /// The longest in mm.
+        most_mm: f64,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// The scene's scans are uneven.
+    #[error(
+        "{scene}: the sensor's clock goes wrong in this scene, so its scans are not evenly spaced, as a WAV file's samples are: take that fault out"
+    )]
+    Uneven {
+        /// The scene's name.
+        scene: String,
+    },
+    /// A place is beyond what a sample of 32 bits says in µm.
+    #[error(
+        "the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
+    )]
+    Far {
+        /// The place in µm.
+        position_um: i64,
+    },
+    /// A file is there already.
+    #[error("{path}: is there already: give another name, or --force to write over it")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file can't be written.
+    #[error("{path}: can't be written: {source}")]
+    NotWritten {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+}
+
+/// What is exported, and where to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The recording, `.mcap`, or the scene, `.toml`.
+    pub from: PathBuf,
+    /// The file, `.hjif`, or what the files' names begin with, `.wav`.
+    pub to: PathBuf,
+    /// From where on, in s since the recording's start; none from its beginning.
+    pub from_s: Option<f64>,
+    /// To where; none to its end.
+    pub to_s: Option<f64>,
+    /// When it is made, for the file to say (RFC 3339).
+    pub date: String,
+    /// Whether to write over files that are there.
+    pub force: bool,
+}
+
+/// A file that was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exported {
+    /// The file.
+    pub path: PathBuf,
+    /// What is in it, in words.
+    pub holds: String,
+    /// The lines of a scene that read it; none if no scene does.
+    pub section: Option<String>,
+}
+
+/// Writes the files.
+///
+/// # Errors
+/// If there is nothing to export, or a file can't be written; files that were written before stay.
+pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
+    let ending = |path: &Path| {
+        let ending = path.extension()?.to_str()?;
+        Some(ending.to_ascii_lowercase())
+    };
+    let is_texture = match ending(&settings.to).as_deref() {
+        Some("hjif") => true,
+        Some("wav") => false,
+        _ => {
+            return Err(ExportError::Format {
+                path: settings.to.clone(),
+            });
+        }
+    };
+    if ending(&settings.from).as_deref() == Some("toml") {
+        if settings.from_s.is_some() || settings.to_s.is_some() {
+            return Err(ExportError::Part);
+        }
+        let scene = Scene::load(&settings.from)?;
+        if is_texture {
+            let texture = of_scene::texture(&scene, settings)?;
+            return write_texture(settings, texture);
+        }
+        return write_groups(settings, of_scene::groups(&scene)?);
+    }
+    let recording = Reader::open(&settings.from)?;
+    let to_s = settings.to_s.unwrap_or(f64::INFINITY);
+    let excerpt = Excerpt::take(recording, settings.from_s.unwrap_or(0.0), to_s)?;
+    if excerpt.samples.len() < 2 {
+        return Err(ExportError::NoSamples {
+            path: settings.from.clone(),
+            count: excerpt.samples.len(),
+        });
+    }
+    if is_texture {
+        let texture = of_recording::texture(&excerpt, settings)?;
+        return write_texture(settings, texture);
+    }
+    write_groups(settings, of_recording::groups(&excerpt)?)
+}
+
+fn write_texture(
+    settings: &Settings,
+    texture: texture::Made,
+) -> Result<Vec<Exported>, ExportError> {
+    let path = settings.to.clone();
+    refuse_taken(&path, settings.force)?;
+    let not_written = |source| ExportError::NotWritten {
+        path: path.clone(),
+        source,
+    };
+    let text = texture
+        .experience
+        .text()
+        .map_err(|error| not_written(io::Error::other(error)))?;
+    fs::write(&path, text).map_err(not_written)?;
+    let section = texture.section(&path);
+    Ok(vec![Exported {
+        path,
+        holds: texture.holds,
+        section: Some(section),
+    }])
+}
+
+fn write_groups(settings: &Settings, groups: Vec<Group>) -> Result<Vec<Exported>, ExportError> {
+    let stem = settings.to.file_stem().unwrap_or_default();
+    let path = |group: &Group| {
+        let name = format!("{}-{}.wav", stem.to_string_lossy(), group.name);
+        settings.to.with_file_name(name)
+    };
+    for group in &groups {
+        refuse_taken(&path(group), settings.force)?;
+    }
+    let mut exported = Vec::with_capacity(groups.len());
+    for group in groups {
+        let path = path(&group);
+        wav::write(&path, &group)?;
+        exported.push(Exported {
+            holds: group.holds(),
+            section: group.section(&path),
+            path,
+        });
+    }
+    Ok(exported)
+}
+
+fn refuse_taken(path: &Path, force: bool) -> Result<(), ExportError> {
+    if path.exists() && !force {
+        return Err(ExportError::Exists {
+            path: path.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// A file's name for a scene that stands beside it.
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    toml::Value::String(name.to_string_lossy().into_owned()).to_string()
+}

@@ -1,0 +1,129 @@
+//! Who moves the arm, for the programs of this user to show: each relay here says it in a line, for as long as it runs.
+
+use protocol::Role;
+
+use crate::relay::name::Name;
+use crate::relay::remote::{RemoteState, site};
+use crate::relay::report::Notice;
+use crate::relay::site::opposite;
+use crate::shared_port::claim::{Claim, Device, held};
+
+/// What the names of these lines begin with.
+const HAND: &str = "hand";
+
+/// What a relay says of the hand. Dropping it takes it back.
+pub struct Hand {
+    device: Device,
+    claim: Option<Claim>,
+    name: Name,
+    role: Role,
+    far: RemoteState,
+    /// That another bridge is there, in words.
+    others: Option<String>,
+}
+
+impl Hand {
+    /// Of the relay at the board of `role` of the bench called `name`: nobody is heard yet.
+    pub fn new(name: Name, role: Role) -> Self {
+        let mut hand = Self {
+            device: Device::named(&format!("{HAND} {name} {}", role.name())),
+            claim: None,
+            name,
+            role,
+            far: RemoteState::Unheard,
+            others: None,
+        };
+        hand.tell();
+        hand
+    }
+
+    /// The relay has noticed something.
+    pub fn on_notice(&mut self, notice: &Notice) {
+        match notice {
+            Notice::Remote(_, state) => {
+                self.far = state.clone();
+                self.others = None;
+            }
+            Notice::Watcher(_) | Notice::Rival(_) => self.others = Some(notice.to_string()),
+            _ => return,
+        }
+        self.tell();
+    }
+
+    fn tell(&mut self) {
+        if self.claim.is_none() {
+            // A second relay of this role, or a folder that can't be had, must not hold up a relay.
+            self.claim = self.device.claim().ok().flatten();
+        }
+        if let Some(claim) = &self.claim {
+            let _ = claim.tell(&self.words());
+        }
+    }
+
+    fn words(&self) -> String {
+        let who = match (self.role, &self.far) {
+            (Role::Display, RemoteState::Known { .. }) => {
+                "the hand here moves the arm at the sensor's site".to_owned()
+            }
+            (_, RemoteState::Known { .. }) => {
+                "the hand at the display's site moves the arm here".to_owned()
+            }
+            (role, state) => {
+                let far = opposite(role).map_or("the other site", site);
+                format!("nobody moves the arm by it: {far}: {state}")
+            }
+        };
+        let others = self.others.as_deref().map(|others| format!("; {others}"));
+        format!(
+            "relay of bench {}: {who}{}",
+            self.name,
+            others.unwrap_or_default()
+        )
+    }
+}
+
+/// What the relays of this user say on this computer, in order of their benches.
+pub fn hands() -> Vec<String> {
+    held(HAND)
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::Hello;
+
+    use super::*;
+
+    #[test]
+    fn a_relay_says_who_moves_the_arm_for_as_long_as_it_runs() {
+        let bench = format!("of-{}", std::process::id());
+        let name: Name = bench.parse().expect("a name");
+        let said = || -> Vec<String> {
+            let mut all = hands();
+            all.retain(|line| line.contains(&bench));
+            all
+        };
+        let mut hand = Hand::new(name.clone(), Role::Display);
+        let line = format!("relay of bench {bench}: nobody moves the arm by it: ");
+        assert!(said()[0].starts_with(&line), "{:?}", said());
+        let known = RemoteState::Known {
+            hello: Hello::new(Role::Sensor, "host-bridge", [0, 1, 0]),
+            session: 7,
+        };
+        hand.on_notice(&Notice::Remote(Role::Sensor, known));
+        let line =
+            format!("relay of bench {bench}: the hand here moves the arm at the sensor's site");
+        assert_eq!(said(), std::slice::from_ref(&line));
+        // A second one says nothing beside it.
+        let second = Hand::new(name, Role::Display);
+        assert_eq!(said(), std::slice::from_ref(&line));
+        drop(second);
+        hand.on_notice(&Notice::Rival(Role::Display));
+        assert!(
+            said()[0].starts_with(&format!("{line}; another bridge")),
+            "{:?}",
+            said()
+        );
+        drop(hand);
+        assert_eq!(said(), [""; 0]);
+    }
+}

@@ -1,0 +1,67 @@
+//! What the surface is besides its wavelength: the shape of its wave, what does not repeat, and how it rubs.
+
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Partials told of besides the fundamental: the second and the third.
+pub const PARTIALS: usize = 2;
+/// Octave bands of wavenumber in which what does not repeat is told.
+pub const BANDS: usize = 4;
+/// The lower end of the lowest of [`BANDS`], in waves per mm; each band reaches to twice its lower end, so that
+/// the highest ends at 2 waves per mm, 0.5 mm.
+pub const LOWEST_BAND_PER_MM: f32 = 0.125;
+/// What stands for the fundamental's amplitude in [`Partial::ratio`] and [`Texture::bands`].
+pub const UNITY: u16 = 1_000;
+/// The largest ratio that is told: ten times the fundamental.
+pub const LARGEST_RATIO: u16 = 10 * UNITY;
+
+/// A partial of the surface's wave, sin θ + Σ rₙ sin(nθ + φₙ), where θ grows by 2π with each λ towards larger x.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Partial {
+    /// rₙ in 1 / [`UNITY`], 0 to [`LARGEST_RATIO`].
+    pub ratio: u16,
+    /// φₙ in turns / 2¹⁶. It belongs to the place, so it is the same whichever way the finger moves.
+    pub phase: u16,
+}
+
+/// How the surface rubs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Friction {
+    /// Mean of the tangential force against the movement, in mN.
+    pub mean_mn: u16,
+    /// Standard deviation of the tangential force while it moves, in mN.
+    pub fluctuation_mn: u16,
+}
+
+/// What the surface is besides λ, at 20 Hz while the fingertip moves.
+///
+/// It belongs to the surface alone: neither the arm's speed nor its direction changes it, so a late one is as good
+/// as an early one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Texture {
+    /// [`crate::Estimate::sequence`] of the estimate that it was made with; one with a smaller one is older.
+    pub sequence: u32,
+    /// When it was made, in µs of the sensor's clock.
+    pub instant_us: u64,
+    /// Whether the sensor stands by all but the friction: it stands by λ, and what it says of the wave is averaged over
+    /// enough of this surface.
+    pub valid: bool,
+    /// The second and the third partial of the wave whose fundamental has the wavelength λ.
+    pub partials: [Partial; PARTIALS],
+    /// Share of the texture's power that repeats with λ, in percent, 0 to 100.
+    pub repeating_percent: u8,
+    /// RMS of what does not repeat, in octave bands of wavenumber from the lowest up, in 1 / [`UNITY`] of the
+    /// fundamental's amplitude, 0 to [`LARGEST_RATIO`]. The sensor's own noise is taken off.
+    pub bands: [u16; BANDS],
+    /// With the force channel, and while the fingertip slips.
+    pub friction: Option<Friction>,
+}
+
+impl Texture {
+    /// Whether all numbers are in their ranges.
+    pub fn is_sound(&self) -> bool {
+        let ratios = self.partials.iter().map(|partial| partial.ratio);
+        ratios.chain(self.bands).all(|ratio| ratio <= LARGEST_RATIO)
+            && self.repeating_percent <= 100
+    }
+}

@@ -1,0 +1,106 @@
+//! The libs compute the same on processors that have nothing in common: this host, the emulated boards' and
+//! QEMU's, each a minute of both boards' logic and the wire between.
+
+use std::process::Command;
+
+use hil_sim_boards::semihosted;
+use tests::elves;
+
+#[path = "../../plain-board/src/rehearsal.rs"]
+mod rehearsal;
+
+use rehearsal::{Met, Rehearsal, SECONDS};
+
+/// Where the program's sources are, for what a test has to say.
+const PROGRAM: &str = "tests/plain-board";
+const QEMU: &str = "qemu-system-arm";
+
+fn on_the_host() -> (String, Met) {
+    let mut rehearsal = Rehearsal::new();
+    let seconds = (0..SECONDS)
+        .map(|_| format!("{}\n", rehearsal.second()))
+        .collect();
+    (seconds, rehearsal.met)
+}
+
+/// The first second, and the first stage in it, in which two runs differ.
+fn difference(one: &str, other: &str) -> Option<String> {
+    let (mut ours, mut theirs) = (one.lines(), other.lines());
+    loop {
+        let (a, b) = (ours.next(), theirs.next());
+        let (Some(a), Some(b)) = (a, b) else {
+            return (a != b).then(|| format!("one ends: {a:?}, {b:?}"));
+        };
+        if a != b {
+            let words = a.split_whitespace().zip(b.split_whitespace());
+            let place = words.take_while(|(a, b)| a == b).count();
+            let stage = a.split_whitespace().nth(place - 1).unwrap_or("?");
+            return Some(format!("from {stage} on:\n{a}\n{b}"));
+        }
+    }
+}
+
+#[test]
+fn the_rehearsal_meets_what_it_is_for() {
+    let (seconds, met) = on_the_host();
+    assert_eq!(seconds.lines().count(), 64);
+    // By spectrum for the most part; each of the other methods has four seconds.
+    assert!(met.valid[0] > 1_500, "{met:?}");
+    assert!(met.valid[1..].iter().all(|&valid| valid > 50), "{met:?}");
+    assert!(met.unwell > 100, "{met:?}");
+    assert!(met.driving > 60_000, "{met:?}");
+    assert!(met.fading > 100 && met.stopped > 1_000, "{met:?}");
+    assert!(met.trips.iter().flatten().count() >= 3, "{met:?}");
+    let end = met.display_end;
+    assert!(end.received > 5_000, "{met:?}");
+    assert!(end.corrupt > 10 && end.lost > 100, "{met:?}");
+}
+
+#[test]
+fn the_emulated_boards_processor_computes_every_bit_of_it_as_the_host_does() {
+    let said = semihosted::run(&elves::plain("plain-stm32f4"), "plain-board: see ./test")
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert!(said.is_done, "{}", said.console);
+    assert_eq!(difference(&on_the_host().0, &said.console), None);
+}
+
+#[test]
+fn so_does_qemus_cortex_m4f() {
+    let program = elves::plain("plain-board");
+    assert!(
+        program.is_file(),
+        "{}: not there: ./test builds it from {PROGRAM}",
+        program.display()
+    );
+    let run = Command::new(QEMU)
+        .args(["-M", "mps2-an386", "-display", "none", "-monitor", "none"])
+        .args(["-chardev", "stdio,id=console"])
+        .args([
+            "-semihosting-config",
+            "enable=on,chardev=console",
+            "-kernel",
+        ])
+        .arg(&program)
+        .output();
+    let Ok(run) = run else {
+        println!("skipped: {QEMU} is not to be had here");
+        return;
+    };
+    let said = String::from_utf8_lossy(&run.stdout);
+    assert!(
+        run.status.success(),
+        "{said}{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    assert_eq!(difference(&on_the_host().0, &said), None);
+}
+
+#[test]
+fn a_difference_is_named_by_its_second_and_its_first_stage() {
+    let lines = "second  0  input 1  sensor 2\nsecond  1  input 3  sensor 4\n";
+    assert_eq!(difference(lines, lines), None);
+    let wrong = lines.replace("sensor 4", "sensor 5");
+    let named = difference(lines, &wrong).unwrap();
+    assert!(named.starts_with("from sensor on:\nsecond  1"), "{named}");
+    assert!(difference(lines, "").is_some());
+}
