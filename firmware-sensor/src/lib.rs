@@ -36,6 +36,7 @@ pub mod landmarks;
 pub mod line;
 pub mod method;
 pub mod noise;
+pub mod normal_equations;
 pub mod phasor;
 pub mod root;
 pub mod sensor;

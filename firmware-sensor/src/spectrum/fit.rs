@@ -13,6 +13,7 @@ use core::ops::Range;
 use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
+use crate::normal_equations::{Eliminated, NormalEquations};
 use crate::phasor::phasor;
 use crate::root::sqrt;
 use crate::travel::{PLACES_PER_MM, Place};
@@ -29,8 +30,6 @@ const LEAST_PIVOT: f32 = 1e-4;
 
 /// What a solution costs, in knots.
 const SOLVING: usize = 4;
-/// Knots that are summed up at a time, so that a sum is fetched and stored once for all of them.
-const ROWS: usize = 4;
 
 /// Unknowns of a gauge, and with the two derivatives of the wave by ln k.
 const LINEAR: usize = 4;
@@ -93,21 +92,8 @@ struct Sums {
     /// Sum of the knots' places, from the first one's.
     places: f32,
     knots: u16,
-    /// Lower triangle of Σ f fᵀ, f = (1, τ, cos, sin, θ cos, θ sin).
-    normal: [[f32; ALL]; ALL],
-    /// Σ f s of each gauge.
-    right: [[f32; ALL]; GAUGES],
-    square: [f32; GAUGES],
-    /// Knots that are not in the sums yet, and how many.
-    rows: [Row; ROWS],
-    filled: usize,
-}
-
-/// A knot's part: f, and what each gauge says.
-#[derive(Clone, Copy, Debug, Default)]
-struct Row {
-    terms: [f32; ALL],
-    felt: [f32; GAUGES],
+    /// f = (1, τ, cos, sin, θ cos, θ sin).
+    normal: NormalEquations<ALL>,
 }
 
 impl Pass {
@@ -163,7 +149,7 @@ impl Pass {
         self.sums.add(waves, phasor, angle, knot, &self.base);
         // A length ends with the knot that is nearest to its end.
         while self.next < self.lengths && self.sums.waves + 0.5 * waves >= LENGTHS[self.next] {
-            self.sums.take_in();
+            self.sums.normal.take_in();
             let mean = self.sums.places / f32::from(self.sums.knots);
             self.found[self.next] = self
                 .sums
@@ -190,46 +176,14 @@ impl Sums {
         base: &[f32; GAUGES],
     ) {
         let tau = self.waves + 0.5 * waves;
-        let row = &mut self.rows[self.filled % ROWS];
-        row.terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
-        for ((felt, gauge), base) in row.felt.iter_mut().zip(knot.gauges).zip(base) {
-            *felt = gauge - base;
+        let mut felt = knot.gauges;
+        for (felt, base) in felt.iter_mut().zip(base) {
+            *felt -= base;
         }
         self.waves += waves;
         self.knots += 1;
-        self.filled += 1;
-        if self.filled == ROWS {
-            self.take_in();
-        }
-    }
-
-    /// Sums up the rows that wait.
-    #[inline(never)]
-    fn take_in(&mut self) {
-        while self.filled < ROWS {
-            self.rows[self.filled] = Row::default();
-            self.filled += 1;
-        }
-        self.filled = 0;
-        let [one, two, three, four] = &self.rows;
-        for i in 0..ALL {
-            for j in 0..=i {
-                self.normal[i][j] += one.terms[i] * one.terms[j]
-                    + two.terms[i] * two.terms[j]
-                    + three.terms[i] * three.terms[j]
-                    + four.terms[i] * four.terms[j];
-            }
-        }
-        for gauge in 0..GAUGES {
-            let felt = [one, two, three, four].map(|row| row.felt[gauge]);
-            for i in 0..ALL {
-                self.right[gauge][i] += one.terms[i] * felt[0]
-                    + two.terms[i] * felt[1]
-                    + three.terms[i] * felt[2]
-                    + four.terms[i] * felt[3];
-            }
-            self.square[gauge] += felt.iter().map(|x| x * x).sum::<f32>();
-        }
+        let terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
+        self.normal.add(terms, felt);
     }
 
     /// The step, of a pass that started at `wavelength_mm`, over `waves`. `None` if the path does not tell
@@ -239,40 +193,16 @@ impl Sums {
             return None;
         }
         let scale = 1.0 / f32::from(self.knots);
-        // Elimination of the linear unknowns: their pivots, the factors below them, and the derivatives' Schur
-        // complement.
-        let mut a = self.normal.map(|row| row.map(|sum| sum * scale));
-        let mut pivots = [0.0_f32; LINEAR];
-        for j in 0..LINEAR {
-            if a[j][j] < LEAST_PIVOT {
-                return None;
-            }
-            pivots[j] = 1.0 / a[j][j];
-            for i in j + 1..ALL {
-                let factor = a[i][j] * pivots[j];
-                #[allow(
-                    clippy::needless_range_loop,
-                    reason = "two rows of one matrix; a slice of each is twice the instructions on the board"
-                )]
-                for k in j + 1..=i {
-                    a[i][k] -= factor * a[k][j];
-                }
-            }
-            for row in &mut a[j + 1..] {
-                row[j] *= pivots[j];
-            }
-        }
+        let products = self.normal.products.map(|row| row.map(|sum| sum * scale));
+        let without = Eliminated::new(products, LINEAR, [LEAST_PIVOT; ALL])?;
+        let Eliminated { a, pivots } = &without;
         let mut fitted = Fitted::default();
         let (mut along, mut curvature, mut rest, mut count) = (0.0, 0.0, 0.0, 0_u16);
         for gauge in 0..GAUGES {
-            let mut y = self.right[gauge].map(|sum| sum * scale);
-            for j in 0..LINEAR {
-                for i in j + 1..ALL {
-                    y[i] -= a[i][j] * y[j];
-                }
-            }
-            let energy = |j: usize| y[j] * y[j] * pivots[j];
-            let total = (self.square[gauge] * scale - energy(0) - energy(1)).max(0.0);
+            let mut y = self.normal.right[gauge].map(|sum| sum * scale);
+            without.forwards(&mut y, LINEAR);
+            let energy = |j: usize| without.energy(&y, j);
+            let total = (self.normal.square[gauge] * scale - energy(0) - energy(1)).max(0.0);
             let explained = (energy(2) + energy(3)).min(total);
             fitted.totals[gauge] = total;
             fitted.explaineds[gauge] = explained;

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use firmware_sensor::counting::predicted_mean_mm;
+use firmware_sensor::texture::Surface;
 use firmware_sensor::{
     Drive, ESTIMATE_RATE_HZ, MICROMETRES_PER_COUNT, MID_RAIL_CODE, Output, SCAN_RATE_HZ,
     SCANS_PER_SAMPLE, Scan, Sensor,
@@ -392,9 +393,10 @@ fn a_replay_is_the_same_bit_for_bit() {
 }
 
 #[test]
-fn the_whole_state_is_within_26_kib() {
-    let bytes = size_of::<Sensor>();
-    assert!(bytes <= 26 * 1_024, "{bytes} bytes");
+fn the_state_of_the_wavelength_is_within_24_kib_and_that_of_the_texture_within_1_5() {
+    let [whole, texture] = [size_of::<Sensor>(), size_of::<Surface>()];
+    assert!(whole - texture <= 24 * 1_024, "{whole} - {texture} bytes");
+    assert!(texture <= 3 * 512, "{texture} bytes");
 }
 
 #[test]

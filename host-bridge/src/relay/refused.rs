@@ -61,7 +61,10 @@ impl Ledger {
         }
         let peer = cut(self.names.get(peer).map_or(peer, String::as_str));
         let key = key.map(cut);
-        let is_news = self.named.len() < NAMED && self.named.insert((peer.clone(), key.clone()));
+        // Who may speak on no key at all is not named once more for each of them.
+        let is_known = self.named.contains(&(peer.clone(), None));
+        let is_news =
+            !is_known && self.named.len() < NAMED && self.named.insert((peer.clone(), key.clone()));
         if is_news {
             self.untold.push(Refused::Named { peer, key });
         } else {
@@ -271,6 +274,25 @@ mod tests {
         let more = 100_000 - NAMED as u64;
         assert_eq!(ledger.untold[NAMED], Refused::More(more));
         assert_eq!(ledger.untold.len(), NAMED + 2, "it is named again");
+    }
+
+    #[test]
+    fn who_may_speak_on_no_key_is_named_once_whatever_it_tries() {
+        let mut ledger = Ledger::default();
+        ledger.note(0, "4f2a", None);
+        ledger.note(0, "4f2a", Some("ridgelink/bench/display/stop"));
+        ledger.note(0, "4f2a", None);
+        ledger.note(0, "8c01", Some("ridgelink/bench/display/stop"));
+        let keys: Vec<_> = ledger
+            .untold
+            .iter()
+            .map(|refused| match refused {
+                Refused::Named { peer, key } => (peer.as_str(), key.is_some()),
+                Refused::More(_) => panic!("nothing is kept back yet"),
+            })
+            .collect();
+        assert_eq!(keys, [("4f2a", false), ("8c01", true)]);
+        assert_eq!(ledger.more, 2);
     }
 
     #[test]

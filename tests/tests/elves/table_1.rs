@@ -117,10 +117,14 @@ fn the_actuators_vibrate_at_speed_over_estimated_wavelength_within_a_thousandth(
 }
 
 #[test]
-fn every_channels_mean_over_time_is_below_fifteen_millivolts() {
-    in_every_cell(|_, run| {
+fn every_channels_mean_over_time_is_below_five_millivolts() {
+    in_every_cell(|cell, run| {
         let mean_v = run.verdict.actuators.mean_v.unwrap_or(f64::NAN);
-        hold(mean_v.abs() <= 15e-3, format!("{mean_v} V"))
+        // Here alone the count's λ̂ swings, 2.4 mm and 4.8 mm by turns: a wave that is due half as long as the other
+        // half has a mean of its own.
+        let swings = (cell.wavelength_mm, cell.speed_mm_s) == (4.0, 30.0);
+        let bound_v = if swings { 15e-3 } else { 5e-3 };
+        hold(mean_v.abs() <= bound_v, format!("{mean_v} V"))
     });
 }
 

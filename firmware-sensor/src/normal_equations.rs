@@ -1,0 +1,141 @@
+//! Normal equations of a linear least-squares fit: the same terms for every gauge, each with its own coefficients.
+
+use protocol::GAUGES;
+
+/// Rows that are summed up at a time, so that a sum is fetched and stored once for all of them.
+const ROWS: usize = 4;
+
+/// Sums over rows of terms f, and of what each gauge felt, s.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalEquations<const TERMS: usize> {
+    /// Lower triangle of Σ f fᵀ.
+    pub products: [[f32; TERMS]; TERMS],
+    /// Σ f s of each gauge.
+    pub right: [[f32; TERMS]; GAUGES],
+    /// Σ s² of each gauge.
+    pub square: [f32; GAUGES],
+    /// Rows that are not in the sums yet, and how many.
+    rows: [Row<TERMS>; ROWS],
+    filled: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Row<const TERMS: usize> {
+    terms: [f32; TERMS],
+    felt: [f32; GAUGES],
+}
+
+impl<const TERMS: usize> Row<TERMS> {
+    const EMPTY: Self = Self {
+        terms: [0.0; TERMS],
+        felt: [0.0; GAUGES],
+    };
+}
+
+/// A lower triangle of products without its first unknowns: their pivots, the factors below those, and what is left of
+/// the other products (the Schur complement).
+#[derive(Clone, Copy, Debug)]
+pub struct Eliminated<const TERMS: usize> {
+    /// Factors, and what is left.
+    pub a: [[f32; TERMS]; TERMS],
+    /// 1 / each pivot.
+    pub pivots: [f32; TERMS],
+}
+
+impl<const TERMS: usize> Default for NormalEquations<TERMS> {
+    fn default() -> Self {
+        Self {
+            products: [[0.0; TERMS]; TERMS],
+            right: [[0.0; TERMS]; GAUGES],
+            square: [0.0; GAUGES],
+            rows: [Row::EMPTY; ROWS],
+            filled: 0,
+        }
+    }
+}
+
+impl<const TERMS: usize> NormalEquations<TERMS> {
+    /// Takes a row: its terms, and what the gauges felt, in ADC steps.
+    #[inline]
+    pub fn add(&mut self, terms: [f32; TERMS], felt: [f32; GAUGES]) {
+        self.rows[self.filled % ROWS] = Row { terms, felt };
+        self.filled += 1;
+        if self.filled == ROWS {
+            self.take_in();
+        }
+    }
+
+    /// Sums up the rows that wait.
+    #[inline(never)]
+    pub fn take_in(&mut self) {
+        while self.filled < ROWS {
+            self.rows[self.filled] = Row::EMPTY;
+            self.filled += 1;
+        }
+        self.filled = 0;
+        let [one, two, three, four] = &self.rows;
+        for i in 0..TERMS {
+            for j in 0..=i {
+                self.products[i][j] += one.terms[i] * one.terms[j]
+                    + two.terms[i] * two.terms[j]
+                    + three.terms[i] * three.terms[j]
+                    + four.terms[i] * four.terms[j];
+            }
+        }
+        for gauge in 0..GAUGES {
+            let felt = [one, two, three, four].map(|row| row.felt[gauge]);
+            for i in 0..TERMS {
+                self.right[gauge][i] += one.terms[i] * felt[0]
+                    + two.terms[i] * felt[1]
+                    + three.terms[i] * felt[2]
+                    + four.terms[i] * felt[3];
+            }
+            self.square[gauge] += felt.iter().map(|x| x * x).sum::<f32>();
+        }
+    }
+}
+
+impl<const TERMS: usize> Eliminated<TERMS> {
+    /// Eliminates the first `unknowns` of the products `a`. `None` if a pivot is not above its `least`: the rows do not
+    /// tell the unknowns apart.
+    #[inline(always)]
+    pub fn new(mut a: [[f32; TERMS]; TERMS], unknowns: usize, least: [f32; TERMS]) -> Option<Self> {
+        let mut pivots = [0.0_f32; TERMS];
+        for j in 0..unknowns {
+            if a[j][j] <= least[j] {
+                return None;
+            }
+            pivots[j] = 1.0 / a[j][j];
+            for i in j + 1..TERMS {
+                let factor = a[i][j] * pivots[j];
+                #[allow(
+                    clippy::needless_range_loop,
+                    reason = "two rows of one matrix; a slice of each is twice the instructions on the board"
+                )]
+                for k in j + 1..=i {
+                    a[i][k] -= factor * a[k][j];
+                }
+            }
+            for row in &mut a[j + 1..] {
+                row[j] *= pivots[j];
+            }
+        }
+        Some(Self { a, pivots })
+    }
+
+    /// Eliminates the first `unknowns` from a right side as well.
+    #[inline(always)]
+    pub fn forwards(&self, y: &mut [f32; TERMS], unknowns: usize) {
+        for j in 0..unknowns {
+            for i in j + 1..TERMS {
+                y[i] -= self.a[i][j] * y[j];
+            }
+        }
+    }
+
+    /// The energy, in the right side's units squared, that unknown `j` explains of what [`Self::forwards`] left in `y`.
+    #[inline(always)]
+    pub fn energy(&self, y: &[f32; TERMS], j: usize) -> f32 {
+        y[j] * y[j] * self.pivots[j]
+    }
+}
