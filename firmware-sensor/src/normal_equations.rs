@@ -32,16 +32,6 @@ impl<const TERMS: usize> Row<TERMS> {
     };
 }
 
-/// A lower triangle of products without its first unknowns: their pivots, the factors below those, and what is left of
-/// the other products (the Schur complement).
-#[derive(Clone, Copy, Debug)]
-pub struct Eliminated<const TERMS: usize> {
-    /// Factors, and what is left.
-    pub a: [[f32; TERMS]; TERMS],
-    /// 1 / each pivot.
-    pub pivots: [f32; TERMS],
-}
-
 impl<const TERMS: usize> Default for NormalEquations<TERMS> {
     fn default() -> Self {
         Self {
@@ -56,23 +46,27 @@ impl<const TERMS: usize> Default for NormalEquations<TERMS> {
 
 impl<const TERMS: usize> NormalEquations<TERMS> {
     /// Takes a row: its terms, and what the gauges felt, in ADC steps.
-    #[inline]
+    #[inline(always)]
     pub fn add(&mut self, terms: [f32; TERMS], felt: [f32; GAUGES]) {
-        self.rows[self.filled % ROWS] = Row { terms, felt };
-        self.filled += 1;
-        if self.filled == ROWS {
-            self.take_in();
+        self.rows[self.filled] = Row { terms, felt };
+        self.filled = (self.filled + 1) % ROWS;
+        if self.filled == 0 {
+            self.sum();
         }
     }
 
     /// Sums up the rows that wait.
-    #[inline(never)]
+    #[inline]
     pub fn take_in(&mut self) {
-        while self.filled < ROWS {
-            self.rows[self.filled] = Row::EMPTY;
-            self.filled += 1;
+        if self.filled > 0 {
+            self.rows[self.filled..].fill(Row::EMPTY);
+            self.filled = 0;
+            self.sum();
         }
-        self.filled = 0;
+    }
+
+    #[inline(never)]
+    fn sum(&mut self) {
         let [one, two, three, four] = &self.rows;
         for i in 0..TERMS {
             for j in 0..=i {
@@ -95,47 +89,47 @@ impl<const TERMS: usize> NormalEquations<TERMS> {
     }
 }
 
-impl<const TERMS: usize> Eliminated<TERMS> {
-    /// Eliminates the first `unknowns` of the products `a`. `None` if a pivot is not above its `least`: the rows do not
-    /// tell the unknowns apart.
-    #[inline(always)]
-    pub fn new(mut a: [[f32; TERMS]; TERMS], unknowns: usize, least: [f32; TERMS]) -> Option<Self> {
-        let mut pivots = [0.0_f32; TERMS];
-        for j in 0..unknowns {
-            if a[j][j] <= least[j] {
-                return None;
-            }
-            pivots[j] = 1.0 / a[j][j];
-            for i in j + 1..TERMS {
-                let factor = a[i][j] * pivots[j];
-                #[allow(
-                    clippy::needless_range_loop,
-                    reason = "two rows of one matrix; a slice of each is twice the instructions on the board"
-                )]
-                for k in j + 1..=i {
-                    a[i][k] -= factor * a[k][j];
-                }
-            }
-            for row in &mut a[j + 1..] {
-                row[j] *= pivots[j];
+/// Eliminates the first `unknowns` from a lower triangle of products: in their columns the factors stay, in the others
+/// what is left of the products (the Schur complement). Returns 1 / each pivot; `None` if one is not above its `least`:
+/// the rows do not tell the unknowns apart.
+#[inline(always)]
+pub fn eliminate<const TERMS: usize, const UNKNOWNS: usize>(
+    a: &mut [[f32; TERMS]; TERMS],
+    least: impl Fn(usize) -> f32,
+) -> Option<[f32; UNKNOWNS]> {
+    let mut pivots = [0.0_f32; UNKNOWNS];
+    for j in 0..UNKNOWNS {
+        if a[j][j] <= least(j) {
+            return None;
+        }
+        pivots[j] = 1.0 / a[j][j];
+        for i in j + 1..TERMS {
+            let factor = a[i][j] * pivots[j];
+            #[allow(
+                clippy::needless_range_loop,
+                reason = "two rows of one matrix; a slice of each is twice the instructions on the board"
+            )]
+            for k in j + 1..=i {
+                a[i][k] -= factor * a[k][j];
             }
         }
-        Some(Self { a, pivots })
-    }
-
-    /// Eliminates the first `unknowns` from a right side as well.
-    #[inline(always)]
-    pub fn forwards(&self, y: &mut [f32; TERMS], unknowns: usize) {
-        for j in 0..unknowns {
-            for i in j + 1..TERMS {
-                y[i] -= self.a[i][j] * y[j];
-            }
+        for row in &mut a[j + 1..] {
+            row[j] *= pivots[j];
         }
     }
+    Some(pivots)
+}
 
-    /// The energy, in the right side's units squared, that unknown `j` explains of what [`Self::forwards`] left in `y`.
-    #[inline(always)]
-    pub fn energy(&self, y: &[f32; TERMS], j: usize) -> f32 {
-        y[j] * y[j] * self.pivots[j]
+/// Eliminates the first `unknowns` from a right side as well, by what [`eliminate`] has left in `a`.
+#[inline(always)]
+pub fn eliminate_right<const TERMS: usize>(
+    a: &[[f32; TERMS]; TERMS],
+    y: &mut [f32; TERMS],
+    unknowns: usize,
+) {
+    for j in 0..unknowns {
+        for i in j + 1..TERMS {
+            y[i] -= a[i][j] * y[j];
+        }
     }
 }

@@ -72,7 +72,7 @@ pub struct Surface {
     rest: Option<Rest>,
     averages: Averages,
     rub: Rub,
-    /// Of the last touch.
+    /// Of the last touch of a block.
     usable: u8,
     noise: [f32; GAUGES],
 }
@@ -110,8 +110,6 @@ impl Surface {
             return;
         };
         let moved = touch.place.wrapping_sub(last);
-        self.usable = touch.usable;
-        self.noise = touch.noise;
         if self.turns(touch.place) {
             self.rub.since_turn_mm = 0.0;
             if !self.block.is_complete() {
@@ -135,6 +133,8 @@ impl Surface {
         // One after the other: the mean cost counts, not how many blocks there are.
         if self.rest.is_none() && !self.block.is_complete() {
             self.block.add(&touch.gauges, self.phase, travel_mm);
+            self.usable = touch.usable;
+            self.noise = touch.noise;
         }
     }
 

@@ -13,7 +13,7 @@ use core::ops::Range;
 use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
-use crate::normal_equations::{Eliminated, NormalEquations};
+use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
 use crate::phasor::phasor;
 use crate::root::sqrt;
 use crate::travel::{PLACES_PER_MM, Place};
@@ -176,13 +176,10 @@ impl Sums {
         base: &[f32; GAUGES],
     ) {
         let tau = self.waves + 0.5 * waves;
-        let mut felt = knot.gauges;
-        for (felt, base) in felt.iter_mut().zip(base) {
-            *felt -= base;
-        }
         self.waves += waves;
         self.knots += 1;
         let terms = [1.0, tau, cos, sin, angle * cos, angle * sin];
+        let felt = core::array::from_fn(|gauge| knot.gauges[gauge] - base[gauge]);
         self.normal.add(terms, felt);
     }
 
@@ -193,15 +190,14 @@ impl Sums {
             return None;
         }
         let scale = 1.0 / f32::from(self.knots);
-        let products = self.normal.products.map(|row| row.map(|sum| sum * scale));
-        let without = Eliminated::new(products, LINEAR, [LEAST_PIVOT; ALL])?;
-        let Eliminated { a, pivots } = &without;
+        let mut a = self.normal.products.map(|row| row.map(|sum| sum * scale));
+        let pivots: [f32; LINEAR] = eliminate(&mut a, |_| LEAST_PIVOT)?;
         let mut fitted = Fitted::default();
         let (mut along, mut curvature, mut rest, mut count) = (0.0, 0.0, 0.0, 0_u16);
         for gauge in 0..GAUGES {
             let mut y = self.normal.right[gauge].map(|sum| sum * scale);
-            without.forwards(&mut y, LINEAR);
-            let energy = |j: usize| without.energy(&y, j);
+            eliminate_right(&a, &mut y, LINEAR);
+            let energy = |j: usize| y[j] * y[j] * pivots[j];
             let total = (self.normal.square[gauge] * scale - energy(0) - energy(1)).max(0.0);
             let explained = (energy(2) + energy(3)).min(total);
             fitted.totals[gauge] = total;

@@ -5,7 +5,7 @@ use protocol::texture::PARTIALS;
 
 use super::averages::PartialSum;
 use super::{Complex, times};
-use crate::normal_equations::{Eliminated, NormalEquations};
+use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
 use crate::phasor::phasor;
 use crate::root::sqrt;
 
@@ -18,12 +18,18 @@ pub(super) const TERMS: usize = 2 + 2 * WAVES;
 /// Pivot relative to its diagonal below which the unknowns are not told apart.
 const LEAST_PIVOT: f32 = 1e-3;
 
-/// What is fitted at a place: τ is -½ to ½ over the block, so that slope and constant have little in common; the phase is
-/// in 2⁻³² cycles.
-pub(super) fn terms(tau: f32, phase: u32) -> [f32; TERMS] {
+/// Cosine and sine of each wave at a phase, in 2⁻³² cycles.
+pub(super) fn waves(phase: u32) -> [f32; 2 * WAVES] {
     let [c1, s1] = phasor(phase);
     let [c2, s2] = [c1 * c1 - s1 * s1, 2.0 * s1 * c1];
     let [c3, s3] = [c2 * c1 - s2 * s1, s2 * c1 + c2 * s1];
+    [c1, s1, c2, s2, c3, s3]
+}
+
+/// What is fitted at a knot: a constant, a slope that is -½ to ½ over the block, so that the two have little in common,
+/// and the waves.
+pub(super) fn terms(knot: usize, [c1, s1, c2, s2, c3, s3]: [f32; 2 * WAVES]) -> [f32; TERMS] {
+    let tau = (knot as f32 + 0.5) * (1.0 / KNOTS as f32) - 0.5;
     [1.0, tau, c1, s1, c2, s2, c3, s3]
 }
 
@@ -32,7 +38,7 @@ pub(super) fn terms(tau: f32, phase: u32) -> [f32; TERMS] {
 struct Knot {
     touches: f32,
     travel_mm: f32,
-    terms: [f32; TERMS],
+    waves: [f32; 2 * WAVES],
     gauges: [f32; GAUGES],
     first_phase: u32,
 }
@@ -104,9 +110,8 @@ impl Block {
         if knot.touches == 0.0 {
             knot.first_phase = phase;
         }
-        let tau = (self.travel_mm + knot.travel_mm) / self.length_mm - 0.5;
-        for (sum, term) in knot.terms.iter_mut().zip(terms(tau, phase)) {
-            *sum += term;
+        for (sum, wave) in knot.waves.iter_mut().zip(waves(phase)) {
+            *sum += wave;
         }
         for (sum, x) in knot.gauges.iter_mut().zip(gauges) {
             *sum += x;
@@ -124,11 +129,13 @@ impl Block {
     }
 
     /// Takes the knot, whose middle is there.
+    #[inline(never)]
     fn take(&mut self, middle: u32) {
         let knot = core::mem::take(&mut self.knot);
         let scale = 1.0 / knot.touches;
         let gauges = knot.gauges.map(|sum| sum * scale);
-        self.normal.add(knot.terms.map(|sum| sum * scale), gauges);
+        self.normal
+            .add(terms(self.knots, knot.waves.map(|sum| sum * scale)), gauges);
         if self.knots < KNOTS {
             self.ground.phases[self.knots] = (middle >> 16) as u16;
             self.ground.felt[self.knots] = gauges[self.loudest];
@@ -140,10 +147,8 @@ impl Block {
 
     /// The gauges' fits. `None` if the block does not tell the unknowns apart.
     pub fn fits(&self) -> Option<[Fit; GAUGES]> {
-        let products = self.normal.products;
-        let least = core::array::from_fn(|j| LEAST_PIVOT * products[j][j]);
-        let without = Eliminated::new(products, TERMS, least)?;
-        let Eliminated { a, pivots } = &without;
+        let mut a = self.normal.products;
+        let pivots: [f32; TERMS] = eliminate(&mut a, |j| LEAST_PIVOT * self.normal.products[j][j])?;
         let free = (self.knots - TERMS) as f32;
         // Cosine and sine have half of the knots' power.
         let per_coefficient = 2.0 / (self.knots as f32 * free);
@@ -151,9 +156,9 @@ impl Block {
         for (gauge, fit) in fits.iter_mut().enumerate() {
             let mut y = self.normal.right[gauge];
             let mut rest = self.normal.square[gauge];
-            without.forwards(&mut y, TERMS);
+            eliminate_right(&a, &mut y, TERMS);
             for j in 0..TERMS {
-                rest -= without.energy(&y, j);
+                rest -= y[j] * y[j] * pivots[j];
                 y[j] *= pivots[j];
             }
             for i in (0..TERMS).rev() {

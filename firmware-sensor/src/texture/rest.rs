@@ -2,7 +2,7 @@
 
 use protocol::texture::{BANDS, LOWEST_BAND_PER_MM};
 
-use super::block::{Fit, Ground, KNOTS, TERMS, terms};
+use super::block::{Fit, Ground, KNOTS, TERMS, terms, waves};
 use crate::phasor::phasor;
 
 /// What is left is worked out for so many knots at a time.
@@ -76,8 +76,8 @@ impl Rest {
         if self.next_knot < KNOTS {
             let end = (self.next_knot + KNOTS_A_STEP).min(KNOTS);
             for knot in self.next_knot..end {
-                let tau = (knot as f32 + 0.5) / KNOTS as f32 - 0.5;
-                let fitted: f32 = terms(tau, u32::from(ground.phases[knot]) << 16)
+                let waves = waves(u32::from(ground.phases[knot]) << 16);
+                let fitted: f32 = terms(knot, waves)
                     .iter()
                     .zip(&self.coefficients)
                     .map(|(term, coefficient)| term * coefficient)
@@ -104,7 +104,7 @@ impl Rest {
         let highest = self
             .highest_per_mm
             .min(0.5 * KNOTS as f32 / self.length_mm + 1e-3);
-        let Some(band) = band_of(per_mm).filter(|&band| upper_end(band) <= highest) else {
+        let Some(band) = band_of(per_mm).filter(|&band| UPPER_ENDS[band] <= highest) else {
             return;
         };
         // Goertzel's recurrence.
@@ -125,16 +125,26 @@ impl Rest {
 
 /// What the mean over so many touches, evenly over so many waves, leaves of a wave.
 fn left_of_mean(waves: f32, touches: f32) -> f32 {
-    let angle = core::f32::consts::PI * waves;
-    libm::sinf(angle) / (touches * libm::sinf(angle / touches))
+    // Half of the waves' angle.
+    let sine = |waves: f32| phasor((2_147_483_648.0 * waves) as u32)[1];
+    sine(waves) / (touches * sine(waves / touches))
 }
+
+/// The upper end of each band, in waves per mm.
+const UPPER_ENDS: [f32; BANDS] = {
+    let mut ends = [2.0 * LOWEST_BAND_PER_MM; BANDS];
+    let mut band = 1;
+    while band < BANDS {
+        ends[band] = 2.0 * ends[band - 1];
+        band += 1;
+    }
+    ends
+};
 
 /// The band that a wavenumber is in, in waves per mm.
 pub(super) fn band_of(per_mm: f32) -> Option<usize> {
-    (0..BANDS).find(|&band| (0.5 * upper_end(band)..upper_end(band)).contains(&per_mm))
-}
-
-/// The upper end of a band, in waves per mm.
-fn upper_end(band: usize) -> f32 {
-    LOWEST_BAND_PER_MM * (2_u32 << band) as f32
+    if per_mm < LOWEST_BAND_PER_MM {
+        return None;
+    }
+    UPPER_ENDS.iter().position(|&end| per_mm < end)
 }
