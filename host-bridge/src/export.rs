@@ -8,12 +8,12 @@
 //!
 //! What is written is what is there: nothing is filtered, and codes and words keep their steps.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use hil_sim_core::scene::{Scene, SceneError};
 
+use crate::output_file::{self, OutputFileError, refuse_taken};
 use crate::recording::reader::{ReadError, Reader};
 use crate::replay::scene::SceneError as ExcerptError;
 use crate::replay::scene::excerpt::Excerpt;
@@ -47,16 +47,6 @@ pub enum ExportError {
     /// A part of a scene was asked for.
     #[error("--from and --to-time are a recording's: a scene is as long as its duration_s says")]
     Part,
-    /// There are too few samples.
-    #[error(
-        "{path}: {count} samples of the gauges there: record without --no-gauges, and give --from and --to-time that leave some"
-    )]
-    NoSamples {
-        /// The recording.
-        path: PathBuf,
-        /// How many there are.
-        count: usize,
-    },
     /// The arm rests.
     #[error(
         "{path}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
@@ -91,20 +81,9 @@ pub enum ExportError {
         /// The place in µm.
         position_um: i64,
     },
-    /// A file is there already.
-    #[error("{path}: is there already: give another name, or --force to write over it")]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file can't be written.
-    #[error("{path}: can't be written: {source}")]
-    NotWritten {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    /// A file can't be made.
+    #[error(transparent)]
+    File(#[from] OutputFileError),
 }
 
 /// What is exported, and where to.
@@ -168,10 +147,10 @@ pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
     let to_s = settings.to_s.unwrap_or(f64::INFINITY);
     let excerpt = Excerpt::take(recording, settings.from_s.unwrap_or(0.0), to_s)?;
     if excerpt.samples.len() < 2 {
-        return Err(ExportError::NoSamples {
+        return Err(ExportError::Excerpt(ExcerptError::NoSamples {
             path: settings.from.clone(),
             count: excerpt.samples.len(),
-        });
+        }));
     }
     if is_texture {
         let texture = of_recording::texture(&excerpt, settings)?;
@@ -186,15 +165,11 @@ fn write_texture(
 ) -> Result<Vec<Exported>, ExportError> {
     let path = settings.to.clone();
     refuse_taken(&path, settings.force)?;
-    let not_written = |source| ExportError::NotWritten {
-        path: path.clone(),
-        source,
-    };
     let text = texture
         .experience
         .text()
-        .map_err(|error| not_written(io::Error::other(error)))?;
-    fs::write(&path, text).map_err(not_written)?;
+        .map_err(|error| OutputFileError::not_written(&path, io::Error::other(error)))?;
+    output_file::write(&path, &text)?;
     let section = texture.section(&path);
     Ok(vec![Exported {
         path,
@@ -223,15 +198,6 @@ fn write_groups(settings: &Settings, groups: Vec<Group>) -> Result<Vec<Exported>
         });
     }
     Ok(exported)
-}
-
-fn refuse_taken(path: &Path, force: bool) -> Result<(), ExportError> {
-    if path.exists() && !force {
-        return Err(ExportError::Exists {
-            path: path.to_owned(),
-        });
-    }
-    Ok(())
 }
 
 /// A file's name for a scene that stands beside it.

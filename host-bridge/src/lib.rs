@@ -24,6 +24,7 @@ pub mod link;
 pub mod live;
 pub mod lock;
 pub mod monitor;
+pub mod output_file;
 pub mod place;
 pub mod recording;
 pub mod relay;

@@ -9,6 +9,7 @@ use super::of_scene::{GAUGE_KEYS, GAUGE_SCALE, PLACE_KEYS, PLACE_SCALE};
 use super::texture::{Made, Trace};
 use super::{Along, ExportError, Group, Samples, Settings};
 use crate::recording::row::GaugeRow;
+use crate::replay::scene::SceneError as ExcerptError;
 use crate::replay::scene::excerpt::Excerpt;
 
 const MID_CODE: i32 = 32_768;
@@ -73,10 +74,10 @@ pub fn texture(excerpt: &Excerpt, settings: &Settings) -> Result<Made, ExportErr
     let samples = &excerpt.samples[longest_way(&excerpt.samples)];
     let places = samples.iter().map(|sample| sample.position_um);
     let (Some(low_um), Some(high_um)) = (places.clone().min(), places.max()) else {
-        return Err(ExportError::NoSamples {
+        return Err(ExportError::Excerpt(ExcerptError::NoSamples {
             path: settings.from.clone(),
             count: 0,
-        });
+        }));
     };
     if low_um == high_um {
         return Err(ExportError::AtRest {

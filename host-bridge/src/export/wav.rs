@@ -5,19 +5,20 @@ use std::path::Path;
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 
-use super::{ExportError, Group, Samples};
+use super::{Group, Samples};
+use crate::output_file::OutputFileError;
 
 /// Writes a group's file.
 ///
 /// # Errors
 /// If it can't be written.
-pub fn write(path: &Path, group: &Group) -> Result<(), ExportError> {
-    write_samples(path, group).map_err(|error| ExportError::NotWritten {
-        path: path.to_owned(),
-        source: match error {
+pub fn write(path: &Path, group: &Group) -> Result<(), OutputFileError> {
+    write_samples(path, group).map_err(|error| {
+        let source = match error {
             hound::Error::IoError(source) => source,
             other => io::Error::other(other),
-        },
+        };
+        OutputFileError::not_written(path, source)
     })
 }
 

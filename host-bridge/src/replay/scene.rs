@@ -8,12 +8,11 @@
 //!
 //! The hand and the arm both move as the recorded arm did: it is the arm that the gauges belong to.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use protocol::Estimate;
 
+use crate::output_file::{self, OutputFileError};
 use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::GaugeRow;
 
@@ -85,20 +84,9 @@ pub enum SceneError {
         /// What it may be.
         give: &'static str,
     },
-    /// A file is there already.
-    #[error("{path}: is there already: give another name, or --force to write over it")]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file can't be written.
-    #[error("{path}: can't be written: {source}")]
-    NotWritten {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    /// A file can't be made.
+    #[error(transparent)]
+    File(#[from] OutputFileError),
 }
 
 /// What is made of a recording.
@@ -144,9 +132,7 @@ pub struct Made {
 /// If none can be made of it, or a file can't be written.
 pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError> {
     let path = settings.path.clone();
-    if path.exists() && !settings.force {
-        return Err(SceneError::Exists { path });
-    }
+    output_file::refuse_taken(&path, settings.force)?;
     let recording_path = recording.path().to_owned();
     let to_s = settings.to_s.unwrap_or(f64::INFINITY);
     let excerpt = Excerpt::take(recording, settings.from_s, to_s)?;
@@ -182,10 +168,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         duration_s: layout.duration_s,
     };
     let toml = document::toml(&path, &piece, &excerpt, wavelength_mm, expected.as_ref())?;
-    fs::write(&path, toml).map_err(|source| SceneError::NotWritten {
-        path: path.clone(),
-        source,
-    })?;
+    output_file::write(&path, &toml)?;
     Ok(Made {
         path,
         duration_s: layout.duration_s,

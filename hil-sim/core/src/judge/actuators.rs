@@ -99,7 +99,7 @@ impl Judge {
             middle: AboutMiddle::default(),
             cycles: Cycles::default(),
             standing: Standing::new(truth.reference_actuator.min(ACTUATORS - 1)),
-            demodulator: Demodulator::default(),
+            demodulator: Demodulator::new(truth.display.rendering),
             reactions: Reactions::default(),
             peaks: Peaks::NONE,
             words: [0x8000; ACTUATORS],

@@ -2,12 +2,19 @@
 
 use std::f64::consts::TAU;
 
+use protocol::Rendering;
+
 use crate::judge::mean;
 use crate::judge::phase::Due;
 
 /// Root mean square of a window's voltage, over the highest voltage, from which on the stimulus
 /// counts as at full amplitude: a full sine has 0.71, one that fades in over half the window 0.58.
 const FULL: f64 = 0.65;
+/// Amplitude of the sine that has the loudest cycle's mean square, over the highest voltage, from which on that cycle
+/// counts as one at full amplitude: a triangle has 0.82. What never gets so far fades.
+const LEAST_FULL: f64 = 0.5;
+/// A window with less than this left of the second harmonic is a whole cycle.
+const WHOLE: f64 = 0.05;
 /// Points that a window needs for its two unknowns to be worth anything.
 const ENOUGH_POINTS: usize = 5;
 
@@ -22,13 +29,16 @@ pub struct PhaseError {
 
 /// Demodulates a voltage by its due phase φ: least squares of a sin 2πφ + b cos 2πφ over
 /// each cycle of travel, forwards or backwards; the phase error is atan2(b, a)/2π.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Demodulator {
     /// The last point and its voltage, whose weight is not known before the next one, and the cycles travelled
     /// at the point before it.
     last: Option<(Due, f64)>,
     before_cycles: f64,
     window: Window,
+    /// Whether a window may hold a part of a cycle: a sine tells its phase by any part of it, but the partials of another
+    /// wave cancel over whole cycles only.
+    takes_parts: bool,
     demodulated: Vec<Demodulated>,
 }
 
@@ -58,6 +68,17 @@ struct Demodulated {
 }
 
 impl Demodulator {
+    /// For a stimulus of that rendering.
+    pub fn new(rendering: Rendering) -> Self {
+        Self {
+            last: None,
+            before_cycles: 0.0,
+            window: Window::default(),
+            takes_parts: rendering == Rendering::Fundamental,
+            demodulated: Vec::new(),
+        }
+    }
+
     /// The voltage at the next point, in V.
     pub fn add(&mut self, due: Due, volts: f64) {
         self.weigh(due.travelled_cycles);
@@ -90,9 +111,19 @@ impl Demodulator {
         if let Some((last, _)) = self.last {
             self.weigh(last.travelled_cycles);
         }
-        self.demodulated.extend(self.window.demodulated());
+        self.demodulated
+            .extend(self.window.demodulated(self.takes_parts));
+        let mean_square = |window: &Demodulated| window.square / window.whole;
+        let loudest = self.demodulated.iter().map(mean_square).fold(0.0, f64::max);
+        // A wave that is no sine has another mean square at the same peak: its loudest cycle is a full one.
+        let is_rendered = loudest >= 0.5 * LEAST_FULL * LEAST_FULL * peak_v * peak_v;
+        let peak_v = if is_rendered {
+            peak_v.min((2.0 * loudest).sqrt())
+        } else {
+            peak_v
+        };
         let full_v = FULL * peak_v;
-        let full = |window: &&Demodulated| window.square >= full_v * full_v * window.whole;
+        let full = |window: &&Demodulated| mean_square(window) >= full_v * full_v;
         let windows = self.demodulated.iter().filter(full);
         windows.map(|window| window.error_cycles).collect()
     }
@@ -110,7 +141,8 @@ impl Demodulator {
         };
         let number = due.travelled_cycles.floor();
         if number != self.window.number {
-            self.demodulated.extend(self.window.demodulated());
+            self.demodulated
+                .extend(self.window.demodulated(self.takes_parts));
             self.window = Window {
                 number,
                 ..Window::default()
@@ -135,12 +167,17 @@ impl Window {
     }
 
     /// The phase of the voltage relative to its due phase.
-    fn demodulated(&self) -> Option<Demodulated> {
+    fn demodulated(&self, takes_parts: bool) -> Option<Demodulated> {
         // sin² + cos² = 1: this is the sum of the weights.
         let whole = self.ss + self.cc;
         let determinant = self.ss * self.cc - self.sc * self.sc;
         // A window in which the phase hardly moved does not tell a from b.
         if self.points < ENOUGH_POINTS || determinant <= 1e-3 * whole * whole {
+            return None;
+        }
+        // What the mean of e^(i 2·2πφ) leaves: 0 over a whole cycle.
+        let left = (self.ss - self.cc).hypot(2.0 * self.sc);
+        if !takes_parts && left > WHOLE * whole {
             return None;
         }
         let a = (self.sv * self.cc - self.cv * self.sc) / determinant;
@@ -150,5 +187,63 @@ impl Window {
             square: self.vv,
             whole,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn due(cycles: f64, travelled_cycles: f64) -> Due {
+        Due {
+            t_s: 0.0,
+            cycles,
+            travelled_cycles,
+            tick: (0.0, 0.0),
+        }
+    }
+
+    /// Adds `cycles` in steps of a fortieth, of a wave of three partials that is highest where they meet, `ahead` of what
+    /// is due.
+    fn demodulate(rendering: Rendering, cycles: &[(f64, f64)], ahead: f64) -> Option<PhaseError> {
+        let mut demodulator = Demodulator::new(rendering);
+        let mut points = 0_u32;
+        for &(from, to) in cycles {
+            let steps = ((to - from).abs() * 40.0).round() as usize;
+            for step in 0..steps {
+                let cycles = from + (to - from) * step as f64 / steps as f64;
+                let angle = TAU * (cycles + ahead);
+                let volts = angle.sin() + (2.0 * angle + 1.5).sin() + (3.0 * angle).cos();
+                demodulator.add(due(cycles, f64::from(points) / 40.0), volts);
+                points += 1;
+            }
+        }
+        demodulator.finish(2.6)
+    }
+
+    #[test]
+    fn a_wave_of_another_form_is_judged_by_its_own_loudest_cycle() {
+        // Its root mean square is 1.22 V, 0.47 of its peak.
+        let error = demodulate(Rendering::Shape, &[(0.0, 12.0)], 0.1).expect("it is driven");
+        assert!((error.mean_cycles - 0.1).abs() < 0.002, "{error:?}");
+        assert!(error.rms_cycles < 0.105, "{error:?}");
+    }
+
+    #[test]
+    fn of_a_wave_of_another_form_only_whole_cycles_count() {
+        // At the end to and fro over the same 0.3 of a cycle, where the wave is loudest.
+        let turning = [(0.0, 7.15), (7.15, 6.85), (6.85, 7.15), (7.15, 6.9)];
+        let whole = demodulate(Rendering::Shape, &turning, 0.0).expect("seven cycles");
+        assert!(whole.rms_cycles < 0.01, "{whole:?}");
+    }
+
+    #[test]
+    fn what_only_fades_is_not_judged() {
+        let mut demodulator = Demodulator::new(Rendering::Texture);
+        for step in 0..400 {
+            let cycles = f64::from(step) / 40.0;
+            demodulator.add(due(cycles, cycles), 0.4 * (TAU * cycles).sin());
+        }
+        assert_eq!(demodulator.finish(1.0), None);
     }
 }

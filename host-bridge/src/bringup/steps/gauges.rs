@@ -13,26 +13,11 @@ pub const STEPS: [Step; 2] = [
         witness: Witness::Boards,
         needs: &["sensor-board"],
         measures: &[
-            level(
-                "mean of gauge 0 (A0)",
-                Source::Number(|sight| mean_v(sight, 0)),
-            ),
-            level(
-                "mean of gauge 1 (A1)",
-                Source::Number(|sight| mean_v(sight, 1)),
-            ),
-            level(
-                "mean of gauge 2 (A2)",
-                Source::Number(|sight| mean_v(sight, 2)),
-            ),
-            level(
-                "mean of gauge 3 (A3)",
-                Source::Number(|sight| mean_v(sight, 3)),
-            ),
-            level(
-                "mean of gauge 4 (A4)",
-                Source::Number(|sight| mean_v(sight, 4)),
-            ),
+            level("mean of gauge 0 (A0)", |sight| mean_v(sight, 0)),
+            level("mean of gauge 1 (A1)", |sight| mean_v(sight, 1)),
+            level("mean of gauge 2 (A2)", |sight| mean_v(sight, 2)),
+            level("mean of gauge 3 (A3)", |sight| mean_v(sight, 3)),
+            level("mean of gauge 4 (A4)", |sight| mean_v(sight, 4)),
         ],
     },
     Step {
@@ -43,35 +28,20 @@ pub const STEPS: [Step; 2] = [
         witness: Witness::Boards,
         needs: &["gauges-level", "arm-encoder"],
         measures: &[
-            alive(
-                "swing of gauge 0 (A0)",
-                Source::Number(|sight| swing_mv(sight, 0)),
-            ),
-            alive(
-                "swing of gauge 1 (A1)",
-                Source::Number(|sight| swing_mv(sight, 1)),
-            ),
-            alive(
-                "swing of gauge 2 (A2)",
-                Source::Number(|sight| swing_mv(sight, 2)),
-            ),
-            alive(
-                "swing of gauge 3 (A3)",
-                Source::Number(|sight| swing_mv(sight, 3)),
-            ),
-            alive(
-                "swing of gauge 4 (A4)",
-                Source::Number(|sight| swing_mv(sight, 4)),
-            ),
+            alive("swing of gauge 0 (A0)", |sight| swing_mv(sight, 0)),
+            alive("swing of gauge 1 (A1)", |sight| swing_mv(sight, 1)),
+            alive("swing of gauge 2 (A2)", |sight| swing_mv(sight, 2)),
+            alive("swing of gauge 3 (A3)", |sight| swing_mv(sight, 3)),
+            alive("swing of gauge 4 (A4)", |sight| swing_mv(sight, 4)),
         ],
     },
 ];
 
-const fn level(what: &'static str, source: Source) -> Measure {
+const fn level(what: &'static str, number: fn(&Sight) -> Option<f64>) -> Measure {
     Measure {
         what,
         unit: "V",
-        source,
+        source: Source::Number(number),
         limit: Limit::Within(1.15, 2.15),
         advice: Advice::Fixed(
             "see the amplifier's supply and its wire, and balance the bridge to mid-rail, 1.65 V: at 0 or 3.3 V a wire \
@@ -80,11 +50,11 @@ const fn level(what: &'static str, source: Source) -> Measure {
     }
 }
 
-const fn alive(what: &'static str, source: Source) -> Measure {
+const fn alive(what: &'static str, number: fn(&Sight) -> Option<f64>) -> Measure {
     Measure {
         what,
         unit: "mV",
-        source,
+        source: Source::Number(number),
         limit: Limit::AtLeast(20.0),
         advice: Advice::Fixed(
             "see the gauge and the wire from its amplifier: shorted, or not connected, or not pushed over ridges",

@@ -381,6 +381,11 @@ impl RunObserver for FaultMonitor {
     }
 
     fn reset(&mut self, reset: &Reset) {
+        if let Some(step) = &mut self.step
+            && reset.role == Role::Display
+        {
+            step.restart(reset.at_ns);
+        }
         if self.due_ns.contains(&reset.at_ns) {
             self.resets += usize::from(reset.role == Role::Display);
             if !reset.is_injected {

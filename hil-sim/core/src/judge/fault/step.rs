@@ -11,7 +11,7 @@ use crate::run::recording::{Arrival, OutputRecord, TickRecord, volts};
 
 /// So long before a fault tells from where the phase goes on, in ns: a display that has started again counts from
 /// another place than the scene.
-const BEFORE_NS: u64 = 250_000_000;
+const BEFORE_NS: u64 = 500_000_000;
 
 /// The phase of the stimulus against the one due, before the fault and since.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub(super) struct Step {
     stimulus: Stimulus,
     reference: usize,
     before: Demodulator,
+    /// When the display last began to count anew before the fault, in s.
+    restarted_s: f64,
     /// Where it stood before the fault, in cycles.
     standing: Option<f64>,
     since: Demodulator,
@@ -32,10 +34,18 @@ impl Step {
             judged_ns,
             stimulus: Stimulus::new(truth),
             reference: truth.reference_actuator,
-            before: Demodulator::default(),
+            before: Demodulator::new(truth.display.rendering),
+            restarted_s: 0.0,
             standing: None,
-            since: Demodulator::default(),
+            since: Demodulator::new(truth.display.rendering),
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
+        }
+    }
+
+    /// The display has begun to count anew.
+    pub fn restart(&mut self, at_ns: u64) {
+        if at_ns < self.judged_ns.start {
+            self.restarted_s = seconds(at_ns);
         }
     }
 
@@ -48,7 +58,7 @@ impl Step {
 
     fn follow(&mut self) {
         let (from_s, to_s) = (seconds(self.judged_ns.start), seconds(self.judged_ns.end));
-        let before_s = from_s - BEFORE_NS as f64 * 1e-9;
+        let before_s = (from_s - BEFORE_NS as f64 * 1e-9).max(self.restarted_s);
         while let Some(told) = self.stimulus.take() {
             let Told::Point(edge, mut due) = told else {
                 continue;
@@ -58,8 +68,7 @@ impl Step {
                 self.before.add(due, volts);
             } else if (from_s..to_s).contains(&edge.t_s) {
                 let standing = *self.standing.get_or_insert_with(|| {
-                    let before = std::mem::take(&mut self.before);
-                    before.standing(self.peak_v).unwrap_or(0.0)
+                    self.before.clone().standing(self.peak_v).unwrap_or(0.0)
                 });
                 due.cycles += standing;
                 self.since.add(due, volts);

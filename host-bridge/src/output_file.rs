@@ -1,0 +1,55 @@
+//! A file that a command makes: never over one that is there, unless that is asked for.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a file is not made.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputFileError {
+    /// It is there already.
+    #[error("{path}: is there already: give another name, or --force to write over it")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It can't be written.
+    #[error("{path}: can't be written: {source}")]
+    NotWritten {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+}
+
+impl OutputFileError {
+    /// That `path` can't be written.
+    pub fn not_written(path: &Path, source: io::Error) -> Self {
+        Self::NotWritten {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// Refuses a file that is there already, unless it is written over by `force`.
+///
+/// # Errors
+/// [`OutputFileError::Exists`].
+pub fn refuse_taken(path: &Path, force: bool) -> Result<(), OutputFileError> {
+    if path.exists() && !force {
+        return Err(OutputFileError::Exists {
+            path: path.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// Writes the whole file.
+///
+/// # Errors
+/// [`OutputFileError::NotWritten`].
+pub fn write(path: &Path, text: &str) -> Result<(), OutputFileError> {
+    fs::write(path, text).map_err(|source| OutputFileError::not_written(path, source))
+}
