@@ -10,12 +10,13 @@
 //! | --- | --- |
 //! | coherence | share of the power of s in 5–200 Hz that is a linear function of y: Σ γ² S_ss / Σ S_ss by Welch's method, the chance of so few segments taken off |
 //! | shift δ | the display's place begins anywhere, and nobody can feel where: the best of a wavelength |
-//! | spectral distance | RMS over third octaves of 5–200 Hz of the two spectra's difference in dB, each over its own total, nothing below [`FLOOR_DB`] |
+//! | spectral distance | RMS over third octaves of 5–200 Hz of the two spectra's difference in dB, each over its own total, nothing below [`likeness::FLOOR_DB`] |
 //! | told apart | by [`observer`] |
 //!
 //! Boards are the firmware's libraries, or its ELFs in one scene, in which arm and hand move alike. The random part cannot be coherent: where the remote surface has a grain, the
 //! display has one of its own; only its spectrum is the surface's.
 
+pub mod likeness;
 pub mod observer;
 pub mod picture;
 pub mod surfaces;
@@ -35,12 +36,11 @@ use hil_sim_core::run::observer::RunObserver;
 use hil_sim_core::run::recording::{Engine, volts};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError, Series};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
 use serde::Serialize;
 
 use crate::psychophysics::bench::BenchError;
 use crate::study::{Fixed, Short, Study, Table, csv_text, number};
+use likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
 use observer::{Pair, pairs};
 use surfaces::{Ground, known, unseen};
 
@@ -59,12 +59,6 @@ const SNR_DB: f64 = 20.0;
 /// The sensor rubs for so long, in s, and the display's voltages are looked at from then on, until then.
 const RUBS_S: f64 = 8.5;
 const LOOKS_S: (f64, f64) = (4.0, 8.0);
-/// What is looked at, in Hz.
-pub const BAND_HZ: (f64, f64) = (5.0, 200.0);
-/// Third octaves in it.
-pub const THIRDS: usize = 16;
-/// A third octave so far below the whole counts as that far.
-pub const FLOOR_DB: f64 = -30.0;
 const DRIFT_MM_S: f64 = 3.0;
 /// Rows of a motion, in s.
 const ROW_S: f64 = 1e-3;
@@ -76,10 +70,6 @@ const GOAL_COHERENCE: f64 = 0.95;
 /// See [`GOAL_LOSS`].
 const GOAL_DB: f64 = 0.3;
 const TICK_NS: u64 = 500_000;
-const TICKS_HZ: f64 = 2_000.0;
-/// Samples in a segment, and from one to the next.
-const SEGMENT: usize = 1_024;
-const HOP: usize = SEGMENT / 2;
 /// Shifts of place that are tried.
 const SHIFTS: usize = 48;
 
@@ -373,89 +363,6 @@ fn coherence_at_best(case: &Case, played: &[f64]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The spectra of half-overlapping segments under a Hann window.
-fn segments(signal: &[f64]) -> Vec<Vec<Complex<f64>>> {
-    let transform = RealFftPlanner::new().plan_fft_forward(SEGMENT);
-    signal
-        .windows(SEGMENT)
-        .step_by(HOP)
-        .map(|segment| {
-            let mut windowed: Vec<f64> = segment
-                .iter()
-                .enumerate()
-                .map(|(n, x)| x * (0.5 - 0.5 * (TAU * n as f64 / SEGMENT as f64).cos()))
-                .collect();
-            let mut lines = transform.make_output_vec();
-            let transformed = transform.process(&mut windowed, &mut lines);
-            debug_assert!(transformed.is_ok(), "the lengths agree");
-            lines
-        })
-        .collect()
-}
-
-/// Lines of [`BAND_HZ`].
-fn lines() -> impl Iterator<Item = usize> {
-    let per_hz = SEGMENT as f64 / TICKS_HZ;
-    (BAND_HZ.0 * per_hz).ceil() as usize..=(BAND_HZ.1 * per_hz).floor() as usize
-}
-
-/// The share of `of`'s power that is coherent with `with`. So many segments show a coherence of 1/n where there is
-/// none.
-fn coherence(of: &[Vec<Complex<f64>>], with: &[Vec<Complex<f64>>]) -> f64 {
-    let chance = 1.0 / of.len() as f64;
-    let (mut coherent, mut all) = (0.0, 0.0);
-    for line in lines() {
-        let (mut own, mut others, mut common) = (0.0, 0.0, Complex::new(0.0, 0.0));
-        for (one, other) in of.iter().zip(with) {
-            own += one[line].norm_sqr();
-            others += other[line].norm_sqr();
-            common += one[line] * other[line].conj();
-        }
-        let share = if own * others > 0.0 {
-            common.norm_sqr() / (own * others)
-        } else {
-            0.0
-        };
-        coherent += own * ((share - chance) / (1.0 - chance)).max(0.0);
-        all += own;
-    }
-    coherent / all
-}
-
-/// Third octaves of [`BAND_HZ`], in dB over their sum.
-fn thirds_db(signal: &[f64]) -> [f64; THIRDS] {
-    thirds_where(signal, |_| true)
-}
-
-/// The same of the segments about such instants alone, in s.
-fn thirds_where(signal: &[f64], counts: impl Fn(f64) -> bool) -> [f64; THIRDS] {
-    let per_hz = SEGMENT as f64 / TICKS_HZ;
-    let mut powers = [0.0; THIRDS];
-    let middle_s = |n: usize| LOOKS_S.0 + (n * HOP + SEGMENT / 2) as f64 / TICKS_HZ;
-    let counted = segments(signal)
-        .into_iter()
-        .enumerate()
-        .filter(|(n, _)| counts(middle_s(*n)));
-    for (_, segment) in counted {
-        for line in lines() {
-            let octaves = (line as f64 / per_hz / BAND_HZ.0).log2();
-            powers[((3.0 * octaves) as usize).min(THIRDS - 1)] += segment[line].norm_sqr();
-        }
-    }
-    let all: f64 = powers.iter().sum();
-    powers.map(|power| (10.0 * (power / all).log10()).max(FLOOR_DB))
-}
-
-/// RMS of the difference, in dB.
-fn distance_db(one: &[f64; THIRDS], other: &[f64; THIRDS]) -> f64 {
-    let squares: f64 = one
-        .iter()
-        .zip(other)
-        .map(|(one, other)| (one - other).powi(2))
-        .sum();
-    (squares / THIRDS as f64).sqrt()
-}
-
 /// What a rendering is called in tables and files.
 pub const fn word(rendering: Rendering) -> &'static str {
     match rendering {
@@ -617,44 +524,7 @@ impl Study for Measured {
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
     use super::*;
-
-    /// As good as white.
-    fn grain(seed: u64) -> Vec<f64> {
-        let mut draws = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..8_192).map(|_| draws.random::<f64>() - 0.5).collect()
-    }
-
-    #[test]
-    fn a_signal_is_coherent_with_itself_and_with_what_it_is_filtered_of_and_not_with_another() {
-        let (one, other) = (grain(1), grain(2));
-        let late: Vec<f64> = one.iter().skip(3).map(|x| -2.0 * x).collect();
-        let of = segments(&one);
-        assert!(coherence(&of, &of) > 0.999);
-        assert!(coherence(&of, &segments(&late)) > 0.95);
-        assert!(coherence(&of, &segments(&other)) < 0.1);
-        let half: Vec<f64> = one.iter().zip(&other).map(|(x, y)| x + y).collect();
-        let share = coherence(&of, &segments(&half));
-        assert!((0.4..0.6).contains(&share), "{share}");
-    }
-
-    #[test]
-    fn third_octaves_hold_what_is_in_them_and_a_level_is_no_distance() {
-        let tone = |hz: f64, volts: f64| -> Vec<f64> {
-            (0..8_192)
-                .map(|n| volts * (TAU * hz * f64::from(n) / TICKS_HZ).sin())
-                .collect()
-        };
-        // 5 Hz · 2^(10/3) = 50.4 Hz begins the eleventh.
-        let levels = thirds_db(&tone(56.0, 5.0));
-        assert!(levels[10] > -0.1, "{levels:?}");
-        assert_eq!((levels[8], levels[12]), (FLOOR_DB, FLOOR_DB));
-        assert!(distance_db(&levels, &thirds_db(&tone(56.0, 0.1))) < 1e-6);
-        assert!(distance_db(&levels, &thirds_db(&tone(112.0, 5.0))) > 8.0);
-    }
 
     #[test]
     fn a_family_that_partials_make_worse_or_the_random_part_misses_is_not_carried() {

@@ -17,8 +17,9 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
+use super::likeness::{THIRDS, thirds_where};
 use super::surfaces::{Ground, gratings, sine, weave};
-use super::{Case, RENDERINGS, SPEEDS, THIRDS, played, said, thirds_where, word};
+use super::{Case, LOOKS_S, RENDERINGS, SPEEDS, played, said, word};
 use crate::psychophysics::interval::{Interval, middle};
 use crate::psychophysics::normal::{PROBABLE_ERROR, cdf};
 use crate::study::{Fixed, csv_text};
@@ -105,7 +106,7 @@ pub fn pairs(quick: bool, done: &(impl Fn() + Sync)) -> Result<Vec<Pair>, SceneE
         Ok::<_, SceneError>(RENDERINGS.map(|rendering| {
             let delay_ms = DELAY_MS * case.seed as f64;
             thirds_where(&played(&said, case.hand, rendering, delay_ms), |t_s| {
-                case.hand.relative_speed(t_s) >= BRISK
+                case.hand.relative_speed(LOOKS_S.0 + t_s) >= BRISK
             })
         }))
     })?;
