@@ -24,8 +24,9 @@ use hil_sim_core::scene::fault::catalogue::{Class, Lasts};
 use hil_sim_core::scene::fault::{Fault, Kind, nanoseconds};
 use hil_sim_core::scene::{Display, Motion, Scene, Specimen, Surface};
 
-/// From power on until the stimulus can be driving, in s: of both boards, and of the display alone.
-const STARTS_S: f64 = 0.3;
+/// From power on until the stimulus can be driving, in s: of both boards, and of the display alone. A sensor that starts again
+/// within its first third of a second is taken for late.
+const STARTS_S: f64 = 0.4;
 const RESTARTS_S: f64 = 0.15;
 /// The boards tell their counters once a second; what has just been tried is not to be in those that tell
 /// of the next.

@@ -106,8 +106,8 @@ impl Demodulator {
         (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
     }
 
-    /// The errors of the windows at full amplitude.
-    fn errors(mut self, peak_v: f64) -> Vec<f64> {
+    /// The errors of the windows at full amplitude, in cycles, with `peak_v` as in [`Demodulator::finish`].
+    pub fn errors(mut self, peak_v: f64) -> Vec<f64> {
         if let Some((last, _)) = self.last {
             self.weigh(last.travelled_cycles);
         }

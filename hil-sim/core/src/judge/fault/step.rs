@@ -1,17 +1,25 @@
 //! Whether the stimulus stays in step with the hand while something is broken.
 
+use std::mem;
 use std::ops::Range;
 
+use protocol::Rendering;
+
 use crate::judge::phase_error::Demodulator;
-use crate::judge::seconds;
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::truth::Truth;
+use crate::judge::voltage::Edge;
+use crate::judge::{mean, seconds};
 use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord, volts};
+use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT, volts};
 
 /// So long before a fault tells from where the phase goes on, in ns: a display that has started again counts from
 /// another place than the scene.
 const BEFORE_NS: u64 = 500_000_000;
+
+/// After a silence of so long, in s, three ticks at 2 kHz, nobody can tell where a phase goes on; how it goes on from there can
+/// be told. Whether a λ that comes at the end of a fade is glided to hangs on what of it the words still show.
+const SILENCE_S: f64 = 1.4e-3;
 
 /// The phase of the stimulus against the one due, before the fault and since.
 #[derive(Clone, Debug)]
@@ -25,6 +33,12 @@ pub(super) struct Step {
     /// Where it stood before the fault, in cycles.
     standing: Option<f64>,
     since: Demodulator,
+    /// Errors up to the last silence, in cycles.
+    errors: Vec<f64>,
+    /// Whether there was a silence since the fault.
+    was_silent: bool,
+    silent_since_s: Option<f64>,
+    rendering: Rendering,
     peak_v: f64,
 }
 
@@ -38,6 +52,10 @@ impl Step {
             restarted_s: 0.0,
             standing: None,
             since: Demodulator::new(truth.display.rendering),
+            errors: Vec::new(),
+            was_silent: false,
+            silent_since_s: None,
+            rendering: truth.display.rendering,
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
         }
     }
@@ -53,7 +71,36 @@ impl Step {
     pub fn finish(mut self) -> Option<f64> {
         self.stimulus.end();
         self.follow();
-        Some(self.since.finish(self.peak_v)?.rms_cycles)
+        self.end_stretch();
+        let squares = self.errors.iter().map(|error| error * error);
+        Some(mean(squares)?.sqrt())
+    }
+
+    /// Takes the errors since the last silence.
+    fn end_stretch(&mut self) {
+        let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
+        let standing = if self.was_silent {
+            since.clone().standing(self.peak_v).unwrap_or(0.0)
+        } else {
+            0.0
+        };
+        let errors = since.errors(self.peak_v).into_iter();
+        self.errors.extend(errors.map(|error| {
+            let off = error - standing;
+            off - off.round()
+        }));
+    }
+
+    /// Ends a stretch where a silence is over.
+    fn notice_silence(&mut self, edge: &Edge) {
+        if edge.words.iter().all(|&word| word == ZERO_VOLT) {
+            self.silent_since_s.get_or_insert(edge.t_s);
+        } else if let Some(since_s) = self.silent_since_s.take()
+            && edge.t_s - since_s >= SILENCE_S
+        {
+            self.end_stretch();
+            self.was_silent = true;
+        }
     }
 
     fn follow(&mut self) {
@@ -64,6 +111,9 @@ impl Step {
                 continue;
             };
             let volts = volts(edge.words[self.reference]);
+            if edge.t_s >= from_s {
+                self.notice_silence(&edge);
+            }
             if (before_s..from_s).contains(&edge.t_s) {
                 self.before.add(due, volts);
             } else if (from_s..to_s).contains(&edge.t_s) {
