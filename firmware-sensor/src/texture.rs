@@ -19,6 +19,7 @@
 mod averages;
 mod block;
 mod friction;
+mod partial;
 mod rest;
 
 use protocol::texture::UNITY;
@@ -28,9 +29,10 @@ use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Finding, MIN_AMPLITUDE_LSB, Touch};
 use crate::root::sqrt;
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Place};
-use averages::{Averages, PartialSum, in_units};
+use averages::Averages;
 use block::Block;
 use friction::Rub;
+use partial::{PartialSum, in_units};
 use rest::Rest;
 
 /// Textures a second.

@@ -1,5 +1,6 @@
 //! Whom a relay refuses, and what it says to whoever starts it wrongly.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -255,8 +256,13 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
             listening.words()
         );
     }
-    let refusals = listening.words().matches("REFUSED: ").count();
-    assert_eq!(refusals, 5, "{}", listening.words());
+    // On a slow machine a minute passes, and each is named again.
+    let words = listening.words();
+    let refusals: BTreeSet<&str> = words
+        .lines()
+        .filter(|line| line.contains("REFUSED: ") && !line.contains("more of the last minute"))
+        .collect();
+    assert_eq!(refusals.len(), 5, "{words}");
     // Only what the real one has said has come.
     let said = listening.words().matches("the display's site: ").count();
     assert_eq!(said, 1, "{}", listening.words());

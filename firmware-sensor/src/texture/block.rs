@@ -3,7 +3,7 @@
 use protocol::GAUGES;
 use protocol::texture::PARTIALS;
 
-use super::averages::PartialSum;
+use super::partial::PartialSum;
 use super::{Complex, times};
 use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
 use crate::phasor::phasor;
