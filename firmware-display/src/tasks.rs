@@ -81,7 +81,7 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
     spawner.spawn(once(supervise(ports, vitals, counters, voice)));
 }
 
-/// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: LDAC's edge, 95 µs after
+/// Reads the hand, moves the phase, starts fifty voltages on their way. Deadline: LDAC's edge, 102 µs after
 /// the tick, for them to arrive. Missed, they are sent again with the next tick's travel in them, and the
 /// miss is counted; missed four times in a row, CLR is no longer held off and all outputs go to 0 V, as
 /// they do by hardware if this task does not run any more.

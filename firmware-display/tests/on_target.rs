@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn ldac_falls_ninety_five_microseconds_behind_the_tick(bench: &mut Bench) {
+    fn ldac_falls_at_its_time_behind_the_tick(bench: &mut Bench) {
         let Board {
             ticks, converters, ..
         } = &mut bench.board;

@@ -27,7 +27,7 @@ const DISPLAY: (&str, &[&str]) = (
         "clr_is_low_until_it_is_held_off_and_falls_two_milliseconds_later",
         "clr_stays_high_for_as_long_as_it_is_held_off",
         "the_tick_comes_as_often_as_it_is_asked_to",
-        "ldac_falls_ninety_five_microseconds_behind_the_tick",
+        "ldac_falls_at_its_time_behind_the_tick",
         "an_open_emergency_stop_is_a_pressed_one_and_an_open_alarm_is_none",
     ],
 );
