@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::fake_board::wait_until;
 use crate::pty::Near;
@@ -101,25 +101,47 @@ impl Terminal {
             .clone()
     }
 
-    /// The last of it, for a message.
+    /// What stands in the window, and the last of what was sent to it, for a message.
     pub fn last_shown(&self) -> String {
         const LONGEST: usize = 3_000;
         let shown = self.shown();
         let characters = shown.chars().count();
-        shown
+        let last: String = shown
             .chars()
             .skip(characters.saturating_sub(LONGEST))
-            .collect()
+            .collect();
+        format!("{}\n---\n{last:?}", self.window())
+    }
+
+    /// What stands in the window.
+    fn window(&self) -> String {
+        let screen = self.screen.lock().unwrap_or_else(PoisonError::into_inner);
+        screen.screen().contents()
     }
 
     /// Waits until `words` stand in a row of the window, or were sent in one piece; whether they were. A
     /// program that writes only what has changed sends words in pieces where others stood before.
     pub fn shows(&self, limit: Duration, words: &str) -> bool {
-        let stand = || {
-            let screen = self.screen.lock().unwrap_or_else(PoisonError::into_inner);
-            screen.screen().contents().contains(words)
-        };
-        wait_until(limit, || stand() || self.shown().contains(words))
+        wait_until(limit, || {
+            self.window().contains(words) || self.shown().contains(words)
+        })
+    }
+
+    /// Types `keys` until `words` are shown, as a person does whose change has found no answer: on a busy machine
+    /// the system itself may pass a board's bytes on later than the 2 s after which a change is given up.
+    ///
+    /// # Panics
+    /// If they are not shown within `limit`.
+    pub fn types_until(&self, limit: Duration, keys: &str, words: &str) {
+        const PATIENCE: Duration = Duration::from_secs(6);
+        let end = Instant::now() + limit;
+        while Instant::now() < end {
+            self.type_keys(keys);
+            if self.shows(PATIENCE, words) {
+                return;
+            }
+        }
+        panic!("{words:?} was not shown:\n{}", self.last_shown());
     }
 
     /// How the terminal is set, as `stty` says it.
