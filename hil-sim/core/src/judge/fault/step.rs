@@ -17,9 +17,10 @@ use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT, volts}
 /// another place than the scene.
 const BEFORE_NS: u64 = 500_000_000;
 
-/// After a silence of so long, in s, three ticks at 2 kHz, nobody can tell where a phase goes on; how it goes on from there can
-/// be told. Whether a λ that comes at the end of a fade is glided to hangs on what of it the words still show.
-const SILENCE_S: f64 = 1.4e-3;
+/// After a silence of so many ticks nobody can tell where a phase goes on; how it goes on from there can be told. Whether
+/// a λ that comes at the end of a fade is glided to hangs on what of it the words still show. It is two ticks: a wave may
+/// meet 0 V to the word at one, in each cycle if its cycles are whole ticks.
+const SILENT_TICKS: f64 = 1.8;
 
 /// The phase of the stimulus against the one due, before the fault and since.
 #[derive(Clone, Debug)]
@@ -38,6 +39,8 @@ pub(super) struct Step {
     /// Whether there was a silence since the fault.
     was_silent: bool,
     silent_since_s: Option<f64>,
+    /// Of a silence, in s.
+    least_silence_s: f64,
     rendering: Rendering,
     peak_v: f64,
 }
@@ -55,6 +58,7 @@ impl Step {
             errors: Vec::new(),
             was_silent: false,
             silent_since_s: None,
+            least_silence_s: SILENT_TICKS / f64::from(truth.display.update_rate.hz()),
             rendering: truth.display.rendering,
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
         }
@@ -96,7 +100,7 @@ impl Step {
         if edge.words.iter().all(|&word| word == ZERO_VOLT) {
             self.silent_since_s.get_or_insert(edge.t_s);
         } else if let Some(since_s) = self.silent_since_s.take()
-            && edge.t_s - since_s >= SILENCE_S
+            && edge.t_s - since_s >= self.least_silence_s
         {
             self.end_stretch();
             self.was_silent = true;

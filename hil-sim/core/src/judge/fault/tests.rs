@@ -249,22 +249,31 @@ fn a_display_that_fades_too_early_or_for_another_reason_or_for_ever_is_found() {
 
 #[test]
 fn a_display_that_follows_what_it_must_not_is_out_of_step() {
-    let judged = |ahead: fn(f64) -> f64| {
+    let judged = |ahead: fn(f64) -> f64, silent_us: std::ops::Range<u64>| {
         let run = Run {
             ahead_cycles: Box::new(ahead),
             ..Run::steady(50.0, 2.0)
         };
+        let mut recording = run.record();
+        for output in &mut recording.outputs {
+            if silent_us.contains(&(output.at_ns / 1_000)) {
+                output.words = [ZERO_VOLT; ACTUATORS];
+            }
+        }
         let scene = Scene {
             duration_s: 2.0,
             faults: vec![Fault::new(Kind::Nothing, 0.5)],
             ..Scene::constant(2.0, 50.0)
         };
-        finding(&scene, 0, 2_000 * MS, &run.record()).unmet()
+        finding(&scene, 0, 2_000 * MS, &recording).unmet()
     };
     // Wherever its phase began, and not where it goes then.
-    assert_eq!(judged(|_| 0.3), [""; 0]);
-    let lost = judged(|t_s| if t_s < 0.6 { 0.3 } else { 0.4 });
+    assert_eq!(judged(|_| 0.3, 0..0), [""; 0]);
+    let goes_on = |t_s| if t_s < 0.6 { 0.3 } else { 0.4 };
+    let lost = judged(goes_on, 0..0);
     assert!(lost[0].starts_with("out of step by 0.09"), "{lost:?}");
+    // Unless nothing was driven between the two, for two ticks.
+    assert_eq!(judged(goes_on, 599_400..600_400), [""; 0]);
 }
 
 #[test]
