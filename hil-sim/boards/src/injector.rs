@@ -155,7 +155,11 @@ impl Injector {
             Kind::TickStopped => gate(TIM3.base + CR1, CEN),
             Kind::SpiStall => gate(RCC.base + RCC_APB2ENR, SPI1EN),
             Kind::DmaStall => gate(RCC.base + RCC_AHB1ENR, DMA2EN),
-            Kind::UartOverrun => gate(RCC.base + RCC_AHB1ENR, DMA1EN),
+            Kind::UartOverrun => {
+                let is_gated = gate(RCC.base + RCC_AHB1ENR, DMA1EN);
+                board.deafen(begins);
+                is_gated
+            }
             Kind::AdcStopped => gate(ADC3.base + ADC_CR2, ADON),
             Kind::WireStuckLow => {
                 board.break_line(begins);

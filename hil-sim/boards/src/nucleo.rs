@@ -141,6 +141,13 @@ impl<P: Pins> Nucleo<P> {
         framing.per_million = if broken { Rate::EVERY_WORD } else { 0 };
     }
 
+    /// Loses every byte that comes to the UARTs, or none: what DMA1 does without its clock. The emulated one goes on.
+    pub fn deafen(&mut self, is_deaf: bool) {
+        for uart in [PEER_UART, CONSOLE_UART] {
+            self.wire(uart).deafen(is_deaf);
+        }
+    }
+
     /// The far end of one of the UARTs.
     pub fn wire(&mut self, uart: usize) -> &mut Wire {
         self.mcu.part.usart[uart]

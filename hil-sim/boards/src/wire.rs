@@ -19,6 +19,7 @@ const SLACK_NS: u64 = 1_000;
 pub struct Wire {
     sent: Vec<TimedByte>,
     due: VecDeque<TimedByte>,
+    is_deaf: bool,
 }
 
 impl Store for Wire {}
@@ -44,6 +45,11 @@ impl Wire {
         self.due.clear();
     }
 
+    /// Loses what comes for as long as the board is deaf.
+    pub fn deafen(&mut self, is_deaf: bool) {
+        self.is_deaf = is_deaf;
+    }
+
     /// When the next byte comes that has not been offered yet.
     pub fn next_due(&self) -> Option<u64> {
         self.due.front().map(|&(at, _)| at)
@@ -61,6 +67,6 @@ impl Peer for Wire {
             return None;
         }
         self.due.pop_front();
-        Some(byte.into())
+        (!self.is_deaf).then_some(byte.into())
     }
 }

@@ -5,6 +5,8 @@
 //! | peer | USART2 | PD5, PD6 | 6, 5 |
 //! | console | USART3, the ST-LINK's | PD8, PD9 | 3, 1 |
 
+use embassy_stm32::interrupt::typelevel::Interrupt;
+use embassy_stm32::interrupt::{self, Priority};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, PD5, PD6, PD8, PD9, USART2, USART3,
@@ -23,6 +25,9 @@ bind_interrupts!(struct Irqs {
 
 /// Speed of both ports, 8N1.
 pub const BAUD: u32 = 921_600;
+/// After the tasks that have a deadline, which run at 6: an interrupt of DMA1 or a UART that cannot be ended comes again
+/// and again, and what comes over the ports is not to hold up gauges or actuators.
+const PRIORITY: Priority = Priority::P7;
 /// One UART: its receiver runs already, so that what the other board says before the tasks run is kept.
 pub struct Serial {
     /// The receiver.
@@ -41,6 +46,9 @@ pub fn peer(
     rx_dma: Peri<'static, DMA1_CH5>,
     ring: &'static mut [u8],
 ) -> Serial {
+    yield_to_deadlines::<interrupt::typelevel::USART2>();
+    yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM6>();
+    yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM5>();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
         ring,
@@ -56,10 +64,17 @@ pub fn console(
     rx_dma: Peri<'static, DMA1_CH1>,
     ring: &'static mut [u8],
 ) -> Serial {
+    yield_to_deadlines::<interrupt::typelevel::USART3>();
+    yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM3>();
+    yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM1>();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
         ring,
     )
+}
+
+fn yield_to_deadlines<I: Interrupt>() {
+    I::set_priority(PRIORITY);
 }
 
 fn configuration() -> Config {

@@ -8,7 +8,7 @@ use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_studies::campaign::{Plan, Tally, Trial, unmet};
-use protocol::{Mode, Rendering, Role};
+use protocol::{Mode, Rendering, Role, RoleCounters};
 use tests::elves;
 
 /// An instruction takes 8.3 ns.
@@ -148,4 +148,33 @@ fn a_dma_that_stalls_in_the_middle_of_an_update_is_named() {
         .collect();
     assert!(unmet.is_empty(), "ns after the tick: {unmet:#?}");
     assert!(findings.iter().all(|(_, finding)| finding.was_driving));
+}
+
+/// What comes over the UARTs waits for the samples: without DMA1's clock its interrupt, if it has just asked for one,
+/// cannot be ended and comes again and again.
+#[test]
+fn uarts_without_their_dma_cost_no_samples() {
+    const TIMES: usize = 12;
+    let faults = (0..TIMES).map(|turn| Fault::new(Kind::UartOverrun, 0.6 + 0.103 * turn as f64));
+    let scene = Scene {
+        duration_s: 2.1,
+        faults: faults.collect(),
+        ..Scene::constant(2.0, 50.0)
+    };
+    let (recording, _) = hil_sim_boards::run(&scene, elves::both()).unwrap();
+    let status = recording.sensor_status.expect("two a run");
+    let RoleCounters::Sensor(counters) = status.role else {
+        panic!("the sensor's: {status:?}");
+    };
+    assert_eq!(
+        (
+            counters.samples,
+            counters.dma_overruns,
+            counters.deadline_misses
+        ),
+        (2_000, 0, 0),
+        "{status:?}"
+    );
+    // At least so often something was lost of what the display says, 500 times a second.
+    assert!(status.peer.lost as usize > TIMES, "{status:?}");
 }

@@ -11,16 +11,18 @@ use crate::judge::truth::Truth;
 use crate::judge::voltage::Edge;
 use crate::judge::{mean, seconds};
 use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT, volts};
+use crate::run::recording::{Arrival, OutputRecord, TickRecord, volts};
 
 /// So long before a fault tells from where the phase goes on, in ns: a display that has started again counts from
 /// another place than the scene.
 const BEFORE_NS: u64 = 500_000_000;
 
-/// After a silence of so many ticks nobody can tell where a phase goes on; how it goes on from there can be told. Whether
-/// a λ that comes at the end of a fade is glided to hangs on what of it the words still show. It is two ticks: a wave may
-/// meet 0 V to the word at one, in each cycle if its cycles are whole ticks.
+/// Where nothing was to be heard, nobody can tell where a phase goes on; how it goes on from there can be told. Whether a λ
+/// that comes at the end of a fade is glided to hangs on what of it the words still show. A silence is so many ticks
+/// with no word above [`QUIET`], one of them at 0 V to the word: a wave's crossing is no silence.
 const SILENT_TICKS: f64 = 1.8;
+/// Of the highest voltage.
+const QUIET: f64 = 0.03;
 
 /// The phase of the stimulus against the one due, before the fault and since.
 #[derive(Clone, Debug)]
@@ -38,7 +40,9 @@ pub(super) struct Step {
     errors: Vec<f64>,
     /// Whether there was a silence since the fault.
     was_silent: bool,
-    silent_since_s: Option<f64>,
+    quiet_since_s: Option<f64>,
+    /// Whether all words were at 0 V since then.
+    was_zero: bool,
     /// Of a silence, in s.
     least_silence_s: f64,
     rendering: Rendering,
@@ -57,7 +61,8 @@ impl Step {
             since: Demodulator::new(truth.display.rendering),
             errors: Vec::new(),
             was_silent: false,
-            silent_since_s: None,
+            quiet_since_s: None,
+            was_zero: false,
             least_silence_s: SILENT_TICKS / f64::from(truth.display.update_rate.hz()),
             rendering: truth.display.rendering,
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
@@ -97,9 +102,13 @@ impl Step {
 
     /// Ends a stretch where a silence is over.
     fn notice_silence(&mut self, edge: &Edge) {
-        if edge.words.iter().all(|&word| word == ZERO_VOLT) {
-            self.silent_since_s.get_or_insert(edge.t_s);
-        } else if let Some(since_s) = self.silent_since_s.take()
+        let loudest = edge.words.iter().map(|&word| volts(word).abs());
+        let loudest_v = loudest.fold(0.0, f64::max);
+        if loudest_v <= QUIET * self.peak_v {
+            self.quiet_since_s.get_or_insert(edge.t_s);
+            self.was_zero |= loudest_v == 0.0;
+        } else if let Some(since_s) = self.quiet_since_s.take()
+            && mem::take(&mut self.was_zero)
             && edge.t_s - since_s >= self.least_silence_s
         {
             self.end_stretch();

@@ -5,7 +5,7 @@ use protocol::{DisplayState, Hold, Message, Safety, Trip};
 use super::*;
 use crate::judge::synthetic::{Run, word_of};
 use crate::run::fault_evidence::FaultEvidence;
-use crate::run::recording::{ACTUATORS, ZERO_VOLT};
+use crate::run::recording::{ACTUATORS, ZERO_VOLT, volts};
 use crate::scene::fault::{Fault, Kind};
 
 const MS: u64 = 1_000_000;
@@ -249,16 +249,15 @@ fn a_display_that_fades_too_early_or_for_another_reason_or_for_ever_is_found() {
 
 #[test]
 fn a_display_that_follows_what_it_must_not_is_out_of_step() {
-    let judged = |ahead: fn(f64) -> f64, silent_us: std::ops::Range<u64>| {
+    let judged = |ahead: fn(f64) -> f64, gain: fn(f64) -> f64| {
         let run = Run {
             ahead_cycles: Box::new(ahead),
             ..Run::steady(50.0, 2.0)
         };
         let mut recording = run.record();
         for output in &mut recording.outputs {
-            if silent_us.contains(&(output.at_ns / 1_000)) {
-                output.words = [ZERO_VOLT; ACTUATORS];
-            }
+            let gain = gain(output.at_ns as f64 * 1e-9);
+            output.words = output.words.map(|word| word_of(gain * volts(word)));
         }
         let scene = Scene {
             duration_s: 2.0,
@@ -268,12 +267,17 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
         finding(&scene, 0, 2_000 * MS, &recording).unmet()
     };
     // Wherever its phase began, and not where it goes then.
-    assert_eq!(judged(|_| 0.3, 0..0), [""; 0]);
+    assert_eq!(judged(|_| 0.3, |_| 1.0), [""; 0]);
     let goes_on = |t_s| if t_s < 0.6 { 0.3 } else { 0.4 };
-    let lost = judged(goes_on, 0..0);
+    let lost = judged(goes_on, |_| 1.0);
     assert!(lost[0].starts_with("out of step by 0.09"), "{lost:?}");
-    // Unless nothing was driven between the two, for two ticks.
-    assert_eq!(judged(goes_on, 599_400..600_400), [""; 0]);
+    // Unless nothing was to be heard between the two, for however short a time: it fades out in 50 ms, and in again.
+    let fades = |t_s: f64| ((t_s - 0.6).abs() / 0.05).min(1.0);
+    assert_eq!(judged(goes_on, fades), [""; 0]);
+    // What only falls to a fifth is heard all the time.
+    let softer = |t_s: f64| ((t_s - 0.6).abs() / 0.05).clamp(0.2, 1.0);
+    let lost = judged(goes_on, softer);
+    assert!(lost[0].starts_with("out of step by 0.0"), "{lost:?}");
 }
 
 #[test]
