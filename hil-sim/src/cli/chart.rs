@@ -16,7 +16,7 @@ use hil_sim_studies::estimators::result::{BenchmarkResult, Entry};
 use hil_sim_studies::estimators::score::Score;
 
 use super::files::{create_folder, keep};
-use super::{Elves, confidence, display, models, progress};
+use super::{Elves, EngineName, confidence, display, models, progress, run_options};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Chart {
@@ -75,6 +75,10 @@ struct Texture {
     /// A little of it only, to see that it works
     #[arg(long)]
     quick: bool,
+    /// Judge recordings instead: the scenes of this folder, which has an index.json with their truths as for `hil-sim
+    /// jury`. Writes texture-recorded.csv and texture-recorded.svg
+    #[arg(long, value_name = "DIR", conflicts_with = "quick")]
+    folder: Option<PathBuf>,
     #[command(flatten)]
     elves: Elves,
 }
@@ -156,6 +160,14 @@ impl Estimators {
 
 impl Texture {
     fn execute(self) -> anyhow::Result<ExitCode> {
+        if let Some(folder) = &self.folder {
+            let scenes = run_options::of_folder(folder, EngineName::Native)?;
+            create_folder(&self.out)?;
+            let progress = progress(scenes.len() as u64, "recordings");
+            let recorded = texture::recorded::measure(&scenes, || progress.inc(1))?;
+            progress.finish_and_clear();
+            return keep(&recorded, &self.out);
+        }
         let firmwares = self.elves.read()?;
         create_folder(&self.out)?;
         let progress = progress(texture::runs(self.quick), "runs");

@@ -17,7 +17,6 @@ use hil_sim_core::scene::{Estimator, Scene};
 use hil_sim_studies::jury::counts::Counts;
 use hil_sim_studies::jury::evidence;
 use hil_sim_studies::jury::evidence::Cases;
-use hil_sim_studies::jury::folder;
 use hil_sim_studies::jury::folder::Entry;
 use hil_sim_studies::jury::play::{Played, play};
 use hil_sim_studies::jury::seeds::Seeds;
@@ -287,24 +286,18 @@ impl Jury {
     }
 
     fn judge_folder(&self, folder: &Path, json: Option<(File, &Path)>) -> anyhow::Result<()> {
-        let entries = folder::read(folder)?;
-        // All of them first: a refusal is not to come after half an hour.
-        let scenes: Vec<(Entry, Scene)> = entries
-            .into_iter()
-            .map(|entry| {
-                let mut scene = run_options::load(&entry.scene, self.engine)?;
-                if let Some(method) = self.method {
-                    scene.estimator.method = method.into();
-                }
-                if let Some(percent) = self.valid_percent {
-                    scene.estimator.valid_percent = percent;
-                }
-                if let Some(max_age_ms) = self.max_age_ms {
-                    scene.display.configuration.max_age_ms = max_age_ms;
-                }
-                anyhow::Ok((entry, scene))
-            })
-            .collect::<Result<_, _>>()?;
+        let mut scenes = run_options::of_folder(folder, self.engine)?;
+        for (_, scene) in &mut scenes {
+            if let Some(method) = self.method {
+                scene.estimator.method = method.into();
+            }
+            if let Some(percent) = self.valid_percent {
+                scene.estimator.valid_percent = percent;
+            }
+            if let Some(max_age_ms) = self.max_age_ms {
+                scene.display.configuration.max_age_ms = max_age_ms;
+            }
+        }
         let ready = Ready::new(self.engine, &self.elves)?;
         let bar = progress(scenes.len() as u64, "scenes");
         let work = |(entry, scene): &(Entry, Scene)| judge_scene(&ready, entry, scene);

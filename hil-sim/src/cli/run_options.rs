@@ -11,6 +11,8 @@ use hil_sim_core::native;
 use hil_sim_core::run::recording::{Engine, Recording};
 use hil_sim_core::scene::{Scene, SceneError};
 use hil_sim_core::scene_file::line::line_of;
+use hil_sim_studies::jury::folder;
+use hil_sim_studies::jury::folder::Entry;
 use hil_sim_studies::output::annotation::Annotation;
 
 use super::say::say;
@@ -156,6 +158,16 @@ pub(super) fn load(path: &Path, engine: EngineName) -> Result<Scene, SceneError>
         native::check(&scene).map_err(|error| at_home(path, error))?;
     }
     Ok(scene)
+}
+
+/// The scenes of a folder's list, all of them before anything is run: a refusal is not to come after half an hour.
+pub(super) fn of_folder(folder: &Path, engine: EngineName) -> anyhow::Result<Vec<(Entry, Scene)>> {
+    let entries = folder::read(folder)?.into_iter();
+    let loaded = entries.map(|entry| {
+        let scene = load(&entry.scene, engine)?;
+        Ok((entry, scene))
+    });
+    loaded.collect()
 }
 
 /// A refusal of an engine's, with the scene's file and line.

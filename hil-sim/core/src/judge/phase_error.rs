@@ -106,6 +106,16 @@ impl Demodulator {
         (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
     }
 
+    /// The errors' median on the circle: the one that the others are nearest to, with `peak_v` as in
+    /// [`Demodulator::finish`]. A window in which the stimulus has only just begun does not move it.
+    pub fn middle(self, peak_v: f64) -> Option<f64> {
+        let errors = self.errors(peak_v);
+        let apart = |one: f64, other: f64| (one - other - (one - other).round()).abs();
+        let from_others = |one: f64| errors.iter().map(|&other| apart(one, other)).sum::<f64>();
+        let nearer = |one: &f64, other: &f64| from_others(*one).total_cmp(&from_others(*other));
+        errors.iter().copied().min_by(nearer)
+    }
+
     /// The errors of the windows at full amplitude, in cycles, with `peak_v` as in [`Demodulator::finish`].
     pub fn errors(mut self, peak_v: f64) -> Vec<f64> {
         if let Some((last, _)) = self.last {
@@ -235,6 +245,24 @@ mod tests {
         let turning = [(0.0, 7.15), (7.15, 6.85), (6.85, 7.15), (7.15, 6.9)];
         let whole = demodulate(Rendering::Shape, &turning, 0.0).expect("seven cycles");
         assert!(whole.rms_cycles < 0.01, "{whole:?}");
+    }
+
+    #[test]
+    fn the_middle_is_where_most_cycles_are_across_the_end_of_the_circle_too() {
+        let mut demodulator = Demodulator::new(Rendering::Fundamental);
+        for point in 0..200 {
+            let cycles = f64::from(point) / 40.0;
+            let ahead = if point < 40 {
+                0.15
+            } else {
+                0.49 + 0.004 * cycles
+            };
+            demodulator.add(due(cycles, cycles), (TAU * (cycles + ahead)).sin());
+        }
+        let middle = demodulator.clone().middle(1.0).expect("five cycles");
+        assert!((middle.abs() - 0.5).abs() < 0.01, "{middle}");
+        let standing = demodulator.standing(1.0).expect("five cycles");
+        assert!((standing.abs() - 0.5).abs() > 0.03, "{standing}");
     }
 
     #[test]

@@ -19,6 +19,7 @@
 pub mod likeness;
 pub mod observer;
 pub mod picture;
+pub mod recorded;
 pub mod surfaces;
 
 use std::f64::consts::TAU;
@@ -106,7 +107,7 @@ pub struct Row {
     /// The surface's name, and its family's.
     pub surface: String,
     /// See `surface`.
-    pub family: &'static str,
+    pub family: String,
     /// Whether nobody looked at it while this was made.
     pub unseen: bool,
     /// Who ran it.
@@ -216,7 +217,7 @@ fn row_on_boards(
 fn row(case: &Case, engine: Engine, rendering: Rendering, delay_ms: f64, played: &[f64]) -> Row {
     Row {
         surface: case.ground.name.clone(),
-        family: case.ground.family,
+        family: case.ground.family.to_owned(),
         unseen: case.ground.unseen,
         engine,
         speeds_mm_s: (case.arm.0, case.hand.0),
@@ -253,7 +254,7 @@ fn cases(quick: bool) -> Vec<Case> {
 }
 
 fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
-    let said = said(case)?;
+    let said = said(&scene(case))?;
     let delays = if quick || case.ground.unseen {
         &DELAYS_MS[..1]
     } else {
@@ -262,7 +263,8 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
     let mut rows = Vec::new();
     for &delay_ms in delays {
         for rendering in RENDERINGS {
-            let played = played(&said, case.hand, rendering, delay_ms);
+            let hand_mm = |t_s| case.hand.position_mm(t_s);
+            let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
             rows.push(row(case, Engine::Native, rendering, delay_ms, &played));
         }
     }
@@ -285,9 +287,9 @@ impl RunObserver for Ear {
     }
 }
 
-fn said(case: &Case) -> Result<Said, SceneError> {
+fn said(scene: &Scene) -> Result<Said, SceneError> {
     let mut ear = Ear::default();
-    native::run_before(&scene(case), &mut ear)?;
+    native::run_before(scene, &mut ear)?;
     Ok(ear.0)
 }
 
@@ -306,8 +308,14 @@ fn scene(case: &Case) -> Scene {
     }
 }
 
-/// The voltages of an actuator at each tick of [`LOOKS_S`].
-fn played(said: &Said, hand: Stroke, rendering: Rendering, delay_ms: f64) -> Vec<f64> {
+/// The voltages of an actuator at each of the ticks that are looked at, under a hand that is at so many mm at an instant in s.
+fn played(
+    said: &Said,
+    hand_mm: impl Fn(f64) -> f64,
+    looked_at: &Range<u64>,
+    rendering: Rendering,
+    delay_ms: f64,
+) -> Vec<f64> {
     let configuration = DisplayConfiguration {
         rendering,
         ..DisplayConfiguration::DEFAULT
@@ -318,7 +326,6 @@ fn played(said: &Said, hand: Stroke, rendering: Rendering, delay_ms: f64) -> Vec
     display.started(Ok(()));
     let delay_ns = (delay_ms * 1e6) as u64;
     let mut due = said.iter().peekable();
-    let looked_at = ticks();
     let mut played = Vec::new();
     for tick in 0..looked_at.end {
         let at_ns = tick * TICK_NS;
@@ -330,7 +337,7 @@ fn played(said: &Said, hand: Stroke, rendering: Rendering, delay_ms: f64) -> Vec
             }
         }
         let t_s = at_ns as f64 * 1e-9;
-        display.tick(encoder(hand.position_mm(t_s)), &Senses::default());
+        display.tick(encoder(hand_mm(t_s)), &Senses::default());
         if looked_at.contains(&tick) {
             played.push(volts(display.words()[0]));
         }
@@ -373,11 +380,11 @@ pub const fn word(rendering: Rendering) -> &'static str {
 }
 
 /// Families in the order of their first row, the unseen ones last.
-fn families(rows: &[Row]) -> Vec<&'static str> {
+fn families(rows: &[Row]) -> Vec<&str> {
     let mut families = Vec::new();
     for row in rows {
-        if !families.contains(&row.family) {
-            families.push(row.family);
+        if !families.contains(&row.family.as_str()) {
+            families.push(&row.family);
         }
     }
     families
@@ -404,7 +411,7 @@ pub fn spread(
 
 /// Whether a family is played the better the more of it is: partials cost no coherence, where there is no grain they give
 /// nearly all of it, and where there is one the random part brings the spectrum no further away.
-fn is_carried(rows: &[Row], engine: Engine, family: &str) -> bool {
+fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bool {
     let of = |value: fn(&Row) -> f64| {
         RENDERINGS.map(|rendering| spread(rows, engine, family, rendering, value))
     };
@@ -414,7 +421,6 @@ fn is_carried(rows: &[Row], engine: Engine, family: &str) -> bool {
         // Not every family is run on the ELFs.
         return engine == Engine::Elf;
     };
-    let has_grain = family.contains("rough");
     shape.0 >= fundamental.0 - GOAL_LOSS
         && (has_grain || shape.0 >= GOAL_COHERENCE)
         && (!has_grain || rough.0 <= plain.0 + GOAL_DB)
@@ -492,7 +498,7 @@ impl Study for Measured {
     fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
         let records = self.rows.iter().map(|row| Record {
             surface: &row.surface,
-            family: row.family,
+            family: &row.family,
             unseen: row.unseen,
             engine: row.engine.name(),
             arm_mm_s: Short(row.speeds_mm_s.0),
@@ -517,7 +523,7 @@ impl Study for Measured {
         families.into_iter().all(|family| {
             [Engine::Native, Engine::Elf]
                 .into_iter()
-                .all(|engine| is_carried(&self.rows, engine, family))
+                .all(|engine| is_carried(&self.rows, engine, family, family.contains("rough")))
         })
     }
 }
@@ -532,7 +538,7 @@ mod tests {
             (0..3)
                 .map(|at| Row {
                     surface: String::new(),
-                    family,
+                    family: family.to_owned(),
                     unseen: false,
                     engine: Engine::Native,
                     speeds_mm_s: (60.0, 40.0),
@@ -551,9 +557,10 @@ mod tests {
             ("rough", [0.75, 0.85, 0.80], [6.0, 3.0, 3.5], false),
         ] {
             let rows = rows(family, coherences, distances);
-            let carried = is_carried(&rows, Engine::Native, family);
+            let has_grain = family == "rough";
+            let carried = is_carried(&rows, Engine::Native, family, has_grain);
             assert_eq!(carried, expected, "{family} {coherences:?}");
-            assert!(is_carried(&rows, Engine::Elf, family), "not run");
+            assert!(is_carried(&rows, Engine::Elf, family, has_grain), "not run");
         }
     }
 }

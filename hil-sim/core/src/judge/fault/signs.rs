@@ -113,6 +113,14 @@ fn counted(
         let words = format!("received {heard}");
         signs.push((Sign::Counted(role, "received"), words));
     }
+    // Whole frames that nobody took leave nothing but the gap.
+    let lost = status
+        .peer
+        .lost
+        .wrapping_sub(before.map_or(0, |status| status.peer.lost));
+    if fault.kind == Kind::UartOverrun && lost > 0 {
+        signs.push((Sign::Counted(role, "lost"), format!("lost {lost}")));
+    }
     signs
 }
 

@@ -38,8 +38,8 @@ pub(super) struct Step {
     since: Demodulator,
     /// Errors up to the last silence, in cycles.
     errors: Vec<f64>,
-    /// Whether there was a silence since the fault.
-    was_silent: bool,
+    /// Whether where it goes on is unknown: there was a silence since the fault, or no whole cycle before it.
+    is_unplaced: bool,
     quiet_since_s: Option<f64>,
     /// Whether all words were at 0 V since then.
     was_zero: bool,
@@ -60,7 +60,7 @@ impl Step {
             standing: None,
             since: Demodulator::new(truth.display.rendering),
             errors: Vec::new(),
-            was_silent: false,
+            is_unplaced: false,
             quiet_since_s: None,
             was_zero: false,
             least_silence_s: SILENT_TICKS / f64::from(truth.display.update_rate.hz()),
@@ -88,7 +88,7 @@ impl Step {
     /// Takes the errors since the last silence.
     fn end_stretch(&mut self) {
         let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
-        let standing = if self.was_silent {
+        let standing = if self.is_unplaced {
             since.clone().standing(self.peak_v).unwrap_or(0.0)
         } else {
             0.0
@@ -112,8 +112,15 @@ impl Step {
             && edge.t_s - since_s >= self.least_silence_s
         {
             self.end_stretch();
-            self.was_silent = true;
+            self.is_unplaced = true;
         }
+    }
+
+    /// Where it stood before the fault. If there was no whole cycle before it, nobody knows, as after a silence.
+    fn stand(&mut self) -> f64 {
+        let known = self.before.clone().middle(self.peak_v);
+        self.is_unplaced |= known.is_none();
+        *self.standing.insert(known.unwrap_or(0.0))
     }
 
     fn follow(&mut self) {
@@ -130,9 +137,10 @@ impl Step {
             if (before_s..from_s).contains(&edge.t_s) {
                 self.before.add(due, volts);
             } else if (from_s..to_s).contains(&edge.t_s) {
-                let standing = *self.standing.get_or_insert_with(|| {
-                    self.before.clone().standing(self.peak_v).unwrap_or(0.0)
-                });
+                let standing = match self.standing {
+                    Some(standing) => standing,
+                    None => self.stand(),
+                };
                 due.cycles += standing;
                 self.since.add(due, volts);
             }

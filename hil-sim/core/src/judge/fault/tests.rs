@@ -1,6 +1,6 @@
 //! Recordings of displays that answer a fault well, or badly.
 
-use protocol::{DisplayState, Hold, Message, Safety, Trip};
+use protocol::{DisplayState, Hold, Message, Rendering, Safety, Trip};
 
 use super::*;
 use crate::judge::synthetic::{Run, word_of};
@@ -249,7 +249,7 @@ fn a_display_that_fades_too_early_or_for_another_reason_or_for_ever_is_found() {
 
 #[test]
 fn a_display_that_follows_what_it_must_not_is_out_of_step() {
-    let judged = |ahead: fn(f64) -> f64, gain: fn(f64) -> f64| {
+    let judged_from = |at_s: f64, rendering, ahead: fn(f64) -> f64, gain: fn(f64) -> f64| {
         let run = Run {
             ahead_cycles: Box::new(ahead),
             ..Run::steady(50.0, 2.0)
@@ -259,15 +259,20 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
             let gain = gain(output.at_ns as f64 * 1e-9);
             output.words = output.words.map(|word| word_of(gain * volts(word)));
         }
-        let scene = Scene {
+        let mut scene = Scene {
             duration_s: 2.0,
-            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            faults: vec![Fault::new(Kind::Nothing, at_s)],
             ..Scene::constant(2.0, 50.0)
         };
+        scene.display.configuration.rendering = rendering;
         finding(&scene, 0, 2_000 * MS, &recording).unmet()
     };
+    let judged = |ahead, gain| judged_from(0.5, Rendering::Fundamental, ahead, gain);
     // Wherever its phase began, and not where it goes then.
     assert_eq!(judged(|_| 0.3, |_| 1.0), [""; 0]);
+    // Also where it has only just begun, and no cycle is whole.
+    let begun = judged_from(0.04, Rendering::Shape, |_| 0.3, |_| 1.0);
+    assert_eq!(begun, [""; 0]);
     let goes_on = |t_s| if t_s < 0.6 { 0.3 } else { 0.4 };
     let lost = judged(goes_on, |_| 1.0);
     assert!(lost[0].starts_with("out of step by 0.09"), "{lost:?}");

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use super::likeness::{THIRDS, thirds_where};
 use super::surfaces::{Ground, gratings, sine, weave};
-use super::{Case, LOOKS_S, RENDERINGS, SPEEDS, played, said, word};
+use super::{Case, LOOKS_S, RENDERINGS, SPEEDS, played, said, scene, ticks, word};
 use crate::psychophysics::interval::{Interval, middle};
 use crate::psychophysics::normal::{PROBABLE_ERROR, cdf};
 use crate::study::{Fixed, csv_text};
@@ -101,11 +101,13 @@ pub fn pairs(quick: bool, done: &(impl Fn() + Sync)) -> Result<Vec<Pair>, SceneE
         })
         .collect();
     let felt: Vec<[[f64; THIRDS]; RENDERINGS.len()]> = on_all_cores(&cases, |case| {
-        let said = said(case)?;
+        let said = said(&scene(case))?;
         done();
         Ok::<_, SceneError>(RENDERINGS.map(|rendering| {
             let delay_ms = DELAY_MS * case.seed as f64;
-            thirds_where(&played(&said, case.hand, rendering, delay_ms), |t_s| {
+            let hand_mm = |t_s| case.hand.position_mm(t_s);
+            let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
+            thirds_where(&played, |t_s| {
                 case.hand.relative_speed(LOOKS_S.0 + t_s) >= BRISK
             })
         }))

@@ -54,30 +54,29 @@ pub fn draw(measured: &Measured) -> String {
         .iter()
         .map(|pair| format!("{} / {}", pair.one, pair.other))
         .collect();
-    page.panels(
-        1,
-        &[HEIGHT, HEIGHT, HEIGHT],
-        &[
-            Panel::new(
-                "coherence with the surface, share of its power",
-                &places(&names),
-                &Axis::even(0.0, 1.0, 0.2, ""),
-            )
-            .with(by_family(|row| row.coherence)),
-            Panel::new(
-                "distance of the spectra, dB",
-                &places(&names),
-                &Axis::even(0.0, 12.0, 2.0, ""),
-            )
-            .with(by_family(|row| row.distance_db)),
-            Panel::new(
-                "pairs of 2 mm told apart, share of choices",
-                &places(&labels),
-                &Axis::even(0.5, 1.0, 0.1, ""),
-            )
-            .with(pairs),
-        ],
-    );
+    let mut panels = vec![
+        Panel::new(
+            "coherence with the surface, share of its power",
+            &places(&names),
+            &Axis::even(0.0, 1.0, 0.2, ""),
+        )
+        .with(by_family(|row| row.coherence)),
+        Panel::new(
+            "distance of the spectra, dB",
+            &places(&names),
+            &Axis::even(0.0, 12.0, 2.0, ""),
+        )
+        .with(by_family(|row| row.distance_db)),
+    ];
+    if !measured.pairs.is_empty() {
+        let told_apart = Panel::new(
+            "pairs of 2 mm told apart, share of choices",
+            &places(&labels),
+            &Axis::even(0.5, 1.0, 0.1, ""),
+        );
+        panels.push(told_apart.with(pairs));
+    }
+    page.panels(1, &vec![HEIGHT; panels.len()], &panels);
     page.finish()
 }
 
@@ -120,7 +119,7 @@ mod tests {
             .flat_map(|ground| {
                 RENDERINGS.map(|rendering| Row {
                     surface: ground.name.clone(),
-                    family: ground.family,
+                    family: ground.family.to_owned(),
                     unseen: ground.unseen,
                     engine: Engine::Native,
                     speeds_mm_s: (60.0, 40.0),

@@ -66,6 +66,13 @@ const LINE: [Sign; 16] = [
 ];
 const FADED: Sign = Sign::Counted(Role::Display, "fades");
 
+const LINE_WITH_GAPS: [Sign; 18] = with(
+    &LINE,
+    [
+        Sign::Counted(Role::Sensor, "lost"),
+        Sign::Counted(Role::Display, "lost"),
+    ],
+);
 const FADED_LINE: [Sign; 17] = with(&LINE, [FADED]);
 /// What the display and its line show of its restart.
 const RESTARTED: [Sign; 20] = with(

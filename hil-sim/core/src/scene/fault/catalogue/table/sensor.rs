@@ -2,7 +2,9 @@
 
 use protocol::{Hold, Role};
 
-use super::{BASE, COUNTED_MS, FADED, LINE, PAST_STATUS_S, SENSOR_RESTARTED, STALE_S, WATCHDOG_MS};
+use super::{
+    BASE, COUNTED_MS, FADED, LINE_WITH_GAPS, PAST_STATUS_S, SENSOR_RESTARTED, STALE_S, WATCHDOG_MS,
+};
 use crate::scene::fault::Kind;
 use crate::scene::fault::catalogue::{Class, Key, Lasts, Needs, Row, Sign};
 
@@ -137,10 +139,10 @@ pub(super) static ROWS: [Row; 9] = [
         injected: "DMA1's clock is taken away (RCC_AHB1ENR, DMA1EN), and given back; what comes meanwhile is lost",
         lasts: Lasts::For(0.02),
         class: Class::Sensor,
-        signs: &LINE,
+        signs: &LINE_WITH_GAPS,
         seen_within_ms: COUNTED_MS,
         silences: &[Role::Sensor],
-        expected: "overruns, line errors or corrupt frames counted, no sample lost; the sensor hears and talks again",
+        expected: "lost or corrupt frames, overruns or line errors counted, no sample lost; the sensor hears and talks again",
         watch_s: PAST_STATUS_S,
         ..BASE
     },
