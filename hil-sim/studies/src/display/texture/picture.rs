@@ -18,14 +18,20 @@ const SYMBOLS: [Symbol; 3] = [
 ];
 const SPREAD: Stroke = Stroke::new(SOFT, 1.2);
 const HEIGHT: f64 = 220.0;
+/// The axis of distances goes up to so much, or further, in such steps.
+const LEAST_TOP_DB: f64 = 12.0;
+const STEP_DB: f64 = 2.0;
 
 /// Draws it.
 pub fn draw(measured: &Measured) -> String {
     let mut page = Page::default();
-    page.note(
+    page.note(if measured.pairs.is_empty() {
+        "What the actuators play against what recorded gauges felt at the hand’s place, 5–200 Hz; the hand as fast as the \
+         arm, and faster. Symbols: means; lines: least to most. Firmware libraries."
+    } else {
         "What the actuators play against the surface under the operator’s hand, 5–200 Hz; arm and hand at different \
-         speeds. Symbols: means; lines: least to most. Firmware libraries; simulated observer.",
-    );
+         speeds. Symbols: means; lines: least to most. Firmware libraries; simulated observer."
+    });
     let keys = RENDERINGS
         .iter()
         .zip(SYMBOLS)
@@ -54,6 +60,9 @@ pub fn draw(measured: &Measured) -> String {
         .iter()
         .map(|pair| format!("{} / {}", pair.one, pair.other))
         .collect();
+    let furthest_db = measured.rows.iter().map(|row| row.distance_db);
+    let top_db = furthest_db.fold(LEAST_TOP_DB, f64::max);
+    let top_db = (top_db / STEP_DB).ceil() * STEP_DB;
     let mut panels = vec![
         Panel::new(
             "coherence with the surface, share of its power",
@@ -64,7 +73,7 @@ pub fn draw(measured: &Measured) -> String {
         Panel::new(
             "distance of the spectra, dB",
             &places(&names),
-            &Axis::even(0.0, 12.0, 2.0, ""),
+            &Axis::even(0.0, top_db, STEP_DB, ""),
         )
         .with(by_family(|row| row.distance_db)),
     ];

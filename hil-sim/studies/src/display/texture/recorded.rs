@@ -17,7 +17,7 @@ use crate::jury::folder::Entry;
 use crate::study::{Study, Table};
 
 /// By then the sensor stands by λ, in s.
-const FROM_S: f64 = 1.5;
+const FROM_S: f64 = 1.0;
 /// From there on the stimulus is looked at: it has faded in.
 const FADED_IN_S: f64 = 0.1;
 /// Looked at for so long, in s, and no less.
@@ -148,7 +148,7 @@ impl<'a> Take<'a> {
             family: self.entry.family.clone(),
             unseen: true,
             engine: Engine::Native,
-            speeds_mm_s: (self.speed_mm_s(), hand.speed_mm_s),
+            speeds_mm_s: (to_a_tenth(self.speed_mm_s()), to_a_tenth(hand.speed_mm_s)),
             delay_ms: 0.0,
             rendering,
             coherence,
@@ -256,6 +256,10 @@ impl Hand {
             looked_at,
         }
     }
+}
+
+fn to_a_tenth(speed_mm_s: f64) -> f64 {
+    (10.0 * speed_mm_s).round() / 10.0
 }
 
 /// When the arm was where, in rising order of places; Err: when it turned back.
