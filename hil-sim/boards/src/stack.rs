@@ -20,9 +20,11 @@ const RESET: usize = 1;
 /// The vector that the boards' second executor runs on, in their `board.rs`.
 const EXECUTOR: &str = "UART5";
 
-/// The priority of a handler, as the boards' set-up has it; what is not named there has that after a reset.
+/// The priority of a handler, as the boards' set-up and that of their ports have it; what is not named there has that after a reset.
 fn priority(handler: &str) -> i8 {
     match handler.trim_end_matches('_') {
+        "USART2" | "USART3" => 7,
+        ports if ports.starts_with("DMA1_STREAM") => 7,
         EXECUTOR | "ADC" => 6,
         "TIM3" => 5,
         "HardFault" => -1,
