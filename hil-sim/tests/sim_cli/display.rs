@@ -149,6 +149,19 @@ fn a_recording_that_meets_a_place_twice_or_is_none_is_refused() {
 }
 
 #[test]
+fn a_folder_in_which_nothing_has_a_period_is_not_judged_as_carried() {
+    let folder = recording("flat", |t_s| 50.0 * (t_s - 0.5).max(0.0));
+    let index = r#"[{ "name": "ridges", "truth": 0 }]"#;
+    fs::write(folder.join("index.json"), index).unwrap();
+    let (status, printed, complaint) = judge_recordings(&folder);
+    assert_eq!(status, Some(2), "{printed}{complaint}");
+    assert!(
+        complaint.contains("no recording has a period"),
+        "{complaint}"
+    );
+}
+
+#[test]
 fn outputs_come_in_time() {
     assert_drawn("timing", &["timing"]);
 }

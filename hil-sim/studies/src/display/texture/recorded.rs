@@ -58,6 +58,11 @@ pub enum RecordedError {
         /// Its ground in mm.
         ground_mm: f64,
     },
+    /// Nothing is played of any of them.
+    #[error(
+        "no recording has a period, and nothing is played of what has none: give the truth of one in mm, above 0"
+    )]
+    NoPeriod,
     /// It cannot be run.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -77,6 +82,9 @@ pub fn measure(
 ) -> Result<Recorded, RecordedError> {
     let takes = scenes.iter().map(|(entry, scene)| Take::new(entry, scene));
     let takes: Vec<Take> = takes.collect::<Result<_, _>>()?;
+    if takes.iter().all(|take| take.wavelength_mm == 0.0) {
+        return Err(RecordedError::NoPeriod);
+    }
     let rows = on_all_cores(&takes, |take| {
         let rows = take.rows();
         done();
