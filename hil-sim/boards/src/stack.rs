@@ -20,7 +20,8 @@ const RESET: usize = 1;
 /// The vector that the boards' second executor runs on, in their `board.rs`.
 const EXECUTOR: &str = "UART5";
 
-/// The priority of a handler, as the boards' set-up and that of their ports have it; what is not named there has that after a reset.
+/// The priority of a handler, as the boards' set-up and that of their ports have it; what is not named there has that
+/// after a reset.
 fn priority(handler: &str) -> i8 {
     match handler.trim_end_matches('_') {
         "USART2" | "USART3" => 7,
