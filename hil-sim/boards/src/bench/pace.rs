@@ -33,7 +33,7 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// From virtual time 0 on.
+    /// From the emulator's start on.
     pub fn new(pace: Pace) -> Self {
         Self {
             pace,
@@ -43,13 +43,15 @@ impl Pacer {
         }
     }
 
-    /// Returns when the wall clock has come to the virtual instant `now_ns`. Instants must not decrease.
-    /// Tells how far the wall clock is ahead, time given up included, since the emulator has warmed up.
+    /// Returns when the wall clock has come to the virtual instant `now_ns`. Instants must not decrease. The
+    /// wall clock begins to count when the emulator has warmed up: before, nothing is waited for.
+    /// Tells how far it is ahead, time given up included.
     pub fn wait(&mut self, now_ns: u64) -> Duration {
+        let wall = Instant::now();
         if now_ns <= WARM_UP_NS {
-            self.slipped = Duration::ZERO;
+            (self.begun, self.begun_ns) = (wall, now_ns);
         }
-        match self.lag(now_ns, Instant::now()) {
+        match self.lag(now_ns, wall) {
             Ok(behind) => behind,
             Err(early) => {
                 std::thread::sleep(early);
@@ -92,6 +94,17 @@ mod tests {
         let begun = pacer.begun;
         assert_eq!(pacer.lag(20_000_000, begun + 4 * MS), Err(6 * MS));
         assert_eq!(pacer.lag(20_000_000, begun + 12 * MS), Ok(2 * MS));
+    }
+
+    #[test]
+    fn nothing_is_waited_for_until_the_emulator_has_warmed_up() {
+        let mut pacer = Pacer::new(Pace::Times(0.01));
+        for now_ns in (0..=WARM_UP_NS).step_by(500_000) {
+            assert_eq!(pacer.wait(now_ns), Duration::ZERO);
+        }
+        let begun = pacer.begun;
+        let due = pacer.lag(WARM_UP_NS + 1_000_000, begun);
+        assert_eq!(due, Err(100 * MS));
     }
 
     #[test]

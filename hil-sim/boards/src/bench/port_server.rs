@@ -13,7 +13,6 @@ use rigless::emulator::Host;
 use super::pace::Pacer;
 use super::socket::Socket;
 use super::{Command, PortName, lock};
-use crate::ElfError;
 use crate::board_pins::BoardPins;
 use crate::console::ConsoleHost;
 use crate::display::DisplayPins;
@@ -23,6 +22,7 @@ use crate::rtt::Channel;
 use crate::sensor::SensorPins;
 use crate::wire::TimedByte;
 use crate::wiring::Mistake;
+use crate::{ElfError, WARM_UP_NS};
 use hil_sim_core::run::recording::{ACTUATORS, volts};
 use hil_sim_core::scene::Scene;
 
@@ -183,7 +183,7 @@ pub struct PortServer {
     shared: Arc<Shared>,
     /// The host that sets the board up before anybody else has its console.
     setup: Option<ConsoleHost>,
-    /// Told once the board is set up.
+    /// Told once the board is set up and the emulator warm.
     ready: Option<Sender<Result<(), ElfError>>>,
     rtt: Option<Channel>,
     logged: Vec<TimedByte>,
@@ -256,7 +256,9 @@ impl PortServer {
                 let _ = ready.send(Err(ElfError::Configuration { board, reason }));
             }
         }
-        if let Some(ready) = self.ready.take() {
+        // Translated for the first time, a board answers so slowly that whoever asks gives it up.
+        let is_warm = now_ns >= WARM_UP_NS.min(self.shared.end_ns.load(Ordering::Relaxed));
+        if is_warm && let Some(ready) = self.ready.take() {
             let _ = ready.send(Ok(()));
         }
         true
