@@ -11,7 +11,7 @@
 
 target=thumbv7em-none-eabihf
 another_target=thumbv8m.main-none-eabihf   # which the libs are linked for as well, where it can be had
-oldest_minor=95        # the oldest Rust 1.x seen to build everything here
+oldest_minor=$(sed -n 's/^rust-version = "1\.\([0-9]*\)"$/\1/p' Cargo.toml)
 emulator_minor=98      # what the emulator's manifest asks for; older ones need to be told to go on
 
 say() { printf '%s\n' "$*" >&2; }

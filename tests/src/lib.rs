@@ -10,6 +10,7 @@ pub mod elves;
 pub mod fake_bench;
 pub mod fake_board;
 pub mod history;
+pub mod other_processor;
 pub mod pty;
 pub mod recorded;
 pub mod relay;

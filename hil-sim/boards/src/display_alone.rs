@@ -202,8 +202,12 @@ pub(super) fn run_before<W: BoardHook>(
     )
     .map_err(|error| board_error(error.to_string()))?;
     let images = [firmware.image.clone()];
-    let session = Session::new(Box::new(board.running(&images)), 0, VirtualNanos(LOOK_NS))
-        .map_err(|error| board_error(error.to_string()))?;
+    let session = Session::new(
+        Box::new(board.running(&images, firmware.processor.clone())),
+        0,
+        VirtualNanos(LOOK_NS),
+    )
+    .map_err(|error| board_error(error.to_string()))?;
     let driver = Solo {
         far: ScriptedSensor::new(alone),
         log: Log::find(&firmware.elf),

@@ -1,9 +1,11 @@
 //! A firmware's ELF, checked before anything runs: is it one, whose is it, does it speak our protocol.
 
+use std::fmt::{self, Debug, Formatter};
 use std::path::{Path, PathBuf};
 
 use object::{Object, ObjectSection};
 use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
+use rigless::emulator::ProcessorConstructor;
 use rigless::image::Image;
 
 /// The section in which a firmware carries its [`Hello`].
@@ -75,7 +77,7 @@ pub enum FirmwareError {
 }
 
 /// A firmware that may run.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Firmware {
     /// Where it came from.
     pub path: PathBuf,
@@ -85,6 +87,18 @@ pub struct Firmware {
     pub hello: Hello,
     /// The same, as the emulator takes it.
     pub image: Image,
+    /// What makes the processor that it runs on; none: the emulator, its own.
+    pub processor: Option<ProcessorConstructor>,
+}
+
+impl Debug for Firmware {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Firmware")
+            .field("path", &self.path)
+            .field("hello", &self.hello)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Firmware {
@@ -135,6 +149,7 @@ impl Firmware {
             elf,
             hello,
             image,
+            processor: None,
         })
     }
 }

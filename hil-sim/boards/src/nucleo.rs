@@ -4,11 +4,12 @@
 //! that the emulator leaves to a board are done at the seam, at the exact instant of TIM3's trigger:
 //! the trigger reaches TIM4 (ITR2, RM0090 table 102), and whatever `Pins` makes of it.
 
-use std::fmt::Debug;
+use std::fmt::{self, Debug, Formatter};
 use std::num::{NonZeroU32, NonZeroU64};
 
 use rigless::chip::uart::Rate;
 use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::emulator::ProcessorConstructor;
 use rigless::image::Image;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
@@ -65,11 +66,12 @@ pub trait Pins: Debug + Send + 'static {
 }
 
 /// A board.
-#[derive(Debug)]
 pub struct Nucleo<P> {
     mcu: Wired<P>,
     /// What it is going to run, if its processor is to be kept.
     program: Option<u64>,
+    /// What makes its processor, if not the emulator.
+    processor: Option<ProcessorConstructor>,
 }
 
 /// The part with its pins connected.
@@ -101,14 +103,16 @@ impl<P: Pins> Nucleo<P> {
                 triggered_ns: 0,
             },
             program: None,
+            processor: None,
         })
     }
 
-    /// The same board, about to run `images`: it takes over a processor that has run them before, if one is
-    /// idle.
-    pub fn running(self, images: &[Image]) -> Self {
+    /// The same board, about to run `images` on a processor that `make` makes; without, on the emulator's own: it
+    /// takes over one that has run them before, if one is idle.
+    pub fn running(self, images: &[Image], make: Option<ProcessorConstructor>) -> Self {
         Self {
             program: Some(processor_pool::program(images)),
+            processor: make,
             ..self
         }
     }
@@ -227,6 +231,12 @@ impl<P: Pins> Mcu for Wired<P> {
     }
 }
 
+impl<P: Debug> Debug for Nucleo<P> {
+    fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
+        self.mcu.fmt(formatter)
+    }
+}
+
 impl<P: Debug> Store for Nucleo<P> {}
 
 impl<P: Pins> Board for Nucleo<P> {
@@ -259,7 +269,9 @@ impl<P: Pins> Board for Nucleo<P> {
             armv7m::Fpu::FpV4Sp,
             armv7m::MpuRegions::Eight,
         );
-        if let Some(program) = self.program {
+        if let Some(make) = &self.processor {
+            core.processor = make.clone();
+        } else if let Some(program) = self.program {
             processor_pool::keep(&mut core, program);
         }
         vec![Target::new("stm32f427", &mut self.mcu, core)]

@@ -123,7 +123,8 @@ fn drive<P: BoardPins, W: BoardHook<P>>(
     let mut images = vec![firmware.image.clone()];
     images.extend(driver.injector().traps().and_then(Traps::image));
     let first_stop = VirtualNanos(PORTION_NS);
-    let session = Session::new(Box::new(board.running(&images)), 0, first_stop)
+    let board = board.running(&images, firmware.processor.clone());
+    let session = Session::new(Box::new(board), 0, first_stop)
         .map_err(|error| board_error(error.to_string()))?;
     let mut finished = emulator::run(session, &Start::new(&images), driver)
         .map_err(|error| board_error(error.to_string()))?;

@@ -4,7 +4,10 @@
 use std::process::Command;
 
 use hil_sim_boards::semihosted;
-use tests::elves;
+use hil_sim_core::scene::Scene;
+use hil_sim_core::scene::fault::{Fault, Kind};
+use tests::run::scene;
+use tests::{elves, other_processor};
 
 #[path = "../../plain-board/src/rehearsal.rs"]
 mod rehearsal;
@@ -103,4 +106,56 @@ fn a_difference_is_named_by_its_second_and_its_first_stage() {
     let named = difference(lines, &wrong).unwrap();
     assert!(named.starts_with("from sensor on:\nsecond  1"), "{named}");
     assert!(difference(lines, "").is_some());
+}
+
+/// A stroke over a border, with a turn, noise, and a link with weather: all tasks and interrupts of both boards.
+const STROKE: &str = r#"
+    duration_s = 1.5
+
+    [surface]
+    specimens = [{ wavelength_mm = 2.0, length_mm = 20.0 }, { wavelength_mm = 3.0 }]
+
+    [motion]
+    kind = "sinusoid"
+    amplitude_mm_s = 70.0
+    frequency_hz = 0.83
+
+    [gauges]
+    snr_db = 20.0
+
+    [link]
+    delay_ms = 5.0
+    jitter_ms = 5.0
+    loss = 0.05
+    corrupt = 0.0005
+"#;
+/// The flashed ELFs, on a processor that interprets where ours translates: every frame, estimate and word at the
+/// converters, and the number of instructions.
+#[test]
+fn the_flashed_elves_do_the_same_on_another_processor() {
+    let (ours, theirs) = other_processor::runs_on_both(&scene(STROKE), elves::both());
+    assert_eq!(other_processor::differences(&ours, &theirs), [""; 0]);
+    assert!(ours.0.estimates.len() > 100 && ours.0.outputs.len() > 2_000);
+    let mut wrong = theirs;
+    wrong.1.sensor_instructions += 6;
+    wrong.0.outputs.pop();
+    assert_eq!(
+        other_processor::differences(&ours, &wrong),
+        ["instructions or resets", "outputs"]
+    );
+}
+
+#[test]
+fn so_they_do_when_the_power_fails() {
+    let broken = Scene {
+        duration_s: 1.0,
+        faults: vec![
+            Fault::new(Kind::LinkGarbage, 0.3),
+            Fault::new(Kind::PowerCycle, 0.5),
+        ],
+        ..scene(STROKE)
+    };
+    let (ours, theirs) = other_processor::runs_on_both(&broken, elves::both());
+    assert_eq!(other_processor::differences(&ours, &theirs), [""; 0]);
+    assert_eq!(ours.1.resets, 2);
 }
