@@ -161,6 +161,8 @@ struct OtherProcessor {
     retired: u64,
     /// The event register (DDI 0403, B1.5.18), kept here: rsemu's knows of SEV only, and not of exceptions.
     event: bool,
+    /// The exceptions that are active, the thread first, each interrupted by the next.
+    active: Vec<u32>,
     /// Lines that have risen since the last instruction.
     risen: Vec<u16>,
     must_return: bool,
@@ -175,6 +177,7 @@ impl OtherProcessor {
             table: FLASH,
             retired: 0,
             event: false,
+            active: vec![0],
             risen: Vec::new(),
             must_return: false,
         }
@@ -229,7 +232,7 @@ impl OtherProcessor {
 
     /// One instruction, or the entry to an exception; whether it has reached a register.
     fn step(&mut self, bus: &mut dyn CoreBus) -> bool {
-        let xpsr_before = self.core.xpsr();
+        let (xpsr_before, fpscr_before) = (self.core.xpsr(), self.core.fpscr());
         let before = xpsr_before & xpsr::EXCEPTION;
         let has_reached = self.step_on(bus);
         let after = self.core.xpsr() & xpsr::EXCEPTION;
@@ -238,14 +241,25 @@ impl OtherProcessor {
             return has_reached;
         }
         self.event = true;
-        // What is entered from another exception leaves that one active; a return and a chain do not.
-        let is_active =
-            |number: u32| (self.core).with_sys(|sys| sys.is_active(Exception(number as u16)));
-        if after != 0 && (before == 0 || is_active(before)) {
-            self.stack_it(xpsr_before & xpsr::IT_MASK, bus);
-        } else {
+        if let Some(place) = self.active.iter().position(|&number| number == after) {
+            // A return, to the handler that had been interrupted, or to the thread.
+            self.active.truncate(place + 1);
             self.retired += 1;
+            return has_reached;
         }
+        let is_left = !(self.core).with_sys(|sys| sys.is_active(Exception(before as u16)));
+        if before != 0 && is_left {
+            // A return that another exception follows without unstacking.
+            self.active.pop();
+            self.retired += 1;
+        } else {
+            self.stack_it(xpsr_before & xpsr::IT_MASK, bus);
+        }
+        self.active.push(after);
+        // rsemu 0.0.7 clears FPSCR whenever an exception is taken, before the lazy push has saved it
+        // (`enter_fp_context`); by DDI 0403, B1.5.7, only its modes change, and that once the handler uses the unit. An
+        // interrupt between VCMP and VMRS would turn the comparison.
+        self.core.set_fpscr(fpscr_before);
         has_reached
     }
 
@@ -346,6 +360,7 @@ impl Processor for OtherProcessor {
         // The sequence that reads the table is no instruction.
         self.core.step();
         self.event = false;
+        self.active = vec![0];
         self.risen.clear();
     }
 
