@@ -414,7 +414,8 @@ fn stop_stops_both_boards_beside_a_monitor_that_has_their_ports() {
         let bench = running.bench();
         [&bench.sensor, &bench.display].map(|board| board.path().clone())
     };
-    let done = stop(&sensor, &display, &[]);
+    // Beside other work the system may be late with the bytes of a pseudo-terminal, by seconds.
+    let done = stop(&sensor, &display, &["--within", "60"]);
     assert_eq!(done.status.code(), Some(0), "{}", done.stderr);
     for board in ["sensor", "display"] {
         let words = format!("{board} has stopped: by the operator");
@@ -526,7 +527,8 @@ fn a_key_records_what_can_be_watched_again() {
         terminal.last_shown()
     );
     let file = folder.join("monitor-1.mcap");
-    let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > 100_000);
+    // Some ten seconds: beside other work, the first ones' times may be wrong by a stall of the pseudo-terminals.
+    let is_long = || fs::metadata(&file).is_ok_and(|file| file.len() > 300_000);
     assert!(wait_until(LIMIT, is_long));
     // The gauges stream for as long, and nothing is changed.
     assert!(running.bench().streams());
