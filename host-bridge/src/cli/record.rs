@@ -258,7 +258,11 @@ impl Session<'_> {
         let mut due = self.started + TOLD;
         loop {
             let past = until.is_some_and(|until| self.started.elapsed() >= until);
-            if ended.load(Ordering::Relaxed) || past || self.recorder.progress().failed {
+            if self.recorder.progress().failed {
+                // What is safe: there will be no summary.
+                return self.count();
+            }
+            if ended.load(Ordering::Relaxed) || past {
                 return;
             }
             let left = until.map_or(LOOK, |until| until.saturating_sub(self.started.elapsed()));
