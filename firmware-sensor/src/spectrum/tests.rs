@@ -93,7 +93,7 @@ fn knots_are_as_long_as_their_spacing_says_and_come_newest_first() {
 
 #[test]
 fn a_spacing_leaves_enough_knots_a_wave() {
-    for number in 0..super::CANDIDATES {
+    for number in 0..super::periodogram::CANDIDATES {
         let mm = wavelength_mm(number);
         let knots = mm / SPACINGS_MM[spacing_for(mm)];
         assert!((5.0..=18.0).contains(&knots), "{knots} at {mm} mm");

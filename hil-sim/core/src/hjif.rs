@@ -13,6 +13,8 @@
 //! | effects | basis effects and references to the library; composite ones are refused |
 
 mod height;
+mod piece;
+mod tracer;
 
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +30,8 @@ pub const LEVEL: u32 = 1;
 pub const TEXTURE: &str = "Vibrotactile Texture";
 /// [`Perception::unit_exponent`] where a file gives none: mm and ms.
 pub const UNIT_EXPONENT: i32 = -3;
+/// The farthest place of any texture, in mm.
+const FARTHEST_MM: f64 = 100_000.0;
 
 /// A haptic experience: a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

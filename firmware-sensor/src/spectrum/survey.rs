@@ -1,0 +1,155 @@
+//! What the spectra have to be fitted: their peaks, and whether one is a harmonic of a longer wave.
+
+use super::fit::Pass;
+use super::periodogram::{
+    CANDIDATES, PER_OCTAVE, Spectrum as Energies, highest_peak, is_peak, sharpness, vertex_mm,
+    wavelength_mm,
+};
+use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off};
+
+/// One estimate of so many fits the line over the longer lengths, too; those after it take its fits over.
+const LONGER_EVERY: u8 = 3;
+
+/// The spectra's peaks, and what fits are under way.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Survey {
+    /// Travel that it is about.
+    pub(super) fresh_mm: f32,
+    pub(super) energies: Energies,
+    pub(super) line_mm: Option<f32>,
+    pub(super) maturity: f32,
+    pub(super) presence: f32,
+    pub(super) sharpness: f32,
+    /// The moment's highest peak is the line's.
+    pub(super) agree: bool,
+    /// The line is twice or three times as long as the highest peak.
+    pub(super) longer: bool,
+    pub(super) line_pass: Option<Pass>,
+    pub(super) wave_pass: Option<Pass>,
+}
+
+impl Spectrum {
+    /// Finds the peaks, and prepares the fits.
+    pub(super) fn survey(&mut self) {
+        let usable = self.touch.usable;
+        let fresh_mm = core::mem::take(&mut self.fresh_mm);
+        let (short, energies) = self.periodogram.energies(usable);
+        self.periodogram.average(&energies, fresh_mm);
+        let averaged = self.periodogram.averaged();
+        // In place: the passes are large.
+        let survey = &mut self.survey;
+        (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
+        (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
+        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
+        else {
+            return;
+        };
+        // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
+        // shorter one in knots that are too long for it.
+        if averaged[highest] < averaged[0].max(averaged[CANDIDATES - 1]) {
+            return;
+        }
+        let kept = self.kept_peak(&averaged, highest);
+        let (number, line_mm) = self
+            .longer_period(&averaged, &energies, kept)
+            .unwrap_or((kept, vertex_mm(&averaged, kept, true)));
+        let momentary = fundamental_of(&energies, momentary, number, line_mm);
+        let momentary_mm = vertex_mm(&energies, momentary, true);
+        let survey = &mut self.survey;
+        survey.line_mm = Some(line_mm);
+        survey.longer = number != kept;
+        survey.sharpness = sharpness(&averaged, number);
+        survey.maturity = self.periodogram.maturity(number);
+        let total: f32 = energies.iter().sum();
+        survey.presence = energies[number] / (total * averaged[number]).max(f32::MIN_POSITIVE);
+        let here_mm = self.trend.of_average(line_mm);
+        survey.agree = off(momentary_mm, here_mm) < 0.12;
+
+        let base = self.periodogram.level();
+        let strong = self.line.share > STRONG;
+        let near = if strong { 0.2 } else { 0.06 };
+        let start_mm = if off(self.line.fitted_mm, here_mm) < near
+            && (!strong || off(self.line.fitted_mm, momentary_mm) < 0.15)
+        {
+            self.line.fitted_mm
+        } else if survey.agree && !survey.longer {
+            momentary_mm
+        } else {
+            here_mm
+        };
+        self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
+        let lengths = if self.shorter_so_far == 0 {
+            self.lengths
+        } else {
+            SHORTER_LENGTHS.min(self.lengths)
+        };
+        survey.line_pass = Some(Pass::new(start_mm, 1..lengths, usable, base));
+        // The short kernel sees a new surface first.
+        let newest = highest_peak(&short)
+            .map(|number| vertex_mm(&short, number, false))
+            .filter(|&mm| {
+                let known = self.known_mm > 0.0 && off(mm, self.known_mm) > 0.25;
+                off(mm, here_mm) > 0.12 && (known || off(mm, self.wave.mm) < SAME)
+            });
+        let wave_mm = newest.or((!survey.agree).then_some(momentary_mm));
+        survey.wave_pass = wave_mm.map(|mm| {
+            let start_mm = if off(self.wave.mm, mm) < 0.06 {
+                self.wave.mm
+            } else {
+                mm
+            };
+            Pass::new(start_mm, 0..3.min(self.lengths), usable, base)
+        });
+    }
+
+    /// The peak where the line was, as long as there is one that is not much lower than the highest.
+    fn kept_peak(&self, averaged: &Energies, highest: usize) -> usize {
+        let was_mm = self.line.mm;
+        (1..CANDIDATES - 1)
+            .filter(|&i| is_peak(averaged, i) && averaged[i] > 0.4 * averaged[highest])
+            .find(|&i| {
+                was_mm > 0.0 && self.line.held_waves > 3.0 && off(wavelength_mm(i), was_mm) < 0.11
+            })
+            .unwrap_or(highest)
+    }
+
+    /// A period of which the peak is the second or third harmonic, and its candidate.
+    fn longer_period(
+        &mut self,
+        averaged: &Energies,
+        energies: &Energies,
+        peak: usize,
+    ) -> Option<(usize, f32)> {
+        if self.refused > 0 {
+            self.refused -= 1;
+            return None;
+        }
+        let peak_mm = vertex_mm(averaged, peak, true);
+        for (ratio, up) in [(2.0, PER_OCTAVE), (3.0, 10)] {
+            for i in [peak + up, peak + up - 1, peak + up + 1] {
+                if i + 1 < CANDIDATES
+                    && is_peak(averaged, i)
+                    && averaged[i] > 0.4 * averaged[peak]
+                    && energies[i] > 0.09 * energies[peak]
+                    && off(vertex_mm(averaged, i, true), ratio * peak_mm) < 0.06
+                {
+                    return Some((i, ratio * peak_mm));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The moment's highest peak, or the line's where that peak is its second or third harmonic.
+fn fundamental_of(energies: &Energies, peak: usize, line: usize, line_mm: f32) -> usize {
+    let ratio = line_mm / wavelength_mm(peak);
+    if (ratio - 2.0).abs() < 0.2 || (ratio - 3.0).abs() < 0.3 {
+        for i in [line, line - 1, line + 1] {
+            if is_peak(energies, i) && energies[i] > 0.09 * energies[peak] {
+                return i;
+            }
+        }
+    }
+    peak
+}

@@ -1,0 +1,43 @@
+//! The wave of the moment, where it is not the line: a new surface, or chance.
+
+use super::evidence::{WaveEvidence, best_of};
+use super::{SAME, Spectrum, Supposition, is_common, off};
+
+/// The wave of the moment, from one estimate to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wave {
+    pub(super) mm: f32,
+    pub(super) held_waves: f32,
+}
+
+impl Spectrum {
+    /// What is to be said of a wave that the line is not.
+    pub(super) fn weigh_wave(&mut self) -> Option<Supposition> {
+        let found = self.survey.wave_pass.as_ref().map(|pass| pass.found);
+        let best = found.as_ref().and_then(|found| best_of(&found[..3]));
+        let (Some(found), Some((best, _))) = (found, best) else {
+            self.wave = Wave::default();
+            return None;
+        };
+        if off(best.wavelength_mm, self.wave.mm) < SAME {
+            self.wave.held_waves += self.survey.fresh_mm / best.wavelength_mm;
+        } else {
+            self.wave.held_waves = 0.0;
+        }
+        self.wave.mm = best.wavelength_mm;
+        let evidence = WaveEvidence::of(&found, self.wave.held_waves, self.known_share)?;
+        self.weighed.wave = Some((best.wavelength_mm, evidence));
+        if !is_common(&best, self.touch.usable) {
+            return None;
+        }
+        // Where a strong line has gone, something has taken its place.
+        let follows = self.line.there < 0.5 && self.wave.held_waves > 0.0;
+        let least = if follows { best.share() } else { 0.0 };
+        Some(Supposition {
+            wavelength_mm: best.wavelength_mm,
+            probability: evidence.probability().max(least),
+            fitted: Some(best),
+            new: follows,
+        })
+    }
+}
