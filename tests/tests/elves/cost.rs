@@ -8,8 +8,8 @@ use tests::elves;
 
 /// What a board has in a millisecond.
 const GIVEN: u64 = BUDGET / 1_000;
-/// The whole sensor, by each method in turn, in `filter_cost`.
-const METHODS: [u64; 4] = [5, 6, 7, 8];
+/// The whole sensor in `filter_cost`: by each method in turn, then by the spectrum where that is hardest.
+const SENSORS: std::ops::RangeInclusive<u64> = 5..=12;
 
 fn measured(example: &str) -> BTreeMap<u64, Taken> {
     measure_example(&elves::example(example), "firmware-sensor --examples")
@@ -17,14 +17,14 @@ fn measured(example: &str) -> BTreeMap<u64, Taken> {
 }
 
 #[test]
-fn no_method_ever_takes_a_quarter_of_a_millisecond() {
+fn no_sensor_ever_takes_a_sixth_of_a_millisecond() {
     let taken = measured("filter_cost");
-    for method in METHODS {
+    for part in SENSORS {
         let Taken {
             largest, pieces, ..
-        } = taken[&method];
-        assert_eq!(pieces, 1_000, "method {method}");
-        assert!(largest < GIVEN / 4, "method {method}: {largest}");
+        } = taken[&part];
+        assert_eq!(pieces, 1_000, "part {part}");
+        assert!(largest <= GIVEN / 6, "part {part}: {largest}");
     }
 }
 
