@@ -181,3 +181,42 @@ fn an_elf_of_another_protocol_exits_2() {
         &[&says, "build both from the same sources"],
     );
 }
+
+/// The numbers of each row of a demo's table in `text`, without the last one, which is the machine's pace.
+fn table_rows(text: &str) -> Vec<Vec<f64>> {
+    let row = |line: &str| {
+        let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse).collect();
+        let mut numbers = numbers.ok().filter(|numbers| numbers.len() == 11)?;
+        numbers.pop();
+        Some(numbers)
+    };
+    text.lines().filter_map(row).collect()
+}
+
+#[test]
+fn the_demo_prints_the_table_that_the_documents_show() {
+    /// What two compilers may make of it, in the columns' units.
+    const ALIKE: f64 = 0.02;
+    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .args(["demo", "--report", "demo.html", "--sensor-elf"])
+        .arg(built(Role::Sensor))
+        .arg("--display-elf")
+        .arg(built(Role::Display))
+        .current_dir(folder("demo"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let printed = table_rows(&String::from_utf8(output.stdout).unwrap());
+    assert_eq!(printed.len(), 12);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for (document, count) in [("docs/src/explanation/paper.md", 12), ("README.md", 2)] {
+        let shown = table_rows(&fs::read_to_string(root.join(document)).unwrap());
+        assert_eq!(shown.len(), count, "{document}");
+        for row in shown {
+            let is_it = |other: &&Vec<f64>| other[..2] == row[..2];
+            let now = printed.iter().find(is_it).unwrap();
+            let are_alike = row.iter().zip(now).all(|(a, b)| (a - b).abs() <= ALIKE);
+            assert!(are_alike, "{document}: {row:?} is {now:?} now");
+        }
+    }
+}
