@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, Write};
 use std::num::NonZero;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::thread;
 use std::time::Instant;
@@ -17,6 +17,7 @@ use hil_sim_studies::display::rendering_of_word;
 
 use protocol::Rendering;
 
+use super::files::create;
 use super::say::say;
 use super::{Elves, number, progress};
 
@@ -213,14 +214,4 @@ fn write_trials(file: File, trials: &[Trial]) -> io::Result<()> {
         )?;
     }
     out.flush()
-}
-
-fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
-    let file = File::create(path).with_context(|| {
-        format!(
-            "{}: cannot be written: give a file in a folder that exists",
-            path.display()
-        )
-    })?;
-    Ok((file, path))
 }

@@ -1,5 +1,6 @@
 //! Files that commands write.
 
+use std::fs::File;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -15,6 +16,22 @@ pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
             folder.display()
         )
     })
+}
+
+/// Makes a file for results, where the user wants it: never over a scene, which `--json *.toml` would take for it.
+pub(super) fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
+    anyhow::ensure!(
+        path.extension().is_none_or(|ending| ending != "toml"),
+        "{}: is a scene's name, and would be written over: give results a name of their own before the scenes",
+        path.display()
+    );
+    let file = File::create(path).with_context(|| {
+        format!(
+            "{}: cannot be written: give a file in a folder that exists",
+            path.display()
+        )
+    })?;
+    Ok((file, path))
 }
 
 pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {

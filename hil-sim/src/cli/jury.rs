@@ -26,6 +26,7 @@ use hil_sim_studies::jury::table::{Row, Weighed};
 use protocol::{DisplayConfiguration, Method, SensorConfiguration};
 use serde::Serialize;
 
+use super::files::create;
 use super::run_options::{self, Ready};
 use super::say::say;
 use super::{Elves, EngineName, progress};
@@ -469,16 +470,6 @@ fn say_worst(trials: &[Judged]) {
             judged.traits.join(", ")
         );
     }
-}
-
-fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
-    let file = File::create(path).with_context(|| {
-        format!(
-            "{}: cannot be written: give a file in a folder that exists",
-            path.display()
-        )
-    })?;
-    Ok((file, path))
 }
 
 fn write(json: Option<(File, &Path)>, content: &impl Serialize) -> anyhow::Result<()> {

@@ -20,6 +20,7 @@ use hil_sim_studies::output::junit;
 use hil_sim_studies::output::junit::{Case, Fate};
 use hil_sim_studies::output::report::{Chapter, html};
 
+use super::files::create;
 use super::number;
 use super::run_options::{Loaded, RunOptions};
 use super::say::say;
@@ -241,16 +242,6 @@ fn write_junit(engine: Engine, cases: &[Case], mut file: File, path: &Path) -> a
     let text = junit::xml(engine, cases)?;
     file.write_all(text.as_bytes())
         .with_context(|| format!("{}", path.display()))
-}
-
-fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
-    let file = File::create(path).with_context(|| {
-        format!(
-            "{}: cannot be written: give a file in a folder that exists",
-            path.display()
-        )
-    })?;
-    Ok((file, path))
 }
 
 const HEADER: &str = "\

@@ -52,6 +52,25 @@ fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
 }
 
 #[test]
+fn a_scene_is_never_written_over_with_results() {
+    let folder = folder("over-a-scene");
+    for name in ["a.toml", "b.toml"] {
+        fs::write(folder.join(name), SOUND).unwrap();
+    }
+    for option in ["--json", "--junit", "--report"] {
+        // As a shell makes it of `--json *.toml`.
+        let output = hil_sim(&folder, &["run", option, "a.toml", "b.toml"]);
+        assert_eq!(output.status.code(), Some(2), "{option}");
+        let complaint = errors(&output);
+        assert!(
+            complaint.contains("a.toml: is a scene's name"),
+            "{complaint}"
+        );
+        assert_eq!(fs::read_to_string(folder.join("a.toml")).unwrap(), SOUND);
+    }
+}
+
+#[test]
 fn a_scene_of_the_banks_runs_with_its_successor_and_standard_error_says_so_once() {
     let folder = folder("successor");
     let text = format!("{SOUND}[estimator]\nmethod = \"bank\"\n");
