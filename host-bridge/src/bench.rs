@@ -56,27 +56,14 @@ impl Seat {
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     /// The file can't be read.
-    #[error("{path}: can't be read: {source}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be read: {1}")]
+    Unreadable(PathBuf, #[source] io::Error),
     /// The file is no bench.
-    #[error("{path}: {source}")]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, with line and key.
-        source: Box<toml::de::Error>,
-    },
+    #[error("{0}: {1}")]
+    Malformed(PathBuf, #[source] Box<toml::de::Error>),
     /// Both boards are said to be at one place.
-    #[error("{place} can't be both boards: give each its own port or serial number")]
-    Twice {
-        /// The place.
-        place: String,
-    },
+    #[error("{0} can't be both boards: give each its own port or serial number")]
+    Twice(String),
 }
 
 impl Bench {
@@ -85,14 +72,10 @@ impl Bench {
     /// # Errors
     /// If it can't be read or is no bench.
     pub fn read(path: &Path) -> Result<Self, BenchError> {
-        let text = fs::read_to_string(path).map_err(|source| BenchError::Unreadable {
-            path: path.to_owned(),
-            source,
-        })?;
-        let bench: Self = toml::from_str(&text).map_err(|source| BenchError::Malformed {
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let text = fs::read_to_string(path)
+            .map_err(|source| BenchError::Unreadable(path.to_owned(), source))?;
+        let bench: Self = toml::from_str(&text)
+            .map_err(|source| BenchError::Malformed(path.to_owned(), Box::new(source)))?;
         bench.checked()
     }
 
@@ -125,9 +108,7 @@ impl Bench {
     pub fn checked(self) -> Result<Self, BenchError> {
         let place = self.sensor.place();
         if place != Place::Anywhere && place == self.display.place() {
-            return Err(BenchError::Twice {
-                place: place.to_string(),
-            });
+            return Err(BenchError::Twice(place.to_string()));
         }
         Ok(self)
     }

@@ -2,7 +2,7 @@
 //! try if it is not.
 //!
 //! ```text
-//! steps ──> step: what to do, figures with their limits
+//! steps.toml ──> step: what to do, quantities with their limits
 //!             ^
 //! look ─> sight ─> judged ─> progress: the state file, JSON ─> report: HTML
 //! ```
@@ -11,6 +11,7 @@
 //! person reads off an instrument.
 
 pub mod progress;
+pub mod quantity;
 pub mod report;
 pub mod sight;
 pub mod step;

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -143,6 +144,19 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
         .filter(|time| !time.is_zero())
         .ok_or_else(|| "give a number of seconds above 0, and at most a hundred years".to_owned())
+}
+
+/// What happens to links, as it comes.
+type Told = Receiver<(Role, Event)>;
+
+/// The same, and what happens.
+fn told_links(bench: &Bench) -> (Vec<(Role, Link)>, Told) {
+    let (events, told) = channel();
+    let links = links(bench, move |role, event| {
+        // Nobody listens any more at the end.
+        let _ = events.send((role, event));
+    });
+    (links, told)
 }
 
 fn put(seat: &mut Seat, place: Option<&Place>) {

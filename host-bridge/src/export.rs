@@ -39,22 +39,16 @@ pub enum ExportError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The target's name says no format.
-    #[error("{path}: give a name that ends in .hjif or in .wav")]
-    Format {
-        /// The target.
-        path: PathBuf,
-    },
+    #[error("{0}: give a name that ends in .hjif or in .wav")]
+    Format(PathBuf),
     /// A part of a scene was asked for.
     #[error("--from and --to-time are a recording's: a scene is as long as its duration_s says")]
     Part,
     /// The arm rests.
     #[error(
-        "{path}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
+        "{0}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
     )]
-    AtRest {
-        /// The recording.
-        path: PathBuf,
-    },
+    AtRest(PathBuf),
     /// The texture is too long.
     #[error("the way is {length_mm:.0} mm: a texture has {most_mm:.0} mm at most: {advice}")]
     TooLong {
@@ -67,12 +61,9 @@ pub enum ExportError {
     },
     /// The scene's scans are uneven.
     #[error(
-        "{scene}: the sensor's clock goes wrong in this scene, so its scans are not evenly spaced, as a WAV file's samples are: take that fault out"
+        "{0}: the sensor's clock goes wrong in this scene, so its scans are not evenly spaced, as a WAV file's samples are: take that fault out"
     )]
-    Uneven {
-        /// The scene's name.
-        scene: String,
-    },
+    Uneven(String),
     /// A place is beyond what a sample of 32 bits says in µm.
     #[error(
         "the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
@@ -127,9 +118,7 @@ pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
         Some("hjif") => true,
         Some("wav") => false,
         _ => {
-            return Err(ExportError::Format {
-                path: settings.to.clone(),
-            });
+            return Err(ExportError::Format(settings.to.clone()));
         }
     };
     if ending(&settings.from).as_deref() == Some("toml") {

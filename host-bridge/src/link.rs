@@ -111,9 +111,7 @@ impl Link {
         let shared = Arc::new(Shared {
             role,
             line: Mutex::new(None),
-            state: Mutex::new(State::Absent {
-                place: wanted.clone(),
-            }),
+            state: Mutex::new(State::Absent(wanted.clone())),
             clock: Mutex::new(ClockOffset::new()),
             counters: Mutex::new(PortCounters::new()),
             missed: Mutex::default(),
@@ -422,31 +420,25 @@ impl<F: FnMut(Event)> Reader<F> {
     fn state(&self, path: &Path, verdict: Verdict) -> State {
         let port = path.to_owned();
         match verdict {
-            Verdict::Open => State::Opened { port },
+            Verdict::Open => State::Opened(port),
             // Whether it asks in return does not make another board of it.
-            Verdict::Known(hello) if hello.role == self.shared.role.byte() => State::Known {
-                port,
-                hello: hello.asking(false),
-            },
+            Verdict::Known(hello) if hello.role == self.shared.role.byte() => {
+                State::Known(port, hello.asking(false))
+            }
             Verdict::Known(hello) => State::Stranger {
                 port,
                 hello: hello.asking(false),
                 wanted: self.shared.role,
             },
-            Verdict::Foreign(hello) => State::Foreign {
-                port,
-                hello: hello.asking(false),
-            },
-            Verdict::Silent => State::Silent { port },
-            Verdict::Deaf => State::Deaf { port },
-            Verdict::Garbage => State::Garbage { port },
+            Verdict::Foreign(hello) => State::Foreign(port, hello.asking(false)),
+            Verdict::Silent => State::Silent(port),
+            Verdict::Deaf => State::Deaf(port),
+            Verdict::Garbage => State::Garbage(port),
         }
     }
 
     fn absent(&self) -> State {
-        State::Absent {
-            place: self.wanted.clone(),
-        }
+        State::Absent(self.wanted.clone())
     }
 
     fn pass(&mut self, line_monitor: &mut LineMonitor, at_us: u64, message: Message) {

@@ -8,28 +8,17 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum OutputFileError {
     /// It is there already.
-    #[error("{path}: is there already: give another name, or --force to write over it")]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: is there already: give another name, or --force to write over it")]
+    Exists(PathBuf),
     /// It can't be written.
-    #[error("{path}: can't be written: {source}")]
-    NotWritten {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be written: {1}")]
+    NotWritten(PathBuf, #[source] io::Error),
 }
 
 impl OutputFileError {
     /// That `path` can't be written.
     pub fn not_written(path: &Path, source: io::Error) -> Self {
-        Self::NotWritten {
-            path: path.to_owned(),
-            source,
-        }
+        Self::NotWritten(path.to_owned(), source)
     }
 }
 
@@ -39,9 +28,7 @@ impl OutputFileError {
 /// [`OutputFileError::Exists`].
 pub fn refuse_taken(path: &Path, force: bool) -> Result<(), OutputFileError> {
     if path.exists() && !force {
-        return Err(OutputFileError::Exists {
-            path: path.to_owned(),
-        });
+        return Err(OutputFileError::Exists(path.to_owned()));
     }
     Ok(())
 }

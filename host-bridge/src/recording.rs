@@ -37,7 +37,7 @@ mod sink;
 pub use cdr_encoder::{CdrEncoder, ChannelSchema, SayError, SchemaError};
 pub use error::RecordingError;
 pub use files::part_path;
-pub use row_builder::{Entry, RowBuilder, Tally};
+pub use row_builder::{Entry, Note, RowBuilder, Tally};
 
 use files::RecordingFiles;
 use queue::{Input, Loss, Output, PATIENCE, Taken, queue};
@@ -75,32 +75,13 @@ pub struct Progress {
     pub failed: bool,
 }
 
-/// What waits to be written.
-enum Note {
-    Event {
-        role: Role,
-        at_us: u64,
-        event: Event,
-    },
-    Counters {
-        role: Role,
-        at_us: u64,
-        counters: PortCounters,
-    },
-    Log {
-        role: Role,
-        at_us: u64,
-        level: Option<&'static str>,
-        text: String,
-    },
-}
-
+/// A note, whose board it is of and when it was made; boxed, so that an empty queue takes little memory.
+type Taking = (Role, u64, Box<Note>);
 type Writer = JoinHandle<Result<Progress, RecordingError>>;
 
 /// A recording under way. Dropping it ends it without a word; [`Recorder::stop`] says how it went.
 pub struct Recorder {
-    /// Boxed, so that an empty queue takes little memory.
-    notes: Input<Box<Note>>,
+    notes: Input<Taking>,
     progress: Arc<Mutex<Progress>>,
     writer: Mutex<Option<Writer>>,
 }
@@ -134,32 +115,21 @@ impl Recorder {
             Event::Heard { at_us, .. } => *at_us,
             Event::Restarted | Event::StateChanged(_) => now_us(),
         };
-        let event = event.clone();
-        let note = Note::Event { role, at_us, event };
-        self.notes.put(role, at_us, Box::new(note));
+        self.put(role, at_us, Note::Event(event.clone()));
     }
 
     /// Takes what this end of the line to the board of `role` has counted.
     pub fn on_counters(&self, role: Role, counters: PortCounters) {
-        let at_us = now_us();
-        let note = Note::Counters {
-            role,
-            at_us,
-            counters,
-        };
-        self.notes.put(role, at_us, Box::new(note));
+        self.put(role, now_us(), Note::Counters(counters));
     }
 
     /// Takes a line of the log of the board of `role`, which was read just now; `level` is defmt's.
     pub fn on_log(&self, role: Role, level: Option<&'static str>, text: String) {
-        let at_us = now_us();
-        let note = Note::Log {
-            role,
-            at_us,
-            level,
-            text,
-        };
-        self.notes.put(role, at_us, Box::new(note));
+        self.put(role, now_us(), Note::Log(level, text));
+    }
+
+    fn put(&self, role: Role, at_us: u64, note: Note) {
+        self.notes.put(role, at_us, (role, at_us, Box::new(note)));
     }
 
     /// How it stands.
@@ -189,7 +159,7 @@ impl Drop for Recorder {
 
 /// Where the writing is done, on a thread of its own.
 struct WriterThread {
-    waiting: Output<Box<Note>>,
+    waiting: Output<Taking>,
     progress: Arc<Mutex<Progress>>,
     files: RecordingFiles,
     row_builder: RowBuilder,
@@ -219,47 +189,32 @@ impl WriterThread {
     fn write_all(&mut self) -> Result<(), RecordingError> {
         let mut due = Instant::now() + SYNC;
         loop {
-            let Self {
-                waiting,
-                progress,
-                files,
-                row_builder,
-            } = self;
-            match waiting.take(due) {
-                Taken::Item(note) => match *note {
-                    Note::Event { role, at_us, event } => {
-                        row_builder.enter(role, &event, at_us, |entry| files.write(&entry))?;
-                    }
-                    Note::Counters {
-                        role,
-                        at_us,
-                        counters,
-                    } => {
-                        row_builder
-                            .enter_counters(role, counters, at_us, |entry| files.write(&entry))?;
-                    }
-                    Note::Log {
-                        role,
-                        at_us,
-                        level,
-                        text,
-                    } => {
-                        row_builder
-                            .enter_log(role, (level, &text), at_us, |entry| files.write(&entry))?;
-                    }
-                },
+            let (role, at_us, note) = match self.waiting.take(due) {
+                Taken::Item(taking) => taking,
                 Taken::Refused(Loss { role, count, at_us }) => {
-                    row_builder.enter_unwritten(role, count, at_us, |entry| files.write(&entry))?;
+                    (role, at_us, Box::new(Note::Unwritten(count)))
                 }
-                Taken::Nothing => {}
+                Taken::Nothing => {
+                    due = self.sync()?;
+                    continue;
+                }
                 Taken::Closed => return Ok(()),
+            };
+            for entry in self.row_builder.enter(role, at_us, &note) {
+                self.files.write(&entry)?;
             }
             if Instant::now() >= due {
-                files.sync()?;
-                *locked(progress) = all_safe(row_builder.tally(), files.safe_bytes());
-                due = Instant::now() + SYNC;
+                due = self.sync()?;
             }
         }
+    }
+
+    /// Makes safe what was written; when that is due again.
+    fn sync(&mut self) -> Result<Instant, RecordingError> {
+        self.files.sync()?;
+        let safe_bytes = self.files.safe_bytes();
+        *locked(&self.progress) = all_safe(self.row_builder.tally(), safe_bytes);
+        Ok(Instant::now() + SYNC)
     }
 }
 

@@ -94,7 +94,7 @@ mod tests {
 
         fn open(&self, port: &Path) -> Result<Opened, State> {
             let port = port.to_owned();
-            Err(State::Busy { port })
+            Err(State::Busy(port))
         }
     }
 

@@ -31,10 +31,10 @@ pub fn open(path: &Path) -> Result<Opened, State> {
         .file_type();
     if !kind.is_char_device() {
         let what = if kind.is_dir() { "a folder" } else { "a file" };
-        return Err(State::Failed {
-            port: path.to_owned(),
-            reason: format!("is {what}, not a serial port"),
-        });
+        return Err(State::Failed(
+            path.to_owned(),
+            format!("is {what}, not a serial port"),
+        ));
     }
     let mut tty = OpenOptions::new()
         .write(true)
@@ -77,31 +77,23 @@ impl Input for TTYPort {
 fn refused(path: &Path, error: &io::Error) -> State {
     let port = path.to_owned();
     match error.raw_os_error() {
-        Some(libc::EBUSY) => State::Busy { port },
-        Some(libc::EACCES | libc::EPERM) => State::Denied { port },
+        Some(libc::EBUSY) => State::Busy(port),
+        Some(libc::EACCES | libc::EPERM) => State::Denied(port),
         // The last three: it has just been unplugged, and its name is still there.
-        Some(libc::ENOENT | libc::ENXIO | libc::ENODEV | libc::EIO) => State::Absent {
-            place: port.display().to_string(),
-        },
-        _ => State::Failed {
-            port,
-            reason: format!("can't be opened: {error}"),
-        },
+        Some(libc::ENOENT | libc::ENXIO | libc::ENODEV | libc::EIO) => {
+            State::Absent(port.display().to_string())
+        }
+        _ => State::Failed(port, format!("can't be opened: {error}")),
     }
 }
 
 fn refused_port(path: &Path, error: &serialport::Error) -> State {
     let port = path.to_owned();
     match error.kind() {
-        ErrorKind::NoDevice => State::Busy { port },
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => State::Denied { port },
-        ErrorKind::Io(io::ErrorKind::NotFound) => State::Absent {
-            place: port.display().to_string(),
-        },
-        _ => State::Failed {
-            port,
-            reason: format!("can't be used as a serial port: {error}"),
-        },
+        ErrorKind::NoDevice => State::Busy(port),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => State::Denied(port),
+        ErrorKind::Io(io::ErrorKind::NotFound) => State::Absent(port.display().to_string()),
+        _ => State::Failed(port, format!("can't be used as a serial port: {error}")),
     }
 }
 

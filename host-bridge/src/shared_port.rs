@@ -74,9 +74,10 @@ impl Ports for SharedPorts {
 
     fn open(&self, path: &Path) -> Result<Opened, State> {
         if is_far(path) {
-            let absent = State::Absent {
-                place: format!("{}: no relay that shows it runs here", path.display()),
-            };
+            let absent = State::Absent(format!(
+                "{}: no relay that shows it runs here",
+                path.display()
+            ));
             return open_source(&path.to_string_lossy(), move || Err(absent.clone()));
         }
         // What is no port is refused in the words of who knows ports.
@@ -201,10 +202,7 @@ impl Seat {
     }
 
     fn failed(&self, reason: String) -> State {
-        State::Failed {
-            port: self.path.clone(),
-            reason,
-        }
+        State::Failed(self.path.clone(), reason)
     }
 }
 

@@ -9,54 +9,23 @@ use protocol::{Hello, PROTOCOL_VERSION, Role};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
     /// There is no such port: not plugged in, or another name.
-    Absent {
-        /// Where it was looked for.
-        place: String,
-    },
+    Absent(String),
     /// Another program has the port.
-    Busy {
-        /// The port.
-        port: PathBuf,
-    },
+    Busy(PathBuf),
     /// This user may not open the port.
-    Denied {
-        /// The port.
-        port: PathBuf,
-    },
+    Denied(PathBuf),
     /// The port can't be used, for another reason.
-    Failed {
-        /// The port.
-        port: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
+    Failed(PathBuf, String),
     /// The port has just been opened: an answer may still come.
-    Opened {
-        /// The port.
-        port: PathBuf,
-    },
+    Opened(PathBuf),
     /// The port is open, and nothing is heard.
-    Silent {
-        /// The port.
-        port: PathBuf,
-    },
+    Silent(PathBuf),
     /// A board that speaks, text or frames, and does not answer: nothing that is sent reaches it.
-    Deaf {
-        /// The port.
-        port: PathBuf,
-    },
+    Deaf(PathBuf),
     /// What is heard is neither frames nor text.
-    Garbage {
-        /// The port.
-        port: PathBuf,
-    },
+    Garbage(PathBuf),
     /// A board of another protocol or schema.
-    Foreign {
-        /// The port.
-        port: PathBuf,
-        /// What it said.
-        hello: Hello,
-    },
+    Foreign(PathBuf, Hello),
     /// A board that is understood, but of another role than wanted.
     Stranger {
         /// The port.
@@ -67,12 +36,7 @@ pub enum State {
         wanted: Role,
     },
     /// The board is there and understood.
-    Known {
-        /// The port.
-        port: PathBuf,
-        /// What it said.
-        hello: Hello,
-    },
+    Known(PathBuf, Hello),
 }
 
 impl State {
@@ -85,7 +49,7 @@ impl State {
     pub const fn is_of(&self, role: Role) -> bool {
         match self {
             Self::Known { .. } => true,
-            Self::Foreign { hello, .. } => hello.role == role.byte(),
+            Self::Foreign(_, hello) => hello.role == role.byte(),
             _ => false,
         }
     }
@@ -94,16 +58,16 @@ impl State {
     pub const fn port(&self) -> Option<&PathBuf> {
         match self {
             Self::Absent { .. } => None,
-            Self::Busy { port }
-            | Self::Denied { port }
-            | Self::Failed { port, .. }
-            | Self::Opened { port }
-            | Self::Silent { port }
-            | Self::Deaf { port }
-            | Self::Garbage { port }
-            | Self::Foreign { port, .. }
+            Self::Busy(port)
+            | Self::Denied(port)
+            | Self::Failed(port, _)
+            | Self::Opened(port)
+            | Self::Silent(port)
+            | Self::Deaf(port)
+            | Self::Garbage(port)
+            | Self::Foreign(port, _)
             | Self::Stranger { port, .. }
-            | Self::Known { port, .. } => Some(port),
+            | Self::Known(port, _) => Some(port),
         }
     }
 
@@ -166,6 +130,19 @@ impl State {
     }
 }
 
+/// A state in one line, and what to do about it.
+pub struct Advised<'a>(pub &'a State);
+
+impl fmt::Display for Advised<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(state) = self;
+        match state.advice() {
+            Some(advice) => write!(f, "{state}: {advice}"),
+            None => write!(f, "{state}"),
+        }
+    }
+}
+
 /// The state in one line, without the advice.
 impl fmt::Display for State {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -173,15 +150,15 @@ impl fmt::Display for State {
             write!(f, "{}: ", port.display())?;
         }
         match self {
-            Self::Absent { place } => write!(f, "{place}: not there"),
+            Self::Absent(place) => write!(f, "{place}: not there"),
             Self::Busy { .. } => f.write_str("another program has it"),
             Self::Denied { .. } => f.write_str("no permission to open it"),
-            Self::Failed { reason, .. } => f.write_str(reason),
+            Self::Failed(_, reason) => f.write_str(reason),
             Self::Opened { .. } => f.write_str("opened"),
             Self::Silent { .. } => f.write_str("silent"),
             Self::Deaf { .. } => f.write_str("speaks and does not answer"),
             Self::Garbage { .. } => f.write_str("sends garbage"),
-            Self::Foreign { hello, .. } => write!(
+            Self::Foreign(_, hello) => write!(
                 f,
                 "{} of protocol {}, this program speaks {PROTOCOL_VERSION}",
                 Named(hello),
@@ -190,7 +167,7 @@ impl fmt::Display for State {
             Self::Stranger { hello, wanted, .. } => {
                 write!(f, "{}, not the {}", Named(hello), wanted.name())
             }
-            Self::Known { hello, .. } => write!(f, "{}", Named(hello)),
+            Self::Known(_, hello) => write!(f, "{}", Named(hello)),
         }
     }
 }
@@ -202,7 +179,12 @@ impl fmt::Display for Named<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(hello) = self;
         let role = Role::from_byte(hello.role).map_or("unknown board", Role::name);
-        let [major, minor, patch] = hello.version;
-        write!(f, "{role} {major}.{minor}.{patch} on {}", hello.chip_name())
+        write!(f, "{role} {} on {}", version(hello), hello.chip_name())
     }
+}
+
+/// The version of who speaks, as "1.2.3".
+pub fn version(hello: &Hello) -> String {
+    let [major, minor, patch] = hello.version;
+    format!("{major}.{minor}.{patch}")
 }

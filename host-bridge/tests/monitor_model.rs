@@ -20,10 +20,10 @@ use protocol::{
 fn connected() -> Dashboard {
     let mut dashboard = Dashboard::default();
     for role in [Role::Sensor, Role::Display] {
-        let state = State::Known {
-            port: "/dev/tty".into(),
-            hello: Hello::new(role, "stm32f429zi", [0, 1, 0]),
-        };
+        let state = State::Known(
+            "/dev/tty".into(),
+            Hello::new(role, "stm32f429zi", [0, 1, 0]),
+        );
         dashboard.on(0, role, Event::StateChanged(state));
     }
     dashboard
@@ -291,7 +291,7 @@ fn every_setting_takes_its_own_value_back_and_names_its_range() {
                 Kind::Number => assert!(wanted.contains(" to "), "{}: {wanted}", setting.name),
                 Kind::Gauges => assert_eq!(wanted, "some of 01234"),
                 Kind::Choice(words) => {
-                    for word in words {
+                    for (word, _) in words {
                         let changed = setting.changed(configuration, word).expect("a word of it");
                         assert_eq!(setting.value(&changed).as_deref(), Some(*word));
                     }

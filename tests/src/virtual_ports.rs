@@ -116,12 +116,12 @@ impl Ports for VirtualPorts {
     }
 
     fn open(&self, port: &Path) -> Result<Opened, State> {
-        let cable = self.cable(port).ok_or_else(|| State::Absent {
-            place: port.display().to_string(),
-        })?;
+        let cable = self
+            .cable(port)
+            .ok_or_else(|| State::Absent(port.display().to_string()))?;
         if !locked(&self.open).insert(port.to_owned()) {
             let port = port.to_owned();
-            return Err(State::Busy { port });
+            return Err(State::Busy(port));
         }
         let _ = cable.to_board.write(&[0]);
         Ok(Opened {

@@ -590,7 +590,7 @@ fn what_is_there_already_is_left_alone_unless_forced() {
         .map(drop)
         .expect_err("it is there");
     assert!(
-        matches!(&error, RecordingError::Exists { path: at } if *at == path),
+        matches!(&error, RecordingError::Exists(at) if *at == path),
         "{error}"
     );
     assert_eq!(fs::read(&path).expect("still there"), b"kept");
@@ -658,10 +658,10 @@ fn a_long_recording_goes_on_in_another_file_that_stands_for_itself() {
         ..Settings::default()
     })
     .expect("a file can be made");
-    let known = Event::StateChanged(host_bridge::state::State::Known {
-        port: "/dev/ttyACM0".into(),
-        hello: Hello::new(Role::Sensor, "stm32f429zi", [0, 1, 0]),
-    });
+    let known = Event::StateChanged(host_bridge::state::State::Known(
+        "/dev/ttyACM0".into(),
+        Hello::new(Role::Sensor, "stm32f429zi", [0, 1, 0]),
+    ));
     recorder.on_event(Role::Sensor, &known);
     let mut speaker = Speaker::new(9);
     let mut said = Vec::new();

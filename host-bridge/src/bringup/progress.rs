@@ -83,29 +83,14 @@ pub struct Progress {
 #[derive(Debug, thiserror::Error)]
 pub enum ProgressError {
     /// It can't be read or written.
-    #[error("{path}: can't be used as the state of a bring-up: {source}: give another by --state")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be used as the state of a bring-up: {1}: give another by --state")]
+    File(PathBuf, #[source] io::Error),
     /// It is no state of a bring-up.
-    #[error("{path}: is no state of a bring-up ({source}): give another by --state, or remove it")]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
+    #[error("{0}: is no state of a bring-up ({1}): give another by --state, or remove it")]
+    Malformed(PathBuf, #[source] serde_json::Error),
     /// It is of another version.
-    #[error("{path}: is of format {format}, this program writes {FORMAT}: give another by --state")]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What it is of.
-        format: u32,
-    },
+    #[error("{0}: is of format {1}, this program writes {FORMAT}: give another by --state")]
+    Format(PathBuf, u32),
 }
 
 impl Default for Progress {
@@ -131,22 +116,13 @@ impl Progress {
             Ok(text) => text,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Self::default()),
             Err(source) => {
-                return Err(ProgressError::File {
-                    path: path.to_owned(),
-                    source,
-                });
+                return Err(ProgressError::File(path.to_owned(), source));
             }
         };
-        let kept: Self =
-            serde_json::from_str(&text).map_err(|source| ProgressError::Malformed {
-                path: path.to_owned(),
-                source,
-            })?;
+        let kept: Self = serde_json::from_str(&text)
+            .map_err(|source| ProgressError::Malformed(path.to_owned(), source))?;
         if kept.format != FORMAT {
-            return Err(ProgressError::Format {
-                path: path.to_owned(),
-                format: kept.format,
-            });
+            return Err(ProgressError::Format(path.to_owned(), kept.format));
         }
         Ok(Self {
             steps: kept.steps,
@@ -165,10 +141,7 @@ impl Progress {
         let beside = path.with_extension("new");
         fs::write(&beside, text)
             .and_then(|()| fs::rename(&beside, path))
-            .map_err(|source| ProgressError::File {
-                path: path.to_owned(),
-                source,
-            })
+            .map_err(|source| ProgressError::File(path.to_owned(), source))
     }
 
     /// What became of a step, if it was tried.
@@ -188,7 +161,7 @@ impl Progress {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
         self.steps.retain(|record| record.step != step.name);
         self.steps.push(Record {
-            step: step.name.to_owned(),
+            step: step.name.clone(),
             outcome,
             note,
             at_unix_s: now.map_or(0, |since| since.as_secs()),
@@ -200,18 +173,19 @@ impl Progress {
     }
 
     /// The step that `step` needs and that was tried in vain.
-    pub fn blocks(&self, step: &Step) -> Option<&'static str> {
-        step.needs.iter().copied().find(|need| {
-            self.record(need)
-                .is_some_and(|record| !record.outcome.is_done())
+    pub fn blocks<'s>(&self, step: &'s Step) -> Option<&'s str> {
+        let mut needs = step.needs.iter().map(String::as_str);
+        needs.find(|need| {
+            let record = self.record(need);
+            record.is_some_and(|record| !record.outcome.is_done())
         })
     }
 
     /// The first step that has not been done.
     pub fn due(&self) -> Option<&'static Step> {
         steps::all().find(|step| {
-            self.record(step.name)
-                .is_none_or(|record| !record.outcome.is_done())
+            let record = self.record(&step.name);
+            record.is_none_or(|record| !record.outcome.is_done())
         })
     }
 }
@@ -246,7 +220,7 @@ mod tests {
     #[test]
     fn what_was_done_is_not_due_and_what_failed_blocks_what_needs_it() {
         let mut progress = Progress::default();
-        assert_eq!(progress.due().map(|due| due.name), Some("usb"));
+        assert_eq!(progress.due().map(|due| due.name.as_str()), Some("usb"));
         progress.put(step("usb"), Outcome::LeftOut, None, Vec::new(), 0.0);
         progress.put(
             step("display-board"),
@@ -256,7 +230,10 @@ mod tests {
             1.0,
         );
         progress.put(step("sensor-board"), Outcome::Failed, None, Vec::new(), 1.0);
-        assert_eq!(progress.due().map(|due| due.name), Some("sensor-board"));
+        assert_eq!(
+            progress.due().map(|due| due.name.as_str()),
+            Some("sensor-board")
+        );
         assert_eq!(progress.blocks(step("rates")), Some("sensor-board"));
         // Of what was not tried nothing is known.
         assert_eq!(progress.blocks(step("link-rate")), None);

@@ -25,8 +25,8 @@ pub fn html(progress: &Progress) -> String {
     boards(&mut page, &progress.doctor);
     page += "<h2>Steps</h2>\n<table>\n<tr><th>step<th>figure<th>value<th>has to be<th>result\n";
     for step in steps::all() {
-        let title = format!("<b>{}</b><br>{}", step.name, escape(step.title));
-        let Some(record) = progress.record(step.name) else {
+        let title = format!("<b>{}</b><br>{}", step.name, escape(&step.title));
+        let Some(record) = progress.record(&step.name) else {
             let _ = writeln!(page, "<tr class=soft><td>{title}<td colspan=4>not tried");
             continue;
         };

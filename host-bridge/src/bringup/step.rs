@@ -4,29 +4,32 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::quantity::Quantity;
 use super::sight::Sight;
 
 /// A step of bringing a bench up.
-#[derive(Debug)]
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Step {
     /// Its name, in commands and in the state file: never changes.
-    pub name: &'static str,
+    pub name: String,
     /// The section of "Your first bench" that it is of.
     pub section: u8,
     /// What it is about, in a line.
-    pub title: &'static str,
+    pub title: String,
     /// What to wire or to do before it is measured.
-    pub to_do: &'static str,
+    pub to_do: String,
     /// Who can tell how it went.
     pub witness: Witness,
     /// The steps without which it can't pass.
-    pub needs: &'static [&'static str],
+    pub needs: Vec<String>,
     /// What is measured. All of it has to be within its limit.
-    pub measures: &'static [Measure],
+    pub measures: Vec<Measure>,
 }
 
 /// Who can tell how a step went.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Witness {
     /// The boards.
     Boards,
@@ -37,33 +40,25 @@ pub enum Witness {
 }
 
 /// Something that is measured.
-#[derive(Debug)]
+#[derive(Debug, Deserialize)]
 pub struct Measure {
     /// What it is.
-    pub what: &'static str,
+    pub what: String,
     /// Its unit; empty for words and counts.
-    pub unit: &'static str,
-    /// Where it comes from.
-    pub source: Source,
+    #[serde(default)]
+    pub unit: String,
+    /// What is seen of the bench; none if a person is asked.
+    pub seen: Option<Quantity>,
     /// What it has to be.
+    #[serde(flatten)]
     pub limit: Limit,
-    /// What to try if it is not.
-    pub advice: Advice,
-}
-
-/// Where a value comes from.
-#[derive(Clone, Copy, Debug)]
-pub enum Source {
-    /// A number that has been seen; none if it was not.
-    Number(fn(&Sight) -> Option<f64>),
-    /// A word that has been seen.
-    Word(fn(&Sight) -> Option<String>),
-    /// What a person answers.
-    Asked,
+    /// What to try if it is not; none if that follows from what is seen.
+    pub advice: Option<String>,
 }
 
 /// What a value has to be.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Limit {
     /// This or more.
     AtLeast(f64),
@@ -72,16 +67,7 @@ pub enum Limit {
     /// From the first to the second.
     Within(f64, f64),
     /// This word.
-    Word(&'static str),
-}
-
-/// What to try.
-#[derive(Clone, Copy, Debug)]
-pub enum Advice {
-    /// Always the same.
-    Fixed(&'static str),
-    /// What follows from what has been seen.
-    Seen(fn(&Sight) -> String),
+    Word(String),
 }
 
 /// What was measured: in JSON a number or a string.
@@ -115,9 +101,7 @@ pub struct Figure {
 impl Step {
     /// Whether it asks for an answer.
     pub fn asks(&self) -> bool {
-        self.measures
-            .iter()
-            .any(|measure| matches!(measure.source, Source::Asked))
+        self.measures.iter().any(|measure| measure.seen.is_none())
     }
 
     /// Everything that it measures, judged by what has been seen and by what `answer` makes of a question.
@@ -126,35 +110,31 @@ impl Step {
         sight: &Sight,
         mut answer: impl FnMut(&Measure) -> Option<Value>,
     ) -> Vec<Figure> {
-        self.measures
-            .iter()
-            .map(|measure| {
-                let value = match measure.source {
-                    Source::Number(read) => read(sight).map(Value::Number),
-                    Source::Word(read) => read(sight).map(Value::Word),
-                    Source::Asked => answer(measure),
-                };
-                measure.judge(value, sight)
-            })
-            .collect()
+        let judge = |measure: &Measure| {
+            let value = match measure.seen {
+                Some(quantity) => quantity.value(sight),
+                None => answer(measure),
+            };
+            measure.judge(value, sight)
+        };
+        self.measures.iter().map(judge).collect()
     }
 }
 
 impl Measure {
     fn judge(&self, value: Option<Value>, sight: &Sight) -> Figure {
         let passes = value.as_ref().is_some_and(|value| self.limit.holds(value));
-        let advice = match self.advice {
-            _ if passes => None,
-            Advice::Fixed(text) => Some(text.to_owned()),
-            Advice::Seen(of) => Some(of(sight)),
+        let advice = || {
+            let seen = || self.seen.map(|quantity| quantity.advice(sight));
+            self.advice.clone().or_else(seen).unwrap_or_default()
         };
         Figure {
-            what: self.what.to_owned(),
-            unit: self.unit.to_owned(),
+            what: self.what.clone(),
+            unit: self.unit.clone(),
             value,
             limit: self.limit.to_string(),
             passes,
-            advice,
+            advice: (!passes).then(advice),
         }
     }
 }
@@ -215,15 +195,9 @@ impl fmt::Display for Value {
 /// `estimates a second: 99.8 Hz (98 to 102)`.
 impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            what,
-            unit,
-            value,
-            limit,
-            ..
-        } = self;
+        let (what, unit, limit) = (&self.what, &self.unit, &self.limit);
         let gap = if unit.is_empty() { "" } else { " " };
-        match value {
+        match &self.value {
             Some(value) => write!(f, "{what}: {value}{gap}{unit} (has to be: {limit})"),
             None => write!(f, "{what}: not to be seen (has to be: {limit}{gap}{unit})"),
         }
@@ -238,6 +212,7 @@ mod tests {
     fn a_value_beyond_its_limit_or_not_seen_or_of_another_kind_does_not_pass() {
         let number = |value| Some(Value::Number(value));
         let word = |text: &str| Some(Value::Word(text.to_owned()));
+        let known = || Limit::Word("known".to_owned());
         for (limit, value, passes) in [
             (Limit::AtLeast(2.0), number(2.0), true),
             (Limit::AtLeast(2.0), number(1.9), false),
@@ -246,18 +221,18 @@ mod tests {
             (Limit::Within(1.0, 2.0), number(2.1), false),
             (Limit::Within(1.0, 2.0), number(f64::NAN), false),
             (Limit::AtLeast(f64::MIN), number(f64::NAN), false),
-            (Limit::Word("known"), word("known"), true),
-            (Limit::Word("known"), word("absent"), false),
-            (Limit::Word("known"), number(1.0), false),
+            (known(), word("known"), true),
+            (known(), word("absent"), false),
+            (known(), number(1.0), false),
             (Limit::AtLeast(0.0), word("known"), false),
             (Limit::AtLeast(0.0), None, false),
         ] {
             let measure = Measure {
-                what: "it",
-                unit: "",
-                source: Source::Asked,
-                limit,
-                advice: Advice::Fixed("see the wire"),
+                what: "it".to_owned(),
+                unit: String::new(),
+                seen: None,
+                limit: limit.clone(),
+                advice: Some("see the wire".to_owned()),
             };
             let figure = measure.judge(value.clone(), &Sight::default());
             assert_eq!(figure.passes, passes, "{limit:?} {value:?}");

@@ -1,31 +1,26 @@
-//! The steps, in the order in which a bench is best brought up: each needs only what those before it have
-//! shown.
+//! The steps, in the order in which a bench is best brought up: the table `steps.toml`.
 
-mod boards;
-mod converters;
-mod encoders;
-mod gauges;
-mod link;
-mod stroke;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
 
 use super::step::Step;
 
 /// The amplitude that the first stroke is made with, in mV.
 pub const FIRST_AMPLITUDE_MV: u16 = 1_000;
 
-/// Groups of steps, in their order.
-const GROUPS: [&[Step]; 6] = [
-    &boards::STEPS,
-    &link::STEPS,
-    &encoders::STEPS,
-    &gauges::STEPS,
-    &converters::STEPS,
-    &stroke::STEPS,
-];
+#[derive(Deserialize)]
+struct Table {
+    steps: Vec<Step>,
+}
+
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    toml::from_str(include_str!("steps.toml")).expect("a table that the tests have read")
+});
 
 /// Every step, in its order.
 pub fn all() -> impl Iterator<Item = &'static Step> {
-    GROUPS.into_iter().flatten()
+    TABLE.steps.iter()
 }
 
 /// The step called `name`.
@@ -43,10 +38,10 @@ mod tests {
         let mut before = Vec::new();
         for step in all() {
             assert!(!before.contains(&step.name), "{} twice", step.name);
-            for need in step.needs {
+            for need in &step.needs {
                 assert!(before.contains(need), "{} before {need}", step.name);
             }
-            before.push(step.name);
+            before.push(step.name.clone());
         }
     }
 

@@ -101,7 +101,7 @@ impl Bringup {
         };
         session.save()?;
         let passed = due.iter().all(|step| {
-            let record = session.progress.record(step.name);
+            let record = session.progress.record(&step.name);
             record.is_some_and(|record| record.outcome.is_done())
         });
         output::print(&format!(
@@ -133,7 +133,7 @@ fn report_path(state: &Path) -> PathBuf {
 fn list(progress: &Progress) -> String {
     let mut out = String::new();
     for step in steps::all() {
-        let record = progress.record(step.name);
+        let record = progress.record(&step.name);
         let outcome = record.map_or("-", |record| record.outcome.name());
         let _ = writeln!(
             out,
@@ -206,7 +206,7 @@ impl Session {
                     Answer::Skip => {
                         let failed = self
                             .progress
-                            .record(step.name)
+                            .record(&step.name)
                             .is_some_and(|record| record.outcome == Outcome::Failed);
                         if !failed {
                             self.leave(step, Outcome::LeftOut, "by its user".to_owned())?;
@@ -320,7 +320,7 @@ fn ask_for(measure: &Measure) -> anyhow::Result<Option<Value>> {
         let Some(answer) = line(&format!("{}{unit}?", measure.what))? else {
             return Ok(None);
         };
-        match measure.limit {
+        match &measure.limit {
             Limit::Word(_) if !answer.is_empty() => {
                 return Ok(Some(Value::Word(answer.to_lowercase())));
             }

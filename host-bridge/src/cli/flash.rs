@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Context;
 use clap::{ValueEnum, ValueHint};
 use host_bridge::bench::Seat;
+use host_bridge::doctor::json::identity;
 use host_bridge::flash::console;
 use host_bridge::flash::firmware::{self, Firmware};
-use host_bridge::flash::plan::{Plan, Summary};
+use host_bridge::flash::plan::Plan;
 use host_bridge::flash::probes::{self, Attached, ProbeRequest, Selector, Undecided};
 use host_bridge::flash::programmer::{Programmer, Progress};
 use host_bridge::flash::trouble::Trouble;
@@ -19,7 +20,7 @@ use host_bridge::state::{Named, State};
 use host_bridge::system::System;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::{Hello, Role};
-use serde::Serialize;
+use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
@@ -90,42 +91,6 @@ impl Board {
         match self {
             Self::Sensor => Role::Sensor,
             Self::Display => Role::Display,
-        }
-    }
-}
-
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    /// What was planned.
-    plan: Summary,
-    /// Whether it was carried out.
-    flashed: bool,
-    /// By which probe.
-    probe: Option<String>,
-    /// What the board says of itself now; none if it was not waited for, or says nothing.
-    hello: Option<Spoken>,
-}
-
-/// A Hello for scripts.
-#[derive(Serialize)]
-struct Spoken {
-    role: &'static str,
-    chip: String,
-    version: String,
-    protocol: u16,
-    schema: String,
-}
-
-impl From<Hello> for Spoken {
-    fn from(hello: Hello) -> Self {
-        let [major, minor, patch] = hello.version;
-        Self {
-            role: Role::from_byte(hello.role).map_or("?", Role::name),
-            chip: hello.chip_name().to_owned(),
-            version: format!("{major}.{minor}.{patch}"),
-            protocol: hello.protocol_version(),
-            schema: format!("{:016x}", hello.schema_hash()),
         }
     }
 }
@@ -208,12 +173,14 @@ impl Flash {
         hello: Option<Hello>,
     ) -> anyhow::Result<()> {
         let text = if self.json {
-            serde_json::to_string(&Report {
-                plan: plan.summary(),
-                flashed: probe.is_some(),
-                probe: probe.map(Attached::selector),
-                hello: hello.map(Spoken::from),
-            })?
+            // The Hello is null if it was not waited for, or not heard.
+            let report = json!({
+                "plan": plan.summary(),
+                "flashed": probe.is_some(),
+                "probe": probe.map(Attached::selector),
+                "hello": hello.as_ref().map(identity),
+            });
+            report.to_string()
         } else {
             match (probe, hello) {
                 (None, _) => format!("{plan}\nnothing was changed: this was a dry run"),
@@ -234,7 +201,7 @@ impl Flash {
         let found = probes::attached();
         let several = match probes::choose(&found, request) {
             Ok(probe) => return Ok(probe),
-            Err(Undecided::Several { found }) => found,
+            Err(Undecided::Several(found)) => found,
             Err(other) => return Err(other.into()),
         };
         let behind = if self.no_hello {

@@ -2,7 +2,6 @@
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::process::ExitCode;
-use std::sync::mpsc::channel;
 
 use anyhow::bail;
 use host_bridge::live::{PORT, Settings, Viewer};
@@ -59,11 +58,7 @@ impl Live {
         }
         let bench = self.boards.find()?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
-        let (events, told) = channel();
-        let links = super::links(&bench, move |role, event| {
-            // Nobody listens any more at the end.
-            let _ = events.send((role, event));
-        });
+        let (links, told) = super::told_links(&bench);
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let settings = Settings {
             address: self.listen,

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use anyhow::Context;
@@ -85,10 +84,14 @@ impl Monitor {
             .context("can't listen to signals")?;
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
-        let mut source = open(&bench);
-        source.logs = Some(lines);
-        let boards = source.links.iter().map(|(_, link)| link.sender());
-        signals::stop_boards(boards.collect()).context("can't listen to signals")?;
+        let (links, events) = super::told_links(&bench);
+        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())
+            .context("can't listen to signals")?;
+        let source = Source {
+            events,
+            links,
+            logs: Some(lines),
+        };
         let format = Format {
             is_json: self.json,
             every: self.every,
@@ -123,19 +126,5 @@ impl Monitor {
             }
         }
         Ok(())
-    }
-}
-
-/// The links to the boards that the bench has.
-fn open(bench: &Bench) -> Source {
-    let (events, told) = channel();
-    let links = super::links(bench, move |role, event| {
-        // A monitor that has ended listens no more.
-        let _ = events.send((role, event));
-    });
-    Source {
-        events: told,
-        links,
-        logs: None,
     }
 }

@@ -12,7 +12,12 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     print_on(text).map(drop)
 }
 
-/// The same, for who goes on printing: false if the reader has gone away.
+/// Says something of this program's on standard error, whether anybody reads it or not.
+pub fn say(text: &str) {
+    let _ = writeln!(io::stderr(), "host-bridge: {text}");
+}
+
+/// The same as [`print`], for who goes on printing: false if the reader has gone away.
 ///
 /// # Errors
 /// If it can't be written for another reason.

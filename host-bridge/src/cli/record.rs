@@ -16,7 +16,7 @@ use host_bridge::monitor::firmware_log::{LogError, Logs, Origin};
 use host_bridge::monitor::log_entry::LogEvent;
 use host_bridge::recording::gauge_stream::GaugeStream;
 use host_bridge::recording::{PART, Progress, Recorder, Settings};
-use host_bridge::state::State;
+use host_bridge::state::{Advised, State};
 use protocol::{Message, Role};
 use serde::Serialize;
 
@@ -304,7 +304,7 @@ impl Session<'_> {
         }
         if !matches!(state, State::Opened { .. }) {
             self.screen
-                .tell(&format!("{}: {}", role.name(), words(state)));
+                .tell(&format!("{}: {}", role.name(), Advised(state)));
         }
     }
 
@@ -340,14 +340,6 @@ impl Session<'_> {
             bytes(progress.safe_bytes),
             missing(&progress),
         ));
-    }
-}
-
-/// How a link stands, and what to do about it.
-fn words(state: &State) -> String {
-    match state.advice() {
-        Some(advice) => format!("{state}: {advice}"),
-        None => state.to_string(),
     }
 }
 

@@ -27,7 +27,7 @@ use protocol::Role;
 use signal_hook::consts::SIGUSR2;
 use signal_hook::iterator::Signals;
 
-use super::output;
+use super::output::{self, say};
 use super::signals::{self, Again};
 
 /// Between two looks whether the bridge is to end.
@@ -216,14 +216,14 @@ impl Bridge {
         let mut orders = Signals::new([SIGUSR2])?;
         thread::spawn(move || orders.forever().for_each(|_| hand_over()));
         let far = opposite(role).map_or("the other site", site);
-        say(&format!("host-bridge: {words}, waiting for {far}"));
+        say(&format!("{words}, waiting for {far}"));
         let mut before = None;
         let mut due = Instant::now() + REPORT;
         while !ended.load(Ordering::Relaxed) {
             match notices.recv_timeout(LOOK.min(due.saturating_duration_since(Instant::now()))) {
                 Ok(notice) => {
                     hand.on_notice(&notice);
-                    say(&format!("host-bridge: {notice}"));
+                    say(&notice.to_string());
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => bail!("the bridge has ended by itself"),
@@ -250,12 +250,12 @@ impl Router {
         let network = Network::new(ends, self.proofs.credentials(), self.names, self.insecure)?;
         let wait_for_end = signals::wait_for(&signals::USUAL)?;
         let session = network.open_router()?;
-        say(&format!("host-bridge: router, {words}"));
+        say(&format!("router, {words}"));
         thread::spawn(|| {
             loop {
                 thread::sleep(LOOK);
                 for refused in refused::take() {
-                    say(&format!("host-bridge: {}", Notice::Refused(refused)));
+                    say(&Notice::Refused(refused).to_string());
                 }
             }
         });
@@ -296,10 +296,7 @@ impl Stopping {
             match outcome {
                 Ok(stopping) => {
                     if let Some(trip) = stopping.trip {
-                        say(&format!(
-                            "host-bridge: Stop: the display has stopped: {}",
-                            trip.name()
-                        ));
+                        say(&format!("Stop: the display has stopped: {}", trip.name()));
                         return Ok(ExitCode::SUCCESS);
                     }
                     progress = progress.max(stopping.progress);
@@ -317,11 +314,11 @@ impl Stopping {
             }
         };
         say(&format!(
-            "host-bridge: NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
+            "NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
             self.within
         ));
         for error in errors {
-            say(&format!("host-bridge: {error}"));
+            say(&error.to_string());
         }
         Ok(ExitCode::from(1))
     }
@@ -334,7 +331,7 @@ fn warn_of(ends: &Ends, is_insecure: bool) {
     {
         for endpoint in endpoints {
             say(&format!(
-                "host-bridge: INSECURE: whoever reaches {endpoint} may move the arm"
+                "INSECURE: whoever reaches {endpoint} may move the arm"
             ));
         }
     }
@@ -356,12 +353,8 @@ fn print(report: &Report, before: Option<&Report>, json: bool) -> anyhow::Result
     } else if report.total {
         output::print_on(&report.to_string())
     } else {
-        say(&report.line(before));
+        // Whether anybody reads it or not.
+        let _ = writeln!(io::stderr(), "{}", report.line(before));
         Ok(true)
     }
-}
-
-/// Says something on standard error, whether anybody reads it or not.
-fn say(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
 }

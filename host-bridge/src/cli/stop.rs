@@ -1,12 +1,13 @@
 //! `host-bridge stop`.
 
-use std::io::{self, Write};
 use std::process::ExitCode;
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use host_bridge::link::{Event, stop_all};
-use protocol::Message;
+use protocol::{Message, Trip};
+
+use super::output::say;
 
 /// How it is used.
 pub const EXAMPLES: &str = "\
@@ -31,11 +32,7 @@ impl StopBoards {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
-        let (events, told) = channel();
-        let mut waiting = super::links(&bench, move |role, event| {
-            // Nobody listens any more at the end.
-            let _ = events.send((role, event));
-        });
+        let (mut waiting, told) = super::told_links(&bench);
         let boards: Vec<_> = waiting.iter().map(|(_, link)| link.sender()).collect();
         stop_all(&boards);
         let end = Instant::now() + Duration::from_secs(self.within.into());
@@ -54,14 +51,9 @@ impl StopBoards {
                         // It answers each time that it was told.
                         continue;
                     }
-                    say(&format!(
-                        "{} has stopped: {}",
-                        role.name(),
-                        stopped
-                            .trip()
-                            .map_or("a reason that this program does not know", |trip| trip
-                                .name())
-                    ));
+                    let trip = stopped.trip().map(Trip::name);
+                    let trip = trip.unwrap_or("a reason that this program does not know");
+                    say(&format!("{} has stopped: {trip}", role.name()));
                 }
                 Ok(_) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
@@ -77,9 +69,4 @@ impl StopBoards {
         }
         Ok(ExitCode::from(u8::from(!waiting.is_empty())))
     }
-}
-
-fn say(text: &str) {
-    // Nobody may be there to read it.
-    let _ = writeln!(io::stderr(), "host-bridge: {text}");
 }

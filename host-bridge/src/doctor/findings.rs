@@ -222,7 +222,7 @@ impl Findings<'_> {
 
     fn of_state(&mut self, board: &BoardFacts) {
         let Some(advice) = board.state.advice() else {
-            if let State::Opened { port } = &board.state {
+            if let State::Opened(port) = &board.state {
                 self.add(
                     "opened",
                     format!("{}: has not answered yet", port.display()),
@@ -241,7 +241,7 @@ impl Findings<'_> {
                 ),
                 permission.advice(),
             ),
-            (State::Foreign { hello, .. }, _) if hello.protocol_version() == PROTOCOL_VERSION => {
+            (State::Foreign(_, hello), _) if hello.protocol_version() == PROTOCOL_VERSION => {
                 self.add(
                     board.state.word(),
                     format!(

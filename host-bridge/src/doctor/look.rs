@@ -200,8 +200,8 @@ impl Watch {
         match event {
             Event::StateChanged(state) => {
                 self.named_us = (!matches!(state, State::Opened { .. })).then(|| self.now_us());
-                if let State::Known { hello, .. }
-                | State::Foreign { hello, .. }
+                if let State::Known(_, hello)
+                | State::Foreign(_, hello)
                 | State::Stranger { hello, .. } = &state
                 {
                     self.facts.hello = Some(*hello);
@@ -258,7 +258,7 @@ impl Watch {
         facts.rate_hz = (facts.state.is_known() && looked >= Duration::from_secs(1))
             .then(|| f64::from(said) / looked.as_secs_f64());
         facts.permission = match &facts.state {
-            State::Denied { port } => Permission::of(port),
+            State::Denied(port) => Permission::of(port),
             _ => None,
         };
         facts

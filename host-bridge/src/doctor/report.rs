@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use protocol::{PROTOCOL_VERSION, RoleCounters, SCHEMA_HASH, Status};
+use protocol::{GaugeHealth, PROTOCOL_VERSION, RoleCounters, SCHEMA_HASH, Status};
 
 use super::examination::{BoardFacts, Examination};
 use super::findings::{Finding, peer_grown};
@@ -112,7 +112,7 @@ fn of_board(out: &mut String, board: &BoardFacts, style: Style) {
         }
     }
     if let Some(health) = board.health {
-        let words = health.map(|health| format!("{health:?}").to_lowercase());
+        let words = health.map(GaugeHealth::name);
         fact("gauges 0-4", words.join(", "));
     }
     if let Some(clock) = &board.clock {

@@ -80,9 +80,7 @@ pub fn texture(excerpt: &Excerpt, settings: &Settings) -> Result<Made, ExportErr
         }));
     };
     if low_um == high_um {
-        return Err(ExportError::AtRest {
-            path: settings.from.clone(),
-        });
+        return Err(ExportError::AtRest(settings.from.clone()));
     }
     let traces = (0..GAUGES).map(|gauge| Trace {
         description: format!("gauge {gauge}"),

@@ -165,9 +165,7 @@ pub fn groups(scene: &Scene) -> Result<Vec<Group>, ExportError> {
     let mut tape = Tape::default();
     native::run_before(scene, &mut tape)?;
     if tape.is_uneven {
-        return Err(ExportError::Uneven {
-            scene: scene.name.clone(),
-        });
+        return Err(ExportError::Uneven(scene.name.clone()));
     }
     let tick_hz = scene.display_configuration().update_rate.hz();
     // One more, so that the file lasts as long as the scene.

@@ -97,9 +97,7 @@ pub fn look_at_all(system: &System, role: Role, places: Vec<Place>) -> Vec<State
     let looks: Vec<_> = places
         .into_iter()
         .map(|place| {
-            let absent = State::Absent {
-                place: place.to_string(),
-            };
+            let absent = State::Absent(place.to_string());
             let found = Arc::new(Mutex::new(absent));
             let (system_of_look, theirs) = (system.clone(), Arc::clone(&found));
             let work = move || {
@@ -170,12 +168,12 @@ pub fn wait(
         }
         let now_us = system.clock.now_us();
         match told.recv_until(end_us.min(now_us.saturating_add(micros(LOOK_AGAIN)))) {
-            Some(Event::StateChanged(State::Known { hello, .. }))
+            Some(Event::StateChanged(State::Known(_, hello)))
                 if hello.version == wanted.version =>
             {
                 return Ok(hello);
             }
-            Some(Event::StateChanged(State::Known { hello, .. })) => other = Some(hello),
+            Some(Event::StateChanged(State::Known(_, hello))) => other = Some(hello),
             Some(_) | None => {}
         }
         if now_us >= end_us {

@@ -22,9 +22,8 @@ type Header = FileHeader32<LittleEndian>;
 pub enum FirmwareError {
     /// The file can't be read.
     #[error(
-        "{}: can't be read ({source}): build it with \
-         `cargo build --release --target thumbv7em-none-eabihf -p firmware-{role}`, or name the ELF",
-        path.display()
+        "{path}: can't be read ({source}): build it with \
+         `cargo build --release --target thumbv7em-none-eabihf -p firmware-{role}`, or name the ELF"
     )]
     Unreadable {
         /// The file.
@@ -35,15 +34,10 @@ pub enum FirmwareError {
         source: io::Error,
     },
     /// The file is no ELF for a 32-bit ARM.
-    #[error("{}: is no firmware's ELF ({reason}): give the file as the build left it", path.display())]
-    NoElf {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
+    #[error("{0}: is no firmware's ELF ({1}): give the file as the build left it")]
+    NoElf(PathBuf, String),
     /// The end of the file is missing.
-    #[error("{}: is cut off: {found} of its {wanted} bytes are there; build or copy it again", path.display())]
+    #[error("{path}: is cut off: {found} of its {wanted} bytes are there; build or copy it again")]
     CutOff {
         /// The file.
         path: PathBuf,
@@ -53,16 +47,14 @@ pub enum FirmwareError {
         wanted: u64,
     },
     /// The ELF does not say what it is.
-    #[error("{}: has no .ridgelink section: it is no firmware of Ridgelink, or was stripped of it", path.display())]
-    NoIdentity {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error(
+        "{0}: has no .ridgelink section: it is no firmware of Ridgelink, or was stripped of it"
+    )]
+    NoIdentity(PathBuf),
     /// The ELF is for the other board.
     #[error(
-        "{}: is the {found} board's firmware, and the {wanted} board was to get it: \
-         exchange the two, or flash it as `host-bridge flash {found}`",
-        path.display()
+        "{path}: is the {found} board's firmware, and the {wanted} board was to get it: \
+         exchange the two, or flash it as `host-bridge flash {found}`"
     )]
     WrongRole {
         /// The file.
@@ -74,9 +66,8 @@ pub enum FirmwareError {
     },
     /// The ELF was built from another protocol.
     #[error(
-        "{}: speaks protocol {found_version} with schema {found_schema:016x}, this program \
-         {PROTOCOL_VERSION} with {SCHEMA_HASH:016x}: build both from the same sources",
-        path.display()
+        "{path}: speaks protocol {found_version} with schema {found_schema:016x}, this program \
+         {PROTOCOL_VERSION} with {SCHEMA_HASH:016x}: build both from the same sources"
     )]
     OtherProtocol {
         /// The file.
@@ -170,10 +161,7 @@ struct Elf<'a> {
 
 impl<'a> Elf<'a> {
     fn open(path: &'a Path, bytes: &'a [u8]) -> Result<Self, FirmwareError> {
-        let no_elf = |reason: &str| FirmwareError::NoElf {
-            path: path.to_owned(),
-            reason: reason.to_owned(),
-        };
+        let no_elf = |reason: &str| FirmwareError::NoElf(path.to_owned(), reason.to_owned());
         let cut_off = |wanted| FirmwareError::CutOff {
             path: path.to_owned(),
             found: bytes.len() as u64,
@@ -208,10 +196,7 @@ impl<'a> Elf<'a> {
     }
 
     fn no_elf(&self, error: object::Error) -> FirmwareError {
-        FirmwareError::NoElf {
-            path: self.path.to_owned(),
-            reason: error.to_string(),
-        }
+        FirmwareError::NoElf(self.path.to_owned(), error.to_string())
     }
 
     /// Where the last of its two tables ends, by its header.
@@ -260,9 +245,7 @@ impl<'a> Elf<'a> {
             .section_by_name(LittleEndian, IDENTITY)
             .and_then(|(_, section)| section.data(LittleEndian, self.bytes).ok())
             .and_then(Hello::from_bytes)
-            .ok_or_else(|| FirmwareError::NoIdentity {
-                path: self.path.to_owned(),
-            })
+            .ok_or_else(|| FirmwareError::NoIdentity(self.path.to_owned()))
     }
 
     /// What is loaded, by physical address: where it lies in the flash, not where it runs.
@@ -276,13 +259,12 @@ impl<'a> Elf<'a> {
             if header.p_type(LittleEndian) != PT_LOAD || header.p_filesz(LittleEndian) == 0 {
                 continue;
             }
-            let bytes =
-                header
-                    .data(LittleEndian, self.bytes)
-                    .map_err(|()| FirmwareError::NoElf {
-                        path: self.path.to_owned(),
-                        reason: "a segment lies outside the file".to_owned(),
-                    })?;
+            let bytes = header.data(LittleEndian, self.bytes).map_err(|()| {
+                FirmwareError::NoElf(
+                    self.path.to_owned(),
+                    "a segment lies outside the file".to_owned(),
+                )
+            })?;
             segments.push(Segment {
                 address: u64::from(header.p_paddr(LittleEndian)),
                 bytes: bytes.to_vec(),

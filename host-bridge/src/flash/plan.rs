@@ -8,9 +8,10 @@ use probe_rs::Target;
 use probe_rs::config::{MemoryRegion, Registry, RegistryError};
 use probe_rs::flashing::{FlashAlgorithm, FlashError, FlashLoader};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::firmware::{Firmware, Segment};
-use crate::state::Named;
+use crate::state::{Named, version};
 
 /// The chip of both boards, as their firmwares name it.
 pub const CHIP: &str = "STM32F429ZI";
@@ -24,27 +25,17 @@ pub const FLASH_START: u64 = 0x0800_0000;
 pub enum PlanError {
     /// The firmware is for another chip.
     #[error(
-        "{}: is for the chip {found}, and Ridgelink's boards have an {CHIP}: build it for \
-         thumbv7em-none-eabihf from these sources",
-        path.display()
+        "{0}: is for the chip {1}, and Ridgelink's boards have an {CHIP}: build it for \
+         thumbv7em-none-eabihf from these sources"
     )]
-    OtherChip {
-        /// The ELF.
-        path: PathBuf,
-        /// The chip that it names.
-        found: String,
-    },
+    OtherChip(PathBuf, String),
     /// There is nothing to flash.
-    #[error("{}: has nothing that goes into the flash: give the file as the build left it", path.display())]
-    Empty {
-        /// The ELF.
-        path: PathBuf,
-    },
+    #[error("{0}: has nothing that goes into the flash: give the file as the build left it")]
+    Empty(PathBuf),
     /// The flash is too small.
     #[error(
-        "{}: is too large: it ends at {end:#010x}, the flash of the {CHIP} at {flash_end:#010x}; \
-         build it with --release",
-        path.display()
+        "{path}: is too large: it ends at {end:#010x}, the flash of the {CHIP} at {flash_end:#010x}; \
+         build it with --release"
     )]
     TooLarge {
         /// The ELF.
@@ -56,9 +47,8 @@ pub enum PlanError {
     },
     /// A part of it would go elsewhere than into the flash.
     #[error(
-        "{}: its part of {bytes} bytes ({sections}) at {address:#010x} would go into {what}, not into the \
-         flash: see the linker's memory.x",
-        path.display()
+        "{path}: its part of {bytes} bytes ({sections}) at {address:#010x} would go into {what}, not into the \
+         flash: see the linker's memory.x"
     )]
     Outside {
         /// The ELF.
@@ -73,25 +63,14 @@ pub enum PlanError {
         what: &'static str,
     },
     /// Two parts of it want the same place.
-    #[error("{}: two of its parts want the flash at {address:#010x}: see the linker's script", path.display())]
-    Overlap {
-        /// The ELF.
-        path: PathBuf,
-        /// The first address that both want.
-        address: u64,
-    },
+    #[error("{0}: two of its parts want the flash at {1:#010x}: see the linker's script")]
+    Overlap(PathBuf, u64),
     /// The chip would not start.
     #[error(
-        "{}: the chip would not start: at {FLASH_START:#010x} there must be a stack in RAM and a reset \
-         vector into the flash, and {found}",
-        path.display()
+        "{0}: the chip would not start: at {FLASH_START:#010x} there must be a stack in RAM and a reset \
+         vector into the flash, and {1}"
     )]
-    NoVectors {
-        /// The ELF.
-        path: PathBuf,
-        /// What there is.
-        found: String,
-    },
+    NoVectors(PathBuf, String),
     /// probe-rs does not know the chip.
     #[error("probe-rs does not know {PART}: {0}")]
     Registry(#[from] RegistryError),
@@ -142,26 +121,23 @@ impl Plan {
     pub fn new(firmware: Firmware) -> Result<Self, PlanError> {
         let path = || firmware.path.clone();
         if !firmware.hello.chip_name().eq_ignore_ascii_case(CHIP) {
-            return Err(PlanError::OtherChip {
-                path: path(),
-                found: firmware.hello.chip_name().to_owned(),
-            });
+            return Err(PlanError::OtherChip(
+                path(),
+                firmware.hello.chip_name().to_owned(),
+            ));
         }
         let target = Registry::from_builtin_families().get_target_by_name(PART)?;
         let algorithm = flash_algorithm(&target)?;
         let flash = algorithm.flash_properties.address_range.clone();
         if firmware.segments.is_empty() {
-            return Err(PlanError::Empty { path: path() });
+            return Err(PlanError::Empty(path()));
         }
         for segment in &firmware.segments {
             check_place(&firmware, segment, &flash, &target)?;
         }
         for pair in firmware.segments.windows(2) {
             if pair[1].address < pair[0].range().end {
-                return Err(PlanError::Overlap {
-                    path: path(),
-                    address: pair[1].address,
-                });
+                return Err(PlanError::Overlap(path(), pair[1].address));
             }
         }
         check_vectors(&firmware, &flash, &target)?;
@@ -222,77 +198,34 @@ impl Plan {
         Ok(loader)
     }
 
-    /// The plan for scripts.
-    pub fn summary(&self) -> Summary {
+    /// The plan for scripts: what `--json` prints.
+    pub fn summary(&self) -> Value {
         let hello = &self.firmware.hello;
-        let [major, minor, patch] = hello.version;
-        Summary {
-            elf: self.firmware.path.display().to_string(),
-            role: self.firmware.role.name(),
-            version: format!("{major}.{minor}.{patch}"),
-            chip: hello.chip_name().to_owned(),
-            protocol: hello.protocol_version(),
-            schema: format!("{:016x}", hello.schema_hash()),
-            segments: self
-                .firmware
-                .segments
-                .iter()
-                .map(|segment| SegmentSummary {
-                    address: segment.address,
-                    bytes: segment.bytes.len(),
-                    sections: segment.sections.clone(),
-                })
-                .collect(),
-            sectors: self.sectors.clone(),
-            pages: self.pages,
-            page_bytes: self.page_bytes,
-            bytes: self.bytes,
-            flash_bytes: self.flash.end - self.flash.start,
-            share_percent: self.share_percent(),
-        }
+        let segment = |segment: &Segment| {
+            json!({
+                "address": segment.address,
+                "bytes": segment.bytes.len(),
+                "sections": segment.sections,
+            })
+        };
+        json!({
+            "elf": self.firmware.path.display().to_string(),
+            "role": self.firmware.role.name(),
+            "version": version(hello),
+            "chip": hello.chip_name(),
+            "protocol": hello.protocol_version(),
+            "schema": format!("{:016x}", hello.schema_hash()),
+            "segments": self.firmware.segments.iter().map(segment).collect::<Value>(),
+            // What is erased, and how many pages are written.
+            "sectors": self.sectors,
+            "pages": self.pages,
+            "page_bytes": self.page_bytes,
+            // Of the firmware, and of the chip's flash.
+            "bytes": self.bytes,
+            "flash_bytes": self.flash.end - self.flash.start,
+            "share_percent": self.share_percent(),
+        })
     }
-}
-
-/// A plan for scripts: what `--json` prints.
-#[derive(Clone, Debug, Serialize)]
-pub struct Summary {
-    /// The ELF.
-    pub elf: String,
-    /// The board that it is for.
-    pub role: &'static str,
-    /// Its version.
-    pub version: String,
-    /// Its chip.
-    pub chip: String,
-    /// The protocol that it speaks.
-    pub protocol: u16,
-    /// The schema that it speaks, in hexadecimal.
-    pub schema: String,
-    /// What goes into the flash.
-    pub segments: Vec<SegmentSummary>,
-    /// What is erased.
-    pub sectors: Vec<Sector>,
-    /// How many pages are written.
-    pub pages: usize,
-    /// A page's size in bytes.
-    pub page_bytes: u64,
-    /// The firmware's size in bytes.
-    pub bytes: u64,
-    /// The flash's size in bytes.
-    pub flash_bytes: u64,
-    /// How much of the flash the firmware takes.
-    pub share_percent: f64,
-}
-
-/// A segment for scripts.
-#[derive(Clone, Debug, Serialize)]
-pub struct SegmentSummary {
-    /// Where it begins.
-    pub address: u64,
-    /// Its size in bytes.
-    pub bytes: usize,
-    /// The sections in it.
-    pub sections: Vec<String>,
 }
 
 impl fmt::Display for Plan {
@@ -390,12 +323,7 @@ fn check_vectors(
     flash: &Range<u64>,
     target: &Target,
 ) -> Result<(), PlanError> {
-    let refuse = |found: String| {
-        Err(PlanError::NoVectors {
-            path: firmware.path.clone(),
-            found,
-        })
-    };
+    let refuse = |found: String| Err(PlanError::NoVectors(firmware.path.clone(), found));
     let first = &firmware.segments[0];
     let Some((stack, reset)) = first
         .bytes

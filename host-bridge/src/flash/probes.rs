@@ -54,9 +54,7 @@ impl Attached {
     /// If it is gone, another program's, or not for this user.
     pub fn open(&self) -> Result<Probe, Trouble> {
         if !self.is_allowed {
-            return Err(Trouble::Denied {
-                probe: self.selector(),
-            });
+            return Err(Trouble::Denied(self.selector()));
         }
         self.info
             .open()
@@ -161,12 +159,9 @@ pub enum Undecided {
     /// Several may be meant.
     #[error(
         "several probes are plugged in: name the board's with --probe, or its serial number as `usb` in the bench file:\n{}",
-        list(found)
+        list(.0)
     )]
-    Several {
-        /// Those.
-        found: Vec<Attached>,
-    },
+    Several(Vec<Attached>),
 }
 
 fn list(found: &[Attached]) -> String {
@@ -218,9 +213,9 @@ pub fn choose(found: &[Attached], request: &ProbeRequest) -> Result<Attached, Un
             found: found.to_vec(),
         }),
         ([], None) => Err(Undecided::None),
-        (several, _) => Err(Undecided::Several {
-            found: several.iter().map(|&probe| probe.clone()).collect(),
-        }),
+        (several, _) => Err(Undecided::Several(
+            several.iter().map(|&probe| probe.clone()).collect(),
+        )),
     }
 }
 

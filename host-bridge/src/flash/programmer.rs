@@ -112,33 +112,27 @@ impl Programmer {
                     .map_err(|_| error),
                 None => Err(error),
             })
-            .map_err(|error| Trouble::NoAnswer {
-                reason: chain(&error),
-            })?;
+            .map_err(|error| Trouble::NoAnswer(chain(&error)))?;
         let mut programmer = Self { session };
         programmer.check(plan)?;
         Ok(programmer)
     }
 
     fn core(&mut self) -> Result<Core<'_>, Trouble> {
-        self.session.core(0).map_err(|error| Trouble::LostBefore {
-            reason: chain(&error),
-        })
+        self.session
+            .core(0)
+            .map_err(|error| Trouble::LostBefore(chain(&error)))
     }
 
     fn check(&mut self, plan: &Plan) -> Result<(), Trouble> {
         let mut core = self.core()?;
         let mut read = |address| {
             core.read_word_32(address)
-                .map_err(|error| Trouble::LostBefore {
-                    reason: chain(&error),
-                })
+                .map_err(|error| Trouble::LostBefore(chain(&error)))
         };
         let device = read(DEVICE_ID)? & 0xFFF;
         if device != OUR_DEVICE {
-            return Err(Trouble::OtherChip {
-                found: named(device),
-            });
+            return Err(Trouble::OtherChip(named(device)));
         }
         check_lock(read(OPTIONS)?, read(OPTIONS_1)?, plan)?;
         let found_kib = u64::from(read(FLASH_SIZE)? >> 16);
@@ -189,9 +183,7 @@ impl Programmer {
         self.session
             .core(0)
             .and_then(|mut core| core.reset())
-            .map_err(|error| Trouble::NotStarted {
-                reason: chain(&error),
-            })
+            .map_err(|error| Trouble::NotStarted(chain(&error)))
     }
 }
 
@@ -219,9 +211,7 @@ fn check_lock(options: u32, options_1: u32, plan: &Plan) -> Result<(), Trouble> 
         .iter()
         .find(|sector| is_protected(sector.number))
     {
-        Some(sector) => Err(Trouble::Protected {
-            sector: sector.number,
-        }),
+        Some(sector) => Err(Trouble::Protected(sector.number)),
         None => Ok(()),
     }
 }

@@ -16,36 +16,20 @@ pub const UDEV_HINT: &str = "let its users at it by the udev rules in host-bridg
 #[derive(Debug, thiserror::Error)]
 pub enum Trouble {
     /// This user may not open the probe.
-    #[error("no permission to open the probe {probe}: {UDEV_HINT}")]
-    Denied {
-        /// The probe.
-        probe: String,
-    },
+    #[error("no permission to open the probe {0}: {UDEV_HINT}")]
+    Denied(String),
     /// Another program has the probe.
     #[error(
-        "another program has the probe {probe}: close it (probe-rs, cargo run, OpenOCD, \
+        "another program has the probe {0}: close it (probe-rs, cargo run, OpenOCD, \
          STM32CubeProgrammer, a debugger in an editor)"
     )]
-    Busy {
-        /// The probe.
-        probe: String,
-    },
+    Busy(String),
     /// The probe went away.
-    #[error("the probe {probe} is gone: plug it in again")]
-    Gone {
-        /// The probe.
-        probe: String,
-    },
+    #[error("the probe {0} is gone: plug it in again")]
+    Gone(String),
     /// The probe can't be opened, for another reason.
-    #[error(
-        "the probe {probe} can't be opened: {reason}; plug it in again, or update its firmware"
-    )]
-    Unopened {
-        /// The probe.
-        probe: String,
-        /// probe-rs's reason.
-        reason: String,
-    },
+    #[error("the probe {0} can't be opened: {1}; plug it in again, or update its firmware")]
+    Unopened(String, String),
     /// The chip has no power.
     #[error(
         "the probe sees {volts:.1} V on the board, not 3.3 V: see the board's supply \
@@ -57,21 +41,15 @@ pub enum Trouble {
     },
     /// Nothing answers behind the probe.
     #[error(
-        "no chip answers behind the probe ({reason}): see that both jumpers of CN4 are on and the board has \
+        "no chip answers behind the probe ({0}): see that both jumpers of CN4 are on and the board has \
          power, and hold its reset button while trying again"
     )]
-    NoAnswer {
-        /// probe-rs's reason.
-        reason: String,
-    },
+    NoAnswer(String),
     /// The chip behind the probe is another one.
     #[error(
-        "the chip behind the probe is {found}, and the firmware is for an {CHIP}: nothing was changed"
+        "the chip behind the probe is {0}, and the firmware is for an {CHIP}: nothing was changed"
     )]
-    OtherChip {
-        /// What it is.
-        found: String,
-    },
+    OtherChip(String),
     /// The chip's flash is smaller than the firmware.
     #[error(
         "the chip behind the probe has {found_kib} KiB of flash, the firmware ends at {wanted_kib} KiB: \
@@ -91,43 +69,29 @@ pub enum Trouble {
     },
     /// Sectors that are to be written are protected.
     #[error(
-        "sector {sector} of the flash is write-protected: take the protection off (STM32CubeProgrammer, \
+        "sector {0} of the flash is write-protected: take the protection off (STM32CubeProgrammer, \
          option bytes nWRP); nothing was changed"
     )]
-    Protected {
-        /// The first of them.
-        sector: usize,
-    },
+    Protected(usize),
     /// The probe lost the chip before anything was erased.
     #[error(
-        "the probe lost the chip before anything was erased ({reason}): see cable and power, try again"
+        "the probe lost the chip before anything was erased ({0}): see cable and power, try again"
     )]
-    LostBefore {
-        /// probe-rs's reason.
-        reason: String,
-    },
+    LostBefore(String),
     /// Erasing or writing failed: the board has no whole firmware now.
     #[error(
-        "{what} failed ({reason}): the board has no whole firmware now and its outputs stay at 0 V; see cable \
+        "{0} failed ({1}): the board has no whole firmware now and its outputs stay at 0 V; see cable \
          and power, and flash it again"
     )]
-    Broken {
-        /// Which part of it.
-        what: &'static str,
-        /// probe-rs's reason.
-        reason: String,
-    },
+    Broken(&'static str, String),
     /// What was read back is not what was written.
     #[error(
         "the flash does not hold what was written: flash it again, and if that fails again exchange the board"
     )]
     Unverified,
     /// The firmware is in the flash but was not started.
-    #[error("flashed and verified, but not started ({reason}): press the board's reset button")]
-    NotStarted {
-        /// probe-rs's reason.
-        reason: String,
-    },
+    #[error("flashed and verified, but not started ({0}): press the board's reset button")]
+    NotStarted(String),
 }
 
 impl Trouble {
@@ -146,19 +110,16 @@ impl Trouble {
             error,
             DebugProbeError::ProbeCouldNotBeCreated(ProbeCreationError::NotFound)
         ) {
-            return Self::Gone { probe };
+            return Self::Gone(probe);
         }
         let system = sources(error).find_map(|source| source.downcast_ref::<io::Error>());
         match system.map(io::Error::kind) {
-            Some(io::ErrorKind::PermissionDenied) => Self::Denied { probe },
-            Some(io::ErrorKind::ResourceBusy) => Self::Busy { probe },
-            Some(io::ErrorKind::NotConnected | io::ErrorKind::NotFound) => Self::Gone { probe },
+            Some(io::ErrorKind::PermissionDenied) => Self::Denied(probe),
+            Some(io::ErrorKind::ResourceBusy) => Self::Busy(probe),
+            Some(io::ErrorKind::NotConnected | io::ErrorKind::NotFound) => Self::Gone(probe),
             // The USB library has a kind of its own for this, which gets lost on the way, but not its words.
-            _ if chain(error).contains("busy") => Self::Busy { probe },
-            _ => Self::Unopened {
-                probe,
-                reason: chain(error),
-            },
+            _ if chain(error).contains("busy") => Self::Busy(probe),
+            _ => Self::Unopened(probe, chain(error)),
         }
     }
 
@@ -168,15 +129,9 @@ impl Trouble {
         match error {
             FlashError::Verify => Self::Unverified,
             // A sector whose erasing failed may be half erased.
-            FlashError::EraseFailed { .. } => Self::Broken {
-                what: "erasing",
-                reason,
-            },
-            _ if is_begun => Self::Broken {
-                what: "writing",
-                reason,
-            },
-            _ => Self::LostBefore { reason },
+            FlashError::EraseFailed { .. } => Self::Broken("erasing", reason),
+            _ if is_begun => Self::Broken("writing", reason),
+            _ => Self::LostBefore(reason),
         }
     }
 }

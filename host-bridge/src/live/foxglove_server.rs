@@ -1,7 +1,6 @@
 //! What the boards say, in Foxglove's WebSocket protocol: the topics, schemas and bytes of a recording.
 
 use std::collections::HashMap;
-use std::convert::Infallible;
 use std::io;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -13,27 +12,17 @@ use foxglove::{
 use protocol::Role;
 
 use crate::link::Event;
-use crate::recording::{CdrEncoder, Entry, RowBuilder, SchemaError};
+use crate::recording::{CdrEncoder, Note, RowBuilder, SchemaError};
 
 /// Why nothing can be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
     /// The port for Foxglove can't be had.
-    #[error("port {port} for Foxglove: {source}: give another one with --port")]
-    Foxglove {
-        /// The port.
-        port: u16,
-        /// The reason.
-        source: Box<FoxgloveError>,
-    },
+    #[error("port {0} for Foxglove: {1}: give another one with --port")]
+    Foxglove(u16, #[source] Box<FoxgloveError>),
     /// The port for the page can't be had.
-    #[error("port {port} for the page: {source}: give another one with --port")]
-    Page {
-        /// The port.
-        port: u16,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("port {0} for the page: {1}: give another one with --port")]
+    Page(u16, #[source] io::Error),
     /// A row has no schema.
     #[error(transparent)]
     Schema(#[from] SchemaError),
@@ -59,10 +48,7 @@ impl FoxgloveServer {
         let encoder = CdrEncoder::new()?;
         // Its own, so that two in one program don't mix.
         let context = Context::new();
-        let refused = |source| LiveError::Foxglove {
-            port,
-            source: Box::new(source),
-        };
+        let refused = |source| LiveError::Foxglove(port, Box::new(source));
         let mut channels = Vec::new();
         for channel in encoder.channels() {
             let text = channel.schema.clone().into_bytes();
@@ -99,22 +85,14 @@ impl FoxgloveServer {
 
     /// Says what a link told at `at_us` of this host's clock.
     pub fn on_event(&mut self, role: Role, event: &Event, at_us: u64) {
-        let Self {
-            encoder,
-            channels,
-            rows,
-            cdr,
-            ..
-        } = self;
-        let told = rows.enter(role, event, at_us, |entry: Entry| {
-            cdr.clear();
+        for entry in self.rows.enter(role, at_us, &Note::Event(event.clone())) {
+            self.cdr.clear();
             // A row that can't be said is none of this program's.
-            if let Ok(Some(at)) = encoder.encode(&entry, cdr) {
-                channels[at].log_with_meta(cdr, PartialMetadata::with_log_time(entry.log_ns));
+            if let Ok(Some(at)) = self.encoder.encode(&entry, &mut self.cdr) {
+                let time = PartialMetadata::with_log_time(entry.log_ns);
+                self.channels[at].log_with_meta(&self.cdr, time);
             }
-            Ok::<_, Infallible>(())
-        });
-        let Ok(()) = told;
+        }
     }
 
     /// Ends all connections.

@@ -61,7 +61,7 @@ pub fn listen(address: IpAddr, port: u16) -> Result<(TcpListener, SocketAddr), L
     listener
         .and_then(|listener| Ok((listener.local_addr()?, listener)))
         .map(|(here, listener)| (listener, here))
-        .map_err(|source| LiveError::Page { port, source })
+        .map_err(|source| LiveError::Page(port, source))
 }
 
 /// Serves the page for as long as the program runs; `stop` is called at each Stop.

@@ -52,21 +52,11 @@ impl Origin {
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The ELF can't be read.
-    #[error("{path}: can't be read: {source}")]
-    Unreadable {
-        /// The ELF.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be read: {1}")]
+    Unreadable(PathBuf, #[source] io::Error),
     /// The ELF has no strings of a log.
-    #[error("{path}: holds no defmt log ({reason}): give the firmware's ELF as the build left it")]
-    NoTable {
-        /// The ELF.
-        path: PathBuf,
-        /// What the decoder said.
-        reason: String,
-    },
+    #[error("{0}: holds no defmt log ({1}): give the firmware's ELF as the build left it")]
+    NoTable(PathBuf, String),
 }
 
 /// A log to be read.
@@ -97,14 +87,8 @@ impl Logs {
     /// # Errors
     /// If the ELF can't be read or has no log. That the bytes can't be had is said as it happens.
     pub fn follow(&self, role: Role, elf: &Path, origin: Origin) -> Result<(), LogError> {
-        let bytes = fs::read(elf).map_err(|source| LogError::Unreadable {
-            path: elf.to_owned(),
-            source,
-        })?;
-        let no_table = |reason: String| LogError::NoTable {
-            path: elf.to_owned(),
-            reason,
-        };
+        let bytes = fs::read(elf).map_err(|source| LogError::Unreadable(elf.to_owned(), source))?;
+        let no_table = |reason: String| LogError::NoTable(elf.to_owned(), reason);
         let table = Table::parse(&bytes)
             .map_err(|error| no_table(format!("{error:#}")))?
             .ok_or_else(|| no_table("no .defmt section".to_owned()))?;
@@ -142,7 +126,7 @@ impl Log {
             };
             if told.as_ref() != Some(&reason) && !self.is_ended() {
                 told = Some(reason.clone());
-                let _ = self.lines.send((self.role, LogEvent::LogLost { reason }));
+                let _ = self.lines.send((self.role, LogEvent::LogLost(reason)));
             }
             thread::park_timeout(AGAIN);
         }

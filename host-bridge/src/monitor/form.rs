@@ -92,9 +92,9 @@ impl Form {
         let current = self.draft.clone().or_else(|| setting.value(configuration?));
         let place = words
             .iter()
-            .position(|word| Some(*word) == current.as_deref())
+            .position(|(word, _)| Some(*word) == current.as_deref())
             .unwrap_or(0);
         let step = if forward { 1 } else { words.len() - 1 };
-        self.draft = Some(words[(place + step) % words.len()].to_owned());
+        self.draft = Some(words[(place + step) % words.len()].0.to_owned());
     }
 }

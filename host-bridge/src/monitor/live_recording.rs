@@ -2,10 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use protocol::{PortCounters, Role};
-
-use crate::link::Event;
-use crate::recording::{PART, Progress, Recorder, RecordingError, Settings, part_path};
+use crate::recording::{PART, Recorder, RecordingError, Settings, part_path};
 
 /// A recording under way.
 pub struct LiveRecording {
@@ -13,7 +10,8 @@ pub struct LiveRecording {
     pub path: PathBuf,
     /// Since when, in µs of [`crate::host_clock::now_us`].
     pub since_us: u64,
-    recorder: Recorder,
+    /// What writes it.
+    pub recorder: Recorder,
 }
 
 impl LiveRecording {
@@ -40,38 +38,5 @@ impl LiveRecording {
             since_us,
             recorder,
         })
-    }
-
-    /// Keeps what a link tells.
-    pub fn keep(&self, role: Role, event: &Event) {
-        self.recorder.on_event(role, event);
-    }
-
-    /// Keeps what this end of a line has counted.
-    pub fn keep_counters(&self, role: Role, counters: PortCounters) {
-        self.recorder.on_counters(role, counters);
-    }
-
-    /// Keeps a line of a board's log; `level` is defmt's.
-    pub fn keep_log(&self, role: Role, level: Option<&'static str>, text: String) {
-        self.recorder.on_log(role, level, text);
-    }
-
-    /// How it stands.
-    pub fn progress(&self) -> Progress {
-        self.recorder.progress()
-    }
-
-    /// Whether it has come to an end before its time.
-    pub fn has_failed(&self) -> bool {
-        self.progress().failed
-    }
-
-    /// Ends it, and says what is in it.
-    ///
-    /// # Errors
-    /// If it could not be written to the end. What was safe before is.
-    pub fn end(self) -> Result<Progress, RecordingError> {
-        self.recorder.stop()
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use protocol::{ArmState, DisplayState, Role, Trip};
 
-use crate::state::State;
+use crate::state::{Advised, State};
 
 /// Something that happened at one of the boards.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,10 +36,7 @@ pub enum LogEvent {
         text: String,
     },
     /// Its log can't be read at the moment.
-    LogLost {
-        /// Why.
-        reason: String,
-    },
+    LogLost(String),
 }
 
 impl LogEvent {
@@ -70,13 +67,7 @@ impl LogEvent {
 impl fmt::Display for LogEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Link(state) => {
-                write!(f, "{state}")?;
-                match state.advice() {
-                    Some(advice) => write!(f, ": {advice}"),
-                    None => Ok(()),
-                }
-            }
+            Self::Link(state) => write!(f, "{}", Advised(state)),
             Self::Safety(state) => write!(f, "{state}"),
             Self::ArmStopped(trip) => write!(f, "arm {}", ArmState::Stopped(*trip)),
             Self::Restarted => f.write_str("has started anew"),
@@ -84,7 +75,7 @@ impl fmt::Display for LogEvent {
                 Some(level) => write!(f, "{level}: {text}"),
                 None => f.write_str(text),
             },
-            Self::LogLost { reason } => write!(f, "its log can't be read: {reason}"),
+            Self::LogLost(reason) => write!(f, "its log can't be read: {reason}"),
         }
     }
 }

@@ -158,7 +158,7 @@ fn kept(recording: &LiveRecording) -> Kept {
     Kept {
         name: recording.path.display().to_string(),
         since_us: recording.since_us,
-        safe_bytes: recording.progress().safe_bytes,
+        safe_bytes: recording.recorder.progress().safe_bytes,
     }
 }
 

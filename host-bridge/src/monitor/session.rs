@@ -90,7 +90,7 @@ impl Session {
             for (role, what) in logs.try_iter() {
                 came = true;
                 if let (Some(recording), LogEvent::Log { level, text }) = (&self.recording, &what) {
-                    recording.keep_log(role, *level, text.clone());
+                    recording.recorder.on_log(role, *level, text.clone());
                 }
                 self.dashboard.log(role, what);
             }
@@ -102,22 +102,16 @@ impl Session {
                 let counters = link.counters();
                 self.dashboard.on_line(*role, counters, link.clocks());
                 if let Some(recording) = &self.recording {
-                    recording.keep_counters(*role, counters);
+                    recording.recorder.on_counters(*role, counters);
                 }
             }
-            if self
-                .recording
-                .as_ref()
-                .is_some_and(LiveRecording::has_failed)
-            {
+            let recording = self.recording.as_ref();
+            if recording.is_some_and(|recording| recording.recorder.progress().failed) {
                 self.end_recording();
             }
         }
-        if self
-            .ending
-            .as_ref()
-            .is_some_and(|(_, ending)| ending.is_finished())
-        {
+        let ending = self.ending.as_ref();
+        if ending.is_some_and(|(_, ending)| ending.is_finished()) {
             came = true;
             // Told on the dashboard.
             let _ = self.finish_recording();
@@ -196,7 +190,7 @@ impl Session {
                 for role in [Role::Sensor, Role::Display] {
                     if let Some(state) = &self.dashboard.board(role).state {
                         let event = Event::StateChanged(state.clone());
-                        recording.keep(role, &event);
+                        recording.recorder.on_event(role, &event);
                         self.stream.on_event(role, &event);
                     }
                 }
@@ -238,7 +232,7 @@ impl Session {
         let path = recording.path.display().to_string();
         // One at a time: the one before has had all its time.
         let _ = self.finish_recording();
-        self.ending = Some((path, thread::spawn(move || recording.end())));
+        self.ending = Some((path, thread::spawn(move || recording.recorder.stop())));
     }
 
     /// Waits for the end of a recording, and tells what has come of it.
@@ -273,7 +267,7 @@ impl Session {
     fn on(&mut self, role: Role, event: Event) {
         self.has_met |= matches!(&event, Event::StateChanged(state) if state.is_known());
         if let Some(recording) = &self.recording {
-            recording.keep(role, &event);
+            recording.recorder.on_event(role, &event);
             self.stream.on_event(role, &event);
         }
         self.dashboard.on(now_us(), role, event);

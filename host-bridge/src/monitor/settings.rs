@@ -1,8 +1,7 @@
-//! The boards' settings by name, as a person changes them.
+//! The boards' settings by name, as a person changes them: fields of the configuration on the wire.
 
-use protocol::{Configuration, DisplayConfiguration, Refusal, Role, SensorConfiguration};
-
-use super::words::{METHODS, MODES, RATES, RENDERINGS, SWITCH, word};
+use protocol::{Configuration, Refusal, Role};
+use serde_json::{Value, json};
 
 /// How a setting is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,21 +10,19 @@ pub enum Kind {
     Number,
     /// Numbers of gauges, typed without anything between them.
     Gauges,
-    /// One of some words.
-    Choice(&'static [&'static str]),
+    /// One of some words, each beside its name on the wire.
+    Choice(&'static [(&'static str, &'static str)]),
 }
 
 /// A setting.
 #[derive(Debug)]
 pub struct Setting {
-    /// Its name, as in the scenes.
+    /// Its name, as on the wire and in the scenes.
     pub name: &'static str,
     /// Its unit; empty if it has none.
     pub unit: &'static str,
     /// How it is given.
     pub kind: Kind,
-    get: fn(&Configuration) -> Option<String>,
-    set: fn(&mut Configuration, &str) -> Option<()>,
 }
 
 /// Why a text is no value of a setting.
@@ -40,7 +37,19 @@ pub struct Misread {
 impl Setting {
     /// Its value in words; none if the configuration is the other board's.
     pub fn value(&self, configuration: &Configuration) -> Option<String> {
-        (self.get)(configuration)
+        let value = match configuration {
+            Configuration::Sensor(sensor) => json!(sensor),
+            Configuration::Display(display) => json!(display),
+        };
+        let value = value.get(self.name)?;
+        let text = value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_owned);
+        Some(match self.kind {
+            Kind::Number => text,
+            Kind::Gauges => gauges(value.as_u64()?),
+            Kind::Choice(words) => words.iter().find(|word| word.1 == text)?.0.to_owned(),
+        })
     }
 
     /// The configuration with this setting changed. The board checks its range.
@@ -52,30 +61,45 @@ impl Setting {
         configuration: Configuration,
         text: &str,
     ) -> Result<Configuration, Misread> {
-        let mut changed = configuration;
-        (self.set)(&mut changed, text.trim())
-            .map(|()| changed)
-            .ok_or_else(|| Misread {
-                name: self.name,
-                text: text.to_owned(),
-                wanted: self.wanted(&configuration),
-            })
+        self.set(configuration, text.trim()).ok_or_else(|| Misread {
+            name: self.name,
+            text: text.to_owned(),
+            wanted: self.wanted(&configuration),
+        })
+    }
+
+    fn set(&self, configuration: Configuration, text: &str) -> Option<Configuration> {
+        let value = match self.kind {
+            Kind::Number => json!(text.parse::<u64>().ok()?),
+            Kind::Gauges => json!(mask(text)?),
+            Kind::Choice(words) => {
+                let name = words.iter().find(|word| word.0 == text)?.1;
+                name.parse::<bool>()
+                    .map_or_else(|_| json!(name), Value::Bool)
+            }
+        };
+        let mut changed = json!(configuration);
+        let fields = changed.as_object_mut()?.values_mut().next()?;
+        *fields.get_mut(self.name)? = value;
+        serde_json::from_value(changed).ok()
     }
 
     /// What may be given, in words: by the protocol's own check, which names the range of a value that is
     /// beyond it.
     pub fn wanted(&self, configuration: &Configuration) -> String {
+        let beyond = |most: &str| {
+            let Refusal { low, high, .. } = check(&self.set(*configuration, most)?).err()?;
+            Some(format!("{low} to {high}"))
+        };
         match self.kind {
-            Kind::Choice(words) => words.join(" or "),
+            Kind::Choice(words) => {
+                let words: Vec<&str> = words.iter().map(|word| word.0).collect();
+                words.join(" or ")
+            }
             Kind::Gauges => "some of 01234".to_owned(),
             Kind::Number => ["4294967295", "65535", "255"]
                 .into_iter()
-                .find_map(|most| {
-                    let mut beyond = *configuration;
-                    (self.set)(&mut beyond, most)?;
-                    let Refusal { low, high, .. } = check(&beyond).err()?;
-                    Some(format!("{low} to {high}"))
-                })
+                .find_map(beyond)
                 .unwrap_or_else(|| "a whole number".to_owned()),
         }
     }
@@ -88,46 +112,9 @@ fn check(configuration: &Configuration) -> Result<(), Refusal> {
     }
 }
 
-const fn sensor(configuration: &Configuration) -> Option<&SensorConfiguration> {
-    match configuration {
-        Configuration::Sensor(sensor) => Some(sensor),
-        Configuration::Display(_) => None,
-    }
-}
-
-const fn sensor_mut(configuration: &mut Configuration) -> Option<&mut SensorConfiguration> {
-    match configuration {
-        Configuration::Sensor(sensor) => Some(sensor),
-        Configuration::Display(_) => None,
-    }
-}
-
-const fn display(configuration: &Configuration) -> Option<&DisplayConfiguration> {
-    match configuration {
-        Configuration::Display(display) => Some(display),
-        Configuration::Sensor(_) => None,
-    }
-}
-
-const fn display_mut(configuration: &mut Configuration) -> Option<&mut DisplayConfiguration> {
-    match configuration {
-        Configuration::Display(display) => Some(display),
-        Configuration::Sensor(_) => None,
-    }
-}
-
-fn meaning<T: Copy>(words: &[(&str, T)], text: &str) -> Option<T> {
-    words
-        .iter()
-        .find(|(word, _)| *word == text)
-        .map(|(_, value)| *value)
-}
-
-fn gauges(mask: u8) -> String {
-    (0..8)
-        .filter(|gauge| mask & (1 << gauge) != 0)
-        .map(|gauge| gauge.to_string())
-        .collect()
+fn gauges(mask: u64) -> String {
+    let used = (0..8).filter(|gauge| mask & (1 << gauge) != 0);
+    used.map(|gauge| gauge.to_string()).collect()
 }
 
 fn mask(text: &str) -> Option<u8> {
@@ -136,82 +123,66 @@ fn mask(text: &str) -> Option<u8> {
     })
 }
 
-/// A setting that is a whole number.
-macro_rules! number {
-    ($of:ident, $of_mut:ident, $field:ident, $unit:literal) => {
-        Setting {
-            name: stringify!($field),
-            unit: $unit,
-            kind: Kind::Number,
-            get: |configuration| Some($of(configuration)?.$field.to_string()),
-            set: |configuration, text| {
-                $of_mut(configuration)?.$field = text.parse().ok()?;
-                Some(())
-            },
-        }
-    };
+const fn number(name: &'static str, unit: &'static str) -> Setting {
+    let kind = Kind::Number;
+    Setting { name, unit, kind }
 }
 
-/// A setting that is one of some words.
-macro_rules! choice {
-    ($of:ident, $of_mut:ident, $field:ident, $unit:literal, $words:ident) => {
-        Setting {
-            name: stringify!($field),
-            unit: $unit,
-            kind: Kind::Choice(&{
-                let mut words = [""; $words.len()];
-                let mut index = 0;
-                while index < words.len() {
-                    words[index] = $words[index].0;
-                    index += 1;
-                }
-                words
-            }),
-            get: |configuration| Some(word(&$words, $of(configuration)?.$field).to_owned()),
-            set: |configuration, text| {
-                $of_mut(configuration)?.$field = meaning(&$words, text)?;
-                Some(())
-            },
-        }
-    };
+const fn choice(
+    name: &'static str,
+    unit: &'static str,
+    words: &'static [(&'static str, &'static str)],
+) -> Setting {
+    let kind = Kind::Choice(words);
+    Setting { name, unit, kind }
 }
+
+const METHODS: &[(&str, &str)] = &[
+    ("spectrum", "Spectrum"),
+    ("counting", "Counting"),
+    ("counting-adapted", "AdaptedCounting"),
+    ("crossings", "Crossings"),
+];
+const MODES: &[(&str, &str)] = &[("uniform", "Uniform"), ("travelling", "Travelling")];
+const RENDERINGS: &[(&str, &str)] = &[
+    ("fundamental", "Fundamental"),
+    ("shape", "Shape"),
+    ("texture", "Texture"),
+];
+const RATES: &[(&str, &str)] = &[("2000", "Hz2000"), ("4000", "Hz4000")];
+const SWITCH: &[(&str, &str)] = &[("off", "false"), ("on", "true")];
 
 /// The sensor board's settings.
 pub static SENSOR: [Setting; 10] = [
-    choice!(sensor, sensor_mut, method, "", METHODS),
-    number!(sensor, sensor_mut, window_ms, "ms"),
-    number!(sensor, sensor_mut, counted_gauge, ""),
+    choice("method", "", METHODS),
+    number("window_ms", "ms"),
+    number("counted_gauge", ""),
     Setting {
         name: "gauges",
         unit: "",
         kind: Kind::Gauges,
-        get: |configuration| Some(gauges(sensor(configuration)?.gauges)),
-        set: |configuration, text| {
-            sensor_mut(configuration)?.gauges = mask(text)?;
-            Some(())
-        },
     },
-    number!(sensor, sensor_mut, waves, "λ"),
-    number!(sensor, sensor_mut, valid_percent, "%"),
-    choice!(sensor, sensor_mut, force_channel, "", SWITCH),
-    number!(sensor, sensor_mut, force_mn_per_v, "mN/V"),
-    number!(sensor, sensor_mut, stiffness_n_per_m, "N/m"),
-    number!(sensor, sensor_mut, arm_full_scale_um_s, "µm/s"),
+    number("waves", "λ"),
+    number("valid_percent", "%"),
+    choice("force_channel", "", SWITCH),
+    number("force_mn_per_v", "mN/V"),
+    number("stiffness_n_per_m", "N/m"),
+    number("arm_full_scale_um_s", "µm/s"),
 ];
 
 /// The display board's settings, but for its array, which takes more than a line to describe.
 pub static DISPLAY: [Setting; 11] = [
-    choice!(display, display_mut, mode, "", MODES),
-    choice!(display, display_mut, rendering, "", RENDERINGS),
-    choice!(display, display_mut, update_rate, "Hz", RATES),
-    number!(display, display_mut, max_age_ms, "ms"),
-    number!(display, display_mut, fade_in_ms, "ms"),
-    number!(display, display_mut, fade_out_ms, "ms"),
-    number!(display, display_mut, glide_ms, "ms"),
-    number!(display, display_mut, amplitude_mv, "mV"),
-    number!(display, display_mut, reference_lsb, "LSB"),
-    number!(display, display_mut, reference_mn, "mN"),
-    number!(display, display_mut, full_drive_s, "s"),
+    choice("mode", "", MODES),
+    choice("rendering", "", RENDERINGS),
+    choice("update_rate", "Hz", RATES),
+    number("max_age_ms", "ms"),
+    number("fade_in_ms", "ms"),
+    number("fade_out_ms", "ms"),
+    number("glide_ms", "ms"),
+    number("amplitude_mv", "mV"),
+    number("reference_lsb", "LSB"),
+    number("reference_mn", "mN"),
+    number("full_drive_s", "s"),
 ];
 
 /// The settings of the board of `role`.
@@ -220,5 +191,35 @@ pub fn of(role: Role) -> &'static [Setting] {
         Role::Sensor => &SENSOR,
         Role::Display => &DISPLAY,
         Role::Host => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use postcard_schema::Schema;
+    use postcard_schema::schema::DataModelType;
+    use protocol::{DisplayConfiguration, SensorConfiguration};
+
+    use super::*;
+
+    #[test]
+    fn every_setting_is_a_field_on_the_wire_and_every_variant_of_it_has_a_word() {
+        for (shape, settings) in [
+            (SensorConfiguration::SCHEMA, &SENSOR[..]),
+            (DisplayConfiguration::SCHEMA, &DISPLAY[..]),
+        ] {
+            let DataModelType::Struct(fields) = shape.ty else {
+                panic!("{} is no struct", shape.name);
+            };
+            for setting in settings {
+                let field = fields.iter().find(|field| field.name == setting.name);
+                let kind = field.expect(setting.name).ty.ty;
+                if let (Kind::Choice(words), DataModelType::Enum(variants)) = (setting.kind, kind) {
+                    let named = |name| words.iter().any(|word| word.1 == name);
+                    assert!(variants.iter().all(|variant| named(variant.name)));
+                    assert_eq!(variants.len(), words.len());
+                }
+            }
+        }
     }
 }

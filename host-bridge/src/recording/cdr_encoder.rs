@@ -13,13 +13,8 @@ pub enum SchemaError {
     #[error("{0} has no place in a recording")]
     Shape(&'static str),
     /// What was made of the shape is no definition.
-    #[error("{name}: {source}")]
-    Definition {
-        /// The message's type.
-        name: String,
-        /// What is wrong.
-        source: DefinitionError,
-    },
+    #[error("{0}: {1}")]
+    Definition(String, #[source] DefinitionError),
 }
 
 /// Why a row can't be said.
@@ -68,7 +63,7 @@ impl CdrEncoder {
                     schema,
                     definition,
                 }),
-                Err(source) => Err(SchemaError::Definition { name, source }),
+                Err(source) => Err(SchemaError::Definition(name, source)),
             }
         });
         Ok(Self {

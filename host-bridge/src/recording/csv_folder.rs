@@ -53,9 +53,7 @@ impl CsvFolder {
         fs::create_dir_all(folder).map_err(not_made)?;
         let full = fs::read_dir(folder).map_err(not_made)?.next().is_some();
         if full && !force {
-            return Err(RecordingError::Exists {
-                path: folder.to_owned(),
-            });
+            return Err(RecordingError::Exists(folder.to_owned()));
         }
         Ok(Self {
             folder: folder.to_owned(),
@@ -73,7 +71,7 @@ impl CsvFolder {
             let path = self.folder.join(file_name(at));
             match fs::remove_file(&path) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                    return Err(RecordingError::NotMade { path, source });
+                    return Err(RecordingError::NotMade(path, source));
                 }
                 _ => {}
             }

@@ -7,19 +7,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// There is such a file or folder already.
-    #[error("{path}: is there already: give another name, or --force to write over it")]
-    Exists {
-        /// The file or folder.
-        path: PathBuf,
-    },
+    #[error("{0}: is there already: give another name, or --force to write over it")]
+    Exists(PathBuf),
     /// The file or folder can't be made.
-    #[error("{path}: can't be made: {source}")]
-    NotMade {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be made: {1}")]
+    NotMade(PathBuf, #[source] io::Error),
     /// The file does not take what is to be written.
     #[error("{path}: can't be written any further: {source}; {safe_bytes} bytes of it are safe")]
     NotWritten {
@@ -31,11 +23,8 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// The file was removed while it was being written.
-    #[error("{path}: was removed while it was being written")]
-    Removed {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: was removed while it was being written")]
+    Removed(PathBuf),
     /// Neither a file nor a folder was named.
     #[error("there is nowhere to record to: give a file, FILE.mcap, or --csv FOLDER")]
     Nowhere,
@@ -48,9 +37,9 @@ impl RecordingError {
     pub(super) fn not_made(path: &Path, source: io::Error) -> Self {
         let path = path.to_owned();
         if source.kind() == io::ErrorKind::AlreadyExists {
-            Self::Exists { path }
+            Self::Exists(path)
         } else {
-            Self::NotMade { path, source }
+            Self::NotMade(path, source)
         }
     }
 }

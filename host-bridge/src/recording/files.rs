@@ -127,7 +127,7 @@ impl RecordingFiles {
             && !settings.force
         {
             let path = path.clone();
-            return Err(RecordingError::Exists { path });
+            return Err(RecordingError::Exists(path));
         }
         let mcap = settings
             .mcap
@@ -157,8 +157,7 @@ impl RecordingFiles {
         }
         if files.settings.force {
             for path in old_parts {
-                fs::remove_file(&path)
-                    .map_err(|source| RecordingError::NotMade { path, source })?;
+                fs::remove_file(&path).map_err(|source| RecordingError::NotMade(path, source))?;
             }
         }
         Ok(files)

@@ -222,7 +222,7 @@ mod tests {
         Motion, Range, Role,
     };
 
-    use super::super::row_builder::RowBuilder;
+    use super::super::row_builder::{Note, RowBuilder};
     use super::*;
     use crate::link::Event;
 
@@ -312,9 +312,10 @@ mod tests {
         let mut noise = Noise(1);
         for at_us in (0..MINUTE_US).step_by(1_000) {
             for (role, message) in said(at_us, &mut noise) {
-                let event = Event::Heard { at_us, message };
-                rows.enter(role, &event, at_us, |entry| file.write(&entry))
-                    .unwrap_or_else(|error| panic!("{error}"));
+                let note = Note::Event(Event::Heard { at_us, message });
+                for entry in rows.enter(role, at_us, &note) {
+                    file.write(&entry).unwrap_or_else(|error| panic!("{error}"));
+                }
             }
             // As often as a recording makes safe what it has.
             if at_us % 1_000_000 == 999_000 {

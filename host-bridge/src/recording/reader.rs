@@ -35,31 +35,14 @@ const NS_PER_S: f64 = 1e9;
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file can't be read at all.
-    #[error("{path}: can't be read: {source}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error("{0}: can't be read: {1}")]
+    Unreadable(PathBuf, #[source] io::Error),
     /// The file is no MCAP, or another program's.
-    #[error("{path}: {what}: give an MCAP file that `host-bridge record` has made")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// What it is instead.
-        what: String,
-    },
+    #[error("{0}: {1}: give an MCAP file that `host-bridge record` has made")]
+    Foreign(PathBuf, String),
     /// The file is of a later version of this program.
-    #[error(
-        "{path}: its format is {format}, this program reads {FORMAT}: take the program that made it"
-    )]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its format.
-        format: String,
-    },
+    #[error("{0}: its format is {1}, this program reads {FORMAT}: take the program that made it")]
+    Newer(PathBuf, String),
     /// The file is damaged.
     #[error("{path}: damaged after {after}: {source}")]
     Damaged {
@@ -145,10 +128,7 @@ impl Reader {
     /// # Errors
     /// If it can't be read or is none.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let unreadable = |source| ReadError::Unreadable {
-            path: path.to_owned(),
-            source,
-        };
+        let unreadable = |source| ReadError::Unreadable(path.to_owned(), source);
         let file = File::open(path).map_err(unreadable)?;
         if file.metadata().map_err(unreadable)?.is_dir() {
             return Err(unreadable(io::ErrorKind::IsADirectory.into()));
@@ -177,10 +157,8 @@ impl Reader {
 
     /// Reads up to the record that tells whose it is.
     fn read_head(&mut self) -> Result<(), ReadError> {
-        let foreign = |path: &Path, what: &str| ReadError::Foreign {
-            path: path.to_owned(),
-            what: what.to_owned(),
-        };
+        let foreign =
+            |path: &Path, what: &str| ReadError::Foreign(path.to_owned(), what.to_owned());
         let mut format = None;
         loop {
             let record = match self.next_record() {
@@ -206,10 +184,7 @@ impl Reader {
                     let told_format = told("format");
                     if format != Some(told_format.as_str()) {
                         let path = self.path.clone();
-                        return Err(ReadError::Newer {
-                            path,
-                            format: told_format,
-                        });
+                        return Err(ReadError::Newer(path, told_format));
                     }
                     self.protocol = told("protocol").parse().unwrap_or(0);
                     return Ok(());
@@ -320,7 +295,7 @@ impl Reader {
                     let room = self.reader.insert(wanted.max(READ_BYTES));
                     let count = self.file.read(room).map_err(|source| {
                         let path = self.path.clone();
-                        ReadError::Unreadable { path, source }
+                        ReadError::Unreadable(path, source)
                     })?;
                     self.reader.notify_read(count);
                     continue;

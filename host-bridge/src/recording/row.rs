@@ -5,12 +5,18 @@ use postcard_schema::schema::NamedType;
 use protocol::{Motion, PortCounters, Role};
 use serde_json::Value;
 
+/// `copied!(from => Type { a, b; c })` is a `Type` with the fields a and b of `from`, and c as it is here.
+macro_rules! copied {
+    ($from:expr => $to:ident { $($field:ident),* $(,)? $(; $($own:ident),*)? }) => {
+        $to { $($field: $from.$field,)* $($($own,)*)? }
+    };
+}
+
 mod configuration;
 mod estimate;
 mod gauges;
 mod link;
 mod log;
-mod number;
 mod status;
 mod text;
 mod texture;

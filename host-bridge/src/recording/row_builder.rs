@@ -1,12 +1,10 @@
 //! From what a link tells to rows with their times; what is missing is found and written down, too.
 
-use protocol::{
-    ClockOffset, Configuration, GAUGE_BLOCK, Message, Pong, PortCounters, Role, RoleCounters,
-};
+use protocol::{ClockOffset, GAUGE_BLOCK, Message, Pong, PortCounters, Role, RoleCounters};
 
 use super::row::{
-    CHANNELS, ClockRow, DisplayReportRow, DisplayStatusRow, EstimateRow, LinkRow, LogRow, Lost,
-    OtherRow, Row, SensorReportRow, SensorStatusRow, channel,
+    CHANNELS, ClockRow, DisplayReportRow, DisplayStatusRow, LinkRow, LogRow, Lost, OtherRow, Row,
+    SensorReportRow, SensorStatusRow, channel,
 };
 use crate::host_clock::unix_ns;
 use crate::link::Event;
@@ -31,6 +29,19 @@ pub struct Entry {
     pub log_ns: u64,
 }
 
+/// Something about a board that is to be written down.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Note {
+    /// What its link told.
+    Event(Event),
+    /// What this end of its line has counted.
+    Counters(PortCounters),
+    /// A line of its firmware's log, with defmt's level.
+    Log(Option<&'static str>, String),
+    /// That so many notes could not be taken from then on.
+    Unwritten(u64),
+}
+
 /// What has been counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
@@ -46,7 +57,7 @@ pub struct Tally {
     pub unwritten: u64,
 }
 
-/// Turns events into entries.
+/// Turns notes into entries.
 #[derive(Default)]
 pub struct RowBuilder {
     sensor: Board,
@@ -114,34 +125,33 @@ impl RowBuilder {
         self.tally
     }
 
-    /// Enters an event of the board of `role`, which was told at `at_us` of this host's clock.
-    ///
-    /// # Errors
-    /// Whatever `put` fails with.
-    pub fn enter<E>(
-        &mut self,
-        role: Role,
-        event: &Event,
-        at_us: u64,
-        mut put: impl FnMut(Entry) -> Result<(), E>,
-    ) -> Result<(), E> {
+    /// The entries of a note on the board of `role`, which was made at `at_us` of this host's clock.
+    pub fn enter(&mut self, role: Role, at_us: u64, note: &Note) -> Vec<Entry> {
         let heard_ns = unix_ns(at_us);
-        let board = match role {
-            Role::Display => &mut self.display,
-            Role::Sensor | Role::Host => &mut self.sensor,
-        };
-        let message = match event {
-            Event::StateChanged(state) => {
-                return put(self.entry(role, Row::Link(LinkRow::turned(state)), heard_ns));
+        let row = match note {
+            Note::Event(Event::Heard { message, .. }) => {
+                return self.enter_message(role, at_us, message);
             }
-            Event::Restarted => {
+            Note::Event(Event::StateChanged(state)) => Row::Link(LinkRow::turned(state)),
+            Note::Event(Event::Restarted) => {
                 // It ends all that was known.
-                *board = Board::default();
-                return put(self.entry(role, Row::Link(LinkRow::restarted()), heard_ns));
+                *self.board(role) = Board::default();
+                Row::Link(LinkRow::restarted())
             }
-            Event::Heard { message, .. } => message,
+            Note::Counters(counters) => Row::Line(*counters),
+            Note::Log(level, text) => Row::Log(LogRow::new(role.name(), *level, text, heard_ns)),
+            Note::Unwritten(missing) => {
+                self.tally.unwritten += missing;
+                Row::Link(LinkRow::gap(Lost::Unwritten, *missing))
+            }
         };
+        vec![self.entry(role, row, heard_ns)]
+    }
+
+    fn enter_message(&mut self, role: Role, at_us: u64, message: &Message) -> Vec<Entry> {
+        let heard_ns = unix_ns(at_us);
         self.tally.messages += 1;
+        let board = self.board(role);
         let (lost, skipped) = match message {
             Message::Estimate(estimate) => {
                 (Lost::Estimates, board.estimates.take(estimate.sequence, 1))
@@ -149,34 +159,38 @@ impl RowBuilder {
             Message::Motion(motion) => (Lost::Motions, board.motions.take(motion.sequence, 1)),
             Message::Gauges(gauges) => {
                 let count = GAUGE_BLOCK as u32;
-                (
-                    Lost::Samples,
-                    board.samples.take(gauges.first_sample, count),
-                )
+                let skipped = board.samples.take(gauges.first_sample, count);
+                (Lost::Samples, skipped)
             }
             _ => (Lost::Samples, 0),
         };
         let (row, instant_us) = row(role, message, at_us, board);
-        // A block has waited for its last sample.
-        let latest_ns = match row {
-            Row::Gauges(_) => heard_ns.saturating_sub((GAUGE_BLOCK as u64 - 1) * SAMPLE_NS),
-            _ => heard_ns,
-        };
         // A board whose time runs faster, as a simulator's may, was not ahead of its words.
-        let taken_ns = instant_us
-            .and_then(|instant_us| board.calendar_ns(instant_us))
-            .map_or(latest_ns, |taken_ns| taken_ns.min(latest_ns));
+        let taken_ns = instant_us.and_then(|instant_us| board.calendar_ns(instant_us));
+        let mut latest_ns = heard_ns;
         if matches!(row, Row::Gauges(_)) {
+            // A block has waited for its last sample.
+            latest_ns = heard_ns.saturating_sub((GAUGE_BLOCK as u64 - 1) * SAMPLE_NS);
             self.tally.samples += GAUGE_BLOCK as u64;
         }
+        let taken_ns = taken_ns.map_or(latest_ns, |taken_ns| taken_ns.min(latest_ns));
+        let mut entries = Vec::with_capacity(2);
         if skipped > 0 {
             self.tally.gaps += 1;
             self.tally.lost += u64::from(skipped);
             // Right before what came after what is missing.
             let gap = Row::Link(LinkRow::gap(lost, skipped.into()));
-            put(self.entry(role, gap, taken_ns))?;
+            entries.push(self.entry(role, gap, taken_ns));
         }
-        put(self.entry(role, row, taken_ns))
+        entries.push(self.entry(role, row, taken_ns));
+        entries
+    }
+
+    const fn board(&mut self, role: Role) -> &mut Board {
+        match role {
+            Role::Display => &mut self.display,
+            Role::Sensor | Role::Host => &mut self.sensor,
+        }
     }
 
     /// An entry, no earlier than the one before on its channel.
@@ -188,125 +202,71 @@ impl RowBuilder {
         }
         Entry { role, row, log_ns }
     }
-
-    /// Enters what this end of the line to the board of `role` has counted.
-    ///
-    /// # Errors
-    /// Whatever `put` fails with.
-    pub fn enter_counters<E>(
-        &mut self,
-        role: Role,
-        counters: PortCounters,
-        at_us: u64,
-        put: impl FnOnce(Entry) -> Result<(), E>,
-    ) -> Result<(), E> {
-        put(self.entry(role, Row::Line(counters), unix_ns(at_us)))
-    }
-
-    /// Enters a line of the log of the board of `role`, with defmt's level.
-    ///
-    /// # Errors
-    /// Whatever `put` fails with.
-    pub fn enter_log<E>(
-        &mut self,
-        role: Role,
-        (level, text): (Option<&str>, &str),
-        at_us: u64,
-        put: impl FnOnce(Entry) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let at_ns = unix_ns(at_us);
-        let row = LogRow::new(role.name(), level, text, at_ns);
-        put(self.entry(role, Row::Log(row), at_ns))
-    }
-
-    /// Enters that events of the board of `role` could not be taken, from `at_us` on.
-    ///
-    /// # Errors
-    /// Whatever `put` fails with.
-    pub fn enter_unwritten<E>(
-        &mut self,
-        role: Role,
-        missing: u64,
-        at_us: u64,
-        put: impl FnOnce(Entry) -> Result<(), E>,
-    ) -> Result<(), E> {
-        self.tally.unwritten += missing;
-        let row = LinkRow::gap(Lost::Unwritten, missing);
-        put(self.entry(role, Row::Link(row), unix_ns(at_us)))
-    }
 }
 
 /// A message's row, and its instant of the board's clock if it has one. What that board never says goes
 /// to the channel for others.
 fn row(role: Role, message: &Message, at_us: u64, board: &mut Board) -> (Row, Option<u64>) {
+    use Message::{Configuration, Estimate, Gauges, Motion, Pong, Safety, Status, Texture};
+    use Role::{Display, Sensor};
+    let other = || Row::Other(OtherRow::new(message));
     match (role, message) {
-        (Role::Sensor, Message::Estimate(estimate)) => (
-            Row::Estimate(EstimateRow::from(*estimate)),
-            Some(estimate.instant_us),
-        ),
-        (Role::Sensor, Message::Texture(texture)) => {
-            (Row::Texture((*texture).into()), Some(texture.instant_us))
-        }
-        (Role::Sensor, Message::Gauges(gauges)) => {
-            (Row::Gauges(gauges.into()), Some(gauges.instant_us))
-        }
-        (Role::Display, Message::Motion(motion)) => (Row::Motion(*motion), Some(motion.instant_us)),
-        (Role::Display, Message::Safety(safety)) => {
-            (Row::Safety((*safety).into()), Some(safety.instant_us))
-        }
-        (_, Message::Status(status)) => {
+        (Sensor, Estimate(said)) => (Row::Estimate((*said).into()), Some(said.instant_us)),
+        (Sensor, Texture(said)) => (Row::Texture((*said).into()), Some(said.instant_us)),
+        (Sensor, Gauges(said)) => (Row::Gauges(said.into()), Some(said.instant_us)),
+        (Display, Motion(said)) => (Row::Motion(*said), Some(said.instant_us)),
+        (Display, Safety(said)) => (Row::Safety((*said).into()), Some(said.instant_us)),
+        (_, Status(status)) => {
             let row = match (role, &status.role) {
-                (Role::Sensor, RoleCounters::Sensor(sensor)) => {
-                    Row::SensorStatus(SensorStatusRow::new(status, *sensor))
+                (Sensor, RoleCounters::Sensor(counters)) => {
+                    Row::SensorStatus(SensorStatusRow::new(status, *counters))
                 }
-                (Role::Display, RoleCounters::Display(display)) => {
-                    Row::DisplayStatus(DisplayStatusRow::new(status, display))
+                (Display, RoleCounters::Display(counters)) => {
+                    Row::DisplayStatus(DisplayStatusRow::new(status, counters))
                 }
-                _ => Row::Other(OtherRow::new(message)),
+                _ => other(),
             };
             (row, Some(status.uptime_us))
         }
-        (_, Message::Configuration(report)) => {
+        (_, Configuration(report)) => {
             let (refused, hash) = (report.refused, report.hash);
             let row = match (role, report.configuration) {
-                (Role::Sensor, Configuration::Sensor(in_force)) => {
+                (Sensor, protocol::Configuration::Sensor(in_force)) => {
                     Row::SensorConfiguration(SensorReportRow {
                         refused,
                         hash,
                         in_force,
                     })
                 }
-                (Role::Display, Configuration::Display(in_force)) => {
+                (Display, protocol::Configuration::Display(in_force)) => {
                     Row::DisplayConfiguration(DisplayReportRow {
                         refused,
                         hash,
                         in_force,
                     })
                 }
-                _ => Row::Other(OtherRow::new(message)),
+                _ => other(),
             };
             (row, None)
         }
-        (_, Message::Pong(pong)) => {
+        (_, Pong(pong)) => {
             board.on_pong(pong, at_us);
-            let row = Row::Clock(ClockRow {
+            let row = ClockRow {
                 sent_us: pong.sent_us,
                 received_us: pong.received_us,
                 answered_us: pong.answered_us,
                 heard_us: at_us,
                 offset_us: board.clock.offset_us(),
                 round_trip_us: board.clock.round_trip_us(),
-            });
-            (row, Some(pong.answered_us))
+            };
+            (Row::Clock(row), Some(pong.answered_us))
         }
-        _ => (Row::Other(OtherRow::new(message)), None),
+        _ => (other(), None),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::convert::Infallible;
-
     use protocol::Motion;
 
     use super::*;
@@ -330,10 +290,7 @@ mod tests {
                     at_us: pinged_us + 1_020,
                     message: Message::Pong(pong),
                 };
-                let entered = builder.enter(Role::Display, &event, pinged_us + 1_020, |_| {
-                    Ok::<_, Infallible>(())
-                });
-                assert_eq!(entered, Ok(()));
+                builder.enter(Role::Display, pinged_us + 1_020, &Note::Event(event));
             }
             let motion = Motion {
                 sequence: times.len() as u32,
@@ -345,11 +302,9 @@ mod tests {
                 at_us: own_us + 3_000,
                 message: Message::Motion(motion),
             };
-            let entered = builder.enter(Role::Display, &event, own_us + 3_000, |entry| {
+            for entry in builder.enter(Role::Display, own_us + 3_000, &Note::Event(event)) {
                 times.push((entry.log_ns - unix_ns(0)) / 1_000);
-                Ok::<_, Infallible>(())
-            });
-            assert_eq!(entered, Ok(()));
+            }
         }
         times
     }

@@ -114,9 +114,7 @@ impl Sink {
         let metadata = self.file.metadata();
         let metadata = metadata.map_err(|source| self.failed(source))?;
         if metadata.nlink() == 0 {
-            return Err(RecordingError::Removed {
-                path: self.path.clone(),
-            });
+            return Err(RecordingError::Removed(self.path.clone()));
         }
         self.safe_bytes = metadata.len();
         Ok(())

@@ -27,27 +27,16 @@ pub struct Credentials {
 #[derive(Debug, thiserror::Error)]
 pub enum CredentialsError {
     /// A file can't be read.
-    #[error("{path}: can't be read: {reason}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's.
-        reason: io::Error,
-    },
+    #[error("{0}: can't be read: {1}")]
+    Unreadable(PathBuf, io::Error),
     /// A file has no certificate in it.
-    #[error("{path}: no certificate in it: a PEM file with BEGIN CERTIFICATE is wanted")]
-    NoCertificate {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: no certificate in it: a PEM file with BEGIN CERTIFICATE is wanted")]
+    NoCertificate(PathBuf),
     /// A file has no key in it.
     #[error(
-        "{path}: no private key in it: a PEM file with BEGIN PRIVATE KEY is wanted, without a password"
+        "{0}: no private key in it: a PEM file with BEGIN PRIVATE KEY is wanted, without a password"
     )]
-    NoKey {
-        /// The file.
-        path: PathBuf,
-    },
+    NoKey(PathBuf),
     /// The key is another certificate's.
     #[error("{key}: not the key of {certificate}: give the two that were made together")]
     Mismatch {
@@ -57,33 +46,19 @@ pub enum CredentialsError {
         certificate: PathBuf,
     },
     /// The certificate is too old.
-    #[error("{path}: the certificate has expired: have a new one made")]
-    Expired {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: the certificate has expired: have a new one made")]
+    Expired(PathBuf),
     /// The certificate's time has not come.
-    #[error("{path}: the certificate is not valid yet: see whether this computer's clock is right")]
-    Early {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error("{0}: the certificate is not valid yet: see whether this computer's clock is right")]
+    Early(PathBuf),
     /// The certificate is not meant for this.
     #[error(
-        "{path}: the certificate is not meant for connecting: it wants extendedKeyUsage = serverAuth, clientAuth"
+        "{0}: the certificate is not meant for connecting: it wants extendedKeyUsage = serverAuth, clientAuth"
     )]
-    Purpose {
-        /// The file.
-        path: PathBuf,
-    },
+    Purpose(PathBuf),
     /// Something else is wrong with a file.
-    #[error("{path}: can't be used: {reason}")]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// What, in the TLS library's words.
-        reason: Error,
-    },
+    #[error("{0}: can't be used: {1}")]
+    Unusable(PathBuf, Error),
 }
 
 impl Credentials {
@@ -96,15 +71,9 @@ impl Credentials {
         let roots = Arc::new(roots(&self.ca)?);
         let chain = certificates(&self.certificate)?;
         self.check_validity(&roots, &chain, &provider)?;
-        let key = PrivateKeyDer::from_pem_slice(&read(&self.key)?).map_err(|_| {
-            CredentialsError::NoKey {
-                path: self.key.clone(),
-            }
-        })?;
-        let unusable = |reason| CredentialsError::Unusable {
-            path: self.key.clone(),
-            reason,
-        };
+        let key = PrivateKeyDer::from_pem_slice(&read(&self.key)?)
+            .map_err(|_| CredentialsError::NoKey(self.key.clone()))?;
+        let unusable = |reason| CredentialsError::Unusable(self.key.clone(), reason);
         ClientConfig::builder_with_provider(provider)
             .with_protocol_versions(&[&TLS13])
             .map_err(unusable)?
@@ -128,29 +97,25 @@ impl Credentials {
         provider: &Arc<CryptoProvider>,
     ) -> Result<(), CredentialsError> {
         let Some((own, between)) = chain.split_first() else {
-            return Err(CredentialsError::NoCertificate {
-                path: self.certificate.clone(),
-            });
+            return Err(CredentialsError::NoCertificate(self.certificate.clone()));
         };
         let verifier =
             WebPkiClientVerifier::builder_with_provider(Arc::clone(roots), Arc::clone(provider))
                 .build()
-                .map_err(|_| CredentialsError::NoCertificate {
-                    path: self.ca.clone(),
-                })?;
+                .map_err(|_| CredentialsError::NoCertificate(self.ca.clone()))?;
         let path = self.certificate.clone();
         match verifier.verify_client_cert(own, between, UnixTime::now()) {
             Ok(_) | Err(Error::InvalidCertificate(CertificateError::UnknownIssuer)) => Ok(()),
             Err(Error::InvalidCertificate(
                 CertificateError::Expired | CertificateError::ExpiredContext { .. },
-            )) => Err(CredentialsError::Expired { path }),
+            )) => Err(CredentialsError::Expired(path)),
             Err(Error::InvalidCertificate(
                 CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. },
-            )) => Err(CredentialsError::Early { path }),
+            )) => Err(CredentialsError::Early(path)),
             Err(Error::InvalidCertificate(
                 CertificateError::InvalidPurpose | CertificateError::InvalidPurposeContext { .. },
-            )) => Err(CredentialsError::Purpose { path }),
-            Err(reason) => Err(CredentialsError::Unusable { path, reason }),
+            )) => Err(CredentialsError::Purpose(path)),
+            Err(reason) => Err(CredentialsError::Unusable(path, reason)),
         }
     }
 }
@@ -160,10 +125,7 @@ fn roots(path: &Path) -> Result<RootCertStore, CredentialsError> {
     for certificate in certificates(path)? {
         roots
             .add(certificate)
-            .map_err(|reason| CredentialsError::Unusable {
-                path: path.to_owned(),
-                reason,
-            })?;
+            .map_err(|reason| CredentialsError::Unusable(path.to_owned(), reason))?;
     }
     Ok(roots)
 }
@@ -172,15 +134,10 @@ fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, Credentials
     let found: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(&read(path)?).collect();
     match found {
         Ok(found) if !found.is_empty() => Ok(found),
-        _ => Err(CredentialsError::NoCertificate {
-            path: path.to_owned(),
-        }),
+        _ => Err(CredentialsError::NoCertificate(path.to_owned())),
     }
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, CredentialsError> {
-    fs::read(path).map_err(|reason| CredentialsError::Unreadable {
-        path: path.to_owned(),
-        reason,
-    })
+    fs::read(path).map_err(|reason| CredentialsError::Unreadable(path.to_owned(), reason))
 }

@@ -54,11 +54,8 @@ pub enum EndpointError {
     #[error("no port from 1 to 65535 behind the host, e.g. tcp/192.168.1.20:7447")]
     Port,
     /// The host is none.
-    #[error("{host:?} is no host: a name, an IPv4 address, or an IPv6 address in [ ]")]
-    Host {
-        /// What stands in its place.
-        host: String,
-    },
+    #[error("{0:?} is no host: a name, an IPv4 address, or an IPv6 address in [ ]")]
+    Host(String),
 }
 
 impl FromStr for Endpoint {
@@ -86,9 +83,7 @@ impl FromStr for Endpoint {
             }
         };
         if !is_host {
-            return Err(EndpointError::Host {
-                host: host.to_owned(),
-            });
+            return Err(EndpointError::Host(host.to_owned()));
         }
         Ok(Self {
             carrier,
@@ -174,10 +169,7 @@ mod tests {
         assert_eq!(error("tcp/localhost:65536"), EndpointError::Port);
         for host in ["", "a b", "a#iface=eth0", "[::", "::1"] {
             let host = host.to_owned();
-            assert_eq!(
-                error(&format!("tls/{host}:1")),
-                EndpointError::Host { host }
-            );
+            assert_eq!(error(&format!("tls/{host}:1")), EndpointError::Host(host));
         }
     }
 

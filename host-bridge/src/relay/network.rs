@@ -76,9 +76,7 @@ impl Transport for Network {
         };
         let session = self.open()?;
         let datagrams = Datagrams::open(&by_datagrams, is_listening, Box::new(on_datagram))
-            .map_err(|error| NetworkError::Engine {
-                reason: format!("datagrams: {error}"),
-            })?;
+            .map_err(|error| NetworkError::Engine(format!("datagrams: {error}")))?;
         let wire = Wire::new(session, datagrams, name, role, &subscriptions)?;
         Ok(Box::new(wire))
     }
@@ -113,20 +111,20 @@ impl Network {
             let endpoint = endpoint.clone();
             match (endpoint.carrier == Carrier::Tls, &credentials) {
                 (true, None) => {
-                    return Err(NetworkError::WithoutCertificates { endpoint });
+                    return Err(NetworkError::WithoutCertificates(endpoint));
                 }
-                (false, Some(_)) => return Err(NetworkError::Open { endpoint }),
+                (false, Some(_)) => return Err(NetworkError::Open(endpoint)),
                 (false, None)
                     if matches!(ends, Ends::Listening(_))
                         && !endpoint.is_loopback()
                         && !is_insecure =>
                 {
-                    return Err(NetworkError::Insecure { endpoint });
+                    return Err(NetworkError::Insecure(endpoint));
                 }
                 (true, Some(_))
                     if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
                 {
-                    return Err(NetworkError::Unmatched { endpoint });
+                    return Err(NetworkError::Unmatched(endpoint));
                 }
                 _ => {}
             }
@@ -139,10 +137,7 @@ impl Network {
             for endpoint in endpoints {
                 endpoint
                     .try_listening()
-                    .map_err(|reason| NetworkError::Listening {
-                        endpoint: endpoint.clone(),
-                        reason,
-                    })?;
+                    .map_err(|reason| NetworkError::Listening(endpoint.clone(), reason))?;
             }
         }
         Ok(Self {
@@ -237,8 +232,8 @@ impl Network {
             connect,
             more,
         };
-        setup.open().map_err(|error| NetworkError::Engine {
-            reason: error.to_string(),
-        })
+        setup
+            .open()
+            .map_err(|error| NetworkError::Engine(error.to_string()))
     }
 }

@@ -20,31 +20,19 @@ pub enum Reach {
     /// Somebody listens there and, with TLS, both ends believe each other.
     Reached,
     /// The name can't be resolved.
-    Unresolved {
-        /// The system's reason.
-        reason: String,
-    },
+    Unresolved(String),
     /// Nobody listens.
     Refused,
     /// Nobody answers.
     Silent,
     /// The network says no.
-    Unreachable {
-        /// The system's reason.
-        reason: String,
-    },
+    Unreachable(String),
     /// Somebody listens, but does not speak TLS.
     NotTls,
     /// The other end's certificate is not believed here.
-    Distrusted {
-        /// Why.
-        reason: String,
-    },
+    Distrusted(String),
     /// One's own certificate is not believed there.
-    Rejected {
-        /// What the other end says.
-        reason: String,
-    },
+    Rejected(String),
 }
 
 impl Reach {
@@ -54,7 +42,7 @@ impl Reach {
             Ok(addresses) => addresses,
             Err(error) => {
                 let reason = error.to_string();
-                return Self::Unresolved { reason };
+                return Self::Unresolved(reason);
             }
         };
         let mut reach = Self::Silent;
@@ -73,9 +61,7 @@ impl Reach {
         match error.kind() {
             io::ErrorKind::ConnectionRefused => Self::Refused,
             io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => Self::Silent,
-            _ => Self::Unreachable {
-                reason: error.to_string(),
-            },
+            _ => Self::Unreachable(error.to_string()),
         }
     }
 
@@ -85,15 +71,11 @@ impl Reach {
             return Self::NotTls;
         };
         match error {
-            Error::InvalidCertificate(CertificateError::UnknownIssuer) => Self::Distrusted {
-                reason: "it was not made by the CA given with --ca".to_owned(),
-            },
-            Error::InvalidCertificate(reason) => Self::Distrusted {
-                reason: reason.to_string(),
-            },
-            Error::AlertReceived(alert) => Self::Rejected {
-                reason: format!("{alert:?}"),
-            },
+            Error::InvalidCertificate(CertificateError::UnknownIssuer) => {
+                Self::Distrusted("it was not made by the CA given with --ca".to_owned())
+            }
+            Error::InvalidCertificate(reason) => Self::Distrusted(reason.to_string()),
+            Error::AlertReceived(alert) => Self::Rejected(format!("{alert:?}")),
             _ => Self::NotTls,
         }
     }
@@ -101,9 +83,7 @@ impl Reach {
 
 fn shake_hands(endpoint: &Endpoint, mut stream: TcpStream, tls: &Arc<ClientConfig>) -> Reach {
     let Ok(name) = ServerName::try_from(endpoint.host.clone()) else {
-        return Reach::Unresolved {
-            reason: "no name that a certificate could have".to_owned(),
-        };
+        return Reach::Unresolved("no name that a certificate could have".to_owned());
     };
     let timed = stream
         .set_read_timeout(Some(PATIENCE))
@@ -134,16 +114,16 @@ impl fmt::Display for Reach {
             Self::Reached => f.write_str(
                 "reached, but nobody there speaks to us: see whether a bridge or a router of Ridgelink is at this port, and whether it says tls/ or tcp/ as well",
             ),
-            Self::Unresolved { reason } => write!(f, "{reason}: see the host's name"),
+            Self::Unresolved(reason) => write!(f, "{reason}: see the host's name"),
             Self::Refused => f.write_str("nobody listens there: start the bridge or router there, or see the port"),
             Self::Silent => f.write_str("no answer: see the address, the network and firewalls"),
-            Self::Unreachable { reason } => write!(f, "{reason}: see the network"),
+            Self::Unreachable(reason) => write!(f, "{reason}: see the network"),
             Self::NotTls => f.write_str("somebody listens there, but without TLS: give the other end its certificates"),
-            Self::Distrusted { reason } => write!(
+            Self::Distrusted(reason) => write!(
                 f,
                 "its certificate is not believed: {reason}: give both sites certificates of one CA, made for the host's name"
             ),
-            Self::Rejected { reason } => write!(
+            Self::Rejected(reason) => write!(
                 f,
                 "our certificate is rejected there ({reason}): give both sites certificates of one CA"
             ),

@@ -5,6 +5,7 @@ use std::fmt;
 use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
 
 use crate::relay::envelope::ENVELOPE_VERSION;
+use crate::state::version;
 
 /// After this long without a word the other site counts as silent, in µs.
 pub const SILENCE_US: u64 = 2_000_000;
@@ -67,8 +68,7 @@ struct Bridge<'a>(&'a Hello);
 impl fmt::Display for Bridge<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(hello) = self;
-        let [major, minor, patch] = hello.version;
-        write!(f, "{} {major}.{minor}.{patch}", hello.chip_name())
+        write!(f, "{} {}", hello.chip_name(), version(hello))
     }
 }
 

@@ -11,7 +11,7 @@ use crate::relay::histogram::Percentiles;
 use crate::relay::reach::Reach;
 use crate::relay::refused::Refused;
 use crate::relay::remote::{RemoteState, site};
-use crate::state::State;
+use crate::state::{Advised, State};
 
 /// What has come from the other site, and what became of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -229,12 +229,7 @@ pub enum Notice {
         max_age_us: u64,
     },
     /// Nobody is heard, for this reason.
-    Unreached {
-        /// Where.
-        endpoint: Endpoint,
-        /// Why.
-        reach: Reach,
-    },
+    Unreached(Endpoint, Reach),
     /// Somebody is reached, but not the other site's bridge.
     Alone(Role),
     /// Nobody has come from the other site.
@@ -253,12 +248,7 @@ pub enum Notice {
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Board(state) => {
-                write!(f, "board: {state}")?;
-                state
-                    .advice()
-                    .map_or(Ok(()), |advice| write!(f, ": {advice}"))
-            }
+            Self::Board(state) => write!(f, "board: {}", Advised(state)),
             Self::Remote(role, state) => write!(f, "{}: {state}", site(*role)),
             Self::Watcher(role) => write!(
                 f,
@@ -304,7 +294,7 @@ impl fmt::Display for Notice {
                 Milliseconds(*age_us),
                 Milliseconds(*max_age_us)
             ),
-            Self::Unreached { endpoint, reach } => write!(f, "{endpoint}: {reach}"),
+            Self::Unreached(endpoint, reach) => write!(f, "{endpoint}: {reach}"),
             Self::Alone(role) => write!(
                 f,
                 "the network is there, but {} is not heard: see whether its bridge runs, with the same --name",

@@ -137,9 +137,8 @@ impl Site {
             system,
         } = settings;
         let clock = Arc::clone(&system.clock);
-        let other_role = opposite(role).ok_or_else(|| NetworkError::Engine {
-            reason: "a host has no board to be carried".to_owned(),
-        })?;
+        let other_role = opposite(role)
+            .ok_or_else(|| NetworkError::Engine("a host has no board to be carried".to_owned()))?;
         let (notices, told) = mpsc::channel();
         let session = random_number();
         let shared = Arc::new(Shared {
@@ -179,7 +178,7 @@ impl Site {
             Event::StateChanged(State::Opened { .. }) => {}
             Event::StateChanged(state) => {
                 *locked(&carrier.board_hello) = match &state {
-                    State::Known { hello, .. } => Some(*hello),
+                    State::Known(_, hello) => Some(*hello),
                     _ => None,
                 };
                 carrier.tell(Notice::Board(state));

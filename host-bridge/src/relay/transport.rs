@@ -17,47 +17,25 @@ pub enum NetworkError {
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
     /// TLS without certificates.
-    #[error("{endpoint} wants certificates on both ends: give --ca, --certificate and --key")]
-    WithoutCertificates {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
+    #[error("{0} wants certificates on both ends: give --ca, --certificate and --key")]
+    WithoutCertificates(Endpoint),
     /// Certificates, but an open endpoint.
-    #[error("{endpoint} would leave certificates unused and let anybody in: say tls/{}:{}, or leave out --ca, --certificate and --key", .endpoint.host, .endpoint.port)]
-    Open {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
+    #[error("{0} would leave certificates unused and let anybody in: say tls/{host}:{port}, or leave out --ca, --certificate and --key", host = .0.host, port = .0.port)]
+    Open(Endpoint),
     /// Others could reach an open endpoint, unasked.
     #[error(
-        "{endpoint} would let anybody who reaches it move the arm: say tls/{}:{} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", .endpoint.host, .endpoint.port
+        "{0} would let anybody who reaches it move the arm: say tls/{host}:{port} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", host = .0.host, port = .0.port
     )]
-    Insecure {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
+    Insecure(Endpoint),
     /// The engine can't match an IPv6 address with a certificate.
-    #[error(
-        "{endpoint}: an IPv6 address can't be matched with a certificate: give the host's name"
-    )]
-    Unmatched {
-        /// The endpoint.
-        endpoint: Endpoint,
-    },
+    #[error("{0}: an IPv6 address can't be matched with a certificate: give the host's name")]
+    Unmatched(Endpoint),
     /// One can't listen there.
-    #[error("{endpoint}: can't listen: {reason}: {}", advice(.reason))]
-    Listening {
-        /// The endpoint.
-        endpoint: Endpoint,
-        /// The system's reason.
-        reason: io::Error,
-    },
+    #[error("{0}: can't listen: {1}: {advice}", advice = advice(.1))]
+    Listening(Endpoint, io::Error),
     /// The engine refuses.
-    #[error("the network's engine refuses: {reason}")]
-    Engine {
-        /// In its words.
-        reason: String,
-    },
+    #[error("the network's engine refuses: {0}")]
+    Engine(String),
 }
 
 fn advice(error: &io::Error) -> &'static str {

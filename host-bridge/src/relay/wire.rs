@@ -26,9 +26,7 @@ pub struct Wire {
 }
 
 fn engine(error: zenoh::Error) -> NetworkError {
-    NetworkError::Engine {
-        reason: error.to_string(),
-    }
+    NetworkError::Engine(error.to_string())
 }
 
 impl Wire {

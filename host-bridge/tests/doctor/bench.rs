@@ -44,10 +44,7 @@ pub fn status(role: Role, uptime_us: u64, frames: u32) -> Status {
 
 /// A board that is well.
 pub fn board(role: Role) -> BoardFacts {
-    let known = State::Known {
-        port: format!("/dev/tty-{}", role.name()).into(),
-        hello: hello(role),
-    };
+    let known = State::Known(format!("/dev/tty-{}", role.name()).into(), hello(role));
     let mut board = BoardFacts::new(role, known);
     board.hello = Some(hello(role));
     board.first = Some(status(role, 90_000_000, 4_000));

@@ -16,10 +16,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
         schema: 7_u64.to_le_bytes(),
         ..hello(Role::Sensor)
     };
-    let foreign = |hello| State::Foreign {
-        port: "/dev/ttyACM0".into(),
-        hello,
-    };
+    let foreign = |hello| State::Foreign("/dev/ttyACM0".into(), hello);
     let found = spoiled(|bench| {
         bench.boards.truncate(1);
         bench.boards[0].elf = None;

@@ -24,48 +24,43 @@ fn each_state_of_a_port_is_named_with_advice() {
     let port = || "/dev/ttyACM0".into();
     for (state, kind, what, advice) in [
         (
-            State::Absent {
-                place: "/dev/ttyACM0".to_owned(),
-            },
+            State::Absent("/dev/ttyACM0".to_owned()),
             "absent",
             "sensor: /dev/ttyACM0: not there",
             "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display",
         ),
         (
-            State::Busy { port: port() },
+            State::Busy(port()),
             "busy",
             "sensor: /dev/ttyACM0: another program has it",
             "close the other program (tio, screen, or one of another user's)",
         ),
         (
-            State::Failed {
-                port: port(),
-                reason: "is a folder, not a serial port".to_owned(),
-            },
+            State::Failed(port(), "is a folder, not a serial port".to_owned()),
             "failed",
             "sensor: /dev/ttyACM0: is a folder, not a serial port",
             "see whether it is a serial port",
         ),
         (
-            State::Opened { port: port() },
+            State::Opened(port()),
             "opened",
             "sensor: /dev/ttyACM0: has not answered yet",
             "look longer: --for 10",
         ),
         (
-            State::Silent { port: port() },
+            State::Silent(port()),
             "silent",
             "sensor: /dev/ttyACM0: silent",
             "see whether the board has power and firmware (`host-bridge flash`), and whether the port is its console",
         ),
         (
-            State::Deaf { port: port() },
+            State::Deaf(port()),
             "deaf",
             "sensor: /dev/ttyACM0: speaks and does not answer",
             "nothing that is sent reaches the board: see its RX line (PD9)",
         ),
         (
-            State::Garbage { port: port() },
+            State::Garbage(port()),
             "garbage",
             "sensor: /dev/ttyACM0: sends garbage",
             "see whether this is a Ridgelink board's console: 921600 baud, 8N1",
@@ -94,9 +89,7 @@ fn each_state_of_a_port_is_named_with_advice() {
 fn a_port_of_another_group_names_the_group() {
     one(
         &sensor_spoiled(|board| {
-            board.state = State::Denied {
-                port: "/dev/ttyACM0".into(),
-            };
+            board.state = State::Denied("/dev/ttyACM0".into());
             board.permission = Some(Permission {
                 group: "uucp".to_owned(),
                 mode: 0o660,
@@ -113,12 +106,7 @@ fn a_port_of_another_group_names_the_group() {
 #[test]
 fn a_board_that_is_not_there_is_asked_for_nothing_else() {
     let found = sensor_spoiled(|board| {
-        *board = BoardFacts::new(
-            Role::Sensor,
-            State::Absent {
-                place: "/dev/ttyACM0".to_owned(),
-            },
-        );
+        *board = BoardFacts::new(Role::Sensor, State::Absent("/dev/ttyACM0".to_owned()));
     });
     assert_eq!(found.len(), 1);
     assert_eq!(found[0].kind, "absent");

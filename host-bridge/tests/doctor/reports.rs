@@ -18,11 +18,10 @@ fn a_bench_that_is_well_has_no_findings() {
 fn the_report_for_people_reads_well_in_eighty_columns() {
     let mut bench = bench();
     bench.boards[1].restarts = 1;
-    bench.boards[1].state = State::Absent {
-        place:
-            "/dev/serial/by-id/usb-STMicroelectronics_STM32_STLink_066CFF484971754867083829-if02"
-                .to_owned(),
-    };
+    bench.boards[1].state = State::Absent(
+        "/dev/serial/by-id/usb-STMicroelectronics_STM32_STLink_066CFF484971754867083829-if02"
+            .to_owned(),
+    );
     let findings = findings::of(&bench);
     let expected = format!(
         "\
@@ -75,9 +74,7 @@ fn a_bench_that_is_well_is_told_so() {
 #[test]
 fn the_report_for_scripts_keeps_its_shape() {
     let mut bench = bench();
-    bench.boards[1].state = State::Busy {
-        port: "/dev/ttyACM1".into(),
-    };
+    bench.boards[1].state = State::Busy("/dev/ttyACM1".into());
     let findings = findings::of(&bench);
     let document: Value =
         serde_json::from_str(&json::write(&bench, &findings)).expect("well-formed");

@@ -131,7 +131,7 @@ fn a_write_protected_sector_is_refused_if_it_is_needed() {
     let (plan, chip) = bench("protected");
     seen(&chip).set_word(OPTIONS, 0x0FEF_AAED);
     match refusal(&plan, &chip) {
-        Trouble::Protected { sector } => assert_eq!(sector, 4),
+        Trouble::Protected(sector) => assert_eq!(sector, 4),
         other => panic!("{other:?}"),
     }
     // Sectors 2 and 12 are not needed.

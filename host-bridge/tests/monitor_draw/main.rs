@@ -22,10 +22,10 @@ use ratatui::style::Color;
 const NOW_US: u64 = 20_000_000;
 
 fn known(role: Role) -> Event {
-    Event::StateChanged(State::Known {
-        port: format!("/dev/tty-{}", role.name()).into(),
-        hello: Hello::new(role, "stm32f429zi", [0, 1, 0]),
-    })
+    Event::StateChanged(State::Known(
+        format!("/dev/tty-{}", role.name()).into(),
+        Hello::new(role, "stm32f429zi", [0, 1, 0]),
+    ))
 }
 
 fn heard(at_us: u64, message: Message) -> Event {
@@ -307,9 +307,7 @@ fn an_estimate_that_grows_old_is_said_to() {
 #[test]
 fn a_board_that_is_not_there_is_told_with_advice() {
     let mut dashboard = busy(DisplayState::Driving);
-    let absent = State::Absent {
-        place: "/dev/ttyACM9".to_owned(),
-    };
+    let absent = State::Absent("/dev/ttyACM9".to_owned());
     let advice = absent.advice().expect("there is something to be done");
     let first = &advice[..30];
     dashboard.on(NOW_US, Role::Display, Event::StateChanged(absent));

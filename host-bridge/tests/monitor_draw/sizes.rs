@@ -204,9 +204,7 @@ fn what_happened_is_told_to_its_end() {
     view.panel = Panel::Log;
     for (width, height) in SIZES {
         let mut dashboard = widest();
-        let absent = State::Absent {
-            place: "/dev/ttyACM1".to_owned(),
-        };
+        let absent = State::Absent("/dev/ttyACM1".to_owned());
         let advice = absent.advice().expect("there is something to be done");
         dashboard.on(NOW_US, Role::Display, Event::StateChanged(absent));
         let shown = picture(&dashboard, &view, width, height);

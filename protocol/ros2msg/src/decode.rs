@@ -9,11 +9,8 @@ use crate::{BIG_ENDIAN, LITTLE_ENDIAN};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
     /// They do not begin as plain CDR does.
-    #[error("is no plain CDR: it begins with {head:02x?}")]
-    Encapsulation {
-        /// The first bytes, up to four.
-        head: Vec<u8>,
-    },
+    #[error("is no plain CDR: it begins with {0:02x?}")]
+    Encapsulation(Vec<u8>),
     /// They end too early.
     #[error("ends within {field}, after {length} bytes")]
     Short {
@@ -23,11 +20,8 @@ pub enum DecodeError {
         length: usize,
     },
     /// A text is no UTF-8.
-    #[error("{field} is no text")]
-    Text {
-        /// The field.
-        field: String,
-    },
+    #[error("{0} is no text")]
+    Text(String),
 }
 
 /// A message's value.
@@ -38,9 +32,7 @@ pub fn decode(definition: &Definition, bytes: &[u8]) -> Result<Value, DecodeErro
     let (head, body) = bytes.split_at_checked(4).unwrap_or((bytes, &[]));
     let is_big = head.get(..2) == BIG_ENDIAN.get(..2);
     if !is_big && head.get(..2) != LITTLE_ENDIAN.get(..2) {
-        return Err(DecodeError::Encapsulation {
-            head: head.to_vec(),
-        });
+        return Err(DecodeError::Encapsulation(head.to_vec()));
     }
     let mut cursor = Cursor {
         body,
@@ -141,9 +133,7 @@ impl<'d> Cursor<'_, 'd> {
         let field = self.field;
         let bytes = self.take(count)?;
         let bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
-        let text = str::from_utf8(bytes).map_err(|_| DecodeError::Text {
-            field: field.to_owned(),
-        })?;
+        let text = str::from_utf8(bytes).map_err(|_| DecodeError::Text(field.to_owned()))?;
         Ok(Value::String(text.to_owned()))
     }
 }

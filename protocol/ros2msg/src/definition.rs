@@ -18,17 +18,11 @@ pub enum DefinitionError {
         text: String,
     },
     /// A type is named that the text does not define.
-    #[error("{name} is not defined")]
-    Missing {
-        /// The type.
-        name: String,
-    },
+    #[error("{0} is not defined")]
+    Missing(String),
     /// A type holds itself.
-    #[error("{name} holds itself")]
-    Endless {
-        /// The type.
-        name: String,
-    },
+    #[error("{0} holds itself")]
+    Endless(String),
 }
 
 /// A message's fields, in their order.
@@ -129,12 +123,10 @@ impl Texts<'_> {
     fn resolve(&self, name: &str, depth: usize) -> Result<Definition, DefinitionError> {
         if depth > DEEPEST {
             let name = name.to_owned();
-            return Err(DefinitionError::Endless { name });
+            return Err(DefinitionError::Endless(name));
         }
         let Some(lines) = self.0.get(name) else {
-            return builtin(name).ok_or_else(|| DefinitionError::Missing {
-                name: name.to_owned(),
-            });
+            return builtin(name).ok_or_else(|| DefinitionError::Missing(name.to_owned()));
         };
         let package = name.split('/').next().unwrap_or_default();
         let mut fields = Vec::new();

@@ -130,15 +130,11 @@ fn texts_that_are_no_definitions_are_refused_by_line_or_name() {
     );
     assert_eq!(
         refusal("Point p\n"),
-        DefinitionError::Missing {
-            name: "a/Point".to_owned()
-        }
+        DefinitionError::Missing("a/Point".to_owned())
     );
     assert_eq!(
         refusal("B again\n"),
-        DefinitionError::Endless {
-            name: "a/B".to_owned()
-        }
+        DefinitionError::Endless("a/B".to_owned())
     );
     assert!(matches!(
         refusal("uint8[x] a\n"),

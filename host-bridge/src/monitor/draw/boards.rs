@@ -10,7 +10,7 @@ use super::text;
 use crate::monitor::board::Board;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::theme::Theme;
-use crate::state::State;
+use crate::state::{State, version};
 
 /// Width of a board's name with what stands around it.
 const NAME_WIDTH: u16 = 10;
@@ -79,10 +79,8 @@ pub fn facts(board: &Board, now_us: u64, theme: Theme) -> Vec<Fact> {
         add(2, "watchdog", text::brief(resets), none);
         add(5, "by", status.reset.name().to_owned(), plain);
     }
-    if let Some(State::Known { hello, .. }) = &board.state {
-        let [major, minor, patch] = hello.version;
-        let version = format!("{major}.{minor}.{patch}");
-        add(7, "", version, theme.quiet());
+    if let Some(State::Known(_, hello)) = &board.state {
+        add(7, "", version(hello), theme.quiet());
         add(8, "", hello.chip_name().to_owned(), theme.quiet());
     }
     facts

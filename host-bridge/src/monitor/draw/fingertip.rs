@@ -1,7 +1,7 @@
 //! The fifty actuators by their places.
 
+use protocol::ACTUATORS;
 use protocol::actuators::Actuator;
-use protocol::{ACTUATORS, Configuration};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -9,9 +9,9 @@ use ratatui::text::{Line, Span};
 
 use super::text;
 use crate::monitor::dashboard::Dashboard;
+use crate::monitor::settings;
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
-use crate::monitor::words;
 
 /// Places along the scan, and across it.
 const COLUMNS: usize = 10;
@@ -130,8 +130,8 @@ fn scale(shown: &Dashboard, view: &View) -> Line<'static> {
         spans.push(Span::styled("to", theme.quiet()));
     }
     spans.push(Span::styled(format!(" {FULL_V:.0} V"), theme.quiet()));
-    if let Some(Configuration::Display(display)) = shown.display.configuration {
-        let mode = words::word(&words::MODES, display.mode);
+    let configuration = shown.display.configuration.as_ref();
+    if let Some(mode) = configuration.and_then(|known| settings::DISPLAY[0].value(known)) {
         spans.push(Span::styled(format!("   {mode}"), theme.quiet()));
     }
     Line::from(spans)

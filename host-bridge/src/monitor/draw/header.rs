@@ -12,7 +12,7 @@ use crate::monitor::board::Board;
 use crate::monitor::dashboard::{Dashboard, Notice};
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
-use crate::state::State;
+use crate::state::{Advised, State};
 
 /// Width of a board's name with what stands around it.
 const NAME_WIDTH: u16 = 11;
@@ -53,10 +53,7 @@ fn rows(text: &str, width: u16) -> u16 {
 /// What is wrong with the way to a board, and what to do about it.
 fn trouble(board: &Board) -> Option<String> {
     let state = board.state.as_ref().filter(|state| !state.is_known())?;
-    Some(match state.advice() {
-        Some(advice) => format!("{state}: {advice}"),
-        None => state.to_string(),
-    })
+    Some(Advised(state).to_string())
 }
 
 /// Draws both boards and the supervisor.
@@ -98,7 +95,7 @@ fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, t
         width: area.width.saturating_sub(NAME_WIDTH),
         ..area
     };
-    if let Some(State::Known { port, .. }) = &board.state {
+    if let Some(State::Known(port, _)) = &board.state {
         let port = port.display().to_string();
         let room = usize::from(rest.width).saturating_sub(port.chars().count());
         let mut spans = vec![Span::raw(port)];

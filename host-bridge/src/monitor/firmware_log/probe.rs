@@ -30,10 +30,8 @@ impl Log {
         let name = format!("probe-{}", serial.unwrap_or_default());
         let opened = open_source(&name, move || {
             let attached = Buffer::attach(wanted.as_deref(), block);
-            let buffer = attached.map_err(|reason| State::Failed {
-                port: PathBuf::from("the probe"),
-                reason,
-            })?;
+            let buffer =
+                attached.map_err(|reason| State::Failed(PathBuf::from("the probe"), reason))?;
             Ok(Opened {
                 input: Box::new(buffer),
                 output: Box::new(io::sink()) as Box<dyn Write + Send>,

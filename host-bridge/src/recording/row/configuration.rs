@@ -32,20 +32,14 @@ pub struct DisplayReportRow {
 
 impl From<SensorReportRow> for ConfigurationReport {
     fn from(row: SensorReportRow) -> Self {
-        Self {
-            refused: row.refused,
-            hash: row.hash,
-            configuration: Configuration::Sensor(row.in_force),
-        }
+        let configuration = Configuration::Sensor(row.in_force);
+        copied!(row => Self { refused, hash; configuration })
     }
 }
 
 impl From<DisplayReportRow> for ConfigurationReport {
     fn from(row: DisplayReportRow) -> Self {
-        Self {
-            refused: row.refused,
-            hash: row.hash,
-            configuration: Configuration::Display(row.in_force),
-        }
+        let configuration = Configuration::Display(row.in_force);
+        copied!(row => Self { refused, hash; configuration })
     }
 }

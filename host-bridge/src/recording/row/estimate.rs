@@ -4,7 +4,7 @@ use postcard_schema::Schema;
 use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range};
 use serde::{Deserialize, Serialize};
 
-use super::number::{number, present};
+use super::text::{number, present};
 
 /// [`Estimate`], field by field; what it has not is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -52,70 +52,18 @@ pub struct EstimateRow {
 
 impl From<Estimate> for EstimateRow {
     fn from(estimate: Estimate) -> Self {
-        let Estimate {
-            sequence,
-            instant_us,
-            wavelength_mm,
-            valid,
-            confidence,
-            amplitude_lsb,
-            counted_mm,
-            range,
-            contact,
-            velocity_um_s,
-            lag_um,
-            gauges_used,
-            health,
-        } = estimate;
-        Self {
-            sequence,
-            instant_us,
-            wavelength_mm,
-            valid,
-            confidence,
-            amplitude_lsb,
-            counted_mm,
-            range,
-            contact,
-            velocity_um_s,
-            lag_um,
-            gauges_used,
-            health,
-        }
+        copied!(estimate => Self {
+            sequence, instant_us, wavelength_mm, valid, confidence, amplitude_lsb, counted_mm, range, contact,
+            velocity_um_s, lag_um, gauges_used, health
+        })
     }
 }
 
 impl From<EstimateRow> for Estimate {
     fn from(row: EstimateRow) -> Self {
-        let EstimateRow {
-            sequence,
-            instant_us,
-            wavelength_mm,
-            valid,
-            confidence,
-            amplitude_lsb,
-            counted_mm,
-            range,
-            contact,
-            velocity_um_s,
-            lag_um,
-            gauges_used,
-            health,
-        } = row;
-        Self {
-            sequence,
-            instant_us,
-            wavelength_mm,
-            valid,
-            confidence,
-            amplitude_lsb,
-            counted_mm,
-            range,
-            contact,
-            velocity_um_s,
-            lag_um,
-            gauges_used,
-            health,
-        }
+        copied!(row => Self {
+            sequence, instant_us, wavelength_mm, valid, confidence, amplitude_lsb, counted_mm, range, contact,
+            velocity_um_s, lag_um, gauges_used, health
+        })
     }
 }

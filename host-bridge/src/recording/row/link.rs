@@ -156,17 +156,17 @@ impl LinkRow {
     /// The link stands differently.
     pub fn turned(state: &State) -> Self {
         let port = match state {
-            State::Absent { place } => Some(place.clone()),
+            State::Absent(place) => Some(place.clone()),
             state => state.port().map(|port| port.display().to_string()),
         };
         let reason = match state {
-            State::Failed { reason, .. } => Some(reason.clone()),
+            State::Failed(_, reason) => Some(reason.clone()),
             _ => None,
         };
         let hello = match state {
-            State::Foreign { hello, .. }
-            | State::Stranger { hello, .. }
-            | State::Known { hello, .. } => Some(hello.into()),
+            State::Foreign(_, hello) | State::Stranger { hello, .. } | State::Known(_, hello) => {
+                Some(hello.into())
+            }
             _ => None,
         };
         Self {
@@ -187,30 +187,21 @@ impl LinkRow {
         let place = port.clone();
         let port = port.into();
         Some(match word.0.as_str() {
-            "absent" => State::Absent { place },
-            "busy" => State::Busy { port },
-            "denied" => State::Denied { port },
-            "failed" => State::Failed {
-                port,
-                reason: self.reason.as_ref()?.0.clone(),
-            },
-            "opened" => State::Opened { port },
-            "silent" => State::Silent { port },
-            "deaf" => State::Deaf { port },
-            "garbage" => State::Garbage { port },
-            "foreign" => State::Foreign {
-                port,
-                hello: hello()?,
-            },
+            "absent" => State::Absent(place),
+            "busy" => State::Busy(port),
+            "denied" => State::Denied(port),
+            "failed" => State::Failed(port, self.reason.as_ref()?.0.clone()),
+            "opened" => State::Opened(port),
+            "silent" => State::Silent(port),
+            "deaf" => State::Deaf(port),
+            "garbage" => State::Garbage(port),
+            "foreign" => State::Foreign(port, hello()?),
             "wrong-role" => State::Stranger {
                 port,
                 hello: hello()?,
                 wanted: role,
             },
-            "known" => State::Known {
-                port,
-                hello: hello()?,
-            },
+            "known" => State::Known(port, hello()?),
             _ => return None,
         })
     }
@@ -238,11 +229,7 @@ pub struct ClockRow {
 impl ClockRow {
     /// The message.
     pub const fn pong(self) -> Pong {
-        Pong {
-            sent_us: self.sent_us,
-            received_us: self.received_us,
-            answered_us: self.answered_us,
-        }
+        copied!(self => Pong { sent_us, received_us, answered_us })
     }
 }
 

@@ -119,24 +119,14 @@ pub enum StandName {
 
 impl From<DisplayState> for Stand {
     fn from(state: DisplayState) -> Self {
-        let stand = |state| Self {
-            state,
-            hold: None,
-            trip: None,
+        let (state, hold, trip) = match state {
+            DisplayState::Boot => (StandName::Boot, None, None),
+            DisplayState::Ready => (StandName::Ready, None, None),
+            DisplayState::Driving => (StandName::Driving, None, None),
+            DisplayState::Fading(hold) => (StandName::Fading, Some(hold), None),
+            DisplayState::Stopped(trip) => (StandName::Stopped, None, Some(trip)),
         };
-        match state {
-            DisplayState::Boot => stand(StandName::Boot),
-            DisplayState::Ready => stand(StandName::Ready),
-            DisplayState::Driving => stand(StandName::Driving),
-            DisplayState::Fading(hold) => Self {
-                hold: Some(hold),
-                ..stand(StandName::Fading)
-            },
-            DisplayState::Stopped(trip) => Self {
-                trip: Some(trip),
-                ..stand(StandName::Stopped)
-            },
-        }
+        Self { state, hold, trip }
     }
 }
 
@@ -156,100 +146,53 @@ impl Stand {
 impl SensorStatusRow {
     /// The row of a sensor board's status.
     pub fn new(status: &Status, sensor: SensorCounters) -> Self {
-        Self {
-            uptime_us: status.uptime_us,
-            reset: status.reset,
-            watchdog_resets: status.watchdog_resets,
-            peer: status.peer,
-            console: status.console,
-            stack_free_bytes: status.stack_free_bytes,
-            sensor,
-        }
+        copied!(status => Self {
+            uptime_us, reset, watchdog_resets, peer, console, stack_free_bytes; sensor
+        })
     }
 
     /// The status.
     pub fn status(self) -> Status {
-        Status {
-            uptime_us: self.uptime_us,
-            reset: self.reset,
-            watchdog_resets: self.watchdog_resets,
-            peer: self.peer,
-            console: self.console,
-            stack_free_bytes: self.stack_free_bytes,
-            role: RoleCounters::Sensor(self.sensor),
-        }
+        let role = RoleCounters::Sensor(self.sensor);
+        copied!(self => Status {
+            uptime_us, reset, watchdog_resets, peer, console, stack_free_bytes; role
+        })
     }
 }
 
 impl DisplayStatusRow {
     /// The row of a display board's status.
-    pub fn new(status: &Status, display: &DisplayCounters) -> Self {
-        Self {
-            uptime_us: status.uptime_us,
-            reset: status.reset,
-            watchdog_resets: status.watchdog_resets,
-            peer: status.peer,
-            console: status.console,
-            stack_free_bytes: status.stack_free_bytes,
-            display: display.into(),
-            supervisor: display.state.into(),
-        }
+    pub fn new(status: &Status, counters: &DisplayCounters) -> Self {
+        let (display, supervisor) = (counters.into(), counters.state.into());
+        copied!(status => Self {
+            uptime_us, reset, watchdog_resets, peer, console, stack_free_bytes; display, supervisor
+        })
     }
 
     /// The status; none if the supervisor's reason is missing.
     pub fn status(self) -> Option<Status> {
-        Some(Status {
-            uptime_us: self.uptime_us,
-            reset: self.reset,
-            watchdog_resets: self.watchdog_resets,
-            peer: self.peer,
-            console: self.console,
-            stack_free_bytes: self.stack_free_bytes,
-            role: RoleCounters::Display(self.display.with(self.supervisor.state()?)),
-        })
+        let role = RoleCounters::Display(self.display.with(self.supervisor.state()?));
+        Some(copied!(self => Status {
+            uptime_us, reset, watchdog_resets, peer, console, stack_free_bytes; role
+        }))
     }
 }
 
 impl From<&DisplayCounters> for DisplayCountersRow {
     fn from(counters: &DisplayCounters) -> Self {
-        Self {
-            ticks: counters.ticks,
-            updates: counters.updates,
-            deadline_misses: counters.deadline_misses,
-            estimates: counters.estimates,
-            refused_estimates: counters.refused_estimates,
-            fades: counters.fades,
-            spi_errors: counters.spi_errors,
-            implausible: counters.implausible,
-            flooded: counters.flooded,
-            encoder_jumps: counters.encoder_jumps,
-            converter_faults: counters.converter_faults,
-            clears: counters.clears,
-            unheard: counters.unheard,
-            changes: counters.changes,
-        }
+        copied!(counters => Self {
+            ticks, updates, deadline_misses, estimates, refused_estimates, fades, spi_errors, implausible, flooded,
+            encoder_jumps, converter_faults, clears, unheard, changes
+        })
     }
 }
 
 impl DisplayCountersRow {
     fn with(self, state: DisplayState) -> DisplayCounters {
-        DisplayCounters {
-            ticks: self.ticks,
-            updates: self.updates,
-            deadline_misses: self.deadline_misses,
-            estimates: self.estimates,
-            refused_estimates: self.refused_estimates,
-            fades: self.fades,
-            spi_errors: self.spi_errors,
-            implausible: self.implausible,
-            flooded: self.flooded,
-            encoder_jumps: self.encoder_jumps,
-            converter_faults: self.converter_faults,
-            clears: self.clears,
-            unheard: self.unheard,
-            changes: self.changes,
-            state,
-        }
+        copied!(self => DisplayCounters {
+            ticks, updates, deadline_misses, estimates, refused_estimates, fades, spi_errors, implausible, flooded,
+            encoder_jumps, converter_faults, clears, unheard, changes; state
+        })
     }
 }
 

@@ -183,10 +183,8 @@ impl Shared {
         if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
             return vec![Notice::Alone(self.other_role)];
         }
-        let reach = |endpoint: &Endpoint| Notice::Unreached {
-            endpoint: endpoint.clone(),
-            reach: self.network.reach(endpoint),
-        };
+        let reach =
+            |endpoint: &Endpoint| Notice::Unreached(endpoint.clone(), self.network.reach(endpoint));
         endpoints.iter().map(reach).collect()
     }
 }
