@@ -67,10 +67,7 @@ pub enum BenchError {
 }
 
 impl Bench {
-    /// Reads a bench file.
-    ///
-    /// # Errors
-    /// If it can't be read or is no bench.
+    /// Reads a bench file. Fails if it can't be read or is no bench.
     pub fn read(path: &Path) -> Result<Self, BenchError> {
         let text = fs::read_to_string(path)
             .map_err(|source| BenchError::Unreadable(path.to_owned(), source))?;
@@ -79,11 +76,9 @@ impl Bench {
         bench.checked()
     }
 
-    /// The bench file to be used: `given`, else [`FILE_NAME`] in the current folder, else
-    /// `ridgelink/bench.toml` in the user's folder of settings; none of them is an empty bench.
-    ///
-    /// # Errors
-    /// If the file can't be read or is no bench.
+    /// The bench file to be used: `given`, else [`FILE_NAME`] in the current folder, else `ridgelink/bench.toml` in
+    /// the user's folder of settings; none of them is an empty bench. Fails if the file can't be read or is no
+    /// bench.
     pub fn find(given: Option<&Path>) -> Result<Self, BenchError> {
         let settings = std::env::var_os("XDG_CONFIG_HOME")
             .map(PathBuf::from)
@@ -101,10 +96,7 @@ impl Bench {
         }
     }
 
-    /// The same, unless both boards are at one place.
-    ///
-    /// # Errors
-    /// If they are.
+    /// The same, unless both boards are at one place. Fails if they are.
     pub fn checked(self) -> Result<Self, BenchError> {
         let place = self.sensor.place();
         if place != Place::Anywhere && place == self.display.place() {

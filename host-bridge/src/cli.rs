@@ -171,10 +171,7 @@ fn put(seat: &mut Seat, place: Option<&Place>) {
 }
 
 impl Arguments {
-    /// Does what was asked for.
-    ///
-    /// # Errors
-    /// If it can't be done.
+    /// Does what was asked for. Fails if it can't be done.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::Flash(flash) => flash.execute(),

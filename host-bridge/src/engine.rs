@@ -22,10 +22,8 @@ pub struct Setup<'a> {
 }
 
 impl Setup<'_> {
-    /// Takes part. Who connects is back when somebody has answered or all have been tried in vain.
-    ///
-    /// # Errors
-    /// The engine's: nobody is reached, or one can't listen.
+    /// Takes part. Who connects is back when somebody has answered or all have been tried in vain. Fails if nobody
+    /// is reached, or one can't listen.
     pub fn open(self) -> Result<Session, Error> {
         zenoh::open(self.configuration()?).wait()
     }

@@ -105,10 +105,8 @@ pub struct Exported {
     pub section: Option<String>,
 }
 
-/// Writes the files.
-///
-/// # Errors
-/// If there is nothing to export, or a file can't be written; files that were written before stay.
+/// Writes the files. Fails if there is nothing to export, or a file can't be written; files that were written
+/// before stay.
 pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
     let ending = |path: &Path| {
         let ending = path.extension()?.to_str()?;

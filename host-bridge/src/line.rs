@@ -104,10 +104,8 @@ impl Line {
         }
     }
 
-    /// Says `message` now. A Stop is said to whoever is there: all versions understand it.
-    ///
-    /// # Errors
-    /// If nobody is there who would understand it, or the line is stuck.
+    /// Says `message` now. A Stop is said to whoever is there: all versions understand it. Fails if nobody is there
+    /// who would understand it, or the line is stuck.
     pub fn say(&mut self, message: &Message) -> Result<(), NotSent> {
         if !self.is_known && !matches!(message, Message::Stop(_)) {
             return Err(NotSent::NotKnown);
@@ -131,11 +129,8 @@ impl Line {
         self.pings_us.contains(&sent_us)
     }
 
-    /// Writes what is to be said. What the line takes no byte of is dropped; a frame of which it has taken
-    /// the beginning is ended as soon as it takes more.
-    ///
-    /// # Errors
-    /// If the line does not take all of it.
+    /// Writes what is to be said. What the line takes no byte of is dropped; a frame of which it has taken the
+    /// beginning is ended as soon as it takes more. Fails if the line does not take all of it.
     pub fn flush(&mut self) -> Result<(), NotSent> {
         let mut bytes = std::mem::take(&mut self.rest);
         let begun = bytes.len();
@@ -179,10 +174,8 @@ impl Line {
     }
 }
 
-/// Writes as many bytes as `output` takes at once, and says how many.
-///
-/// # Errors
-/// [`ErrorKind::WouldBlock`] if those are not all; else what broke the line.
+/// Writes as many bytes as `output` takes at once, and says how many. Fails with [`ErrorKind::WouldBlock`] if those
+/// are not all; else what broke the line.
 pub fn write_some(output: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     let mut taken = 0;
     while taken < bytes.len() {

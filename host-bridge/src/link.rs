@@ -141,18 +141,12 @@ impl Link {
         }
     }
 
-    /// Says `message` now. See [`LinkSender::post`].
-    ///
-    /// # Errors
-    /// If nobody is there, or the line is stuck.
+    /// Says `message` now. See [`LinkSender::post`]. Fails if nobody is there, or the line is stuck.
     pub fn post(&self, message: &Message) -> Result<(), NotSent> {
         self.shared.post(message)
     }
 
-    /// Stops the board. See [`LinkSender::stop`].
-    ///
-    /// # Errors
-    /// If it could not be said yet.
+    /// Stops the board. See [`LinkSender::stop`]. Fails if it could not be said yet.
     pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
         self.shared.stop(stop)
     }
@@ -207,19 +201,13 @@ pub struct LinkSender {
 }
 
 impl LinkSender {
-    /// Says `message` now: it is with the system when this returns.
-    ///
-    /// # Errors
-    /// If nobody is there, or the line is stuck.
+    /// Says `message` now: it is with the system when this returns. Fails if nobody is there, or the line is stuck.
     pub fn post(&self, message: &Message) -> Result<(), NotSent> {
         self.shared.post(message)
     }
 
-    /// Stops whatever board is there: says so now, and again until it answers that it has stopped; a board
-    /// that comes later is told as soon as its port is open. Never waits.
-    ///
-    /// # Errors
-    /// If it could not be said yet.
+    /// Stops whatever board is there: says so now, and again until it answers that it has stopped; a board that
+    /// comes later is told as soon as its port is open. Never waits. Fails if it could not be said yet.
     pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
         self.shared.stop(stop)
     }

@@ -63,10 +63,8 @@ pub enum MonitorError {
 }
 
 /// Watches what `source` tells, until a key or `ended` ends it; lines end with the source, too. True if somebody
-/// watched, or if a board was there to be written of.
-///
-/// # Errors
-/// If standard output takes no more, unless nobody reads it any more, or if a recording can't be written.
+/// watched, or if a board was there to be written of. Fails if standard output takes no more, unless nobody reads
+/// it any more, or if a recording can't be written.
 pub fn run(
     source: Source,
     options: &Options,

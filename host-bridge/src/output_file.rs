@@ -22,9 +22,7 @@ impl OutputFileError {
     }
 }
 
-/// Refuses a file that is there already, unless it is written over by `force`.
-///
-/// # Errors
+/// Refuses a file that is there already, unless it is written over by `force`. Fails with
 /// [`OutputFileError::Exists`].
 pub fn refuse_taken(path: &Path, force: bool) -> Result<(), OutputFileError> {
     if path.exists() && !force {
@@ -33,10 +31,7 @@ pub fn refuse_taken(path: &Path, force: bool) -> Result<(), OutputFileError> {
     Ok(())
 }
 
-/// Writes the whole file.
-///
-/// # Errors
-/// [`OutputFileError::NotWritten`].
+/// Writes the whole file. Fails with [`OutputFileError::NotWritten`].
 pub fn write(path: &Path, text: &str) -> Result<(), OutputFileError> {
     fs::write(path, text).map_err(|source| OutputFileError::not_written(path, source))
 }

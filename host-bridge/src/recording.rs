@@ -87,10 +87,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Makes the files and begins to record.
-    ///
-    /// # Errors
-    /// If there are such files already, or they can't be made.
+    /// Makes the files and begins to record. Fails if there are such files already, or they can't be made.
     pub fn start(settings: Settings) -> Result<Self, RecordingError> {
         let files = RecordingFiles::open(settings)?;
         let (notes, waiting) = queue(PATIENCE);
@@ -137,11 +134,8 @@ impl Recorder {
         *locked(&self.progress)
     }
 
-    /// Writes what still waits, ends the files as they should end, and says what is in them. The second call
-    /// says nothing.
-    ///
-    /// # Errors
-    /// If they could not be written to the end. What was safe before is.
+    /// Writes what still waits, ends the files as they should end, and says what is in them. The second call says
+    /// nothing. Fails if they could not be written to the end. What was safe before is.
     pub fn stop(&self) -> Result<Progress, RecordingError> {
         self.notes.close();
         match locked(&self.writer).take() {

@@ -64,10 +64,8 @@ pub struct Played {
 
 /// Tells the events of a recording, each at its time by `clock`, until its end or until `ended`.
 ///
-/// What was known before `pace.from_s` of the links and the configurations is told first.
-///
-/// # Errors
-/// If the recording can't be read to the end; what was read before has been told.
+/// What was known before `pace.from_s` of the links and the configurations is told first. Fails if the recording
+/// can't be read to the end; what was read before has been told.
 pub fn play(
     clock: &dyn Clock,
     recording: Reader,

@@ -19,10 +19,7 @@ const READ_TIMEOUT: Duration = Duration::from_millis(20);
 /// How long what was said last may take to leave a line that is closed.
 const DRAIN: Duration = Duration::from_millis(40);
 
-/// Opens a port for this program alone.
-///
-/// # Errors
-/// If it can't be: the state says why.
+/// Opens a port for this program alone. Fails if it can't be: the state says why.
 pub fn open(path: &Path) -> Result<Opened, State> {
     // A link that is put elsewhere between the two openings must not lead to two boards.
     let device = fs::canonicalize(path).map_err(|error| refused(path, &error))?;

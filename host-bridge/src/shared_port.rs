@@ -94,10 +94,8 @@ impl Ports for SharedPorts {
     }
 }
 
-/// Opens a source of bytes that is no port, and shares it under `name` as a port is shared.
-///
-/// # Errors
-/// As `open`'s, which is called where no other program has the source, and whenever its owner has gone.
+/// Opens a source of bytes that is no port, and shares it under `name` as a port is shared. Fails as
+/// `open` does, which is called where no other program has the source, and whenever its owner has gone.
 pub fn open_source(
     name: &str,
     open: impl Fn() -> Result<Opened, State> + Send + 'static,

@@ -25,10 +25,7 @@ pub trait Ports: Send + Sync {
     /// Whether this program has `port` open.
     fn is_open(&self, port: &Path) -> bool;
 
-    /// Opens `port` for this program alone.
-    ///
-    /// # Errors
-    /// If it can't be: the state says why.
+    /// Opens `port` for this program alone. Fails if it can't be: the state says why.
     fn open(&self, port: &Path) -> Result<Opened, State>;
 }
 
@@ -42,10 +39,8 @@ pub struct Opened {
 
 /// Where a port's bytes come from.
 pub trait Input: Send {
-    /// Reads what has come; waits 20 ms for it at the longest, and then says [`io::ErrorKind::TimedOut`].
-    ///
-    /// # Errors
-    /// If nothing came, or nothing will: the port is gone.
+    /// Reads what has come; waits 20 ms for it at the longest, and then says [`io::ErrorKind::TimedOut`]. Fails if
+    /// nothing came, or nothing will: the port is gone.
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize>;
 
     /// How often the port has changed hands between programs since it was opened: some of what the board said

@@ -107,10 +107,7 @@ impl Default for Progress {
 }
 
 impl Progress {
-    /// What `path` holds; nothing tried yet if it is not there.
-    ///
-    /// # Errors
-    /// If it can't be read, or is something else.
+    /// What `path` holds; nothing tried yet if it is not there. Fails if it can't be read, or is something else.
     pub fn read(path: &Path) -> Result<Self, ProgressError> {
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
@@ -131,10 +128,7 @@ impl Progress {
         })
     }
 
-    /// Writes it as a whole, in the place of what was there.
-    ///
-    /// # Errors
-    /// If it can't be written.
+    /// Writes it as a whole, in the place of what was there. Fails if it can't be written.
     pub fn write(&self, path: &Path) -> Result<(), ProgressError> {
         // Nothing in it can fail to be written: every key is a string.
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";

@@ -4,10 +4,8 @@ use std::io::{self, Write};
 
 use anyhow::Context;
 
-/// Prints `text` and ends its line. A reader that has gone away has seen enough.
-///
-/// # Errors
-/// If it can't be written for another reason.
+/// Prints `text` and ends its line. A reader that has gone away has seen enough. Fails if it can't be written for
+/// another reason.
 pub fn print(text: &str) -> anyhow::Result<()> {
     print_on(text).map(drop)
 }
@@ -17,10 +15,8 @@ pub fn say(text: &str) {
     let _ = writeln!(io::stderr(), "host-bridge: {text}");
 }
 
-/// The same as [`print`], for who goes on printing: false if the reader has gone away.
-///
-/// # Errors
-/// If it can't be written for another reason.
+/// The same as [`print`], for who goes on printing: false if the reader has gone away. Fails if it can't be written
+/// for another reason.
 pub fn print_on(text: &str) -> anyhow::Result<bool> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {

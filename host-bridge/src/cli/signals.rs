@@ -12,18 +12,13 @@ use signal_hook::iterator::Signals;
 /// What asks for an end; a terminal that goes away does.
 pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 
-/// Has SIGUSR1 stop the boards, by a thread that waits for nothing else.
-///
-/// # Errors
-/// If the system does not let one listen to signals.
+/// Has SIGUSR1 stop the boards, by a thread that waits for nothing else. Fails if the system does not let one
+/// listen to signals.
 pub fn stop_boards(boards: Vec<LinkSender>) -> io::Result<()> {
     on_stop(move || stop_all(&boards))
 }
 
-/// Has SIGUSR1 call `stop`, on a thread of its own.
-///
-/// # Errors
-/// If the system does not let one listen to signals.
+/// Has SIGUSR1 call `stop`, on a thread of its own. Fails if the system does not let one listen to signals.
 pub fn on_stop(stop: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut signals = Signals::new([SIGUSR1])?;
     std::thread::spawn(move || signals.forever().for_each(|_| stop()));
@@ -39,10 +34,7 @@ pub enum Again {
     EndsAtOnce,
 }
 
-/// A flag that the first of these signals sets.
-///
-/// # Errors
-/// If the system does not let one listen to signals.
+/// A flag that the first of these signals sets. Fails if the system does not let one listen to signals.
 pub fn flag_set_by(signals: &[i32], again: Again) -> io::Result<Arc<AtomicBool>> {
     let ended = Arc::new(AtomicBool::new(false));
     for &signal in signals {
@@ -54,10 +46,8 @@ pub fn flag_set_by(signals: &[i32], again: Again) -> io::Result<Arc<AtomicBool>>
     Ok(ended)
 }
 
-/// A wait for the first of these signals; the second one ends the program at once.
-///
-/// # Errors
-/// If the system does not let one listen to signals.
+/// A wait for the first of these signals; the second one ends the program at once. Fails if the system does not let
+/// one listen to signals.
 pub fn wait_for(signals: &[i32]) -> io::Result<impl FnOnce()> {
     let mut first = Signals::new(signals)?;
     flag_set_by(signals, Again::EndsAtOnce)?;

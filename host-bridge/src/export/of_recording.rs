@@ -17,10 +17,8 @@ const AT_SAMPLES: Along = Along::Time {
     rate_hz: SAMPLE_RATE_HZ,
 };
 
-/// The gauges, the force if there is one, and the arm's place, over time.
-///
-/// # Errors
-/// If the arm is too far from its start.
+/// The gauges, the force if there is one, and the arm's place, over time. Fails if the arm is too far from its
+/// start.
 pub fn groups(excerpt: &Excerpt) -> Result<Vec<Group>, ExportError> {
     let samples = &excerpt.samples;
     let code = |code: u16| (i32::from(code) - MID_CODE) as i16;
@@ -66,10 +64,7 @@ pub fn groups(excerpt: &Excerpt) -> Result<Vec<Group>, ExportError> {
     Ok(groups)
 }
 
-/// The five gauges over the longest way that the arm goes in one direction.
-///
-/// # Errors
-/// If it rests.
+/// The five gauges over the longest way that the arm goes in one direction. Fails if it rests.
 pub fn texture(excerpt: &Excerpt, settings: &Settings) -> Result<Made, ExportError> {
     let samples = &excerpt.samples[longest_way(&excerpt.samples)];
     let places = samples.iter().map(|sample| sample.position_um);

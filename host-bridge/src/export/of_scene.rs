@@ -85,10 +85,7 @@ fn way_mm(motion: &Motion, duration_s: f64) -> (f64, f64) {
         })
 }
 
-/// The scene's surface, as a point feels it through the contact.
-///
-/// # Errors
-/// If it is too long.
+/// The scene's surface, as a point feels it through the contact. Fails if it is too long.
 pub fn texture(scene: &Scene, settings: &Settings) -> Result<Made, ExportError> {
     let felt = Felt::of(scene)?;
     let points = (0..).map(|point: u64| point * SPACING_UM);
@@ -156,10 +153,8 @@ fn micrometres(x_mm: f64) -> i32 {
     (x_mm * 1e3).round() as i32
 }
 
-/// The surface over place; gauges, force, arm, hand and actuators over time.
-///
-/// # Errors
-/// If the surface is too long, or the scene can't be run by this engine.
+/// The surface over place; gauges, force, arm, hand and actuators over time. Fails if the surface is too long, or
+/// the scene can't be run by this engine.
 pub fn groups(scene: &Scene) -> Result<Vec<Group>, ExportError> {
     let felt = Felt::of(scene)?;
     let mut tape = Tape::default();

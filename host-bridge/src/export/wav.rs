@@ -8,10 +8,7 @@ use hound::{SampleFormat, WavSpec, WavWriter};
 use super::{Group, Samples};
 use crate::output_file::OutputFileError;
 
-/// Writes a group's file.
-///
-/// # Errors
-/// If it can't be written.
+/// Writes a group's file. Fails if it can't be written.
 pub fn write(path: &Path, group: &Group) -> Result<(), OutputFileError> {
     write_samples(path, group).map_err(|error| {
         let source = match error {

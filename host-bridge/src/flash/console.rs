@@ -22,11 +22,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// Where the console of the board of `seat` is, behind a probe of serial number `probe`.
 ///
-/// A port that was named is taken at its word, unless it is another ST-LINK's: then the Hello that is heard
-/// there would be another board's.
-///
-/// # Errors
-/// If the port is another ST-LINK's.
+/// A port that was named is taken at its word, unless it is another ST-LINK's: then the Hello that is heard there
+/// would be another board's. Fails if the port is another ST-LINK's.
 pub fn place(seat: &Place, probe: Option<&str>, links: &[StLink]) -> Result<Place, Elsewhere> {
     let own = probe.filter(|serial| {
         links
@@ -147,10 +144,8 @@ pub enum NoHello {
     CalledOff,
 }
 
-/// Waits at `place` for the Hello of the firmware that says `wanted` of itself, for at most `limit`.
-///
-/// # Errors
-/// If it is not heard, or when `called_off` becomes true.
+/// Waits at `place` for the Hello of the firmware that says `wanted` of itself, for at most `limit`. Fails if it is
+/// not heard, or when `called_off` becomes true.
 pub fn wait(
     system: &System,
     role: Role,

@@ -116,10 +116,8 @@ pub fn built(role: Role) -> PathBuf {
 }
 
 impl Firmware {
-    /// Reads the ELF at `path`, which is to be the firmware of `role`.
-    ///
-    /// # Errors
-    /// If it can't be read, is no whole ELF of this protocol, or is another board's.
+    /// Reads the ELF at `path`, which is to be the firmware of `role`. Fails if it can't be read, is no whole ELF
+    /// of this protocol, or is another board's.
     pub fn read(path: &Path, role: Role) -> Result<Self, FirmwareError> {
         let elf = fs::read(path).map_err(|source| FirmwareError::Unreadable {
             path: path.to_owned(),

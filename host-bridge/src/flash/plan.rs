@@ -113,11 +113,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for `firmware`.
-    ///
-    /// # Errors
-    /// If the firmware is for another chip, does not fit, would touch anything but the flash, or would not
-    /// start.
+    /// The plan for `firmware`. Fails if the firmware is for another chip, does not fit, would touch anything but
+    /// the flash, or would not start.
     pub fn new(firmware: Firmware) -> Result<Self, PlanError> {
         let path = || firmware.path.clone();
         if !firmware.hello.chip_name().eq_ignore_ascii_case(CHIP) {
@@ -186,10 +183,7 @@ impl Plan {
         self.sectors.iter().map(|sector| sector.bytes).sum()
     }
 
-    /// The same for probe-rs, with all that goes into the flash.
-    ///
-    /// # Errors
-    /// If probe-rs sees what this plan did not.
+    /// The same for probe-rs, with all that goes into the flash. Fails if probe-rs sees what this plan did not.
     pub fn loader(&self) -> Result<FlashLoader, FlashError> {
         let mut loader = self.target.flash_loader();
         for segment in &self.firmware.segments {

@@ -48,10 +48,7 @@ impl Attached {
         }
     }
 
-    /// Opens it.
-    ///
-    /// # Errors
-    /// If it is gone, another program's, or not for this user.
+    /// Opens it. Fails if it is gone, another program's, or not for this user.
     pub fn open(&self) -> Result<Probe, Trouble> {
         if !self.is_allowed {
             return Err(Trouble::Denied(self.selector()));
@@ -169,10 +166,7 @@ fn list(found: &[Attached]) -> String {
     lines.join("\n")
 }
 
-/// The probe that is meant.
-///
-/// # Errors
-/// If there is none, or if several may be meant.
+/// The probe that is meant. Fails if there is none, or if several may be meant.
 pub fn choose(found: &[Attached], request: &ProbeRequest) -> Result<Attached, Undecided> {
     if found.is_empty() {
         return Err(Undecided::None);

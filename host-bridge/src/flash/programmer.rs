@@ -86,12 +86,10 @@ pub struct Programmer {
 }
 
 impl Programmer {
-    /// Asks the chip behind `probe` whether `plan` can be carried out on it. Nothing is changed but that the
-    /// chip may be halted or, if it does not answer otherwise, reset. `reopen` opens the probe a second
-    /// time, for an attempt under reset.
-    ///
-    /// # Errors
-    /// If the chip has no power, does not answer, is another one, too small, locked or protected.
+    /// Asks the chip behind `probe` whether `plan` can be carried out on it. Nothing is changed but that the chip
+    /// may be halted or, if it does not answer otherwise, reset. `reopen` opens the probe a second time, for an
+    /// attempt under reset. Fails if the chip has no power, does not answer, is another one, too small, locked or
+    /// protected.
     pub fn attach(
         mut probe: Probe,
         plan: &Plan,
@@ -153,10 +151,8 @@ impl Programmer {
         Ok(())
     }
 
-    /// Erases, writes and verifies. `tell` is called as it comes along.
-    ///
-    /// # Errors
-    /// If the flash could not be written, or does not hold what was written.
+    /// Erases, writes and verifies. `tell` is called as it comes along. Fails if the flash could not be written, or
+    /// does not hold what was written.
     pub fn write(&mut self, plan: &Plan, mut tell: impl FnMut(Progress)) -> Result<(), Trouble> {
         let loader = plan
             .loader()
@@ -175,10 +171,7 @@ impl Programmer {
         result.map_err(|error| Trouble::flashing(&error, is_begun))
     }
 
-    /// Resets the chip and lets it run.
-    ///
-    /// # Errors
-    /// If it does not take the reset.
+    /// Resets the chip and lets it run. Fails if it does not take the reset.
     pub fn start(mut self) -> Result<(), Trouble> {
         self.session
             .core(0)

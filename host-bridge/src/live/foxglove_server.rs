@@ -40,10 +40,7 @@ pub struct FoxgloveServer {
 }
 
 impl FoxgloveServer {
-    /// Begins to listen.
-    ///
-    /// # Errors
-    /// If the port can't be had.
+    /// Begins to listen. Fails if the port can't be had.
     pub fn start(address: IpAddr, port: u16) -> Result<Self, LiveError> {
         let encoder = CdrEncoder::new()?;
         // Its own, so that two in one program don't mix.

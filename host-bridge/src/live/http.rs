@@ -21,10 +21,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// Reads one; none if it is no request.
-    ///
-    /// # Errors
-    /// If the connection fails.
+    /// Reads one; none if it is no request. Fails if the connection fails.
     pub fn read(stream: &TcpStream) -> io::Result<Option<Self>> {
         stream.set_read_timeout(Some(PATIENCE))?;
         stream.set_write_timeout(Some(PATIENCE))?;
@@ -79,10 +76,7 @@ impl Request {
     }
 }
 
-/// Answers with a whole body, and ends.
-///
-/// # Errors
-/// If the connection fails.
+/// Answers with a whole body, and ends. Fails if the connection fails.
 pub fn answer(mut stream: &TcpStream, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
     write!(
         stream,
@@ -94,10 +88,7 @@ pub fn answer(mut stream: &TcpStream, status: &str, kind: &str, body: &[u8]) -> 
     stream.flush()
 }
 
-/// Begins a stream of events, each to be said by [`event`].
-///
-/// # Errors
-/// If the connection fails.
+/// Begins a stream of events, each to be said by [`event`]. Fails if the connection fails.
 pub fn begin_events(mut stream: &TcpStream) -> io::Result<()> {
     write!(
         stream,
@@ -106,10 +97,7 @@ pub fn begin_events(mut stream: &TcpStream) -> io::Result<()> {
     stream.flush()
 }
 
-/// Says an event of one line.
-///
-/// # Errors
-/// If the connection fails.
+/// Says an event of one line. Fails if the connection fails.
 pub fn event(mut stream: &TcpStream, line: &str) -> io::Result<()> {
     stream.write_all(format!("data: {line}\n\n").as_bytes())?;
     stream.flush()

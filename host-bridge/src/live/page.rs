@@ -52,10 +52,7 @@ struct Shared {
     connections: AtomicUsize,
 }
 
-/// Takes a port, and says where.
-///
-/// # Errors
-/// If it can't be had.
+/// Takes a port, and says where. Fails if it can't be had.
 pub fn listen(address: IpAddr, port: u16) -> Result<(TcpListener, SocketAddr), LiveError> {
     let listener = TcpListener::bind((address, port));
     listener

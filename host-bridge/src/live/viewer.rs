@@ -51,10 +51,7 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Begins to listen. What the links tell comes from `told`.
-    ///
-    /// # Errors
-    /// If a port can't be had.
+    /// Begins to listen. What the links tell comes from `told`. Fails if a port can't be had.
     pub fn start(
         settings: Settings,
         links: Vec<(Role, Link)>,

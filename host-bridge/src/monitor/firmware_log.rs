@@ -82,10 +82,8 @@ impl Logs {
         (Self { lines, ended }, read)
     }
 
-    /// Reads the log of the board of `role`, whose firmware is `elf`, for as long as this lives.
-    ///
-    /// # Errors
-    /// If the ELF can't be read or has no log. That the bytes can't be had is said as it happens.
+    /// Reads the log of the board of `role`, whose firmware is `elf`, for as long as this lives. Fails if the ELF
+    /// can't be read or has no log. That the bytes can't be had is said as it happens.
     pub fn follow(&self, role: Role, elf: &Path, origin: Origin) -> Result<(), LogError> {
         let bytes = fs::read(elf).map_err(|source| LogError::Unreadable(elf.to_owned(), source))?;
         let no_table = |reason: String| LogError::NoTable(elf.to_owned(), reason);

@@ -15,11 +15,8 @@ pub struct LiveRecording {
 }
 
 impl LiveRecording {
-    /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is
-    /// free.
-    ///
-    /// # Errors
-    /// If it can't be written there.
+    /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is free.
+    /// Fails if it can't be written there.
     pub fn begin(folder: &Path, since_us: u64) -> Result<Self, RecordingError> {
         let named = |number: u32| folder.join(format!("monitor-{number}.mcap"));
         let is_free = |path: &PathBuf| !path.exists() && !part_path(path, 2).exists();

@@ -33,10 +33,7 @@ impl Default for Format {
 /// Writes lines until `ended`, for `limit` at most, until the source has ended, or until nobody reads them any
 /// more.
 ///
-/// True if a board was there, or if nobody reads any more.
-///
-/// # Errors
-/// If they can't be written for another reason.
+/// True if a board was there, or if nobody reads any more. Fails if they can't be written for another reason.
 pub fn run(
     mut session: Session,
     format: &Format,

@@ -56,10 +56,8 @@ impl Drop for Screen {
     }
 }
 
-/// Shows the dashboard until a key, `ended` or `limit` ends it.
-///
-/// # Errors
-/// If there is no terminal, or if the last of a recording can't be written.
+/// Shows the dashboard until a key, `ended` or `limit` ends it. Fails if there is no terminal, or if the last of a
+/// recording can't be written.
 pub fn run(
     mut session: Session,
     limit: Option<Duration>,

@@ -214,10 +214,7 @@ impl Session {
         self.recording.as_ref()
     }
 
-    /// Ends what is under way.
-    ///
-    /// # Errors
-    /// If the last of a recording can't be written.
+    /// Ends what is under way. Fails if the last of a recording can't be written.
     pub fn close(mut self) -> Result<(), RecordingError> {
         if self.recording.is_some() {
             self.end_recording();

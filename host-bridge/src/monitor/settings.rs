@@ -52,10 +52,8 @@ impl Setting {
         })
     }
 
-    /// The configuration with this setting changed. The board checks its range.
-    ///
-    /// # Errors
-    /// If the text is no value of it at all.
+    /// The configuration with this setting changed. The board checks its range. Fails if the text is no value of it
+    /// at all.
     pub fn changed(
         &self,
         configuration: Configuration,

@@ -47,10 +47,7 @@ pub struct CdrEncoder {
 }
 
 impl CdrEncoder {
-    /// With all schemas.
-    ///
-    /// # Errors
-    /// If a row's shape makes none.
+    /// With all schemas. Fails if a row's shape makes none.
     pub fn new() -> Result<Self, SchemaError> {
         let channels = CHANNELS.into_iter().map(|(role, kind)| {
             let shape = kind.shape();
@@ -76,10 +73,8 @@ impl CdrEncoder {
         &self.channels
     }
 
-    /// Appends an entry's message to `out`; the index of its channel, none if that board says no such things.
-    ///
-    /// # Errors
-    /// If the row is not as its own schema says.
+    /// Appends an entry's message to `out`; the index of its channel, none if that board says no such things. Fails
+    /// if the row is not as its own schema says.
     pub fn encode(&self, entry: &Entry, out: &mut Vec<u8>) -> Result<Option<usize>, SayError> {
         let kind = entry.row.kind();
         let Some(at) = channel(entry.role, kind) else {

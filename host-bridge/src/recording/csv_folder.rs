@@ -42,11 +42,8 @@ pub fn file_name(at: usize) -> String {
 }
 
 impl CsvFolder {
-    /// Makes the folder. `force` takes one that is not empty. Dropping it before [`CsvFolder::keep`] takes
-    /// away what was made.
-    ///
-    /// # Errors
-    /// If there is one with anything in it, or it can't be made.
+    /// Makes the folder. `force` takes one that is not empty. Dropping it before [`CsvFolder::keep`] takes away
+    /// what was made. Fails if there is one with anything in it, or it can't be made.
     pub fn create(folder: &Path, force: bool) -> Result<Self, RecordingError> {
         let not_made = |source| RecordingError::not_made(folder, source);
         let fresh = !folder.exists();
@@ -62,10 +59,7 @@ impl CsvFolder {
         })
     }
 
-    /// The folder stays, and the files of an earlier recording go.
-    ///
-    /// # Errors
-    /// If one of them can't be removed.
+    /// The folder stays, and the files of an earlier recording go. Fails if one of them can't be removed.
     pub fn keep(&mut self) -> Result<(), RecordingError> {
         for at in 0..CHANNELS.len() {
             let path = self.folder.join(file_name(at));
@@ -80,10 +74,8 @@ impl CsvFolder {
         Ok(())
     }
 
-    /// Writes an entry. It is safe after the next [`CsvFolder::sync`].
-    ///
-    /// # Errors
-    /// If its file can't be made, or does not take it.
+    /// Writes an entry. It is safe after the next [`CsvFolder::sync`]. Fails if its file can't be made, or does not
+    /// take it.
     pub fn write(&mut self, entry: &Entry) -> Result<(), RecordingError> {
         let kind = entry.row.kind();
         let Some(at) = channel(entry.role, kind) else {
@@ -96,10 +88,7 @@ impl CsvFolder {
         file.write(entry)
     }
 
-    /// Makes everything written so far safe.
-    ///
-    /// # Errors
-    /// If a file does not take it, or was removed.
+    /// Makes everything written so far safe. Fails if a file does not take it, or was removed.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         self.files.iter_mut().flatten().try_for_each(Channel::sync)
     }

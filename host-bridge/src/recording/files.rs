@@ -113,10 +113,7 @@ impl Facts {
 }
 
 impl RecordingFiles {
-    /// Makes the files.
-    ///
-    /// # Errors
-    /// If there are such files already, or they can't be made.
+    /// Makes the files. Fails if there are such files already, or they can't be made.
     pub fn open(settings: Settings) -> Result<Self, RecordingError> {
         if settings.mcap.is_none() && settings.csv.is_none() {
             return Err(RecordingError::Nowhere);
@@ -163,10 +160,7 @@ impl RecordingFiles {
         Ok(files)
     }
 
-    /// Writes an entry. It is safe after the next [`RecordingFiles::sync`].
-    ///
-    /// # Errors
-    /// If a file does not take it.
+    /// Writes an entry. It is safe after the next [`RecordingFiles::sync`]. Fails if a file does not take it.
     pub fn write(&mut self, entry: &Entry) -> Result<(), RecordingError> {
         self.note(entry)?;
         if let Some(mcap) = &mut self.mcap {
@@ -201,10 +195,8 @@ impl RecordingFiles {
         Ok(())
     }
 
-    /// Makes everything written so far safe, and goes on in another file if it is time to.
-    ///
-    /// # Errors
-    /// If a file does not take it, was removed, or can't be made.
+    /// Makes everything written so far safe, and goes on in another file if it is time to. Fails if a file does not
+    /// take it, was removed, or can't be made.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         if let Some(mcap) = &mut self.mcap {
             mcap.sync()?;
@@ -246,10 +238,8 @@ impl RecordingFiles {
             + self.csv.as_ref().map_or(0, CsvFolder::safe_bytes)
     }
 
-    /// Ends all files as they should end. Returns the bytes of all.
-    ///
-    /// # Errors
-    /// If one does not take it. What was safe before is.
+    /// Ends all files as they should end. Returns the bytes of all. Fails if one does not take it. What was safe
+    /// before is.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         if let Some(csv) = &mut self.csv {
             csv.sync()?;

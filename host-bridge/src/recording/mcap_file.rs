@@ -53,10 +53,7 @@ fn reason(error: McapError) -> io::Error {
 
 impl McapFile {
     /// Makes a file, with all schemas and channels in it; `force` takes the place of one that is there, at
-    /// [`McapFile::keep`].
-    ///
-    /// # Errors
-    /// If there is one already, or it can't be made or written; then none is made.
+    /// [`McapFile::keep`]. Fails if there is one already, or it can't be made or written; then none is made.
     pub fn create(
         path: &Path,
         force: bool,
@@ -123,10 +120,7 @@ impl McapFile {
         })
     }
 
-    /// Writes a record of facts.
-    ///
-    /// # Errors
-    /// If the file does not take it.
+    /// Writes a record of facts. Fails if the file does not take it.
     pub fn tell(
         &mut self,
         name: &str,
@@ -137,10 +131,7 @@ impl McapFile {
             .map_err(|error| self.failed(reason(error)))
     }
 
-    /// Writes an entry. It is safe after the next [`McapFile::sync`].
-    ///
-    /// # Errors
-    /// If the file does not take it.
+    /// Writes an entry. It is safe after the next [`McapFile::sync`]. Fails if the file does not take it.
     pub fn write(&mut self, entry: &Entry) -> Result<(), RecordingError> {
         self.cdr.clear();
         let encoded = self.encoder.encode(entry, &mut self.cdr);
@@ -160,10 +151,8 @@ impl McapFile {
             .map_err(|error| self.failed(reason(error)))
     }
 
-    /// Closes the chunk and makes everything written so far safe.
-    ///
-    /// # Errors
-    /// If the file does not take it, or was removed.
+    /// Closes the chunk and makes everything written so far safe. Fails if the file does not take it, or was
+    /// removed.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         if std::mem::take(&mut self.dirty) {
             self.writer
@@ -174,9 +163,7 @@ impl McapFile {
     }
 
     /// The file stays, and stands in the place of the one that was there; until then dropping it takes it away.
-    ///
-    /// # Errors
-    /// If it can't get that place.
+    /// Fails if it can't get that place.
     pub fn keep(&mut self) -> Result<(), RecordingError> {
         self.sink.keep()
     }
@@ -186,10 +173,8 @@ impl McapFile {
         self.sink.safe_bytes()
     }
 
-    /// Ends the file as it should end, with index and summary, and makes it safe. Returns its length.
-    ///
-    /// # Errors
-    /// If the file does not take it. What was safe before is.
+    /// Ends the file as it should end, with index and summary, and makes it safe. Returns its length. Fails if the
+    /// file does not take it. What was safe before is.
     pub fn finish(mut self) -> Result<u64, RecordingError> {
         self.sync()?;
         let ended = self.writer.finish().map_err(reason);

@@ -123,10 +123,7 @@ enum Ending {
 }
 
 impl Reader {
-    /// Opens a recording.
-    ///
-    /// # Errors
-    /// If it can't be read or is none.
+    /// Opens a recording. Fails if it can't be read or is none.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |source| ReadError::Unreadable(path.to_owned(), source);
         let file = File::open(path).map_err(unreadable)?;
@@ -210,10 +207,8 @@ impl Reader {
         log_ns.saturating_sub(first_ns) as f64 / NS_PER_S
     }
 
-    /// The next entry, in the order in which they were heard; none at the end.
-    ///
-    /// # Errors
-    /// If the file can't be read, is damaged, or holds what it should not.
+    /// The next entry, in the order in which they were heard; none at the end. Fails if the file can't be read, is
+    /// damaged, or holds what it should not.
     pub fn next_entry(&mut self) -> Result<Option<Entry>, ReadError> {
         loop {
             let Some(record) = self.next_record()? else {

@@ -35,10 +35,8 @@ pub fn name(named: &NamedType) -> String {
     }
 }
 
-/// The schema of a struct: its definition and those of all structs within it.
-///
-/// # Errors
-/// The name of a type that has no place in a recording.
+/// The schema of a struct: its definition and those of all structs within it. Fails with the name of a type that
+/// has no place in a recording.
 pub fn schema(named: &'static NamedType) -> Result<String, &'static str> {
     let mut text = definition(named)?;
     let mut known = Vec::new();

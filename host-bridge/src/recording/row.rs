@@ -59,10 +59,7 @@ macro_rules! rows {
                 }
             }
 
-            /// A row from JSON.
-            ///
-            /// # Errors
-            /// If it is none of this kind.
+            /// A row from JSON. Fails if it is none of this kind.
             pub fn row(self, json: Value) -> serde_json::Result<Row> {
                 match self {
                     $(Self::$kind => serde_json::from_value(json).map(Row::$kind),)*
@@ -78,10 +75,7 @@ macro_rules! rows {
                 }
             }
 
-            /// It as JSON.
-            ///
-            /// # Errors
-            /// None: every row can be said in JSON.
+            /// It as JSON. Every row can be said in JSON.
             pub fn value(&self) -> serde_json::Result<Value> {
                 match self {
                     $(Self::$kind(row) => serde_json::to_value(row),)*

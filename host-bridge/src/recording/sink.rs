@@ -32,11 +32,9 @@ pub struct SinkWriter {
 }
 
 impl Sink {
-    /// Makes a file. With `force` it takes the place of one that is there at [`Sink::keep`], and writes to a
-    /// device or a pipe that is there at once. Dropping it before takes it away again.
-    ///
-    /// # Errors
-    /// If there is one already, or it can't be made.
+    /// Makes a file. With `force` it takes the place of one that is there at [`Sink::keep`], and writes to a device
+    /// or a pipe that is there at once. Dropping it before takes it away again. Fails if there is one already, or
+    /// it can't be made.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
         let there = fs::metadata(path).ok().filter(|_| force);
         let is_file = there.as_ref().is_some_and(fs::Metadata::is_file);
@@ -73,10 +71,7 @@ impl Sink {
         }
     }
 
-    /// The file stays, under its own name.
-    ///
-    /// # Errors
-    /// If it can't get that name.
+    /// The file stays, under its own name. Fails if it can't get that name.
     pub fn keep(&mut self) -> Result<(), RecordingError> {
         if let Some(beside) = &self.beside {
             fs::rename(beside, &self.path)
@@ -88,10 +83,7 @@ impl Sink {
         Ok(())
     }
 
-    /// What writes to it.
-    ///
-    /// # Errors
-    /// If the system has no more handles.
+    /// What writes to it. Fails if the system has no more handles.
     pub fn writer(&self) -> Result<SinkWriter, RecordingError> {
         let file = self.file.try_clone();
         Ok(SinkWriter {
@@ -101,10 +93,8 @@ impl Sink {
         })
     }
 
-    /// Makes what has been written safe against a loss of power.
-    ///
-    /// # Errors
-    /// If the system can't, or the file was removed: what is written to a file without a name is lost.
+    /// Makes what has been written safe against a loss of power. Fails if the system can't, or the file was
+    /// removed: what is written to a file without a name is lost.
     pub fn sync(&mut self) -> Result<(), RecordingError> {
         match self.file.sync_data() {
             // A pipe or a device: there is nothing to be synced.

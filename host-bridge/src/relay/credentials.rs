@@ -62,10 +62,8 @@ pub enum CredentialsError {
 }
 
 impl Credentials {
-    /// Reads and checks all three: what a connection will be made with.
-    ///
-    /// # Errors
-    /// If one of them can't be read, is none, doesn't fit, or is not valid today.
+    /// Reads and checks all three: what a connection will be made with. Fails if one of them can't be read, is
+    /// none, doesn't fit, or is not valid today.
     pub fn load(&self) -> Result<ClientConfig, CredentialsError> {
         let provider = Arc::new(ring::default_provider());
         let roots = Arc::new(roots(&self.ca)?);

@@ -54,10 +54,8 @@ struct End {
 }
 
 impl Datagrams {
-    /// Listens at `endpoints`, or connects to them. None if there are none.
-    ///
-    /// # Errors
-    /// The system's, if it has no such port.
+    /// Listens at `endpoints`, or connects to them. None if there are none. Fails with the system's reason, if it has no
+    /// such port.
     pub fn open(
         endpoints: &[&Endpoint],
         is_listening: bool,

@@ -120,19 +120,13 @@ impl Endpoint {
         format!("{}/{}:{}", stream.name(), self.host, self.port)
     }
 
-    /// The addresses behind the name, at this moment.
-    ///
-    /// # Errors
-    /// If the name can't be resolved.
+    /// The addresses behind the name, at this moment. Fails if the name can't be resolved.
     pub fn resolve(&self) -> io::Result<Vec<SocketAddr>> {
         let found = format!("{}:{}", self.host, self.port).to_socket_addrs()?;
         Ok(found.collect())
     }
 
-    /// Tries whether one may listen here, so that who may not is told why in plain words.
-    ///
-    /// # Errors
-    /// The system's.
+    /// Tries whether one may listen here, so that who may not is told why in plain words. Fails with the system's reason.
     pub fn try_listening(&self) -> io::Result<()> {
         let addresses = &self.resolve()?[..];
         if self.carrier == Carrier::Udp {

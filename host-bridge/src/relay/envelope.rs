@@ -131,11 +131,8 @@ impl Envelope {
         bytes
     }
 
-    /// Reads what came over the network and believes nothing of it: length, build, shape, numbers, and
-    /// whether the sender may say it at all.
-    ///
-    /// # Errors
-    /// If it is not an envelope of this build with a sound content.
+    /// Reads what came over the network and believes nothing of it: length, build, shape, numbers, and whether the
+    /// sender may say it at all. Fails if it is not an envelope of this build with a sound content.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, EnvelopeError> {
         let (hello, rest) = bytes
             .split_at_checked(HELLO_LENGTH)

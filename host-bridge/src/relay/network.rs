@@ -94,12 +94,10 @@ impl Transport for Network {
 }
 
 impl Network {
-    /// Looks at everything that can be looked at before anybody is talked to. With credentials, certificates
-    /// decide who may speak for which board of the benches `names`: see [`access`]. Without, nobody listens
-    /// beyond this computer unless it `is_insecure` on purpose.
-    ///
-    /// # Errors
-    /// If endpoints and credentials don't fit, credentials can't be used, or one can't listen.
+    /// Looks at everything that can be looked at before anybody is talked to. With credentials, certificates decide
+    /// who may speak for which board of the benches `names`: see [`access`]. Without, nobody listens beyond this
+    /// computer unless it `is_insecure` on purpose. Fails if endpoints and credentials don't fit, credentials can't
+    /// be used, or one can't listen.
     pub fn new(
         ends: Ends,
         credentials: Option<Credentials>,
@@ -159,10 +157,7 @@ impl Network {
         self.take_part(mode)
     }
 
-    /// Takes part as a router: carries on what bridges say.
-    ///
-    /// # Errors
-    /// If one can't listen.
+    /// Takes part as a router: carries on what bridges say. Fails if one can't listen.
     pub fn open_router(&self) -> Result<Session, NetworkError> {
         self.take_part("router")
     }

@@ -37,11 +37,8 @@ pub struct Stopping {
     pub trip: Option<Trip>,
 }
 
-/// Says Stop at the bench called `name` until the display's board says that it has stopped, for at most
-/// `within`: how far that came.
-///
-/// # Errors
-/// If nobody was reached in that time.
+/// Says Stop at the bench called `name` until the display's board says that it has stopped, for at most `within`:
+/// how far that came. Fails if nobody was reached in that time.
 pub fn stop(
     network: &dyn Transport,
     clock: &Arc<dyn Clock>,

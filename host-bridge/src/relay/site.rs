@@ -121,11 +121,8 @@ pub fn bridge_hello(role: Role) -> Hello {
 }
 
 impl Site {
-    /// Starts a bridge. It looks for its board and for the other site for as long as it lives; what a
-    /// person should know comes out of the receiver.
-    ///
-    /// # Errors
-    /// If it can't listen, or if `role` is a host's.
+    /// Starts a bridge. It looks for its board and for the other site for as long as it lives; what a person should
+    /// know comes out of the receiver. Fails if it can't listen, or if `role` is a host's.
     pub fn open(settings: Settings) -> Result<(Self, Receiver<Notice>), NetworkError> {
         let Settings {
             role,

@@ -72,12 +72,9 @@ impl Subscription {
 
 /// A way to the other site.
 pub trait Transport: Send + Sync {
-    /// Takes part as the bridge of `role` at the bench called `name`. Where it connects, this returns when
-    /// somebody has answered or all have been tried in vain: to be tried again then. Afterwards the
-    /// connection is kept up.
-    ///
-    /// # Errors
-    /// If nobody is reached, or one can't listen.
+    /// Takes part as the bridge of `role` at the bench called `name`. Where it connects, this returns when somebody
+    /// has answered or all have been tried in vain: to be tried again then. Afterwards the connection is kept up.
+    /// Fails if nobody is reached, or one can't listen.
     fn connect(
         &self,
         name: &Name,

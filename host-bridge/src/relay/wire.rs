@@ -30,10 +30,7 @@ fn engine(error: zenoh::Error) -> NetworkError {
 }
 
 impl Wire {
-    /// Takes the place of the bridge of `role` at the bench called `name`.
-    ///
-    /// # Errors
-    /// If the engine refuses.
+    /// Takes the place of the bridge of `role` at the bench called `name`. Fails if the engine refuses.
     pub fn new(
         session: Session,
         datagrams: Option<Datagrams>,

@@ -126,10 +126,7 @@ pub struct Made {
     pub passed_over: u64,
 }
 
-/// Writes the scene of a recording.
-///
-/// # Errors
-/// If none can be made of it, or a file can't be written.
+/// Writes the scene of a recording. Fails if none can be made of it, or a file can't be written.
 pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError> {
     let path = settings.path.clone();
     output_file::refuse_taken(&path, settings.force)?;

@@ -104,10 +104,7 @@ pub struct Guest {
 }
 
 impl Guest {
-    /// Joins the owner at `socket`.
-    ///
-    /// # Errors
-    /// If nobody answers there.
+    /// Joins the owner at `socket`. Fails if nobody answers there.
     pub fn open(socket: &Path) -> io::Result<Self> {
         if !socket.exists() {
             return Err(ErrorKind::NotFound.into());
@@ -156,10 +153,7 @@ impl Guest {
 pub struct Asker(Arc<Publisher<'static>>);
 
 impl Asker {
-    /// Says whole frames.
-    ///
-    /// # Errors
-    /// If the owner is gone.
+    /// Says whole frames. Fails if the owner is gone.
     pub fn ask(&self, frames: Vec<u8>) -> io::Result<()> {
         self.0.put(frames).wait().map_err(failed)
     }

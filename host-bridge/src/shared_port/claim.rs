@@ -23,10 +23,7 @@ impl Claim {
         Self(Arc::clone(&self.0))
     }
 
-    /// Has `words` stand where its holder is told.
-    ///
-    /// # Errors
-    /// If they can't be written.
+    /// Has `words` stand where its holder is told. Fails if they can't be written.
     pub fn tell(&self, words: &str) -> io::Result<()> {
         self.0.write_all_at(words.as_bytes(), 0)?;
         self.0.set_len(words.len() as u64)
@@ -59,10 +56,7 @@ impl Device {
         }
     }
 
-    /// Claims the port; `None` if another program has it.
-    ///
-    /// # Errors
-    /// If there is no folder to do so in.
+    /// Claims the port; `None` if another program has it. Fails if there is no folder to do so in.
     pub fn claim(&self) -> io::Result<Option<Claim>> {
         let file = OpenOptions::new()
             .read(true)

@@ -25,9 +25,7 @@ impl Funnel {
         }
     }
 
-    /// Says `frames`, each ended by a 0x00. What is no frame is left out: nobody would understand it.
-    ///
-    /// # Errors
+    /// Says `frames`, each ended by a 0x00. What is no frame is left out: nobody would understand it. Fails with
     /// [`io::ErrorKind::WouldBlock`] if the line took none of a frame: that and those after it are not said. What
     /// it took a part of is said to its end as soon as it takes more.
     pub fn put(&mut self, frames: &[u8]) -> io::Result<()> {

@@ -24,10 +24,8 @@ pub enum DecodeError {
     Text(String),
 }
 
-/// A message's value.
-///
-/// # Errors
-/// If the bytes are none of that definition. What is behind the last field is not looked at.
+/// A message's value. Fails if the bytes are none of that definition. What is behind the last field is not looked
+/// at.
 pub fn decode(definition: &Definition, bytes: &[u8]) -> Result<Value, DecodeError> {
     let (head, body) = bytes.split_at_checked(4).unwrap_or((bytes, &[]));
     let is_big = head.get(..2) == BIG_ENDIAN.get(..2);

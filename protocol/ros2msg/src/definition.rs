@@ -77,10 +77,8 @@ pub enum Kind {
 }
 
 impl Definition {
-    /// The definition of a message of the type `name` (`package/msg/Name`).
-    ///
-    /// # Errors
-    /// If the text holds what is no definition, or lacks one.
+    /// The definition of a message of the type `name` (`package/msg/Name`). Fails if the text holds what is no
+    /// definition, or lacks one.
     pub fn parse(name: &str, text: &str) -> Result<Self, DefinitionError> {
         let package = name.split('/').next().unwrap_or_default();
         let mut texts = Texts::default();

@@ -15,11 +15,8 @@ pub struct EncodeError {
     pub value: String,
 }
 
-/// Appends a message's bytes, little endian. Fields that the value lacks are 0, false, empty or, where a
-/// number has a fraction, NaN.
-///
-/// # Errors
-/// If a field holds what is not of its kind.
+/// Appends a message's bytes, little endian. Fields that the value lacks are 0, false, empty or, where a number has
+/// a fraction, NaN. Fails if a field holds what is not of its kind.
 pub fn encode(
     definition: &Definition,
     value: &Value,

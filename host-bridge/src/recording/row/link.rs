@@ -249,10 +249,7 @@ impl OtherRow {
         }
     }
 
-    /// The message.
-    ///
-    /// # Errors
-    /// If it is none.
+    /// The message. Fails if it is none.
     pub fn message(&self) -> serde_json::Result<Message> {
         serde_json::from_str(&self.json.0)
     }

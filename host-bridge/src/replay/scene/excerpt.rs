@@ -44,11 +44,9 @@ impl Run {
 }
 
 impl Excerpt {
-    /// Takes what lies between two times, in s since the recording's start.
-    ///
-    /// # Errors
-    /// If the recording can't be read, has no samples there, more than a scene holds or a gap there, or if the
-    /// sensor was configured otherwise meanwhile.
+    /// Takes what lies between two times, in s since the recording's start. Fails if the recording can't be read,
+    /// has no samples there, more than a scene holds or a gap there, or if the sensor was configured otherwise
+    /// meanwhile.
     pub fn take(mut recording: Reader, from_s: f64, to_s: f64) -> Result<Self, SceneError> {
         let mut excerpt = Self::default();
         let mut runs: Vec<Run> = Vec::new();
