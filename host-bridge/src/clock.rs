@@ -85,6 +85,11 @@ pub fn micros(time: Duration) -> u64 {
     u64::try_from(time.as_micros()).unwrap_or(u64::MAX)
 }
 
+/// Whether what was done at `last_us`, if ever, is to be done again at `now_us`.
+pub fn is_due(last_us: Option<u64>, period_us: u64, now_us: u64) -> bool {
+    last_us.is_none_or(|last_us| now_us.saturating_sub(last_us) >= period_us)
+}
+
 /// A channel whose receiver waits by `clock`.
 pub fn channel<T>(clock: &Arc<dyn Clock>) -> (Sender<T>, Receiver<T>) {
     let (sender, receiver) = mpsc::channel();

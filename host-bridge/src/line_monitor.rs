@@ -2,6 +2,8 @@
 
 use protocol::{Hello, Peer, PortCounters};
 
+use crate::clock::is_due;
+
 /// What a board may take for its first answer: two Hellos and a status.
 pub const PATIENCE_US: u64 = 1_500_000;
 /// How long a board that was known may say nothing: it reports once a second.
@@ -112,9 +114,7 @@ impl LineMonitor {
 
     /// Whether a ping is due; it counts as sent.
     pub fn ping_due(&mut self, at_us: u64) -> bool {
-        let due = self
-            .pinged_us
-            .is_none_or(|pinged_us| at_us.saturating_sub(pinged_us) >= PING_US);
+        let due = is_due(self.pinged_us, PING_US, at_us);
         if due {
             self.pinged_us = Some(at_us);
         }

@@ -461,7 +461,7 @@ impl<F: FnMut(Event)> Reader<F> {
 }
 
 /// Whether a read only had nothing to give yet.
-fn is_pause(error: &io::Error) -> bool {
+pub(crate) fn is_pause(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted

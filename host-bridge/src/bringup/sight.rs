@@ -7,9 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use protocol::{
-    Configuration, ConfigurationReport, Configure, DisplayConfiguration, DisplayCounters, Estimate,
-    GAUGES, Gauges, Message, Motion, PortCounters, Question, Role, RoleCounters, SensorCounters,
-    StreamGauges,
+    Configuration, ConfigurationReport, Configure, DisplayConfiguration, DisplayCounters, GAUGES,
+    Message, PortCounters, Question, Role, RoleCounters, SensorCounters, StreamGauges,
 };
 
 use crate::bench::Bench;
@@ -68,7 +67,12 @@ struct Point {
 }
 
 impl Track {
-    fn go(&mut self, point: Point) {
+    fn go(&mut self, sequence: u32, instant_us: u64, position_um: i64) {
+        let point = Point {
+            sequence,
+            instant_us,
+            position_um,
+        };
         // A board that has started anew begins again.
         if self.last.is_some_and(|last| point.sequence < last.sequence) {
             self.first = None;
@@ -287,9 +291,15 @@ impl Observer for Watcher {
     fn hear(&mut self, role: Role, message: &Message) {
         let sight = &mut self.sight;
         match message {
-            Message::Motion(motion) => sight.hand.go(Point::from(motion)),
+            Message::Motion(motion) => {
+                sight
+                    .hand
+                    .go(motion.sequence, motion.instant_us, motion.position_um);
+            }
             Message::Estimate(estimate) => {
-                sight.estimates.go(Point::from(estimate));
+                sight
+                    .estimates
+                    .go(estimate.sequence, estimate.instant_us, 0);
                 sight.surface.heard += 1;
                 if let Some(wavelength_mm) = estimate.wavelength_mm.filter(|_| estimate.valid) {
                     sight.surface.valid += 1;
@@ -297,7 +307,9 @@ impl Observer for Watcher {
                 }
             }
             Message::Gauges(gauges) => {
-                sight.arm.go(Point::from(gauges));
+                sight
+                    .arm
+                    .go(gauges.first_sample, gauges.instant_us, gauges.position_um);
                 for sample in &gauges.samples {
                     for (gauge, &code) in sight.gauges.iter_mut().zip(&sample.codes) {
                         gauge.take(code);
@@ -372,36 +384,6 @@ impl Watcher {
                 None => Ok(display.amplitude_mv),
                 Some(refusal) => Err(refusal.to_string()),
             });
-        }
-    }
-}
-
-impl From<&Motion> for Point {
-    fn from(motion: &Motion) -> Self {
-        Self {
-            sequence: motion.sequence,
-            instant_us: motion.instant_us,
-            position_um: motion.position_um,
-        }
-    }
-}
-
-impl From<&Estimate> for Point {
-    fn from(estimate: &Estimate) -> Self {
-        Self {
-            sequence: estimate.sequence,
-            instant_us: estimate.instant_us,
-            position_um: 0,
-        }
-    }
-}
-
-impl From<&Gauges> for Point {
-    fn from(gauges: &Gauges) -> Self {
-        Self {
-            sequence: gauges.first_sample,
-            instant_us: gauges.instant_us,
-            position_um: gauges.position_um,
         }
     }
 }

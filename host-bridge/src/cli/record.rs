@@ -18,7 +18,7 @@ use host_bridge::recording::gauge_stream::GaugeStream;
 use host_bridge::recording::{PART, Progress, Recorder, Settings};
 use host_bridge::state::{Advised, State};
 use protocol::{Message, Role};
-use serde::Serialize;
+use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
@@ -84,20 +84,6 @@ pub struct Record {
     boards: super::Where,
 }
 
-/// What a script is told.
-#[derive(Serialize)]
-struct Summary {
-    seconds: f64,
-    messages: u64,
-    samples: u64,
-    bytes: u64,
-    lost: u64,
-    gaps: u64,
-    unwritten: u64,
-    /// The boards that were never there.
-    absent: Vec<&'static str>,
-}
-
 impl Record {
     /// Records.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
@@ -142,28 +128,25 @@ impl Record {
         let progress = recorder.stop()?;
         self.report(seconds, &progress, &absent)?;
         let is_missed = self.until.is_some() && roles.iter().any(|role| absent.contains(role));
-        Ok(if is_missed {
-            ExitCode::FAILURE
-        } else {
-            ExitCode::SUCCESS
-        })
+        Ok(ExitCode::from(u8::from(is_missed)))
     }
 
     fn report(&self, seconds: f64, progress: &Progress, absent: &[Role]) -> anyhow::Result<()> {
         let absent: Vec<&str> = absent.iter().map(|role| role.name()).collect();
         let tally = progress.tally;
         if self.json {
-            let summary = Summary {
-                seconds,
-                messages: tally.messages,
-                samples: tally.samples,
-                bytes: progress.safe_bytes,
-                lost: tally.lost,
-                gaps: tally.gaps,
-                unwritten: tally.unwritten,
-                absent,
-            };
-            return output::print(&serde_json::to_string(&summary)?);
+            let summary = json!({
+                "seconds": seconds,
+                "messages": tally.messages,
+                "samples": tally.samples,
+                "bytes": progress.safe_bytes,
+                "lost": tally.lost,
+                "gaps": tally.gaps,
+                "unwritten": tally.unwritten,
+                // The boards that were never there.
+                "absent": absent,
+            });
+            return output::print(&summary.to_string());
         }
         let absent = match absent.as_slice() {
             [] => String::new(),

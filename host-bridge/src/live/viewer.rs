@@ -10,7 +10,7 @@ use protocol::Role;
 
 use super::foxglove_server::{FoxgloveServer, LiveError};
 use super::page::{self, Newest};
-use super::picture::Picture;
+use super::picture::picture;
 use crate::hand;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link, stop_all};
@@ -114,10 +114,8 @@ impl Viewer {
                     hands_due = Instant::now() + HANDS;
                     hands = hand::hands();
                 }
-                let picture = Picture::of(&self.dashboard, hands.clone());
-                if let Ok(json) = serde_json::to_string(&picture) {
-                    self.newest.put(json);
-                }
+                self.newest
+                    .put(picture(&self.dashboard, &hands).to_string());
             }
         }
         self.foxglove.stop();

@@ -1,15 +1,13 @@
 //! What is known of one board.
 
-use protocol::{Configuration, PortCounters, Role, Status, Trip};
+use protocol::{Configuration, PortCounters, Status, Trip};
 
 use crate::link::Clocks;
 use crate::state::State;
 
 /// One board, as far as it is known.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Board {
-    /// Which one.
-    pub role: Role,
     /// How the way to it stands; none before anything was heard of it.
     pub state: Option<State>,
     /// What it said of itself last, and when, in µs of [`crate::host_clock::now_us`].
@@ -27,20 +25,6 @@ pub struct Board {
 }
 
 impl Board {
-    /// Nothing is known yet.
-    pub fn new(role: Role) -> Self {
-        Self {
-            role,
-            state: None,
-            status: None,
-            arm_stopped: None,
-            configuration: None,
-            counters: None,
-            clocks: None,
-            rate: Rate::default(),
-        }
-    }
-
     /// Whether the board is there and understood.
     pub fn is_known(&self) -> bool {
         self.state.as_ref().is_some_and(State::is_known)

@@ -56,7 +56,7 @@ pub struct Notice {
 }
 
 /// All that a monitor knows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Dashboard {
     /// The present, in µs of [`crate::host_clock::now_us`].
     pub now_us: u64,
@@ -89,30 +89,6 @@ pub struct Dashboard {
     notice: Option<Notice>,
     orders: [Orders; 2],
     fresh: Vec<LogEntry>,
-}
-
-impl Default for Dashboard {
-    fn default() -> Self {
-        Self {
-            now_us: 0,
-            sensor: Board::new(Role::Sensor),
-            display: Board::new(Role::Display),
-            estimate: None,
-            motion: None,
-            gauges_us: None,
-            safety: None,
-            traces: Traces::default(),
-            fingertip: Fingertip::default(),
-            log_entries: VecDeque::new(),
-            streams: false,
-            outcome: None,
-            linked: Vec::new(),
-            stopping: None,
-            notice: None,
-            orders: [Orders::new(), Orders::new()],
-            fresh: Vec::new(),
-        }
-    }
 }
 
 impl Dashboard {

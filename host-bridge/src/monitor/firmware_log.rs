@@ -2,7 +2,7 @@
 //! decoder with the strings in the ELF.
 
 use std::fs::{self, File};
-use std::io::{self, ErrorKind, IsTerminal, Read};
+use std::io::{self, IsTerminal, Read};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,6 +15,7 @@ use defmt_decoder::{DecodeError, Table};
 use protocol::Role;
 
 use super::log_entry::LogEvent;
+use crate::link::is_pause;
 use crate::shared_port::SharedPorts;
 use crate::system::{Opened, Ports};
 
@@ -213,12 +214,4 @@ impl Log {
         }
         Ok(())
     }
-}
-
-/// Whether a read only had nothing to give yet.
-fn is_pause(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
-    )
 }

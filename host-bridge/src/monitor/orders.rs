@@ -7,6 +7,7 @@
 use protocol::{Configuration, ConfigurationReport, Configure, Message, Question, Refusal};
 
 use super::settings::{Misread, Setting};
+use crate::clock::is_due;
 
 /// A question that was not answered is repeated after so long, in µs.
 const AGAIN_US: u64 = 300_000;
@@ -51,15 +52,6 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Nothing is to be said.
-    pub const fn new() -> Self {
-        Self {
-            wanted: None,
-            change: None,
-            outbox: Vec::new(),
-        }
-    }
-
     /// Asks for the configuration.
     pub fn read(&mut self) {
         self.wanted.get_or_insert(None);
@@ -137,25 +129,15 @@ impl Orders {
 
     /// Repeats what was not answered; what is given up is returned.
     pub fn elapse(&mut self, now_us: u64, is_known: bool) -> Option<Outcome> {
-        if is_known {
-            let due = |at_us: u64| now_us.saturating_sub(at_us) >= AGAIN_US;
-            if let Some(asked_us) = &mut self.wanted
-                && asked_us.is_none_or(due)
-            {
-                *asked_us = Some(now_us);
-                self.outbox.push(QUESTION);
-            }
-        }
-        let given_up = |since_us: u64| now_us.saturating_sub(since_us) >= GIVEN_UP_US;
-        if self
-            .change
-            .as_ref()
-            .is_some_and(|change| given_up(change.since_us))
+        if let Some(asked_us) = &mut self.wanted
+            && is_known
+            && is_due(*asked_us, AGAIN_US, now_us)
         {
-            self.change = None;
-            return Some(Outcome::Unanswered);
+            *asked_us = Some(now_us);
+            self.outbox.push(Message::Question(Question::Configuration));
         }
-        None
+        let given_up = |change: &mut Change| is_due(Some(change.since_us), GIVEN_UP_US, now_us);
+        self.change.take_if(given_up).map(|_| Outcome::Unanswered)
     }
 
     /// What is to be said now.
@@ -163,5 +145,3 @@ impl Orders {
         std::mem::take(&mut self.outbox)
     }
 }
-
-const QUESTION: Message = Message::Question(Question::Configuration);

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::line;
 use super::session::Session;
+use crate::clock::micros;
 use crate::host_clock::now_us;
 
 /// Longest wait until a signal, or a line of a log, is seen.
@@ -97,8 +98,4 @@ fn write_lines(
             return Ok(());
         }
     }
-}
-
-fn micros(duration: Duration) -> u64 {
-    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }

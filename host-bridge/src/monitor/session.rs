@@ -10,6 +10,7 @@ use protocol::Role;
 use super::dashboard::Dashboard;
 use super::live_recording::LiveRecording;
 use super::log_entry::LogEvent;
+use crate::clock::is_due;
 use crate::host_clock::now_us;
 use crate::link::{Event, Link, LinkSender};
 use crate::recording::gauge_stream::{GaugeStream, Lease};
@@ -95,8 +96,7 @@ impl Session {
                 self.dashboard.log(role, what);
             }
         }
-        let due = |at_us: u64| now_us.saturating_sub(at_us) >= LINES_US;
-        if self.lines_us.is_none_or(due) {
+        if is_due(self.lines_us, LINES_US, now_us) {
             self.lines_us = Some(now_us);
             for (role, link) in &self.source.links {
                 let counters = link.counters();

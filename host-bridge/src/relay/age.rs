@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use protocol::Pong;
 
+use crate::clock::micros;
+
 /// How far two clocks drift apart, in µs a second: two crystals of 100 ppm.
 const DRIFT_US_PER_S: u64 = 200;
 /// How much further apart than they can have drifted two comparisons may lie, in µs, before a clock is
@@ -55,7 +57,7 @@ impl Ages {
     pub fn new(max_age: Duration) -> Self {
         Self {
             best: None,
-            max_age_us: u64::try_from(max_age.as_micros()).unwrap_or(u64::MAX),
+            max_age_us: micros(max_age),
         }
     }
 

@@ -8,6 +8,8 @@
 //! does. So does `CoDel` (RFC 8289) tell a burst from a standing queue. What does not become shorter
 //! although next to nothing is sent is no queue of ours: the way has become longer.
 
+use crate::clock::is_due;
+
 /// Round trips in which TCP makes up for a loss, and for the loss of what makes up for it.
 const REPAIR_ROUND_TRIPS: u64 = 2;
 /// What an answer may take beyond that and its own round trip before it is late, in µs: pings go every
@@ -94,9 +96,7 @@ impl Flow {
             0 => self.spacing_us,
             _ => self.spacing_us.max(LATE_SPACING_US),
         };
-        let is_due = self
-            .last_us
-            .is_none_or(|last_us| now_us.saturating_sub(last_us) >= spacing_us);
+        let is_due = is_due(self.last_us, spacing_us, now_us);
         let waited_us = self
             .answered_us
             .map_or(0, |at_us| now_us.saturating_sub(at_us));
@@ -114,16 +114,14 @@ impl Flow {
 
     /// A ping was answered.
     pub fn on_answer(&mut self, answer: Answer) {
-        let Answer {
-            sent_us,
-            there_us,
-            round_trip_us,
-        } = answer;
+        let sent_us = answer.sent_us;
         self.answered_us = self.answered_us.max(Some(sent_us));
-        self.there_us.add(sent_us, there_us);
-        self.round_trip_us.add(sent_us, round_trip_us);
-        let there_us = there_us.saturating_sub(self.there_us.get().unwrap_or(there_us));
-        let round_trip_us = round_trip_us.saturating_sub(self.round_trip_us().unwrap_or(0));
+        self.there_us.add(sent_us, answer.there_us);
+        self.round_trip_us.add(sent_us, answer.round_trip_us);
+        let least_us = self.there_us.get().unwrap_or(answer.there_us);
+        let there_us = answer.there_us.saturating_sub(least_us);
+        let least_us = self.round_trip_us().unwrap_or(0);
+        let round_trip_us = answer.round_trip_us.saturating_sub(least_us);
         // What waits there does so on the round trip too; a clock that jumps does not.
         let wait_us = u64::try_from(there_us)
             .unwrap_or(u64::MAX)

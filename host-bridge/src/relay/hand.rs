@@ -1,5 +1,6 @@
 //! Who holds the bench, as a bridge knows it from the other site's answers, and how it hands the bench over.
 
+use crate::clock::is_due;
 use crate::relay::report::{Holding, Notice};
 
 /// How long a bridge that hands the bench over waits for somebody to take it, in µs.
@@ -64,9 +65,7 @@ impl Hand {
             return Due::Nothing;
         };
         let has_begun = self.said_us.is_some();
-        let is_due = self
-            .said_us
-            .is_none_or(|said_us| now_us.saturating_sub(said_us) >= AGAIN_US);
+        let is_due = is_due(self.said_us, AGAIN_US, now_us);
         match self.holding {
             Holding::Held if now_us >= until_us => {
                 self.until_us = None;

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use protocol::{Hello, Message, Ping, Pong, Role, Stop, Trip};
 
+use crate::clock::micros;
 use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
 use crate::relay::flow::Answer;
@@ -77,7 +78,7 @@ impl Inward {
         Self {
             role,
             session,
-            max_age_us: u64::try_from(max_age.as_micros()).unwrap_or(u64::MAX),
+            max_age_us: micros(max_age),
             gate: Gate::default(),
             ages: Ages::new(max_age),
             remote: RemoteBridge::default(),

@@ -108,95 +108,69 @@ impl Report {
         };
         let passed = self.incoming.passed - before.map_or(0, |before| before.incoming.passed);
         let sent = self.outgoing.sent - before.map_or(0, |before| before.outgoing.sent);
-        let Incoming {
-            arrivals,
-            stale,
-            undated,
-            replaced,
-            boardless,
-            stuck,
-            refused,
+        let Self { incoming: i, .. } = self;
+        let Arrivals {
+            lost,
+            late,
+            duplicated,
+            superseded,
             ..
-        } = self.incoming;
+        } = i.arrivals;
         let not_passed =
-            stale + undated + replaced + boardless + stuck + refused + arrivals.superseded;
+            i.stale + i.undated + i.replaced + i.boardless + i.stuck + i.refused + superseded;
+        let round_trip = self
+            .round_trip_us
+            .map(|us| format!("{} ms", milliseconds(us)));
         format!(
-            "{:8.1} s  in {:5.1}/s, age {}; lost {}, late {}, twice {}, not passed on {not_passed}; out {:5.1}/s; round trip {}",
+            "{:8.1} s  in {:5.1}/s, age {}; lost {lost}, late {late}, twice {duplicated}, not passed on {not_passed}; out {:5.1}/s; round trip {}",
             self.uptime_s,
             rate(passed),
-            Ages(self.age),
-            arrivals.lost,
-            arrivals.late,
-            arrivals.duplicated,
+            ages(self.age),
             rate(sent),
-            self.round_trip_us.map_or_else(
-                || "unknown".to_owned(),
-                |time_us| format!("{} ms", Milliseconds(time_us))
-            ),
+            round_trip.unwrap_or_else(|| "unknown".to_owned()),
         )
     }
 }
 
 /// µs as ms.
-struct Milliseconds(u64);
-
-impl fmt::Display for Milliseconds {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.2}", self.0 as f64 / 1_000.0)
-    }
+fn milliseconds(us: u64) -> String {
+    format!("{:.2}", us as f64 / 1_000.0)
 }
 
-struct Ages(Option<Percentiles>);
-
-impl fmt::Display for Ages {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.0 {
-            None => f.write_str("unknown"),
-            Some(age) => write!(
-                f,
-                "{} p50, {} p99, {} max ms",
-                Milliseconds(age.p50_us),
-                Milliseconds(age.p99_us),
-                Milliseconds(age.max_us)
-            ),
-        }
-    }
+fn ages(age: Option<Percentiles>) -> String {
+    let Some(age) = age else {
+        return "unknown".to_owned();
+    };
+    let [p50, p99, max] = [age.p50_us, age.p99_us, age.max_us].map(milliseconds);
+    format!("{p50} p50, {p99} p99, {max} max ms")
 }
 
 /// All counts, for the end.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Incoming {
-            arrivals,
-            passed,
-            stale,
-            undated,
-            replaced,
-            boardless,
-            stuck,
-            refused,
-        } = self.incoming;
-        writeln!(
+        let Self {
+            uptime_s,
+            site,
+            incoming: i,
+            outgoing: o,
+            ..
+        } = self;
+        let Arrivals {
+            received,
+            lost,
+            late,
+            duplicated,
+            superseded,
+        } = i.arrivals;
+        write!(
             f,
-            "{:.1} s at {}: {} came, {passed} passed on",
-            self.uptime_s, self.site, arrivals.received
-        )?;
-        writeln!(
-            f,
-            "  on the network: {} lost, {} late, {} twice, {refused} refused",
-            arrivals.lost, arrivals.late, arrivals.duplicated
-        )?;
-        writeln!(
-            f,
-            "  not passed on: {stale} too old, {undated} of unknown age, {replaced} replaced by a newer one, {} superseded, {boardless} without a board, {stuck} to a full line",
-            arrivals.superseded
-        )?;
-        writeln!(
-            f,
-            "  sent: {}, held back: {}, refused by the network: {}",
-            self.outgoing.sent, self.outgoing.held, self.outgoing.failed
-        )?;
-        write!(f, "  age: {}", Ages(self.age))
+            "{uptime_s:.1} s at {site}: {received} came, {} passed on
+  on the network: {lost} lost, {late} late, {duplicated} twice, {} refused
+  not passed on: {} too old, {} of unknown age, {} replaced by a newer one, {superseded} superseded, {} without a board, {} to a full line
+  sent: {}, held back: {}, refused by the network: {}
+  age: {}",
+            i.passed, i.refused, i.stale, i.undated, i.replaced, i.boardless, i.stuck, o.sent, o.held, o.failed, ages(self.age)
+        )
     }
 }
 
@@ -291,8 +265,8 @@ impl fmt::Display for Notice {
             Self::Slow { age_us, max_age_us } => write!(
                 f,
                 "the network takes {} ms, longer than the {} ms of --max-age: nothing is passed on; give a longer one if such a delay is meant",
-                Milliseconds(*age_us),
-                Milliseconds(*max_age_us)
+                milliseconds(*age_us),
+                milliseconds(*max_age_us)
             ),
             Self::Unreached(endpoint, reach) => write!(f, "{endpoint}: {reach}"),
             Self::Alone(role) => write!(

@@ -71,12 +71,9 @@ pub struct Site {
 
 /// What the threads share.
 struct Shared {
-    role: Role,
+    settings: Settings,
     other_role: Role,
-    name: Name,
     session: u64,
-    network: Arc<dyn Transport>,
-    system: System,
     started_us: u64,
     wire: OnceLock<Box<dyn Connection>>,
     outward: Mutex<Outward>,
@@ -87,7 +84,6 @@ struct Shared {
     board_hello: Mutex<Option<Hello>>,
     /// Until when the other site watches the board here, in µs.
     shown_until_us: AtomicU64,
-    shows_far_board: bool,
     far_board: OnceLock<FarBoard>,
     stops: Mutex<Stops>,
     hand: Mutex<Hand>,
@@ -124,36 +120,27 @@ impl Site {
     /// Starts a bridge. It looks for its board and for the other site for as long as it lives; what a person should
     /// know comes out of the receiver. Fails if it can't listen, or if `role` is a host's.
     pub fn open(settings: Settings) -> Result<(Self, Receiver<Notice>), NetworkError> {
-        let Settings {
-            role,
-            place,
-            name,
-            network,
-            max_age,
-            shows_far_board,
-            system,
-        } = settings;
+        let (role, place, system) = (
+            settings.role,
+            settings.place.clone(),
+            settings.system.clone(),
+        );
         let clock = Arc::clone(&system.clock);
         let other_role = opposite(role)
             .ok_or_else(|| NetworkError::Engine("a host has no board to be carried".to_owned()))?;
         let (notices, told) = mpsc::channel();
         let session = random_number();
         let shared = Arc::new(Shared {
-            role,
             other_role,
-            name,
             session,
-            network,
             started_us: clock.now_us(),
-            system: system.clone(),
             wire: OnceLock::new(),
             outward: Mutex::new(Outward::new(bridge_hello(role), session)),
-            inward: Mutex::new(Inward::new(other_role, session, max_age)),
+            inward: Mutex::new(Inward::new(other_role, session, settings.max_age)),
             outbox: Outbox::new(clock.notify()),
             board: OnceLock::new(),
             board_hello: Mutex::new(None),
             shown_until_us: AtomicU64::new(0),
-            shows_far_board,
             far_board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
             hand: Mutex::new(Hand::default()),
@@ -161,8 +148,9 @@ impl Site {
             notices,
             is_ended: AtomicBool::new(false),
             keeper_woken: clock.notify(),
+            settings,
         });
-        if shared.network.endpoints().is_empty() {
+        if shared.settings.network.endpoints().is_empty() {
             shared.connect()?;
         } else {
             let shared = Arc::clone(&shared);
@@ -228,7 +216,7 @@ impl Site {
         drop(outward);
         let mut inward = locked(&shared.inward);
         Report {
-            site: shared.role.name(),
+            site: shared.settings.role.name(),
             uptime_s: (shared.now_us() - shared.started_us) as f64 / 1e6,
             board: self.link.state().word(),
             far: inward.remote().state().word(),
@@ -255,7 +243,7 @@ impl Drop for Site {
             .into_iter()
             .flatten()
         {
-            self.shared.system.clock.join(thread);
+            self.shared.settings.system.clock.join(thread);
         }
         self.shared.say(Channel::Stop, Content::Leaving);
         if let Some(wire) = self.shared.wire.get() {
@@ -266,7 +254,7 @@ impl Drop for Site {
 
 impl Shared {
     fn now_us(&self) -> u64 {
-        self.system.clock.now_us()
+        self.settings.system.clock.now_us()
     }
 
     fn tell(&self, notice: Notice) {
@@ -296,21 +284,28 @@ impl Shared {
             }
         };
         let subscriptions = vec![
-            subscription(self.name.keys(self.other_role), Self::hear),
+            subscription(self.settings.name.keys(self.other_role), Self::hear),
             subscription(
-                self.name.key(Role::Host, Channel::Stop),
+                self.settings.name.key(Role::Host, Channel::Stop),
                 Self::hear_operator,
             ),
-            subscription(self.name.key(self.role, Channel::Clock), Self::hear_rival),
+            subscription(
+                self.settings.name.key(self.settings.role, Channel::Clock),
+                Self::hear_rival,
+            ),
         ];
-        let wire = self.network.connect(&self.name, self.role, subscriptions)?;
+        let wire = self.settings.network.connect(
+            &self.settings.name,
+            self.settings.role,
+            subscriptions,
+        )?;
         // Only one thread connects, once.
         let _ = self.wire.set(wire);
         Ok(())
     }
 
     fn pause(&self, span: Duration) {
-        let clock = &self.system.clock;
+        let clock = &self.settings.system.clock;
         clock
             .notify()
             .wait_until(clock.now_us().saturating_add(micros(span)));
@@ -343,7 +338,7 @@ impl Shared {
         if self.now_us() < self.shown_until_us.load(Ordering::Acquire) {
             self.say(Channel::Shown, Content::Shown(message.clone()));
         }
-        if !is_carried(self.role, &message) {
+        if !is_carried(self.settings.role, &message) {
             return;
         }
         let envelope = locked(&self.outward).carry(at_us, self.now_us(), message);
@@ -437,7 +432,7 @@ impl Shared {
             && envelope.session != self.session
             && !self.told_rival.swap(true, Ordering::Relaxed)
         {
-            self.tell(Notice::Rival(self.role));
+            self.tell(Notice::Rival(self.settings.role));
         }
     }
 
@@ -483,8 +478,10 @@ impl Shared {
                 shared.stop(stop);
             }
         };
-        let clock = Arc::clone(&self.system.clock);
-        if let Some(far_board) = FarBoard::open(&self.name, self.other_role, clock, on_stop) {
+        let clock = Arc::clone(&self.settings.system.clock);
+        if let Some(far_board) =
+            FarBoard::open(&self.settings.name, self.other_role, clock, on_stop)
+        {
             let _ = self.far_board.set(far_board);
         }
     }
@@ -497,7 +494,7 @@ impl Shared {
         let id = random_number();
         locked(&self.stops).say(id, stop);
         self.tell_board(id, stop);
-        self.tell(Notice::StopSaid(self.role));
+        self.tell(Notice::StopSaid(self.settings.role));
         self.say(Channel::Stop, Content::Stop { id, stop });
     }
 

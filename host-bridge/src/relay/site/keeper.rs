@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use protocol::Ping;
 
 use super::Shared;
+use crate::clock::is_due;
 use crate::lock::locked;
 use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::Content;
@@ -127,7 +128,8 @@ impl Keeper {
     /// Keeps the other site's board in view, if somebody here watches it.
     fn watch(&mut self, at_us: u64) {
         let Some(far_board) = self.shared.far_board.get() else {
-            if self.shared.shows_far_board && is_due(self.watched_us, SHOW_AGAIN_US, at_us) {
+            if self.shared.settings.shows_far_board && is_due(self.watched_us, SHOW_AGAIN_US, at_us)
+            {
                 self.watched_us = Some(at_us);
                 self.shared.show_far_board();
             }
@@ -155,7 +157,7 @@ impl Keeper {
         }
         self.looked_us = Some(at_us);
         let (shared, found) = (Arc::clone(&self.shared), Arc::clone(&self.found));
-        let clock = Arc::clone(&shared.system.clock);
+        let clock = Arc::clone(&shared.settings.system.clock);
         clock.spawn(Box::new(move || {
             let notices = shared.diagnose();
             let mut found = locked(&found);
@@ -169,22 +171,19 @@ impl Keeper {
     }
 }
 
-fn is_due(last_us: Option<u64>, period_us: u64, at_us: u64) -> bool {
-    last_us.is_none_or(|last_us| at_us.saturating_sub(last_us) >= period_us)
-}
-
 impl Shared {
     /// Why the other site is not heard.
     fn diagnose(&self) -> Vec<Notice> {
-        let endpoints = self.network.endpoints();
+        let endpoints = self.settings.network.endpoints();
         if endpoints.is_empty() {
             return vec![Notice::Unvisited(self.other_role)];
         }
         if self.wire.get().is_some_and(|wire| wire.neighbours() > 0) {
             return vec![Notice::Alone(self.other_role)];
         }
-        let reach =
-            |endpoint: &Endpoint| Notice::Unreached(endpoint.clone(), self.network.reach(endpoint));
+        let reach = |endpoint: &Endpoint| {
+            Notice::Unreached(endpoint.clone(), self.settings.network.reach(endpoint))
+        };
         endpoints.iter().map(reach).collect()
     }
 }
