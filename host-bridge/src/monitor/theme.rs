@@ -1,5 +1,6 @@
 //! Colours: few, of a middle brightness that is legible on light and on dark, and none if told so.
 
+use protocol::Role;
 use ratatui::style::{Color, Modifier, Style};
 
 /// Voltages from 0 to the largest: from grey over violet to orange.
@@ -83,6 +84,14 @@ impl Theme {
         self.colour(170, Modifier::empty())
     }
 
+    /// What comes from the board of `role`.
+    pub const fn of(self, role: Role) -> Style {
+        match role {
+            Role::Sensor => self.sensor(),
+            Role::Display | Role::Host => self.display(),
+        }
+    }
+
     /// What is chosen.
     pub const fn chosen(self) -> Style {
         Style::new().add_modifier(Modifier::REVERSED)
@@ -102,10 +111,6 @@ impl Theme {
         let last = steps.len() - 1;
         // What is no number is cast to 0.
         let step = (part.clamp(0.0, 1.0) * last as f32).round() as usize;
-        if self.has_colour {
-            Style::new().fg(Color::Indexed(steps[step.min(last)]))
-        } else {
-            Style::new()
-        }
+        self.colour(steps[step.min(last)], Modifier::empty())
     }
 }

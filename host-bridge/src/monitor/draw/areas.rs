@@ -5,35 +5,31 @@
 use ratatui::layout::Rect;
 
 /// The uppermost `height` rows, as far as there are so many, and the rest.
-pub const fn cut_top(area: Rect, height: u16) -> [Rect; 2] {
-    let height = if height < area.height {
-        height
-    } else {
-        area.height
-    };
-    let top = Rect { height, ..area };
-    let rest = Rect {
-        y: area.y + height,
-        height: area.height - height,
-        ..area
-    };
-    [top, rest]
+pub fn cut_top(area: Rect, height: u16) -> [Rect; 2] {
+    let height = height.min(area.height);
+    let (y, rest) = (area.y + height, area.height - height);
+    [
+        Rect { height, ..area },
+        Rect {
+            y,
+            height: rest,
+            ..area
+        },
+    ]
 }
 
 /// The leftmost `width` columns, as far as there are so many, and the rest.
-pub const fn cut_left(area: Rect, width: u16) -> [Rect; 2] {
-    let width = if width < area.width {
-        width
-    } else {
-        area.width
-    };
-    let left = Rect { width, ..area };
-    let rest = Rect {
-        x: area.x + width,
-        width: area.width - width,
-        ..area
-    };
-    [left, rest]
+pub fn cut_left(area: Rect, width: u16) -> [Rect; 2] {
+    let width = width.min(area.width);
+    let (x, rest) = (area.x + width, area.width - width);
+    [
+        Rect { width, ..area },
+        Rect {
+            x,
+            width: rest,
+            ..area
+        },
+    ]
 }
 
 /// Columns of one width, a space apart; what is left over stays empty at the right.

@@ -50,13 +50,13 @@ impl Fact {
 /// How a board is to be reached, how long it runs, why it started, and its firmware: as far as it is known.
 pub fn facts(board: &Board, now_us: u64, theme: Theme) -> Vec<Fact> {
     let mut facts = Vec::new();
-    let mut add = |rank, name, value, style| {
+    let mut add = |rank, name, value: String, style| {
         facts.push(Fact {
             name,
             value,
             style,
             rank,
-        });
+        })
     };
     let plain = Style::new();
     if let Some(clocks) = board.clocks {
@@ -73,10 +73,18 @@ pub fn facts(board: &Board, now_us: u64, theme: Theme) -> Vec<Fact> {
     if let Some((_, status)) = &board.status {
         let style = |count: u32, if_any| if count > 0 { if_any } else { plain };
         let (misses, resets) = (missed(status), status.watchdog_resets);
-        let few = style(misses, theme.warning());
-        add(1, "misses", text::brief(misses), few);
-        let none = style(resets, theme.bad());
-        add(2, "watchdog", text::brief(resets), none);
+        add(
+            1,
+            "misses",
+            text::brief(misses),
+            style(misses, theme.warning()),
+        );
+        add(
+            2,
+            "watchdog",
+            text::brief(resets),
+            style(resets, theme.bad()),
+        );
         add(5, "by", status.reset.name().to_owned(), plain);
     }
     if let Some(State::Known(_, hello)) = &board.state {
@@ -113,11 +121,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
     let area = text::panel(frame, area, theme, text::title(theme, "boards", about));
     let mut lines = Vec::new();
     for role in [Role::Sensor, Role::Display] {
-        let name = match role {
-            Role::Sensor => theme.sensor(),
-            Role::Display | Role::Host => theme.display(),
-        };
-        let mut line = vec![Span::styled(format!(" {:<8}", role.name()), name)];
+        let mut line = vec![Span::styled(format!(" {:<8}", role.name()), theme.of(role))];
         let room = usize::from(area.width.saturating_sub(NAME_WIDTH));
         let mut used = 0;
         for fact in facts(shown.board(role), shown.now_us, theme) {

@@ -26,17 +26,12 @@ const FULL_V: f32 = 5.0;
 /// Draws the map, and the scale of its colours.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let theme = view.theme;
-    let about = if view.shows_moment {
-        "V now, computed"
+    let (about, volts) = if view.shows_moment {
+        ("V now, computed", shown.volts())
     } else {
-        "peak V, computed"
+        ("peak V, computed", shown.peaks_v())
     };
     let area = text::panel(frame, area, theme, text::title(theme, "fingertip", about));
-    let volts = if view.shows_moment {
-        shown.volts()
-    } else {
-        shown.peaks_v()
-    };
     let (Some(volts), Some(actuators)) = (volts, shown.fingertip.actuators()) else {
         let why = if shown.fingertip.is_known() {
             [" the display is not heard", ""]
@@ -53,11 +48,10 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     };
     for (row, places) in (0..).zip(by_place(actuators, &volts)) {
         let mut spans = vec![Span::raw(" ")];
-        spans.extend(
-            places
-                .into_iter()
-                .flat_map(|place| cell(place, view.shows_moment, theme)),
-        );
+        let cells = places
+            .into_iter()
+            .flat_map(|place| cell(place, view.shows_moment, theme));
+        spans.extend(cells);
         text::put(frame, area, row, Line::from(spans));
     }
     text::put(frame, area, ROWS as u16, scale(shown, view));

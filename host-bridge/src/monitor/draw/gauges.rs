@@ -5,8 +5,9 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::areas::{self, cut_top};
 use super::plot::{Plot, Range, Series, round_step};
-use super::{areas, text};
+use super::text;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::view::View;
 
@@ -20,31 +21,16 @@ const SILENT_US: u64 = 500_000;
 /// Draws the gauges side by side, all to one scale.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let theme = view.theme;
-    let inner = Rect {
-        y: area.y + 1,
-        height: area.height.saturating_sub(1),
-        ..area
-    };
-    let columns: [Rect; GAUGES] = areas::columns(inner);
-    let plots = columns.map(|column| {
-        let area = Rect {
-            y: column.y + 1,
-            height: column.height.saturating_sub(1),
-            ..column
-        };
-        Plot::bare(area, view.span_s() * PART)
-    });
-    let streams = shown
-        .gauges_us
-        .is_some_and(|at_us| shown.now_us.saturating_sub(at_us) < SILENT_US);
-    let extents: [Option<(f32, f32)>; GAUGES] = std::array::from_fn(|gauge| {
-        plots[gauge].extent(shown.now_us, &[&shown.traces.gauges_lsb[gauge]])
-    });
-    let widest = extents
-        .iter()
-        .flatten()
-        .map(|(low, high)| high - low)
-        .fold(LEAST_LSB, f32::max);
+    let columns: [Rect; GAUGES] = areas::columns(cut_top(area, 1)[1]);
+    let plots = columns.map(|column| Plot::bare(cut_top(column, 1)[1], view.span_s() * PART));
+    let traces = shown.traces.gauges_lsb.each_ref();
+    let series = traces.map(|trace| [Series::line(trace, theme.sensor())]);
+    let is_fresh = |at_us: u64| shown.now_us.saturating_sub(at_us) < SILENT_US;
+    let streams = shown.gauges_us.is_some_and(is_fresh);
+    let extents: [_; GAUGES] =
+        std::array::from_fn(|gauge| plots[gauge].extent(shown.now_us, &series[gauge]));
+    let heights = extents.iter().flatten().map(|(low, high)| high - low);
+    let widest = heights.fold(LEAST_LSB, f32::max);
     // A little more than the widest, in round numbers, so that it does not change all the time.
     let step = round_step(widest);
     let height = (widest / step).ceil() * step;
@@ -60,12 +46,8 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     };
     text::panel(frame, area, theme, text::title(theme, "gauges", &about));
     for gauge in 0..GAUGES {
-        text::put(
-            frame,
-            columns[gauge],
-            0,
-            name(shown, gauge, extents[gauge], columns[gauge].width, view),
-        );
+        let name = name(shown, gauge, extents[gauge], columns[gauge].width, view);
+        text::put(frame, columns[gauge], 0, name);
         if let (Some((low, high)), true) = (extents[gauge], streams) {
             let middle = (low + high) / 2.0;
             let range = Range {
@@ -73,12 +55,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
                 high: middle + height / 2.0,
                 digits: 0,
             };
-            let series = [Series {
-                trace: &shown.traces.gauges_lsb[gauge],
-                style: theme.sensor(),
-                is_dotted: false,
-            }];
-            plots[gauge].draw(frame, shown.now_us, range, &series, None);
+            plots[gauge].draw(frame, shown.now_us, range, &series[gauge], None);
         }
     }
 }
@@ -102,11 +79,8 @@ fn name(
     let mut spans = vec![Span::styled(format!("{gauge} "), theme.strong())];
     if let Some((_, estimate)) = shown.estimate {
         let health = estimate.health[gauge];
-        let style = if health == GaugeHealth::Good {
-            theme.good()
-        } else {
-            theme.bad()
-        };
+        let is_good = health == GaugeHealth::Good;
+        let style = if is_good { theme.good() } else { theme.bad() };
         fits(health.name());
         spans.push(Span::styled(health.name(), style));
         if estimate.gauges_used & (1 << gauge) == 0 && fits(" unused") {

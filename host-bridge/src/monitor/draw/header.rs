@@ -7,6 +7,7 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
+use super::areas::{cut_left, cut_top};
 use super::{boards, text};
 use crate::monitor::board::Board;
 use crate::monitor::dashboard::{Dashboard, Notice};
@@ -61,11 +62,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
     let mut row = 0;
     for role in [Role::Sensor, Role::Display] {
         let rows = board_rows(live, role, area.width);
-        let place = Rect {
-            y: area.y + row,
-            height: rows,
-            ..area
-        };
+        let [place, _] = cut_top(cut_top(area, row)[1], rows);
         draw_board(frame, place, live, role, view.theme);
         row += rows;
     }
@@ -81,20 +78,12 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
 
 fn draw_board(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, role: Role, theme: Theme) {
     let board = live.board(role);
-    let name = match role {
-        Role::Sensor => theme.sensor(),
-        Role::Display | Role::Host => theme.display(),
-    };
     let head = Line::from(vec![
-        Span::styled(format!(" {:<8}", role.name()), name),
+        Span::styled(format!(" {:<8}", role.name()), theme.of(role)),
         Span::styled("● ", state_style(board, theme)),
     ]);
     text::put(frame, area, 0, head);
-    let rest = Rect {
-        x: area.x + NAME_WIDTH,
-        width: area.width.saturating_sub(NAME_WIDTH),
-        ..area
-    };
+    let [_, rest] = cut_left(area, NAME_WIDTH);
     if let Some(State::Known(port, _)) = &board.state {
         let port = port.display().to_string();
         let room = usize::from(rest.width).saturating_sub(port.chars().count());
@@ -136,25 +125,19 @@ pub fn supervisor(live: &Dashboard, theme: Theme) -> Line<'static> {
     let Some((since_us, state)) = live.safety else {
         return Line::styled(" supervisor not heard", theme.quiet());
     };
-    let words = state.to_string();
+    let words = state.to_string().to_uppercase();
     let since = text::seconds(live.now_us.saturating_sub(since_us));
     let style = match state {
         DisplayState::Boot | DisplayState::Ready => theme.strong(),
         DisplayState::Driving => theme.good(),
         DisplayState::Fading(_) => theme.warning(),
         DisplayState::Stopped(_) => {
-            let line = format!(
-                " {}, 0 V until the display board's reset button or power ",
-                words.to_uppercase()
-            );
+            let line = format!(" {words}, 0 V until the display board's reset button or power ");
             return Line::from(Span::styled(line, theme.alarm()));
         }
     };
     Line::from(vec![
-        Span::styled(
-            format!(" {}", words.to_uppercase()),
-            style.patch(theme.strong()),
-        ),
+        Span::styled(format!(" {words}"), style.patch(theme.strong())),
         Span::styled(format!("  for {since}"), theme.quiet()),
     ])
 }
@@ -162,13 +145,13 @@ pub fn supervisor(live: &Dashboard, theme: Theme) -> Line<'static> {
 /// What the view itself is up to.
 fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
     let mut spans = Vec::new();
-    if view.is_frozen {
-        spans.push(Span::raw("  "));
-        spans.push(Span::styled(" FROZEN ", view.theme.chosen()));
-    }
-    if view.is_over {
-        spans.push(Span::raw("  "));
-        spans.push(Span::styled(" END OF RECORDING ", view.theme.chosen()));
+    for (is_so, mark) in [
+        (view.is_frozen, " FROZEN "),
+        (view.is_over, " END OF RECORDING "),
+    ] {
+        if is_so {
+            spans.extend([Span::raw("  "), Span::styled(mark, view.theme.chosen())]);
+        }
     }
     if let Some(kept) = &view.kept {
         let for_us = live.now_us.saturating_sub(kept.since_us);
@@ -187,11 +170,7 @@ fn marks(live: &Dashboard, view: &View) -> Vec<Span<'static>> {
 pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
     let theme = view.theme;
     if let Some(notice) = live.notice() {
-        let place = Rect {
-            x: area.x + 1,
-            width: area.width.saturating_sub(1),
-            ..area
-        };
+        let [_, place] = cut_left(area, 1);
         let words = Paragraph::new(notice.text.as_str()).wrap(Wrap { trim: true });
         frame.render_widget(words.style(notice_style(notice, theme)), place);
         return;

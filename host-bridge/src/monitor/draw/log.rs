@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use protocol::Role;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
@@ -17,33 +16,26 @@ const HEAD_WIDTH: u16 = 19;
 
 /// Draws the last lines, each over as many rows as it takes.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
-    let area = text::panel(
-        frame,
-        area,
-        theme,
-        text::title(theme, "log", "s since the monitor's start"),
-    );
+    let title = text::title(theme, "log", "s since the monitor's start");
+    let area = text::panel(frame, area, theme, title);
     let room = usize::from(area.width.saturating_sub(HEAD_WIDTH)).max(1);
     let mut lines = VecDeque::new();
     for log_entry in shown.log_entries.iter().rev() {
         if lines.len() >= area.height.into() {
             break;
         }
-        let role = match log_entry.role {
-            Role::Sensor => theme.sensor(),
-            Role::Display | Role::Host => theme.display(),
-        };
         let style = match &log_entry.what {
             what if what.is_bad() => theme.bad(),
             LogEvent::Log { .. } => theme.quiet(),
             _ => ratatui::style::Style::new(),
         };
+        let at = format!(" {:>9.3} ", log_entry.at_us as f64 / 1e6);
         let head = [
+            Span::styled(at, theme.quiet()),
             Span::styled(
-                format!(" {:>9.3} ", log_entry.at_us as f64 / 1e6),
-                theme.quiet(),
+                format!("{:<8}", log_entry.role.name()),
+                theme.of(log_entry.role),
             ),
-            Span::styled(format!("{:<8}", log_entry.role.name()), role),
         ];
         let words = log_entry.what.to_string();
         let mut rows = text::broken(&words, room);

@@ -7,6 +7,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::Line;
 use ratatui::widgets::canvas::{Canvas, Context, Painter, Shape};
 
+use super::areas::cut_left;
 use super::text;
 use crate::monitor::theme::Theme;
 use crate::monitor::trace::{Extent, Trace, column_us};
@@ -18,12 +19,29 @@ const AXIS_WIDTH: u16 = 7;
 
 /// How one of the traces is drawn.
 pub struct Series<'a> {
-    /// The trace.
-    pub trace: &'a Trace,
-    /// Its colour.
-    pub style: Style,
-    /// Whether it is drawn as points that nothing joins, to tell it from the others without colours.
-    pub is_dotted: bool,
+    trace: &'a Trace,
+    style: Style,
+    is_dotted: bool,
+}
+
+impl<'a> Series<'a> {
+    /// A line.
+    pub const fn line(trace: &'a Trace, style: Style) -> Self {
+        Self {
+            trace,
+            style,
+            is_dotted: false,
+        }
+    }
+
+    /// Points that nothing joins, to tell them from a line without colours.
+    pub const fn dots(trace: &'a Trace, style: Style) -> Self {
+        Self {
+            trace,
+            style,
+            is_dotted: true,
+        }
+    }
 }
 
 /// What the axes show.
@@ -82,12 +100,7 @@ pub struct Plot {
 impl Plot {
     /// A plot of `span_s` seconds or a little more in an area, of which a part goes to the numbers.
     pub fn new(area: Rect, span_s: f32) -> Self {
-        let axis = AXIS_WIDTH.min(area.width / 3);
-        let area = Rect {
-            x: area.x + axis,
-            width: area.width - axis,
-            ..area
-        };
+        let [_, area] = cut_left(area, AXIS_WIDTH.min(area.width / 3));
         Self::bare(area, span_s)
     }
 
@@ -105,13 +118,16 @@ impl Plot {
     }
 
     /// What the traces were within it, up to `now_us`.
-    pub fn extent(&self, now_us: u64, traces: &[&Trace]) -> Option<(f32, f32)> {
+    pub fn extent(&self, now_us: u64, series: &[Series<'_>]) -> Option<(f32, f32)> {
         let span_us = self.column_us * dots_across(self.area) as u64;
-        traces
-            .iter()
-            .filter_map(|trace| trace.extent(now_us.saturating_sub(span_us), now_us + 1))
-            .map(|Extent { low, high, .. }| (low, high))
-            .reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)))
+        let extent = |series: &Series<'_>| {
+            let extent = series
+                .trace
+                .extent(now_us.saturating_sub(span_us), now_us + 1)?;
+            Some((extent.low, extent.high))
+        };
+        let extents = series.iter().filter_map(extent);
+        extents.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)))
     }
 
     /// Writes the numbers.
@@ -153,9 +169,8 @@ impl Plot {
                 dots_across(self.area),
                 usize::from(self.area.height * DOTS.1),
             );
-            if let Some((zero, style)) =
-                zero.filter(|(zero, _)| (range.low..=range.high).contains(zero))
-            {
+            let is_within = |(zero, _): &(f32, Style)| (range.low..=range.high).contains(zero);
+            if let Some((zero, style)) = zero.filter(is_within) {
                 context.draw(&Level {
                     row: row(zero, range, height),
                     width,
@@ -174,8 +189,7 @@ impl Plot {
                     // Which columns are left out moves on with them.
                     skips: series
                         .is_dotted
-                        .then_some(now_us / self.column_us % 2)
-                        .map(|odd| odd as usize),
+                        .then_some((now_us / self.column_us % 2) as usize),
                 });
             }
         };
@@ -229,16 +243,11 @@ struct Stroke {
 impl Shape for Stroke {
     fn draw(&self, painter: &mut Painter<'_, '_>) {
         for (column, extent) in self.columns.iter().enumerate() {
-            let Some(Extent {
-                low, high, last, ..
-            }) = extent
-            else {
-                continue;
-            };
+            let Some(extent) = extent else { continue };
             let (high, low) = match self.skips {
                 Some(odd) if (column + odd) % 2 == 1 => continue,
-                Some(_) => (*last, *last),
-                None => (*high, *low),
+                Some(_) => (extent.last, extent.last),
+                None => (extent.high, extent.low),
             };
             let top = row(high, self.range, self.height);
             for row in top..=row(low, self.range, self.height) {

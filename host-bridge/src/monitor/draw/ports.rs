@@ -2,9 +2,10 @@
 
 use protocol::PortCounters;
 use ratatui::Frame;
-use ratatui::layout::{Alignment, Rect};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::areas::cut_left;
 use super::text;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::theme::Theme;
@@ -16,16 +17,16 @@ const NUMBER: usize = 8;
 /// A counter.
 struct Column {
     name: &'static str,
-    count: fn(&PortCounters) -> u32,
     /// Whether it counts what should not be.
     is_bad: bool,
+    count: fn(&PortCounters) -> u32,
 }
 
 const fn column(name: &'static str, is_bad: bool, count: fn(&PortCounters) -> u32) -> Column {
     Column {
         name,
-        count,
         is_bad,
+        count,
     }
 }
 
@@ -53,16 +54,17 @@ pub const HEIGHT: u16 = 7;
 /// that count what should not be.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
     let fitting = usize::from(area.width).saturating_sub(NAME) / NUMBER;
-    let (columns, rest) = if fitting < COLUMNS.len() {
-        COLUMNS.split_at(fitting.saturating_sub(1))
+    let is_narrow = fitting < COLUMNS.len();
+    let shown_columns = if is_narrow {
+        fitting.saturating_sub(1)
     } else {
-        COLUMNS.split_at(COLUMNS.len())
+        COLUMNS.len()
     };
+    let (columns, rest) = COLUMNS.split_at(shown_columns);
     let others = |port: &PortCounters| {
         let bad = rest.iter().filter(|column| column.is_bad);
-        bad.fold(0, |sum: u32, column| {
-            sum.saturating_add((column.count)(port))
-        })
+        bad.map(|column| (column.count)(port))
+            .fold(0, u32::saturating_add)
     };
     // The names stand in the panel's own line, which takes a row less.
     let inner = text::panel(frame, area, theme, text::title(theme, "ports", ""));
@@ -72,31 +74,18 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         .chain((!rest.is_empty()).then_some("others"))
         .map(|name| Span::styled(format!("{name:>NUMBER$}"), theme.quiet()))
         .collect();
-    let heading = Rect {
-        x: area.x + NAME as u16,
-        width: area.width.saturating_sub(NAME as u16),
-        ..area
-    };
+    let [_, heading] = cut_left(area, NAME as u16);
     text::put(frame, heading, 0, Line::from(names));
     for (row, (name, counters)) in (0..).zip(shown.ports()) {
-        let mut spans = vec![Span::styled(
-            format!(" {name:<width$}", width = NAME - 1),
-            theme.quiet(),
-        )];
-        spans.extend(
-            columns
-                .iter()
-                .map(|column| number(column.is_bad, counters.as_ref().map(column.count), theme)),
-        );
+        let name = format!(" {name:<width$}", width = NAME - 1);
+        let mut spans = vec![Span::styled(name, theme.quiet())];
+        let count =
+            |column: &Column| number(column.is_bad, counters.as_ref().map(column.count), theme);
+        spans.extend(columns.iter().map(count));
         if !rest.is_empty() {
             spans.push(number(true, counters.as_ref().map(others), theme));
         }
-        text::put(
-            frame,
-            inner,
-            row,
-            Line::from(spans).alignment(Alignment::Left),
-        );
+        text::put(frame, inner, row, Line::from(spans));
     }
 }
 

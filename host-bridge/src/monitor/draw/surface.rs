@@ -6,6 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 
+use super::areas::cut_top;
 use super::plot::{Plot, Range, Series};
 use super::{big, text};
 use crate::monitor::dashboard::Dashboard;
@@ -37,10 +38,8 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         .and_then(|estimate| estimate.wavelength_mm)
         .map_or_else(|| "-.--".to_owned(), millimetres);
     for (row, mut line) in (0..).zip(big::lines(&number, style)) {
-        line.spans.insert(
-            0,
-            Span::styled(if row == 2 { " λ " } else { "   " }, theme.quiet()),
-        );
+        let name = if row == 2 { " λ " } else { "   " };
+        line.spans.insert(0, Span::styled(name, theme.quiet()));
         if row == 2 {
             line.spans.push(Span::styled("mm", theme.quiet()));
             if let Some(estimate) = &estimate {
@@ -78,6 +77,21 @@ fn faded(style: Style, is_old: bool, theme: Theme) -> Style {
     if is_old { theme.quiet() } else { style }
 }
 
+/// Two values, each behind what it is.
+fn two(
+    one: (&'static str, String, Style),
+    other: (&'static str, String, Style),
+    theme: Theme,
+) -> Line<'static> {
+    let spans = [one, other].map(|(name, value, style)| {
+        [
+            Span::styled(name, theme.quiet()),
+            Span::styled(value, style),
+        ]
+    });
+    Line::from(spans.concat())
+}
+
 fn confidence(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     let part = estimate.confidence.clamp(0.0, 1.0);
     let full = (part * BAR as f32).round() as usize;
@@ -96,31 +110,26 @@ fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     } else {
         ("unsure", theme.warning())
     };
-    Line::from(vec![
-        Span::raw(" "),
-        Span::styled(
-            word,
-            faded(style.add_modifier(Modifier::BOLD), is_old, theme),
-        ),
-        Span::styled("   contact ", theme.quiet()),
-        Span::styled(
-            words::contact(estimate.contact),
-            faded(Style::new(), is_old, theme),
-        ),
-    ])
+    let bold = faded(style.add_modifier(Modifier::BOLD), is_old, theme);
+    let contact = words::contact(estimate.contact).to_owned();
+    let plain = faded(Style::new(), is_old, theme);
+    two(
+        (" ", word.to_owned(), bold),
+        ("   contact ", contact, plain),
+        theme,
+    )
 }
 
 fn count(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
-    let counted = estimate
-        .counted_mm
-        .map_or_else(|| "  -  ".to_owned(), |mm| format!("{mm:.2} mm"));
+    let counted = estimate.counted_mm.map(|mm| format!("{mm:.2} mm"));
+    let counted = counted.unwrap_or_else(|| "  -  ".to_owned());
     let style = faded(Style::new(), is_old, theme);
-    Line::from(vec![
-        Span::styled(" paper's count ", theme.quiet()),
-        Span::styled(counted, style),
-        Span::styled("   range ", theme.quiet()),
-        Span::styled(words::range(estimate.range), style),
-    ])
+    let range = words::range(estimate.range).to_owned();
+    two(
+        (" paper's count ", counted, style),
+        ("   range ", range, style),
+        theme,
+    )
 }
 
 fn gauges(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
@@ -133,44 +142,25 @@ fn gauges(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     } else {
         used
     };
-    let lag = estimate
-        .lag_um
-        .map_or_else(|| "-".to_owned(), |lag_um| format!("{lag_um} µm"));
+    let lag = estimate.lag_um.map(|lag_um| format!("{lag_um} µm"));
+    let lag = lag.unwrap_or_else(|| "-".to_owned());
     let style = faded(Style::new(), is_old, theme);
-    Line::from(vec![
-        Span::styled(" gauges used ", theme.quiet()),
-        Span::styled(used, style),
-        Span::styled("   lag ", theme.quiet()),
-        Span::styled(lag, style),
-    ])
+    two(
+        (" gauges used ", used, style),
+        ("   lag ", lag, style),
+        theme,
+    )
 }
 
 /// Draws λ and the paper's count over the last seconds.
 pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let theme = view.theme;
-    let inner = Rect {
-        y: area.y + 1,
-        height: area.height.saturating_sub(1),
-        ..area
-    };
-    let plot = Plot::new(inner, view.span_s());
+    let plot = Plot::new(cut_top(area, 1)[1], view.span_s());
     let traces = &shown.traces;
     let series = [
-        Series {
-            trace: &traces.wavelength_mm,
-            style: theme.sensor(),
-            is_dotted: false,
-        },
-        Series {
-            trace: &traces.unsure_mm,
-            style: theme.quiet(),
-            is_dotted: true,
-        },
-        Series {
-            trace: &traces.counted_mm,
-            style: theme.warning(),
-            is_dotted: true,
-        },
+        Series::line(&traces.wavelength_mm, theme.sensor()),
+        Series::dots(&traces.unsure_mm, theme.quiet()),
+        Series::dots(&traces.counted_mm, theme.warning()),
     ];
     let title = Line::from(vec![
         Span::styled("λ", theme.strong()),
@@ -182,8 +172,7 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
         Span::styled("paper's", theme.quiet()),
     ]);
     text::panel(frame, area, theme, title);
-    let all = series.each_ref().map(|series| series.trace);
-    if let Some((low, high)) = plot.extent(shown.now_us, &all) {
+    if let Some((low, high)) = plot.extent(shown.now_us, &series) {
         let range = Range::around(low, high, LEAST_PART * high);
         plot.draw_axis(frame, range, theme);
         plot.draw(frame, shown.now_us, range, &series, None);

@@ -21,10 +21,8 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         None => "not heard",
     };
     let velocity = |um_s: Option<i32>| {
-        um_s.map_or_else(
-            || "-".to_owned(),
-            |um_s| format!("{:+.1}", um_s as f32 / 1e3),
-        )
+        let words = um_s.map(|um_s| format!("{:+.1}", um_s as f32 / 1e3));
+        words.unwrap_or_else(|| "-".to_owned())
     };
     let hand = velocity(live.motion.map(|(_, motion)| motion.velocity_um_s));
     let arm = velocity(estimate.map(|estimate| estimate.velocity_um_s));

@@ -4,6 +4,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::areas::cut_top;
 use super::plot::{Plot, Range, Series};
 use super::text;
 use crate::monitor::dashboard::Dashboard;
@@ -17,20 +18,12 @@ const OLD_MS: u64 = 300;
 /// Draws both velocities over the last seconds.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let theme = view.theme;
-    let inner = Rect {
-        y: area.y + 1,
-        height: area.height.saturating_sub(1),
-        ..area
-    };
-    let plot = Plot::new(inner, view.span_s());
+    let plot = Plot::new(cut_top(area, 1)[1], view.span_s());
     let traces = &shown.traces;
     let now = |velocity_um_s: Option<i32>, age_ms: Option<u64>| {
-        velocity_um_s
-            .filter(|_| age_ms.is_some_and(|age_ms| age_ms <= OLD_MS))
-            .map_or_else(
-                || "     -".to_owned(),
-                |um_s| format!("{:+6.1}", um_s as f32 / 1e3),
-            )
+        let fresh = velocity_um_s.filter(|_| age_ms.is_some_and(|age_ms| age_ms <= OLD_MS));
+        let words = fresh.map(|um_s| format!("{:+6.1}", um_s as f32 / 1e3));
+        words.unwrap_or_else(|| "     -".to_owned())
     };
     let hand = shown.motion.map(|(_, motion)| motion.velocity_um_s);
     let arm = shown.estimate.map(|(_, estimate)| estimate.velocity_um_s);
@@ -46,28 +39,14 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
         Span::raw(now(arm, shown.estimate_age_ms())),
     ]);
     text::panel(frame, area, theme, title);
-    let both = [&traces.hand_mm_s, &traces.arm_mm_s];
-    if let Some((low, high)) = plot.extent(shown.now_us, &both) {
+    let series = [
+        Series::dots(&traces.arm_mm_s, theme.sensor()),
+        Series::line(&traces.hand_mm_s, theme.display()),
+    ];
+    if let Some((low, high)) = plot.extent(shown.now_us, &series) {
         let range = Range::around(low, high, LEAST_MM_S);
-        let series = [
-            Series {
-                trace: &traces.arm_mm_s,
-                style: theme.sensor(),
-                is_dotted: true,
-            },
-            Series {
-                trace: &traces.hand_mm_s,
-                style: theme.display(),
-                is_dotted: false,
-            },
-        ];
         plot.draw_axis(frame, range, theme);
-        plot.draw(
-            frame,
-            shown.now_us,
-            range,
-            &series,
-            Some((0.0, theme.quiet())),
-        );
+        let zero = Some((0.0, theme.quiet()));
+        plot.draw(frame, shown.now_us, range, &series, zero);
     }
 }
