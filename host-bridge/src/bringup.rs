@@ -15,4 +15,3 @@ pub mod quantity;
 pub mod report;
 pub mod sight;
 pub mod step;
-pub mod steps;

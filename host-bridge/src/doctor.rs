@@ -7,7 +7,6 @@
 //!
 //! Everything behind [`look`] is pure: the same facts give the same findings.
 
-pub mod clock;
 pub mod counters;
 pub mod examination;
 pub mod findings;

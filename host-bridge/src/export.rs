@@ -22,7 +22,6 @@ mod group;
 mod of_recording;
 mod of_scene;
 mod texture;
-mod wav;
 
 pub use group::{Along, Group, Samples};
 
@@ -177,7 +176,7 @@ fn write_groups(settings: &Settings, groups: Vec<Group>) -> Result<Vec<Exported>
     let mut exported = Vec::with_capacity(groups.len());
     for group in groups {
         let path = path(&group);
-        wav::write(&path, &group)?;
+        group::write(&path, &group)?;
         exported.push(Exported {
             holds: group.holds(),
             section: group.section(&path),

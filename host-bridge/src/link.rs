@@ -15,10 +15,10 @@ use protocol::{ClockOffset, Message, Peer, Ping, PortCounters, Role, Stop, StopR
 use crate::clock::{Notify, micros};
 pub use crate::line::{BAUD, Missed, NotSent, host_hello};
 use crate::line::{Handovers, Line};
+use crate::line_monitor::BoardClock;
 use crate::line_monitor::{LineMonitor, Verdict};
 use crate::lock::locked;
 use crate::place::Place;
-use crate::restart::BoardClock;
 use crate::search::{Candidates, Search};
 use crate::state::State;
 use crate::system::{Opened, System};

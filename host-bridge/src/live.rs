@@ -8,9 +8,7 @@
 //! Two ports, for the server of Foxglove's crate answers nothing but its own protocol.
 
 mod foxglove_server;
-mod http;
 mod page;
-mod picture;
 mod viewer;
 
 pub use foxglove_server::LiveError;

@@ -13,20 +13,16 @@ pub mod dashboard;
 pub mod draw;
 pub mod fingertip;
 pub mod firmware_log;
-pub mod form;
 pub mod keys;
 pub mod line;
-pub mod live_recording;
 pub mod log_entry;
 pub mod orders;
-pub mod plain;
 pub mod screen;
 pub mod session;
 pub mod settings;
 pub mod theme;
 pub mod trace;
 pub mod view;
-pub mod words;
 
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
@@ -37,7 +33,7 @@ use std::time::Duration;
 pub use session::Source;
 
 use crate::recording::RecordingError;
-use plain::Format;
+use line::Format;
 use session::Session;
 
 /// How the boards are watched.
@@ -79,7 +75,7 @@ pub fn run(
     match format {
         Some(format) => {
             let mut output = io::stdout().lock();
-            Ok(plain::run(
+            Ok(line::run(
                 session,
                 &format,
                 options.limit,

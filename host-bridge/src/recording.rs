@@ -8,22 +8,25 @@
 //! MCAP holds messages of ROS 2 with their definitions, which Foxglove, PlotJuggler and ROS 2's own tools read
 //! as they come. There is a channel for each board and kind of message: [`row::CHANNELS`].
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use files::RecordingFiles;
+pub use files::part_path;
 use protocol::{PortCounters, Role};
+use queue::{Input, Loss, Output, PATIENCE, Taken, queue};
+pub use ros2::{CdrEncoder, ChannelSchema, SayError, SchemaError};
+pub use row_builder::{Entry, Note, RowBuilder, Tally};
 
-use crate::host_clock::now_us;
+use crate::clock::now_us;
 use crate::link::Event;
 use crate::lock::locked;
 
-mod cdr_encoder;
-mod columns;
 mod csv_folder;
 mod descriptions;
-mod error;
 mod files;
 pub mod gauge_stream;
 mod mcap_file;
@@ -33,15 +36,6 @@ mod ros2;
 pub mod row;
 mod row_builder;
 mod sink;
-
-pub use cdr_encoder::{CdrEncoder, ChannelSchema, SayError, SchemaError};
-pub use error::RecordingError;
-pub use files::part_path;
-pub use row_builder::{Entry, Note, RowBuilder, Tally};
-
-use files::RecordingFiles;
-use queue::{Input, Loss, Output, PATIENCE, Taken, queue};
-
 /// How often what has been heard is made safe: with the time that the disk takes, once a second.
 pub const SYNC: Duration = Duration::from_millis(900);
 /// How long an MCAP file gets before another one follows: its index takes some 10 MB of memory until then.
@@ -222,6 +216,47 @@ fn all_safe(tally: Tally, safe_bytes: u64) -> Progress {
     }
 }
 
+/// What went wrong with a recording that is being written.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// There is such a file or folder already.
+    #[error("{0}: is there already: give another name, or --force to write over it")]
+    Exists(PathBuf),
+    /// The file or folder can't be made.
+    #[error("{0}: can't be made: {1}")]
+    NotMade(PathBuf, #[source] io::Error),
+    /// The file does not take what is to be written.
+    #[error("{path}: can't be written any further: {source}; {safe_bytes} bytes of it are safe")]
+    NotWritten {
+        /// The file.
+        path: PathBuf,
+        /// What is on the disk and readable.
+        safe_bytes: u64,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file was removed while it was being written.
+    #[error("{0}: was removed while it was being written")]
+    Removed(PathBuf),
+    /// Neither a file nor a folder was named.
+    #[error("there is nowhere to record to: give a file, FILE.mcap, or --csv FOLDER")]
+    Nowhere,
+    /// The thread that writes has come to grief; it has said so on standard error.
+    #[error("the recording stopped by an error of this program")]
+    Died,
+}
+
+impl RecordingError {
+    pub(super) fn not_made(path: &Path, source: io::Error) -> Self {
+        let path = path.to_owned();
+        if source.kind() == io::ErrorKind::AlreadyExists {
+            Self::Exists(path)
+        } else {
+            Self::NotMade(path, source)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -267,7 +302,7 @@ mod tests {
             panic!("{error}");
         };
         assert_eq!(path, Path::new("/dev/full"));
-        assert_eq!(source.kind(), std::io::ErrorKind::StorageFull, "{error}");
+        assert_eq!(source.kind(), io::ErrorKind::StorageFull, "{error}");
     }
 
     #[test]

@@ -10,7 +10,6 @@
 //! dropped, and so is what was too long on its way. Nothing here keeps the operator safe: the display's
 //! supervisor does that, on its board, whatever the network does.
 
-pub mod access;
 pub mod age;
 pub mod credentials;
 pub mod datagrams;
@@ -20,18 +19,15 @@ pub mod far_board;
 pub mod flow;
 pub mod gate;
 pub mod hand;
-pub mod histogram;
 pub mod inward;
 pub mod name;
 pub mod network;
 pub mod operator;
 pub mod outbox;
 pub mod outward;
-pub mod reach;
 pub mod refused;
 pub mod remote;
 pub mod report;
 pub mod site;
 pub mod stops;
 pub mod transport;
-pub mod wire;

@@ -6,21 +6,21 @@
 //! recording ─> scene: TOML for the simulator, which reads the recording itself
 //! ```
 
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use protocol::Role;
+use protocol::{Message, Role};
 
+use crate::clock::now_us;
 use crate::clock::{Clock, micros};
 use crate::link::Event;
+use crate::recording::Entry;
 use crate::recording::reader::{ReadError, Reader};
+use crate::recording::row::{Kind, LinkEvent, Row};
 
-mod events;
 pub mod scene;
 pub mod stand_in;
-
-use events::Events;
-
 /// The slowest and the fastest that a recording can be played, relative to its own time.
 pub const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 /// How soon a player hears that it is to end.
@@ -92,8 +92,8 @@ pub fn play(
         played.events += 1;
         tell(role, event);
     }
-    played.cut = events.is_cut();
-    played.passed_over = events.passed_over();
+    played.cut = events.recording.is_cut();
+    played.passed_over = events.recording.passed_over();
     Ok(played)
 }
 
@@ -109,5 +109,104 @@ fn wait_until(clock: &dyn Clock, due_us: u64, ended: &AtomicBool) -> bool {
             return true;
         }
         notify.wait_until(due_us.min(now_us.saturating_add(micros(LOOK))));
+    }
+}
+
+/// The events of a recording, in order.
+struct Events {
+    recording: Reader,
+    /// What was known before the part that is played.
+    known: Vec<(Role, Kind, Event)>,
+    due: VecDeque<(f64, Role, Event)>,
+    begun: bool,
+}
+
+impl Events {
+    fn new(recording: Reader) -> Self {
+        Self {
+            recording,
+            known: Vec::new(),
+            due: VecDeque::new(),
+            begun: false,
+        }
+    }
+
+    /// The next event at or after `from_s` and its time in s since the recording's start; before the first
+    /// one, what was known until then.
+    fn next_from(&mut self, from_s: f64) -> Result<Option<(f64, Role, Event)>, ReadError> {
+        loop {
+            if let Some(due) = self.due.pop_front() {
+                return Ok(Some(due));
+            }
+            let entry = self.recording.next_entry()?;
+            for (role, row) in self.recording.take_told() {
+                self.keep(role, row);
+            }
+            let Some(entry) = entry else {
+                return Ok(None);
+            };
+            let at_s = self.recording.since_start_s(entry.log_ns);
+            if at_s < from_s {
+                self.keep(entry.role, entry.row);
+                continue;
+            }
+            if !std::mem::replace(&mut self.begun, true) {
+                let known = std::mem::take(&mut self.known);
+                self.due.extend(
+                    known
+                        .into_iter()
+                        .map(|(role, _, event)| (at_s, role, event)),
+                );
+            }
+            let Entry { role, row, .. } = entry;
+            if let Some(event) = Self::event(role, row) {
+                self.due.push_back((at_s, role, event));
+            }
+        }
+    }
+
+    /// Keeps what a link or a configuration was last.
+    fn keep(&mut self, role: Role, row: Row) {
+        let kind = row.kind();
+        let lasting = matches!(
+            kind,
+            Kind::Link | Kind::SensorConfiguration | Kind::DisplayConfiguration
+        );
+        if !lasting {
+            return;
+        }
+        if let Some(event) = Self::event(role, row).filter(|event| *event != Event::Restarted) {
+            self.known
+                .retain(|(of, what, _)| (*of, *what) != (role, kind));
+            self.known.push((role, kind, event));
+        }
+    }
+
+    fn event(role: Role, row: Row) -> Option<Event> {
+        let message = match row {
+            Row::Estimate(row) => Message::Estimate(row.into()),
+            Row::Texture(row) => Message::Texture(row.into()),
+            Row::Motion(motion) => Message::Motion(motion),
+            Row::Gauges(row) => Message::Gauges((&row).into()),
+            Row::SensorStatus(row) => Message::Status(row.status()),
+            Row::DisplayStatus(row) => Message::Status(row.status()?),
+            Row::Safety(row) => Message::Safety(row.safety()?),
+            Row::SensorConfiguration(row) => Message::Configuration(row.into()),
+            Row::DisplayConfiguration(row) => Message::Configuration(row.into()),
+            Row::Clock(row) => Message::Pong(row.pong()),
+            Row::Other(row) => row.message().ok()?,
+            Row::Link(row) => {
+                return match row.event {
+                    LinkEvent::Turned => row.state(role).map(Event::StateChanged),
+                    LinkEvent::Restarted => Some(Event::Restarted),
+                    LinkEvent::Gap => None,
+                };
+            }
+            Row::Line(_) | Row::Log(_) => return None,
+        };
+        Some(Event::Heard {
+            at_us: now_us(),
+            message,
+        })
     }
 }

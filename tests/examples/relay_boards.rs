@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use host_bridge::relay::histogram::Histogram;
+use host_bridge::relay::report::Histogram;
 use protocol::{Message, Role};
 use rustix::process::Signal;
 use tests::relay::{Relay, free_port};

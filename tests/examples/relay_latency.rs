@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use host_bridge::link::{Event, Link};
 use host_bridge::place::Place;
-use host_bridge::relay::histogram::Histogram;
+use host_bridge::relay::report::Histogram;
 use protocol::{Message, Motion, Role};
 use rustix::process::Signal;
 use tests::bridge;

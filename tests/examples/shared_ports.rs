@@ -15,10 +15,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use host_bridge::host_clock::unix_ns;
+use host_bridge::clock::unix_ns;
 use host_bridge::link::{Event, Link};
 use host_bridge::place::Place;
-use host_bridge::relay::histogram::Histogram;
+use host_bridge::relay::report::Histogram;
 use protocol::{GAUGE_BLOCK, GaugeSample, Gauges, Hello, Message, Motion, Role};
 use tests::fake_board::{FakeBoard, Script};
 
@@ -212,7 +212,7 @@ impl Client {
             heard += 1;
         }
         let percentiles = late.percentiles();
-        let of = |pick: fn(&host_bridge::relay::histogram::Percentiles) -> u64| {
+        let of = |pick: fn(&host_bridge::relay::report::Percentiles) -> u64| {
             percentiles.as_ref().map_or(u64::MAX, pick)
         };
         Report {

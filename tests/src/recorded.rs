@@ -4,7 +4,7 @@ use std::path::Path;
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
 use hil_sim_core::run::recording::ScanRecord;
-use host_bridge::host_clock::now_us;
+use host_bridge::clock::now_us;
 use host_bridge::link::Event;
 use host_bridge::recording::{Recorder, Settings};
 use protocol::{

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use host_bridge::host_clock::now_us;
+use host_bridge::clock::now_us;
 use protocol::{Hello, MAX_FRAME, Message, Port, Role};
 
 use crate::pty::Near;

@@ -9,10 +9,10 @@ use std::time::Duration;
 use host_bridge::clock::{Clock, Notify, micros};
 use host_bridge::lock::locked;
 use host_bridge::relay::endpoint::Endpoint;
+use host_bridge::relay::endpoint::Reach;
 use host_bridge::relay::envelope::Envelope;
 use host_bridge::relay::name::{Channel, Name};
 use host_bridge::relay::network::NetworkError;
-use host_bridge::relay::reach::Reach;
 use host_bridge::relay::transport::{Connection, Subscription, Transport};
 use protocol::Role;
 

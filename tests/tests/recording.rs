@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use hil_sim_core::scene::Scene;
 use host_bridge::clock::SystemClock;
-use host_bridge::host_clock::now_us;
+use host_bridge::clock::now_us;
 use host_bridge::link::Event;
 use host_bridge::recording::reader::{ReadError, Reader};
 use host_bridge::recording::row::{GaugeRow, Lost, Row, VOLTS_PER_CODE};

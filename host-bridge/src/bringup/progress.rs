@@ -8,8 +8,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use protocol::{PROTOCOL_VERSION, SCHEMA_HASH};
 use serde::{Deserialize, Serialize};
 
+use super::step;
 use super::step::{Figure, Step};
-use super::steps;
 
 /// The version of this shape.
 const FORMAT: u32 = 1;
@@ -162,7 +162,7 @@ impl Progress {
             looked_s,
             figures,
         });
-        let place = |name: &str| steps::all().position(|step| step.name == name);
+        let place = |name: &str| step::all().position(|step| step.name == name);
         self.steps.sort_by_key(|record| place(&record.step));
     }
 
@@ -177,7 +177,7 @@ impl Progress {
 
     /// The first step that has not been done.
     pub fn due(&self) -> Option<&'static Step> {
-        steps::all().find(|step| {
+        step::all().find(|step| {
             let record = self.record(&step.name);
             record.is_none_or(|record| !record.outcome.is_done())
         })
@@ -187,11 +187,11 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bringup::quantity::Value;
     use crate::bringup::sight::Sight;
-    use crate::bringup::step::Value;
 
     fn step(name: &str) -> &'static Step {
-        steps::named(name).expect("a step of that name")
+        step::named(name).expect("a step of that name")
     }
 
     #[test]

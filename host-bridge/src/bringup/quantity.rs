@@ -1,10 +1,11 @@
 //! What can be seen of a bench, by its name in `steps.toml`.
 
+use std::fmt;
+
 use protocol::{DisplayCounters, DisplayState, Trip};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::sight::{Sight, Track};
-use super::step::Value;
 use crate::doctor::findings;
 
 /// Changes of state of a board whose converters did not start: it stops out of its first state.
@@ -99,6 +100,46 @@ pub enum Quantity {
     Held,
     /// Findings of `host-bridge doctor`.
     Findings,
+}
+
+/// What was measured: in JSON a number or a string.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+// Not untagged: serde does not tell a number by that where a crate of the build wants numbers of any precision.
+#[serde(from = "serde_json::Value", into = "serde_json::Value")]
+pub enum Value {
+    /// A number, in its measure's unit.
+    Number(f64),
+    /// A word.
+    Word(String),
+}
+
+impl From<serde_json::Value> for Value {
+    fn from(value: serde_json::Value) -> Self {
+        match (value.as_f64(), value.as_str()) {
+            (Some(number), _) => Self::Number(number),
+            (None, Some(word)) => Self::Word(word.to_owned()),
+            (None, None) => Self::Word(value.to_string()),
+        }
+    }
+}
+
+impl From<Value> for serde_json::Value {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Number(number) => Self::from(number),
+            Value::Word(word) => Self::String(word),
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) if number.fract() == 0.0 => write!(f, "{number}"),
+            Self::Number(number) => write!(f, "{number:.3}"),
+            Self::Word(word) => f.write_str(word),
+        }
+    }
 }
 
 impl Quantity {

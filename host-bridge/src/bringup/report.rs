@@ -5,8 +5,8 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use super::progress::{Outcome, Progress};
+use super::step;
 use super::step::Figure;
-use super::steps;
 
 const STYLE: &str = "body{font:16px/1.4 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}\
 table{border-collapse:collapse;width:100%}td,th{border:1px solid #999;padding:.2em .5em;text-align:left}\
@@ -24,7 +24,7 @@ pub fn html(progress: &Progress) -> String {
     );
     boards(&mut page, &progress.doctor);
     page += "<h2>Steps</h2>\n<table>\n<tr><th>step<th>figure<th>value<th>has to be<th>result\n";
-    for step in steps::all() {
+    for step in step::all() {
         let title = format!("<b>{}</b><br>{}", step.name, escape(&step.title));
         let Some(record) = progress.record(&step.name) else {
             let _ = writeln!(page, "<tr class=soft><td>{title}<td colspan=4>not tried");
@@ -130,12 +130,12 @@ mod tests {
     #[test]
     fn every_step_and_figure_is_in_it_and_markup_stays_text() {
         let mut progress = Progress::default();
-        let step = steps::named("link-to-display").expect("a step");
+        let step = step::named("link-to-display").expect("a step");
         let mut figures = step.judge(&Sight::default(), |_| None);
         figures[0].advice = Some("PD5 <to> PD6 & ground".to_owned());
         progress.put(step, Outcome::Failed, None, figures.clone(), 2.0);
         let page = html(&progress);
-        for step in steps::all() {
+        for step in step::all() {
             assert!(page.contains(&format!("<b>{}</b>", step.name)));
         }
         for figure in figures {

@@ -1,10 +1,11 @@
-//! What a step is made of, and how what is seen is judged.
+//! What a step is made of, how what is seen is judged, and the steps themselves: the table `steps.toml`.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::quantity::Quantity;
+use super::quantity::{Quantity, Value};
 use super::sight::Sight;
 
 /// A step of bringing a bench up.
@@ -67,17 +68,6 @@ pub enum Limit {
     /// From the first to the second.
     Within(f64, f64),
     /// This word.
-    Word(String),
-}
-
-/// What was measured: in JSON a number or a string.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-// Not untagged: serde does not tell a number by that where a crate of the build wants numbers of any precision.
-#[serde(from = "serde_json::Value", into = "serde_json::Value")]
-pub enum Value {
-    /// A number, in its measure's unit.
-    Number(f64),
-    /// A word.
     Word(String),
 }
 
@@ -151,25 +141,6 @@ impl Limit {
     }
 }
 
-impl From<serde_json::Value> for Value {
-    fn from(value: serde_json::Value) -> Self {
-        match (value.as_f64(), value.as_str()) {
-            (Some(number), _) => Self::Number(number),
-            (None, Some(word)) => Self::Word(word.to_owned()),
-            (None, None) => Self::Word(value.to_string()),
-        }
-    }
-}
-
-impl From<Value> for serde_json::Value {
-    fn from(value: Value) -> Self {
-        match value {
-            Value::Number(number) => Self::from(number),
-            Value::Word(word) => Self::String(word),
-        }
-    }
-}
-
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -177,16 +148,6 @@ impl fmt::Display for Limit {
             Self::AtMost(0.0) => f.write_str("0"),
             Self::AtMost(high) => write!(f, "at most {high}"),
             Self::Within(low, high) => write!(f, "{low} to {high}"),
-            Self::Word(word) => f.write_str(word),
-        }
-    }
-}
-
-impl fmt::Display for Value {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(number) if number.fract() == 0.0 => write!(f, "{number}"),
-            Self::Number(number) => write!(f, "{number:.3}"),
             Self::Word(word) => f.write_str(word),
         }
     }
@@ -202,6 +163,28 @@ impl fmt::Display for Figure {
             None => write!(f, "{what}: not to be seen (has to be: {limit}{gap}{unit})"),
         }
     }
+}
+
+/// The amplitude that the first stroke is made with, in mV.
+pub const FIRST_AMPLITUDE_MV: u16 = 1_000;
+
+#[derive(Deserialize)]
+struct Table {
+    steps: Vec<Step>,
+}
+
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    toml::from_str(include_str!("steps.toml")).expect("a table that the tests have read")
+});
+
+/// Every step, in its order.
+pub fn all() -> impl Iterator<Item = &'static Step> {
+    TABLE.steps.iter()
+}
+
+/// The step called `name`.
+pub fn named(name: &str) -> Option<&'static Step> {
+    all().find(|step| step.name == name)
 }
 
 #[cfg(test)]
@@ -237,6 +220,42 @@ mod tests {
             let figure = measure.judge(value.clone(), &Sight::default());
             assert_eq!(figure.passes, passes, "{limit:?} {value:?}");
             assert_eq!(figure.advice.is_none(), passes);
+        }
+    }
+}
+
+#[cfg(test)]
+mod steps_tests {
+    use super::*;
+    use crate::bringup::sight::Sight;
+
+    #[test]
+    fn every_step_has_a_name_of_its_own_and_needs_only_what_comes_before_it() {
+        let mut before = Vec::new();
+        for step in all() {
+            assert!(!before.contains(&step.name), "{} twice", step.name);
+            for need in &step.needs {
+                assert!(before.contains(need), "{} before {need}", step.name);
+            }
+            before.push(step.name.clone());
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_seen_no_step_passes_and_each_says_what_to_try() {
+        for step in all() {
+            assert!(!step.measures.is_empty() && !step.to_do.is_empty());
+            let figures = step.judge(&Sight::default(), |_| None);
+            for figure in figures.iter().filter(|figure| !figure.passes) {
+                assert!(
+                    figure
+                        .advice
+                        .as_ref()
+                        .is_some_and(|advice| advice.len() > 10)
+                );
+            }
+            // What USB has attached is nothing, and so is what this user may not open.
+            assert!(figures.iter().any(|figure| !figure.passes), "{}", step.name);
         }
     }
 }

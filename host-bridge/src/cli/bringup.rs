@@ -12,9 +12,10 @@ use anyhow::Context;
 use clap::ValueHint;
 use host_bridge::bench::Bench;
 use host_bridge::bringup::progress::{Outcome, Progress};
+use host_bridge::bringup::quantity::Value;
 use host_bridge::bringup::sight::{Sight, Wanted};
-use host_bridge::bringup::step::{Figure, Limit, Measure, Step, Value, Witness};
-use host_bridge::bringup::{report, steps};
+use host_bridge::bringup::step::{Figure, Limit, Measure, Step, Witness};
+use host_bridge::bringup::{report, step};
 use host_bridge::doctor::{findings, json};
 use host_bridge::system::System;
 
@@ -51,10 +52,10 @@ pub struct Bringup {
     #[arg(long, value_name = "FILE", default_value = "bringup.json", value_hint = ValueHint::FilePath)]
     state: PathBuf,
     /// Begins at this step, whatever has been done
-    #[arg(long, value_name = "STEP", value_parser = step)]
+    #[arg(long, value_name = "STEP", value_parser = named)]
     from: Option<&'static Step>,
     /// Does this step alone
-    #[arg(long, value_name = "STEP", value_parser = step, conflicts_with = "from")]
+    #[arg(long, value_name = "STEP", value_parser = named, conflicts_with = "from")]
     only: Option<&'static Step>,
     /// Measures all at once and asks nothing: the bench is wired and its hand moves to the right. What needs a
     /// person is left out
@@ -65,8 +66,8 @@ pub struct Bringup {
     list: bool,
 }
 
-fn step(name: &str) -> Result<&'static Step, String> {
-    steps::named(name).ok_or_else(|| "no such step; --list names them all".to_owned())
+fn named(name: &str) -> Result<&'static Step, String> {
+    step::named(name).ok_or_else(|| "no such step; --list names them all".to_owned())
 }
 
 impl Bringup {
@@ -120,7 +121,7 @@ impl Bringup {
         let Some(first) = self.from.or_else(|| progress.due()) else {
             return Vec::new();
         };
-        steps::all()
+        step::all()
             .skip_while(|step| step.name != first.name)
             .collect()
     }
@@ -132,7 +133,7 @@ fn report_path(state: &Path) -> PathBuf {
 
 fn list(progress: &Progress) -> String {
     let mut out = String::new();
-    for step in steps::all() {
+    for step in step::all() {
         let record = progress.record(&step.name);
         let outcome = record.map_or("-", |record| record.outcome.name());
         let _ = writeln!(
@@ -235,7 +236,7 @@ impl Session {
         }
         let wanted = Wanted {
             span_s: SPAN_S,
-            amplitude_mv: sets_amplitude.then_some(steps::FIRST_AMPLITUDE_MV),
+            amplitude_mv: sets_amplitude.then_some(step::FIRST_AMPLITUDE_MV),
         };
         Sight::of(&System::default(), &self.bench, wanted, &self.ended)
     }

@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::ValueHint;
 use host_bridge::bench::Bench;
 use host_bridge::monitor::firmware_log::{Logs, Origin};
-use host_bridge::monitor::plain::Format;
+use host_bridge::monitor::line::Format;
 use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use clap::ValueHint;
 use host_bridge::bench::Bench;
-use host_bridge::host_clock::now_us;
+use host_bridge::clock::now_us;
 use host_bridge::link::{Event, Link};
 use host_bridge::monitor::firmware_log::{LogError, Logs, Origin};
 use host_bridge::monitor::log_entry::LogEvent;

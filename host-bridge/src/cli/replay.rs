@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use clap::ValueHint;
 use host_bridge::clock::SystemClock;
-use host_bridge::host_clock::now_us;
+use host_bridge::clock::now_us;
 use host_bridge::link::{Event, Link};
 use host_bridge::monitor::{self, Options, Source};
 use host_bridge::recording::reader::Reader;

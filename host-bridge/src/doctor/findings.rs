@@ -8,8 +8,8 @@ use protocol::{
     SCHEMA_HASH, Status,
 };
 
-use super::clock::ClockFacts;
 use super::counters::{self, Count};
+use super::examination::ClockFacts;
 use super::examination::{BoardFacts, ElfFacts, Examination, ProbeFacts};
 use super::permission::{RELOAD, RULES, probe_rule};
 use super::supervisor;

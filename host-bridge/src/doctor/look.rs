@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use protocol::{Message, Ping, Role, Status};
 
-use super::clock::{ClockFacts, Exchange};
 use super::examination::{BoardFacts, ElfFacts, Examination, ProbeFacts};
+use super::examination::{ClockFacts, Exchange};
 use super::permission::{Permission, has_plugdev};
 use crate::bench::{Bench, Seat};
 use crate::clock::{Receiver, Sender, channel, micros};

@@ -10,7 +10,7 @@ use crate::state::State;
 pub struct Board {
     /// How the way to it stands; none before anything was heard of it.
     pub state: Option<State>,
-    /// What it said of itself last, and when, in µs of [`crate::host_clock::now_us`].
+    /// What it said of itself last, and when, in µs of [`crate::clock::now_us`].
     pub status: Option<(u64, Status)>,
     /// What has stopped a sensor board's arm for good; none while it may follow, or is not known.
     pub arm_stopped: Option<Trip>,

@@ -11,9 +11,9 @@ use super::board::Board;
 use super::fingertip::Fingertip;
 use super::log_entry::{LogEntry, LogEvent};
 use super::orders::{Orders, Outcome};
+use super::settings;
 use super::settings::Setting;
 use super::trace::Trace;
-use super::words;
 use crate::link::{Clocks, Event, NotSent};
 
 /// Happenings kept.
@@ -58,7 +58,7 @@ pub struct Notice {
 /// All that a monitor knows.
 #[derive(Clone, Debug, Default)]
 pub struct Dashboard {
-    /// The present, in µs of [`crate::host_clock::now_us`].
+    /// The present, in µs of [`crate::clock::now_us`].
     pub now_us: u64,
     /// The sensor board.
     pub sensor: Board,
@@ -340,7 +340,7 @@ impl Dashboard {
             }
             (_, Message::Configuration(report)) => {
                 let configuration = report.configuration;
-                if words::role_of(&configuration) == role {
+                if settings::role_of(&configuration) == role {
                     self.board_mut(role).configuration = Some(configuration);
                 }
                 if let protocol::Configuration::Display(display) = &configuration {

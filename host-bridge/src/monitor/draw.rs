@@ -8,28 +8,24 @@
 //! keys
 //! ```
 
-mod areas;
-mod big;
 mod boards;
 mod fingertip;
 mod gauges;
 mod header;
-mod help;
 mod log;
 mod plot;
 mod ports;
 mod settings;
 mod surface;
 mod text;
-mod tiny;
 mod velocity;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
 
-use self::areas::{cut_left, cut_top};
 use super::dashboard::Dashboard;
 use super::view::{Panel, View};
+use text::{cut_left, cut_top};
 
 /// Below this size only the most needful lines are shown.
 const LEAST_WIDTH: u16 = 60;
@@ -47,7 +43,7 @@ const LOG_HEIGHT: u16 = 3;
 pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &View) {
     let area = frame.area();
     if area.width < LEAST_WIDTH || area.height < LEAST_HEIGHT {
-        tiny::draw(frame, area, live, view);
+        header::draw_tiny(frame, area, live, view);
         return;
     }
     let [header, rest] = cut_top(area, header::height(live, view, area.width));
@@ -59,7 +55,7 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
     if let Some(form) = &view.form {
         settings::draw(frame, body, live, view, form);
     } else if view.shows_help {
-        help::draw(frame, body, view.theme);
+        settings::draw_help(frame, body, view.theme);
     }
 }
 

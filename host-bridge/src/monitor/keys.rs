@@ -3,7 +3,7 @@
 use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::dashboard::Dashboard;
-use super::form::Form;
+use super::view::Form;
 use super::view::{SPANS_S, View};
 
 /// What a key asks of whoever runs the dashboard.

@@ -1,6 +1,10 @@
-//! A dashboard in lines: columns for people and scripts, or JSON.
+//! The monitor for pipes and logs: a line now and then, and one at each change; in columns for people and scripts, or
+//! in JSON.
 
 use std::fmt::Write as _;
+use std::io::{self, ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use protocol::{GaugeHealth, PortCounters, RoleCounters, Trip};
 use serde_json::{Value, json};
@@ -8,8 +12,10 @@ use serde_json::{Value, json};
 use super::board::Board;
 use super::dashboard::Dashboard;
 use super::log_entry::{LogEntry, LogEvent};
-use super::words;
-use crate::host_clock::unix_ns;
+use super::session::Session;
+use super::settings;
+use crate::clock::micros;
+use crate::clock::{now_us, unix_ns};
 use crate::state::State;
 
 /// The names of the columns of [`second`], over their values. What is not known is `-`; the last column
@@ -48,8 +54,8 @@ pub fn second(dashboard: &Dashboard) -> String {
         " {:>9} {:>4} {valid:<6} {:<5} {:<10} {:>8} {:>9} {:>9} {age:>6} {lost:>5} {bad:>5} {:>8} {:>8} {}",
         number(estimate.and_then(|estimate| estimate.wavelength_mm), 3),
         number(estimate.map(|estimate| estimate.confidence), 2),
-        estimate.map_or("-", |estimate| words::range(estimate.range)),
-        estimate.map_or("-", |estimate| words::contact(estimate.contact)),
+        estimate.map_or("-", |estimate| settings::range(estimate.range)),
+        estimate.map_or("-", |estimate| settings::contact(estimate.contact)),
         number(estimate.and_then(|estimate| estimate.counted_mm), 2),
         mm_s(estimate.map(|estimate| estimate.velocity_um_s)),
         mm_s(dashboard.motion.map(|(_, motion)| motion.velocity_um_s)),
@@ -83,8 +89,8 @@ pub fn second_json(dashboard: &Dashboard) -> Value {
             "wavelength_mm": estimate.wavelength_mm,
             "confidence": estimate.confidence,
             "valid": estimate.valid,
-            "range": words::range(estimate.range),
-            "contact": words::contact(estimate.contact),
+            "range": settings::range(estimate.range),
+            "contact": settings::contact(estimate.contact),
             "counted_mm": estimate.counted_mm,
             "amplitude_lsb": estimate.amplitude_lsb,
             "velocity_mm_s": mm_s(estimate.velocity_um_s),
@@ -200,4 +206,95 @@ fn seconds(us: u64) -> f64 {
 
 fn unix_s(at_us: u64) -> f64 {
     (unix_ns(at_us) / 1_000_000) as f64 / 1e3
+}
+
+/// Longest wait until a signal, or a line of a log, is seen.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// What the lines are to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Format {
+    /// JSON instead of columns.
+    pub is_json: bool,
+    /// Time between two lines.
+    pub every: Duration,
+}
+
+impl Default for Format {
+    /// Columns, a line a second.
+    fn default() -> Self {
+        Self {
+            is_json: false,
+            every: Duration::from_secs(1),
+        }
+    }
+}
+
+/// Writes lines until `ended`, for `limit` at most, until the source has ended, or until nobody reads them any
+/// more.
+///
+/// True if a board was there, or if nobody reads any more. Fails if they can't be written for another reason.
+pub fn run(
+    mut session: Session,
+    format: &Format,
+    limit: Option<Duration>,
+    ended: &AtomicBool,
+    output: &mut impl Write,
+) -> io::Result<bool> {
+    match write_lines(&mut session, format, limit, ended, output) {
+        // Who reads no more has seen enough.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(true),
+        written => written.map(|()| session.has_met()),
+    }
+}
+
+fn write_lines(
+    session: &mut Session,
+    format: &Format,
+    limit: Option<Duration>,
+    ended: &AtomicBool,
+    output: &mut impl Write,
+) -> io::Result<()> {
+    let begun_us = now_us();
+    let every_us = micros(format.every).max(1);
+    let mut next_us = begun_us + every_us;
+    let end_us = limit.map(|limit| begun_us.saturating_add(micros(limit)));
+    if !format.is_json {
+        writeln!(output, "{}", HEADING)?;
+        output.flush()?;
+    }
+    loop {
+        let now = now_us();
+        let wait = Duration::from_micros(next_us.saturating_sub(now)).min(LOOK);
+        session.wait(wait);
+        session.take();
+        let now = now_us();
+        let log_entries = session.dashboard.take_log_entries();
+        let is_due = now >= next_us;
+        let is_over = session.is_over()
+            || ended.load(Ordering::Acquire)
+            || end_us.is_some_and(|end_us| now >= end_us);
+        for entry in &log_entries {
+            if format.is_json {
+                writeln!(output, "{}", happening_json(entry))?;
+            } else {
+                writeln!(output, "{}", log_entry(entry))?;
+            }
+        }
+        if is_due {
+            // One line stands for those that would have been due while nobody took them.
+            next_us = (next_us + every_us).max(now);
+            if format.is_json {
+                writeln!(output, "{}", second_json(&session.dashboard))?;
+            } else {
+                writeln!(output, "{}", second(&session.dashboard))?;
+            }
+        }
+        if is_due || !log_entries.is_empty() {
+            output.flush()?;
+        }
+        if is_over {
+            return Ok(());
+        }
+    }
 }

@@ -9,7 +9,7 @@ use crate::state::{Advised, State};
 /// Something that happened at one of the boards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogEntry {
-    /// When, in µs of [`crate::host_clock::now_us`].
+    /// When, in µs of [`crate::clock::now_us`].
     pub at_us: u64,
     /// Where.
     pub role: Role,

@@ -15,7 +15,7 @@ use super::MonitorError;
 use super::dashboard::Dashboard;
 use super::draw::draw;
 use super::keys::{Asked, is_stop, press};
-use super::live_recording::LiveRecording;
+use super::session::LiveRecording;
 use super::session::Session;
 use super::theme::Theme;
 use super::view::{Kept, View};

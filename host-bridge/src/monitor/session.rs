@@ -1,6 +1,6 @@
 //! A dashboard that is watched: where events come from, and where orders go to.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
@@ -8,13 +8,12 @@ use std::time::Duration;
 use protocol::Role;
 
 use super::dashboard::Dashboard;
-use super::live_recording::LiveRecording;
 use super::log_entry::LogEvent;
 use crate::clock::is_due;
-use crate::host_clock::now_us;
+use crate::clock::now_us;
 use crate::link::{Event, Link, LinkSender};
 use crate::recording::gauge_stream::{GaugeStream, Lease};
-use crate::recording::{Progress, RecordingError};
+use crate::recording::{PART, Progress, Recorder, RecordingError, Settings, part_path};
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
@@ -268,5 +267,39 @@ impl Session {
             self.stream.on_event(role, &event);
         }
         self.dashboard.on(now_us(), role, event);
+    }
+}
+
+/// A recording under way.
+pub struct LiveRecording {
+    /// Its file.
+    pub path: PathBuf,
+    /// Since when, in µs of [`crate::clock::now_us`].
+    pub since_us: u64,
+    /// What writes it.
+    pub recorder: Recorder,
+}
+
+impl LiveRecording {
+    /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is free.
+    /// Fails if it can't be written there.
+    pub fn begin(folder: &Path, since_us: u64) -> Result<Self, RecordingError> {
+        let named = |number: u32| folder.join(format!("monitor-{number}.mcap"));
+        let is_free = |path: &PathBuf| !path.exists() && !part_path(path, 2).exists();
+        let path = (1..=u32::MAX)
+            .map(named)
+            .find(is_free)
+            .unwrap_or_else(|| named(0));
+        let recorder = Recorder::start(Settings {
+            mcap: Some(path.clone()),
+            csv: None,
+            force: false,
+            part: Some(PART),
+        })?;
+        Ok(Self {
+            path,
+            since_us,
+            recorder,
+        })
     }
 }

@@ -1,19 +1,17 @@
-//! A folder of CSV files, one a channel, that are being written.
+//! A folder of CSV files, one a channel, that are being written; their columns are those of the rows' types.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use postcard_schema::Schema;
-use postcard_schema::schema::NamedType;
+use postcard_schema::schema::{DataModelType, NamedType};
 use protocol::Gauges;
 use serde_json::Value;
 
-use super::columns::{cells, columns};
-use super::error::RecordingError;
 use super::row::{CHANNELS, GaugeRow, Kind, Row, SAMPLE_US, channel};
 use super::row_builder::Entry;
 use super::sink::{Sink, SinkWriter};
+use crate::recording::RecordingError;
 
 const NS_PER_S: u64 = 1_000_000_000;
 const NS_PER_US: u64 = 1_000;
@@ -189,5 +187,66 @@ impl Channel {
 
     fn failed(&self, source: io::Error) -> RecordingError {
         self.sink.failed(source)
+    }
+}
+
+/// The CSV columns of a type: fields within fields are joined by `_`, items are numbered from 0.
+pub fn columns(named: &'static NamedType) -> Vec<String> {
+    let mut names = Vec::new();
+    add_columns(named, "", &mut names);
+    names
+}
+
+fn add_columns(named: &'static NamedType, name: &str, names: &mut Vec<String>) {
+    let within = |inner: &str| {
+        if name.is_empty() {
+            inner.to_owned()
+        } else {
+            format!("{name}_{inner}")
+        }
+    };
+    match named.ty {
+        DataModelType::Option(inner) | DataModelType::NewtypeStruct(inner) => {
+            add_columns(inner, name, names);
+        }
+        DataModelType::Struct(fields) => {
+            for field in *fields {
+                add_columns(field.ty, &within(field.name), names);
+            }
+        }
+        DataModelType::Tuple(items) => {
+            for (index, item) in items.iter().enumerate() {
+                add_columns(item, &within(&index.to_string()), names);
+            }
+        }
+        _ => names.push(name.to_owned()),
+    }
+}
+
+/// The cells under [`columns`] of a value of the type; those of a field that is missing are empty.
+pub fn cells(named: &'static NamedType, value: Option<&Value>, cells: &mut Vec<String>) {
+    match named.ty {
+        DataModelType::Option(inner) | DataModelType::NewtypeStruct(inner) => {
+            self::cells(inner, value, cells);
+        }
+        DataModelType::Struct(fields) => {
+            for field in *fields {
+                self::cells(
+                    field.ty,
+                    value.and_then(|value| value.get(field.name)),
+                    cells,
+                );
+            }
+        }
+        DataModelType::Tuple(items) => {
+            for (index, item) in items.iter().enumerate() {
+                self::cells(item, value.and_then(|value| value.get(index)), cells);
+            }
+        }
+        _ => cells.push(match value {
+            None | Some(Value::Null) => String::new(),
+            Some(Value::String(text)) => text.clone(),
+            Some(value) => value.to_string(),
+        }),
     }
 }

@@ -5,14 +5,12 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// Every file with a type that a row is made of.
-const SOURCES: [&str; 16] = [
-    include_str!("row/configuration.rs"),
+const SOURCES: [&str; 14] = [
     include_str!("row/estimate.rs"),
     include_str!("row/gauges.rs"),
     include_str!("row/link.rs"),
     include_str!("row/log.rs"),
     include_str!("row/status.rs"),
-    include_str!("row/texture.rs"),
     include_str!("../../../protocol/src/actuators.rs"),
     include_str!("../../../protocol/src/configuration.rs"),
     include_str!("../../../protocol/src/hello.rs"),

@@ -9,11 +9,11 @@ use protocol::{PROTOCOL_VERSION, SCHEMA_HASH};
 
 use super::Settings;
 use super::csv_folder::CsvFolder;
-use super::error::RecordingError;
 use super::mcap_file::{FORMAT, McapFile};
 use super::row::{HelloRow, LinkEvent, Row};
 use super::row_builder::Entry;
-use crate::host_clock::{now_us, unix_ns};
+use crate::clock::{now_us, unix_ns};
+use crate::recording::RecordingError;
 
 /// The key of a board's configuration, as JSON, in what a later part tells of it.
 pub const CONFIGURATION: &str = "configuration";

@@ -13,10 +13,10 @@ use std::path::Path;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::cdr_encoder::CdrEncoder;
-use super::error::RecordingError;
+use super::ros2::CdrEncoder;
 use super::row_builder::Entry;
 use super::sink::{Sink, SinkWriter};
+use crate::recording::RecordingError;
 
 /// What stands in the file's header: it can be read as a recording of ROS 2.
 pub const PROFILE: &str = "ros2";

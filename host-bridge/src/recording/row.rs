@@ -12,23 +12,20 @@ macro_rules! copied {
     };
 }
 
-mod configuration;
 mod estimate;
 mod gauges;
 mod link;
 mod log;
 mod status;
-mod text;
-mod texture;
 
-pub use configuration::{DisplayReportRow, SensorReportRow};
 pub use estimate::EstimateRow;
+pub use estimate::TextureRow;
 pub use gauges::{GaugeRow, GaugesRow, SAMPLE_US, VOLTS_PER_CODE, block};
 pub use link::{ClockRow, HelloRow, LinkEvent, LinkRow, Lost, OtherRow};
+pub use log::Text;
 pub use log::{LEVELS, LogRow, Time};
+pub use status::{DisplayReportRow, SensorReportRow};
 pub use status::{DisplayStatusRow, SafetyRow, SensorStatusRow, Stand, StandName};
-pub use text::Text;
-pub use texture::TextureRow;
 
 macro_rules! rows {
     ($($(#[$doc:meta])* $kind:ident($row:ty): $name:literal),* $(,)?) => {

@@ -6,7 +6,7 @@ use super::row::{
     CHANNELS, ClockRow, DisplayReportRow, DisplayStatusRow, LinkRow, LogRow, Lost, OtherRow, Row,
     SensorReportRow, SensorStatusRow, channel,
 };
-use crate::host_clock::unix_ns;
+use crate::clock::unix_ns;
 use crate::link::Event;
 
 const SAMPLE_NS: u64 = 1_000_000;

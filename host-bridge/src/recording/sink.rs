@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::error::RecordingError;
+use crate::recording::RecordingError;
 
 /// A file that is being written.
 pub struct Sink {

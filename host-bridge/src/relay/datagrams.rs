@@ -12,7 +12,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use std::{io, iter};
 
-use crate::host_clock::now_us;
+use crate::clock::now_us;
 use crate::lock::locked;
 use crate::relay::endpoint::Endpoint;
 use crate::relay::envelope::MAX_ENVELOPE;

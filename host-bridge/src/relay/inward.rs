@@ -9,9 +9,9 @@ use crate::relay::age::{Age, Ages};
 use crate::relay::envelope::{Content, Envelope, EnvelopeError, sequence_number};
 use crate::relay::flow::Answer;
 use crate::relay::gate::{Gate, Order};
-use crate::relay::histogram::{Histogram, Percentiles};
 use crate::relay::outbox::Waiting;
 use crate::relay::remote::RemoteBridge;
+use crate::relay::report::{Histogram, Percentiles};
 use crate::relay::report::{Incoming, Notice};
 
 /// What is to be done about an envelope.

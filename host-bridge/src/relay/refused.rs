@@ -11,7 +11,7 @@ use tracing::span::{Attributes, Id, Record};
 use tracing::subscriber::{self, Interest};
 use tracing::{Event, Metadata, Subscriber};
 
-use crate::host_clock;
+use crate::clock;
 use crate::lock::locked;
 
 /// Where the engine traces what it allows and what not.
@@ -175,7 +175,7 @@ fn hear(denial: Denial<'_>) {
     };
     if is_said {
         let key = (!key.is_empty()).then_some(key);
-        ledger.note(host_clock::now_us(), peer, key);
+        ledger.note(clock::now_us(), peer, key);
     }
 }
 

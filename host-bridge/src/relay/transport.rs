@@ -6,9 +6,9 @@ use protocol::Role;
 
 use crate::relay::credentials::CredentialsError;
 use crate::relay::endpoint::Endpoint;
+use crate::relay::endpoint::Reach;
 use crate::relay::envelope::Envelope;
 use crate::relay::name::{Channel, Name};
-use crate::relay::reach::Reach;
 
 /// Why a program can't take part.
 #[derive(Debug, thiserror::Error)]

@@ -18,10 +18,9 @@ use crate::recording::row::GaugeRow;
 
 mod document;
 pub(crate) mod excerpt;
-mod expectation;
 
+use document::Expectation;
 use excerpt::Excerpt;
-use expectation::Expectation;
 
 /// The longest scene, in s.
 const LONGEST_S: f64 = 600.0;

@@ -1,8 +1,8 @@
 //! A bench as the doctor finds it, well or spoiled.
 
-use host_bridge::doctor::clock::ClockFacts;
-use host_bridge::doctor::clock::Drift;
 use host_bridge::doctor::examination::BoardFacts;
+use host_bridge::doctor::examination::ClockFacts;
+use host_bridge::doctor::examination::Drift;
 use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::doctor::examination::Examination;
 use host_bridge::doctor::examination::ProbeFacts;

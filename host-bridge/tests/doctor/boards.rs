@@ -1,7 +1,7 @@
 //! Boards that are wrong, restarted, silent or ill.
 
-use host_bridge::doctor::clock::Drift;
 use host_bridge::doctor::examination::BoardFacts;
+use host_bridge::doctor::examination::Drift;
 use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::state::State;
 use protocol::{DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, Trip};

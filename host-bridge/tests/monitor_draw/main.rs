@@ -5,8 +5,8 @@ mod sizes;
 use host_bridge::link::{Clocks, Event};
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::draw::draw;
-use host_bridge::monitor::form::Form;
 use host_bridge::monitor::theme::Theme;
+use host_bridge::monitor::view::Form;
 use host_bridge::monitor::view::{Panel, View};
 use host_bridge::state::State;
 use protocol::{

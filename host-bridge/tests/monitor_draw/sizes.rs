@@ -2,8 +2,8 @@
 
 use host_bridge::link::{Clocks, Event};
 use host_bridge::monitor::dashboard::Dashboard;
-use host_bridge::monitor::form::Form;
 use host_bridge::monitor::orders::Outcome;
+use host_bridge::monitor::view::Form;
 use host_bridge::monitor::view::{Kept, Panel};
 use host_bridge::state::State;
 use protocol::{

@@ -5,9 +5,8 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::areas::{self, cut_top};
 use super::plot::{Plot, Range, Series, round_step};
-use super::text;
+use super::text::{self, cut_top};
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::view::View;
 
@@ -21,7 +20,7 @@ const SILENT_US: u64 = 500_000;
 /// Draws the gauges side by side, all to one scale.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
     let theme = view.theme;
-    let columns: [Rect; GAUGES] = areas::columns(cut_top(area, 1)[1]);
+    let columns: [Rect; GAUGES] = text::columns(cut_top(area, 1)[1]);
     let plots = columns.map(|column| Plot::bare(cut_top(column, 1)[1], view.span_s() * PART));
     let traces = shown.traces.gauges_lsb.each_ref();
     let series = traces.map(|trace| [Series::line(trace, theme.sensor())]);

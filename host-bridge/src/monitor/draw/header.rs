@@ -1,4 +1,4 @@
-//! The boards, the supervisor, and the keys.
+//! The boards, the supervisor, and the keys; or the most needful lines, where there is room for no more.
 
 use protocol::{DisplayState, Role};
 use ratatui::Frame;
@@ -7,8 +7,8 @@ use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::areas::{cut_left, cut_top};
-use super::{boards, text};
+use super::text::{cut_left, cut_top};
+use super::{boards, surface, text};
 use crate::monitor::board::Board;
 use crate::monitor::dashboard::{Dashboard, Notice};
 use crate::monitor::theme::Theme;
@@ -202,4 +202,50 @@ pub fn keys(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
         })
         .collect();
     frame.render_widget(Line::from(spans), area);
+}
+
+/// Draws as many lines as there is room for.
+pub fn draw_tiny(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View) {
+    let theme = view.theme;
+    let estimate = live.estimate.map(|(_, estimate)| estimate);
+    let wavelength = estimate
+        .and_then(|estimate| estimate.wavelength_mm)
+        .map_or_else(|| "-".to_owned(), surface::millimetres);
+    let sure = match estimate {
+        Some(estimate) if estimate.valid => "valid",
+        Some(_) => "unsure",
+        None => "not heard",
+    };
+    let velocity = |um_s: Option<i32>| {
+        let words = um_s.map(|um_s| format!("{:+.1}", um_s as f32 / 1e3));
+        words.unwrap_or_else(|| "-".to_owned())
+    };
+    let hand = velocity(live.motion.map(|(_, motion)| motion.velocity_um_s));
+    let arm = velocity(estimate.map(|estimate| estimate.velocity_um_s));
+    let board = |role| {
+        let board = live.board(role);
+        let word = board.state.as_ref().map_or("-", |state| state.word());
+        Line::from(vec![
+            Span::styled(role.name(), theme.quiet()),
+            Span::styled(format!(" {word}"), state_style(board, theme)),
+        ])
+    };
+    let lines = [
+        supervisor(live, theme),
+        Line::from(vec![
+            Span::styled("λ ", theme.quiet()),
+            Span::styled(format!("{wavelength} mm"), theme.strong()),
+            Span::raw(format!(" {sure}")),
+        ]),
+        Line::raw(format!("hand {hand} arm {arm} mm/s")),
+        board(Role::Sensor),
+        board(Role::Display),
+        live.notice().map_or_else(
+            || Line::styled("s stop  q quit", theme.quiet()),
+            |notice| Line::styled(notice.text.clone(), notice_style(notice, theme)),
+        ),
+    ];
+    for (row, line) in (0..).zip(lines) {
+        text::put(frame, area, row, line);
+    }
 }

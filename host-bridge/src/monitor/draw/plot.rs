@@ -7,8 +7,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::Line;
 use ratatui::widgets::canvas::{Canvas, Context, Painter, Shape};
 
-use super::areas::cut_left;
 use super::text;
+use super::text::cut_left;
 use crate::monitor::theme::Theme;
 use crate::monitor::trace::{Extent, Trace, column_us};
 

@@ -5,8 +5,8 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::areas::cut_left;
 use super::text;
+use super::text::cut_left;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::theme::Theme;
 

@@ -6,13 +6,13 @@ use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::text::{Line, Span};
 
-use super::areas::cut_top;
 use super::plot::{Plot, Range, Series};
-use super::{big, text};
+use super::text;
+use super::text::cut_top;
 use crate::monitor::dashboard::Dashboard;
+use crate::monitor::settings;
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
-use crate::monitor::words;
 
 /// An estimate that is older than this, in ms, is no more than a memory.
 const OLD_MS: u64 = 300;
@@ -37,7 +37,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
     let number = estimate
         .and_then(|estimate| estimate.wavelength_mm)
         .map_or_else(|| "-.--".to_owned(), millimetres);
-    for (row, mut line) in (0..).zip(big::lines(&number, style)) {
+    for (row, mut line) in (0..).zip(text::big_lines(&number, style)) {
         let name = if row == 2 { " λ " } else { "   " };
         line.spans.insert(0, Span::styled(name, theme.quiet()));
         if row == 2 {
@@ -59,7 +59,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
         count(&estimate, theme, is_old),
         gauges(&estimate, theme, is_old),
     ];
-    for (row, line) in (big::ROWS as u16..).zip(lines) {
+    for (row, line) in (text::BIG_ROWS as u16..).zip(lines) {
         text::put(frame, area, row, line);
     }
 }
@@ -111,7 +111,7 @@ fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
         ("unsure", theme.warning())
     };
     let bold = faded(style.add_modifier(Modifier::BOLD), is_old, theme);
-    let contact = words::contact(estimate.contact).to_owned();
+    let contact = settings::contact(estimate.contact).to_owned();
     let plain = faded(Style::new(), is_old, theme);
     two(
         (" ", word.to_owned(), bold),
@@ -124,7 +124,7 @@ fn count(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     let counted = estimate.counted_mm.map(|mm| format!("{mm:.2} mm"));
     let counted = counted.unwrap_or_else(|| "  -  ".to_owned());
     let style = faded(Style::new(), is_old, theme);
-    let range = words::range(estimate.range).to_owned();
+    let range = settings::range(estimate.range).to_owned();
     two(
         (" paper's count ", counted, style),
         ("   range ", range, style),

@@ -1,7 +1,8 @@
-//! Titles, numbers and lines that fit.
+//! Areas, titles, numbers and lines that fit.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders};
 
@@ -117,6 +118,103 @@ pub fn span(s: f32) -> String {
     } else {
         format!("{s:.0} s")
     }
+}
+
+/// The uppermost `height` rows, as far as there are so many, and the rest.
+pub fn cut_top(area: Rect, height: u16) -> [Rect; 2] {
+    let height = height.min(area.height);
+    let (y, rest) = (area.y + height, area.height - height);
+    [
+        Rect { height, ..area },
+        Rect {
+            y,
+            height: rest,
+            ..area
+        },
+    ]
+}
+
+/// The leftmost `width` columns, as far as there are so many, and the rest.
+pub fn cut_left(area: Rect, width: u16) -> [Rect; 2] {
+    let width = width.min(area.width);
+    let (x, rest) = (area.x + width, area.width - width);
+    [
+        Rect { width, ..area },
+        Rect {
+            x,
+            width: rest,
+            ..area
+        },
+    ]
+}
+
+/// Columns of one width, a space apart; what is left over stays empty at the right.
+pub fn columns<const COUNT: usize>(area: Rect) -> [Rect; COUNT] {
+    const GAP: u16 = 1;
+    let count = COUNT as u16;
+    let width = area.width.saturating_sub(GAP * (count - 1)) / count;
+    std::array::from_fn(|index| Rect {
+        x: area.x + (width + GAP) * index as u16,
+        width,
+        ..area
+    })
+    .map(|column| column.intersection(area))
+}
+
+/// Rows of a number.
+pub const BIG_ROWS: usize = 3;
+/// Dots of a character across, and down.
+const WIDTH: usize = 3;
+const HEIGHT: usize = 5;
+
+/// Five rows of three bits, from the top, the left one highest.
+const fn dots(character: char) -> [u8; HEIGHT] {
+    match character {
+        '0' => [0b111, 0b101, 0b101, 0b101, 0b111],
+        '1' => [0b010, 0b110, 0b010, 0b010, 0b111],
+        '2' => [0b111, 0b001, 0b111, 0b100, 0b111],
+        '3' => [0b111, 0b001, 0b111, 0b001, 0b111],
+        '4' => [0b101, 0b101, 0b111, 0b001, 0b001],
+        '5' => [0b111, 0b100, 0b111, 0b001, 0b111],
+        '6' => [0b111, 0b100, 0b111, 0b101, 0b111],
+        '7' => [0b111, 0b001, 0b001, 0b001, 0b001],
+        '8' => [0b111, 0b101, 0b111, 0b101, 0b111],
+        '9' => [0b111, 0b101, 0b111, 0b001, 0b111],
+        '-' => [0b000, 0b000, 0b111, 0b000, 0b000],
+        '.' => [0b000, 0b000, 0b000, 0b000, 0b010],
+        _ => [0; HEIGHT],
+    }
+}
+
+/// A number, in three big_lines.
+pub fn big_lines(text: &str, style: Style) -> [Line<'static>; BIG_ROWS] {
+    std::array::from_fn(|row| {
+        let text: String = text
+            .chars()
+            .map(|character| cells(character, row))
+            .collect();
+        Line::from(Span::styled(text, style))
+    })
+}
+
+/// A row of a character, and the space after it.
+fn cells(character: char, row: usize) -> String {
+    let dots = dots(character);
+    let line = |at: usize| dots.get(at).copied().unwrap_or(0);
+    let (upper, lower) = (line(2 * row), line(2 * row + 1));
+    let columns = if character == '.' { 1..2 } else { 0..WIDTH };
+    columns
+        .map(|column| {
+            let bit = 1 << (WIDTH - 1 - column);
+            match (upper & bit != 0, lower & bit != 0) {
+                (true, true) => '█',
+                (true, false) => '▀',
+                (false, true) => '▄',
+                (false, false) => ' ',
+            }
+        })
+        .chain([' '])
+        .collect()
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::areas::cut_top;
 use super::plot::{Plot, Range, Series};
 use super::text;
+use super::text::cut_top;
 use crate::monitor::dashboard::Dashboard;
 use crate::monitor::view::View;
 

@@ -1,10 +1,11 @@
-//! An estimate as a row.
+//! What the sensor finds of the surface as rows: estimates and textures.
 
 use postcard_schema::Schema;
-use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range};
+use protocol::texture::{BANDS, PARTIALS};
+use protocol::{Contact, Estimate, Friction, GAUGES, GaugeHealth, Partial, Range, Texture};
 use serde::{Deserialize, Serialize};
 
-use super::text::{number, present};
+use super::log::{number, present};
 
 /// [`Estimate`], field by field; what it has not is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
@@ -65,5 +66,67 @@ impl From<EstimateRow> for Estimate {
             sequence, instant_us, wavelength_mm, valid, confidence, amplitude_lsb, counted_mm, range, contact,
             velocity_um_s, lag_um, gauges_used, health
         })
+    }
+}
+
+/// [`Texture`], field by field, in the wire's units; what it has not is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct TextureRow {
+    /// [`Texture::sequence`]
+    pub sequence: u32,
+    /// [`Texture::instant_us`]
+    pub instant_us: u64,
+    /// [`Texture::valid`]
+    pub valid: bool,
+    /// [`Partial::ratio`] of the second and the third, in thousandths of the fundamental's amplitude.
+    pub partial_ratios: [u16; PARTIALS],
+    /// [`Partial::phase`] of these, in turns / 2¹⁶.
+    pub partial_phases: [u16; PARTIALS],
+    /// [`Texture::repeating_percent`]
+    pub repeating_percent: u8,
+    /// [`Texture::bands`], in thousandths of the fundamental's amplitude.
+    pub bands: [u16; BANDS],
+    /// [`Friction::mean_mn`]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_mean_mn: Option<u16>,
+    /// [`Friction::fluctuation_mn`]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_fluctuation_mn: Option<u16>,
+}
+
+impl From<Texture> for TextureRow {
+    fn from(texture: Texture) -> Self {
+        Self {
+            sequence: texture.sequence,
+            instant_us: texture.instant_us,
+            valid: texture.valid,
+            partial_ratios: texture.partials.map(|partial| partial.ratio),
+            partial_phases: texture.partials.map(|partial| partial.phase),
+            repeating_percent: texture.repeating_percent,
+            bands: texture.bands,
+            friction_mean_mn: texture.friction.map(|friction| friction.mean_mn),
+            friction_fluctuation_mn: texture.friction.map(|friction| friction.fluctuation_mn),
+        }
+    }
+}
+
+impl From<TextureRow> for Texture {
+    fn from(row: TextureRow) -> Self {
+        let friction = row.friction_mean_mn.zip(row.friction_fluctuation_mn);
+        Self {
+            sequence: row.sequence,
+            instant_us: row.instant_us,
+            valid: row.valid,
+            partials: std::array::from_fn(|n| Partial {
+                ratio: row.partial_ratios[n],
+                phase: row.partial_phases[n],
+            }),
+            repeating_percent: row.repeating_percent,
+            bands: row.bands,
+            friction: friction.map(|(mean_mn, fluctuation_mn)| Friction {
+                mean_mn,
+                fluctuation_mn,
+            }),
+        }
     }
 }

@@ -1,9 +1,9 @@
-//! A line of a firmware's log as a row, in the form that ROS 2 gives its own logs.
+//! A line of a firmware's log as a row, in the form that ROS 2 gives its own logs; and texts and numbers as rows have
+//! them: texts with a shape, and numbers that may be none.
 
 use postcard_schema::Schema;
-use serde::{Deserialize, Serialize};
-
-use super::Text;
+use postcard_schema::schema::{DataModelType, NamedType};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A line of a firmware's log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -66,4 +66,32 @@ impl LogRow {
             line: 0,
         }
     }
+}
+
+/// A text.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Text(pub String);
+
+impl Schema for Text {
+    const SCHEMA: &'static NamedType = &NamedType {
+        name: "Text",
+        ty: &DataModelType::String,
+    };
+}
+
+impl<T: Into<String>> From<T> for Text {
+    fn from(text: T) -> Self {
+        Self(text.into())
+    }
+}
+
+/// A number; null is NaN, which JSON has not.
+pub fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f32::NAN))
+}
+
+/// A number that is there; null is NaN. To be used with `default`: a number that is not there is none.
+pub fn present<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f32>, D::Error> {
+    number(deserializer).map(Some)
 }
