@@ -104,11 +104,8 @@ impl Flash {
             Board::Sensor => (&bench.sensor, &bench.display),
             Board::Display => (&bench.display, &bench.sensor),
         };
-        let elf = self
-            .elf
-            .clone()
-            .or_else(|| seat.elf.clone())
-            .unwrap_or_else(|| firmware::built(role));
+        let elf = self.elf.clone().or_else(|| seat.elf.clone());
+        let elf = elf.unwrap_or_else(|| firmware::built(role));
         let plan = Plan::new(Firmware::read(&elf, role)?)?;
         if self.dry_run {
             self.report(&plan, None, None)?;
@@ -138,31 +135,25 @@ impl Flash {
         if let Err(trouble) = written.and_then(|()| programmer.start()) {
             return failed(trouble);
         }
-        let hello = if self.no_hello {
-            None
-        } else {
-            let wanted = plan.firmware.hello;
-            eprintln!("flashed and verified; waiting for the board's Hello");
-            match console::wait(
-                &system,
-                role,
-                console,
-                wanted,
-                console::PATIENCE,
-                &called_off,
-            ) {
-                Ok(hello) => Some(hello),
-                Err(error) => {
-                    eprintln!("host-bridge: {error}");
-                    if self.json {
-                        self.report(plan, Some(&probe), None)?;
-                    }
-                    return Ok(ExitCode::FAILURE);
-                }
+        if self.no_hello {
+            self.report(plan, Some(&probe), None)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        eprintln!("flashed and verified; waiting for the board's Hello");
+        let (wanted, limit) = (plan.firmware.hello, console::PATIENCE);
+        match console::wait(&system, role, console, wanted, limit, &called_off) {
+            Ok(hello) => {
+                self.report(plan, Some(&probe), Some(hello))?;
+                Ok(ExitCode::SUCCESS)
             }
-        };
-        self.report(plan, Some(&probe), hello)?;
-        Ok(ExitCode::SUCCESS)
+            Err(error) => {
+                output::say(&error.to_string());
+                if self.json {
+                    self.report(plan, Some(&probe), None)?;
+                }
+                Ok(ExitCode::FAILURE)
+            }
+        }
     }
 
     /// Prints what is planned, or what was done by `probe`.
@@ -209,14 +200,11 @@ impl Flash {
         } else {
             who(&several, role)
         };
-        let lines: Vec<String> = several
-            .iter()
-            .zip(&behind)
-            .map(|(probe, state)| match state {
-                Some(state) => format!("{probe}  {state}"),
-                None => probe.to_string(),
-            })
-            .collect();
+        let line = |(probe, state): (&Attached, &Option<State>)| match state {
+            Some(state) => format!("{probe}  {state}"),
+            None => probe.to_string(),
+        };
+        let lines: Vec<String> = several.iter().zip(&behind).map(line).collect();
         if !is_attended() {
             anyhow::bail!(
                 "several probes are plugged in: name the {} board's with --probe, or its serial number as \
@@ -228,19 +216,12 @@ impl Flash {
         for (number, line) in lines.iter().enumerate() {
             eprintln!("{:>3}  {line}", number + 1);
         }
-        let number = ask(
-            &format!(
-                "Which is the {} board's? [1-{}] ",
-                role.name(),
-                several.len()
-            ),
-            |answer| {
-                answer
-                    .parse::<usize>()
-                    .ok()
-                    .filter(|number| (1..=several.len()).contains(number))
-            },
-        )?;
+        let count = several.len();
+        let question = format!("Which is the {} board's? [1-{count}] ", role.name());
+        let number = ask(&question, |answer| {
+            let number = answer.parse::<usize>().ok();
+            number.filter(|number| (1..=count).contains(number))
+        })?;
         Ok(several[number - 1].clone())
     }
 
@@ -315,7 +296,7 @@ fn failed(trouble: Trouble) -> anyhow::Result<ExitCode> {
     if trouble.is_harmless() {
         return Err(trouble.into());
     }
-    eprintln!("host-bridge: {trouble}");
+    output::say(&trouble.to_string());
     Ok(ExitCode::FAILURE)
 }
 

@@ -9,8 +9,7 @@ use protocol::{
 };
 
 use super::counters::{self, Count};
-use super::examination::ClockFacts;
-use super::examination::{BoardFacts, ElfFacts, Examination, ProbeFacts};
+use super::examination::{BoardFacts, ClockFacts, ElfFacts, Examination, ProbeFacts};
 use super::permission::{RELOAD, RULES, probe_rule};
 use super::supervisor;
 use crate::state::{Named, State};
@@ -51,93 +50,16 @@ impl fmt::Display for Finding {
 
 /// Everything that is wrong: of the bench, then board by board.
 pub fn of(examination: &Examination) -> Vec<Finding> {
-    let mut all: Vec<Finding> = examination
-        .probes
-        .iter()
-        .filter(|probe| !probe.is_allowed)
-        .map(|probe| of_probe(probe, examination.has_plugdev))
-        .collect();
-    all.extend(between(examination));
+    let mut found = Findings::default();
+    for probe in examination.probes.iter().filter(|probe| !probe.is_allowed) {
+        found.of_probe(probe, examination.has_plugdev);
+    }
+    found.between(examination);
     for board in &examination.boards {
-        let mut found = Findings {
-            role: board.role,
-            all: &mut all,
-        };
+        found.board = Some(board.role);
         found.of_board(board);
     }
-    all
-}
-
-fn of_probe(probe: &ProbeFacts, has_plugdev: bool) -> Finding {
-    let ProbeFacts {
-        name,
-        vendor,
-        product,
-        serial,
-        ..
-    } = probe;
-    let serial = serial.as_deref().unwrap_or("without a serial number");
-    Finding {
-        board: None,
-        kind: "probe-denied",
-        what: format!("no permission to use {name} {serial} as a probe"),
-        advice: format!(
-            "put this line into {RULES}, then `{RELOAD}`: {}",
-            probe_rule(*vendor, *product, has_plugdev)
-        ),
-    }
-}
-
-/// What is wrong between the boards.
-fn between(examination: &Examination) -> Vec<Finding> {
-    let finding = |kind, what: String, advice: &str| {
-        vec![Finding {
-            board: None,
-            kind,
-            what,
-            advice: advice.to_owned(),
-        }]
-    };
-    let [Some(sensor), Some(display)] =
-        [Role::Sensor, Role::Display].map(|role| examination.board(role))
-    else {
-        return Vec::new();
-    };
-    let (Some(one), Some(other)) = (&sensor.hello, &display.hello) else {
-        return Vec::new();
-    };
-    if (one.protocol, one.schema) != (other.protocol, other.schema) {
-        return finding(
-            "boards-differ",
-            format!(
-                "the boards do not understand each other: sensor {}, display {}",
-                Spoken(one),
-                Spoken(other)
-            ),
-            "flash both boards with one build: `host-bridge flash`",
-        );
-    }
-    if !(sensor.state.is_known() && display.state.is_known()) {
-        return Vec::new();
-    }
-    let deaf: Vec<&str> = [sensor, display]
-        .into_iter()
-        .filter(|board| peer_grown(board) == Some(0))
-        .map(|board| board.role.name())
-        .collect();
-    match deaf[..] {
-        [] => Vec::new(),
-        [one] => finding(
-            "peer-link",
-            format!("the link between the boards is down: the {one} hears nothing"),
-            "see the wire to its PD6 from the other board's PD5, and the common ground",
-        ),
-        _ => finding(
-            "peer-link",
-            "the link between the boards is down: neither hears the other".to_owned(),
-            "see the wires between the boards: PD5 and PD6 crossed, a common ground",
-        ),
-    }
+    found.all
 }
 
 /// Frames that a board has taken from the other one while it was looked at.
@@ -161,20 +83,74 @@ impl fmt::Display for Spoken<'_> {
     }
 }
 
-/// What has been found, board by board.
-struct Findings<'a> {
-    role: Role,
-    all: &'a mut Vec<Finding>,
+/// What has been found so far.
+#[derive(Default)]
+struct Findings {
+    /// The board that is looked at; none if it is the bench as a whole.
+    board: Option<Role>,
+    all: Vec<Finding>,
 }
 
-impl Findings<'_> {
+impl Findings {
     fn add(&mut self, kind: &'static str, what: impl Into<String>, advice: impl Into<String>) {
         self.all.push(Finding {
-            board: Some(self.role),
+            board: self.board,
             kind,
             what: what.into(),
             advice: advice.into(),
         });
+    }
+
+    fn of_probe(&mut self, probe: &ProbeFacts, has_plugdev: bool) {
+        let serial = probe.serial.as_deref().unwrap_or("without a serial number");
+        let what = format!("no permission to use {} {serial} as a probe", probe.name);
+        let rule = probe_rule(probe.vendor, probe.product, has_plugdev);
+        let advice = format!("put this line into {RULES}, then `{RELOAD}`: {rule}");
+        self.add("probe-denied", what, advice);
+    }
+
+    /// What is wrong between the boards.
+    fn between(&mut self, examination: &Examination) {
+        let [Some(sensor), Some(display)] =
+            [Role::Sensor, Role::Display].map(|role| examination.board(role))
+        else {
+            return;
+        };
+        let (Some(one), Some(other)) = (&sensor.hello, &display.hello) else {
+            return;
+        };
+        if (one.protocol, one.schema) != (other.protocol, other.schema) {
+            let (one, other) = (Spoken(one), Spoken(other));
+            return self.add(
+                "boards-differ",
+                format!("the boards do not understand each other: sensor {one}, display {other}"),
+                "flash both boards with one build: `host-bridge flash`",
+            );
+        }
+        if !(sensor.state.is_known() && display.state.is_known()) {
+            return;
+        }
+        let is_deaf = [sensor, display].map(|board| peer_grown(board) == Some(0));
+        let (hears, advice) = match is_deaf {
+            [false, false] => return,
+            [true, true] => (
+                "neither hears the other",
+                "see the wires between the boards: PD5 and PD6 crossed, a common ground",
+            ),
+            [is_sensor, _] => (
+                if is_sensor {
+                    "the sensor hears nothing"
+                } else {
+                    "the display hears nothing"
+                },
+                "see the wire to its PD6 from the other board's PD5, and the common ground",
+            ),
+        };
+        self.add(
+            "peer-link",
+            format!("the link between the boards is down: {hears}"),
+            advice,
+        );
     }
 
     fn of_board(&mut self, board: &BoardFacts) {
@@ -183,12 +159,13 @@ impl Findings<'_> {
             self.of_elf(elf, board.hello.as_ref());
         }
         if board.losses > 0 {
+            let what = format!(
+                "its line was lost {} while it was looked at",
+                times(board.losses)
+            );
             self.add(
                 "lost",
-                format!(
-                    "its line was lost {} while it was looked at",
-                    times(board.losses)
-                ),
+                what,
                 "see USB cable, plug and hub, and the board's supply",
             );
         }
@@ -256,18 +233,14 @@ impl Findings<'_> {
     }
 
     fn of_elf(&mut self, elf: &ElfFacts, runs: Option<&Hello>) {
-        let command = format!("`host-bridge flash {}`", self.role.name());
+        let board = self.board.map_or("", Role::name);
         let hello = match &elf.hello {
             Ok(hello) => hello,
             Err(reason) => {
-                return self.add(
-                    "elf-unusable",
-                    reason.clone(),
-                    format!(
-                        "name the right file as `elf` under [{}] in the bench file, or build it",
-                        self.role.name()
-                    ),
+                let advice = format!(
+                    "name the right file as `elf` under [{board}] in the bench file, or build it"
                 );
+                return self.add("elf-unusable", reason.clone(), advice);
             }
         };
         let Some(runs) = runs else { return };
@@ -284,13 +257,14 @@ impl Findings<'_> {
                 Named(hello),
                 Spoken(hello)
             ),
-            format!("flash what the bench names: {command}"),
+            format!("flash what the bench names: `host-bridge flash {board}`"),
         );
     }
 
     fn of_status(&mut self, board: &BoardFacts, status: &Status) {
         if status.watchdog_resets > 0 {
-            let last = if status.reset == ResetCause::Watchdog {
+            let is_last = status.reset == ResetCause::Watchdog;
+            let last = if is_last {
                 ", the last start among them"
             } else {
                 ""
@@ -305,33 +279,23 @@ impl Findings<'_> {
             );
         }
         if (1..LITTLE_STACK_BYTES).contains(&status.stack_free_bytes) {
+            let what = format!(
+                "its stack had no more than {} bytes left",
+                status.stack_free_bytes
+            );
             self.add(
                 "stack",
-                format!(
-                    "its stack had no more than {} bytes left",
-                    status.stack_free_bytes
-                ),
+                what,
                 "report it with its log: a board whose stack is full stops",
             );
         }
         let (Some(first), last) = (&board.first, board.last.as_ref()) else {
             return;
         };
-        let ports = [
-            (
-                "peer link",
-                counters::of_peer(&first.peer, last.map(|last| &last.peer)),
-            ),
-            (
-                "console",
-                counters::of_console(&first.console, last.map(|last| &last.console)),
-            ),
-            (
-                "board",
-                counters::of_role(&first.role, last.map(|last| &last.role)),
-            ),
-        ];
-        for (place, counts) in ports {
+        let peer = counters::of_peer(&first.peer, last.map(|last| &last.peer));
+        let console = counters::of_console(&first.console, last.map(|last| &last.console));
+        let role = counters::of_role(&first.role, last.map(|last| &last.role));
+        for (place, counts) in [("peer link", peer), ("console", console), ("board", role)] {
             for count in counts {
                 self.of_count(place, &count);
             }
@@ -353,8 +317,7 @@ impl Findings<'_> {
     fn of_supervisor(&mut self, state: DisplayState, uptime_us: u64) {
         let is_starting = state == DisplayState::Boot && uptime_us < START_US;
         if let Some(advice) = supervisor::advice(state).filter(|_| !is_starting) {
-            let kind = state.name();
-            self.add(kind, format!("no stimulus: {state}"), advice);
+            self.add(state.name(), format!("no stimulus: {state}"), advice);
         }
     }
 

@@ -33,29 +33,23 @@ type Told = (Role, Event);
 /// Who listens along while a bench is looked at.
 pub trait Observer {
     /// The board of `role` has said this.
-    fn hear(&mut self, role: Role, message: &Message);
+    fn hear(&mut self, _role: Role, _message: &Message) {}
 
     /// What is to be said to the boards now; asked some ten times a second.
-    fn say(&mut self) -> Vec<(Role, Message)>;
+    fn say(&mut self) -> Vec<(Role, Message)> {
+        Vec::new()
+    }
 
     /// Whether enough has been seen of the boards that are there.
-    fn has_enough(&self, present: &[&BoardFacts]) -> bool;
+    fn has_enough(&self, _present: &[&BoardFacts]) -> bool {
+        false
+    }
 }
 
 /// Hears nothing, says nothing, and has never enough.
 struct Nobody;
 
-impl Observer for Nobody {
-    fn hear(&mut self, _role: Role, _message: &Message) {}
-
-    fn say(&mut self) -> Vec<(Role, Message)> {
-        Vec::new()
-    }
-
-    fn has_enough(&self, _present: &[&BoardFacts]) -> bool {
-        false
-    }
-}
+impl Observer for Nobody {}
 
 /// Looks at everything, and listens for `span` to the boards that are there. If the bench names the place
 /// of one board only, it has only that one, as at one end of a relay. It ends early once `ended` is set.
@@ -235,28 +229,21 @@ impl Watch {
     }
 
     fn status(&mut self, status: Status) {
-        let place = if self.facts.first.is_none() {
-            &mut self.facts.first
+        if self.facts.first.is_none() {
+            self.facts.first = Some(status);
         } else {
-            &mut self.facts.last
-        };
-        *place = Some(status);
+            self.facts.last = Some(status);
+        }
     }
 
     /// What has been seen in the end, after it was listened to for `looked`.
     fn end(self, looked: Duration) -> BoardFacts {
-        let Self {
-            link,
-            mut facts,
-            exchanges,
-            said,
-            ..
-        } = self;
-        facts.counters = link.counters();
-        facts.missed = link.missed();
-        facts.clock = ClockFacts::new(&exchanges);
+        let mut facts = self.facts;
+        facts.counters = self.link.counters();
+        facts.missed = self.link.missed();
+        facts.clock = ClockFacts::new(&self.exchanges);
         facts.rate_hz = (facts.state.is_known() && looked >= Duration::from_secs(1))
-            .then(|| f64::from(said) / looked.as_secs_f64());
+            .then(|| f64::from(self.said) / looked.as_secs_f64());
         facts.permission = match &facts.state {
             State::Denied(port) => Permission::of(port),
             _ => None,

@@ -19,15 +19,6 @@ pub struct Attached {
     pub is_allowed: bool,
 }
 
-impl From<ProbeListItem> for Attached {
-    fn from(item: ProbeListItem) -> Self {
-        Self {
-            info: item.info,
-            is_allowed: item.accessibility == Accessibility::Accessible,
-        }
-    }
-}
-
 impl Attached {
     /// Its serial number.
     pub fn serial(&self) -> Option<&str> {
@@ -73,11 +64,12 @@ impl fmt::Display for Attached {
 
 /// All probes that probe-rs finds.
 pub fn attached() -> Vec<Attached> {
-    Lister::new()
-        .list_all_with_access()
-        .into_iter()
-        .map(Attached::from)
-        .collect()
+    let attached = |item: ProbeListItem| Attached {
+        info: item.info,
+        is_allowed: item.accessibility == Accessibility::Accessible,
+    };
+    let found = Lister::new().list_all_with_access();
+    found.into_iter().map(attached).collect()
 }
 
 /// A probe by its USB identity, as `--probe` takes it.
@@ -171,35 +163,23 @@ pub fn choose(found: &[Attached], request: &ProbeRequest) -> Result<Attached, Un
     if found.is_empty() {
         return Err(Undecided::None);
     }
-    let (wanted, fitting): (Option<String>, Vec<&Attached>) =
-        match (&request.selector, &request.serial) {
-            (Some(selector), _) => (
-                Some(selector.to_string()),
-                found
-                    .iter()
-                    .filter(|probe| selector.0.matches_probe(&probe.info))
-                    .collect(),
-            ),
-            (None, Some(serial)) => (
-                Some(format!("the one of serial number {serial} in the bench")),
-                found
-                    .iter()
-                    .filter(|probe| probe.serial() == Some(serial))
-                    .collect(),
-            ),
-            (None, None) => (
-                request.other_serial.as_ref().map(|other| {
-                    format!("this board's: the bench has {other} for the other board")
-                }),
-                found
-                    .iter()
-                    .filter(|probe| {
-                        request.other_serial.is_none()
-                            || probe.serial() != request.other_serial.as_deref()
-                    })
-                    .collect(),
-            ),
-        };
+    let fits = |probe: &&Attached| match (&request.selector, &request.serial) {
+        (Some(selector), _) => selector.0.matches_probe(&probe.info),
+        (None, Some(serial)) => probe.serial() == Some(serial),
+        (None, None) => {
+            let other = request.other_serial.as_deref();
+            other.is_none() || probe.serial() != other
+        }
+    };
+    let fitting: Vec<&Attached> = found.iter().filter(fits).collect();
+    let wanted = match (&request.selector, &request.serial, &request.other_serial) {
+        (Some(selector), ..) => Some(selector.to_string()),
+        (None, Some(serial), _) => Some(format!("the one of serial number {serial} in the bench")),
+        (None, None, Some(other)) => Some(format!(
+            "this board's: the bench has {other} for the other board"
+        )),
+        (None, None, None) => None,
+    };
     match (fitting.as_slice(), wanted) {
         ([only], _) => Ok((*only).clone()),
         ([], Some(wanted)) => Err(Undecided::NotThere {

@@ -53,11 +53,7 @@ pub fn part_path(path: &Path, part: u32) -> PathBuf {
 
 /// The later parts of an earlier recording of this name, which would be in the way hours from now, or be
 /// taken for this one's.
-fn later_parts(path: &Path) -> Vec<PathBuf> {
-    found_parts(path).unwrap_or_default()
-}
-
-fn found_parts(path: &Path) -> Option<Vec<PathBuf>> {
+fn later_parts(path: &Path) -> Option<Vec<PathBuf>> {
     let folder = path.parent().filter(|folder| folder.as_os_str() != "");
     let stem = path.file_stem()?.to_str()?;
     let parts = fs::read_dir(folder.unwrap_or(Path::new(".")))
@@ -95,11 +91,13 @@ impl Facts {
     fn map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::new();
         if let Some(hello) = &self.hello {
-            let [major, minor, patch] = hello.version;
             let facts = [
                 ("role", hello.role.0.clone()),
                 ("chip", hello.chip.0.clone()),
-                ("version", format!("{major}.{minor}.{patch}")),
+                (
+                    "version",
+                    hello.version.map(|number| number.to_string()).join("."),
+                ),
                 ("protocol", hello.protocol.to_string()),
                 ("schema", hello.schema.0.clone()),
             ];
@@ -118,28 +116,30 @@ impl RecordingFiles {
         if settings.mcap.is_none() && settings.csv.is_none() {
             return Err(RecordingError::Nowhere);
         }
-        let old_parts = settings.mcap.as_deref().map_or(Vec::new(), later_parts);
+        let old_parts = settings
+            .mcap
+            .as_deref()
+            .and_then(later_parts)
+            .unwrap_or_default();
         if let Some(path) = old_parts.first()
             && settings.part.is_some()
             && !settings.force
         {
-            let path = path.clone();
-            return Err(RecordingError::Exists(path));
+            return Err(RecordingError::Exists(path.clone()));
         }
+        let force = settings.force;
         let mcap = settings
             .mcap
             .as_deref()
-            .map(|path| McapFile::create(path, settings.force, about(1)))
-            .transpose()?;
+            .map(|path| McapFile::create(path, force, about(1)));
         let csv = settings
             .csv
             .as_deref()
-            .map(|folder| CsvFolder::create(folder, settings.force))
-            .transpose()?;
+            .map(|folder| CsvFolder::create(folder, force));
         let mut files = Self {
+            mcap: mcap.transpose()?,
+            csv: csv.transpose()?,
             settings,
-            mcap,
-            csv,
             part: 1,
             begun: Instant::now(),
             ended_bytes: 0,
@@ -204,11 +204,8 @@ impl RecordingFiles {
         if let Some(csv) = &mut self.csv {
             csv.sync()?;
         }
-        let due = self
-            .settings
-            .part
-            .is_some_and(|length| self.begun.elapsed() >= length);
-        if due {
+        let part = self.settings.part;
+        if part.is_some_and(|length| self.begun.elapsed() >= length) {
             self.turn_over()?;
         }
         Ok(())
