@@ -10,8 +10,8 @@
 //! The steps are data. What they measure is what the boards say of themselves, as `doctor` hears it, and what a
 //! person reads off an instrument.
 
-pub mod progress;
-pub mod quantity;
-pub mod report;
-pub mod sight;
-pub mod step;
+pub(crate) mod progress;
+pub(crate) mod quantity;
+pub(crate) mod report;
+pub(crate) mod sight;
+pub(crate) mod step;

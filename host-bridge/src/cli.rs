@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+use crate::bench::{Bench, BenchError, Seat};
+use crate::link::{Event, Link};
+use crate::place::Place;
 use clap::{Args, Parser, Subcommand, ValueHint};
-use host_bridge::bench::{Bench, BenchError, Seat};
-use host_bridge::link::{Event, Link};
-use host_bridge::place::Place;
 use protocol::Role;
 
 mod bringup;
@@ -49,7 +49,7 @@ A first session:
 Results go to standard output, progress and complaints to standard error. Exit status 0 means done, 2 that \
 what was asked for can't be done; what 1 means, each command's own --help says."
 )]
-pub struct Arguments {
+struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
@@ -170,9 +170,31 @@ fn put(seat: &mut Seat, place: Option<&Place>) {
     }
 }
 
+/// Does what the command line asks for.
+pub fn run() -> ExitCode {
+    match Arguments::parse().execute() {
+        Ok(status) => status,
+        Err(error) => {
+            output::say(&words(&error));
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// An error and its causes, each said once: many errors name their cause themselves.
+fn words(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
+}
+
 impl Arguments {
     /// Does what was asked for. Fails if it can't be done.
-    pub fn execute(self) -> anyhow::Result<ExitCode> {
+    fn execute(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::Flash(flash) => flash.execute(),
             Command::Monitor(monitor) => monitor.execute(),

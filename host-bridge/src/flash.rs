@@ -13,6 +13,6 @@
 pub mod console;
 pub mod firmware;
 pub mod plan;
-pub mod probes;
+pub(crate) mod probes;
 pub mod programmer;
 pub mod trouble;

@@ -6,24 +6,27 @@
 //!
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
+pub use cli::run;
+
 /// This program and its version.
-pub const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
+const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
 
 pub mod bench;
-pub mod bringup;
+mod bringup;
+mod cli;
 pub mod clock;
 pub mod doctor;
 mod engine;
 pub mod export;
 pub mod flash;
-pub mod hand;
+mod hand;
 mod line;
 mod line_monitor;
 pub mod link;
-pub mod live;
+mod live;
 pub mod lock;
 pub mod monitor;
-pub mod output_file;
+mod output_file;
 pub mod place;
 pub mod recording;
 pub mod relay;

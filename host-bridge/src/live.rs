@@ -11,5 +11,4 @@ mod foxglove_server;
 mod page;
 mod viewer;
 
-pub use foxglove_server::LiveError;
 pub use viewer::{PORT, Settings, Viewer};

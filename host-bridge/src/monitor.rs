@@ -8,17 +8,17 @@
 //!
 //! The [`dashboard`] knows neither boards nor terminals: it is fed events, and says what is to be said.
 
-pub mod board;
+pub(crate) mod board;
 pub mod dashboard;
 pub mod draw;
 pub mod fingertip;
-pub mod firmware_log;
-pub mod keys;
-pub mod line;
+pub(crate) mod firmware_log;
+pub(crate) mod keys;
+pub(crate) mod line;
 pub mod log_entry;
 pub mod orders;
-pub mod screen;
-pub mod session;
+pub(crate) mod screen;
+pub(crate) mod session;
 pub mod settings;
 pub mod theme;
 pub mod trace;

@@ -28,7 +28,7 @@ use crate::lock::locked;
 mod csv_folder;
 mod descriptions;
 mod files;
-pub mod gauge_stream;
+pub(crate) mod gauge_stream;
 mod mcap_file;
 mod queue;
 pub mod reader;

@@ -10,24 +10,24 @@
 //! dropped, and so is what was too long on its way. Nothing here keeps the operator safe: the display's
 //! supervisor does that, on its board, whatever the network does.
 
-pub mod age;
+pub(crate) mod age;
 pub mod credentials;
-pub mod datagrams;
+pub(crate) mod datagrams;
 pub mod endpoint;
 pub mod envelope;
-pub mod far_board;
+pub(crate) mod far_board;
 pub mod flow;
-pub mod gate;
-pub mod hand;
-pub mod inward;
+pub(crate) mod gate;
+pub(crate) mod hand;
+pub(crate) mod inward;
 pub mod name;
 pub mod network;
 pub mod operator;
-pub mod outbox;
-pub mod outward;
-pub mod refused;
-pub mod remote;
+pub(crate) mod outbox;
+pub(crate) mod outward;
+pub(crate) mod refused;
+pub(crate) mod remote;
 pub mod report;
 pub mod site;
-pub mod stops;
+pub(crate) mod stops;
 pub mod transport;

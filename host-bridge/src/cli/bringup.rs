@@ -8,16 +8,16 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::bench::Bench;
+use crate::bringup::progress::{Outcome, Progress};
+use crate::bringup::quantity::Value;
+use crate::bringup::sight::{Sight, Wanted};
+use crate::bringup::step::{Figure, Limit, Measure, Step, Witness};
+use crate::bringup::{report, step};
+use crate::doctor::{findings, json};
+use crate::system::System;
 use anyhow::Context;
 use clap::ValueHint;
-use host_bridge::bench::Bench;
-use host_bridge::bringup::progress::{Outcome, Progress};
-use host_bridge::bringup::quantity::Value;
-use host_bridge::bringup::sight::{Sight, Wanted};
-use host_bridge::bringup::step::{Figure, Limit, Measure, Step, Witness};
-use host_bridge::bringup::{report, step};
-use host_bridge::doctor::{findings, json};
-use host_bridge::system::System;
 
 use super::output;
 use super::signals::{self, Again};

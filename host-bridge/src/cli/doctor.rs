@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use super::output;
 use super::signals::{self, Again};
-use host_bridge::doctor::report::Style;
-use host_bridge::doctor::{findings, json, look, report};
-use host_bridge::system::System;
+use crate::doctor::report::Style;
+use crate::doctor::{findings, json, look, report};
+use crate::system::System;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]

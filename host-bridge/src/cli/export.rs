@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::SystemTime;
 
+use crate::export::{Settings, write};
 use anyhow::bail;
 use clap::ValueHint;
-use host_bridge::export::{Settings, write};
 
 use super::output;
 

@@ -3,8 +3,8 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::process::ExitCode;
 
+use crate::live::{PORT, Settings, Viewer};
 use anyhow::bail;
-use host_bridge::live::{PORT, Settings, Viewer};
 
 use super::output;
 use super::signals::{self, Again};

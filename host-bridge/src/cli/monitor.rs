@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use crate::bench::Bench;
+use crate::monitor::firmware_log::{Logs, Origin};
+use crate::monitor::line::Format;
+use crate::monitor::{self, Options, Source};
 use anyhow::Context;
 use clap::ValueHint;
-use host_bridge::bench::Bench;
-use host_bridge::monitor::firmware_log::{Logs, Origin};
-use host_bridge::monitor::line::Format;
-use host_bridge::monitor::{self, Options, Source};
 use protocol::Role;
 
 use super::signals::{self, Again};

@@ -8,15 +8,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use crate::bench::Bench;
+use crate::clock::now_us;
+use crate::link::{Event, Link};
+use crate::monitor::firmware_log::{LogError, Logs, Origin};
+use crate::monitor::log_entry::LogEvent;
+use crate::recording::gauge_stream::GaugeStream;
+use crate::recording::{PART, Progress, Recorder, Settings};
+use crate::state::{Advised, State};
 use clap::ValueHint;
-use host_bridge::bench::Bench;
-use host_bridge::clock::now_us;
-use host_bridge::link::{Event, Link};
-use host_bridge::monitor::firmware_log::{LogError, Logs, Origin};
-use host_bridge::monitor::log_entry::LogEvent;
-use host_bridge::recording::gauge_stream::GaugeStream;
-use host_bridge::recording::{PART, Progress, Recorder, Settings};
-use host_bridge::state::{Advised, State};
 use protocol::{Message, Role};
 use serde_json::json;
 

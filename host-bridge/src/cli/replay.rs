@@ -9,16 +9,16 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::clock::SystemClock;
+use crate::clock::now_us;
+use crate::link::{Event, Link};
+use crate::monitor::{self, Options, Source};
+use crate::recording::reader::Reader;
+use crate::replay::scene;
+use crate::replay::stand_in::StandIn;
+use crate::replay::{Pace, Played, SPEEDS, play};
 use anyhow::{Context, bail};
 use clap::ValueHint;
-use host_bridge::clock::SystemClock;
-use host_bridge::clock::now_us;
-use host_bridge::link::{Event, Link};
-use host_bridge::monitor::{self, Options, Source};
-use host_bridge::recording::reader::Reader;
-use host_bridge::replay::scene;
-use host_bridge::replay::stand_in::StandIn;
-use host_bridge::replay::{Pace, Played, SPEEDS, play};
 use protocol::Role;
 
 use super::output;
@@ -205,7 +205,7 @@ impl Replay {
     fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
-        let place = bench.seat(role).map(host_bridge::bench::Seat::place);
+        let place = bench.seat(role).map(crate::bench::Seat::place);
         let (states, turned) = channel();
         let link = Link::open(role, place.unwrap_or_default(), move |event| {
             if let Event::StateChanged(state) = event {

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
-use host_bridge::link::{Event, stop_all};
+use crate::link::{Event, stop_all};
 use protocol::{Message, Trip};
 
 use super::output::say;
