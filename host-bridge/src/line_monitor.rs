@@ -21,7 +21,6 @@ const TEXT_BYTES_A_STRANGE_ONE: u64 = 8;
 pub struct LineMonitor {
     opened_us: u64,
     patience_us: u64,
-    /// When a byte came last.
     heard_us: Option<u64>,
     /// When a frame came last that was understood.
     understood_us: Option<u64>,
@@ -32,7 +31,6 @@ pub struct LineMonitor {
     pinged_us: Option<u64>,
     /// Since when the other end has spoken text.
     text_us: Option<u64>,
-    /// When the newer span began.
     span_us: u64,
     /// This span, and the one before.
     spans: [Sound; 2],
@@ -51,17 +49,13 @@ struct Sound {
 /// What the other end of a line is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// An answer may still come.
     Open,
-    /// Somebody who is understood.
     Known(Hello),
     /// Somebody of another protocol or schema.
     Foreign(Hello),
-    /// Nothing is heard.
     Silent,
     /// Text, or frames, from somebody who does not answer.
     Deaf,
-    /// Neither frames nor text.
     Garbage,
 }
 
@@ -126,7 +120,6 @@ impl LineMonitor {
         self.pinged_us = None;
     }
 
-    /// What all this tells.
     pub fn judge(&mut self, at_us: u64, peer: Peer) -> Verdict {
         match peer {
             Peer::Text if self.text_us.is_none() => {

@@ -16,7 +16,6 @@ pub enum OutputFileError {
 }
 
 impl OutputFileError {
-    /// That `path` can't be written.
     pub fn not_written(path: &Path, source: io::Error) -> Self {
         Self::NotWritten(path.to_owned(), source)
     }

@@ -64,7 +64,6 @@ impl Search {
 
 /// Ports to try.
 pub struct Candidates {
-    /// The ports, in order.
     pub ports: Vec<PathBuf>,
     /// Whether a port behind which something else is, is to be left for the next one.
     pub choosy: bool,

@@ -213,7 +213,6 @@ enum Part {
         claim: Claim,
         since: Instant,
     },
-    /// The port is gone.
     Nobody,
 }
 

@@ -29,7 +29,6 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The outcome in words.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -50,7 +49,6 @@ impl Outcome {
 pub struct Record {
     /// [`Step::name`]
     pub step: String,
-    /// How it went.
     pub outcome: Outcome,
     /// Why it was not tried.
     pub note: Option<String>,
@@ -58,7 +56,6 @@ pub struct Record {
     pub at_unix_s: u64,
     /// How long the boards were listened to, in s.
     pub looked_s: f64,
-    /// What was measured.
     pub figures: Vec<Figure>,
 }
 
@@ -66,9 +63,7 @@ pub struct Record {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     format: u32,
-    /// The program and its version.
     pub program: String,
-    /// The protocol that it speaks.
     pub protocol: u16,
     /// Its schema, 16 hexadecimal digits.
     pub schema: String,

@@ -19,9 +19,7 @@ const STANDS_MM: f64 = 0.5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// The one with the gauges.
     Sensor,
-    /// The one with the actuators.
     Display,
 }
 
@@ -38,7 +36,6 @@ impl From<Role> for protocol::Role {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// Consoles of ST-LINKs.
     Consoles,
     /// Probes that this user may not use.
     DeniedProbes,
@@ -98,7 +95,6 @@ pub enum Quantity {
     Words,
     /// Whether the converters hold what they were given.
     Held,
-    /// Findings of `host-bridge doctor`.
     Findings,
 }
 
@@ -109,7 +105,6 @@ pub enum Quantity {
 pub enum Value {
     /// A number, in its measure's unit.
     Number(f64),
-    /// A word.
     Word(String),
 }
 

@@ -36,15 +36,12 @@ pub struct Wanted {
 /// What has been seen.
 #[derive(Clone, Debug, Default)]
 pub struct Sight {
-    /// What `doctor` sees.
     pub examination: Examination,
     /// The hand, by the display's motions.
     pub hand: Track,
     /// The arm, by the positions beside the gauges' samples.
     pub arm: Track,
-    /// When estimates came.
     pub estimates: Track,
-    /// What the estimates said.
     pub surface: Surface,
     /// Each gauge's voltage.
     pub gauges: [Voltage; GAUGES],

@@ -32,7 +32,6 @@ pub struct Step {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Witness {
-    /// The boards.
     Boards,
     /// The USB of this computer: nothing is to be seen of a bench whose ports are named in its file.
     Usb,
@@ -43,7 +42,6 @@ pub enum Witness {
 /// Something that is measured.
 #[derive(Debug, Deserialize)]
 pub struct Measure {
-    /// What it is.
     pub what: String,
     /// Its unit; empty for words and counts.
     #[serde(default)]
@@ -61,20 +59,16 @@ pub struct Measure {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
-    /// This or more.
     AtLeast(f64),
-    /// This or less.
     AtMost(f64),
     /// From the first to the second.
     Within(f64, f64),
-    /// This word.
     Word(String),
 }
 
 /// A value beside its limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
-    /// What was measured.
     pub what: String,
     /// Its unit; empty for words and counts.
     pub unit: String,
@@ -82,7 +76,6 @@ pub struct Figure {
     pub value: Option<Value>,
     /// What it had to be, in words.
     pub limit: String,
-    /// Whether it was.
     pub passes: bool,
     /// What to try, if it was not.
     pub advice: Option<String>,

@@ -28,7 +28,6 @@ const AVATAR: u32 = 1;
 
 /// One channel of a texture.
 pub struct Trace {
-    /// What it is, in words.
     pub description: String,
     /// What an amplitude of 1 stands for.
     pub gain: f64,
@@ -40,9 +39,7 @@ pub struct Trace {
 
 /// A texture, ready to be written.
 pub struct Made {
-    /// What is written.
     pub experience: Experience,
-    /// What it holds, in words.
     pub holds: String,
     /// The keys of `[surface]` that read it, but for the file's name.
     pub keys: String,

@@ -20,17 +20,14 @@ pub struct Attached {
 }
 
 impl Attached {
-    /// Its serial number.
     pub fn serial(&self) -> Option<&str> {
         self.info.serial_number.as_deref()
     }
 
-    /// What probe-rs knows of it.
     pub const fn info(&self) -> &DebugProbeInfo {
         &self.info
     }
 
-    /// What `--probe` takes for it.
     pub fn selector(&self) -> String {
         let (vendor, product) = (self.info.vendor_id, self.info.product_id);
         match self.serial() {
@@ -140,9 +137,7 @@ pub enum Undecided {
     /// None of those that are plugged in is the one that is meant.
     #[error("no probe is {wanted}; there {}:\n{}", if found.len() == 1 { "is" } else { "are" }, list(found))]
     NotThere {
-        /// What is meant.
         wanted: String,
-        /// What is there.
         found: Vec<Attached>,
     },
     /// Several may be meant.

@@ -92,7 +92,6 @@ impl FoxgloveServer {
         }
     }
 
-    /// Ends all connections.
     pub fn stop(self) {
         self.server.stop().wait_blocking();
     }

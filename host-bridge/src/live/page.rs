@@ -129,9 +129,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// What a browser asks for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Request {
-    /// `GET`, `POST` and so on.
     pub method: String,
-    /// The path.
     pub path: String,
     /// The names of its headers in lower case, and what they say.
     pub headers: Vec<(String, String)>,
@@ -172,7 +170,6 @@ impl Request {
         Ok(None)
     }
 
-    /// What a header says.
     pub fn header(&self, name: &str) -> Option<&str> {
         let mut headers = self.headers.iter();
         let found = headers.find(|(known, _)| known == name);

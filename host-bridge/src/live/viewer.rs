@@ -30,7 +30,6 @@ const PAIRS: u16 = 16;
 /// Where it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The address to listen on.
     pub address: IpAddr,
     /// The port for Foxglove; the page has the next one. 0: any that are free; none: [`PORT`], or the next pair
     /// that is free.
@@ -78,17 +77,14 @@ impl Viewer {
         })
     }
 
-    /// The port for Foxglove.
     pub fn foxglove_port(&self) -> u16 {
         self.foxglove.port()
     }
 
-    /// Where the page is.
     pub const fn page(&self) -> SocketAddr {
         self.page
     }
 
-    /// Shows until `ended`.
     pub fn run(mut self, ended: &AtomicBool) {
         let mut due = Instant::now();
         let (mut hands, mut hands_due) = (Vec::new(), due);

@@ -60,12 +60,10 @@ impl Rate {
     /// Over so long it is taken, in µs.
     const OVER_US: u64 = 1_000_000;
 
-    /// One has come.
     pub fn count(&mut self) {
         self.count += 1;
     }
 
-    /// It is `now_us`.
     pub fn elapse(&mut self, now_us: u64) {
         let elapsed_us = now_us.saturating_sub(self.since_us);
         if elapsed_us >= Self::OVER_US {

@@ -9,13 +9,10 @@ use super::view::{SPANS_S, View};
 /// What a key asks of whoever runs the dashboard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
-    /// Nothing more.
     Nothing,
-    /// A recording, or its end.
     Keep,
     /// The view stands still, or goes on.
     Freeze,
-    /// The end.
     Quit,
 }
 

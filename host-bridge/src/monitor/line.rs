@@ -214,14 +214,11 @@ const LOOK: Duration = Duration::from_millis(20);
 /// What the lines are to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
-    /// JSON instead of columns.
     pub is_json: bool,
-    /// Time between two lines.
     pub every: Duration,
 }
 
 impl Default for Format {
-    /// Columns, a line a second.
     fn default() -> Self {
         Self {
             is_json: false,

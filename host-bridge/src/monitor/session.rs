@@ -30,17 +30,14 @@ pub struct Source {
 
 /// A dashboard with its source.
 pub struct Session {
-    /// What is known.
     pub dashboard: Dashboard,
     source: Source,
-    /// Where recordings go.
     folder: PathBuf,
     recording: Option<LiveRecording>,
     /// A recording that is being ended, by a thread of its own: a disk may take its time.
     ending: Option<(String, JoinHandle<Result<Progress, RecordingError>>)>,
     /// Has the gauges stream for as long as a recording lasts.
     stream: GaugeStream,
-    /// The same for who watches.
     watch: Lease,
     lines_us: Option<u64>,
     is_over: bool,
@@ -272,11 +269,9 @@ impl Session {
 
 /// A recording under way.
 pub struct LiveRecording {
-    /// Its file.
     pub path: PathBuf,
     /// Since when, in µs of [`crate::clock::now_us`].
     pub since_us: u64,
-    /// What writes it.
     pub recorder: Recorder,
 }
 

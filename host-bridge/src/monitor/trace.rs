@@ -35,7 +35,6 @@ impl Extent {
         }
     }
 
-    /// Both, one after the other.
     fn then(self, later: Self) -> Self {
         Self {
             low: self.low.min(later.low),

@@ -91,7 +91,6 @@ impl CsvFolder {
         self.files.iter_mut().flatten().try_for_each(Channel::sync)
     }
 
-    /// Bytes that are safe.
     pub fn safe_bytes(&self) -> u64 {
         let files = self.files.iter().flatten();
         files.map(|file| file.sink.safe_bytes()).sum()

@@ -35,7 +35,6 @@ pub struct GaugeStream {
 #[derive(Default)]
 struct Interview {
     is_known: bool,
-    /// Its configuration is asked for.
     asks: bool,
     due_us: u64,
 }

@@ -168,7 +168,6 @@ impl McapFile {
         self.sink.keep()
     }
 
-    /// Bytes that are safe.
     pub const fn safe_bytes(&self) -> u64 {
         self.sink.safe_bytes()
     }

@@ -44,9 +44,7 @@ struct Refused(Vec<Loss>);
 /// Some of a board that were not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Loss {
-    /// The board.
     pub role: Role,
-    /// How many.
     pub count: u64,
     /// When the first of them was put in, in µs of this host's clock.
     pub at_us: u64,
@@ -92,13 +90,11 @@ pub struct Output<T> {
 
 /// What a look at the queue gives.
 pub enum Taken<T> {
-    /// The next one.
     Item(T),
     /// Some were not taken, between the one before and the next one.
     Refused(Loss),
     /// Nothing has come by the time given.
     Nothing,
-    /// Nothing will come any more.
     Closed,
 }
 
@@ -169,7 +165,6 @@ impl<T> Output<T> {
         self.ready().unwrap_or(Taken::Nothing)
     }
 
-    /// What has been taken already.
     fn ready(&mut self) -> Option<Taken<T>> {
         if let Some(loss) = self.told.pop() {
             return Some(Taken::Refused(loss));

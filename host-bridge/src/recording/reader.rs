@@ -93,7 +93,6 @@ pub struct Reader {
     path: PathBuf,
     file: File,
     reader: LinearReader,
-    /// Their names and texts.
     schemas: BTreeMap<u16, (String, String)>,
     channels: BTreeMap<u16, Channel>,
     /// The protocol's version that the boards were to speak.

@@ -110,7 +110,6 @@ impl Sink {
         Ok(())
     }
 
-    /// Bytes that are safe.
     pub const fn safe_bytes(&self) -> u64 {
         self.safe_bytes
     }

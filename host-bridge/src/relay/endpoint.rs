@@ -24,7 +24,6 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    /// All.
     const ALL: [Self; 3] = [Self::Tcp, Self::Tls, Self::Udp];
 
     /// What endpoints of it begin with.

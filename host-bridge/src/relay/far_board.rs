@@ -22,7 +22,6 @@ pub struct FarBoard {
     outlet: Outlet,
     asked: Arc<Asked>,
     hello: Mutex<Option<Hello>>,
-    /// Of the next frame.
     sequence: AtomicU16,
     said_us: AtomicU64,
     clock: Arc<dyn Clock>,
@@ -71,13 +70,11 @@ impl FarBoard {
         })
     }
 
-    /// Whether a program listens.
     pub fn is_watched(&self) -> bool {
         let at_us = self.asked.at_us.load(Ordering::Acquire);
         at_us > 0 && self.clock.now_us().saturating_sub(at_us) < WATCH_US
     }
 
-    /// The board introduced itself.
     pub fn greet(&self, hello: Hello) {
         let is_other = locked(&self.hello).replace(hello) != Some(hello);
         if is_other {
@@ -85,7 +82,6 @@ impl FarBoard {
         }
     }
 
-    /// The board said something.
     pub fn say(&self, message: &Message) {
         let mut bytes = [0; MAX_FRAME];
         let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);

@@ -53,7 +53,6 @@ pub struct Flow {
     watched_until_us: u64,
     /// The shortest wait of the pings of this watch, in µs.
     wait_us: Option<u64>,
-    /// That of the watch before.
     wait_before_us: u64,
     /// Between two messages, in µs.
     spacing_us: u64,

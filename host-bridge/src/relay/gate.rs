@@ -13,11 +13,9 @@ const PAST: usize = 8;
 /// What an envelope's place says about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Newer than all before.
     Newer,
     /// A newer one came before: the network changed their order.
     Late,
-    /// It came before.
     Duplicate,
     /// From a bridge that does not hold the stream: another does.
     Rival,
@@ -28,13 +26,10 @@ pub enum Order {
 /// What the gate has counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Arrivals {
-    /// All that came.
     pub received: u64,
     /// Never came, of those between the first and the newest.
     pub lost: u64,
-    /// Came after a newer one.
     pub late: u64,
-    /// Came again.
     pub duplicated: u64,
     /// Came from a bridge while another held the stream, or repeated what the board had said before.
     pub superseded: u64,
@@ -77,9 +72,7 @@ impl Heard {
 /// The order of one stream, and whose it is.
 #[derive(Clone, Debug, Default)]
 pub struct Gate {
-    /// Who holds the stream.
     holder: Option<Heard>,
-    /// Who would have it next.
     waiting: Option<Heard>,
     stream: Stream,
     /// Those that held it before, the newest first, and how far they came; none for one that has left for good. So

@@ -11,7 +11,6 @@ const AGAIN_US: u64 = 250_000;
 /// What is due while the bench is handed over.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Due {
-    /// Nothing.
     Nothing,
     /// The other site is to be told.
     Say,
@@ -30,7 +29,6 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// How it stands.
     pub const fn holding(self) -> Holding {
         self.holding
     }
@@ -48,7 +46,6 @@ impl Hand {
         Some(Notice::Hand(holding))
     }
 
-    /// The other site is silent.
     pub const fn on_silence(&mut self) {
         self.holding = Holding::Unknown;
     }

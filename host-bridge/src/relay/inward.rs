@@ -21,22 +21,18 @@ use crate::relay::report::{Incoming, Notice};
     reason = "it is done at once, on the stack of one callback"
 )]
 pub enum Heard {
-    /// Nothing.
     Nothing,
     /// The board is to be told.
     Pass(Waiting),
     /// A ping is to be answered.
     Asked {
-        /// Whose.
         session: u64,
-        /// The ping.
         ping: Ping,
         /// Whether that one holds the bench.
         holds: bool,
     },
     /// A ping of one's own was answered.
     Answered {
-        /// The answer.
         answer: Answer,
         /// Whether this bridge holds the bench, as the other site sees it.
         holds: bool,
@@ -47,7 +43,6 @@ pub enum Heard {
     Stopped(u64, Option<Trip>),
     /// Somebody there watches the board here.
     Watched,
-    /// Who the board there is.
     Greeting(Hello),
     /// What the board there said, for who watches here.
     Shown(Message),
@@ -66,7 +61,6 @@ pub struct Inward {
     counts: Incoming,
     total: Histogram,
     recent: Histogram,
-    /// The last one.
     round_trip_us: u64,
     told_rival: bool,
     told_slow: bool,
@@ -166,7 +160,6 @@ impl Inward {
         self.counts.stale += 1;
     }
 
-    /// A message found no board.
     pub const fn on_boardless(&mut self) {
         self.counts.boardless += 1;
     }
@@ -176,7 +169,6 @@ impl Inward {
         self.counts.stuck += 1;
     }
 
-    /// Time passes.
     pub fn elapse(&mut self, now_us: u64, mut tell: impl FnMut(Notice)) {
         if self.remote.elapse(now_us) {
             tell(Notice::Remote(self.role, self.remote.state().clone()));
@@ -201,7 +193,6 @@ impl Inward {
         std::mem::take(&mut self.recent).percentiles()
     }
 
-    /// All ages.
     pub fn total(&self) -> Option<Percentiles> {
         self.total.percentiles()
     }

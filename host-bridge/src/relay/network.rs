@@ -147,7 +147,6 @@ impl Network {
         })
     }
 
-    /// Takes part as a bridge.
     fn open(&self) -> Result<Session, NetworkError> {
         let mode = match self.ends {
             // What connects is a client: a router carries on what clients say, but takes peers for

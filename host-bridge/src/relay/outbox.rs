@@ -10,7 +10,6 @@ use crate::lock::locked;
 /// A message that waits for the line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Waiting {
-    /// What is to be said.
     pub message: Message,
     /// When it is too old to be said, in µs of the bridge's clock.
     pub until_us: u64,
@@ -27,11 +26,8 @@ pub struct Waiting {
     reason = "it is taken out and said at once"
 )]
 pub enum Due {
-    /// The newest message.
     Message(Waiting),
-    /// Nothing came in time.
     Nothing,
-    /// The outbox was closed.
     Closed,
 }
 
@@ -63,7 +59,6 @@ impl Outbox {
         replaced
     }
 
-    /// No more is taken out.
     pub fn close(&self) {
         self.contents().is_closed = true;
         self.changed.notify();

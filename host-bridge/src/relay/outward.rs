@@ -65,7 +65,6 @@ impl Outward {
         })
     }
 
-    /// An envelope for anything else.
     pub const fn other(&self, at_us: u64, content: Content) -> Envelope {
         Envelope {
             hello: self.hello,
@@ -76,12 +75,10 @@ impl Outward {
         }
     }
 
-    /// A ping was answered.
     pub fn on_answer(&mut self, answer: Answer) {
         self.flow.on_answer(answer);
     }
 
-    /// How the network does.
     pub const fn flow(&self) -> &Flow {
         &self.flow
     }

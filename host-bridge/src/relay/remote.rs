@@ -13,20 +13,16 @@ pub const SILENCE_US: u64 = 2_000_000;
 /// How the other site stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RemoteState {
-    /// Nothing was ever heard.
     Unheard,
     /// A bridge of this build is there.
     Known {
-        /// What it says of itself.
         hello: Hello,
-        /// Which start of it.
         session: u64,
     },
     /// A bridge was there, and nothing has been heard for [`SILENCE_US`].
     Silent,
     /// A bridge of another build is there.
     Foreign {
-        /// What it says of itself.
         hello: Hello,
         /// Its envelope's version.
         version: u8,
@@ -89,7 +85,6 @@ impl Default for RemoteBridge {
 }
 
 impl RemoteBridge {
-    /// How it stands.
     pub const fn state(&self) -> &RemoteState {
         &self.state
     }

@@ -317,7 +317,6 @@ impl Shared {
         }
     }
 
-    /// The board has said something.
     fn carry(&self, at_us: u64, message: Message) {
         let obeyed = locked(&self.stops).obeyed(at_us, &message);
         if let Some((trip, ids)) = obeyed {

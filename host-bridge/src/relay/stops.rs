@@ -16,10 +16,7 @@ pub enum Standing {
     /// It was not known before, and is to be said to the board.
     New,
     /// The board has not obeyed yet.
-    Pending {
-        /// Whether it has been told.
-        is_told: bool,
-    },
+    Pending { is_told: bool },
     /// The board says that it has stopped, for this reason, if this program knows it.
     Done(Option<Trip>),
 }
@@ -109,7 +106,6 @@ impl Stops {
         is_news
     }
 
-    /// The board has started anew.
     pub fn on_restart(&mut self) {
         self.is_halted = false;
     }

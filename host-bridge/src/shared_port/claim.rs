@@ -18,7 +18,6 @@ pub struct Device {
 pub struct Claim(Arc<File>);
 
 impl Claim {
-    /// The same claim once more.
     pub fn again(&self) -> Self {
         Self(Arc::clone(&self.0))
     }

@@ -9,7 +9,6 @@ use crate::line::write_some;
 /// The way to a board for frames of any number of programs.
 pub struct Funnel {
     output: Box<dyn Write + Send>,
-    /// Of the next frame.
     sequence: u16,
     /// What is left of a frame of which the line has taken the beginning.
     rest: Vec<u8>,

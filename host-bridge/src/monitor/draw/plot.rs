@@ -25,7 +25,6 @@ pub struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    /// A line.
     pub const fn line(trace: &'a Trace, style: Style) -> Self {
         Self {
             trace,
@@ -47,9 +46,7 @@ impl<'a> Series<'a> {
 /// What the axes show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// At the bottom.
     pub low: f32,
-    /// At the top.
     pub high: f32,
     /// Digits behind the point that tell the two apart.
     pub digits: usize,
@@ -91,7 +88,6 @@ fn digits(step: f32) -> usize {
 
 /// Where traces go, with numbers at the left.
 pub struct Plot {
-    /// Where the traces themselves go.
     area: Rect,
     /// Time of a column of dots, in µs.
     column_us: u64,
@@ -104,7 +100,6 @@ impl Plot {
         Self::bare(area, span_s)
     }
 
-    /// The same without numbers.
     pub fn bare(area: Rect, span_s: f32) -> Self {
         Self {
             area,
@@ -130,7 +125,6 @@ impl Plot {
         extents.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)))
     }
 
-    /// Writes the numbers.
     pub fn draw_axis(&self, frame: &mut Frame<'_>, range: Range, theme: Theme) {
         let Rect { x, .. } = self.area;
         let width = AXIS_WIDTH.min(x);

@@ -14,11 +14,9 @@ const LATE_S: f64 = 10.0;
 /// A piece of a recording.
 #[derive(Default)]
 pub struct Excerpt {
-    /// Samples without a gap.
     pub samples: Vec<GaugeRow>,
     /// The time of the first of them, in s since the recording's start.
     pub first_s: f64,
-    /// The estimates within the piece.
     pub estimates: Vec<Estimate>,
     /// The sensor's configuration, if it was reported.
     pub sensor: Option<SensorConfiguration>,
