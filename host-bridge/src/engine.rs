@@ -18,7 +18,7 @@ pub struct Setup<'a> {
     /// Where it connects, in the same words.
     pub connect: Vec<String>,
     /// Whatever else is to be set, by the engine's names.
-    pub more: Vec<(&'static str, Value)>,
+    pub more: Vec<(String, Value)>,
 }
 
 impl Setup<'_> {
@@ -53,8 +53,9 @@ impl Setup<'_> {
             ),
         ];
         let mut configuration = Config::default();
+        let settings = settings.map(|(key, value)| (key.to_owned(), value));
         for (key, value) in settings.into_iter().chain(self.more) {
-            configuration.insert_json5(key, &value.to_string())?;
+            configuration.insert_json5(&key, &value.to_string())?;
         }
         Ok(configuration)
     }

@@ -70,6 +70,9 @@ pub enum Channel {
 }
 
 impl Channel {
+    /// All.
+    pub const ALL: [Self; 4] = [Self::Board, Self::Clock, Self::Stop, Self::Shown];
+
     /// Whether only the newest on it matters: what the network loses of it is not sent again, and holds up nothing.
     pub const fn is_fleeting(self) -> bool {
         matches!(self, Self::Board | Self::Clock)

@@ -43,6 +43,17 @@ pub enum Ends {
     Connecting(Vec<Endpoint>),
 }
 
+impl Ends {
+    fn endpoints(&self) -> &[Endpoint] {
+        let (Self::Listening(endpoints) | Self::Connecting(endpoints)) = self;
+        endpoints
+    }
+
+    const fn is_listening(&self) -> bool {
+        matches!(self, Self::Listening(_))
+    }
+}
+
 /// What a program needs to take part.
 #[derive(Clone)]
 pub struct Network {
@@ -60,12 +71,9 @@ impl Transport for Network {
         role: Role,
         subscriptions: Vec<Subscription>,
     ) -> Result<Box<dyn Connection>, NetworkError> {
-        let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &self.ends;
-        let by_datagrams: Vec<&Endpoint> = endpoints
-            .iter()
-            .filter(|endpoint| endpoint.carrier == Carrier::Udp)
-            .collect();
-        let is_listening = matches!(self.ends, Ends::Listening(_));
+        let is_udp = |endpoint: &&Endpoint| endpoint.carrier == Carrier::Udp;
+        let by_datagrams: Vec<&Endpoint> = self.ends.endpoints().iter().filter(is_udp).collect();
+        let is_listening = self.ends.is_listening();
         let subscriptions = Arc::new(subscriptions);
         let heard = Arc::clone(&subscriptions);
         let on_datagram = move |key: &str, bytes: &[u8]| {
@@ -96,7 +104,7 @@ impl Transport for Network {
 
 impl Network {
     /// Looks at everything that can be looked at before anybody is talked to. With credentials, certificates decide
-    /// who may speak for which board of the benches `names`: see [`access`]. Without, nobody listens beyond this
+    /// who may speak for which board of the benches `names`: see [`name::rules`]. Without, nobody listens beyond this
     /// computer unless it `is_insecure` on purpose. Fails if endpoints and credentials don't fit, credentials can't
     /// be used, or one can't listen.
     pub fn new(
@@ -105,56 +113,41 @@ impl Network {
         names: Vec<Name>,
         is_insecure: bool,
     ) -> Result<Self, NetworkError> {
-        let (Ends::Listening(endpoints) | Ends::Connecting(endpoints)) = &ends;
-        for endpoint in endpoints {
-            let endpoint = endpoint.clone();
-            match (endpoint.carrier == Carrier::Tls, &credentials) {
-                (true, None) => {
-                    return Err(NetworkError::WithoutCertificates(endpoint));
-                }
-                (false, Some(_)) => return Err(NetworkError::Open(endpoint)),
-                (false, None)
-                    if matches!(ends, Ends::Listening(_))
-                        && !endpoint.is_loopback()
-                        && !is_insecure =>
-                {
-                    return Err(NetworkError::Insecure(endpoint));
-                }
-                (true, Some(_))
-                    if endpoint.host.starts_with('[') && matches!(ends, Ends::Connecting(_)) =>
-                {
-                    return Err(NetworkError::Unmatched(endpoint));
-                }
-                _ => {}
-            }
+        let is_listening = ends.is_listening();
+        for endpoint in ends.endpoints() {
+            let is_open = is_listening && !endpoint.is_loopback() && !is_insecure;
+            let is_numbered = !is_listening && endpoint.host.starts_with('[');
+            let refusal = match (endpoint.carrier == Carrier::Tls, &credentials) {
+                (true, None) => NetworkError::WithoutCertificates,
+                (false, Some(_)) => NetworkError::Open,
+                (false, None) if is_open => NetworkError::Insecure,
+                (true, Some(_)) if is_numbered => NetworkError::Unmatched,
+                _ => continue,
+            };
+            return Err(refusal(endpoint.clone()));
         }
-        let tls = match &credentials {
-            Some(credentials) => Some(Arc::new(credentials.load()?)),
-            None => None,
-        };
-        if let Ends::Listening(endpoints) = &ends {
-            for endpoint in endpoints {
-                endpoint
-                    .try_listening()
-                    .map_err(|reason| NetworkError::Listening(endpoint.clone(), reason))?;
-            }
+        let tls = credentials.as_ref().map(Credentials::load).transpose()?;
+        for endpoint in ends.endpoints().iter().filter(|_| is_listening) {
+            endpoint
+                .try_listening()
+                .map_err(|reason| NetworkError::Listening(endpoint.clone(), reason))?;
         }
         Ok(Self {
             ends,
             credentials,
-            tls,
+            tls: tls.map(Arc::new),
             names,
         })
     }
 
     fn open(&self) -> Result<Session, NetworkError> {
-        let mode = match self.ends {
-            // What connects is a client: a router carries on what clients say, but takes peers for
-            // neighbours who hear each other.
-            Ends::Connecting(_) => "client",
-            Ends::Listening(_) => "peer",
-        };
-        self.take_part(mode)
+        // What connects is a client: a router carries on what clients say, but takes peers for neighbours who hear
+        // each other.
+        self.take_part(if self.ends.is_listening() {
+            "peer"
+        } else {
+            "client"
+        })
     }
 
     /// Takes part as a router: carries on what bridges say. Fails if one can't listen.
@@ -163,22 +156,24 @@ impl Network {
     }
 
     fn take_part(&self, mode: &str) -> Result<Session, NetworkError> {
-        let locators = |endpoints: &[Endpoint]| -> Vec<String> {
-            endpoints.iter().map(Endpoint::locator).collect()
+        let locators = self
+            .ends
+            .endpoints()
+            .iter()
+            .map(Endpoint::locator)
+            .collect();
+        let (listen, connect) = if self.ends.is_listening() {
+            (locators, Vec::new())
+        } else {
+            (Vec::new(), locators)
         };
-        let (listen, connect) = match &self.ends {
-            Ends::Listening(endpoints) => (locators(endpoints), Vec::new()),
-            Ends::Connecting(endpoints) => (Vec::new(), locators(endpoints)),
-        };
-        let mut more = vec![
-            (
-                "connect/retry",
-                json!({
-                    "period_init_ms": RETRY_FIRST.as_millis(),
-                    "period_max_ms": RETRY_LONGEST.as_millis(),
-                    "period_increase_factor": 1.5,
-                }),
-            ),
+        let retry = json!({
+            "period_init_ms": RETRY_FIRST.as_millis(),
+            "period_max_ms": RETRY_LONGEST.as_millis(),
+            "period_increase_factor": 1.5,
+        });
+        let more = [
+            ("connect/retry", retry),
             ("transport/link/tx/lease", json!(LEASE.as_millis())),
             ("transport/link/tx/batch_size", json!(BATCH_BYTES)),
             (
@@ -186,40 +181,24 @@ impl Network {
                 json!(MAX_MESSAGE_BYTES),
             ),
         ];
+        let mut more = more.map(|(key, value)| (key.to_owned(), value)).to_vec();
         if let Some(credentials) = &self.credentials {
             refused::watch();
-            more.extend([
-                (
-                    "transport/link/tls/root_ca_certificate",
-                    json!(credentials.ca),
-                ),
-                (
-                    "transport/link/tls/listen_certificate",
-                    json!(credentials.certificate),
-                ),
-                (
-                    "transport/link/tls/listen_private_key",
-                    json!(credentials.key),
-                ),
-                (
-                    "transport/link/tls/connect_certificate",
-                    json!(credentials.certificate),
-                ),
-                (
-                    "transport/link/tls/connect_private_key",
-                    json!(credentials.key),
-                ),
-                (
-                    "access_control",
-                    name::rules(&self.names, matches!(self.ends, Ends::Connecting(_))),
-                ),
-                ("transport/link/tls/enable_mtls", json!(true)),
-                // Never without: the engine also believes the CAs of the web, so that any of their
-                // customers could listen in place of the other site. That one would still have to be called
-                // as the rules want it.
-                ("transport/link/tls/verify_name_on_connect", json!(true)),
-                ("transport/link/tls/close_link_on_expiration", json!(true)),
-            ]);
+            let rules = name::rules(&self.names, !self.ends.is_listening());
+            more.push(("access_control".to_owned(), rules));
+            let tls = [
+                ("root_ca_certificate", json!(credentials.ca)),
+                ("listen_certificate", json!(credentials.certificate)),
+                ("listen_private_key", json!(credentials.key)),
+                ("connect_certificate", json!(credentials.certificate)),
+                ("connect_private_key", json!(credentials.key)),
+                ("enable_mtls", json!(true)),
+                // Never without: the engine also believes the CAs of the web, so that any of their customers could
+                // listen in place of the other site. That one would still have to be called as the rules want it.
+                ("verify_name_on_connect", json!(true)),
+                ("close_link_on_expiration", json!(true)),
+            ];
+            more.extend(tls.map(|(key, value)| (format!("transport/link/tls/{key}"), value)));
         }
         let setup = Setup {
             mode,
@@ -227,9 +206,7 @@ impl Network {
             connect,
             more,
         };
-        setup
-            .open()
-            .map_err(|error| NetworkError::Engine(error.to_string()))
+        setup.open().map_err(engine)
     }
 }
 
@@ -237,10 +214,8 @@ impl Network {
 pub struct Wire {
     session: Session,
     datagrams: Option<Arc<Datagrams>>,
-    board: Publisher<'static>,
-    clock: Publisher<'static>,
-    stop: Publisher<'static>,
-    shown: Publisher<'static>,
+    /// In the order of [`Channel::ALL`].
+    publishers: [Publisher<'static>; 4],
     _subscribers: Vec<Subscriber<()>>,
 }
 
@@ -258,12 +233,9 @@ impl Wire {
         subscriptions: &Arc<Vec<Subscription>>,
     ) -> Result<Self, NetworkError> {
         let datagrams = datagrams.map(Arc::new);
-        let fleeting: Vec<String> = [Role::Sensor, Role::Display]
-            .into_iter()
-            .flat_map(|role| {
-                [Channel::Board, Channel::Clock].map(|channel| name.key(role, channel))
-            })
-            .collect();
+        let fleeting = [Role::Sensor, Role::Display]
+            .map(|role| [Channel::Board, Channel::Clock].map(|channel| name.key(role, channel)))
+            .concat();
         let subscribe = |at: usize| {
             let subscriptions = Arc::clone(subscriptions);
             let keys = subscriptions[at].keys.clone();
@@ -293,7 +265,13 @@ impl Wire {
         let subscribers = (0..subscriptions.len())
             .map(subscribe)
             .collect::<Result<_, _>>()?;
-        let publisher = |channel: Channel, priority| {
+        let publisher = |channel: Channel| {
+            let priority = match channel {
+                Channel::Board | Channel::Clock => Priority::InteractiveHigh,
+                Channel::Stop => Priority::RealTime,
+                // After all that the boards need.
+                Channel::Shown => Priority::DataLow,
+            };
             session
                 .declare_publisher(name.key(role, channel))
                 .priority(priority)
@@ -306,12 +284,9 @@ impl Wire {
                 .wait()
                 .map_err(engine)
         };
+        let [board, clock, stop, shown] = Channel::ALL.map(publisher);
         Ok(Self {
-            board: publisher(Channel::Board, Priority::InteractiveHigh)?,
-            clock: publisher(Channel::Clock, Priority::InteractiveHigh)?,
-            stop: publisher(Channel::Stop, Priority::RealTime)?,
-            // After all that the boards need.
-            shown: publisher(Channel::Shown, Priority::DataLow)?,
+            publishers: [board?, clock?, stop?, shown?],
             session,
             datagrams,
             _subscribers: subscribers,
@@ -321,12 +296,7 @@ impl Wire {
 
 impl Connection for Wire {
     fn publish(&self, channel: Channel, envelope: &Envelope) -> bool {
-        let publisher = match channel {
-            Channel::Board => &self.board,
-            Channel::Clock => &self.clock,
-            Channel::Stop => &self.stop,
-            Channel::Shown => &self.shown,
-        };
+        let publisher = &self.publishers[channel as usize];
         let bytes = envelope.to_bytes();
         if channel.is_fleeting()
             && let Some(datagrams) = &self.datagrams

@@ -34,16 +34,17 @@ fn open(mode: &str, end: &str, socket: &Path) -> io::Result<Session> {
         "listen" => (vec![socket], Vec::new()),
         _ => (Vec::new(), vec![socket]),
     };
-    let setup = Setup {
+    let timeouts = ["open_timeout", "accept_timeout"];
+    let more = timeouts.map(|key| (format!("transport/unicast/{key}"), json!(ANSWER_MS)));
+    let more = more.into();
+    Setup {
         mode,
         listen,
         connect,
-        more: vec![
-            ("transport/unicast/open_timeout", json!(ANSWER_MS)),
-            ("transport/unicast/accept_timeout", json!(ANSWER_MS)),
-        ],
-    };
-    setup.open().map_err(failed)
+        more,
+    }
+    .open()
+    .map_err(failed)
 }
 
 fn publisher(session: &Session, key: &'static str) -> io::Result<Publisher<'static>> {

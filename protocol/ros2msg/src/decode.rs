@@ -68,20 +68,24 @@ impl<'d> Cursor<'_, 'd> {
         }
     }
 
-    /// A number of `N` bytes at a multiple of `N`, as little-endian bytes.
-    fn aligned<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
-        self.at = self.at.next_multiple_of(N);
+    /// A number of `size` bytes at a multiple of `size`, as little-endian bytes with zeros behind them.
+    fn aligned(&mut self, size: usize) -> Result<[u8; 8], DecodeError> {
+        self.at = self.at.next_multiple_of(size);
         let is_big = self.is_big;
-        let mut bytes = [0; N];
-        bytes.copy_from_slice(self.take(N)?);
+        let mut bytes = [0; 8];
+        bytes[..size].copy_from_slice(self.take(size)?);
         if is_big {
-            bytes.reverse();
+            bytes[..size].reverse();
         }
         Ok(bytes)
     }
 
+    fn whole(&mut self, size: usize) -> Result<u64, DecodeError> {
+        Ok(u64::from_le_bytes(self.aligned(size)?))
+    }
+
     fn count(&mut self) -> Result<usize, DecodeError> {
-        Ok(u32::from_le_bytes(self.aligned()?) as usize)
+        Ok(self.whole(4)? as usize)
     }
 
     fn message(&mut self, definition: &'d Definition) -> Result<Value, DecodeError> {
@@ -104,17 +108,15 @@ impl<'d> Cursor<'_, 'd> {
 
     fn value(&mut self, kind: &'d Kind) -> Result<Value, DecodeError> {
         Ok(match kind {
-            Kind::Bool => Value::Bool(self.aligned::<1>()? != [0]),
-            Kind::I8 => i8::from_le_bytes(self.aligned()?).into(),
-            Kind::I16 => i16::from_le_bytes(self.aligned()?).into(),
-            Kind::I32 => i32::from_le_bytes(self.aligned()?).into(),
-            Kind::I64 => i64::from_le_bytes(self.aligned()?).into(),
-            Kind::U8 => u8::from_le_bytes(self.aligned()?).into(),
-            Kind::U16 => u16::from_le_bytes(self.aligned()?).into(),
-            Kind::U32 => u32::from_le_bytes(self.aligned()?).into(),
-            Kind::U64 => u64::from_le_bytes(self.aligned()?).into(),
-            Kind::F32 => float(f32::from_le_bytes(self.aligned()?).into()),
-            Kind::F64 => float(f64::from_le_bytes(self.aligned()?)),
+            Kind::Bool => Value::Bool(self.whole(1)? != 0),
+            Kind::Signed(size) => {
+                // The sign is that of the highest byte there is.
+                let unused = 64 - 8 * *size as u32;
+                ((self.whole(*size)? << unused).cast_signed() >> unused).into()
+            }
+            Kind::Unsigned(size) => self.whole(*size)?.into(),
+            Kind::F32 => float(f32::from_bits(self.whole(4)? as u32).into()),
+            Kind::F64 => float(f64::from_bits(self.whole(8)?)),
             Kind::Text => self.text()?,
             Kind::Message(definition) => self.message(definition)?,
             Kind::Array(kind, count) => self.list(kind, *count)?,

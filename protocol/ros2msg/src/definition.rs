@@ -46,22 +46,10 @@ pub struct Field {
 pub enum Kind {
     /// `bool`
     Bool,
-    /// `int8`
-    I8,
-    /// `int16`
-    I16,
-    /// `int32`
-    I32,
-    /// `int64`
-    I64,
-    /// `uint8`, `byte`, `char`
-    U8,
-    /// `uint16`
-    U16,
-    /// `uint32`
-    U32,
-    /// `uint64`
-    U64,
+    /// `int8` to `int64`: so many bytes.
+    Signed(usize),
+    /// `uint8` to `uint64`, `byte`, `char`: so many bytes.
+    Unsigned(usize),
     /// `float32`
     F32,
     /// `float64`
@@ -181,14 +169,14 @@ impl Texts<'_> {
         let bare = text.split("<=").next().unwrap_or(text);
         Ok(match bare {
             "bool" => Kind::Bool,
-            "int8" => Kind::I8,
-            "int16" => Kind::I16,
-            "int32" => Kind::I32,
-            "int64" => Kind::I64,
-            "uint8" | "byte" | "char" => Kind::U8,
-            "uint16" => Kind::U16,
-            "uint32" => Kind::U32,
-            "uint64" => Kind::U64,
+            "int8" => Kind::Signed(1),
+            "int16" => Kind::Signed(2),
+            "int32" => Kind::Signed(4),
+            "int64" => Kind::Signed(8),
+            "uint8" | "byte" | "char" => Kind::Unsigned(1),
+            "uint16" => Kind::Unsigned(2),
+            "uint32" => Kind::Unsigned(4),
+            "uint64" => Kind::Unsigned(8),
             "float32" => Kind::F32,
             "float64" => Kind::F64,
             "string" => Kind::Text,
@@ -221,7 +209,7 @@ fn builtin(name: &str) -> Option<Definition> {
         "builtin_interfaces/Time" | "builtin_interfaces/Duration"
     )
     .then(|| Definition {
-        fields: [("sec", Kind::I32), ("nanosec", Kind::U32)]
+        fields: [("sec", Kind::Signed(4)), ("nanosec", Kind::Unsigned(4))]
             .map(|(name, kind)| Field {
                 name: name.to_owned(),
                 kind,

@@ -40,9 +40,9 @@ struct Writer<'o, 'd> {
 }
 
 impl<'d> Writer<'_, 'd> {
-    fn aligned<const N: usize>(&mut self, bytes: [u8; N]) {
+    fn aligned(&mut self, bytes: &[u8]) {
         let length = self.out.len() - self.start;
-        let room = length.next_multiple_of(N) - length;
+        let room = length.next_multiple_of(bytes.len()) - length;
         self.out.resize(self.out.len() + room, 0);
         self.out.extend(bytes);
     }
@@ -66,20 +66,25 @@ impl<'d> Writer<'_, 'd> {
         }
     }
 
-    fn unsigned<T: TryFrom<u64> + Default>(&self, value: &Value) -> Result<T, EncodeError> {
-        if value.is_null() {
-            return Ok(T::default());
-        }
-        let number = value.as_u64().and_then(|number| T::try_from(number).ok());
-        number.ok_or_else(|| self.wrong(value))
-    }
-
-    fn signed<T: TryFrom<i64> + Default>(&self, value: &Value) -> Result<T, EncodeError> {
-        if value.is_null() {
-            return Ok(T::default());
-        }
-        let number = value.as_i64().and_then(|number| T::try_from(number).ok());
-        number.ok_or_else(|| self.wrong(value))
+    /// The low `size` bytes of a whole number, if it has no more.
+    fn whole(&mut self, value: &Value, size: usize, is_signed: bool) -> Result<(), EncodeError> {
+        let bits = 8 * size as u32;
+        let (low, high) = if is_signed {
+            (-(1_i128 << (bits - 1)), 1_i128 << (bits - 1))
+        } else {
+            (0, 1_i128 << bits)
+        };
+        let number = match value {
+            Value::Null => Some(0),
+            value => value
+                .as_i64()
+                .map(i128::from)
+                .or_else(|| value.as_u64().map(i128::from)),
+        };
+        let number = number.filter(|number| (low..high).contains(number));
+        let number = number.ok_or_else(|| self.wrong(value))?;
+        self.aligned(&number.to_le_bytes()[..size]);
+        Ok(())
     }
 
     fn float(&self, value: &Value) -> Result<f64, EncodeError> {
@@ -96,7 +101,7 @@ impl<'d> Writer<'_, 'd> {
             value => return Err(self.wrong(value)),
         };
         let length = u32::try_from(text.len() + 1).map_err(|_| self.wrong(value))?;
-        self.aligned(length.to_le_bytes());
+        self.aligned(&length.to_le_bytes());
         self.out.extend(text.as_bytes());
         self.out.push(0);
         Ok(())
@@ -110,18 +115,12 @@ impl<'d> Writer<'_, 'd> {
                     Value::Bool(is) => *is,
                     value => return Err(self.wrong(value)),
                 };
-                self.aligned([u8::from(is)]);
+                self.aligned(&[u8::from(is)]);
             }
-            Kind::I8 => self.aligned(self.signed::<i8>(value)?.to_le_bytes()),
-            Kind::I16 => self.aligned(self.signed::<i16>(value)?.to_le_bytes()),
-            Kind::I32 => self.aligned(self.signed::<i32>(value)?.to_le_bytes()),
-            Kind::I64 => self.aligned(self.signed::<i64>(value)?.to_le_bytes()),
-            Kind::U8 => self.aligned(self.unsigned::<u8>(value)?.to_le_bytes()),
-            Kind::U16 => self.aligned(self.unsigned::<u16>(value)?.to_le_bytes()),
-            Kind::U32 => self.aligned(self.unsigned::<u32>(value)?.to_le_bytes()),
-            Kind::U64 => self.aligned(self.unsigned::<u64>(value)?.to_le_bytes()),
-            Kind::F32 => self.aligned((self.float(value)? as f32).to_le_bytes()),
-            Kind::F64 => self.aligned(self.float(value)?.to_le_bytes()),
+            Kind::Signed(size) => self.whole(value, *size, true)?,
+            Kind::Unsigned(size) => self.whole(value, *size, false)?,
+            Kind::F32 => self.aligned(&(self.float(value)? as f32).to_le_bytes()),
+            Kind::F64 => self.aligned(&self.float(value)?.to_le_bytes()),
             Kind::Text => self.text(value)?,
             Kind::Message(definition) => self.message(definition, value)?,
             Kind::Array(kind, count) => {
@@ -136,7 +135,7 @@ impl<'d> Writer<'_, 'd> {
             Kind::Sequence(kind) => {
                 let items = self.items(value)?;
                 let length = u32::try_from(items.len()).map_err(|_| self.wrong(value))?;
-                self.aligned(length.to_le_bytes());
+                self.aligned(&length.to_le_bytes());
                 for item in items {
                     self.value(kind, item)?;
                 }
