@@ -14,4 +14,3 @@ pub mod json;
 pub mod look;
 pub mod permission;
 pub mod report;
-mod supervisor;

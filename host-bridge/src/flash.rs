@@ -15,4 +15,3 @@ pub mod firmware;
 pub mod plan;
 pub(crate) mod probes;
 pub mod programmer;
-pub mod trouble;

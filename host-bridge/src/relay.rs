@@ -23,7 +23,6 @@ pub(crate) mod inward;
 pub mod name;
 pub mod network;
 pub mod operator;
-pub(crate) mod outbox;
 pub(crate) mod outward;
 pub(crate) mod refused;
 pub(crate) mod remote;

@@ -11,7 +11,6 @@ use protocol::{
 use super::counters::{self, Count};
 use super::examination::{BoardFacts, ClockFacts, ElfFacts, Examination, ProbeFacts};
 use super::permission::{RELOAD, RULES, probe_rule};
-use super::supervisor;
 use crate::state::{Named, State};
 
 /// Beyond this, a clock is not a crystal's, in ppm: two of 100 ppm, and as much again for heat and age.
@@ -316,7 +315,7 @@ impl Findings {
 
     fn of_supervisor(&mut self, state: DisplayState, uptime_us: u64) {
         let is_starting = state == DisplayState::Boot && uptime_us < START_US;
-        if let Some(advice) = supervisor::advice(state).filter(|_| !is_starting) {
+        if let Some(advice) = counters::supervisor_advice(state).filter(|_| !is_starting) {
             self.add(state.name(), format!("no stimulus: {state}"), advice);
         }
     }

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use probe_rs::probe::list::{Accessibility, Lister, ProbeListItem};
 use probe_rs::probe::{DebugProbeInfo, DebugProbeSelector, Probe};
 
-use super::trouble::{Trouble, UDEV_HINT};
+use super::programmer::{Trouble, UDEV_HINT};
 use crate::bench::Seat;
 use crate::place::StLink;
 

@@ -14,11 +14,9 @@ mod gauges;
 mod header;
 mod log;
 mod plot;
-mod ports;
 mod settings;
 mod surface;
 mod text;
-mod velocity;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -60,7 +58,7 @@ pub fn draw(frame: &mut Frame<'_>, live: &Dashboard, shown: &Dashboard, view: &V
 }
 
 fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) {
-    let lower = [GAUGES_HEIGHT, ports::HEIGHT, LOG_HEIGHT];
+    let lower = [GAUGES_HEIGHT, boards::PORTS_HEIGHT, LOG_HEIGHT];
     let all: u16 = lower.iter().sum();
     let upper = SURFACE_HEIGHT + FINGERTIP_HEIGHT;
     let has_room = body.height >= upper + all;
@@ -69,7 +67,7 @@ fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) 
         upper + (body.height - upper - all) / 2
     } else {
         let table = match view.panel {
-            Panel::Ports => ports::HEIGHT,
+            Panel::Ports => boards::PORTS_HEIGHT,
             Panel::Gauges | Panel::Boards | Panel::Log => 0,
         };
         upper.min(body.height.saturating_sub(table))
@@ -81,17 +79,17 @@ fn draw_body(frame: &mut Frame<'_>, body: Rect, shown: &Dashboard, view: &View) 
     surface::draw(frame, surface, shown, view.theme);
     surface::draw_trace(frame, wavelength, shown, view);
     fingertip::draw(frame, fingertip, shown, view);
-    velocity::draw(frame, velocity, shown, view);
+    surface::draw_velocity(frame, velocity, shown, view);
     if has_room {
         let [gauges, rest] = cut_top(bottom, lower[0]);
         let [ports, log] = cut_top(rest, lower[1]);
         gauges::draw(frame, gauges, shown, view);
-        ports::draw(frame, ports, shown, view.theme);
+        boards::draw_ports(frame, ports, shown, view.theme);
         log::draw(frame, log, shown, view.theme);
     } else if bottom.height >= 2 {
         match view.panel {
             Panel::Gauges => gauges::draw(frame, bottom, shown, view),
-            Panel::Ports => ports::draw(frame, bottom, shown, view.theme),
+            Panel::Ports => boards::draw_ports(frame, bottom, shown, view.theme),
             Panel::Boards => boards::draw(frame, bottom, shown, view.theme),
             Panel::Log => log::draw(frame, bottom, shown, view.theme),
         }

@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use host_bridge::flash::firmware::Firmware;
 use host_bridge::flash::plan::Plan;
+use host_bridge::flash::programmer::Trouble;
 use host_bridge::flash::programmer::{Programmer, Progress, Stage};
-use host_bridge::flash::trouble::Trouble;
 use probe_rs::integration::FakeProbe;
 use protocol::Role;
 

@@ -1,4 +1,5 @@
-//! λ: how long, how sure, by which count, over which seconds.
+//! λ: how long, how sure, by which count, over which seconds; and v of both sides: the hand that leads, and the arm that
+//! follows.
 
 use protocol::Estimate;
 use ratatui::Frame;
@@ -14,7 +15,7 @@ use crate::monitor::settings;
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
 
-/// An estimate that is older than this, in ms, is no more than a memory.
+/// What is older than this, in ms, is no more than a memory.
 const OLD_MS: u64 = 300;
 /// Parts of the bar of confidence.
 const BAR: usize = 14;
@@ -176,5 +177,44 @@ pub fn draw_trace(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &V
         let range = Range::around(low, high, LEAST_PART * high);
         plot.draw_axis(frame, range, theme);
         plot.draw(frame, shown.now_us, range, &series, None);
+    }
+}
+
+/// Velocities that are drawn as far apart as the area is high, in mm/s: a hand at rest has its noise.
+const LEAST_MM_S: f32 = 20.0;
+
+/// Draws both velocities over the last seconds.
+pub fn draw_velocity(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, view: &View) {
+    let theme = view.theme;
+    let plot = Plot::new(cut_top(area, 1)[1], view.span_s());
+    let traces = &shown.traces;
+    let now = |velocity_um_s: Option<i32>, age_ms: Option<u64>| {
+        let fresh = velocity_um_s.filter(|_| age_ms.is_some_and(|age_ms| age_ms <= OLD_MS));
+        let words = fresh.map(|um_s| format!("{:+6.1}", um_s as f32 / 1e3));
+        words.unwrap_or_else(|| "     -".to_owned())
+    };
+    let hand = shown.motion.map(|(_, motion)| motion.velocity_um_s);
+    let arm = shown.estimate.map(|(_, estimate)| estimate.velocity_um_s);
+    let title = Line::from(vec![
+        Span::styled("v", theme.strong()),
+        Span::styled("  mm/s, ", theme.quiet()),
+        Span::styled(text::span(plot.span_s()), theme.quiet()),
+        Span::styled("   ━ ", theme.display()),
+        Span::styled("hand ", theme.quiet()),
+        Span::raw(now(hand, shown.motion_age_ms())),
+        Span::styled("  ┅ ", theme.sensor()),
+        Span::styled("arm ", theme.quiet()),
+        Span::raw(now(arm, shown.estimate_age_ms())),
+    ]);
+    text::panel(frame, area, theme, title);
+    let series = [
+        Series::dots(&traces.arm_mm_s, theme.sensor()),
+        Series::line(&traces.hand_mm_s, theme.display()),
+    ];
+    if let Some((low, high)) = plot.extent(shown.now_us, &series) {
+        let range = Range::around(low, high, LEAST_MM_S);
+        plot.draw_axis(frame, range, theme);
+        let zero = Some((0.0, theme.quiet()));
+        plot.draw(frame, shown.now_us, range, &series, zero);
     }
 }
