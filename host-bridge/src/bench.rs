@@ -87,13 +87,9 @@ impl Bench {
             Some(PathBuf::from(FILE_NAME)),
             settings.map(|folder| folder.join("ridgelink").join("bench.toml")),
         ];
-        match given {
-            Some(path) => Self::read(path),
-            None => match usual.into_iter().flatten().find(|path| path.exists()) {
-                Some(path) => Self::read(&path),
-                None => Ok(Self::default()),
-            },
-        }
+        let usual = usual.into_iter().flatten().find(|path| path.exists());
+        let path = given.map(Path::to_owned).or(usual);
+        path.map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
     }
 
     /// The same, unless both boards are at one place. Fails if they are.

@@ -324,17 +324,9 @@ impl Input for SharedInput {
         *locked(&way) = Way::None;
         match part {
             Part::Owner(owner) => {
-                let Owner {
-                    input,
-                    funnel,
-                    host,
-                    _claim: claim,
-                    ..
-                } = owner;
-                input.close(discards);
-                drop(host);
-                drop(funnel);
-                drop(claim);
+                owner.input.close(discards);
+                drop(owner.host);
+                // What is left of it goes now, the claim last.
             }
             Part::Guest(hearing) => hearing.guest.leave(),
             Part::Heir { .. } | Part::Nobody => {}

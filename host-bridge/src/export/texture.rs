@@ -112,13 +112,8 @@ fn device() -> ReferenceDevice {
 }
 
 fn channel(id: u32, trace: Trace) -> Channel {
-    let Trace {
-        description,
-        gain,
-        per_metre,
-        points,
-    } = trace;
-    let sample_count = u32::try_from(points.len()).ok();
+    let per_metre = trace.per_metre;
+    let sample_count = u32::try_from(trace.points.len()).ok();
     let keyframe = |(at, amplitude): (u64, f64)| Keyframe {
         amplitude_modulation: Some((amplitude * PER_UNIT).round() / PER_UNIT),
         frequency_modulation: None,
@@ -130,13 +125,13 @@ fn channel(id: u32, trace: Trace) -> Channel {
         position: Some(0),
         phase: None,
         base_signal: None,
-        keyframes: points.into_iter().map(keyframe).collect(),
+        keyframes: trace.points.into_iter().map(keyframe).collect(),
     };
     Channel {
         id,
-        description,
+        description: trace.description,
         reference_device_id: Some(DEVICE),
-        gain,
+        gain: trace.gain,
         mixing_coefficient: 1.0,
         actuator_resolution: Some(GRID),
         body_part_target: Some(vec!["Index".to_owned(), "Third Phalanx".to_owned()]),

@@ -25,31 +25,26 @@ const LOOK_AGAIN: Duration = Duration::from_millis(100);
 /// A port that was named is taken at its word, unless it is another ST-LINK's: then the Hello that is heard there
 /// would be another board's. Fails if the port is another ST-LINK's.
 pub fn place(seat: &Place, probe: Option<&str>, links: &[StLink]) -> Result<Place, Elsewhere> {
-    let own = probe.filter(|serial| {
+    let is_console = |serial: &&str| {
         links
             .iter()
-            .any(|link| link.serial.as_deref() == Some(serial))
-    });
-    match (seat, own) {
-        (Place::Port(port), Some(own)) => {
-            let real = port.canonicalize().unwrap_or_else(|_| port.clone());
-            match links
-                .iter()
-                .find(|link| link.port == real)
-                .and_then(|link| link.serial.as_deref())
-            {
-                Some(serial) if serial != own => Err(Elsewhere {
-                    console: port.display().to_string(),
-                    serial: serial.to_owned(),
-                    probe: own.to_owned(),
-                }),
-                _ => Ok(seat.clone()),
-            }
-        }
-        (Place::Usb(_) | Place::Among(_) | Place::Anywhere, Some(own)) => {
-            Ok(Place::Usb(own.to_owned()))
-        }
-        (_, None) => Ok(seat.clone()),
+            .any(|link| link.serial.as_deref() == Some(*serial))
+    };
+    let Some(own) = probe.filter(is_console) else {
+        return Ok(seat.clone());
+    };
+    let Place::Port(port) = seat else {
+        return Ok(Place::Usb(own.to_owned()));
+    };
+    let real = port.canonicalize().unwrap_or_else(|_| port.clone());
+    let link = links.iter().find(|link| link.port == real);
+    match link.and_then(|link| link.serial.as_deref()) {
+        Some(serial) if serial != own => Err(Elsewhere {
+            console: port.display().to_string(),
+            serial: serial.to_owned(),
+            probe: own.to_owned(),
+        }),
+        _ => Ok(seat.clone()),
     }
 }
 

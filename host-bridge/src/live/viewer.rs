@@ -56,12 +56,7 @@ impl Viewer {
         links: Vec<(Role, Link)>,
         told: Receiver<(Role, Event)>,
     ) -> Result<Self, LiveError> {
-        let Settings {
-            address,
-            port,
-            gauges,
-        } = settings;
-        let (foxglove, (listener, page)) = take_ports(address, port)?;
+        let (foxglove, (listener, page)) = take_ports(settings.address, settings.port)?;
         let newest = Arc::<Newest>::default();
         let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
         let stop = move || stop_all(&boards);
@@ -71,7 +66,7 @@ impl Viewer {
             page,
             newest,
             dashboard: Dashboard::default(),
-            stream: GaugeStream::new(gauges),
+            stream: GaugeStream::new(settings.gauges),
             links,
             told,
         })

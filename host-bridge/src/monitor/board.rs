@@ -2,6 +2,7 @@
 
 use protocol::{Configuration, PortCounters, Status, Trip};
 
+use super::orders::Orders;
 use crate::link::Clocks;
 use crate::state::State;
 
@@ -22,6 +23,8 @@ pub struct Board {
     pub clocks: Option<Clocks>,
     /// How often its fastest message comes: [`protocol::Estimate`] or [`protocol::Motion`].
     pub rate: Rate,
+    /// What is to be said to it.
+    pub orders: Orders,
 }
 
 impl Board {

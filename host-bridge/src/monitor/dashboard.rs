@@ -10,7 +10,7 @@ use protocol::{
 use super::board::Board;
 use super::fingertip::Fingertip;
 use super::log_entry::{LogEntry, LogEvent};
-use super::orders::{Orders, Outcome};
+use super::orders::Outcome;
 use super::settings;
 use super::settings::Setting;
 use super::trace::Trace;
@@ -87,7 +87,6 @@ pub struct Dashboard {
     /// The boards that have not answered a Stop, and since when.
     stopping: Option<(u64, Vec<Role>)>,
     notice: Option<Notice>,
-    orders: [Orders; 2],
     fresh: Vec<LogEntry>,
 }
 
@@ -107,14 +106,6 @@ impl Dashboard {
         }
     }
 
-    const fn orders(&mut self, role: Role) -> &mut Orders {
-        let [sensor, display] = &mut self.orders;
-        match role {
-            Role::Sensor => sensor,
-            Role::Display | Role::Host => display,
-        }
-    }
-
     /// Takes an event of the link to the board of `role`, at `now_us`.
     pub fn on(&mut self, now_us: u64, role: Role, event: Event) {
         self.now_us = self.now_us.max(now_us);
@@ -128,12 +119,12 @@ impl Dashboard {
                 board.clocks = None;
                 board.arm_stopped = None;
                 self.fingertip.restart();
-                self.orders(role).read();
+                self.board_mut(role).orders.read();
                 self.log(role, LogEvent::Restarted);
             }
             Event::StateChanged(state) => {
                 if state.is_known() {
-                    self.orders(role).read();
+                    self.board_mut(role).orders.read();
                 } else {
                     self.lose(role);
                 }
@@ -176,7 +167,7 @@ impl Dashboard {
         self.display.rate.elapse(now_us);
         for role in [Role::Sensor, Role::Display] {
             let is_known = self.board(role).is_known();
-            if let Some(outcome) = self.orders(role).elapse(now_us, is_known) {
+            if let Some(outcome) = self.board_mut(role).orders.elapse(now_us, is_known) {
                 self.conclude(role, outcome);
             }
         }
@@ -185,20 +176,17 @@ impl Dashboard {
         {
             let names: Vec<&str> = boards.iter().map(|role| role.name()).collect();
             let names = names.join(" and ");
-            self.notify(
-                true,
-                format!("NOT STOPPED: {names}: no answer, told again: use the emergency stop"),
-            );
+            let words =
+                format!("NOT STOPPED: {names}: no answer, told again: use the emergency stop");
+            self.notify(true, words);
         }
-        let is_over = |notice: &Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;
-        if self.notice.as_ref().is_some_and(is_over) {
-            self.notice = None;
-        }
+        let is_over = |notice: &mut Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;
+        self.notice.take_if(is_over);
     }
 
     /// What is to be said to the board of `role` now.
     pub fn take_outbox(&mut self, role: Role) -> Vec<Message> {
-        self.orders(role).take()
+        self.board_mut(role).orders.take()
     }
 
     /// Something could not be said.
@@ -228,38 +216,31 @@ impl Dashboard {
         }
         let confirmed = self.linked.iter().filter(|board| !waits.contains(board));
         let names: Vec<&str> = confirmed.map(|board| board.name()).collect();
-        self.notify(
-            false,
-            format!("stop: confirmed by the {}", names.join(" and the ")),
-        );
+        let names = names.join(" and the ");
+        self.notify(false, format!("stop: confirmed by the {names}"));
     }
 
     /// Reads both configurations anew.
     pub fn read_configurations(&mut self) {
         for role in [Role::Sensor, Role::Display] {
-            self.orders(role).read();
+            self.board_mut(role).orders.read();
         }
     }
 
     /// Changes one setting of the board of `role`, and keeps all others.
     pub fn change(&mut self, role: Role, setting: &'static Setting, text: &str) {
         if !self.board(role).is_known() {
-            self.notify(true, format!("{}: {}", role.name(), NotSent::NotKnown));
-            return;
+            return self.on_not_sent(role, NotSent::NotKnown);
         }
         let now_us = self.now_us;
         self.outcome = None;
-        self.orders(role).change(setting, text, now_us);
+        self.board_mut(role).orders.change(setting, text, now_us);
     }
 
     /// Has the gauges streamed for who watches, or no longer.
     pub fn toggle_gauges(&mut self) {
         if !self.board(Role::Sensor).is_known() {
-            self.notify(
-                true,
-                format!("{}: {}", Role::Sensor.name(), NotSent::NotKnown),
-            );
-            return;
+            return self.on_not_sent(Role::Sensor, NotSent::NotKnown);
         }
         self.streams = !self.streams;
         let text = if self.streams {
@@ -346,7 +327,7 @@ impl Dashboard {
                 if let protocol::Configuration::Display(display) = &configuration {
                     self.fingertip.configure(display);
                 }
-                if let Some(outcome) = self.orders(role).on_report(report) {
+                if let Some(outcome) = self.board_mut(role).orders.on_report(report) {
                     self.conclude(role, outcome);
                 }
             }
@@ -421,7 +402,7 @@ impl Dashboard {
         board.clocks = None;
         board.arm_stopped = None;
         board.configuration = None;
-        self.orders(role).lost();
+        self.board_mut(role).orders.lost();
         if role == Role::Display {
             self.safety = None;
             self.fingertip.turn(None);

@@ -139,69 +139,60 @@ impl Log {
 
     fn read_file(&self, path: &Path) -> Result<(), String> {
         let failed = |error: io::Error| format!("{}: {error}", path.display());
-        let file = File::open(path).map_err(failed)?;
+        let mut file = File::open(path).map_err(failed)?;
         if file.is_terminal() {
             // Opened as a line, so that the system does not take the bytes for text.
             let opened = SharedPorts.open(path).map_err(|state| state.to_string())?;
             return self.listen(opened).map_err(failed);
         }
         let grows = file.metadata().is_ok_and(|metadata| metadata.is_file());
-        self.pump(file, grows).map_err(failed)
+        self.decode(!grows, |bytes| file.read(bytes))
+            .map_err(failed)
     }
 
     fn read_tcp(&self, address: &str) -> Result<(), String> {
         let failed = |error: io::Error| format!("tcp:{address}: {error}");
-        let stream = TcpStream::connect(address).map_err(failed)?;
+        let mut stream = TcpStream::connect(address).map_err(failed)?;
         stream.set_read_timeout(Some(LOOK)).map_err(failed)?;
-        self.pump(stream, false).map_err(failed)
+        self.decode(true, |bytes| stream.read(bytes))
+            .map_err(failed)
     }
 
     /// Decodes what comes over a line that other programs may listen to as well.
     fn listen(&self, opened: Opened) -> io::Result<()> {
         let Opened { mut input, .. } = opened;
-        let mut bytes = vec![0; READ_BYTES];
-        let result = self.decode(|| match input.read(&mut bytes) {
-            Ok(count) => Ok(Some(bytes[..count].to_vec())),
-            Err(error) if is_pause(&error) => Ok(Some(Vec::new())),
-            Err(error) => Err(error),
-        });
+        let result = self.decode(false, |bytes| input.read(bytes));
         input.close(true);
         result
     }
 
-    /// Decodes what a reader gives, until it ends; one that `grows` goes on after its end.
-    fn pump(&self, mut reader: impl Read, grows: bool) -> io::Result<()> {
+    /// Decodes what `read` gives; until it gives nothing, if it `ends` then.
+    fn decode(
+        &self,
+        ends: bool,
+        mut read: impl FnMut(&mut [u8]) -> io::Result<usize>,
+    ) -> io::Result<()> {
         let mut bytes = vec![0; READ_BYTES];
-        self.decode(|| match reader.read(&mut bytes) {
-            Ok(0) if grows => {
-                thread::park_timeout(LOOK);
-                Ok(Some(Vec::new()))
-            }
-            Ok(0) => Ok(None),
-            Ok(count) => Ok(Some(bytes[..count].to_vec())),
-            Err(error) if is_pause(&error) => Ok(Some(Vec::new())),
-            Err(error) => Err(error),
-        })
-    }
-
-    /// Decodes what `more` gives, until it gives none.
-    fn decode<E>(&self, mut more: impl FnMut() -> Result<Option<Vec<u8>>, E>) -> Result<(), E> {
         let mut decoder = self.table.new_stream_decoder();
         while !self.is_ended() {
-            let Some(bytes) = more()? else {
-                return Ok(());
+            let count = match read(&mut bytes) {
+                Ok(0) if ends => return Ok(()),
+                Ok(0) => {
+                    thread::park_timeout(LOOK);
+                    0
+                }
+                Ok(count) => count,
+                Err(error) if is_pause(&error) => 0,
+                Err(error) => return Err(error),
             };
-            decoder.received(&bytes);
+            decoder.received(&bytes[..count]);
             loop {
                 match decoder.decode() {
                     Ok(frame) => {
                         let level = frame.level().map(|level| level.as_str());
                         let text = frame.display_message().to_string();
-                        if self
-                            .lines
-                            .send((self.role, LogEvent::Log { level, text }))
-                            .is_err()
-                        {
+                        let line = (self.role, LogEvent::Log { level, text });
+                        if self.lines.send(line).is_err() {
                             return Ok(());
                         }
                     }

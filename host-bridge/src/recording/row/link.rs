@@ -9,7 +9,7 @@ use super::Text;
 use crate::state::State;
 
 /// Something happened to a link.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub struct LinkRow {
     /// What.
     pub event: LinkEvent,
@@ -36,9 +36,10 @@ pub struct LinkRow {
 }
 
 /// What can happen to a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum LinkEvent {
     /// It stands differently.
+    #[default]
     Turned,
     /// The board has started anew.
     Restarted,
@@ -130,12 +131,7 @@ impl LinkRow {
         Self {
             event,
             text: text.into().into(),
-            state: None,
-            port: None,
-            reason: None,
-            hello: None,
-            lost: None,
-            missing: None,
+            ..Self::default()
         }
     }
 
