@@ -57,12 +57,8 @@ pub struct Settings {
 /// How a recording stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
-    /// What has been written.
+    /// What has been written, and is safe on the disk.
     pub tally: Tally,
-    /// Messages of the boards that are safe on the disk.
-    pub safe_messages: u64,
-    /// Samples of the gauges that are safe on the disk.
-    pub safe_samples: u64,
     /// Bytes that are safe on the disk.
     pub safe_bytes: u64,
     /// Whether it has come to an end before its time: [`Recorder::stop`] says why.
@@ -209,8 +205,6 @@ impl WriterThread {
 fn all_safe(tally: Tally, safe_bytes: u64) -> Progress {
     Progress {
         tally,
-        safe_messages: tally.messages,
-        safe_samples: tally.samples,
         safe_bytes,
         failed: false,
     }
@@ -316,7 +310,7 @@ mod tests {
         .unwrap_or_else(|error| panic!("{error}"));
         (0..10).for_each(|at_us| recorder.on_event(Role::Display, &heard(at_us)));
         let end = Instant::now() + LIMIT;
-        while recorder.progress().safe_messages < 10 && Instant::now() < end {
+        while recorder.progress().tally.messages < 10 && Instant::now() < end {
             thread::park_timeout(Duration::from_millis(1));
         }
         let progress = recorder.progress();
@@ -324,7 +318,7 @@ mod tests {
             .expect("the folder was made")
             .map(|file| file.and_then(|file| file.metadata()).expect("a file").len())
             .sum();
-        assert_eq!((progress.safe_messages, progress.safe_bytes), (10, bytes));
+        assert_eq!((progress.tally.messages, progress.safe_bytes), (10, bytes));
         let ended = recorder.stop().unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(ended.tally.messages, 10);
         std::fs::remove_dir_all(&folder).expect("the folder is there");

@@ -58,7 +58,7 @@ fn record_gauges(path: &Path, blocks: u32) {
         recorder.on_event(Role::Sensor, &heard(gauges));
     }
     let progress = recorder.stop().expect("a whole file");
-    assert_eq!(progress.safe_samples, u64::from(blocks) * 8);
+    assert_eq!(progress.tally.samples, u64::from(blocks) * 8);
 }
 
 /// Everything that can be read of a file, and whether it was cut off.
@@ -125,7 +125,7 @@ fn every_message_is_recorded_once_in_order_and_read_back_as_it_was() {
         }
     }
     let progress = recorder.stop().expect("a whole file");
-    assert_eq!(progress.safe_messages, said.len() as u64);
+    assert_eq!(progress.tally.messages, said.len() as u64);
     let read = messages(events(&path));
     for (read, said) in read.iter().zip(&said) {
         assert_eq!(read, said);
@@ -802,7 +802,7 @@ fn what_has_been_recorded_is_safe_within_a_second() {
     let recorder = recorder(&path);
     let mut speaker = Speaker::new(7);
     recorder.on_event(Role::Sensor, &heard(speaker.estimate()));
-    assert!(wait_until(LIMIT, || recorder.progress().safe_messages == 1));
+    assert!(wait_until(LIMIT, || recorder.progress().tally.messages == 1));
     let (read, is_cut) = entries(&path).expect("a recording");
     assert!(is_cut && read.len() == 1);
     drop(recorder);

@@ -318,8 +318,8 @@ impl Session<'_> {
         self.screen.progress(&format!(
             "{:.0} s: {} messages, {} samples, {} safe{frames}{}",
             self.started.elapsed().as_secs_f64(),
-            progress.safe_messages,
-            progress.safe_samples,
+            progress.tally.messages,
+            progress.tally.samples,
             bytes(progress.safe_bytes),
             missing(&progress),
         ));

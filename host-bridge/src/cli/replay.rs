@@ -246,16 +246,13 @@ impl Replay {
             }
         })?;
         let status = report(role, &played, said, unsaid)?;
-        Ok(if ended.load(Ordering::Relaxed) {
-            // Not to its end.
-            ExitCode::FAILURE
-        } else {
-            status
-        })
+        // Not to its end.
+        let is_ended = ended.load(Ordering::Relaxed);
+        Ok(if is_ended { ExitCode::FAILURE } else { status })
     }
 }
 
-fn cut(is_cut: bool) -> &'static str {
+const fn cut(is_cut: bool) -> &'static str {
     if is_cut {
         "; the recording was cut off there"
     } else {
@@ -288,9 +285,5 @@ fn report(role: Role, played: &Played, said: u64, unsaid: u64) -> anyhow::Result
         cut(played.cut),
         passed_over(played.passed_over),
     ))?;
-    Ok(if unsaid == 0 {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(ExitCode::from(u8::from(unsaid > 0)))
 }

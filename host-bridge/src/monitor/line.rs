@@ -1,7 +1,6 @@
 //! The monitor for pipes and logs: a line now and then, and one at each change; in columns for people and scripts, or
 //! in JSON.
 
-use std::fmt::Write as _;
 use std::io::{self, ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -42,16 +41,11 @@ pub fn second(dashboard: &Dashboard) -> String {
     let age = dashboard
         .estimate_age_ms()
         .map_or_else(|| "-".to_owned(), |ms| ms.to_string());
-    let mut line = format!("{:8.3}", seconds(dashboard.now_us));
-    for (width, cell) in [
-        (10, state_word(&dashboard.sensor).to_owned()),
-        (10, state_word(&dashboard.display).to_owned()),
-    ] {
-        let _ = write!(line, " {cell:<width$}");
-    }
-    let _ = write!(
-        line,
-        " {:>9} {:>4} {valid:<6} {:<5} {:<10} {:>8} {:>9} {:>9} {age:>6} {lost:>5} {bad:>5} {:>8} {:>8} {}",
+    format!(
+        "{:8.3} {:<10} {:<10} {:>9} {:>4} {valid:<6} {:<5} {:<10} {:>8} {:>9} {:>9} {age:>6} {lost:>5} {bad:>5} {:>8} {:>8} {}",
+        seconds(dashboard.now_us),
+        state_word(&dashboard.sensor),
+        state_word(&dashboard.display),
         number(estimate.and_then(|estimate| estimate.wavelength_mm), 3),
         number(estimate.map(|estimate| estimate.confidence), 2),
         estimate.map_or("-", |estimate| settings::range(estimate.range)),
@@ -64,8 +58,7 @@ pub fn second(dashboard: &Dashboard) -> String {
         dashboard
             .safety
             .map_or_else(|| "-".to_owned(), |(_, state)| state.to_string()),
-    );
-    line
+    )
 }
 
 /// Something that happened, in one line, which scripts that read the columns take for a comment.

@@ -242,7 +242,7 @@ impl Session {
                 false,
                 format!(
                     "recorded: {path}: {} messages, {} samples",
-                    progress.safe_messages, progress.safe_samples
+                    progress.tally.messages, progress.tally.samples
                 ),
             ),
             Err(error) => self

@@ -151,23 +151,9 @@ impl Inward {
         self.recent.add(age_us);
     }
 
-    /// A message had to make room for a newer one.
-    pub const fn on_replaced(&mut self) {
-        self.counts.replaced += 1;
-    }
-
-    /// A message became too old while it waited for the board's line.
-    pub const fn on_stale(&mut self) {
-        self.counts.stale += 1;
-    }
-
-    pub const fn on_boardless(&mut self) {
-        self.counts.boardless += 1;
-    }
-
-    /// The board's line took no more bytes.
-    pub const fn on_stuck(&mut self) {
-        self.counts.stuck += 1;
+    /// What has become of messages that were not given to the board.
+    pub const fn counts_mut(&mut self) -> &mut Incoming {
+        &mut self.counts
     }
 
     pub fn elapse(&mut self, now_us: u64, mut tell: impl FnMut(Notice)) {

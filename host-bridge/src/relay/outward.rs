@@ -4,7 +4,7 @@
 use protocol::{Hello, Message};
 
 use crate::relay::envelope::{Content, Envelope, sequence_number};
-use crate::relay::flow::{Answer, Flow};
+use crate::relay::flow::Flow;
 use crate::relay::gate::SequenceNumber;
 use crate::relay::report::Outgoing;
 
@@ -16,8 +16,10 @@ pub struct Outward {
     counter: u64,
     start: u32,
     last: Option<SequenceNumber>,
-    flow: Flow,
-    counts: Outgoing,
+    /// How the network does.
+    pub flow: Flow,
+    /// What has been counted so far.
+    pub counts: Outgoing,
 }
 
 impl Outward {
@@ -53,15 +55,11 @@ impl Outward {
         let counter = self.counter;
         self.counter += 1;
         self.counts.sent += 1;
+        let start = self.start;
+        let envelope = self.other(at_us, Content::Board { start, message });
         Some(Envelope {
             counter,
-            ..self.other(
-                at_us,
-                Content::Board {
-                    start: self.start,
-                    message,
-                },
-            )
+            ..envelope
         })
     }
 
@@ -74,30 +72,13 @@ impl Outward {
             content,
         }
     }
-
-    pub fn on_answer(&mut self, answer: Answer) {
-        self.flow.on_answer(answer);
-    }
-
-    pub const fn flow(&self) -> &Flow {
-        &self.flow
-    }
-
-    /// The network refused what was carried last.
-    pub const fn on_failure(&mut self) {
-        self.counts.failed += 1;
-    }
-
-    /// What has been counted so far.
-    pub const fn counts(&self) -> Outgoing {
-        self.counts
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::link::host_hello;
+    use crate::relay::flow::Answer;
     use protocol::Motion;
 
     fn motion(sequence: u32) -> Message {
@@ -120,7 +101,7 @@ mod tests {
     /// A bridge whose network has just answered.
     fn answered() -> Outward {
         let mut outward = Outward::new(host_hello(), 1);
-        outward.on_answer(answer(0));
+        outward.flow.on_answer(answer(0));
         outward
     }
 
@@ -147,11 +128,11 @@ mod tests {
     fn what_a_stuck_network_does_not_take_is_held_back_and_not_numbered() {
         let mut outward = Outward::new(host_hello(), 1);
         assert_eq!(outward.carry(9, 9, motion(5)), None);
-        outward.on_answer(answer(0));
+        outward.flow.on_answer(answer(0));
         assert_eq!(carried(&mut outward, 6), (0, 0));
         assert_eq!(outward.carry(9, 9_000_000, motion(7)), None);
-        outward.on_answer(answer(9_000_000));
+        outward.flow.on_answer(answer(9_000_000));
         assert_eq!(carried(&mut outward, 8), (1, 0));
-        assert_eq!(outward.counts().held, 2);
+        assert_eq!(outward.counts.held, 2);
     }
 }

@@ -212,7 +212,7 @@ impl Site {
     pub fn report(&self, total: bool) -> Report {
         let shared = &self.shared;
         let outward = locked(&shared.outward);
-        let (outgoing, round_trip_us) = (outward.counts(), outward.flow().round_trip_us());
+        let (outgoing, round_trip_us) = (outward.counts, outward.flow.round_trip_us());
         drop(outward);
         let mut inward = locked(&shared.inward);
         Report {
@@ -345,7 +345,7 @@ impl Shared {
         if let (Some(envelope), Some(wire)) = (envelope, self.wire.get())
             && !wire.publish(Channel::Board, &envelope)
         {
-            locked(&self.outward).on_failure();
+            locked(&self.outward).counts.failed += 1;
         }
     }
 
@@ -353,20 +353,24 @@ impl Shared {
     fn hear(&self, bytes: &[u8]) {
         let at_us = self.now_us();
         let mut inward = locked(&self.inward);
-        match inward.hear(bytes, at_us, |notice| self.tell(notice)) {
-            Heard::Nothing => {}
+        let heard = match inward.hear(bytes, at_us, |notice| self.tell(notice)) {
             // Under the lock, so that nothing older can slip in behind it.
             Heard::Pass(waiting) => {
                 if self.outbox.put(waiting) {
-                    inward.on_replaced();
+                    inward.counts_mut().replaced += 1;
                 }
+                return;
             }
+            heard => heard,
+        };
+        drop(inward);
+        match heard {
+            Heard::Nothing | Heard::Pass(_) => {}
             Heard::Asked {
                 session: to,
                 ping: Ping { sent_us },
                 holds,
             } => {
-                drop(inward);
                 let pong = Pong {
                     sent_us,
                     received_us: at_us,
@@ -375,19 +379,14 @@ impl Shared {
                 self.say(Channel::Clock, Content::Pong { to, pong, holds });
             }
             Heard::Answered { answer, holds } => {
-                drop(inward);
-                locked(&self.outward).on_answer(answer);
+                locked(&self.outward).flow.on_answer(answer);
                 let news = locked(&self.hand).on_word(holds);
                 if let Some(news) = news {
                     self.tell(news);
                 }
             }
-            Heard::Stop(id, stop) => {
-                drop(inward);
-                self.on_stop(self.other_role, id, stop);
-            }
+            Heard::Stop(id, stop) => self.on_stop(self.other_role, id, stop),
             Heard::Watched => {
-                drop(inward);
                 let until_us = at_us.saturating_add(far_board::WATCH_US);
                 self.shown_until_us.store(until_us, Ordering::Release);
                 let hello = *locked(&self.board_hello);
@@ -396,19 +395,16 @@ impl Shared {
                 }
             }
             Heard::Greeting(hello) => {
-                drop(inward);
-                if let Some(far_board) = self.far_board.get() {
-                    far_board.greet(hello);
-                }
+                self.far_board
+                    .get()
+                    .inspect(|far_board| far_board.greet(hello));
             }
             Heard::Shown(message) => {
-                drop(inward);
-                if let Some(far_board) = self.far_board.get() {
-                    far_board.say(&message);
-                }
+                self.far_board
+                    .get()
+                    .inspect(|far_board| far_board.say(&message));
             }
             Heard::Stopped(id, trip) => {
-                drop(inward);
                 if locked(&self.stops).on_outcome(id) {
                     self.tell(Notice::StopHeard(self.other_role, trip));
                 }
@@ -456,13 +452,13 @@ impl Shared {
                 Due::Closed => return,
                 Due::Nothing => {}
                 Due::Message(waiting) if self.now_us() > waiting.until_us => {
-                    locked(&self.inward).on_stale();
+                    locked(&self.inward).counts_mut().stale += 1;
                 }
                 Due::Message(waiting) => match sender.post(&waiting.message) {
                     Ok(()) => locked(&self.inward).on_passed(&waiting, self.now_us()),
-                    Err(NotSent::NotKnown) => locked(&self.inward).on_boardless(),
+                    Err(NotSent::NotKnown) => locked(&self.inward).counts_mut().boardless += 1,
                     // A newer one is on its way, and may find the line free.
-                    Err(NotSent::Stuck) => locked(&self.inward).on_stuck(),
+                    Err(NotSent::Stuck) => locked(&self.inward).counts_mut().stuck += 1,
                 },
             }
         }

@@ -80,7 +80,7 @@ impl Keeper {
             locked(&self.shared.hand).on_silence();
         }
         drop(inward);
-        let is_answered = locked(&self.shared.outward).flow().is_answered(at_us);
+        let is_answered = locked(&self.shared.outward).flow.is_answered(at_us);
         if is_answered || is_due(self.pinged_us, KNOCK_US, at_us) {
             self.pinged_us = Some(at_us);
             let ping = Ping {
