@@ -54,14 +54,12 @@ impl Seat {
 
 /// Why a bench can't be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum BenchError {
-    /// The file can't be read.
     #[error("{0}: can't be read: {1}")]
     Unreadable(PathBuf, #[source] io::Error),
-    /// The file is no bench.
     #[error("{0}: {1}")]
     Malformed(PathBuf, #[source] Box<toml::de::Error>),
-    /// Both boards are said to be at one place.
     #[error("{0} can't be both boards: give each its own port or serial number")]
     Twice(String),
 }

@@ -27,43 +27,34 @@ pub use group::{Along, Group, Samples};
 
 /// Why nothing is exported.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum ExportError {
-    /// The recording can't be read.
     #[error(transparent)]
     Unread(#[from] ReadError),
-    /// Nothing can be taken out of the recording.
     #[error(transparent)]
     Excerpt(#[from] ExcerptError),
-    /// The scene can't be used.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The target's name says no format.
     #[error("{0}: give a name that ends in .hjif or in .wav")]
     Format(PathBuf),
-    /// A part of a scene was asked for.
     #[error("--from and --to-time are a recording's: a scene is as long as its duration_s says")]
     Part,
-    /// The arm rests.
     #[error(
         "{0}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
     )]
     AtRest(PathBuf),
-    /// The texture is too long.
     #[error("the way is {length_mm:.0} mm: a texture has {most_mm:.0} mm at most: {advice}")]
     TooLong {
         /// Its length in mm.
         length_mm: f64,
         /// The longest in mm.
         most_mm: f64,
-        /// What to do.
         advice: &'static str,
     },
-    /// The scene's scans are uneven.
     #[error(
         "{0}: the sensor's clock goes wrong in this scene, so its scans are not evenly spaced, as a WAV file's samples are: take that fault out"
     )]
     Uneven(String),
-    /// A place is beyond what a sample of 32 bits says in µm.
     #[error(
         "the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
     )]
@@ -71,7 +62,6 @@ pub enum ExportError {
         /// The place in µm.
         position_um: i64,
     },
-    /// A file can't be made.
     #[error(transparent)]
     File(#[from] OutputFileError),
 }

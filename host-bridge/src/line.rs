@@ -13,11 +13,10 @@ const PINGS: usize = 64;
 
 /// Why something was not said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum NotSent {
-    /// Nobody is there who would understand it.
     #[error("the board is not there")]
     NotKnown,
-    /// The line does not take bytes now. A part of it may have been taken: then it is still said, late.
     #[error("the line takes no bytes")]
     Stuck,
 }

@@ -49,11 +49,10 @@ pub struct Options {
 
 /// Why the watching ended before its time.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum MonitorError {
-    /// The terminal, or whatever takes the lines, takes no more.
     #[error("can't write to standard output: {0}")]
     Output(#[from] io::Error),
-    /// A recording could not be written to its end.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 /// Why a file is not made.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputFileError {
-    /// It is there already.
     #[error("{0}: is there already: give another name, or --force to write over it")]
     Exists(PathBuf),
-    /// It can't be written.
     #[error("{0}: can't be written: {1}")]
     NotWritten(PathBuf, #[source] io::Error),
 }

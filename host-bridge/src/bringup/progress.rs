@@ -77,13 +77,10 @@ pub struct Progress {
 /// Why the state file can't be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ProgressError {
-    /// It can't be read or written.
     #[error("{0}: can't be used as the state of a bring-up: {1}: give another by --state")]
     File(PathBuf, #[source] io::Error),
-    /// It is no state of a bring-up.
     #[error("{0}: is no state of a bring-up ({1}): give another by --state, or remove it")]
     Malformed(PathBuf, #[source] serde_json::Error),
-    /// It is of another version.
     #[error("{0}: is of format {1}, this program writes {FORMAT}: give another by --state")]
     Format(PathBuf, u32),
 }

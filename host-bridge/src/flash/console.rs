@@ -108,33 +108,21 @@ pub fn look_at_all(system: &System, role: Role, places: Vec<Place>) -> Vec<State
 
 /// Why the new firmware was not heard.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum NoHello {
-    /// Nothing, or something else, was heard.
     #[error(
         "flashed and verified, but no Hello from the board within {} s: {state}; {}",
         limit.as_secs(),
         state.advice().unwrap_or("press its reset button and see `host-bridge doctor`")
     )]
-    Silence {
-        /// How the console stands.
-        state: State,
-        /// How long it was waited for.
-        limit: Duration,
-    },
-    /// A firmware of another version answers.
+    Silence { state: State, limit: Duration },
     #[error(
         "flashed and verified, but the board says that it is {}, not {}: see that console and probe are the \
          same board's, and press its reset button",
         Named(found),
         Named(wanted)
     )]
-    AnotherVersion {
-        /// What it says.
-        found: Hello,
-        /// What was flashed.
-        wanted: Hello,
-    },
-    /// It was called off.
+    AnotherVersion { found: Hello, wanted: Hello },
     #[error("flashed and verified; the board's Hello was not waited for")]
     CalledOff,
 }

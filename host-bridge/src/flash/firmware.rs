@@ -19,62 +19,47 @@ type Header = FileHeader32<LittleEndian>;
 
 /// Why an ELF is no firmware for the board.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum FirmwareError {
-    /// The file can't be read.
     #[error(
         "{path}: can't be read ({source}): build it with \
          `cargo build --release --target thumbv7em-none-eabihf -p firmware-{role}`, or name the ELF"
     )]
     Unreadable {
-        /// The file.
         path: PathBuf,
-        /// Whose firmware it was to be.
         role: &'static str,
-        /// The system's reason.
         source: io::Error,
     },
-    /// The file is no ELF for a 32-bit ARM.
     #[error("{0}: is no firmware's ELF ({1}): give the file as the build left it")]
     NoElf(PathBuf, String),
-    /// The end of the file is missing.
     #[error("{path}: is cut off: {found} of its {wanted} bytes are there; build or copy it again")]
     CutOff {
-        /// The file.
         path: PathBuf,
         /// Its length in bytes.
         found: u64,
         /// The length in bytes that its own tables ask for.
         wanted: u64,
     },
-    /// The ELF does not say what it is.
     #[error(
         "{0}: has no .ridgelink section: it is no firmware of Ridgelink, or was stripped of it"
     )]
     NoIdentity(PathBuf),
-    /// The ELF is for the other board.
     #[error(
         "{path}: is the {found} board's firmware, and the {wanted} board was to get it: \
          exchange the two, or flash it as `host-bridge flash {found}`"
     )]
     WrongRole {
-        /// The file.
         path: PathBuf,
-        /// The role in the ELF.
         found: &'static str,
-        /// The role wanted.
         wanted: &'static str,
     },
-    /// The ELF was built from another protocol.
     #[error(
         "{path}: speaks protocol {found_version} with schema {found_schema:016x}, this program \
          {PROTOCOL_VERSION} with {SCHEMA_HASH:016x}: build both from the same sources"
     )]
     OtherProtocol {
-        /// The file.
         path: PathBuf,
-        /// The protocol version in the ELF.
         found_version: u16,
-        /// The schema hash in the ELF.
         found_schema: u64,
     },
 }

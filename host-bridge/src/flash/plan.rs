@@ -22,62 +22,46 @@ pub const FLASH_START: u64 = 0x0800_0000;
 
 /// Why a firmware can't go into the flash.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum PlanError {
-    /// The firmware is for another chip.
     #[error(
         "{0}: is for the chip {1}, and Ridgelink's boards have an {CHIP}: build it for \
          thumbv7em-none-eabihf from these sources"
     )]
     OtherChip(PathBuf, String),
-    /// There is nothing to flash.
     #[error("{0}: has nothing that goes into the flash: give the file as the build left it")]
     Empty(PathBuf),
-    /// The flash is too small.
     #[error(
         "{path}: is too large: it ends at {end:#010x}, the flash of the {CHIP} at {flash_end:#010x}; \
          build it with --release"
     )]
     TooLarge {
-        /// The ELF.
         path: PathBuf,
-        /// The address behind its last byte.
         end: u64,
-        /// The address behind the flash's last byte.
         flash_end: u64,
     },
-    /// A part of it would go elsewhere than into the flash.
     #[error(
         "{path}: its part of {bytes} bytes ({sections}) at {address:#010x} would go into {what}, not into the \
          flash: see the linker's memory.x"
     )]
     Outside {
-        /// The ELF.
         path: PathBuf,
-        /// Where the part would begin.
         address: u64,
-        /// Its length.
         bytes: usize,
-        /// The sections in it.
         sections: String,
-        /// What lies there.
         what: &'static str,
     },
-    /// Two parts of it want the same place.
     #[error("{0}: two of its parts want the flash at {1:#010x}: see the linker's script")]
     Overlap(PathBuf, u64),
-    /// The chip would not start.
     #[error(
         "{0}: the chip would not start: at {FLASH_START:#010x} there must be a stack in RAM and a reset \
          vector into the flash, and {1}"
     )]
     NoVectors(PathBuf, String),
-    /// probe-rs does not know the chip.
     #[error("probe-rs does not know {PART}: {0}")]
     Registry(#[from] RegistryError),
-    /// probe-rs can't work on the chip's flash.
     #[error("probe-rs has no way to write the flash of {PART}: {0}")]
     Algorithm(#[from] FlashError),
-    /// probe-rs knows the chip, but not its flash.
     #[error("probe-rs knows no flash of {PART} at {FLASH_START:#010x}")]
     NoFlash,
 }

@@ -129,18 +129,15 @@ fn serial_of(seat: &Seat, links: &[StLink]) -> Option<String> {
 /// Why no probe was chosen.
 #[derive(Debug, thiserror::Error)]
 pub enum Undecided {
-    /// None is plugged in.
     #[error(
         "no probe is plugged in: connect the board by its ST-LINK's USB socket (CN1); if it is connected, {UDEV_HINT}"
     )]
     None,
-    /// None of those that are plugged in is the one that is meant.
     #[error("no probe is {wanted}; there {}:\n{}", if found.len() == 1 { "is" } else { "are" }, list(found))]
     NotThere {
         wanted: String,
         found: Vec<Attached>,
     },
-    /// Several may be meant.
     #[error(
         "several probes are plugged in: name the board's with --probe, or its serial number as `usb` in the bench file:\n{}",
         list(.0)

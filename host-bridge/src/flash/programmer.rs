@@ -264,43 +264,33 @@ pub const UDEV_HINT: &str = "let its users at it by the udev rules in host-bridg
 
 /// Why a board was not flashed.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum Trouble {
-    /// This user may not open the probe.
     #[error("no permission to open the probe {0}: {UDEV_HINT}")]
     Denied(String),
-    /// Another program has the probe.
     #[error(
         "another program has the probe {0}: close it (probe-rs, cargo run, OpenOCD, \
          STM32CubeProgrammer, a debugger in an editor)"
     )]
     Busy(String),
-    /// The probe went away.
     #[error("the probe {0} is gone: plug it in again")]
     Gone(String),
-    /// The probe can't be opened, for another reason.
     #[error("the probe {0} can't be opened: {1}; plug it in again, or update its firmware")]
     Unopened(String, String),
-    /// The chip has no power.
     #[error(
         "the probe sees {volts:.1} V on the board, not 3.3 V: see the board's supply \
          (jumper JP3 at U5V, JP5 on) and the probe's cable"
     )]
-    NoPower {
-        /// What it measures.
-        volts: f32,
-    },
-    /// Nothing answers behind the probe.
+    NoPower { volts: f32 },
     #[error(
         "no chip answers behind the probe ({0}): see that both jumpers of CN4 are on and the board has \
          power, and hold its reset button while trying again"
     )]
     NoAnswer(String),
-    /// The chip behind the probe is another one.
     #[error(
         "the chip behind the probe is {0}, and the firmware is for an {CHIP}: nothing was changed"
     )]
     OtherChip(String),
-    /// The chip's flash is smaller than the firmware.
     #[error(
         "the chip behind the probe has {found_kib} KiB of flash, the firmware ends at {wanted_kib} KiB: \
          nothing was changed"
@@ -311,35 +301,29 @@ pub enum Trouble {
         /// What is wanted, in KiB.
         wanted_kib: u64,
     },
-    /// The chip is locked for good, or until it is erased.
     #[error("the chip is locked (read-out protection level {level}): {}; nothing was changed", advice(*level))]
     Locked {
         /// RDP: 1 or 2.
         level: u8,
     },
-    /// Sectors that are to be written are protected.
     #[error(
         "sector {0} of the flash is write-protected: take the protection off (STM32CubeProgrammer, \
          option bytes nWRP); nothing was changed"
     )]
     Protected(usize),
-    /// The probe lost the chip before anything was erased.
     #[error(
         "the probe lost the chip before anything was erased ({0}): see cable and power, try again"
     )]
     LostBefore(String),
-    /// Erasing or writing failed: the board has no whole firmware now.
     #[error(
         "{0} failed ({1}): the board has no whole firmware now and its outputs stay at 0 V; see cable \
          and power, and flash it again"
     )]
     Broken(&'static str, String),
-    /// What was read back is not what was written.
     #[error(
         "the flash does not hold what was written: flash it again, and if that fails again exchange the board"
     )]
     Unverified,
-    /// The firmware is in the flash but was not started.
     #[error("flashed and verified, but not started ({0}): press the board's reset button")]
     NotStarted(String),
 }

@@ -17,13 +17,10 @@ use crate::recording::{CdrEncoder, Note, RowBuilder, SchemaError};
 /// Why nothing can be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// The port for Foxglove can't be had.
     #[error("port {0} for Foxglove: {1}: give another one with --port")]
     Foxglove(u16, #[source] Box<FoxgloveError>),
-    /// The port for the page can't be had.
     #[error("port {0} for the page: {1}: give another one with --port")]
     Page(u16, #[source] io::Error),
-    /// A row has no schema.
     #[error(transparent)]
     Schema(#[from] SchemaError),
 }

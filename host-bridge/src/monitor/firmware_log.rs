@@ -54,10 +54,8 @@ impl Origin {
 /// Why a log can't be read at all.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// The ELF can't be read.
     #[error("{0}: can't be read: {1}")]
     Unreadable(PathBuf, #[source] io::Error),
-    /// The ELF has no strings of a log.
     #[error("{0}: holds no defmt log ({1}): give the firmware's ELF as the build left it")]
     NoTable(PathBuf, String),
 }

@@ -33,57 +33,42 @@ const NS_PER_S: f64 = 1e9;
 
 /// Why a recording can't be read.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum ReadError {
-    /// The file can't be read at all.
     #[error("{0}: can't be read: {1}")]
     Unreadable(PathBuf, #[source] io::Error),
-    /// The file is no MCAP, or another program's.
     #[error("{0}: {1}: give an MCAP file that `host-bridge record` has made")]
     Foreign(PathBuf, String),
-    /// The file is of a later version of this program.
     #[error("{0}: its format is {1}, this program reads {FORMAT}: take the program that made it")]
     Newer(PathBuf, String),
-    /// The file is damaged.
     #[error("{path}: damaged after {after}: {source}")]
     Damaged {
-        /// The file.
         path: PathBuf,
-        /// The last that could be read: its channel and its time.
         after: String,
-        /// What is wrong.
         source: McapError,
     },
-    /// A channel's schema is no definition of messages.
     #[error("{path}: the schema of {topic}: {source}")]
     Schema {
-        /// The file.
         path: PathBuf,
-        /// The channel.
         topic: String,
-        /// What is wrong.
         source: DefinitionError,
     },
-    /// What is on a channel does not belong there.
     #[error("{path}: {topic} at {at_s:.3} s: {source}")]
     Row {
-        /// The file.
         path: PathBuf,
-        /// The channel.
         topic: String,
         /// Its time since the recording's start, in s.
         at_s: f64,
-        /// What is wrong.
         source: RowError,
     },
 }
 
 /// What is wrong with a row.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum RowError {
-    /// It is not as its schema says.
     #[error(transparent)]
     Bytes(#[from] DecodeError),
-    /// It is as its schema says, and no row of this version.
     #[error(transparent)]
     Fields(#[from] serde_json::Error),
 }

@@ -259,22 +259,20 @@ pub fn inward(named: &'static NamedType, value: Value) -> Value {
 
 /// Why a row's shape makes no schema.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum SchemaError {
-    /// A type has no place in a recording.
     #[error("{0} has no place in a recording")]
     Shape(&'static str),
-    /// What was made of the shape is no definition.
     #[error("{0}: {1}")]
     Definition(String, #[source] DefinitionError),
 }
 
 /// Why a row can't be said.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum SayError {
-    /// It can't be said in JSON.
     #[error(transparent)]
     Value(#[from] serde_json::Error),
-    /// It is not as its schema says.
     #[error(transparent)]
     Bytes(#[from] EncodeError),
 }

@@ -25,38 +25,26 @@ pub struct Credentials {
 
 /// Why credentials can't be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum CredentialsError {
-    /// A file can't be read.
     #[error("{0}: can't be read: {1}")]
     Unreadable(PathBuf, io::Error),
-    /// A file has no certificate in it.
     #[error("{0}: no certificate in it: a PEM file with BEGIN CERTIFICATE is wanted")]
     NoCertificate(PathBuf),
-    /// A file has no key in it.
     #[error(
         "{0}: no private key in it: a PEM file with BEGIN PRIVATE KEY is wanted, without a password"
     )]
     NoKey(PathBuf),
-    /// The key is another certificate's.
     #[error("{key}: not the key of {certificate}: give the two that were made together")]
-    Mismatch {
-        /// The key's file.
-        key: PathBuf,
-        /// The certificate's file.
-        certificate: PathBuf,
-    },
-    /// The certificate is too old.
+    Mismatch { key: PathBuf, certificate: PathBuf },
     #[error("{0}: the certificate has expired: have a new one made")]
     Expired(PathBuf),
-    /// The certificate's time has not come.
     #[error("{0}: the certificate is not valid yet: see whether this computer's clock is right")]
     Early(PathBuf),
-    /// The certificate is not meant for this.
     #[error(
         "{0}: the certificate is not meant for connecting: it wants extendedKeyUsage = serverAuth, clientAuth"
     )]
     Purpose(PathBuf),
-    /// Something else is wrong with a file.
     #[error("{0}: can't be used: {1}")]
     Unusable(PathBuf, Error),
 }

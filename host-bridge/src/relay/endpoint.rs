@@ -49,16 +49,14 @@ pub struct Endpoint {
 
 /// Why a word is no endpoint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum EndpointError {
-    /// None of `tcp/`, `udp/` and `tls/` is in front.
     #[error(
         "say tcp/HOST:PORT or udp/HOST:PORT, or tls/HOST:PORT with certificates, e.g. tcp/192.168.1.20:7447"
     )]
     Transport,
-    /// There is no port behind the last colon.
     #[error("no port from 1 to 65535 behind the host, e.g. tcp/192.168.1.20:7447")]
     Port,
-    /// The host is none.
     #[error("{0:?} is no host: a name, an IPv4 address, or an IPv6 address in [ ]")]
     Host(String),
 }

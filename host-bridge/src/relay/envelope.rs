@@ -97,19 +97,12 @@ pub struct Envelope {
 
 /// Why an envelope can't be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum EnvelopeError {
-    /// No bridge made it.
     #[error("it is no envelope of a bridge")]
     Strange,
-    /// It comes from another build.
     #[error("it is of another build")]
-    Foreign {
-        /// Who sent it.
-        hello: Hello,
-        /// Its envelope's version.
-        version: u8,
-    },
-    /// Its content is not what it should be.
+    Foreign { hello: Hello, version: u8 },
     #[error("its content is malformed")]
     Malformed,
 }

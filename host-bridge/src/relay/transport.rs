@@ -12,28 +12,22 @@ use crate::relay::name::{Channel, Name};
 
 /// Why a program can't take part.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum NetworkError {
-    /// Credentials can't be used.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// TLS without certificates.
     #[error("{0} wants certificates on both ends: give --ca, --certificate and --key")]
     WithoutCertificates(Endpoint),
-    /// Certificates, but an open endpoint.
     #[error("{0} would leave certificates unused and let anybody in: say tls/{host}:{port}, or leave out --ca, --certificate and --key", host = .0.host, port = .0.port)]
     Open(Endpoint),
-    /// Others could reach an open endpoint, unasked.
     #[error(
         "{0} would let anybody who reaches it move the arm: say tls/{host}:{port} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", host = .0.host, port = .0.port
     )]
     Insecure(Endpoint),
-    /// The engine can't match an IPv6 address with a certificate.
     #[error("{0}: an IPv6 address can't be matched with a certificate: give the host's name")]
     Unmatched(Endpoint),
-    /// One can't listen there.
     #[error("{0}: can't listen: {1}: {advice}", advice = advice(.1))]
     Listening(Endpoint, io::Error),
-    /// The engine refuses.
     #[error("the network's engine refuses: {0}")]
     Engine(String),
 }

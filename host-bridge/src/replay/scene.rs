@@ -33,57 +33,32 @@ const SCAN_US: i64 = 250;
 const HALF_COUNT_MM: f64 = 0.002_5;
 /// Why no scene can be made of a recording.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum SceneError {
-    /// The recording can't be read.
     #[error(transparent)]
     Unread(#[from] ReadError),
-    /// There are no samples of the gauges, or too few.
     #[error(
         "{path}: {count} samples of the gauges there: record without --no-gauges, and give --from and --to-time that leave some"
     )]
-    NoSamples {
-        /// The recording.
-        path: PathBuf,
-        /// How many there are.
-        count: usize,
-    },
-    /// Samples are missing.
+    NoSamples { path: PathBuf, count: usize },
     #[error(
         "samples are missing at {at_s:.3} s, and what is made of them has no gaps: the longest piece without is --from {from_s:.3} --to-time {to_s:.3}"
     )]
-    Gap {
-        /// Where the first gap is.
-        at_s: f64,
-        /// Where the longest piece without begins.
-        from_s: f64,
-        /// Where it ends.
-        to_s: f64,
-    },
-    /// The sensor was configured otherwise in the middle of it.
+    Gap { at_s: f64, from_s: f64, to_s: f64 },
     #[error(
         "the sensor was configured anew at {at_s:.3} s, and what is made of it has one configuration: end before it or begin after it, with --from and --to-time"
     )]
-    Reconfigured {
-        /// When.
-        at_s: f64,
-    },
-    /// It is too long.
+    Reconfigured { at_s: f64 },
     #[error("that is too long: give --from and --to-time, {LONGEST_S} s apart at most")]
     TooLong,
-    /// Nothing is known of the surface.
     #[error("no valid estimate tells what was rubbed: give its wavelength with --wavelength")]
     NoWavelength,
-    /// The board was set as no scene can be.
     #[error("{setting} was {value}, which a scene can't have: give {give}")]
     Setting {
-        /// The setting.
         setting: &'static str,
-        /// What it was.
         value: f64,
-        /// What it may be.
         give: &'static str,
     },
-    /// A file can't be made.
     #[error(transparent)]
     File(#[from] OutputFileError),
 }

@@ -7,19 +7,16 @@ use crate::{BIG_ENDIAN, LITTLE_ENDIAN};
 
 /// Why bytes are no message of a definition.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum DecodeError {
-    /// They do not begin as plain CDR does.
     #[error("is no plain CDR: it begins with {0:02x?}")]
     Encapsulation(Vec<u8>),
-    /// They end too early.
     #[error("ends within {field}, after {length} bytes")]
     Short {
-        /// The field that is not whole.
         field: String,
         /// How many bytes there are.
         length: usize,
     },
-    /// A text is no UTF-8.
     #[error("{0} is no text")]
     Text(String),
 }

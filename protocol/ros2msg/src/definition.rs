@@ -8,19 +8,16 @@ const DEEPEST: usize = 32;
 
 /// Why a text is no definition.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum DefinitionError {
-    /// A line is neither a field nor a constant.
     #[error("line {line}: {text:?} is neither a field nor a constant")]
     Line {
         /// From 1 on.
         line: usize,
-        /// The line.
         text: String,
     },
-    /// A type is named that the text does not define.
     #[error("{0} is not defined")]
     Missing(String),
-    /// A type holds itself.
     #[error("{0} holds itself")]
     Endless(String),
 }
