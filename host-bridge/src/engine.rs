@@ -9,7 +9,6 @@ use zenoh::{Config, Error, Session, Wait};
 /// out for 4 ms. When a network is stuck, as little that is old comes out of it later.
 const STREAM_MESSAGES: usize = 16;
 
-/// How a program takes part.
 pub struct Setup<'a> {
     /// `peer`, `client` or `router`, as the engine calls them.
     pub mode: &'a str,

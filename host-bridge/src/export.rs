@@ -58,10 +58,7 @@ pub enum ExportError {
     #[error(
         "the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
     )]
-    Far {
-        /// The place in µm.
-        position_um: i64,
-    },
+    Far { position_um: i64 },
     #[error(transparent)]
     File(#[from] OutputFileError),
 }

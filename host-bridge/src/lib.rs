@@ -8,7 +8,6 @@
 
 pub use cli::run;
 
-/// This program and its version.
 const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
 
 pub mod bench;

@@ -8,7 +8,6 @@ use crate::clock::is_due;
 pub const PATIENCE_US: u64 = 1_500_000;
 /// How long a board that was known may say nothing: it reports once a second.
 const SILENCE_US: u64 = 2_500_000;
-/// Between two pings.
 const PING_US: u64 = 1_000_000;
 /// What is heard is judged by this much time at least, and by twice as much at most: a board that speaks
 /// text has a line a second.

@@ -260,7 +260,6 @@ impl Shared {
     }
 }
 
-/// The thread that reads.
 struct Reader<F> {
     shared: Arc<Shared>,
     search: Search,

@@ -62,7 +62,6 @@ impl Search {
     }
 }
 
-/// Ports to try.
 pub struct Candidates {
     pub ports: Vec<PathBuf>,
     /// Whether a port behind which something else is, is to be left for the next one.

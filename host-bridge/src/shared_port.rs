@@ -53,7 +53,6 @@ static OPEN: Mutex<BTreeMap<PathBuf, usize>> = Mutex::new(BTreeMap::new());
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SharedPorts;
 
-/// This computer.
 impl Default for System {
     fn default() -> Self {
         Self {
@@ -404,7 +403,6 @@ impl SharedInput {
     }
 }
 
-/// Where frames go.
 enum Way {
     Port(Arc<Mutex<Funnel>>),
     Bus(bus::Asker),

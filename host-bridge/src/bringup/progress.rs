@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use super::step;
 use super::step::{Figure, Step};
 
-/// The version of this shape.
 const FORMAT: u32 = 1;
 
 /// How a step went.

@@ -12,7 +12,6 @@ const STYLE: &str = "body{font:16px/1.4 sans-serif;max-width:60em;margin:2em aut
 table{border-collapse:collapse;width:100%}td,th{border:1px solid #999;padding:.2em .5em;text-align:left}\
 .passed{color:#060}.failed{color:#b00;font-weight:bold}.soft{color:#666}";
 
-/// The page.
 pub fn html(progress: &Progress) -> String {
     let mut page = format!(
         "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n<title>Ridgelink: a bench brought up</title>\n\

@@ -269,7 +269,6 @@ impl Sight {
     }
 }
 
-/// Who collects it.
 struct Watcher {
     sight: Sight,
     wanted: Wanted,

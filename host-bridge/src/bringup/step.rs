@@ -170,12 +170,10 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
     toml::from_str(include_str!("steps.toml")).expect("a table that the tests have read")
 });
 
-/// Every step, in its order.
 pub fn all() -> impl Iterator<Item = &'static Step> {
     TABLE.steps.iter()
 }
 
-/// The step called `name`.
 pub fn named(name: &str) -> Option<&'static Step> {
     all().find(|step| step.name == name)
 }

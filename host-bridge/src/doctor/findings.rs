@@ -37,7 +37,6 @@ pub struct Finding {
     pub advice: String,
 }
 
-/// `sensor: what is wrong`.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.board {
@@ -67,7 +66,6 @@ pub fn peer_grown(board: &BoardFacts) -> Option<u32> {
     Some(last.peer.received.wrapping_sub(first.peer.received))
 }
 
-/// What is spoken, in words.
 struct Spoken<'a>(&'a Hello);
 
 impl fmt::Display for Spoken<'_> {

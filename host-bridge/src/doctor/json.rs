@@ -10,7 +10,6 @@ use crate::link::host_hello;
 use crate::place::StLink;
 use crate::state::version;
 
-/// The version of this shape.
 const FORMAT: u32 = 1;
 
 /// The document, indented.

@@ -27,7 +27,6 @@ const LOOK_US: u64 = 50_000;
 /// Between two pings: often enough to see a clock drift within seconds; in µs.
 const PING_EVERY_US: u64 = 100_000;
 
-/// What a link tells.
 type Told = (Role, Event);
 
 /// Who listens along while a bench is looked at.

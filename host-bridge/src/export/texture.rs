@@ -26,7 +26,6 @@ const GRID: Vector = Vector { x: 10, y: 5, z: 1 };
 const DEVICE: u32 = 1;
 const AVATAR: u32 = 1;
 
-/// One channel of a texture.
 pub struct Trace {
     pub description: String,
     /// What an amplitude of 1 stands for.

@@ -135,7 +135,6 @@ impl Firmware {
     }
 }
 
-/// An ELF that is whole.
 struct Elf<'a> {
     path: &'a Path,
     bytes: &'a [u8],

@@ -59,7 +59,6 @@ impl fmt::Display for Attached {
     }
 }
 
-/// All probes that probe-rs finds.
 pub fn attached() -> Vec<Attached> {
     let attached = |item: ProbeListItem| Attached {
         info: item.info,

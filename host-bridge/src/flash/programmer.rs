@@ -185,7 +185,6 @@ impl Programmer {
     }
 }
 
-/// A device by its identity.
 fn named(device: u32) -> String {
     DEVICES.iter().find(|(id, _)| *id == device).map_or_else(
         || format!("none that this program knows (device 0x{device:03X})"),
@@ -295,12 +294,7 @@ pub enum Trouble {
         "the chip behind the probe has {found_kib} KiB of flash, the firmware ends at {wanted_kib} KiB: \
          nothing was changed"
     )]
-    SmallFlash {
-        /// Its size in KiB.
-        found_kib: u64,
-        /// What is wanted, in KiB.
-        wanted_kib: u64,
-    },
+    SmallFlash { found_kib: u64, wanted_kib: u64 },
     #[error("the chip is locked (read-out protection level {level}): {}; nothing was changed", advice(*level))]
     Locked {
         /// RDP: 1 or 2.

@@ -11,11 +11,9 @@ use std::{io, thread};
 use super::foxglove_server::LiveError;
 use crate::lock::locked;
 
-/// The page, in one file.
 const PAGE: &str = include_str!("page.html");
 /// What a page of ours says with its Stop: no other site's page may, for its browser asks here first.
 const STOP_HEADER: &str = "x-ridgelink-stop";
-/// Browsers at a time.
 const MOST: usize = 32;
 /// A browser that has gone is noticed at the next thing that is said to it.
 const LOOK: Duration = Duration::from_secs(1);
@@ -45,7 +43,6 @@ impl Newest {
     }
 }
 
-/// What all connections share.
 struct Shared {
     newest: Arc<Newest>,
     stop: Box<dyn Fn() + Send + Sync>,

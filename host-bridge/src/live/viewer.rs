@@ -38,7 +38,6 @@ pub struct Settings {
     pub gauges: bool,
 }
 
-/// Shows what the boards say.
 pub struct Viewer {
     foxglove: FoxgloveServer,
     page: SocketAddr,

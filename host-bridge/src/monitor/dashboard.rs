@@ -16,7 +16,6 @@ use super::settings::Setting;
 use super::trace::Trace;
 use crate::link::{Clocks, Event, NotSent};
 
-/// Happenings kept.
 const LOG_ENTRIES: usize = 500;
 /// A message to the person who watches stands for so long, in µs.
 const NOTICE_US: u64 = 6_000_000;

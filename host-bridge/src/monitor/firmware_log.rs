@@ -60,7 +60,6 @@ pub enum LogError {
     NoTable(PathBuf, String),
 }
 
-/// A log to be read.
 struct Log {
     role: Role,
     elf: Vec<u8>,

@@ -22,7 +22,6 @@ use crate::state::State;
 pub const HEADING: &str = "#    t_s sensor     display    lambda_mm conf valid  range contact    \
                            count_mm  arm_mm_s hand_mm_s age_ms  lost   bad rtt_s_ms rtt_d_ms supervisor";
 
-/// The present in one line.
 pub fn second(dashboard: &Dashboard) -> String {
     let estimate = dashboard.estimate.map(|(_, estimate)| estimate);
     let number = |value: Option<f32>, digits: usize| {

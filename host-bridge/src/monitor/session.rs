@@ -28,7 +28,6 @@ pub struct Source {
     pub logs: Option<Receiver<(Role, LogEvent)>>,
 }
 
-/// A dashboard with its source.
 pub struct Session {
     pub dashboard: Dashboard,
     source: Source,
@@ -267,7 +266,6 @@ impl Session {
     }
 }
 
-/// A recording under way.
 pub struct LiveRecording {
     pub path: PathBuf,
     /// Since when, in µs of [`crate::clock::now_us`].

@@ -91,7 +91,6 @@ impl View {
     }
 }
 
-/// Most characters of a value.
 const LONGEST: usize = 10;
 
 /// Which setting is looked at, and what is being typed.

@@ -15,7 +15,6 @@ use crate::recording::RecordingError;
 
 const NS_PER_S: u64 = 1_000_000_000;
 const NS_PER_US: u64 = 1_000;
-/// Some hundred lines.
 const BUFFER_BYTES: usize = 1 << 16;
 
 /// A folder that is being written. A channel's file is made when something is said on it.

@@ -64,7 +64,6 @@ fn told(name: &str, field: &str, depth: usize) -> Option<String> {
     Some(referred.unwrap_or_else(|| bare(text)))
 }
 
-/// Without the marks of rustdoc.
 fn bare(text: &str) -> String {
     text.replace("[`", "")
         .replace("`]", "")

@@ -18,7 +18,6 @@ use crate::recording::RecordingError;
 /// The key of a board's configuration, as JSON, in what a later part tells of it.
 pub const CONFIGURATION: &str = "configuration";
 
-/// What is being written to.
 pub struct RecordingFiles {
     settings: Settings,
     mcap: Option<McapFile>,

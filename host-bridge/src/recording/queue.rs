@@ -68,7 +68,6 @@ struct Waiting<T> {
     item: T,
 }
 
-/// Where things are put in.
 pub struct Input<T> {
     /// `None` once it is closed.
     sender: Mutex<Option<Sender<Waiting<T>>>>,

@@ -25,7 +25,6 @@ use super::row_builder::Entry;
 
 /// The profile of recordings of format 1, and that format.
 const OLD: (&str, &str) = ("ridgelink", "1");
-/// Read at a time.
 const READ_BYTES: usize = 1 << 16;
 /// Longer records are none of a recording: a damaged length must not ask for all memory.
 const LONGEST_RECORD: usize = 1 << 26;
@@ -361,7 +360,6 @@ impl Reader {
     }
 }
 
-/// What a message is.
 enum Read {
     Row(Row),
     /// Of format 1, which has a message for each.

@@ -276,7 +276,6 @@ struct Contents {
     is_closed: bool,
 }
 
-/// One message at most.
 pub struct Outbox {
     contents: Mutex<Contents>,
     changed: Arc<dyn Notify>,

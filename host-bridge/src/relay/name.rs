@@ -107,7 +107,6 @@ impl Name {
 const ROUTER: &str = "router";
 /// What the certificates of operators without a board end with.
 const OPERATOR: &str = "operator";
-/// All messages that bridges exchange.
 const MESSAGES: [&str; 3] = ["put", "delete", "declare_subscriber"];
 
 /// The common name of the certificate of `role` at the bench called `name`; a host is an operator.

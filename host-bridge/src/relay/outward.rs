@@ -16,7 +16,6 @@ pub struct Outward {
     counter: u64,
     start: u32,
     last: Option<SequenceNumber>,
-    /// How the network does.
     pub flow: Flow,
     /// What has been counted so far.
     pub counts: Outgoing,

@@ -120,7 +120,6 @@ impl RemoteBridge {
     }
 }
 
-/// A site in words.
 pub const fn site(role: Role) -> &'static str {
     match role {
         Role::Sensor => "the sensor's site",

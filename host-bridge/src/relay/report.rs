@@ -144,7 +144,6 @@ fn ages(age: Option<Percentiles>) -> String {
     format!("{p50} p50, {p99} p99, {max} max ms")
 }
 
-/// All counts, for the end.
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {

@@ -69,7 +69,6 @@ pub struct Site {
     keeper: Option<JoinHandle<()>>,
 }
 
-/// What the threads share.
 struct Shared {
     settings: Settings,
     other_role: Role,

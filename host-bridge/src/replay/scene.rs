@@ -24,7 +24,6 @@ use excerpt::Excerpt;
 
 /// The longest scene, in s.
 const LONGEST_S: f64 = 600.0;
-/// Samples that make an estimate.
 const SAMPLES_PER_ESTIMATE: u32 = 10;
 /// What the sensor's filter delays a sample by, in samples.
 const DELAY_SAMPLES: u32 = 4;

@@ -14,9 +14,7 @@ use zenoh::{Session, Wait};
 
 use crate::engine::Setup;
 
-/// What the board says.
 const SAID: &str = "ridgelink/port/said";
-/// What is said to it.
 const ASKED: &str = "ridgelink/port/asked";
 /// Reads that may wait for a guest, some seconds of everything; one that is slower misses some, and sees that
 /// it does.

@@ -17,7 +17,6 @@ use crate::state::{State, version};
 /// Width of a board's name with what stands around it.
 const NAME_WIDTH: u16 = 10;
 
-/// A fact about a board.
 pub struct Fact {
     name: &'static str,
     value: String,
@@ -145,7 +144,6 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) 
 const NAME: usize = 16;
 const NUMBER: usize = 8;
 
-/// A counter.
 struct Column {
     name: &'static str,
     /// Whether it counts what should not be.

@@ -210,7 +210,6 @@ fn row(value: f32, range: Range, height: usize) -> usize {
     (part * height.saturating_sub(1) as f32).round() as usize
 }
 
-/// A faint line.
 struct Level {
     row: usize,
     width: usize,
@@ -225,7 +224,6 @@ impl Shape for Level {
     }
 }
 
-/// A trace.
 struct Stroke {
     columns: Vec<Option<Extent>>,
     range: Range,

@@ -12,7 +12,6 @@ use crate::monitor::settings::{self, Kind};
 use crate::monitor::theme::Theme;
 use crate::monitor::view::{Form, View};
 
-/// Width with the frame.
 const WIDTH: u16 = 74;
 /// Width of a value: the longest word that there is.
 const VALUE: usize = 16;
@@ -88,7 +87,6 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, fo
 
 /// Each key, or word, and what it means.
 const HELP: &str = include_str!("help.txt");
-/// Width with the frame.
 const HELP_WIDTH: u16 = 78;
 
 /// Draws the help over the middle of an area.

@@ -22,7 +22,6 @@ const BAR: usize = 14;
 /// The trace shows λ within so much of it at least: noise is not to look like news.
 const LEAST_PART: f32 = 0.1;
 
-/// Draws the numbers.
 pub fn draw(frame: &mut Frame<'_>, area: Rect, shown: &Dashboard, theme: Theme) {
     let age_ms = shown.estimate_age_ms();
     let is_old = age_ms.is_none_or(|age_ms| age_ms > OLD_MS);

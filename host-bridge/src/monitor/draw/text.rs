@@ -161,7 +161,6 @@ pub fn columns<const COUNT: usize>(area: Rect) -> [Rect; COUNT] {
     .map(|column| column.intersection(area))
 }
 
-/// Rows of a number.
 pub const BIG_ROWS: usize = 3;
 /// Dots of a character across, and down.
 const WIDTH: usize = 3;
@@ -186,7 +185,6 @@ const fn dots(character: char) -> [u8; HEIGHT] {
     }
 }
 
-/// A number, in three big_lines.
 pub fn big_lines(text: &str, style: Style) -> [Line<'static>; BIG_ROWS] {
     std::array::from_fn(|row| {
         let text: String = text

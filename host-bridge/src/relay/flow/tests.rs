@@ -157,7 +157,6 @@ impl Network {
     }
 }
 
-/// What came of a stream.
 struct Stream {
     /// Messages that came after the first `settled_us`.
     count: u64,

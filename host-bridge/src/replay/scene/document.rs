@@ -85,7 +85,6 @@ fn name(scene: &Path) -> String {
     }
 }
 
-/// Which piece of which recording.
 fn recorded(scene: &Path, piece: &Piece<'_>) -> String {
     let file = file_beside(scene, piece.recording);
     let file = file.to_string_lossy();
