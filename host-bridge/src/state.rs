@@ -73,35 +73,27 @@ impl State {
 
     /// How much it tells: of several ports that were tried, the one that stands highest is told of.
     pub(crate) const fn weight(&self) -> u8 {
-        match self {
-            Self::Absent { .. } => 0,
-            Self::Stranger { .. } => 1,
-            Self::Opened { .. } => 2,
-            Self::Busy { .. } => 3,
-            Self::Silent { .. } => 4,
-            Self::Failed { .. } => 5,
-            Self::Deaf { .. } => 6,
-            Self::Garbage { .. } => 7,
-            Self::Denied { .. } => 8,
-            Self::Foreign { .. } => 9,
-            Self::Known { .. } => 10,
-        }
+        self.rank().0
     }
 
     /// One word for it, for scripts; never changes.
     pub const fn word(&self) -> &'static str {
+        self.rank().1
+    }
+
+    const fn rank(&self) -> (u8, &'static str) {
         match self {
-            Self::Absent { .. } => "absent",
-            Self::Busy { .. } => "busy",
-            Self::Denied { .. } => "denied",
-            Self::Failed { .. } => "failed",
-            Self::Opened { .. } => "opened",
-            Self::Silent { .. } => "silent",
-            Self::Deaf { .. } => "deaf",
-            Self::Garbage { .. } => "garbage",
-            Self::Foreign { .. } => "foreign",
-            Self::Stranger { .. } => "wrong-role",
-            Self::Known { .. } => "known",
+            Self::Absent(..) => (0, "absent"),
+            Self::Stranger { .. } => (1, "wrong-role"),
+            Self::Opened(..) => (2, "opened"),
+            Self::Busy(..) => (3, "busy"),
+            Self::Silent(..) => (4, "silent"),
+            Self::Failed(..) => (5, "failed"),
+            Self::Deaf(..) => (6, "deaf"),
+            Self::Garbage(..) => (7, "garbage"),
+            Self::Denied(..) => (8, "denied"),
+            Self::Foreign(..) => (9, "foreign"),
+            Self::Known(..) => (10, "known"),
         }
     }
 

@@ -170,11 +170,11 @@ mod tests {
         let holds = Hold::ALL.map(DisplayState::Fading);
         let trips = Trip::ALL.map(DisplayState::Stopped);
         for state in holds.into_iter().chain(trips).chain([DisplayState::Boot]) {
-            let advice = advice(state).unwrap_or_else(|| panic!("{state}: no advice"));
+            let advice = supervisor_advice(state).unwrap_or_else(|| panic!("{state}: no advice"));
             assert!(advice.len() <= 120 && !advice.contains('\n'), "{advice}");
         }
-        assert_eq!(advice(DisplayState::Ready), None);
-        assert_eq!(advice(DisplayState::Driving), None);
+        assert_eq!(supervisor_advice(DisplayState::Ready), None);
+        assert_eq!(supervisor_advice(DisplayState::Driving), None);
     }
 
     #[test]

@@ -19,6 +19,15 @@ pub struct Attached {
     pub is_allowed: bool,
 }
 
+impl From<ProbeListItem> for Attached {
+    fn from(item: ProbeListItem) -> Self {
+        Self {
+            info: item.info,
+            is_allowed: item.accessibility == Accessibility::Accessible,
+        }
+    }
+}
+
 impl Attached {
     pub fn serial(&self) -> Option<&str> {
         self.info.serial_number.as_deref()
@@ -60,12 +69,8 @@ impl fmt::Display for Attached {
 }
 
 pub fn attached() -> Vec<Attached> {
-    let attached = |item: ProbeListItem| Attached {
-        info: item.info,
-        is_allowed: item.accessibility == Accessibility::Accessible,
-    };
     let found = Lister::new().list_all_with_access();
-    found.into_iter().map(attached).collect()
+    found.into_iter().map(Attached::from).collect()
 }
 
 /// A probe by its USB identity, as `--probe` takes it.

@@ -317,10 +317,8 @@ impl Reader {
                 self.schemas.insert(header.id, (header.name.clone(), text));
             }
             Record::Channel(found) => {
-                let known = CHANNELS
-                    .into_iter()
-                    .find(|&(role, kind)| topic(role, kind) == found.topic);
-                if let Some((role, kind)) = known {
+                let is_it = |&(role, kind): &(Role, Kind)| topic(role, kind) == found.topic;
+                if let Some((role, kind)) = CHANNELS.into_iter().find(is_it) {
                     let schema = self.schemas.get(&found.schema_id);
                     let schema = schema.filter(|_| found.message_encoding == "cdr");
                     let definition = schema
@@ -331,24 +329,23 @@ impl Reader {
                             topic: found.topic.clone(),
                             source,
                         })?;
-                    let channel = Channel {
-                        role,
-                        kind,
-                        definition,
-                    };
-                    self.channels.insert(found.id, channel);
+                    self.channels.insert(
+                        found.id,
+                        Channel {
+                            role,
+                            kind,
+                            definition,
+                        },
+                    );
                 }
             }
             Record::Metadata(metadata) => {
-                let configurations = [
-                    (Role::Sensor, Kind::SensorConfiguration),
-                    (Role::Display, Kind::DisplayConfiguration),
-                ];
-                let told = configurations
-                    .into_iter()
-                    .find(|(role, _)| role.name() == metadata.name);
-                if let (Some((role, kind)), Some(json)) =
-                    (told, metadata.metadata.get(CONFIGURATION))
+                let (role, kind) = match metadata.name.as_str() {
+                    "sensor" => (Role::Sensor, Kind::SensorConfiguration),
+                    "display" => (Role::Display, Kind::DisplayConfiguration),
+                    _ => return Ok(()),
+                };
+                if let Some(json) = metadata.metadata.get(CONFIGURATION)
                     && let Ok(row) = serde_json::from_str(json).and_then(|json| kind.row(json))
                 {
                     self.told.push((role, row));
