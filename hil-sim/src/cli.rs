@@ -1,10 +1,14 @@
 //! The command line.
 
+use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::thread;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim_boards::{Firmware, FirmwareError, Firmwares};
+use hil_sim_core::run::recording::Engine;
+use hil_sim_studies::bench::Bench;
 use hil_sim_studies::study::number;
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::Role;
@@ -12,10 +16,8 @@ use protocol::Role;
 mod budget;
 mod campaign;
 mod chart;
-mod confidence;
 mod cost;
 mod demo;
-mod display;
 mod faults;
 mod files;
 mod goals;
@@ -23,7 +25,6 @@ mod golden;
 mod init;
 mod jury;
 mod map;
-mod models;
 mod on_target;
 mod paper;
 mod people;
@@ -56,12 +57,12 @@ enum Command {
     Golden(golden::Command),
     /// Rubs the paper's four specimens at its three speeds on the ELFs and prints Table I three times
     /// over: the paper's, predicted, and this ELF's
-    Demo(Demo),
+    Demo(demo::Demo),
     /// Prints what the two ELFs take of flash and RAM
     Size(Elves),
     /// Counts instructions a millisecond on an emulated board: the filters beside others', the whole
     /// sensor
-    Cost(Cost),
+    Cost(cost::Cost),
     /// Counts what the display's ELF spends its instructions on, update by update and part by part, on an
     /// emulated board: exit status 1 if it is more than 15 % of them at 2 kHz
     Budget(budget::Budget),
@@ -82,11 +83,12 @@ enum Command {
     Campaign(campaign::Campaign),
     /// Draws what the estimators give against what they cost, what the display does, and what the contact
     /// models are worth
+    #[command(subcommand)]
     Chart(chart::Chart),
     /// Measures when the display's outputs change, on its ELF: jitter of the LDAC edges, skew of the
     /// channels, hand to output at 2 and 4 kHz over links of all sorts. Exit status 1 if p99 is above 0.6 ms
     /// at 2 kHz. Writes timing.csv and timing.svg
-    Timing(display::Timing),
+    Timing(chart::OfDisplay),
     /// Sets up a bench to try things on: both ELFs on emulated boards, held to real time, each board's
     /// console as a pseudo-terminal, until it is told to quit
     #[cfg(target_os = "linux")]
@@ -105,29 +107,6 @@ enum Command {
     Soak(soak::Soak),
 }
 
-#[derive(Debug, clap::Args)]
-struct Demo {
-    #[command(flatten)]
-    elves: Elves,
-    /// Where to write the report with plots
-    #[arg(long, value_name = "FILE", default_value = "target/demo.html")]
-    report: PathBuf,
-}
-
-#[derive(Debug, clap::Args)]
-struct Cost {
-    /// The ELF that exercises the filters: the example filter_cost of firmware-sensor
-    #[arg(
-        long,
-        value_name = "ELF",
-        default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost"
-    )]
-    elf: PathBuf,
-    /// Estimates the processor's cycles of the whole sensor as well, instruction by instruction: some minutes
-    #[arg(long)]
-    cycles: bool,
-}
-
 /// Where the boards' firmwares are.
 #[derive(Debug, clap::Args)]
 struct Elves {
@@ -138,6 +117,12 @@ struct Elves {
         default_value = "target/thumbv7em-none-eabihf/release/firmware-sensor"
     )]
     sensor_elf: PathBuf,
+    #[command(flatten)]
+    display: DisplayElf,
+}
+
+#[derive(Debug, clap::Args)]
+struct DisplayElf {
     /// The display board's ELF
     #[arg(
         long,
@@ -147,11 +132,17 @@ struct Elves {
     display_elf: PathBuf,
 }
 
+impl DisplayElf {
+    fn read(&self) -> Result<Firmware, FirmwareError> {
+        Firmware::read(&self.display_elf, Role::Display)
+    }
+}
+
 impl Elves {
     fn read(&self) -> Result<Firmwares, FirmwareError> {
         Ok(Firmwares {
             sensor: Firmware::read(&self.sensor_elf, Role::Sensor)?,
-            display: Firmware::read(&self.display_elf, Role::Display)?,
+            display: self.display.read()?,
         })
     }
 }
@@ -162,6 +153,23 @@ enum EngineName {
     Native,
     /// The flashed ELFs, on emulated boards
     Elf,
+}
+
+impl EngineName {
+    fn engine(self) -> Engine {
+        match self {
+            Self::Native => Engine::Native,
+            Self::Elf => Engine::Elf,
+        }
+    }
+
+    /// The engine, with the ELFs if it needs them.
+    fn bench(self, elves: &Elves) -> Result<Bench, FirmwareError> {
+        Ok(match self {
+            Self::Native => Bench::Native,
+            Self::Elf => Bench::Elf(Box::new(elves.read()?)),
+        })
+    }
 }
 
 impl Arguments {
@@ -181,10 +189,10 @@ impl Arguments {
             Command::Map(maps) => maps.execute(),
             Command::Jury(jury) => jury.execute(),
             Command::Goals(goals) => goals.execute(),
-            Command::Faults => faults::execute(),
+            Command::Faults => Ok(faults::execute()),
             Command::Campaign(campaign) => campaign.execute(),
             Command::Chart(chart) => chart.execute(),
-            Command::Timing(timing) => timing.execute(),
+            Command::Timing(timing) => timing.timing(),
             #[cfg(target_os = "linux")]
             Command::Serve(serve) => serve.execute(),
             Command::OnTarget(tests) => tests.execute(),
@@ -193,6 +201,18 @@ impl Arguments {
             Command::Soak(soak) => soak.execute(),
         }
     }
+}
+
+/// Exit status 0, or 1 if something is not as it is to be.
+fn status(is_met: bool) -> ExitCode {
+    ExitCode::from(u8::from(!is_met))
+}
+
+/// So many at a time; 0: one per core.
+fn threads(jobs: usize) -> NonZero<usize> {
+    NonZero::new(jobs)
+        .or_else(|| thread::available_parallelism().ok())
+        .unwrap_or(NonZero::<usize>::MIN)
 }
 
 /// A bar for so many things, on standard error; none if that is not a terminal.

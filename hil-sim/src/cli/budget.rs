@@ -1,18 +1,19 @@
 //! `hil-sim budget`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::ExitCode;
 
 use hil_sim_boards::cycles::CLOCK_HZ;
 use hil_sim_boards::display_alone::DisplayBench;
-use hil_sim_boards::instructions;
-use hil_sim_boards::instructions::{BUDGET, Counted, Cycles};
+use hil_sim_boards::instructions::{self, BUDGET, Counted, Cycles};
 use hil_sim_core::scene::Motion;
 use hil_sim_studies::display::{RICH_TEXTURE, rendering_of_word, word_of_mode, word_of_rendering};
-use protocol::{DisplayConfiguration, Mode, Rendering, Texture, UpdateRate};
+use hil_sim_studies::study::{Record, Table};
+use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::display::Measured;
+use super::chart::OfDisplay;
 use super::say::say;
+use super::status;
 
 /// Of all instructions, the display may take this many at 2 kHz, in percent: of the sine, and of more than that.
 const GOAL_PERCENT: f64 = 15.0;
@@ -83,7 +84,7 @@ const CYCLES: [(&str, Estimated); 5] = [
 #[derive(Debug, clap::Args)]
 pub(super) struct Budget {
     #[command(flatten)]
-    measured: Measured,
+    measured: OfDisplay,
     /// How much of the surface is played: fundamental, shape or texture; more than the fundamental may take 20 %
     #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
     rendering: Rendering,
@@ -95,18 +96,20 @@ pub(super) struct Budget {
 impl Budget {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let firmware = self.measured.firmware()?;
-        let rates: &[UpdateRate] = if self.measured.quick {
-            &[UpdateRate::Hz2000]
+        let is_rich = self.rendering != Rendering::Fundamental;
+        let (wavelength_mm, goal, words) = if is_rich {
+            let word = word_of_rendering(self.rendering);
+            (RICH_WAVELENGTH_MM, RICH_GOAL_PERCENT, format!(" {word}"))
         } else {
-            &[UpdateRate::Hz2000, UpdateRate::Hz4000]
+            (WAVELENGTH_MM, GOAL_PERCENT, String::new())
         };
-        let mut columns: Vec<(String, Counted)> = Vec::new();
-        for &update_rate in rates {
+        let rates = [UpdateRate::Hz2000, UpdateRate::Hz4000];
+        let mut columns: Vec<Column> = Vec::new();
+        for &update_rate in &rates[..if self.measured.quick { 1 } else { 2 }] {
             for mode in [Mode::Uniform, Mode::Travelling] {
                 let motion = Motion::Constant {
                     speed_mm_s: SPEED_MM_S,
                 };
-                let wavelength_mm = self.wavelength_mm();
                 let alone = DisplayBench {
                     configuration: DisplayConfiguration {
                         mode,
@@ -114,11 +117,11 @@ impl Budget {
                         update_rate,
                         ..DisplayConfiguration::DEFAULT
                     },
-                    texture: self.texture(),
+                    texture: is_rich.then_some(RICH_TEXTURE),
                     ..DisplayBench::new(motion, wavelength_mm, SETTLING_S + COUNTED_S)
                 };
                 let counted = instructions::count(alone, &firmware, COUNTED_S)?;
-                let head = self.head(update_rate, mode);
+                let head = format!("{} Hz {}{words}:", update_rate.hz(), word_of_mode(mode));
                 columns.push((head, counted));
             }
         }
@@ -127,132 +130,77 @@ impl Budget {
             && let Some((_, counted)) = columns.last()
         {
             say!("");
-            let mut places: Vec<(&String, &u64)> = counted
-                .by_place
-                .iter()
-                .chain(&counted.by_function)
-                .collect();
+            let places = counted.by_place.iter().chain(&counted.by_function);
+            let mut places: Vec<(&String, &u64)> = places.collect();
             places.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
             for (place, count) in places {
                 say!("{:10.1} {place}", *count as f64 / counted.ticks as f64);
             }
         }
-        let met = columns
+        let mut judged = columns.iter().filter(|(head, _)| head.starts_with("2000"));
+        Ok(status(judged.all(|(_, counted)| percent(counted) <= goal)))
+    }
+}
+
+/// What a column is called, and what was counted.
+type Column = (String, Counted);
+
+fn print(columns: &[Column]) {
+    let row = |name: String, value: &dyn Fn(usize, &Counted) -> String| {
+        let row = Record::default().with("instructions an update", name);
+        columns
             .iter()
-            .all(|(head, counted)| !head.starts_with("2000") || percent(counted) <= self.goal());
-        Ok(ExitCode::from(u8::from(!met)))
-    }
-}
-
-impl Budget {
-    fn is_rich(&self) -> bool {
-        self.rendering != Rendering::Fundamental
-    }
-
-    fn wavelength_mm(&self) -> f64 {
-        if self.is_rich() {
-            RICH_WAVELENGTH_MM
-        } else {
-            WAVELENGTH_MM
-        }
-    }
-
-    fn texture(&self) -> Option<Texture> {
-        self.is_rich().then_some(RICH_TEXTURE)
-    }
-
-    fn goal(&self) -> f64 {
-        if self.is_rich() {
-            RICH_GOAL_PERCENT
-        } else {
-            GOAL_PERCENT
-        }
-    }
-
-    fn head(&self, rate: UpdateRate, mode: Mode) -> String {
-        let mode = word_of_mode(mode);
-        if self.is_rich() {
-            let rendering = word_of_rendering(self.rendering);
-            format!("{} Hz {mode} {rendering}", rate.hz())
-        } else {
-            format!("{} Hz {mode}", rate.hz())
-        }
-    }
-}
-
-fn print(columns: &[(String, Counted)]) {
+            .enumerate()
+            .fold(row, |row, (index, (head, counted))| {
+                row.with(head.clone(), value(index, counted))
+            })
+    };
+    let an_update =
+        |count: u64, counted: &Counted| format!("{:.1}", count as f64 / counted.ticks as f64);
     let mut parts: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for (index, (_, counted)) in columns.iter().enumerate() {
         for (place, &count) in &counted.by_place {
-            let row = parts
-                .entry(part_of(place))
-                .or_insert_with(|| vec![0.0; columns.len()]);
-            row[index] += count as f64 / counted.ticks as f64;
+            let part = parts.entry(part_of(place));
+            let counts = part.or_insert_with(|| vec![0.0; columns.len()]);
+            counts[index] += count as f64 / counted.ticks as f64;
         }
     }
     let mut parts: Vec<(String, Vec<f64>)> = parts.into_iter().collect();
-    parts.sort_by(|one, other| {
-        let whole = |row: &[f64]| row.iter().sum::<f64>();
-        whole(&other.1).total_cmp(&whole(&one.1))
-    });
-    let cells = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(" | ");
-    let heads = cells(&mut columns.iter().map(|(head, _)| head.clone()));
-    say!("| instructions an update | {heads} |");
-    say!("| --- |{}", " ---: |".repeat(columns.len()));
-    for (part, row) in &parts {
-        let row = cells(&mut row.iter().map(|count| format!("{count:.1}")));
-        say!("| {part} | {row} |");
-    }
-    let whole = cells(
-        &mut columns
-            .iter()
-            .map(|(_, counted)| format!("{:.1}", counted.total as f64 / counted.ticks as f64)),
-    );
-    say!("| **in all** | {whole} |");
-    for (name, of) in CYCLES {
-        let row = cells(
-            &mut columns
-                .iter()
-                .map(|(_, counted)| {
-                    counted
-                        .cycles
-                        .map(|cycles| format!("{:.1}", of(counted, &cycles)))
-                })
-                .map(|[least, most, bare]| format!("{least} to {most} ({bare})")),
-        );
-        say!("| {name} | {row} |");
-    }
-    let mut peripherals: Vec<&str> = columns
-        .iter()
-        .flat_map(|(_, counted)| counted.accesses.keys().copied())
+    let whole = |counts: &[f64]| counts.iter().sum::<f64>();
+    parts.sort_by(|one, other| whole(&other.1).total_cmp(&whole(&one.1)));
+    let parts = parts.into_iter();
+    let mut rows: Vec<Record> = parts
+        .map(|(part, counts)| row(part, &|index, _| format!("{:.1}", counts[index])))
         .collect();
-    peripherals.sort_unstable();
-    peripherals.dedup();
-    let accesses = |counted: &Counted, of: Option<&str>| {
-        let count: u64 = counted
-            .accesses
-            .iter()
-            .filter(|(name, _)| of.is_none_or(|of| of == **name))
-            .map(|(_, count)| count)
-            .sum();
-        format!("{:.1}", count as f64 / counted.ticks as f64)
-    };
-    let shares = cells(
-        &mut columns
-            .iter()
-            .map(|(_, counted)| format!("{:.2}", percent(counted))),
-    );
-    say!(
-        "| **% of {} M instructions a second** | {shares} |",
-        BUDGET / 1_000_000
-    );
-    for of in peripherals.into_iter().map(Some).chain([None]) {
-        let row = cells(&mut columns.iter().map(|(_, counted)| accesses(counted, of)));
-        say!(
-            "| accesses to registers: {} | {row} |",
-            of.unwrap_or("in all")
-        );
+    rows.push(row("**in all**".to_owned(), &|_, counted| {
+        an_update(counted.total, counted)
+    }));
+    for (name, of) in CYCLES {
+        rows.push(row(name.to_owned(), &|_, counted| {
+            let told = counted
+                .cycles
+                .map(|cycles| format!("{:.1}", of(counted, &cycles)));
+            let [least, most, bare] = told;
+            format!("{least} to {most} ({bare})")
+        }));
     }
+    let budget = format!("**% of {} M instructions a second**", BUDGET / 1_000_000);
+    rows.push(row(budget, &|_, counted| {
+        format!("{:.2}", percent(counted))
+    }));
+    let peripherals = columns
+        .iter()
+        .flat_map(|(_, counted)| counted.accesses.keys().copied());
+    let peripherals: BTreeSet<&str> = peripherals.collect();
+    for of in peripherals.into_iter().map(Some).chain([None]) {
+        let name = format!("accesses to registers: {}", of.unwrap_or("in all"));
+        rows.push(row(name, &|_, counted| {
+            let accesses = counted.accesses.iter();
+            let counts = accesses.filter(|(name, _)| of.is_none_or(|of| of == **name));
+            an_update(counts.map(|(_, count)| count).sum(), counted)
+        }));
+    }
+    say!("{}", Table::from_iter(rows));
 }
 
 /// The share of the board's instructions.

@@ -1,14 +1,10 @@
 //! `hil-sim campaign`.
 
-use std::fs::File;
-use std::io::{self, Write};
-use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::thread;
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use hil_sim_boards::ElfError;
 use hil_sim_core::run::batch;
 use hil_sim_core::scene::fault::Kind;
@@ -17,9 +13,9 @@ use hil_sim_studies::display::rendering_of_word;
 
 use protocol::Rendering;
 
-use super::files::create;
+use super::files::Results;
 use super::say::say;
-use super::{Elves, number, progress};
+use super::{Elves, number, progress, status, threads};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Campaign {
@@ -36,7 +32,7 @@ pub(super) struct Campaign {
     #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
     rendering: Rendering,
     /// Runs at a time; each takes up to two processors
-    #[arg(long, value_name = "RUNS", default_value_t = jobs())]
+    #[arg(long, value_name = "RUNS", default_value_t = threads(0).get())]
     jobs: usize,
     /// Where to write the table as JSON
     #[arg(long, value_name = "FILE")]
@@ -46,11 +42,6 @@ pub(super) struct Campaign {
     csv: Option<PathBuf>,
     #[command(flatten)]
     elves: Elves,
-}
-
-/// As many as there are processors: the boards of a run wait for each other half of the time.
-fn jobs() -> usize {
-    thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 impl Campaign {
@@ -63,27 +54,23 @@ impl Campaign {
             rendering: self.rendering,
         };
         let firmwares = self.elves.read()?;
-        let json = self.json.as_deref().map(create).transpose()?;
-        let csv = self.csv.as_deref().map(create).transpose()?;
+        let json = Results::wanted(self.json.as_deref())?;
+        let csv = Results::wanted(self.csv.as_deref())?;
 
         let shifts = plan.shifts();
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
         let bar = progress(shifts.len() as u64, "scenes");
         let started = Instant::now();
         let mut trials = Vec::new();
-        let jobs = NonZero::new(self.jobs).unwrap_or(NonZero::<usize>::MIN);
         let work = |shift: &Shift| shift.run(&firmwares);
-        batch::in_order(&shifts, jobs, work, |_, tried| {
+        batch::in_order(&shifts, threads(self.jobs.max(1)), work, |_, tried| {
             trials.extend(tried?);
             bar.inc(1);
             Ok::<_, ElfError>(())
         })?;
         bar.finish_and_clear();
-        let tallies: Vec<Tally> = plan
-            .kinds
-            .iter()
-            .map(|&kind| Tally::of(kind, &trials))
-            .collect();
+        let tallies = plan.kinds.iter().map(|&kind| Tally::of(kind, &trials));
+        let tallies: Vec<Tally> = tallies.collect();
 
         say!("{HEADER}");
         for tally in &tallies {
@@ -117,31 +104,24 @@ impl Campaign {
         for line in &unmet {
             say!("not met: {line}");
         }
-        if let Some((mut file, path)) = json {
-            let text = serde_json::to_string_pretty(&tallies)?;
-            writeln!(file, "{text}").with_context(|| format!("{}", path.display()))?;
+        if let Some(json) = json {
+            json.write_json(&tallies)?;
         }
-        if let Some((file, path)) = csv {
-            write_trials(file, &trials).with_context(|| format!("{}", path.display()))?;
+        if let Some(csv) = csv {
+            csv.write(&csv_of(&trials))?;
         }
-        Ok(if unmet.is_empty() {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(1)
-        })
+        Ok(status(unmet.is_empty()))
     }
 
     fn kinds(&self) -> anyhow::Result<Vec<Kind>> {
         if self.kinds.is_empty() {
             return Ok(Kind::all().collect());
         }
-        self.kinds
-            .iter()
-            .map(|name| match Kind::from_name(name) {
-                Some(kind) => Ok(kind),
-                None => bail!("{name}: no such kind: give some of those in `hil-sim faults`"),
-            })
-            .collect()
+        let kind = |name: &String| match Kind::from_name(name) {
+            Some(kind) => Ok(kind),
+            None => bail!("{name}: no such kind: give some of those in `hil-sim faults`"),
+        };
+        self.kinds.iter().map(kind).collect()
     }
 }
 
@@ -150,12 +130,11 @@ kind                    expected  tried   on  seen  first sign ms       0 V in t
 
 fn line(tally: &Tally) -> String {
     let times = |times: Option<[f64; 2]>| {
-        format!(
-            "{:>7} {:>8}",
-            number(times.map(|[middle, _]| middle), 2),
-            number(times.map(|[_, worst]| worst), 2)
-        )
+        let [middle, worst] = [0, 1].map(|at| number(times.map(|times| times[at]), 2));
+        format!("{middle:>7} {worst:>8}")
     };
+    let in_time = format!("{}/{}", tally.safe, tally.injected);
+    let in_time = tally.safe_within_ms.map_or("–", |_| &in_time);
     format!(
         "{:<23} {:<8} {:>6} {:>4} {:>5}  {}  {:>12}  {}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
         tally.kind,
@@ -164,10 +143,7 @@ fn line(tally: &Tally) -> String {
         tally.driving,
         tally.seen,
         times(tally.detected_ms),
-        tally.safe_within_ms.map_or("–".to_owned(), |_| format!(
-            "{}/{}",
-            tally.safe, tally.injected
-        )),
+        in_time,
         times(tally.safe_ms),
         tally.stuck,
         tally.resets,
@@ -185,22 +161,19 @@ fn keys(trial: &Trial) -> String {
         .collect()
 }
 
-fn write_trials(file: File, trials: &[Trial]) -> io::Result<()> {
-    let mut out = io::BufWriter::new(file);
-    writeln!(
-        out,
-        "kind,scene,motion,mode,at_s,keys,was_driving,detected_ms,sign,safe_ms,stuck,resets,drives_again,unmet"
-    )?;
+fn csv_of(trials: &[Trial]) -> String {
     let ms = |ms: Option<f64>| ms.map_or(String::new(), |ms| format!("{ms:.4}"));
+    let mut text = "kind,scene,motion,mode,at_s,keys,was_driving,detected_ms,sign,safe_ms,stuck,resets,drives_again,unmet\n".to_owned();
     for trial in trials {
-        let finding = &trial.finding;
-        writeln!(
-            out,
-            "{},{},{},{},{:.6},{},{},{},\"{}\",{},{},{},{},\"{}\"",
+        let Trial {
+            scene,
+            motion,
+            mode,
+            finding,
+        } = trial;
+        text += &format!(
+            "{},{scene},{motion},{mode},{:.6},{},{},{},\"{}\",{},{},{},{},\"{}\"\n",
             finding.fault.kind.name(),
-            trial.scene,
-            trial.motion,
-            trial.mode,
             finding.fault.at_s,
             keys(trial).trim(),
             finding.was_driving,
@@ -211,7 +184,7 @@ fn write_trials(file: File, trials: &[Trial]) -> io::Result<()> {
             finding.resets,
             finding.drives_again,
             finding.unmet().join("; ")
-        )?;
+        );
     }
-    out.flush()
+    text
 }

@@ -1,13 +1,27 @@
 //! `hil-sim cost`.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use hil_sim_boards::cost::{measure, meter};
 use hil_sim_boards::cycles::CLOCK_HZ;
-use hil_sim_studies::study::Table;
+use hil_sim_studies::study::{Record, Table};
 
-use super::Cost;
 use super::say::say;
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Cost {
+    /// The ELF that exercises the filters: the example filter_cost of firmware-sensor
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/release/examples/filter_cost"
+    )]
+    elf: PathBuf,
+    /// Estimates the processor's cycles of the whole sensor as well, instruction by instruction: some minutes
+    #[arg(long)]
+    cycles: bool,
+}
 
 /// Milliseconds of samples that each part works through.
 const MILLISECONDS: u64 = 1_000;
@@ -39,39 +53,32 @@ impl Cost {
         } else {
             measure(&self.elf)?
         };
-        let mut heads = vec![
-            "part",
-            "instructions a millisecond:",
-            "the longest millisecond:",
-        ];
-        if self.cycles {
-            heads.extend(["cycles:", "the longest:", "of a millisecond:"]);
-        }
-        let mut table = Table::new(&heads);
-        let or_dash =
-            |count: Option<u64>| count.map_or("–".to_owned(), |count| count.to_string());
-        for (part, name) in PARTS {
+        let or_dash = |count: Option<u64>| count.map_or("–".to_owned(), |of| of.to_string());
+        let rows = PARTS.map(|(part, name)| {
             let taken = taken.get(&part);
             let mean = taken.map(|taken| taken.total.div_ceil(MILLISECONDS));
             // A part that is measured in one piece has no longest one.
-            let largest = taken
-                .filter(|taken| taken.pieces > 1)
-                .map(|taken| taken.largest);
-            let mut row = vec![name.to_owned(), or_dash(mean), or_dash(largest)];
-            if self.cycles {
-                let metered = taken.filter(|taken| taken.cycles > 0);
-                row.push(or_dash(
-                    metered.map(|taken| taken.cycles.div_ceil(MILLISECONDS)),
-                ));
-                row.push(or_dash(metered.map(|taken| taken.largest_cycles)));
-                row.push(metered.map_or("–".to_owned(), |taken| {
-                    let share = taken.largest_cycles as f64 / GIVEN as f64;
-                    format!("{:.1} %", 100.0 * share)
-                }));
+            let in_pieces = taken.filter(|taken| taken.pieces > 1);
+            let row = Record::default()
+                .with("part", name)
+                .with("instructions a millisecond:", or_dash(mean))
+                .with(
+                    "the longest millisecond:",
+                    or_dash(in_pieces.map(|of| of.largest)),
+                );
+            if !self.cycles {
+                return row;
             }
-            table.row(row);
-        }
-        say!("{table}");
+            let metered = taken.filter(|taken| taken.cycles > 0);
+            let mean = metered.map(|taken| taken.cycles.div_ceil(MILLISECONDS));
+            let longest = metered.map(|taken| taken.largest_cycles);
+            let share = longest.map(|longest| 100.0 * longest as f64 / GIVEN as f64);
+            let share = share.map_or("–".to_owned(), |share| format!("{share:.1} %"));
+            row.with("cycles:", or_dash(mean))
+                .with("the longest:", or_dash(longest))
+                .with("of a millisecond:", share)
+        });
+        say!("{}", Table::from_iter(rows));
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -1,5 +1,6 @@
 //! `hil-sim demo`.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
@@ -7,11 +8,20 @@ use firmware_sensor::counting::predicted_mean_mm;
 use hil_sim_boards::Firmwares;
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::scene::Scene;
-use hil_sim_studies::output::report::html;
-use hil_sim_studies::paper::published::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
+use hil_sim_studies::output::report::{Chapter, html};
+use hil_sim_studies::paper::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
 
 use super::say::say;
-use super::{Demo, number};
+use super::{Elves, number, status};
+
+#[derive(Debug, clap::Args)]
+pub(super) struct Demo {
+    #[command(flatten)]
+    elves: Elves,
+    /// Where to write the report with plots
+    #[arg(long, value_name = "FILE", default_value = "target/demo.html")]
+    report: PathBuf,
+}
 
 /// The paper's counting window.
 const WINDOW_S: f64 = 0.080;
@@ -38,29 +48,20 @@ impl Demo {
             for (wavelength_mm, paper_mm) in CELLS_MM.into_iter().zip(paper_mm) {
                 let outcome = rub(wavelength_mm, speed_mm_s, &firmwares)?;
                 let predicted_mm = predicted_mean_mm(wavelength_mm, speed_mm_s, WINDOW_S);
-                say!(
-                    "{}",
-                    row(wavelength_mm, speed_mm_s, paper_mm, predicted_mm, &outcome)
-                );
+                let cells = row(paper_mm, predicted_mm, &outcome);
+                say!("{speed_mm_s:>4} {wavelength_mm:>3} {cells}");
                 as_predicted &= is_as_predicted(predicted_mm, &outcome);
                 outcomes.push(outcome);
             }
         }
-        let chapters: Vec<_> = outcomes
-            .iter()
-            .map(hil_sim_studies::output::report::Chapter::of)
-            .collect();
-        let folder = self.report.parent().unwrap_or(std::path::Path::new("."));
+        let chapters: Vec<_> = outcomes.iter().map(Chapter::of).collect();
+        let folder = self.report.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         std::fs::write(&self.report, html(&chapters))
             .with_context(|| self.report.display().to_string())?;
         say!("\n{}", verdict(as_predicted));
         say!("Plots of every cell: {}", self.report.display());
-        Ok(if as_predicted {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(1)
-        })
+        Ok(status(as_predicted))
     }
 }
 
@@ -77,17 +78,11 @@ const HEADER: &str = concat!(
     "mm/s  mm                                                                            time",
 );
 
-fn row(
-    wavelength_mm: f64,
-    speed_mm_s: f64,
-    paper_mm: f64,
-    predicted_mm: f64,
-    outcome: &Outcome,
-) -> String {
+fn row(paper_mm: f64, predicted_mm: f64, outcome: &Outcome) -> String {
     let summary = &outcome.verdict.summary;
     let actuators = &outcome.verdict.actuators;
     format!(
-        "{speed_mm_s:>4} {wavelength_mm:>3} {paper_mm:>8.3} {predicted_mm:>9.3} {:>7} {:>8} {:>8} {:>10} {:>9} {:>8} {:>8}",
+        "{paper_mm:>8.3} {predicted_mm:>9.3} {:>7} {:>8} {:>8} {:>10} {:>9} {:>8} {:>8}",
         number(counted_mean_mm(outcome), 3),
         number(summary.counted_rms_percent, 2),
         number(summary.rms_percent, 2),
@@ -100,11 +95,8 @@ fn row(
 
 /// The mean of the paper's count, which stands beside the default estimator's λ̂ in every estimate.
 fn counted_mean_mm(outcome: &Outcome) -> Option<f64> {
-    let counted = outcome
-        .verdict
-        .estimates
-        .iter()
-        .filter_map(|e| e.counted_mm);
+    let estimates = outcome.verdict.estimates.iter();
+    let counted = estimates.filter_map(|e| e.counted_mm);
     let (count, sum) = counted.fold((0_u32, 0.0), |(count, sum), mm| (count + 1, sum + mm));
     (count > 0).then(|| sum / f64::from(count))
 }

@@ -1,16 +1,15 @@
 //! `hil-sim faults`.
 
-use std::fmt::Write;
 use std::process::ExitCode;
 
 use super::say::say;
 use hil_sim_core::scene::fault::catalogue::{Lasts, Needs, Row, rows};
 
 /// Prints the list.
-pub(super) fn execute() -> anyhow::Result<ExitCode> {
+pub(super) fn execute() -> ExitCode {
     let list: Vec<String> = rows().iter().map(entry).collect();
     say!("{}", list.join("\n"));
-    Ok(ExitCode::SUCCESS)
+    ExitCode::SUCCESS
 }
 
 fn entry(row: &Row) -> String {
@@ -19,33 +18,25 @@ fn entry(row: &Row) -> String {
         Lasts::For(s) => format!("for_s = {s} unless given"),
         Lasts::ForGood => "to the end unless for_s is given".to_owned(),
     };
-    let mut text = format!("{}: {}\n", row.name, row.meaning);
-    // Writing to a String cannot fail.
-    let _ = writeln!(text, "    done      {}", row.injected);
-    let _ = writeln!(text, "    lasts     {lasts}");
-    for key in row.keys {
-        let _ = writeln!(
-            text,
-            "    {:<9} {} (default {})",
+    let keys = row.keys.iter().map(|key| {
+        format!(
+            "    {:<9} {} (default {})\n",
             key.name, key.meaning, key.default
-        );
-    }
+        )
+    });
     let engine = match row.needs {
         Needs::Nothing => "native, elf",
         Needs::Boards => "elf",
     };
-    let _ = writeln!(text, "    engine    {engine}");
-    let _ = writeln!(text, "    expected  {}", row.expected);
     let sign = match (row.signs, row.seen_within_ms) {
         ([], _) => "no sign of it".to_owned(),
         (_, Some(ms)) => format!("seen within {ms} ms"),
         (_, None) => "seen when what arrives is a reason to hold".to_owned(),
     };
-    let safe = row
-        .safe_within_ms
-        .map_or("can't put out a wrong voltage".to_owned(), |ms| {
-            format!("all outputs at 0 V within {ms} ms")
-        });
+    let safe = match row.safe_within_ms {
+        None => "can't put out a wrong voltage".to_owned(),
+        Some(ms) => format!("all outputs at 0 V within {ms} ms"),
+    };
     let resets = match row.resets {
         0 => "no reset of the display",
         _ => "one reset of the display at most",
@@ -55,10 +46,14 @@ fn entry(row: &Row) -> String {
         (true, Some(ms)) => format!("drives again within {ms} ms of its end"),
         (true, None) => "drives on".to_owned(),
     };
-    let _ = writeln!(
-        text,
-        "    judged    {}: {sign}; {safe}; {again}; {resets}",
+    format!(
+        "{}: {}\n    done      {}\n    lasts     {lasts}\n{}    engine    {engine}\n    expected  {}\n    \
+         judged    {}: {sign}; {safe}; {again}; {resets}\n",
+        row.name,
+        row.meaning,
+        row.injected,
+        keys.collect::<String>(),
+        row.expected,
         row.class.name()
-    );
-    text
+    )
 }

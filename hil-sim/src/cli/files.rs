@@ -1,16 +1,15 @@
 //! Files that commands write.
 
-use std::fs::File;
+use std::fs::{self, File};
+use std::io::Write;
 use std::path::Path;
-use std::process::ExitCode;
 
 use anyhow::Context;
-use hil_sim_studies::study::Study;
 
 use super::say::say;
 
 pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| {
+    fs::create_dir_all(folder).with_context(|| {
         format!(
             "{}: can't be made: give another with --out",
             folder.display()
@@ -18,36 +17,61 @@ pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
     })
 }
 
-/// Makes a file for results, where the user wants it: never over a scene, which `--json *.toml` would take for it.
-pub(super) fn create(path: &Path) -> anyhow::Result<(File, &Path)> {
-    anyhow::ensure!(
-        path.extension().is_none_or(|ending| ending != "toml"),
-        "{}: is a scene's name, and would be written over: give results a name of their own before the scenes",
-        path.display()
-    );
-    let file = File::create(path).with_context(|| {
-        format!(
-            "{}: cannot be written: give a file in a folder that exists",
-            path.display()
-        )
-    })?;
-    Ok((file, path))
+/// A file for results, opened before there are any: an hour is not to be lost for a folder that is not there.
+pub(super) struct Results<'a> {
+    pub path: &'a Path,
+    pub file: File,
 }
 
+impl<'a> Results<'a> {
+    /// Makes a file where the user wants it: never over a scene, which `--json *.toml` would take for it.
+    pub fn create(path: &'a Path) -> anyhow::Result<Self> {
+        anyhow::ensure!(
+            path.extension().is_none_or(|ending| ending != "toml"),
+            "{}: is a scene's name, and would be written over: give results a name of their own before the scenes",
+            path.display()
+        );
+        let file = File::create(path).with_context(|| {
+            format!(
+                "{}: cannot be written: give a file in a folder that exists",
+                path.display()
+            )
+        })?;
+        Ok(Self { path, file })
+    }
+
+    /// The same where one is wanted.
+    pub fn wanted(path: Option<&'a Path>) -> anyhow::Result<Option<Self>> {
+        path.map(Self::create).transpose()
+    }
+
+    /// Writes everything at once.
+    pub fn write(mut self, text: &str) -> anyhow::Result<()> {
+        let written = self.file.write_all(text.as_bytes());
+        written.with_context(|| self.path.display().to_string())
+    }
+
+    /// Writes everything at once, as JSON.
+    pub fn write_json(self, content: &impl serde::Serialize) -> anyhow::Result<()> {
+        self.write(&(serde_json::to_string_pretty(content)? + "\n"))
+    }
+}
+
+/// Writes a file of a folder that is there, and tells of it.
 pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
+    fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
     say!("{}", path.display());
     Ok(())
 }
 
-/// Prints a study's table and writes its files. Exit status 1 if it misses a goal.
-pub(super) fn keep<S: Study + ?Sized>(study: &S, out: &Path) -> anyhow::Result<ExitCode> {
-    if let Some(table) = study.table() {
-        say!("{table}");
+/// Writes files of a folder that is there.
+pub(super) fn write_all<'a>(
+    folder: &Path,
+    files: impl IntoIterator<Item = (&'a str, String)>,
+) -> anyhow::Result<()> {
+    for (name, text) in files {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| path.display().to_string())?;
     }
-    for (kind, text) in study.csvs()? {
-        write(&out.join(format!("{}{kind}.csv", S::NAME)), &text)?;
-    }
-    write(&out.join(format!("{}.svg", S::NAME)), &study.picture())?;
-    Ok(ExitCode::from(u8::from(!study.is_met())))
+    Ok(())
 }

@@ -3,18 +3,16 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use hil_sim_boards::Firmwares;
 use hil_sim_core::judge::Summary;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::scene::Scene;
-use hil_sim_studies::estimators::family;
-use hil_sim_studies::estimators::family::Family;
-
-use hil_sim_studies::study::Table;
+use hil_sim_studies::bench::Bench;
+use hil_sim_studies::estimators::family::{self, Family};
+use hil_sim_studies::study::{Record, Table, short};
 
 use super::say::say;
-use super::{Elves, EngineName, number, progress};
+use super::{Elves, EngineName, number, progress, status};
 
 /// Every family of scenes, judged by what its scenes expect, as a table
 #[derive(Debug, clap::Args)]
@@ -34,108 +32,85 @@ pub(super) struct Goals {
 }
 
 /// A scene's numbers, and what it did not meet.
-#[derive(Clone, Debug)]
-struct Judged {
-    summary: Summary,
-    unmet: Vec<String>,
-}
+type Judged = (Summary, Vec<String>);
 
 impl Goals {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let families = family::load(&self.scenes)?;
-        let firmwares = match self.engine {
-            EngineName::Native => None,
-            EngineName::Elf => Some(self.elves.read()?),
-        };
+        let bench = self.engine.bench(&self.elves)?;
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
-        let judged = run(&scenes, firmwares.as_ref())?;
+        let judged = run(&scenes, &bench)?;
 
-        let mut table = Table::new(&HEADS);
-        let mut rest = &judged[..];
-        for family in &families {
-            let (these, others) = rest.split_at(family.scenes.len());
-            rest = others;
-            table.row(row(family, these));
-        }
-        say!("{table}");
+        let mut rest = judged.iter();
+        let rows = families.iter().map(|family| {
+            let summaries = rest.by_ref().take(family.scenes.len());
+            row(
+                family,
+                &summaries.map(|(summary, _)| *summary).collect::<Vec<_>>(),
+            )
+        });
+        say!("{}", Table::from_iter(rows));
         let mut met = true;
-        for (scene, judged) in scenes.iter().zip(&judged) {
-            for line in &judged.unmet {
+        for (scene, (_, unmet)) in scenes.iter().zip(&judged) {
+            for line in unmet {
                 met = false;
                 say!("{}: not as expected: {line}", scene.name);
             }
         }
-        Ok(if met {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(1)
-        })
+        Ok(status(met))
     }
 }
 
 /// Runs the scenes, on all cores: an emulated pair keeps two of them half busy.
-fn run(scenes: &[&Scene], firmwares: Option<&Firmwares>) -> anyhow::Result<Vec<Judged>> {
+fn run(scenes: &[&Scene], bench: &Bench) -> anyhow::Result<Vec<Judged>> {
     let bar = progress(scenes.len() as u64, "scenes");
-    let judged = on_all_cores(scenes, |scene| {
-        let judgement = match firmwares {
-            None => Judgement::of(scene, false)?,
-            Some(firmwares) => {
-                let (recording, _) = hil_sim_boards::run(scene, firmwares)?;
-                Outcome::new((*scene).clone(), recording).judgement(false)
-            }
+    let judged = on_all_cores(scenes, |&scene| {
+        let judgement = match bench {
+            Bench::Native => Judgement::of(scene, false)?,
+            Bench::Elf(_) => Outcome::new(scene.clone(), bench.run(scene)?).judgement(false),
         };
         bar.inc(1);
-        Ok(Judged {
-            summary: judgement.verdict.summary,
-            unmet: judgement.unmet,
-        })
+        Ok((judgement.verdict.summary, judgement.unmet))
     });
     bar.finish_and_clear();
     judged
 }
 
-const HEADS: [&str; 10] = [
-    "scenes",
-    "how many:",
-    "worst rms, %:",
-    "goal:",
-    "least valid share:",
-    "valid yet > 10 % off, worst, %:",
-    "least felt right:",
-    "most felt wrong, %:",
-    "longest to settle, ms:",
-    "the paper's count, worst rms, %:",
-];
-
-fn row(family: &Family, judged: &[Judged]) -> [String; 10] {
-    let most = |number: fn(&Summary) -> Option<f64>| {
-        judged
-            .iter()
-            .filter_map(|judged| number(&judged.summary))
-            .reduce(f64::max)
-    };
-    let least = |number: fn(&Summary) -> Option<f64>| {
-        judged
-            .iter()
-            .filter_map(|judged| number(&judged.summary))
-            .reduce(f64::min)
-    };
-    [
-        family.title.to_owned(),
-        judged.len().to_string(),
-        number(most(|summary| summary.rms_percent), 2),
-        number(family.goal_percent(), 1),
-        number(least(|summary| summary.valid_share), 3),
-        number(
-            most(|summary| summary.wrong_share).map(|share| 100.0 * share),
-            2,
-        ),
-        number(least(|summary| summary.felt_right_share), 3),
-        number(
-            most(|summary| summary.felt_wrong_share).map(|share| 100.0 * share),
-            2,
-        ),
-        number(most(|summary| summary.settling_ms), 0),
-        number(most(|summary| summary.counted_rms_percent), 0),
-    ]
+fn row(family: &Family, summaries: &[Summary]) -> Record {
+    let of = |number: fn(&Summary) -> Option<f64>| summaries.iter().filter_map(number);
+    let most = |number| of(number).reduce(f64::max);
+    let least = |number| of(number).reduce(f64::min);
+    let percent = |share: Option<f64>| number(share.map(|share| 100.0 * share), 2);
+    Record::default()
+        .with("scenes", family.title)
+        .with("how many:", short(summaries.len()))
+        .with(
+            "worst rms, %:",
+            number(most(|summary| summary.rms_percent), 2),
+        )
+        .with("goal:", number(family.goal_percent(), 1))
+        .with(
+            "least valid share:",
+            number(least(|summary| summary.valid_share), 3),
+        )
+        .with(
+            "valid yet > 10 % off, worst, %:",
+            percent(most(|summary| summary.wrong_share)),
+        )
+        .with(
+            "least felt right:",
+            number(least(|summary| summary.felt_right_share), 3),
+        )
+        .with(
+            "most felt wrong, %:",
+            percent(most(|summary| summary.felt_wrong_share)),
+        )
+        .with(
+            "longest to settle, ms:",
+            number(most(|summary| summary.settling_ms), 0),
+        )
+        .with(
+            "the paper's count, worst rms, %:",
+            number(most(|summary| summary.counted_rms_percent), 0),
+        )
 }

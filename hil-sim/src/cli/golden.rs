@@ -4,16 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use hil_sim_core::run::batch;
-use hil_sim_core::scene::SceneError;
-use hil_sim_studies::output::annotation::Annotation;
 use hil_sim_studies::output::golden::{Comparison, Golden, complaint};
 
-use super::progress;
 use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
+use super::{progress, status};
 
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Command {
@@ -45,12 +43,8 @@ pub(super) struct What {
     way: RunOptions,
 }
 
-/// A scene's runs so far.
-#[derive(Clone, Debug, Default)]
-struct Seen {
-    /// Each hash, and how many runs had it.
-    hashes: Vec<(u64, u32)>,
-}
+/// A scene's runs so far: each hash, and how many runs had it.
+type Seen = Vec<(u64, u32)>;
 
 impl Command {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
@@ -72,7 +66,7 @@ impl What {
         let mut met = true;
         for (Loaded { path, scene }, seen) in scenes.iter().zip(&seen) {
             let name = golden.name(path)?;
-            for &(hash, count) in &seen.hashes {
+            for &(hash, count) in seen {
                 let standing = golden.standing(&name, engine, hash);
                 let Some(line) = complaint(&standing, hash, &golden, &name) else {
                     continue;
@@ -83,12 +77,8 @@ impl What {
                     Comparison::Other(_, at) => (golden.path(), at),
                     Comparison::Same | Comparison::Missing => (path.as_path(), None),
                 };
-                self.way.annotate(&Annotation {
-                    file: &file.display().to_string(),
-                    line: at,
-                    title: &format!("{} is not as it was", scene.name),
-                    message: &line,
-                });
+                let title = format!("{} is not as it was", scene.name);
+                self.way.annotate(file, at, &title, &line);
             }
         }
         let runs = scenes.len() as u64 * u64::from(repeat);
@@ -102,11 +92,7 @@ impl What {
                 "not all hashes are the golden ones"
             }
         );
-        Ok(if met {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(1)
-        })
+        Ok(status(met))
     }
 
     fn renew(&self) -> anyhow::Result<ExitCode> {
@@ -117,7 +103,7 @@ impl What {
         let mut same = 0;
         for (Loaded { path, .. }, seen) in scenes.iter().zip(&seen) {
             let name = golden.name(path)?;
-            for &(hash, _) in &seen.hashes {
+            for &(hash, _) in seen {
                 let hash_text = format!("{hash:016x}");
                 match golden.renew(&name, engine, hash) {
                     Some(before) if before == hash_text => same += 1,
@@ -144,13 +130,7 @@ impl What {
                 path.display()
             );
         }
-        let loaded = self.way.load(&files);
-        let refusals: Vec<&SceneError> =
-            loaded.iter().filter_map(|one| one.as_ref().err()).collect();
-        if !refusals.is_empty() {
-            return Err(self.way.refuse(&refusals));
-        }
-        Ok(loaded.into_iter().flatten().collect())
+        self.way.accepted(self.way.load(&files))
     }
 
     /// Runs each scene so often, one after the other in turn.
@@ -158,13 +138,12 @@ impl What {
         let ready = self.way.ready()?;
         let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();
         let bar = progress(inputs.len() as u64, "runs");
-        let mut seen = vec![Seen::default(); scenes.len()];
+        let mut seen = vec![Seen::new(); scenes.len()];
         let work = |&index: &usize| ready.hash(&scenes[index].scene);
         batch::in_order(&inputs, self.way.threads(), work, |at, hash| {
-            let hash = hash
-                .map_err(|error| error.context(format!("{}", scenes[inputs[at]].path.display())))?;
+            let hash = hash.with_context(|| scenes[inputs[at]].path.display().to_string())?;
             bar.inc(1);
-            let hashes = &mut seen[inputs[at]].hashes;
+            let hashes = &mut seen[inputs[at]];
             match hashes.iter_mut().find(|(other, _)| *other == hash) {
                 Some((_, count)) => *count += 1,
                 None => hashes.push((hash, 1)),

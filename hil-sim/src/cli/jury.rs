@@ -2,18 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::fs::File;
-use std::io::Write;
-use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::thread;
 
 use anyhow::Context;
 use clap::ValueEnum;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::run::batch;
 use hil_sim_core::scene::{Estimator, Scene};
+use hil_sim_studies::bench::Bench;
 use hil_sim_studies::jury::counts::Counts;
 use hil_sim_studies::jury::evidence;
 use hil_sim_studies::jury::evidence::Cases;
@@ -26,10 +23,10 @@ use hil_sim_studies::jury::table::{Row, Weighed};
 use protocol::{DisplayConfiguration, Method, SensorConfiguration};
 use serde::Serialize;
 
-use super::files::create;
-use super::run_options::{self, Ready};
+use super::files::Results;
+use super::run_options;
 use super::say::say;
-use super::{Elves, EngineName, progress};
+use super::{Elves, EngineName, progress, threads};
 
 /// Surfaces named as the worst.
 const WORST: usize = 8;
@@ -157,8 +154,7 @@ struct Felt {
 
 impl Jury {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        // Opened first: an hour is not to be lost for a folder that is not there.
-        let json = self.json.as_deref().map(create).transpose()?;
+        let json = Results::wanted(self.json.as_deref())?;
         if self.weights {
             self.find_weights()?;
             return Ok(ExitCode::SUCCESS);
@@ -177,7 +173,7 @@ impl Jury {
         let mut cases = Cases::default();
         let Ok(()) = batch::in_order(
             &seeds.all(),
-            self.threads(),
+            threads(self.jobs),
             |&seed| Cases::of(&Trial::draw(seed).record()),
             |_, of_one| {
                 bar.inc(1);
@@ -205,7 +201,7 @@ impl Jury {
         }
     }
 
-    fn judge_strangers(&self, json: Option<(File, &Path)>) -> anyhow::Result<()> {
+    fn judge_strangers(&self, json: Option<Results>) -> anyhow::Result<()> {
         let seeds = self.seeds();
         let purpose = seeds.purpose()?.name();
         let mut sensor = SensorConfiguration::DEFAULT;
@@ -236,7 +232,7 @@ impl Jury {
         };
         let Ok(()) = batch::in_order(
             &seeds.all(),
-            self.threads(),
+            threads(self.jobs),
             work,
             |_, (trial, Played { said, felt })| {
                 bar.inc(1);
@@ -286,7 +282,7 @@ impl Jury {
         )
     }
 
-    fn judge_folder(&self, folder: &Path, json: Option<(File, &Path)>) -> anyhow::Result<()> {
+    fn judge_folder(&self, folder: &Path, json: Option<Results>) -> anyhow::Result<()> {
         let mut scenes = run_options::of_folder(folder, self.engine)?;
         for (_, scene) in &mut scenes {
             if let Some(method) = self.method {
@@ -299,21 +295,18 @@ impl Jury {
                 scene.display.configuration.max_age_ms = max_age_ms;
             }
         }
-        let ready = Ready::new(self.engine, &self.elves)?;
+        let bench = self.engine.bench(&self.elves)?;
         let bar = progress(scenes.len() as u64, "scenes");
-        let work = |(entry, scene): &(Entry, Scene)| judge_scene(&ready, entry, scene);
+        let work = |(entry, scene): &(Entry, Scene)| judge_scene(&bench, entry, scene);
         let mut judged = Vec::new();
-        batch::in_order(&scenes, self.threads(), work, |_, result| {
+        batch::in_order(&scenes, threads(self.jobs), work, |_, result| {
             bar.inc(1);
             judged.push(result?);
             anyhow::Ok(())
         })?;
         bar.finish_and_clear();
 
-        let engine = match self.engine {
-            EngineName::Native => "native",
-            EngineName::Elf => "elf",
-        };
+        let engine = self.engine.engine().name();
         say!(
             "{}, engine {engine}; intervals: {}",
             folder.display(),
@@ -332,12 +325,6 @@ impl Jury {
             },
         )
     }
-
-    fn threads(&self) -> NonZero<usize> {
-        NonZero::new(self.jobs)
-            .or_else(|| thread::available_parallelism().ok())
-            .unwrap_or(NonZero::<usize>::MIN)
-    }
 }
 
 impl From<MethodName> for Method {
@@ -351,12 +338,12 @@ impl From<MethodName> for Method {
     }
 }
 
-fn judge_scene(ready: &Ready, entry: &Entry, scene: &Scene) -> anyhow::Result<JudgedScene> {
+fn judge_scene(bench: &Bench, entry: &Entry, scene: &Scene) -> anyhow::Result<JudgedScene> {
     let context = || format!("{}", entry.scene.display());
-    let verdict = match ready {
-        Ready::Native => Judgement::of(scene, false).with_context(context)?.verdict,
-        Ready::Elf(_) => {
-            let recording = ready.run(scene).with_context(context)?;
+    let verdict = match bench {
+        Bench::Native => Judgement::of(scene, false).with_context(context)?.verdict,
+        Bench::Elf(_) => {
+            let recording = bench.run(scene).with_context(context)?;
             Outcome::new(scene.clone(), recording).verdict
         }
     };
@@ -472,10 +459,6 @@ fn say_worst(trials: &[Judged]) {
     }
 }
 
-fn write(json: Option<(File, &Path)>, content: &impl Serialize) -> anyhow::Result<()> {
-    let Some((mut file, path)) = json else {
-        return Ok(());
-    };
-    let text = serde_json::to_string_pretty(content)?;
-    writeln!(file, "{text}").with_context(|| format!("{}", path.display()))
+fn write(json: Option<Results>, content: &impl Serialize) -> anyhow::Result<()> {
+    json.map_or(Ok(()), |json| json.write_json(content))
 }

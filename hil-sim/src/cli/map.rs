@@ -3,15 +3,12 @@
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::thread;
 
-use super::progress;
 use super::run_options::tell_notes;
 use super::say::{self, say};
-use hil_sim_studies::map::shard::Shard;
-use hil_sim_studies::map::survey::whole_methods;
-use hil_sim_studies::map::{METHODS, Map, Plan, Survey, catalogue, find, summary, words};
-use hil_sim_studies::study::Table;
+use super::{progress, threads};
+use hil_sim_studies::map::{Axis, METHODS, Made, Map, Plan, Shard, Survey, catalogue, find};
+use hil_sim_studies::study::{Record, Table, short};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Maps {
@@ -80,10 +77,7 @@ impl Maps {
             methods,
             folder: self.out,
             shard: self.shard.as_deref().map(str::parse::<Shard>).transpose()?,
-            threads: match self.jobs {
-                Some(jobs) => jobs,
-                None => thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN),
-            },
+            threads: threads(self.jobs.map_or(0, NonZero::get)),
             renew: self.renew,
         };
         // All of it first: a refusal is not to come after half an hour.
@@ -95,22 +89,20 @@ impl Maps {
                 tell_notes(&map.scene(0, method)?);
             }
         }
-        let mut table = vec![summary::HEADER.to_owned()];
-        let mut words = Vec::new();
-        for map in &maps {
-            let (lines, said) = make(map, &plan, self.merge)?;
-            table.extend(lines);
-            words.push(said);
-        }
+        let made = maps.iter().map(|map| make(map, &plan, self.merge));
+        let made: Vec<Made> = made.collect::<Result<_, _>>()?;
         if plan.shard.is_none() {
-            say!("{}\n\n{}", table.join("\n"), words.join("\n").trim_end());
+            let words: Vec<&str> = made.iter().map(|made| &*made.words).collect();
+            let words = words.join("\n");
+            let table = Table::from_iter(made.iter().flat_map(|made| made.lines.clone()));
+            say!("{table}\n\n{}", words.trim_end());
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Makes one map and gives its lines of the table, and where each method fails.
-fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, String)> {
+/// Makes one map.
+fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Made> {
     let mut survey = Survey::open(map, plan)?;
     if merge {
         survey.complete()?;
@@ -118,39 +110,24 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<(Vec<String>, Str
     let bar = progress(survey.missing() as u64, &format!("runs of {}", map.name));
     survey.run(|| bar.inc(1))?;
     bar.finish_and_clear();
-    let (files, rows) = survey.finish()?;
-    eprintln!("{}", files.csv.display());
-    for file in [files.picture, files.words].into_iter().flatten() {
+    let made = survey.finish()?;
+    for file in &made.files {
         eprintln!("{}", file.display());
     }
-    let methods = whole_methods(map, &rows);
-    let lines = methods
-        .iter()
-        .map(|method| summary::line(map, method, &rows))
-        .collect();
-    Ok((lines, words::text(map, &methods, &rows)))
+    Ok(made)
 }
 
 fn list(maps: &[Map]) {
-    let mut table = Table::new(&["map", "cells:", "along x", "along y", "in all cells"]);
-    for map in maps {
-        let axis = |axis: &hil_sim_studies::map::axis::Axis| {
-            format!(
-                "{}: {} steps, {}",
-                axis.label,
-                axis.steps.len(),
-                axis.places()
-            )
-        };
-        table.row([
-            map.name.to_owned(),
-            map.len().to_string(),
-            axis(&map.x),
-            axis(&map.y),
-            map.conditions.to_owned(),
-        ]);
-    }
-    say!("{table}");
+    let axis = |axis: &Axis| format!("{}: {}", axis.label, axis.told());
+    let rows = maps.iter().map(|map| {
+        Record::default()
+            .with("map", map.name)
+            .with("cells:", short(map.len()))
+            .with("along x", axis(&map.x))
+            .with("along y", axis(&map.y))
+            .with("in all cells", map.conditions)
+    });
+    say!("{}", Table::from_iter(rows));
 }
 
 fn print_scene(maps: &[Map], place: &str, methods: &[String]) -> anyhow::Result<()> {

@@ -8,6 +8,7 @@ use hil_sim_boards::jig::Jumper;
 use hil_sim_boards::semihosted;
 
 use super::say::{say, text};
+use super::status;
 
 /// What a program of tests is run on.
 #[derive(Debug, clap::Args)]
@@ -39,6 +40,6 @@ impl OnTarget {
         for line in &said.log {
             say!("{line}");
         }
-        Ok(ExitCode::from(u8::from(!said.is_done)))
+        Ok(status(said.is_done))
     }
 }

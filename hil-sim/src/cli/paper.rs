@@ -6,13 +6,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use hil_sim_studies::paper::{plan, report};
-use hil_sim_studies::psychophysics::bench::Job;
-use hil_sim_studies::psychophysics::study::Plan;
+use hil_sim_studies::paper::{jobs, report};
+use hil_sim_studies::psychophysics::{Job, Plan, run};
 
-use super::people::bench;
+use super::files::write_all;
 use super::say::say;
-use super::{Elves, EngineName};
+use super::{Elves, EngineName, status};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Paper {
@@ -32,7 +31,7 @@ pub(super) struct Paper {
 impl Paper {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let started = Instant::now();
-        let bench = bench(self.engine, &self.elves)?;
+        let bench = self.engine.bench(&self.elves)?;
         let (folder, name) = folder(&self.out)?;
         // First: runs are not to be lost for a folder that cannot be.
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -41,9 +40,9 @@ impl Paper {
             seed: self.seed,
             ..Plan::default()
         };
-        let jobs = plan::jobs(&plan);
+        let jobs = jobs(&plan);
         let done = AtomicUsize::new(0);
-        let recordings = bench.run(&jobs, |job| {
+        let recordings = run(&bench, &jobs, |job| {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             let what = match job {
                 Job::Pair(scene) => scene.name.as_str(),
@@ -54,10 +53,7 @@ impl Paper {
         })?;
 
         let report = report(plan, &recordings, &name)?;
-        for (file, text) in &report.files {
-            let path = folder.join(file);
-            std::fs::write(&path, text).with_context(|| path.display().to_string())?;
-        }
+        write_all(&folder, report.files)?;
         std::fs::write(&self.out, &report.html).with_context(|| self.out.display().to_string())?;
         say!(
             "Tables I to IV and Figs 4 to 8, ours beside the paper's: {}\nTheir numbers as CSV: {}\n{:.0} s in all",
@@ -68,7 +64,7 @@ impl Paper {
         for line in &report.contradicted {
             say!("not borne out by these runs: {line}");
         }
-        Ok(ExitCode::from(u8::from(!report.contradicted.is_empty())))
+        Ok(status(report.contradicted.is_empty()))
     }
 }
 

@@ -4,12 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
-use clap::ValueEnum;
-use hil_sim_studies::psychophysics::bench::Bench;
-use hil_sim_studies::psychophysics::study;
-use hil_sim_studies::psychophysics::study::{Friction, Plan, Study};
-use hil_sim_studies::psychophysics::{record, tables};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use hil_sim_studies::psychophysics::{Friction, Plan, Study, csvs, jobs, json, run, text};
 
+use super::files::write_all;
 use super::say::{self, say};
 use super::{Elves, EngineName, progress};
 
@@ -26,8 +24,8 @@ pub(super) struct People {
     trials: u32,
     /// How sticky the specimens of Table III are. With friction the fingertip sticks and slips, and its
     /// tangential channel is fitted
-    #[arg(long, value_enum, default_value_t = FrictionName::None)]
-    friction: FrictionName,
+    #[arg(long, default_value = "none", value_parser = frictions())]
+    friction: Friction,
     /// Where to write a CSV for each table
     #[arg(long, value_name = "FOLDER", default_value = "target/people")]
     out: PathBuf,
@@ -38,49 +36,35 @@ pub(super) struct People {
     elves: Elves,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FrictionName {
-    None,
-    Mild,
-    Strong,
-}
-
-/// The engine by its name, with the ELFs if it needs them.
-pub(super) fn bench(engine: EngineName, elves: &Elves) -> anyhow::Result<Bench> {
-    Ok(match engine {
-        EngineName::Native => Bench::Native,
-        EngineName::Elf => Bench::Elf(Box::new(elves.read()?)),
+fn frictions() -> impl TypedValueParser<Value = Friction> {
+    PossibleValuesParser::new(Friction::ALL.map(Friction::name)).map(|name| {
+        let mut all = Friction::ALL.into_iter();
+        all.find(|friction| friction.name() == name)
+            .expect("only these are taken")
     })
 }
 
 impl People {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let bench = bench(self.engine, &self.elves)?;
+        let bench = self.engine.bench(&self.elves)?;
         // First: a study is not to be lost for a folder that cannot be.
         std::fs::create_dir_all(&self.out).with_context(|| self.out.display().to_string())?;
         let plan = Plan {
             seed: self.seed,
             trials: self.trials,
-            friction: match self.friction {
-                FrictionName::None => Friction::None,
-                FrictionName::Mild => Friction::Mild,
-                FrictionName::Strong => Friction::Strong,
-            },
+            friction: self.friction,
             ..Plan::default()
         };
-        let jobs = study::jobs(&plan);
+        let jobs = jobs(&plan);
         let progress = progress(jobs.len() as u64, "runs");
-        let recordings = bench.run(&jobs, |_| progress.inc(1))?;
+        let recordings = run(&bench, &jobs, |_| progress.inc(1))?;
         progress.finish_and_clear();
         let study = Study::new(plan, &recordings)?;
-        for (name, text) in record::csvs(&study)? {
-            let path = self.out.join(name);
-            std::fs::write(&path, text).with_context(|| path.display().to_string())?;
-        }
+        write_all(&self.out, csvs(&study))?;
         if self.json {
-            say!("{}", record::json(&study)?);
+            say!("{}", json(&study)?);
         } else {
-            say::text(format_args!("{}", tables::text(&study)));
+            say::text(format_args!("{}", text(&study)));
             say!("\nEvery number as CSV: {}", self.out.display());
         }
         Ok(ExitCode::SUCCESS)

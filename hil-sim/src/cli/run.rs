@@ -1,6 +1,6 @@
 //! `hil-sim run`.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -12,19 +12,17 @@ use hil_sim_core::run::batch;
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::SceneError;
 use hil_sim_core::scene_file::line::line_of;
-use hil_sim_studies::map::shard::Shard;
-use hil_sim_studies::output::annotation::Annotation;
+use hil_sim_studies::map::Shard;
 use hil_sim_studies::output::golden::{Comparison, Golden, complaint};
-use hil_sim_studies::output::json::JsonList;
-use hil_sim_studies::output::junit;
-use hil_sim_studies::output::junit::{Case, Fate};
+use hil_sim_studies::output::json::{JsonList, SceneResult};
+use hil_sim_studies::output::junit::{Fate, TestCase, case, xml};
 use hil_sim_studies::output::report::{Chapter, html};
 
-use super::files::create;
-use super::number;
+use super::files::Results;
 use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
+use super::{number, status};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -66,28 +64,27 @@ impl Run {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let files = scene_files(&self.scenes, self.shard)?;
         let loaded = self.way.load(&files);
-        let refusals: Vec<&SceneError> =
-            loaded.iter().filter_map(|one| one.as_ref().err()).collect();
-        if !refusals.is_empty() {
-            if let Some((file, path)) = self.junit.as_deref().map(create).transpose()? {
-                let cases: Vec<Case> = files.iter().zip(&loaded).map(unrun).collect();
-                write_junit(self.way.engine(), &cases, file, path)?;
-            }
-            return Err(self.way.refuse(&refusals));
+        if loaded.iter().any(Result::is_err)
+            && let Some(junit) = Results::wanted(self.junit.as_deref())?
+        {
+            junit.write(&xml(
+                self.way.engine(),
+                files.iter().zip(&loaded).map(unrun),
+            )?)?;
         }
-        let scenes: Vec<Loaded> = loaded.into_iter().flatten().collect();
+        let scenes = self.way.accepted(loaded)?;
         let ready = self.way.ready()?;
         let golden = self.golden.as_deref().map(Golden::read).transpose()?;
         // Opened first: a run is not to be lost for a folder that is not there.
-        let json = self.json.as_deref().map(create).transpose()?;
-        let report = self.report.as_deref().map(create).transpose()?;
-        let junit = self.junit.as_deref().map(create).transpose()?;
+        let json = Results::wanted(self.json.as_deref())?;
+        let report = Results::wanted(self.report.as_deref())?;
+        let junit = Results::wanted(self.junit.as_deref())?;
 
         say!("{HEADER}");
         let mut books = Books {
             way: &self.way,
             golden,
-            json: json.map(|(file, path)| (BufWriter::new(file), path, JsonList::default())),
+            json: json.map(|json| (BufWriter::new(json.file), json.path, JsonList::default())),
             cases: Vec::with_capacity(scenes.len()),
             outcomes: Vec::new(),
             met: true,
@@ -111,31 +108,27 @@ impl Run {
         let ran = batch::in_order(&scenes, self.way.threads(), work, |index, judged| {
             books.enter(&scenes[index], judged)
         });
-        if let Some((file, path)) = junit {
+        if let Some(junit) = junit {
             let rest = scenes.iter().skip(books.cases.len());
-            books
-                .cases
-                .extend(rest.map(|loaded| case(&loaded.path, &loaded.scene.name, Fate::Skipped)));
-            write_junit(self.way.engine(), &books.cases, file, path)?;
+            let rest = rest.map(|loaded| case(&loaded.path, &loaded.scene.name, &Fate::Skipped));
+            junit.write(&xml(
+                self.way.engine(),
+                books.cases.into_iter().chain(rest),
+            )?)?;
         }
         ran?;
         if let Some((mut file, path, list)) = books.json {
             file.write_all(list.end().as_bytes())
                 .and_then(|()| file.flush())
-                .with_context(|| format!("{}", path.display()))?;
+                .with_context(|| path.display().to_string())?;
         }
-        if let Some((mut file, path)) = report {
+        if let Some(report) = report {
             let chapters: Vec<_> = books.outcomes.iter().map(Chapter::of).collect();
-            let page = html(&chapters);
-            file.write_all(page.as_bytes())
-                .with_context(|| format!("{}", path.display()))?;
+            let path = report.path;
+            report.write(&html(&chapters))?;
             say!("report: {}", path.display());
         }
-        Ok(if books.met {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::from(1)
-        })
+        Ok(status(books.met))
     }
 }
 
@@ -143,8 +136,8 @@ impl Run {
 struct Books<'a> {
     way: &'a RunOptions,
     golden: Option<Golden>,
-    json: Option<(BufWriter<File>, &'a Path, JsonList)>,
-    cases: Vec<Case>,
+    json: Option<(BufWriter<fs::File>, &'a Path, JsonList)>,
+    cases: Vec<TestCase>,
     outcomes: Vec<Outcome>,
     /// Whether all was as expected so far.
     met: bool,
@@ -156,17 +149,12 @@ impl Books<'_> {
         let Judged { judgement, outcome } = match judged {
             Ok(judged) => judged,
             Err(error) => {
-                let file = path.display().to_string();
                 let reason = format!("{error:#}");
-                self.way.annotate(&Annotation {
-                    file: &file,
-                    line: None,
-                    title: &format!("{} could not be run", scene.name),
-                    message: &reason,
-                });
-                self.cases
-                    .push(case(path, &scene.name, Fate::Unusable(reason)));
-                return Err(error.context(file));
+                let title = format!("{} could not be run", scene.name);
+                self.way.annotate(path, None, &title, &reason);
+                let fate = Fate::Unusable(&reason);
+                self.cases.push(case(path, &scene.name, &fate));
+                return Err(error.context(path.display().to_string()));
             }
         };
         let (hash, wall_s) = (judgement.ran.hash, judgement.ran.wall_s);
@@ -174,10 +162,8 @@ impl Books<'_> {
         let mut unmet = judgement.unmet.clone();
         let text = fs::read_to_string(path).unwrap_or_default();
         // Each line with the file and the line of it that it is about.
-        let mut places: Vec<(&Path, Option<usize>)> = unmet
-            .iter()
-            .map(|line| (path.as_path(), line_of(&text, &keys_of(line))))
-            .collect();
+        let place = |line: &String| (path.as_path(), line_of(&text, &keys_of(line)));
+        let mut places: Vec<(&Path, Option<usize>)> = unmet.iter().map(place).collect();
         if let Some(golden) = &self.golden {
             let name = golden.name(path)?;
             let standing = golden.standing(&name, self.way.engine(), hash);
@@ -192,56 +178,36 @@ impl Books<'_> {
         say!("{row}");
         for (line, (file, at)) in unmet.iter().zip(places) {
             say!("  not as expected: {line}");
-            self.way.annotate(&Annotation {
-                file: &file.display().to_string(),
-                line: at,
-                title: &format!("{} is not as expected", scene.name),
-                message: line,
-            });
+            let title = format!("{} is not as expected", scene.name);
+            self.way.annotate(file, at, &title, line);
         }
         self.met &= is_met;
         if let Some((file, path, list)) = &mut self.json {
-            list.write(
-                &hil_sim_studies::output::json::SceneResult::of(&judgement, scene),
-                file,
-            )
-            .with_context(|| format!("{}", path.display()))?;
+            let written = list.write(&SceneResult::of(&judgement, scene), file);
+            written.with_context(|| path.display().to_string())?;
         }
         self.outcomes.extend(outcome);
+        let (row, unmet) = (&row, &unmet);
         let fate = Fate::Ran {
             wall_s,
             hash,
             row,
             unmet,
         };
-        self.cases.push(case(path, &scene.name, fate));
+        self.cases.push(case(path, &scene.name, &fate));
         Ok(())
     }
 }
 
-fn case(path: &Path, name: &str, fate: Fate) -> Case {
-    Case {
-        file: path.display().to_string(),
-        name: name.to_owned(),
-        fate,
-    }
-}
-
 /// The case of a scene that has not run, because it or another cannot be used.
-fn unrun((path, loaded): (&PathBuf, &Result<Loaded, SceneError>)) -> Case {
+fn unrun((path, loaded): (&PathBuf, &Result<Loaded, SceneError>)) -> TestCase {
     match loaded {
-        Ok(loaded) => case(path, &loaded.scene.name, Fate::Skipped),
+        Ok(loaded) => case(path, &loaded.scene.name, &Fate::Skipped),
         Err(error) => {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            case(path, &name, Fate::Unusable(error.to_string()))
+            case(path, &name, &Fate::Unusable(&error.to_string()))
         }
     }
-}
-
-fn write_junit(engine: Engine, cases: &[Case], mut file: File, path: &Path) -> anyhow::Result<()> {
-    let text = junit::xml(engine, cases)?;
-    file.write_all(text.as_bytes())
-        .with_context(|| format!("{}", path.display()))
 }
 
 const HEADER: &str = "\
@@ -267,12 +233,6 @@ fn row(name: &str, judgement: &Judgement) -> String {
 
 /// A multiple of real time, with decimals where they matter.
 fn pace(factor: Option<f64>) -> String {
-    number(
-        factor,
-        if factor.is_some_and(|factor| factor < 10.0) {
-            2
-        } else {
-            0
-        },
-    )
+    let matter = factor.is_some_and(|factor| factor < 10.0);
+    number(factor, if matter { 2 } else { 0 })
 }

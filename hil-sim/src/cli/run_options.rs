@@ -3,20 +3,19 @@
 use std::fs;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use clap::ValueEnum;
-use hil_sim_boards::Firmwares;
+use hil_sim_boards::FirmwareError;
 use hil_sim_core::native;
-use hil_sim_core::run::recording::{Engine, Recording};
+use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::{Scene, SceneError};
 use hil_sim_core::scene_file::line::line_of;
-use hil_sim_studies::jury::folder;
-use hil_sim_studies::jury::folder::Entry;
-use hil_sim_studies::output::annotation::Annotation;
+use hil_sim_studies::bench::Bench;
+use hil_sim_studies::jury::folder::{self, Entry};
+use hil_sim_studies::output::annotation::annotation;
 
 use super::say::say;
-use super::{Elves, EngineName};
+use super::{Elves, EngineName, threads};
 
 /// How scenes are run, and how it is told.
 #[derive(Debug, clap::Args)]
@@ -44,14 +43,6 @@ enum Annotate {
     Off,
 }
 
-/// What runs the scenes, ready.
-pub(super) enum Ready {
-    /// The libraries.
-    Native,
-    /// The ELFs.
-    Elf(Box<Firmwares>),
-}
-
 /// A scene with its file.
 pub(super) struct Loaded {
     /// The file, as it was named.
@@ -60,59 +51,30 @@ pub(super) struct Loaded {
     pub scene: Scene,
 }
 
-impl Ready {
-    /// Reads the firmwares, if they are to run.
-    pub fn new(engine: EngineName, elves: &Elves) -> anyhow::Result<Self> {
-        Ok(match engine {
-            EngineName::Native => Self::Native,
-            EngineName::Elf => Self::Elf(Box::new(elves.read()?)),
-        })
-    }
-
-    pub fn run(&self, scene: &Scene) -> anyhow::Result<Recording> {
-        Ok(match self {
-            Self::Native => native::run(scene)?,
-            Self::Elf(firmwares) => hil_sim_boards::run(scene, firmwares)?.0,
-        })
-    }
-
-    /// The hash of a scene's run.
-    pub fn hash(&self, scene: &Scene) -> anyhow::Result<u64> {
-        Ok(match self {
-            Self::Native => native::run_before(scene, &mut ())?.hash,
-            Self::Elf(firmwares) => hil_sim_boards::run(scene, firmwares)?.0.hash,
-        })
-    }
-}
-
 impl RunOptions {
     pub fn engine(&self) -> Engine {
-        match self.engine {
-            EngineName::Native => Engine::Native,
-            EngineName::Elf => Engine::Elf,
-        }
+        self.engine.engine()
     }
 
     /// Reads the firmwares, if they are to run.
-    pub fn ready(&self) -> anyhow::Result<Ready> {
-        Ready::new(self.engine, &self.elves)
+    pub fn ready(&self) -> Result<Bench, FirmwareError> {
+        self.engine.bench(&self.elves)
     }
 
     pub fn threads(&self) -> NonZero<usize> {
-        NonZero::new(self.jobs)
-            .or_else(|| thread::available_parallelism().ok())
-            .unwrap_or(NonZero::<usize>::MIN)
+        threads(self.jobs)
     }
 
     /// Prints an annotation, if it is wanted.
-    pub fn annotate(&self, annotation: &Annotation<'_>) {
+    pub fn annotate(&self, file: &Path, line: Option<usize>, title: &str, message: &str) {
         let wanted = match self.annotate {
             Annotate::Auto => std::env::var_os("GITHUB_ACTIONS").is_some_and(|set| set == "true"),
             Annotate::Github => true,
             Annotate::Off => false,
         };
         if wanted {
-            say!("{annotation}");
+            let file = file.display().to_string();
+            say!("{}", annotation(&file, line, title, message));
         }
     }
 
@@ -128,18 +90,21 @@ impl RunOptions {
         files.iter().map(load).collect()
     }
 
-    /// Annotates refusals, and makes one error of them.
-    pub fn refuse(&self, refusals: &[&SceneError]) -> anyhow::Error {
-        for refusal in refusals {
-            self.annotate(&Annotation {
-                file: &refusal.file,
-                line: refusal.line,
-                title: "this scene cannot be used",
-                message: &refusal.to_string(),
-            });
+    /// All scenes, or one error of all refusals, which are annotated.
+    pub fn accepted(&self, loaded: Vec<Result<Loaded, SceneError>>) -> anyhow::Result<Vec<Loaded>> {
+        let mut lines = Vec::new();
+        for refusal in loaded.iter().filter_map(|one| one.as_ref().err()) {
+            let (file, line) = (Path::new(&refusal.file), refusal.line);
+            lines.push(refusal.to_string());
+            self.annotate(
+                file,
+                line,
+                "this scene cannot be used",
+                &refusal.to_string(),
+            );
         }
-        let lines: Vec<String> = refusals.iter().map(ToString::to_string).collect();
-        anyhow::anyhow!(lines.join("\n"))
+        anyhow::ensure!(lines.is_empty(), lines.join("\n"));
+        Ok(loaded.into_iter().flatten().collect())
     }
 }
 
@@ -172,11 +137,8 @@ pub(super) fn of_folder(folder: &Path, engine: EngineName) -> anyhow::Result<Vec
 
 /// A refusal of an engine's, with the scene's file and line.
 fn at_home(path: &Path, error: SceneError) -> SceneError {
-    let keys: Vec<&str> = error
-        .key
-        .split(['.', '[', ']'])
-        .filter(|key| !key.is_empty())
-        .collect();
+    let keys = error.key.split(['.', '[', ']']);
+    let keys: Vec<&str> = keys.filter(|key| !key.is_empty()).collect();
     let text = fs::read_to_string(path).unwrap_or_default();
     SceneError {
         file: path.display().to_string(),

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use hil_sim_studies::map::shard::Shard;
+use hil_sim_studies::map::Shard;
 
 /// The files, in the order in which they are named, those of a folder in the order of their names; only those
 /// of a shard, if one is given.

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use hil_sim_studies::study::Table;
+use hil_sim_studies::study::{Record, Table, short};
 use object::{Object, ObjectSection, SectionKind};
 
 use super::Elves;
@@ -24,28 +24,22 @@ pub(super) fn execute(elves: &Elves) -> anyhow::Result<ExitCode> {
     let firmwares = elves.read()?;
     let flash_total = FLASH.end - FLASH.start;
     let ram_total = RAM.end - RAM.start;
-    let mut table = Table::new(&[
-        "ELF",
-        "flash, bytes:",
-        "of 2 MiB:",
-        "static RAM, bytes:",
-        "of 192 KiB:",
-    ]);
+    let mut rows = Vec::new();
     for (name, firmware) in [
         ("firmware-sensor", &firmwares.sensor),
         ("firmware-display", &firmwares.display),
     ] {
         let Footprint { flash, ram } = footprint(&object::File::parse(&*firmware.elf)?);
         let share = |bytes: u64, of: u64| format!("{:.1} %", 100.0 * bytes as f64 / of as f64);
-        table.row([
-            name.to_owned(),
-            flash.to_string(),
-            share(flash, flash_total),
-            ram.to_string(),
-            share(ram, ram_total),
-        ]);
+        let row = Record::default()
+            .with("ELF", name)
+            .with("flash, bytes:", short(flash))
+            .with("of 2 MiB:", share(flash, flash_total))
+            .with("static RAM, bytes:", short(ram))
+            .with("of 192 KiB:", share(ram, ram_total));
+        rows.push(row);
     }
-    say!("{table}");
+    say!("{}", Table::from_iter(rows));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,7 +9,7 @@ use hil_sim_studies::display::rendering_of_word;
 use protocol::Rendering;
 
 use super::say::say;
-use super::{Elves, progress};
+use super::{Elves, progress, status};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Soak {
@@ -77,6 +77,6 @@ impl Soak {
                 "not as it must be"
             }
         );
-        Ok(ExitCode::from(u8::from(!soaked.holds())))
+        Ok(status(soaked.holds()))
     }
 }

@@ -1,22 +1,4 @@
-//! What every estimator gives and what it costs, what the display does, and what the contact models are
-//! worth: `hil-sim chart`.
-//!
-//! | file | what |
-//! | --- | --- |
-//! | [`family`] | the committed scenes, by family |
-//! | [`settings`] | the firmware's estimators, knobs swept |
-//! | [`rivals`], [`pitch`], [`fourier`] | the field's methods, by crates where there are good ones |
-//! | [`contest`] | all of them on the same samples, [`score`] |
-//! | [`costs`], [`tally`], [`parts`] | instructions on the Cortex-M4F |
-//! | [`bank`] | the former default's last rows |
-//! | [`bound`] | the Cramér–Rao bound |
-//! | [`efficiency`] | how near the default estimator comes to it |
-//! | [`confidence`] | whether it is a probability, on strangers' surfaces |
-//! | [`result`], [`picture`] | CSV and SVG |
-//! | [`models`] | speed and error of the contact models |
-//! | [`stability`] | where integrators fail |
-//! | [`purity`], [`stop`], [`timing`], [`delay`] | the display's ELF, measured |
-//! | [`texture`] | what partials and a random part carry besides λ |
+//! What the display does, measured on its ELF or its library.
 
 pub mod delay;
 pub mod purity;
@@ -24,10 +6,13 @@ pub mod stop;
 pub mod texture;
 pub mod timing;
 
-use protocol::texture::{BANDS, PARTIALS};
-use protocol::{Partial, Rendering, Texture};
+use std::sync::Arc;
 
-/// Every rendering, by its name in tables, files and commands.
+use hil_sim_core::scene::{Link, Motion, Series};
+use protocol::texture::{BANDS, PARTIALS};
+use protocol::{DisplayConfiguration, Mode, Partial, Rendering, Texture, UpdateRate};
+
+/// Every rendering, the simplest first, by its name in tables, files and commands.
 pub const RENDERINGS: [(&str, Rendering); 3] = [
     ("fundamental", Rendering::Fundamental),
     ("shape", Rendering::Shape),
@@ -36,10 +21,8 @@ pub const RENDERINGS: [(&str, Rendering); 3] = [
 
 /// The name of a rendering.
 pub fn word_of_rendering(rendering: Rendering) -> &'static str {
-    RENDERINGS
-        .iter()
-        .find(|(_, of)| *of == rendering)
-        .map_or("", |(word, _)| word)
+    let found = RENDERINGS.iter().find(|(_, of)| *of == rendering);
+    found.map_or("", |(word, _)| word)
 }
 
 /// The rendering of a name.
@@ -68,7 +51,7 @@ pub const RICH_TEXTURE: Texture = Texture {
 };
 
 /// A surface that is a sine and nothing else.
-pub const PLAIN_TEXTURE: Texture = Texture {
+const PLAIN_TEXTURE: Texture = Texture {
     partials: [Partial { ratio: 0, phase: 0 }; PARTIALS],
     repeating_percent: 100,
     bands: [0; BANDS],
@@ -76,9 +59,44 @@ pub const PLAIN_TEXTURE: Texture = Texture {
 };
 
 /// The name of a mode in tables and files.
-pub const fn word_of_mode(mode: protocol::Mode) -> &'static str {
+pub const fn word_of_mode(mode: Mode) -> &'static str {
     match mode {
-        protocol::Mode::Uniform => "uniform",
-        protocol::Mode::Travelling => "travelling",
+        Mode::Uniform => "uniform",
+        Mode::Travelling => "travelling",
     }
+}
+
+/// What the board starts with, but for this.
+fn configured(mode: Mode, update_rate: UpdateRate) -> DisplayConfiguration {
+    DisplayConfiguration {
+        mode,
+        update_rate,
+        ..DisplayConfiguration::DEFAULT
+    }
+}
+
+/// A link that is late and nothing else.
+fn late(delay_ms: f64) -> Link {
+    Link {
+        delay_ms,
+        ..Link::default()
+    }
+}
+
+/// A link that is late and loses a fifth, with 50 ms of jitter.
+fn bad(delay_ms: f64) -> Link {
+    Link {
+        jitter_ms: 50.0,
+        loss: 0.2,
+        ..late(delay_ms)
+    }
+}
+
+/// A hand that goes through these places in mm at these instants in s.
+pub(crate) fn through(at: Vec<f64>, values: Vec<f64>) -> Motion {
+    Motion::Recorded(Arc::new(Series {
+        at,
+        values,
+        width: 1,
+    }))
 }

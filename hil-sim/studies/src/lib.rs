@@ -1,5 +1,6 @@
 //! What is measured over many runs: estimators, display, contact models, the paper, people, faults.
 
+pub mod bench;
 pub mod campaign;
 pub mod contact;
 pub mod display;

@@ -6,42 +6,42 @@
 //!
 //! Every cell is an ordinary scene ([`Map::scene_text`]); `hil-sim run` gives the same numbers for it.
 
-pub mod axis;
-pub mod catalogue;
-pub mod error;
-pub mod fingerprint;
-pub mod journal;
-pub mod knob;
-pub mod measurement;
-pub mod picture;
-pub mod ramp;
-pub mod row;
-pub mod shard;
-pub mod summary;
-pub mod survey;
+mod axis;
+mod catalogue;
+mod error;
+mod fingerprint;
+mod journal;
+mod knob;
+mod measurement;
+mod picture;
+mod ramp;
+mod row;
+mod shard;
+mod summary;
+mod survey;
 #[cfg(test)]
 mod tests;
-pub mod words;
+mod words;
 
-use std::fmt::Write;
 use std::hash::Hasher;
 use std::path::Path;
 
 use twox_hash::XxHash3_64;
 
-use axis::Axis;
 use hil_sim_core::scene::{Scene, SceneError};
 use knob::Setting;
 
+pub use axis::Axis;
 pub use catalogue::{catalogue, find};
 pub use error::MapError;
-pub use survey::{Plan, Survey};
+pub use shard::Shard;
+pub use survey::{Made, Plan, Survey};
 
 /// Methods that a map compares if none are asked for, in the order of the pictures' rows.
 pub const METHODS: [&str; 3] = ["spectrum", "crossings", "counting"];
-/// Virtual time of a cell's scene, in s: a thousand estimates, one of which is the 0.1 % that may be
+/// Virtual time of a cell's scene: a thousand estimates, one of which is the 0.1 % that may be
 /// wrong.
-pub const DURATION_S: f64 = 10.0;
+const DURATION_S: f64 = 10.0;
 
 /// A named grid of scenes.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ pub struct Map {
     /// Names the map and its files.
     pub name: &'static str,
     /// What is compared with what, for the picture's title.
-    pub title: &'static str,
+    title: &'static str,
     /// What all cells have in common, in words.
     pub conditions: &'static str,
     /// What changes from left to right.
@@ -57,7 +57,7 @@ pub struct Map {
     /// What changes from the bottom up.
     pub y: Axis,
     /// What all cells have in common. An axis' setting of the same knob stands above it.
-    pub base: Vec<Setting>,
+    base: Vec<Setting>,
 }
 
 impl Map {
@@ -72,58 +72,49 @@ impl Map {
     }
 
     /// Column and row of a cell below [`Map::len`]: cells are counted along x first.
-    pub fn place(&self, cell: usize) -> (usize, usize) {
+    fn place(&self, cell: usize) -> (usize, usize) {
         (cell % self.x.steps.len(), cell / self.x.steps.len())
     }
 
-    /// The cell at a column and a row.
-    pub fn cell(&self, column: usize, row: usize) -> usize {
+    fn cell(&self, column: usize, row: usize) -> usize {
         row * self.x.steps.len() + column
     }
 
     /// The names of the CSV's columns that say what a cell is: x's, then y's.
-    pub fn columns(&self) -> Vec<&'static str> {
+    fn columns(&self) -> Vec<&'static str> {
         self.x.columns().chain(self.y.columns()).collect()
     }
 
-    /// What stands in these columns for a cell.
-    pub fn parameters(&self, cell: usize) -> Vec<&str> {
+    /// What a cell changes in its scene.
+    fn own(&self, cell: usize) -> impl Iterator<Item = &Setting> {
         let (column, row) = self.place(cell);
         let steps = [&self.x.steps[column], &self.y.steps[row]];
-        steps
-            .into_iter()
-            .flat_map(|step| step.settings.iter().map(|setting| setting.value.as_str()))
-            .collect()
+        steps.into_iter().flat_map(|step| &step.settings)
+    }
+
+    /// What stands in these columns for a cell.
+    fn parameters(&self, cell: usize) -> Vec<&str> {
+        self.own(cell).map(|setting| &*setting.value).collect()
     }
 
     /// A cell's name: the map's and the cell's number.
-    pub fn scene_name(&self, cell: usize) -> String {
+    fn scene_name(&self, cell: usize) -> String {
         format!("{}-{cell:04}", self.name)
     }
 
     /// A cell's scene file. Its seed depends on the map and on what the cell is, not on the method: all
     /// methods get the same samples.
     pub fn scene_text(&self, cell: usize, method: &str) -> String {
-        let (column, row) = self.place(cell);
-        let own = [&self.x.steps[column], &self.y.steps[row]].map(|step| &step.settings);
-        let own: Vec<&Setting> = own.into_iter().flatten().collect();
-        let common = self
-            .base
-            .iter()
-            .filter(|base| own.iter().all(|setting| setting.knob != base.knob));
-        let settings: Vec<&Setting> = common.chain(own.iter().copied()).collect();
-
+        let is_own = |base: &Setting| self.own(cell).any(|setting| setting.knob == base.knob);
+        let common = self.base.iter().filter(|base| !is_own(base));
+        let settings: Vec<&Setting> = common.chain(self.own(cell)).collect();
         let mut sections = String::new();
         for section in knob::SECTIONS {
-            let mut entries = settings
-                .iter()
-                .filter(|setting| setting.knob.section() == section)
-                .map(|setting| setting.knob.entries(&setting.value))
-                .peekable();
-            if entries.peek().is_some() {
-                let _ = write!(sections, "\n[{section}]\n");
+            let of_section = settings.iter().filter(|of| of.knob.section == section);
+            let entries: String = of_section.map(|setting| setting.entries()).collect();
+            if !entries.is_empty() {
+                sections += &format!("\n[{section}]\n{entries}");
             }
-            sections.extend(entries);
         }
         let mut seed = XxHash3_64::with_seed(0);
         seed.write(self.name.as_bytes());
@@ -154,7 +145,7 @@ impl Map {
             axis.nearest(text).ok_or_else(|| MapError::NoSuchPlace {
                 map: self.name,
                 text: text.to_owned(),
-                axis: axis.label.to_owned(),
+                axis: axis.label,
                 places: axis.places(),
             })
         };

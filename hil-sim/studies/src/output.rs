@@ -5,5 +5,5 @@ pub mod escape;
 pub mod golden;
 pub mod json;
 pub mod junit;
-pub mod plot;
+pub(crate) mod plot;
 pub mod report;

@@ -7,21 +7,8 @@
 //! ```
 //!
 //! The observer feels what the actuators' voltages really do under the moving hand: the travel of the hand
-//! for each wave, with its errors over time, and not the number that an estimator gave ([`presented`]). His skin
-//! is the paper's Table II ([`thresholds`]), his chance is seeded ([`observer`]).
-//!
-//! | file | what |
-//! | --- | --- |
-//! | [`published`] | the paper's Tables II to IV |
-//! | [`hand`], [`given`], [`bench`] | what is run, and on what |
-//! | [`presented`] | the waves of a run's voltages |
-//! | [`thresholds`], [`observer`] | who feels them |
-//! | [`limits`] | Table II, by the method of limits |
-//! | [`pairs`] | Table III, by paired comparison |
-//! | [`thurstone`], [`mosteller`] | Table IV and its test |
-//! | [`interval`] | confidence intervals |
-//! | [`study`] | all of it; [`recount`] does the same with the paper's own numbers |
-//! | [`tables`], [`record`] | as text, CSV and JSON |
+//! for each wave, with its errors over time, and not the number that an estimator gave (`presented`). His skin
+//! is the paper's Table II (`thresholds`), his chance is seeded (`observer`).
 //!
 //! # What it shows, and what not
 //!
@@ -29,29 +16,40 @@
 //! the paper's subjects', and what experiments of the paper's size can tell at all. It proves nothing on
 //! people: an observer who was given Table II's limens has them, and one who integrates, tires, learns or
 //! attends otherwise would answer otherwise. Whether the fingertip on the specimen sticks and slips, which the
-//! paper holds responsible for part of its errors, is a choice ([`study::Friction`]), and how much it does a
+//! paper holds responsible for part of its errors, is a choice ([`Friction`]), and how much it does a
 //! guess.
 
-pub mod bench;
-pub mod given;
-pub mod hand;
-pub mod interval;
-pub mod limits;
-pub mod mosteller;
-pub mod normal;
-pub mod observer;
-pub mod pair;
-pub mod pairs;
-pub mod presented;
-pub mod published;
-pub mod record;
-pub mod recount;
-pub mod study;
-pub mod tables;
-pub mod thresholds;
-pub mod thurstone;
+mod given;
+mod hand;
+pub(crate) mod interval;
+mod job;
+mod limits;
+mod mosteller;
+pub(crate) mod normal;
+mod observer;
+mod pair;
+mod pairs;
+mod presented;
+mod published;
+mod record;
+mod recount;
+mod study;
+mod tables;
+mod thresholds;
+mod thurstone;
+
+pub use job::{Job, run};
+pub use record::{csvs, json};
+pub use study::{Friction, Plan, Silent, Study, jobs};
+pub use tables::text;
+
+pub(crate) use hand::{FREQUENCY_HZ, PEAK_MM_S};
+pub(crate) use pairs::mean_share;
+pub(crate) use published::{SAMPLES_MM, TABLE_3};
+pub(crate) use study::SNR_DB;
+pub(crate) use tables::{felt, glimpses, limens, mosteller_tests, scores, shares, span};
 
 /// What every output says of itself.
-pub const DISCLAIMER: &str = "A simulated observer proves nothing on people. It was given the paper's limens, so that Table II can \
+pub(crate) const DISCLAIMER: &str = "A simulated observer proves nothing on people. It was given the paper's limens, so that Table II can \
 only show what the display and the method of limits add to them; Tables III and IV show what the stimulus' \
 errors cost somebody with that skin. Neither attention, learning nor fatigue is in it.";

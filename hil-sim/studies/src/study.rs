@@ -1,8 +1,9 @@
 //! What a study leaves behind: a table to read, its rows as CSV, a picture, and whether its goals are met.
 
+use std::borrow::Cow;
 use std::fmt;
 
-use serde::{Serialize, Serializer};
+use hil_sim_core::run::batch::on_all_cores;
 
 /// A finished study.
 pub trait Study {
@@ -14,11 +15,13 @@ pub trait Study {
         None
     }
 
+    /// What there is to read: that table, as a rule.
+    fn text(&self) -> Option<String> {
+        self.table().map(|table| table.to_string())
+    }
+
     /// Its CSVs: what follows the name in each file's, and the text.
-    ///
-    /// # Errors
-    /// None in practice: they are written to memory.
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error>;
+    fn csvs(&self) -> Vec<(&'static str, String)>;
 
     /// The picture, as SVG text.
     fn picture(&self) -> String;
@@ -29,112 +32,197 @@ pub trait Study {
     }
 }
 
-/// A CSV's text from its rows: structures, whose fields name the columns.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv_text<R: Serialize>(rows: impl IntoIterator<Item = R>) -> Result<String, csv::Error> {
-    written(csv::Writer::from_writer(Vec::new()), rows)
-}
+/// Who is told how far a study is.
+pub trait Progress: Sync {
+    /// There are so many runs.
+    fn begin(&self, runs: usize);
 
-/// The same from rows that are tuples, under a header.
-///
-/// # Errors
-/// None in practice: it is written to memory.
-pub fn csv_text_under<R: Serialize>(
-    header: &[&str],
-    rows: impl IntoIterator<Item = R>,
-) -> Result<String, csv::Error> {
-    let mut table = csv::WriterBuilder::new()
-        .has_headers(false)
-        .from_writer(Vec::new());
-    table.write_record(header)?;
-    written(table, rows)
-}
+    /// One of them is done.
+    fn step(&self);
 
-fn written<R: Serialize>(
-    mut table: csv::Writer<Vec<u8>>,
-    rows: impl IntoIterator<Item = R>,
-) -> Result<String, csv::Error> {
-    for row in rows {
-        table.serialize(row)?;
+    /// Does `work` on each input, on all cores, and tells of each.
+    ///
+    /// # Errors
+    /// The first of `work`'s, by the inputs' order.
+    fn each<I: Sync, O: Send, E: Send>(
+        &self,
+        inputs: &[I],
+        work: impl Fn(&I) -> Result<O, E> + Sync,
+    ) -> Result<Vec<O>, E> {
+        on_all_cores(inputs, |input| {
+            let output = work(input);
+            self.step();
+            output
+        })
     }
-    let bytes = table
-        .into_inner()
-        .map_err(|error| csv::Error::from(error.into_error()))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// A CSV's number with so many decimals; an empty field if there is none.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fixed<const DECIMALS: usize>(Option<f64>);
+/// Nobody.
+impl Progress for () {
+    fn begin(&self, _runs: usize) {}
+    fn step(&self) {}
+}
 
-impl<const DECIMALS: usize> From<f64> for Fixed<DECIMALS> {
+/// What stands in a field of a CSV.
+pub struct Cell(String);
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self(text)
+    }
+}
+
+/// Every digit, and a decimal at least.
+impl From<f64> for Cell {
     fn from(value: f64) -> Self {
-        Self(Some(value))
+        Self(serde_json::Number::from_f64(value).map_or("NaN".to_owned(), |n| n.to_string()))
     }
 }
 
-impl<const DECIMALS: usize> From<Option<f64>> for Fixed<DECIMALS> {
-    fn from(value: Option<f64>) -> Self {
-        Self(value)
+/// An empty field if there is nothing.
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self(String::new()), T::into)
     }
 }
 
-impl<const DECIMALS: usize> Serialize for Fixed<DECIMALS> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self.0 {
-            Some(value) => serializer.collect_str(&format_args!("{value:.DECIMALS$}")),
-            None => serializer.serialize_none(),
+/// A number with so many decimals; an empty field if there is none.
+pub fn fixed(value: impl Into<Option<f64>>, decimals: usize) -> Cell {
+    value
+        .into()
+        .map(|value| format!("{value:.decimals$}"))
+        .into()
+}
+
+/// A number, or a truth, in as few characters as it takes: whole ones without a decimal.
+pub fn short(value: impl fmt::Display) -> Cell {
+    Cell(value.to_string())
+}
+
+/// A number with so many decimals, or a dash: for tables.
+pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
+    let text = |value| format!("{value:.decimals$}");
+    value.into().map_or("–".to_owned(), text)
+}
+
+/// A row of a CSV or of a table: what each column is called, and what stands in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Record {
+    /// Name and text of each column. In a table, the name of a column of numbers ends with ":".
+    pub cells: Vec<(Cow<'static, str>, String)>,
+    remark: &'static str,
+}
+
+impl Record {
+    /// These cells under these names.
+    pub fn of(names: &[&'static str], cells: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            cells: names.iter().map(|name| (*name).into()).zip(cells).collect(),
+            remark: "",
         }
     }
+
+    /// The same with a further column.
+    pub fn with(mut self, name: impl Into<Cow<'static, str>>, cell: impl Into<Cell>) -> Self {
+        self.cells.push((name.into(), cell.into().0));
+        self
+    }
+
+    /// The same, with a remark beside it if it misses a goal.
+    pub fn judged(self, is_met: bool) -> Self {
+        let remark = if is_met { "" } else { "goal missed" };
+        Self { remark, ..self }
+    }
 }
 
-/// A CSV's number in as few digits as it takes: whole ones without a decimal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Short(pub f64);
-
-impl Serialize for Short {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&self.0)
-    }
+/// A CSV's text. Its header is from the first row.
+pub fn csv(rows: impl IntoIterator<Item = Record>) -> String {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    let mut is_begun = false;
+    let written = rows.into_iter().try_for_each(|row| {
+        if !std::mem::replace(&mut is_begun, true) {
+            out.write_record(row.cells.iter().map(|cell| &*cell.0))?;
+        }
+        out.write_record(row.cells.iter().map(|cell| &cell.1))
+    });
+    written.expect("all rows have the same columns");
+    let bytes = out.into_inner().expect("memory takes what is written");
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 /// A table to read; `Display` gives it as Markdown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    heads: Vec<&'static str>,
-    rows: Vec<(Vec<String>, &'static str)>,
+    /// What it is of; empty if that is said elsewhere.
+    pub caption: &'static str,
+    /// Its rows.
+    pub rows: Vec<Record>,
+}
+
+impl FromIterator<Record> for Table {
+    fn from_iter<I: IntoIterator<Item = Record>>(rows: I) -> Self {
+        Self {
+            caption: "",
+            rows: rows.into_iter().collect(),
+        }
+    }
 }
 
 impl Table {
-    /// A table under these heads. A column of numbers has a head that ends with ":".
-    pub fn new(heads: &[&'static str]) -> Self {
-        Self {
-            heads: heads.to_vec(),
-            rows: Vec::new(),
-        }
+    /// The same with a caption.
+    pub fn called(self, caption: &'static str) -> Self {
+        Self { caption, ..self }
     }
 
-    /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.row_with(cells, "");
+    /// The names of its columns, as the first row has them.
+    pub fn heads(&self) -> impl Iterator<Item = &str> {
+        let first = self.rows.iter().take(1);
+        first.flat_map(|row| row.cells.iter().map(|cell| &*cell.0))
     }
 
-    /// Adds a row with a remark beside the table.
-    pub fn row_with(&mut self, cells: impl IntoIterator<Item = String>, remark: &'static str) {
-        self.rows.push((cells.into_iter().collect(), remark));
+    /// In columns for a terminal: the first to the left, the others to the right.
+    pub fn text(&self) -> String {
+        let heads: Vec<&str> = self.heads().collect();
+        let rows = self.rows.iter();
+        let rows = rows.map(|row| row.cells.iter().map(|cell| cell.1.as_str()).collect());
+        let lines: Vec<Vec<&str>> = std::iter::once(heads).chain(rows).collect();
+        let width = |column: usize| {
+            let cells = lines.iter().filter_map(|line| line.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let line = |cells: &Vec<&str>| {
+            let padded = cells.iter().enumerate().map(|(column, cell)| {
+                let width = width(column);
+                match column {
+                    0 => format!("{cell:<width$}"),
+                    _ => format!("{cell:>width$}"),
+                }
+            });
+            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+        };
+        lines.iter().map(line).collect()
     }
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |head: &&'static str| head.trim_end_matches(':').to_owned();
-        let dashes = |head: &&str| if head.ends_with(':') { "---:" } else { "---" };
-        let heads: Vec<String> = self.heads.iter().map(name).collect();
-        let rule: Vec<&str> = self.heads.iter().map(dashes).collect();
-        write!(f, "| {} |\n| {} |", heads.join(" | "), rule.join(" | "))?;
-        for (cells, remark) in &self.rows {
+        let names: Vec<&str> = self
+            .heads()
+            .map(|head| head.trim_end_matches(':'))
+            .collect();
+        let rule = self
+            .heads()
+            .map(|head| if head.ends_with(':') { "---:" } else { "---" });
+        let rule: Vec<&str> = rule.collect();
+        write!(f, "| {} |\n| {} |", names.join(" | "), rule.join(" | "))?;
+        for Record { cells, remark } in &self.rows {
+            let cells: Vec<&str> = cells.iter().map(|cell| cell.1.as_str()).collect();
             write!(f, "\n| {} |", cells.join(" | "))?;
             if !remark.is_empty() {
                 write!(f, " {remark}")?;
@@ -144,43 +232,28 @@ impl fmt::Display for Table {
     }
 }
 
-/// A number with so many decimals, or a dash.
-pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
-    let text = |value| format!("{value:.decimals$}");
-    value.into().map_or("–".to_owned(), text)
-}
-
-/// What stands beside a row of a table.
-pub const fn remark(is_met: bool) -> &'static str {
-    if is_met { "" } else { "goal missed" }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn numbers_keep_their_decimals_and_nothing_is_an_empty_field() {
-        #[derive(Serialize)]
-        struct Row {
-            speed_mm_s: Short,
-            error_percent: Fixed<2>,
-        }
-        let rows = [(50.0, Some(1.0)), (0.5, None)].map(|(speed_mm_s, error)| Row {
-            speed_mm_s: Short(speed_mm_s),
-            error_percent: error.into(),
+        let rows = [(50.0, Some(1.0)), (0.5, None)].map(|(speed_mm_s, error)| {
+            Record::default()
+                .with("speed_mm_s", short(speed_mm_s))
+                .with("error_percent", fixed(error, 2))
         });
-        assert_eq!(
-            csv_text(rows).unwrap(),
-            "speed_mm_s,error_percent\n50,1.00\n0.5,\n"
-        );
+        assert_eq!(csv(rows), "speed_mm_s,error_percent\n50,1.00\n0.5,\n");
     }
 
     #[test]
     fn a_table_is_markdown_with_its_numbers_to_the_right() {
-        let mut table = Table::new(&["hand", "late, ms:"]);
-        table.row_with(["whole".to_owned(), number(1.25, 1)], remark(false));
-        table.row(["none".to_owned(), number(None::<f64>, 1)]);
+        let row = |hand: &str, late_ms: Option<f64>| {
+            Record::default()
+                .with("hand", hand)
+                .with("late, ms:", number(late_ms, 1))
+        };
+        let table = Table::from_iter([row("whole", Some(1.25)).judged(false), row("none", None)]);
         assert_eq!(
             table.to_string(),
             "| hand | late, ms |\n| --- | ---: |\n| whole | 1.2 | goal missed\n| none | – |"

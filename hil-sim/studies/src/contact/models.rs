@@ -6,64 +6,59 @@
 //! share of the reference's own RMS. Where the fingertip sticks and slips it is that of its place, as a
 //! share of λ: a slip that comes a little early changes the signal by as much as there is of it.
 
-pub mod picture;
+mod picture;
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use protocol::GAUGES;
-use serde::Serialize;
 
-use crate::study::{Short, Study, Table, csv_text, number};
+use crate::study::{Progress, Record, Study, Table, csv, number, short};
 use hil_sim_core::plant::contact::{Contact, EVENT_STEP_S};
 use hil_sim_core::plant::gauges::{SCAN_RATE_HZ, Texture};
 use hil_sim_core::plant::patch::Patch;
 use hil_sim_core::plant::surface::Surface;
-use hil_sim_core::scene;
-use hil_sim_core::scene::Integrator;
-use hil_sim_core::scene::{ContactModel, Friction, Motion, Scene, Solver, Specimen};
+use hil_sim_core::scene::{
+    self, ContactModel, Friction, Integrator, Motion, Scene, Solver, Specimen,
+};
 
-/// Steps of the integrators that take what they are told, in µs.
-pub const STEPS_US: [f64; 8] = [250.0, 125.0, 50.0, 25.0, 10.0, 5.0, 2.0, 1.0];
-/// Virtual time of a run, in s: ten slips and more.
+/// Steps of the integrators that take what they are told.
+const STEPS_US: [f64; 8] = [250.0, 125.0, 50.0, 25.0, 10.0, 5.0, 2.0, 1.0];
+/// Virtual time of a run: ten slips and more.
 const DURATION_S: f64 = 0.5;
 /// A run is repeated for so long at least, and the fastest one counts: others have the machine, too.
 const MEASURED: Duration = Duration::from_millis(60);
 
 /// What is rubbed, and how.
 #[derive(Clone, Debug)]
-pub struct Case {
-    /// In words.
-    pub name: &'static str,
+struct Case {
+    name: &'static str,
     scene: Scene,
 }
 
 /// A rung, solved in one way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entrant {
-    /// The rung.
-    pub rung: ContactModel,
+struct Entrant {
+    rung: ContactModel,
     /// None if it is solved exactly, or from event to event.
-    pub integrator: Option<Integrator>,
-    /// Its step in µs; none if it chooses its own, or has none.
-    pub step_us: Option<f64>,
+    integrator: Option<Integrator>,
+    /// None if it chooses its own, or has none.
+    step_us: Option<f64>,
 }
 
 /// What an entrant came to in a case.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// The case's name.
-    pub case: &'static str,
-    /// Who.
-    pub entrant: Entrant,
+    case: &'static str,
+    entrant: Entrant,
     /// Virtual seconds per second.
-    pub pace: f64,
-    /// RMS error in percent; none if it diverged.
-    pub error_percent: Option<f64>,
+    pace: f64,
+    /// RMS; none if it diverged.
+    error_percent: Option<f64>,
 }
 
 /// The cases: a border, a hand that shakes, friction.
-pub fn cases() -> Vec<Case> {
+fn cases() -> [Case; 3] {
     let steady = Scene::constant(2.0, 50.0);
     let mut border = steady.clone();
     border.surface.specimens = [(1.0, 12.0), (4.0, f64::INFINITY)]
@@ -89,38 +84,31 @@ pub fn cases() -> Vec<Case> {
         ("place, % of λ: strong friction", sticky),
     ]
     .map(|(name, scene)| Case { name, scene })
-    .to_vec()
 }
 
 /// Who takes part in a case: each rung, and the integrators of what the case lets swing or slip.
-pub fn entrants(case: &Case) -> Vec<Entrant> {
+fn entrants(case: &Case) -> Vec<Entrant> {
     let friction = case.scene.contact.friction;
-    let exact = |rung| Entrant {
+    let entrant = |rung, integrator, step_us| Entrant {
         rung,
-        integrator: None,
-        step_us: None,
+        integrator,
+        step_us,
     };
-    let mut entrants: Vec<Entrant> = ContactModel::ALL
-        .into_iter()
-        // Without friction nothing sticks.
-        .filter(|&rung| friction.is_some() || rung != ContactModel::StickSlip)
-        .map(exact)
-        .collect();
+    // Without friction nothing sticks.
+    let takes_part = |rung: &_| friction.is_some() || *rung != ContactModel::StickSlip;
+    let rungs = ContactModel::ALL.into_iter().filter(takes_part);
+    let mut entrants: Vec<Entrant> = rungs.map(|rung| entrant(rung, None, None)).collect();
     let rung = match friction {
         Some(_) => ContactModel::StickSlip,
         None => ContactModel::Viscoelastic,
     };
     for integrator in Integrator::ALL {
-        let steps: Vec<Option<f64>> = if integrator.is_fixed() {
-            STEPS_US.map(Some).to_vec()
+        let stepped = |step_us| entrant(rung, Some(integrator), step_us);
+        if integrator.is_fixed() {
+            entrants.extend(STEPS_US.map(Some).map(stepped));
         } else {
-            vec![None]
-        };
-        entrants.extend(steps.into_iter().map(|step_us| Entrant {
-            rung,
-            integrator: Some(integrator),
-            step_us,
-        }));
+            entrants.push(stepped(None));
+        }
     }
     entrants
 }
@@ -163,20 +151,16 @@ impl Case {
 /// What is felt along a case, scan by scan.
 fn felt(case: &Case, textures: &Textures, contact: scene::Contact) -> Vec<Felt> {
     fn scans(case: &Case, contact: scene::Contact, texture: &impl Texture) -> Vec<Felt> {
-        let mut contact = Contact::new(contact, case.scene.force.stiffness_n_per_m);
+        let Scene { force, motion, .. } = &case.scene;
+        let mut contact = Contact::new(contact, force.stiffness_n_per_m);
         let count = (DURATION_S * f64::from(SCAN_RATE_HZ)) as u32;
-        (0..count)
-            .map(|scan| {
-                let t_s = f64::from(scan) / f64::from(SCAN_RATE_HZ);
-                let place_mm = contact
-                    .follow(t_s, case.scene.motion.position_mm(t_s))
-                    .position_mm;
-                (
-                    place_mm,
-                    std::array::from_fn(|gauge| texture.felt_by(gauge, place_mm)),
-                )
-            })
-            .collect()
+        let instants_s = (0..count).map(|scan| f64::from(scan) / f64::from(SCAN_RATE_HZ));
+        let scan = |t_s| {
+            let place_mm = contact.follow(t_s, motion.position_mm(t_s)).position_mm;
+            let felt = std::array::from_fn(|gauge| texture.felt_by(gauge, place_mm));
+            (place_mm, felt)
+        };
+        instants_s.map(scan).collect()
     }
     if contact.rung.has_patch() {
         scans(case, contact, &textures.patch)
@@ -185,17 +169,15 @@ fn felt(case: &Case, textures: &Textures, contact: scene::Contact) -> Vec<Felt> 
     }
 }
 
-/// Runs every entrant of every case. `done` is told after each of [`runs`].
-pub fn measure(done: impl Fn()) -> Vec<Row> {
+/// Runs every entrant of every case, one after the other: they are timed.
+pub fn measure(progress: &impl Progress) -> Vec<Row> {
+    progress.begin(cases().iter().map(|case| entrants(case).len()).sum());
     let mut rows = Vec::new();
     for case in cases() {
         let friction = case.scene.contact.friction;
         let textures = case.textures();
-        let reference = felt(
-            &case,
-            &textures,
-            scene::Contact::of(ContactModel::Reference, friction),
-        );
+        let reference = scene::Contact::of(ContactModel::Reference, friction);
+        let reference = felt(&case, &textures, reference);
         for entrant in entrants(&case) {
             let contact = entrant.contact(friction);
             let error_percent = error_percent(&case, &felt(&case, &textures, contact), &reference);
@@ -205,15 +187,10 @@ pub fn measure(done: impl Fn()) -> Vec<Row> {
                 pace: pace(&case, &textures, contact),
                 error_percent,
             });
-            done();
+            progress.step();
         }
     }
     rows
-}
-
-/// How many entrants [`measure`] runs.
-pub fn runs() -> u64 {
-    cases().iter().map(|case| entrants(case).len() as u64).sum()
 }
 
 fn pace(case: &Case, textures: &Textures, contact: scene::Contact) -> f64 {
@@ -244,48 +221,42 @@ fn error_percent(case: &Case, felt: &[Felt], reference: &[Felt]) -> Option<f64> 
     percent.is_finite().then_some(percent)
 }
 
-#[derive(Serialize)]
-struct Record {
-    case: &'static str,
-    rung: &'static str,
-    integrator: &'static str,
-    step_us: Option<Short>,
-    pace: String,
-    error_percent: String,
-}
-
-impl Study for [Row] {
+impl Study for Vec<Row> {
     const NAME: &'static str = "models";
 
     fn table(&self) -> Option<Table> {
-        let mut table = Table::new(&["case", "rung", "virtual s per s:", "error, %:"]);
-        for row in self.iter().filter(|row| row.entrant.integrator.is_none()) {
-            table.row([
-                row.case.to_owned(),
-                row.entrant.rung.name().to_owned(),
-                number(row.pace, 0),
-                match (row.entrant.rung, row.error_percent) {
-                    (ContactModel::Reference, _) => "–".to_owned(),
-                    (_, Some(percent)) => format!("{percent:.2e}"),
-                    (_, None) => "diverges".to_owned(),
-                },
-            ]);
-        }
-        Some(table)
+        let exact = self.iter().filter(|row| row.entrant.integrator.is_none());
+        let rows = exact.map(|row| {
+            let error = match (row.entrant.rung, row.error_percent) {
+                (ContactModel::Reference, _) => "–".to_owned(),
+                (_, Some(percent)) => format!("{percent:.2e}"),
+                (_, None) => "diverges".to_owned(),
+            };
+            Record::default()
+                .with("case", row.case)
+                .with("rung", row.entrant.rung.name())
+                .with("virtual s per s:", number(row.pace, 0))
+                .with("error, %:", error)
+        });
+        Some(rows.collect())
     }
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let records = self.iter().map(|row| Record {
-            case: row.case,
-            rung: row.entrant.rung.name(),
-            integrator: row.entrant.integrator.map_or("exact", Integrator::name),
-            step_us: row.entrant.step_us.map(Short),
-            pace: format!("{:.3e}", row.pace),
-            error_percent: row
-                .error_percent
-                .map_or("diverges".to_owned(), |percent| format!("{percent:.3e}")),
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let rows = self.iter().map(|row| {
+            let entrant = row.entrant;
+            let error = row.error_percent.map(|percent| format!("{percent:.3e}"));
+            Record::default()
+                .with("case", row.case)
+                .with("rung", entrant.rung.name())
+                .with(
+                    "integrator",
+                    entrant.integrator.map_or("exact", Integrator::name),
+                )
+                .with("step_us", entrant.step_us.map(short))
+                .with("pace", format!("{:.3e}", row.pace))
+                .with("error_percent", error.unwrap_or("diverges".to_owned()))
         });
-        Ok(vec![("", csv_text(records)?)])
+        vec![("", csv(rows))]
     }
 
     fn picture(&self) -> String {

@@ -4,51 +4,47 @@
 //! Beside what is seen, each map has the longest step that [`hil_sim_core::plant::contact::stability`] allows: the guard
 //! by which scenes are refused.
 
-pub mod picture;
+mod picture;
 
-use serde::Serialize;
+use std::convert::Infallible;
 
-use crate::study::{Fixed, Study, csv_text};
+use crate::study::{Progress, Record, Study, csv, fixed};
 use hil_sim_core::plant::contact::{Bristles, MASS_KG, Spring, Stribeck, stability};
-use hil_sim_core::run::batch::on_all_cores;
-use hil_sim_core::scene::Friction;
-use hil_sim_core::scene::Integrator;
+use hil_sim_core::scene::{Friction, Integrator};
 
 /// Stiffnesses of a map, and steps.
-pub const GRID: (usize, usize) = (24, 40);
-/// Bristles' stiffnesses, in N/m.
-pub const BRISTLES_N_PER_M: (f64, f64) = (1e3, 1e6);
-/// Steps of a fingertip that clings, in s.
-pub const CLINGING_STEPS_S: (f64, f64) = (1e-6, 1e-3);
-/// A fingertip's stiffnesses, in N/m.
-pub const FINGERTIP_N_PER_M: (f64, f64) = (10.0, 10_000.0);
-/// Steps of a fingertip that swings, in s.
-pub const SWINGING_STEPS_S: (f64, f64) = (1e-5, 1e-2);
+const GRID: (usize, usize) = (24, 40);
+/// Ranges of bristles' stiffnesses and of the steps of a fingertip that clings by them.
+const BRISTLES_N_PER_M: (f64, f64) = (1e3, 1e6);
+const CLINGING_STEPS_S: (f64, f64) = (1e-6, 1e-3);
+/// Ranges of a fingertip's stiffnesses and of the steps of one that swings.
+const FINGERTIP_N_PER_M: (f64, f64) = (10.0, 10_000.0);
+const SWINGING_STEPS_S: (f64, f64) = (1e-5, 1e-2);
 
-/// The fingertip's stiffness where it clings, in N/m: the default.
+/// The fingertip's stiffness where it clings: the default.
 const STIFFNESS_N_PER_M: f64 = 400.0;
-/// The arm's speed before it stops, in m/s.
+/// The arm's speed before it stops.
 const ARM_M_S: f64 = 0.07;
-/// For how long it rubs, in s: a slip and more.
+/// For how long it rubs: a slip and more.
 const RUBBED_S: f64 = 0.05;
-/// What is left to come to rest, in s.
+/// What is left to come to rest.
 const SETTLED_S: f64 = 0.15;
-/// How long the rest is watched, in s.
+/// How long the rest is watched.
 const WATCHED_S: f64 = 0.05;
-/// A fingertip that rests goes no further than this in that time, in m: a tenth of a count of the encoder.
+/// A fingertip that rests goes no further than this in that time: a tenth of a count of the encoder.
 const DRIFT_M: f64 = 0.5e-6;
-/// A fingertip that goes to and fro faster than this does not rest, in m/s.
+/// A fingertip that goes to and fro faster than this does not rest.
 const CHATTER_M_S: f64 = 1e-4;
 /// Whatever goes faster than ten times the fastest slip has lost its way.
 const LOST: f64 = 10.0;
-/// For how long a swing is watched, in s.
+/// For how long a swing is watched.
 const SWUNG_S: f64 = 0.04;
 /// Share of its energy that a swing may gain or lose by its integration.
 const ENERGY_SHARE: f64 = 0.05;
 
 /// What becomes of a fingertip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
+enum Outcome {
     /// It does what its equations say.
     Sound,
     /// It creeps while it should rest, or its swing dies too soon.
@@ -61,7 +57,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// In the CSV.
-    pub const fn name(self) -> &'static str {
+    const fn name(self) -> &'static str {
         match self {
             Self::Sound => "sound",
             Self::Creeps => "creeps",
@@ -73,7 +69,7 @@ impl Outcome {
 
 /// What is mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Test {
+enum Test {
     /// Bristles on a surface: the arm rubs and stops, the fingertip should rest.
     LuGre,
     /// A spring without friction: the arm starts, the fingertip should swing and calm down.
@@ -83,53 +79,39 @@ pub enum Test {
 /// A map of one integrator.
 #[derive(Clone, Debug)]
 pub struct Map {
-    /// Of what.
-    pub test: Test,
-    /// Of whom.
-    pub integrator: Integrator,
-    /// A row for each stiffness in N/m.
-    pub rows: Vec<MapRow>,
+    test: Test,
+    integrator: Integrator,
+    rows: Vec<MapRow>,
 }
 
 /// One stiffness.
 #[derive(Clone, Debug)]
-pub struct MapRow {
-    /// In N/m.
-    pub stiffness_n_per_m: f64,
-    /// The longest step that the guard allows, in s; infinite if any.
-    pub allowed_s: f64,
+struct MapRow {
+    stiffness_n_per_m: f64,
+    /// The longest step that the guard allows; infinite if any.
+    allowed_s: f64,
     /// Steps in s, and what came of them.
-    pub cells: Vec<(f64, Outcome)>,
+    cells: Vec<(f64, Outcome)>,
 }
 
 /// The integrators that are mapped: those that take the steps they are told to.
-pub fn integrators() -> impl Iterator<Item = Integrator> {
-    Integrator::ALL
-        .into_iter()
-        .filter(|integrator| integrator.is_fixed())
+fn integrators() -> impl Iterator<Item = Integrator> {
+    let all = Integrator::ALL.into_iter();
+    all.filter(|integrator| integrator.is_fixed())
 }
 
-/// Makes all maps, on all cores. `done` is told after each of [`runs`].
-pub fn measure(grid: (usize, usize), done: impl Fn() + Sync) -> Vec<Map> {
+/// Makes all maps.
+pub fn measure(progress: &impl Progress) -> Vec<Map> {
+    let of_test = |test| integrators().map(move |integrator| (test, integrator));
     let wanted: Vec<(Test, Integrator)> = [Test::LuGre, Test::SteppedSpring]
         .into_iter()
-        .flat_map(|test| integrators().map(move |integrator| (test, integrator)))
+        .flat_map(of_test)
         .collect();
-    let maps: Result<Vec<Map>, std::convert::Infallible> =
-        on_all_cores(&wanted, |&(test, integrator)| {
-            let map = map(test, integrator, grid);
-            done();
-            Ok(map)
-        });
-    match maps {
-        Ok(maps) => maps,
-        Err(never) => match never {},
-    }
-}
-
-/// How many maps [`measure`] makes.
-pub fn runs() -> u64 {
-    2 * integrators().count() as u64
+    progress.begin(wanted.len());
+    let Ok(maps) = progress.each(&wanted, |&(test, integrator)| {
+        Ok::<_, Infallible>(map(test, integrator))
+    });
+    maps
 }
 
 /// `count` values from one to the other, each the same multiple of the one before.
@@ -138,29 +120,27 @@ fn spread((low, high): (f64, f64), count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |index| low * (ratio * index as f64).exp())
 }
 
-fn map(test: Test, integrator: Integrator, (stiffnesses, steps): (usize, usize)) -> Map {
+fn map(test: Test, integrator: Integrator) -> Map {
     let (stiffness_range, step_range) = match test {
         Test::LuGre => (BRISTLES_N_PER_M, CLINGING_STEPS_S),
         Test::SteppedSpring => (FINGERTIP_N_PER_M, SWINGING_STEPS_S),
     };
-    let rows = spread(stiffness_range, stiffnesses)
-        .map(|stiffness_n_per_m| MapRow {
-            stiffness_n_per_m,
-            allowed_s: allowed_s(test, integrator, stiffness_n_per_m),
-            cells: spread(step_range, steps)
-                .map(|step_s| (step_s, outcome(test, integrator, stiffness_n_per_m, step_s)))
-                .collect(),
-        })
-        .collect();
+    let row = |stiffness_n_per_m| MapRow {
+        stiffness_n_per_m,
+        allowed_s: allowed_s(test, integrator, stiffness_n_per_m),
+        cells: spread(step_range, GRID.1)
+            .map(|step_s| (step_s, outcome(test, integrator, stiffness_n_per_m, step_s)))
+            .collect(),
+    };
     Map {
         test,
         integrator,
-        rows,
+        rows: spread(stiffness_range, GRID.0).map(row).collect(),
     }
 }
 
 /// The longest step that the guard allows, in s.
-pub fn allowed_s(test: Test, integrator: Integrator, stiffness_n_per_m: f64) -> f64 {
+fn allowed_s(test: Test, integrator: Integrator, stiffness_n_per_m: f64) -> f64 {
     match test {
         Test::LuGre => {
             let (bristles, fastest_m_s) = clinging(stiffness_n_per_m);
@@ -171,7 +151,7 @@ pub fn allowed_s(test: Test, integrator: Integrator, stiffness_n_per_m: f64) -> 
 }
 
 /// What becomes of a fingertip in steps of `step_s`.
-pub fn outcome(test: Test, integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome {
+fn outcome(test: Test, integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome {
     match test {
         Test::LuGre => cling(integrator, stiffness_n_per_m, step_s),
         Test::SteppedSpring => swing(integrator, stiffness_n_per_m, step_s),
@@ -250,39 +230,32 @@ fn swing(integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome
     }
 }
 
-/// A cell of a map.
-#[derive(Serialize)]
-struct Record {
-    test: &'static str,
-    integrator: &'static str,
-    stiffness_n_per_m: String,
-    step_us: Fixed<4>,
-    allowed_us: Fixed<4>,
-    outcome: &'static str,
-}
-
-impl Study for [Map] {
+impl Study for Vec<Map> {
     const NAME: &'static str = "stability";
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
+    fn csvs(&self) -> Vec<(&'static str, String)> {
         let rows = self
             .iter()
             .flat_map(|map| map.rows.iter().map(move |row| (map, row)));
-        let records = rows.flat_map(|(map, row)| {
-            let record = |(step_s, outcome): &(f64, Outcome)| Record {
-                test: match map.test {
-                    Test::LuGre => "clinging",
-                    Test::SteppedSpring => "swinging",
-                },
-                integrator: map.integrator.name(),
-                stiffness_n_per_m: format!("{:.4e}", row.stiffness_n_per_m),
-                step_us: (step_s * 1e6).into(),
-                allowed_us: (row.allowed_s * 1e6).into(),
-                outcome: outcome.name(),
+        let cells = rows.flat_map(|(map, row)| {
+            let test = match map.test {
+                Test::LuGre => "clinging",
+                Test::SteppedSpring => "swinging",
             };
-            row.cells.iter().map(record).collect::<Vec<_>>()
+            row.cells.iter().map(move |(step_s, outcome)| {
+                Record::default()
+                    .with("test", test)
+                    .with("integrator", map.integrator.name())
+                    .with(
+                        "stiffness_n_per_m",
+                        format!("{:.4e}", row.stiffness_n_per_m),
+                    )
+                    .with("step_us", fixed(step_s * 1e6, 4))
+                    .with("allowed_us", fixed(row.allowed_s * 1e6, 4))
+                    .with("outcome", outcome.name())
+            })
         });
-        Ok(vec![("", csv_text(records)?)])
+        vec![("", csv(cells))]
     }
 
     fn picture(&self) -> String {

@@ -12,124 +12,87 @@
 //! It has no other fault: no loss, no jitter, no buffer, no sampling, an arm without lag, a display
 //! without a tick. A real one is worse.
 
-pub mod picture;
+mod picture;
 
-use protocol::DisplayConfiguration;
-use serde::Serialize;
+use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::timing::{STROKE, WAVELENGTH_MM};
-use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
-use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::DisplayBench;
+use super::{bad, late};
+use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
+use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
-use hil_sim_core::judge::actuators;
 use hil_sim_core::judge::edges::edges;
 use hil_sim_core::judge::truth::Truth;
-use hil_sim_core::run::batch::on_all_cores;
+use hil_sim_core::judge::{actuators, seconds};
 use hil_sim_core::run::recording::volts;
 use hil_sim_core::scene::{Link, Motion};
+use protocol::DisplayConfiguration;
 
-/// The delays, in ms.
 const DELAYS_MS: [f64; 8] = [0.0, 10.0, 20.0, 50.0, 100.0, 200.0, 350.0, 500.0];
-/// The delay whose voltages are drawn, in ms.
-pub const SHOWN_MS: f64 = 100.0;
-/// What of it is drawn, in s: about a reversal of the hand.
-const SHOWN_S: std::ops::Range<f64> = 5.2..5.75;
+/// The delay whose voltages are drawn, and what of it: about a reversal of the hand.
+const SHOWN_MS: f64 = 100.0;
+const SHOWN_S: Range<f64> = 5.2..5.75;
 /// The most that our phase may be off at any delay, in cycles rms, and our outputs behind the hand, in ms: a
 /// hundredth of a cycle, two ticks.
 const GOAL_CYCLES: f64 = 0.01;
 const GOAL_MS: f64 = 1.0;
-/// The amplitude of both, in V.
+/// The amplitude of both.
 const AMPLITUDE_V: f64 = 5.0;
 
 /// A delay, and what came of it.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// What became of the estimates on their way.
-    pub link: Link,
-    /// Root mean square of our phase error about its mean, in cycles, cycle by cycle.
-    pub ours_cycles: Option<f64>,
-    /// From a movement of the hand to our output, median, in ms.
-    pub ours_ms: Option<f64>,
-    /// From a tick to its edge, in ms: what of it is not the wait for the tick.
-    pub edge_ms: Option<f64>,
-    /// Root mean square of the relayed stimulus' phase error about its mean, in cycles, not wrapped.
-    pub relayed_cycles: f64,
-    /// How late the relayed stimulus is, in ms.
-    pub relayed_ms: f64,
-    /// The phase that our stimulus happened to begin with, in cycles ahead of x/λ.
-    pub begins_cycles: f64,
+    link: Link,
+    /// Root mean square of our phase error about its mean, cycle by cycle.
+    ours_cycles: Option<f64>,
+    /// From a movement of the hand to our output, median.
+    ours_ms: Option<f64>,
+    /// From a tick to its edge: what of it is not the wait for the tick.
+    edge_ms: Option<f64>,
+    /// Root mean square of the relayed stimulus' phase error about its mean, not wrapped.
+    relayed_cycles: f64,
+    /// The phase that our stimulus happened to begin with, ahead of x/λ.
+    begins_cycles: f64,
     /// Our voltage in V over s, of the delay that is drawn.
-    pub drawn: Vec<(f64, f64)>,
+    drawn: Vec<(f64, f64)>,
 }
 
-/// Measures all rows, on all cores. `done` is told after each of [`runs`].
+/// Measures all rows.
 ///
 /// # Errors
 /// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     quick: bool,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Vec<Row>, ElfError> {
-    let links = links(quick);
-    on_all_cores(&links, |&link| {
-        let row = row(firmware, link, quick);
-        done();
-        row
-    })
-}
-
-/// How many runs [`measure`] makes.
-pub fn runs(quick: bool) -> u64 {
-    links(quick).len() as u64
-}
-
-fn links(quick: bool) -> Vec<Link> {
-    let late = |delay_ms: f64| Link {
-        delay_ms,
-        ..Link::default()
+    let links = if quick {
+        vec![late(SHOWN_MS)]
+    } else {
+        DELAYS_MS.map(|ms| [late(ms), bad(ms)]).concat()
     };
-    let bad = |delay_ms: f64| Link {
-        delay_ms,
-        jitter_ms: 50.0,
-        loss: 0.2,
-        ..Link::default()
-    };
-    if quick {
-        return vec![late(SHOWN_MS)];
-    }
-    DELAYS_MS
-        .into_iter()
-        .flat_map(|delay_ms| [late(delay_ms), bad(delay_ms)])
-        .collect()
+    progress.begin(links.len());
+    progress.each(&links, |&link| row(firmware, link, quick))
 }
 
 fn row(firmware: &Firmware, link: Link, quick: bool) -> Result<Row, ElfError> {
     let duration_s = if quick { 2.0 } else { 8.0 };
-    let run = display_alone::run(
-        DisplayBench {
-            link,
-            ..DisplayBench::new(STROKE, WAVELENGTH_MM, duration_s)
-        },
-        firmware,
-    )?;
+    let bench = DisplayBench {
+        link,
+        ..DisplayBench::new(STROKE, WAVELENGTH_MM, duration_s)
+    };
+    let recording = display_alone::run(bench, firmware)?.recording;
     let surface = |_| WAVELENGTH_MM;
     let mut truth = Truth::new("delay", "", &surface);
     truth.display = DisplayConfiguration::DEFAULT;
-    let recording = &run.recording;
-    let judged = actuators::judge(&truth, recording);
-    let delay_s = link.delay_ms * 1e-3;
-    let voltages: Vec<(f64, f64)> = recording
-        .outputs
-        .iter()
-        .map(|output| {
-            (
-                output.at_ns as f64 * 1e-9,
-                volts(output.words[truth.reference_actuator]),
-            )
-        })
-        .collect();
+    let judged = actuators::judge(&truth, &recording);
+    let outputs = recording.outputs.iter();
+    let voltages = outputs.map(|o| (seconds(o.at_ns), volts(o.words[truth.reference_actuator])));
+    let mut voltages: Vec<(f64, f64)> = voltages.collect();
+    let begins_cycles = begins_cycles(&voltages);
+    let is_drawn = link.delay_ms == SHOWN_MS && link.loss == 0.0;
+    voltages.retain(|(t_s, _)| is_drawn && SHOWN_S.contains(t_s));
     Ok(Row {
         link,
         ours_cycles: about_mean(
@@ -139,17 +102,9 @@ fn row(firmware: &Firmware, link: Link, quick: bool) -> Result<Row, ElfError> {
         ours_ms: judged.hand_to_output.map(|reaction| reaction.p50_ms),
         edge_ms: edges(&recording.ticks, &recording.outputs, 0)
             .map(|edges| edges.after.p50_us * 1e-3),
-        relayed_cycles: relayed_cycles(&STROKE, WAVELENGTH_MM, delay_s, duration_s),
-        relayed_ms: 2.0 * link.delay_ms,
-        begins_cycles: begins_cycles(&voltages),
-        drawn: if link.delay_ms == SHOWN_MS && link.loss == 0.0 {
-            voltages
-                .into_iter()
-                .filter(|(t_s, _)| SHOWN_S.contains(t_s))
-                .collect()
-        } else {
-            Vec::new()
-        },
+        relayed_cycles: relayed_cycles(&STROKE, WAVELENGTH_MM, link.delay_ms * 1e-3, duration_s),
+        begins_cycles,
+        drawn: voltages,
     })
 }
 
@@ -182,29 +137,17 @@ fn begins_cycles(voltages: &[(f64, f64)]) -> f64 {
     let (mut along, mut across) = (0.0, 0.0);
     for (t_s, volts) in voltages {
         let turns = STROKE.position_mm(*t_s) / WAVELENGTH_MM;
-        let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+        let (sin, cos) = (TAU * turns).sin_cos();
         along += volts * sin;
         across += volts * cos;
     }
-    across.atan2(along) / std::f64::consts::TAU
+    across.atan2(along) / TAU
 }
 
 /// A stimulus by the hand's position `late_s` ago that began with such a phase, in V.
 fn stimulus_v(t_s: f64, late_s: f64, begins_cycles: f64) -> f64 {
     let turns = STROKE.position_mm((t_s - late_s).max(0.0)) / WAVELENGTH_MM + begins_cycles;
-    AMPLITUDE_V * (std::f64::consts::TAU * turns).sin()
-}
-
-#[derive(Serialize)]
-struct Record {
-    delay_ms: Short,
-    jitter_ms: Short,
-    loss: Short,
-    ours_rms_cycles: Fixed<5>,
-    ours_hand_to_output_p50_ms: Fixed<5>,
-    ours_edge_after_tick_ms: Fixed<5>,
-    relayed_rms_cycles: Fixed<5>,
-    relayed_late_ms: Fixed<5>,
+    AMPLITUDE_V * (TAU * turns).sin()
 }
 
 impl Row {
@@ -214,57 +157,50 @@ impl Row {
             && self.ours_ms.is_some_and(|ms| ms <= GOAL_MS)
     }
 
+    fn relayed_ms(&self) -> f64 {
+        2.0 * self.link.delay_ms
+    }
+
     /// Cycles and ms of the relayed stimulus, which is modelled with the delay alone.
     fn relayed(&self) -> (Option<f64>, Option<f64>) {
-        let modelled = (self.link.loss == 0.0).then_some((self.relayed_cycles, self.relayed_ms));
-        modelled.unzip()
+        let modelled = (self.relayed_cycles, self.relayed_ms());
+        (self.link.loss == 0.0).then_some(modelled).unzip()
     }
 }
 
-impl Study for [Row] {
+impl Study for Vec<Row> {
     const NAME: &'static str = "delay";
 
     fn table(&self) -> Option<Table> {
-        let mut table = Table::new(&[
-            "delay, ms:",
-            "jitter, ms:",
-            "loss, %:",
-            "ours: phase error RMS, cycles:",
-            "hand to output p50, ms:",
-            "relayed: phase error RMS, cycles:",
-            "late, ms:",
-        ]);
-        for row in self {
+        let rows = self.iter().map(|row| {
             let (cycles, ms) = row.relayed();
-            let cells = [
-                row.link.delay_ms.to_string(),
-                row.link.jitter_ms.to_string(),
-                number(100.0 * row.link.loss, 0),
-                number(row.ours_cycles, 4),
-                number(row.ours_ms, 3),
-                number(cycles, 3),
-                number(ms, 0),
-            ];
-            table.row_with(cells, remark(row.is_met()));
-        }
-        Some(table)
+            Record::default()
+                .with("delay, ms:", short(row.link.delay_ms))
+                .with("jitter, ms:", short(row.link.jitter_ms))
+                .with("loss, %:", number(100.0 * row.link.loss, 0))
+                .with("ours: phase error RMS, cycles:", number(row.ours_cycles, 4))
+                .with("hand to output p50, ms:", number(row.ours_ms, 3))
+                .with("relayed: phase error RMS, cycles:", number(cycles, 3))
+                .with("late, ms:", number(ms, 0))
+                .judged(row.is_met())
+        });
+        Some(rows.collect())
     }
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let records = self.iter().map(|row| {
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let rows = self.iter().map(|row| {
             let (relayed_cycles, relayed_ms) = row.relayed();
-            Record {
-                delay_ms: Short(row.link.delay_ms),
-                jitter_ms: Short(row.link.jitter_ms),
-                loss: Short(row.link.loss),
-                ours_rms_cycles: row.ours_cycles.into(),
-                ours_hand_to_output_p50_ms: row.ours_ms.into(),
-                ours_edge_after_tick_ms: row.edge_ms.into(),
-                relayed_rms_cycles: relayed_cycles.into(),
-                relayed_late_ms: relayed_ms.into(),
-            }
+            Record::default()
+                .with("delay_ms", short(row.link.delay_ms))
+                .with("jitter_ms", short(row.link.jitter_ms))
+                .with("loss", short(row.link.loss))
+                .with("ours_rms_cycles", fixed(row.ours_cycles, 5))
+                .with("ours_hand_to_output_p50_ms", fixed(row.ours_ms, 5))
+                .with("ours_edge_after_tick_ms", fixed(row.edge_ms, 5))
+                .with("relayed_rms_cycles", fixed(relayed_cycles, 5))
+                .with("relayed_late_ms", fixed(relayed_ms, 5))
         });
-        Ok(vec![("", csv_text(records)?)])
+        vec![("", csv(rows))]
     }
 
     fn picture(&self) -> String {
@@ -283,7 +219,7 @@ mod tests {
     #[test]
     fn a_relayed_sine_is_off_by_the_chord_of_its_round_trip() {
         // x(t) − x(t − 2d) = 2 X sin ωd · sin ω(t − d), X = α/ω: √2 X sin ωd / λ over whole strokes.
-        let omega = std::f64::consts::TAU * 0.83;
+        let omega = TAU * 0.83;
         for delay_s in [0.01, 0.1, 0.3] {
             let due = 2f64.sqrt() * 70.0 / omega * f64::sin(omega * delay_s) / 2.0;
             let whole_strokes_s = 2.0 * delay_s + 6.0 / 0.83;
@@ -301,11 +237,10 @@ mod tests {
             ours_ms: Some(0.345),
             edge_ms: None,
             relayed_cycles: 0.0,
-            relayed_ms: 0.0,
             begins_cycles: 0.0,
             drawn: Vec::new(),
         };
-        let is_met = |row: Row| [row].is_met();
+        let is_met = |row: Row| vec![row].is_met();
         assert!(is_met(row.clone()));
         // Relayed over 1 ms, 50 mm/s over 2 mm are off by 0.05 cycles.
         for (ours_cycles, ours_ms) in [

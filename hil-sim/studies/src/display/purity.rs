@@ -5,100 +5,81 @@
 //! encoder a tick, the encoder adds nothing and what is not the sine is the display's own; the same
 //! stimuli at speeds between whole counts show what the encoder's steps add.
 
-pub mod picture;
+mod picture;
 mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
-use serde::Serialize;
 
-use crate::display::PLAIN_TEXTURE;
-use crate::study::{Fixed, Short, Study, Table, csv_text, number, remark};
-use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::DisplayBench;
+use super::{PLAIN_TEXTURE, configured, word_of_mode};
+use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
+use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::mean::{Held, about_a_second_s};
-use hil_sim_core::judge::spectrum::{Line, Spectrum, spectra};
+use hil_sim_core::judge::seconds;
+use hil_sim_core::judge::spectrum::{Spectrum, spectra};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
-use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::recording::{ACTUATORS, Recording, volts};
 use stretch::{StimulusSequence, Stretch};
 
 /// The highest a spur may be, in dB over the stimulus.
-pub const GOAL_DBC: f64 = -80.0;
-/// The farthest from 0 V that a channel's mean may be, in mV.
-pub const GOAL_MEAN_MV: f64 = 5.0;
+const GOAL_DBC: f64 = -80.0;
+/// The farthest from 0 V that a channel's mean may be.
+const GOAL_MEAN_MV: f64 = 5.0;
 /// Spurs are looked for from 0 Hz to this.
 const HIGHEST_HZ: f64 = 1_000.0;
-/// The stimuli, in Hz.
+/// The stimuli.
 const FREQUENCIES_HZ: [f64; 12] = [
     5.0, 7.3, 10.4, 14.2, 20.6, 28.7, 40.0, 57.4, 80.6, 113.3, 160.7, 200.0,
 ];
-/// The wavelength that a stimulus' is kept near to, in mm.
+/// The wavelength that a stimulus' is kept near to.
 const USUAL_MM: f64 = 1.5;
 /// Counts a tick between whole ones: the golden section, which no small fraction comes near to.
 const BETWEEN: f64 = 0.381_966;
-/// From a stretch's beginning to where it is looked at, in s: what fades, glides and settles has done so.
+/// From a stretch's beginning to where it is looked at: what fades, glides and settles has done so.
 const SETTLING_S: f64 = 2.5;
-/// For how long it is looked at, in s.
+/// For how long it is looked at.
 const LOOK_S: f64 = 2.2;
-/// Over what a spectrum is taken, in s: 0.5 Hz a bin.
+/// Over what a spectrum is taken: 0.5 Hz a bin.
 const SPECTRUM_S: f64 = 2.0;
-/// The frequency whose spectra are drawn, in Hz.
-pub const SHOWN_HZ: f64 = 40.0;
+/// The frequency whose spectra are drawn.
+const SHOWN_HZ: f64 = 40.0;
 
 /// How the hand moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Hand {
+enum Hand {
     /// At a steady speed, by whole counts a tick.
     Whole,
     /// At a steady speed between whole counts a tick.
     Between,
     /// To and fro, v = peak · sin 2π f t.
-    Stroke {
-        /// Highest speed, in mm/s.
-        peak_mm_s: f64,
-        /// Strokes a second.
-        frequency_hz: f64,
-    },
+    Stroke { peak_mm_s: f64, frequency_hz: f64 },
 }
 
 /// A stimulus, and what came of it.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// Updates per second.
-    pub rate_hz: u32,
-    /// How the actuators share the stimulus.
-    pub mode: Mode,
-    /// How the hand moved.
-    pub hand: Hand,
-    /// Its speed in mm/s; the highest of strokes.
-    pub speed_mm_s: f64,
-    /// λ in mm.
-    pub wavelength_mm: f64,
-    /// v/λ in Hz, of a steady speed.
-    pub frequency_hz: Option<f64>,
+    rate_hz: u32,
+    mode: Mode,
+    hand: Hand,
+    /// The highest of strokes.
+    speed_mm_s: f64,
+    wavelength_mm: f64,
+    /// v/λ of a steady speed.
+    frequency_hz: Option<f64>,
     /// Ticks in which a steady hand did not move by the usual counts: 0 for whole ones.
-    pub uneven_ticks: usize,
-    /// Amplitude of the stimulus' own line, in V, the lowest of the channels.
-    pub stimulus_v: Option<f64>,
+    uneven_ticks: usize,
+    /// Amplitude of the stimulus' own line, the lowest of the channels.
+    stimulus_v: Option<f64>,
     /// The highest spur over its channel's stimulus, in dB, and its frequency, at worst over the channels.
-    pub spur: Option<(f64, f64)>,
-    /// The farthest mean of any channel over whole cycles of about a second, in mV: cycles of a steady
+    spur: Option<(f64, f64)>,
+    /// The farthest mean of any channel over whole cycles of about a second: cycles of a steady
     /// stimulus, or of the hand.
-    pub whole_mean_mv: f64,
+    whole_mean_mv: f64,
     /// The same over exactly a second, wherever it begins.
-    pub second_mean_mv: f64,
+    second_mean_mv: f64,
     /// The spectrum of the channel with the highest spur, for [`SHOWN_HZ`].
-    pub spectrum: Option<Spectrum>,
-}
-
-/// What is run: everything, or a little of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
-    /// Every stimulus.
-    Whole,
-    /// Two stimuli and a stroke at 2 kHz.
-    Quick,
+    spectrum: Option<Spectrum>,
 }
 
 /// One run of the ELF.
@@ -108,58 +89,44 @@ struct Plan {
     hands: Vec<Hand>,
 }
 
-/// Measures all rows, on all cores. With another rendering than the fundamental the surface is told to be a sine and
-/// nothing else, so that what is not the sine is still the display's own. `done` is told after each of [`runs`].
+/// Measures all rows; quick: two stimuli and a stroke at 2 kHz. With another rendering than the fundamental the
+/// surface is told to be a sine and nothing else, so that what is not the sine is still the display's own.
 ///
 /// # Errors
 /// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     rendering: Rendering,
-    extent: Extent,
-    done: impl Fn() + Sync,
+    quick: bool,
+    progress: &impl Progress,
 ) -> Result<Vec<Row>, ElfError> {
-    let plans = plans(extent);
-    let rows = on_all_cores(&plans, |plan| {
-        let rows = run(plan, firmware, rendering, extent);
-        done();
-        rows
-    })?;
+    let plans = plans(quick);
+    progress.begin(plans.len());
+    let rows = progress.each(&plans, |plan| run(plan, firmware, rendering, quick))?;
     Ok(rows.into_iter().flatten().collect())
 }
 
-/// How many runs [`measure`] makes.
-pub fn runs(extent: Extent) -> u64 {
-    plans(extent).len() as u64
-}
-
-fn plans(extent: Extent) -> Vec<Plan> {
+fn plans(quick: bool) -> Vec<Plan> {
     let strokes = [(70.0, 0.83), (30.0, 0.5), (100.0, 1.5)];
     // A hand that trembles about a place: 0.5 mm, 0.3 mm and 0.1 mm either way.
     let wobbles = [(10.0, 3.2), (15.0, 7.7), (6.0, 9.5)];
-    let stroke = |(peak_mm_s, frequency_hz): (f64, f64)| Hand::Stroke {
+    let stroke = |(peak_mm_s, frequency_hz)| Hand::Stroke {
         peak_mm_s,
         frequency_hz,
     };
-    let (rates, modes): (&[UpdateRate], &[Mode]) = match extent {
-        Extent::Whole => (
-            &[UpdateRate::Hz2000, UpdateRate::Hz4000],
-            &[Mode::Uniform, Mode::Travelling],
-        ),
-        Extent::Quick => (&[UpdateRate::Hz2000], &[Mode::Travelling]),
-    };
+    if quick {
+        return vec![Plan {
+            rate: UpdateRate::Hz2000,
+            mode: Mode::Travelling,
+            hands: vec![Hand::Whole, stroke(strokes[0])],
+        }];
+    }
     let mut plans = Vec::new();
-    for &rate in rates {
-        for &mode in modes {
-            let groups = match extent {
-                Extent::Whole => vec![
-                    vec![Hand::Whole],
-                    vec![Hand::Between],
-                    strokes.into_iter().chain(wobbles).map(stroke).collect(),
-                ],
-                Extent::Quick => vec![vec![Hand::Whole, stroke(strokes[0])]],
-            };
-            plans.extend(groups.into_iter().map(|hands| Plan { rate, mode, hands }));
+    for rate in [UpdateRate::Hz2000, UpdateRate::Hz4000] {
+        for mode in [Mode::Uniform, Mode::Travelling] {
+            let to_and_fro = strokes.into_iter().chain(wobbles).map(stroke).collect();
+            let groups = [vec![Hand::Whole], vec![Hand::Between], to_and_fro];
+            plans.extend(groups.map(|hands| Plan { rate, mode, hands }));
         }
     }
     plans
@@ -169,12 +136,13 @@ fn run(
     plan: &Plan,
     firmware: &Firmware,
     rendering: Rendering,
-    extent: Extent,
+    quick: bool,
 ) -> Result<Vec<Row>, ElfError> {
-    let frequencies: &[f64] = match extent {
-        Extent::Whole => &FREQUENCIES_HZ,
-        // The second comes with what the first has left behind.
-        Extent::Quick => &[10.4, SHOWN_HZ],
+    // The second comes with what the first has left behind.
+    let frequencies: &[f64] = if quick {
+        &[10.4, SHOWN_HZ]
+    } else {
+        &FREQUENCIES_HZ
     };
     let mut stretches = Vec::new();
     for &hand in &plan.hands {
@@ -191,25 +159,21 @@ fn run(
         }
     }
     let course = StimulusSequence::new(stretches);
-    let alone = DisplayBench {
+    let bench = DisplayBench {
         configuration: DisplayConfiguration {
-            mode: plan.mode,
             rendering,
-            update_rate: plan.rate,
-            ..DisplayConfiguration::DEFAULT
+            ..configured(plan.mode, plan.rate)
         },
         texture: (rendering != Rendering::Fundamental).then_some(PLAIN_TEXTURE),
         surface: course.surface(),
-        ..DisplayBench::new(course.hand(), 2.0, course.ends_s() + 0.01)
+        ..DisplayBench::new(course.hand(), 2.0, course.ends_s + 0.01)
     };
-    let recording = display_alone::run(alone, firmware)?.recording;
-    Ok(course
-        .stretches()
-        .map(|(from_s, stretch)| {
-            let looked_at = (from_s + SETTLING_S, from_s + stretch.lasts_s);
-            row(plan, stretch, &recording, looked_at)
-        })
-        .collect())
+    let recording = display_alone::run(bench, firmware)?.recording;
+    let rows = course.stretches.iter().map(|(from_s, stretch)| {
+        let looked_at = (from_s + SETTLING_S, from_s + stretch.lasts_s);
+        row(plan, stretch, &recording, looked_at)
+    });
+    Ok(rows.collect())
 }
 
 /// The steady stretch that makes a stimulus of `frequency_hz` at a usual λ.
@@ -231,29 +195,27 @@ fn steady(rate: UpdateRate, hand: Hand, frequency_hz: f64) -> Stretch {
 fn row(plan: &Plan, stretch: &Stretch, recording: &Recording, (from_s, to_s): (f64, f64)) -> Row {
     // One edge before what is looked at, so that there is a voltage to begin with.
     let outputs = &recording.outputs;
-    let first = outputs
-        .partition_point(|output| output.at_ns as f64 * 1e-9 <= from_s)
-        .saturating_sub(1);
-    let last = outputs.partition_point(|output| output.at_ns as f64 * 1e-9 < to_s);
-    let outputs = outputs.get(first..last).unwrap_or_default();
-    let edges_s: Vec<f64> = outputs.iter().map(|o| o.at_ns as f64 * 1e-9).collect();
+    let first = outputs.partition_point(|output| seconds(output.at_ns) <= from_s);
+    let last = outputs.partition_point(|output| seconds(output.at_ns) < to_s);
+    let outputs = outputs.get(first.saturating_sub(1)..last);
+    let outputs = outputs.unwrap_or_default();
+    let edges_s: Vec<f64> = outputs.iter().map(|o| seconds(o.at_ns)).collect();
     let channels = distinct(outputs.iter().map(|output| &output.words));
     let from_s = edges_s
         .first()
         .map_or(from_s, |&first_s| from_s.max(first_s));
 
-    let (frequency_hz, cycles_s) = match stretch.hand {
-        Hand::Stroke { frequency_hz, .. } => (None, about_a_second_s(frequency_hz)),
+    let (frequency_hz, cycles_hz) = match stretch.hand {
+        Hand::Stroke { frequency_hz, .. } => (None, frequency_hz),
         Hand::Whole | Hand::Between => {
             let frequency_hz = stretch.speed_mm_s / stretch.wavelength_mm;
-            (Some(frequency_hz), about_a_second_s(frequency_hz))
+            (Some(frequency_hz), frequency_hz)
         }
     };
     let farthest_mv = |window_s: f64| {
-        let means = channels.iter().filter_map(|channel| {
-            (!edges_s.is_empty())
-                .then(|| Held::new(&edges_s, channel).farthest_mean((from_s, to_s), window_s))
-                .flatten()
+        let channels = channels.iter().filter(|_| !edges_s.is_empty());
+        let means = channels.filter_map(|channel| {
+            Held::new(&edges_s, channel).farthest_mean((from_s, to_s), window_s)
         });
         1e3 * means.fold(0.0, |worst, mean| mean.abs().max(worst))
     };
@@ -267,42 +229,28 @@ fn row(plan: &Plan, stretch: &Stretch, recording: &Recording, (from_s, to_s): (f
         uneven_ticks: uneven_ticks(recording, (from_s, to_s)),
         stimulus_v: None,
         spur: None,
-        whole_mean_mv: farthest_mv(cycles_s),
+        whole_mean_mv: farthest_mv(about_a_second_s(cycles_hz)),
         second_mean_mv: farthest_mv(1.0),
         spectrum: None,
     };
-    if let Some(frequency_hz) = frequency_hz
-        && edges_s.len() > 1
-    {
-        let seen = spectra(
-            &edges_s,
-            &channels,
-            (from_s, from_s + SPECTRUM_S),
-            HIGHEST_HZ,
-        );
-        for spectrum in seen {
-            let (Some(line), Some(spur)) = (
-                spectrum.line(frequency_hz),
-                spectrum.worst_spur(frequency_hz),
-            ) else {
-                continue;
-            };
-            let dbc = over_db(spur, line);
-            row.stimulus_v = Some(
-                row.stimulus_v
-                    .map_or(line.amplitude_v, |least: f64| least.min(line.amplitude_v)),
-            );
-            if row.spur.is_none_or(|(worst, _)| dbc > worst) {
-                row.spur = Some((dbc, spur.frequency_hz));
-                row.spectrum = (frequency_hz.round() == SHOWN_HZ).then_some(spectrum);
-            }
+    let Some(frequency_hz) = frequency_hz.filter(|_| edges_s.len() > 1) else {
+        return row;
+    };
+    let looked_at = (from_s, from_s + SPECTRUM_S);
+    for spectrum in spectra(&edges_s, &channels, looked_at, HIGHEST_HZ) {
+        let line = spectrum.line(frequency_hz);
+        let Some((line, spur)) = line.zip(spectrum.worst_spur(frequency_hz)) else {
+            continue;
+        };
+        let own_v = line.amplitude_v;
+        let dbc = 20.0 * (spur.amplitude_v / own_v).log10();
+        row.stimulus_v = Some(row.stimulus_v.map_or(own_v, |least: f64| least.min(own_v)));
+        if row.spur.is_none_or(|(worst, _)| dbc > worst) {
+            row.spur = Some((dbc, spur.frequency_hz));
+            row.spectrum = (frequency_hz.round() == SHOWN_HZ).then_some(spectrum);
         }
     }
     row
-}
-
-fn over_db(spur: Line, line: Line) -> f64 {
-    20.0 * (spur.amplitude_v / line.amplitude_v).log10()
 }
 
 /// The channels that differ from one another, in V.
@@ -314,143 +262,109 @@ fn distinct<'a>(words: impl Iterator<Item = &'a [u16; ACTUATORS]> + Clone) -> Ve
             channels.push(channel);
         }
     }
-    channels
-        .into_iter()
-        .map(|channel| channel.into_iter().map(volts).collect())
-        .collect()
+    let in_volts = |channel: Vec<u16>| channel.into_iter().map(volts).collect();
+    channels.into_iter().map(in_volts).collect()
 }
 
 /// Ticks in which the hand's encoder went on by other than its commonest counts.
 fn uneven_ticks(recording: &Recording, (from_s, to_s): (f64, f64)) -> usize {
-    let within: Vec<u16> = recording
-        .ticks
-        .iter()
-        .filter(|tick| (from_s..to_s).contains(&(tick.at_ns as f64 * 1e-9)))
-        .map(|tick| tick.encoder)
-        .collect();
+    let ticks = recording.ticks.iter();
+    let within = ticks.filter(|tick| (from_s..to_s).contains(&seconds(tick.at_ns)));
+    let within: Vec<u16> = within.map(|tick| tick.encoder).collect();
     let mut counts: Vec<u16> = within
         .windows(2)
         .map(|pair| pair[1].wrapping_sub(pair[0]))
         .collect();
     counts.sort_unstable();
-    let commonest = counts
-        .chunk_by(|one, other| one == other)
-        .map(<[u16]>::len)
-        .max();
-    counts.len() - commonest.unwrap_or(0)
+    let alike = counts.chunk_by(|one, other| one == other);
+    counts.len() - alike.map(<[u16]>::len).max().unwrap_or(0)
 }
 
-/// Whether a row meets what is asked of it: whole counts the spurs, everything the mean.
-pub fn is_met(row: &Row) -> bool {
-    let pure = row.hand != Hand::Whole || row.spur.is_some_and(|(dbc, _)| dbc <= GOAL_DBC);
-    pure && row.whole_mean_mv <= GOAL_MEAN_MV
-}
+impl Row {
+    /// Whole counts are to have no spurs, everything no mean.
+    fn is_met(&self) -> bool {
+        let pure = self.hand != Hand::Whole || self.spur.is_some_and(|(dbc, _)| dbc <= GOAL_DBC);
+        pure && self.whole_mean_mv <= GOAL_MEAN_MV
+    }
 
-/// The word for how the hand moved.
-pub const fn word_of(hand: Hand) -> &'static str {
-    match hand {
-        Hand::Whole => "whole counts",
-        Hand::Between => "between counts",
-        Hand::Stroke { .. } => "strokes",
+    fn word_of_hand(&self) -> &'static str {
+        match self.hand {
+            Hand::Whole => "whole counts",
+            Hand::Between => "between counts",
+            Hand::Stroke { .. } => "strokes",
+        }
+    }
+
+    /// The spectrum: Hz, and dB over the stimulus.
+    fn levels_dbc(&self) -> Vec<(f64, f64)> {
+        let (Some(spectrum), Some(frequency_hz)) = (&self.spectrum, self.frequency_hz) else {
+            return Vec::new();
+        };
+        let own = spectrum.line(frequency_hz);
+        let stimulus_v = own.map_or(1.0, |line| line.amplitude_v);
+        let level = |(bin, amplitude_v): (u32, &f64)| {
+            let dbc = 20.0 * (amplitude_v / stimulus_v).max(1e-9).log10();
+            (f64::from(bin) * spectrum.bin_hz, dbc)
+        };
+        (0..).zip(&spectrum.amplitudes_v).map(level).collect()
     }
 }
 
-#[derive(Serialize)]
-struct Record {
-    rate_hz: u32,
-    mode: &'static str,
-    hand: &'static str,
-    hand_hz: Fixed<4>,
-    speed_mm_s: Fixed<4>,
-    wavelength_mm: Fixed<4>,
-    frequency_hz: Fixed<4>,
-    uneven_ticks: usize,
-    stimulus_v: Fixed<4>,
-    spur_dbc: Fixed<4>,
-    spur_hz: Fixed<4>,
-    whole_cycles_mean_mv: Fixed<4>,
-    any_second_mean_mv: Fixed<4>,
-}
-
-/// A line of a spectrum that is drawn: dB over the stimulus.
-#[derive(Serialize)]
-struct SpectralLine {
-    rate_hz: u32,
-    mode: &'static str,
-    hand: &'static str,
-    frequency_hz: Short,
-    level_dbc: Fixed<2>,
-}
-
-impl Study for [Row] {
+impl Study for Vec<Row> {
     const NAME: &'static str = "purity";
 
     fn table(&self) -> Option<Table> {
-        let mut table = Table::new(&[
-            "rate, Hz:",
-            "mode",
-            "hand",
-            "mm/s:",
-            "λ, mm:",
-            "stimulus, Hz:",
-            "V:",
-            "worst spur, dBc:",
-            "at, Hz:",
-            "mean over whole cycles, mV:",
-            "over any second, mV:",
-        ]);
-        for row in self {
-            let cells = [
-                row.rate_hz.to_string(),
-                super::word_of_mode(row.mode).to_owned(),
-                word_of(row.hand).to_owned(),
-                number(row.speed_mm_s, 1),
-                number(row.wavelength_mm, 2),
-                number(row.frequency_hz, 0),
-                number(row.stimulus_v, 3),
-                number(row.spur.map(|spur| spur.0), 1),
-                number(row.spur.map(|spur| spur.1), 1),
-                number(row.whole_mean_mv, 2),
-                number(row.second_mean_mv, 1),
-            ];
-            table.row_with(cells, remark(is_met(row)));
-        }
-        Some(table)
+        let rows = self.iter().map(|row| {
+            Record::default()
+                .with("rate, Hz:", short(row.rate_hz))
+                .with("mode", word_of_mode(row.mode))
+                .with("hand", row.word_of_hand())
+                .with("mm/s:", number(row.speed_mm_s, 1))
+                .with("λ, mm:", number(row.wavelength_mm, 2))
+                .with("stimulus, Hz:", number(row.frequency_hz, 0))
+                .with("V:", number(row.stimulus_v, 3))
+                .with("worst spur, dBc:", number(row.spur.map(|spur| spur.0), 1))
+                .with("at, Hz:", number(row.spur.map(|spur| spur.1), 1))
+                .with("mean over whole cycles, mV:", number(row.whole_mean_mv, 2))
+                .with("over any second, mV:", number(row.second_mean_mv, 1))
+                .judged(row.is_met())
+        });
+        Some(rows.collect())
     }
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let records = self.iter().map(|row| Record {
-            rate_hz: row.rate_hz,
-            mode: super::word_of_mode(row.mode),
-            hand: word_of(row.hand),
-            hand_hz: match row.hand {
-                Hand::Stroke { frequency_hz, .. } => frequency_hz.into(),
-                Hand::Whole | Hand::Between => Fixed::default(),
-            },
-            speed_mm_s: row.speed_mm_s.into(),
-            wavelength_mm: row.wavelength_mm.into(),
-            frequency_hz: row.frequency_hz.into(),
-            uneven_ticks: row.uneven_ticks,
-            stimulus_v: row.stimulus_v.into(),
-            spur_dbc: row.spur.map(|spur| spur.0).into(),
-            spur_hz: row.spur.map(|spur| spur.1).into(),
-            whole_cycles_mean_mv: row.whole_mean_mv.into(),
-            any_second_mean_mv: row.second_mean_mv.into(),
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let of = |row: &Row| {
+            Record::default()
+                .with("rate_hz", short(row.rate_hz))
+                .with("mode", word_of_mode(row.mode))
+                .with("hand", row.word_of_hand())
+        };
+        let rows = self.iter().map(|row| {
+            let hand_hz = match row.hand {
+                Hand::Stroke { frequency_hz, .. } => Some(frequency_hz),
+                Hand::Whole | Hand::Between => None,
+            };
+            of(row)
+                .with("hand_hz", fixed(hand_hz, 4))
+                .with("speed_mm_s", fixed(row.speed_mm_s, 4))
+                .with("wavelength_mm", fixed(row.wavelength_mm, 4))
+                .with("frequency_hz", fixed(row.frequency_hz, 4))
+                .with("uneven_ticks", short(row.uneven_ticks))
+                .with("stimulus_v", fixed(row.stimulus_v, 4))
+                .with("spur_dbc", fixed(row.spur.map(|spur| spur.0), 4))
+                .with("spur_hz", fixed(row.spur.map(|spur| spur.1), 4))
+                .with("whole_cycles_mean_mv", fixed(row.whole_mean_mv, 4))
+                .with("any_second_mean_mv", fixed(row.second_mean_mv, 4))
         });
         let lines = self.iter().flat_map(|row| {
-            let levels = levels_dbc(row).into_iter();
-            levels.map(|(frequency_hz, dbc)| SpectralLine {
-                rate_hz: row.rate_hz,
-                mode: super::word_of_mode(row.mode),
-                hand: word_of(row.hand),
-                frequency_hz: Short(frequency_hz),
-                level_dbc: dbc.into(),
+            let levels = row.levels_dbc().into_iter();
+            levels.map(move |(frequency_hz, dbc)| {
+                of(row)
+                    .with("frequency_hz", short(frequency_hz))
+                    .with("level_dbc", fixed(dbc, 2))
             })
         });
-        Ok(vec![
-            ("", csv_text(records)?),
-            ("-spectra", csv_text(lines)?),
-        ])
+        vec![("", csv(rows)), ("-spectra", csv(lines))]
     }
 
     fn picture(&self) -> String {
@@ -458,25 +372,8 @@ impl Study for [Row] {
     }
 
     fn is_met(&self) -> bool {
-        self.iter().all(is_met)
+        self.iter().all(Row::is_met)
     }
-}
-
-/// A row's spectrum: Hz, and dB over the stimulus.
-fn levels_dbc(row: &Row) -> Vec<(f64, f64)> {
-    let (Some(spectrum), Some(frequency_hz)) = (&row.spectrum, row.frequency_hz) else {
-        return Vec::new();
-    };
-    let stimulus_v = spectrum
-        .line(frequency_hz)
-        .map_or(1.0, |line| line.amplitude_v);
-    (0..)
-        .zip(&spectrum.amplitudes_v)
-        .map(|(bin, amplitude_v)| {
-            let dbc = 20.0 * (amplitude_v / stimulus_v).max(1e-9).log10();
-            (f64::from(bin) * spectrum.bin_hz, dbc)
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -586,6 +483,6 @@ mod tests {
             "{}",
             row.whole_mean_mv
         );
-        assert!(!is_met(&row));
+        assert!(!row.is_met());
     }
 }

@@ -16,59 +16,52 @@
 //! Boards are the firmware's libraries, or its ELFs in one scene, in which arm and hand move alike. The random part cannot be coherent: where the remote surface has a grain, the
 //! display has one of its own; only its spectrum is the surface's.
 
-pub mod likeness;
-pub mod observer;
-pub mod picture;
+mod likeness;
+mod observer;
+mod picture;
 pub mod recorded;
-pub mod surfaces;
+mod surfaces;
 
 use std::f64::consts::TAU;
 use std::ops::Range;
-use std::sync::Arc;
 
 use firmware_display::{Display, Senses, Settings};
 use hil_sim_boards::{ElfError, Firmwares};
+use hil_sim_core::judge::seconds;
 use hil_sim_core::native;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::plant::surface;
-use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::decoder::TimedMessage;
 use hil_sim_core::run::observer::RunObserver;
 use hil_sim_core::run::recording::{Engine, volts};
-use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError, Series};
+use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
-use serde::Serialize;
 
-use crate::psychophysics::bench::BenchError;
-use crate::study::{Fixed, Short, Study, Table, csv_text, number};
+use super::{RENDERINGS, through};
+use crate::bench::BenchError;
+use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
 use observer::{Pair, pairs};
 use surfaces::{Ground, known, unseen};
 
-/// All renderings, the simplest first.
-pub const RENDERINGS: [Rendering; 3] =
-    [Rendering::Fundamental, Rendering::Shape, Rendering::Texture];
-/// Highest speed of the arm and of the hand, in mm/s, and their strokes a second.
-pub const SPEEDS: [(Stroke, Stroke); 2] = [
+/// How arm and hand move.
+const SPEEDS: [(Stroke, Stroke); 2] = [
     (Stroke(60.0, 0.8), Stroke(40.0, 0.5)),
     (Stroke(30.0, 0.4), Stroke(80.0, 0.83)),
 ];
-/// Delays of the link, in ms, one way.
-pub const DELAYS_MS: [f64; 3] = [0.0, 100.0, 500.0];
-/// Signal to noise of the gauges, in dB.
+/// Delays of the link, one way.
+const DELAYS_MS: [f64; 3] = [0.0, 100.0, 500.0];
 const SNR_DB: f64 = 20.0;
-/// The sensor rubs for so long, in s, and the display's voltages are looked at from then on, until then.
+/// The sensor rubs for so long, and the display's voltages are looked at from then on, until then.
 const RUBS_S: f64 = 8.5;
 const LOOKS_S: (f64, f64) = (4.0, 8.0);
 const DRIFT_MM_S: f64 = 3.0;
-/// Rows of a motion, in s.
+/// Rows of a motion.
 const ROW_S: f64 = 1e-3;
 /// What partials may cost of a family's coherence in the mean, what they have to give where there is no grain, and by how
 /// many dB the random part may take a rough family's spectrum further away.
 const GOAL_LOSS: f64 = 0.02;
-/// See [`GOAL_LOSS`].
 const GOAL_COHERENCE: f64 = 0.95;
-/// See [`GOAL_LOSS`].
 const GOAL_DB: f64 = 0.3;
 const TICK_NS: u64 = 500_000;
 /// Shifts of place that are tried.
@@ -76,18 +69,14 @@ const SHIFTS: usize = 48;
 
 /// v = peak · sin 2π f t, and [`DRIFT_MM_S`] on top, so that no two strokes turn at the same place: mm/s and Hz.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stroke(pub f64, pub f64);
+struct Stroke(f64, f64);
 
 impl Stroke {
     fn motion(self) -> Motion {
         let rows = (RUBS_S / ROW_S) as u32;
         let at: Vec<f64> = (0..=rows).map(|row| f64::from(row) * ROW_S).collect();
         let values = at.iter().map(|&t_s| self.position_mm(t_s)).collect();
-        Motion::Recorded(Arc::new(Series {
-            at,
-            values,
-            width: 1,
-        }))
+        through(at, values)
     }
 
     /// The speed at an instant over the highest.
@@ -103,37 +92,32 @@ impl Stroke {
 
 /// A surface, rubbed and played.
 #[derive(Clone, Debug)]
-pub struct Row {
-    /// The surface's name, and its family's.
-    pub surface: String,
-    /// See `surface`.
-    pub family: String,
+struct Row {
+    surface: String,
+    family: String,
     /// Whether nobody looked at it while this was made.
-    pub unseen: bool,
-    /// Who ran it.
-    pub engine: Engine,
-    /// Highest speeds in mm/s of arm and hand.
-    pub speeds_mm_s: (f64, f64),
-    /// The link's delay in ms.
-    pub delay_ms: f64,
-    /// How it was played.
-    pub rendering: Rendering,
+    unseen: bool,
+    engine: Engine,
+    /// Highest speeds of arm and hand.
+    speeds_mm_s: (f64, f64),
+    /// The link's.
+    delay_ms: f64,
+    rendering: Rendering,
     /// Share of the surface's power that is coherent with what is played, 0 to 1.
-    pub coherence: f64,
-    /// Between the spectra, in dB.
-    pub distance_db: f64,
+    coherence: f64,
+    /// Between the spectra.
+    distance_db: f64,
 }
 
-/// All that is measured.
+/// All that is measured: every surface, and pairs of surfaces of one λ.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Every surface.
-    pub rows: Vec<Row>,
-    /// Pairs of surfaces of one λ.
-    pub pairs: Vec<Pair>,
+    rows: Vec<Row>,
+    pairs: Vec<Pair>,
 }
 
-/// A surface, how it is rubbed, and what is said of it.
+/// A surface and how it is rubbed.
+#[derive(Clone)]
 struct Case {
     ground: Ground,
     arm: Stroke,
@@ -148,24 +132,17 @@ struct Case {
 pub fn measure(
     firmwares: &Firmwares,
     quick: bool,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Measured, BenchError> {
-    let cases = cases(quick);
-    let rows = on_all_cores(&cases, |case| {
-        let rows = rows(case, quick);
-        done();
-        rows
+    let (cases, scenes) = (cases(quick), scenes(quick));
+    progress.begin(cases.len() + scenes.len() + observer::runs(quick));
+    let rows = progress.each(&cases, |case| rows(case, quick))?;
+    let on_boards = progress.each(&scenes, |(case, rendering)| {
+        row_on_boards(case, *rendering, firmwares)
     })?;
-    let scenes = scenes(quick);
-    let on_boards = on_all_cores(&scenes, |(case, rendering)| {
-        let row = row_on_boards(case, *rendering, firmwares);
-        done();
-        row
-    })?;
-    let pairs = pairs(quick, &done)?;
     Ok(Measured {
         rows: rows.into_iter().flatten().chain(on_boards).collect(),
-        pairs,
+        pairs: pairs(quick, progress)?,
     })
 }
 
@@ -173,19 +150,15 @@ pub fn measure(
 fn scenes(quick: bool) -> Vec<(Case, Rendering)> {
     let (arm, _) = SPEEDS[0];
     let grounds = known().into_iter().take(if quick { 1 } else { usize::MAX });
-    grounds
-        .flat_map(|ground| {
-            RENDERINGS.map(|rendering| {
-                let ground = ground.clone();
-                let case = Case {
-                    ground,
-                    arm,
-                    hand: arm,
-                    seed: 1,
-                };
-                (case, rendering)
-            })
-        })
+    let case = |ground| Case {
+        ground,
+        arm,
+        hand: arm,
+        seed: 1,
+    };
+    let cases = grounds.map(case);
+    cases
+        .flat_map(|case| RENDERINGS.map(|(_, rendering)| (case.clone(), rendering)))
         .collect()
 }
 
@@ -201,16 +174,15 @@ fn row_on_boards(
     let (recording, _) = hil_sim_boards::run(&scene, firmwares)?;
     let mut edges = recording.outputs.iter().peekable();
     let mut held = 0.0;
-    let played: Vec<f64> = ticks()
-        .map(|tick| {
-            // The middle of what holds from one edge to the next.
-            let at_ns = tick * TICK_NS + TICK_NS / 2;
-            while let Some(edge) = edges.next_if(|edge| edge.at_ns <= at_ns) {
-                held = volts(edge.words[0]);
-            }
-            held
-        })
-        .collect();
+    let played = ticks().map(|tick| {
+        // The middle of what holds from one edge to the next.
+        let at_ns = tick * TICK_NS + TICK_NS / 2;
+        while let Some(edge) = edges.next_if(|edge| edge.at_ns <= at_ns) {
+            held = volts(edge.words[0]);
+        }
+        held
+    });
+    let played: Vec<f64> = played.collect();
     Ok(row(case, Engine::Elf, rendering, delay_ms, &played))
 }
 
@@ -228,29 +200,24 @@ fn row(case: &Case, engine: Engine, rendering: Rendering, delay_ms: f64, played:
     }
 }
 
-/// How often `done` is told.
-pub fn runs(quick: bool) -> u64 {
-    (cases(quick).len() + scenes(quick).len()) as u64 + observer::runs(quick)
-}
-
 fn cases(quick: bool) -> Vec<Case> {
-    let grounds = if quick {
-        known().into_iter().take(2).collect()
+    let mut grounds = known();
+    if quick {
+        grounds.truncate(2);
     } else {
-        known().into_iter().chain(unseen()).collect::<Vec<_>>()
-    };
+        grounds.extend(unseen());
+    }
     let speeds = &SPEEDS[..if quick { 1 } else { 2 }];
-    grounds
-        .iter()
-        .flat_map(|ground| {
-            speeds.iter().map(|&(arm, hand)| Case {
-                ground: ground.clone(),
-                arm,
-                hand,
-                seed: 1,
-            })
-        })
-        .collect()
+    let of_ground = |ground: &Ground| {
+        let case = |&(arm, hand)| Case {
+            ground: ground.clone(),
+            arm,
+            hand,
+            seed: 1,
+        };
+        speeds.iter().map(case).collect::<Vec<_>>()
+    };
+    grounds.iter().flat_map(of_ground).collect()
 }
 
 fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
@@ -262,7 +229,7 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
     };
     let mut rows = Vec::new();
     for &delay_ms in delays {
-        for rendering in RENDERINGS {
+        for (_, rendering) in RENDERINGS {
             let hand_mm = |t_s| case.hand.position_mm(t_s);
             let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
             rows.push(row(case, Engine::Native, rendering, delay_ms, &played));
@@ -271,23 +238,20 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
     Ok(rows)
 }
 
-/// What the sensor says, and when, in ns.
-type Said = Vec<TimedMessage>;
-
+/// What the sensor says of the surface.
 #[derive(Default)]
-struct Ear(Said);
+struct Ear(Vec<TimedMessage>);
 
 impl RunObserver for Ear {
     fn said(&mut self, role: Role, said: &TimedMessage) {
-        if role == Role::Sensor
-            && matches!(said.message, Message::Estimate(_) | Message::Texture(_))
-        {
+        let of_surface = matches!(said.message, Message::Estimate(_) | Message::Texture(_));
+        if role == Role::Sensor && of_surface {
             self.0.push(said.clone());
         }
     }
 }
 
-fn said(scene: &Scene) -> Result<Said, SceneError> {
+fn said(scene: &Scene) -> Result<Vec<TimedMessage>, SceneError> {
     let mut ear = Ear::default();
     native::run_before(scene, &mut ear)?;
     Ok(ear.0)
@@ -310,7 +274,7 @@ fn scene(case: &Case) -> Scene {
 
 /// The voltages of an actuator at each of the ticks that are looked at, under a hand that is at so many mm at an instant in s.
 fn played(
-    said: &Said,
+    said: &[TimedMessage],
     hand_mm: impl Fn(f64) -> f64,
     looked_at: &Range<u64>,
     rendering: Rendering,
@@ -336,8 +300,7 @@ fn played(
                 _ => {}
             }
         }
-        let t_s = at_ns as f64 * 1e-9;
-        display.tick(encoder(hand_mm(t_s)), &Senses::default());
+        display.tick(encoder(hand_mm(seconds(at_ns))), &Senses::default());
         if looked_at.contains(&tick) {
             played.push(volts(display.words()[0]));
         }
@@ -362,21 +325,10 @@ fn under_the_hand(case: &Case, shift_mm: f64) -> Vec<f64> {
 
 fn coherence_at_best(case: &Case, played: &[f64]) -> f64 {
     let played = segments(played);
-    (0..SHIFTS)
-        .map(|shift| {
-            let shift_mm = case.ground.wavelength_mm * shift as f64 / SHIFTS as f64;
-            coherence(&segments(&under_the_hand(case, shift_mm)), &played)
-        })
+    let shifts = (0..SHIFTS).map(|n| case.ground.wavelength_mm * n as f64 / SHIFTS as f64);
+    shifts
+        .map(|shift_mm| coherence(&segments(&under_the_hand(case, shift_mm)), &played))
         .fold(0.0, f64::max)
-}
-
-/// What a rendering is called in tables and files.
-pub const fn word(rendering: Rendering) -> &'static str {
-    match rendering {
-        Rendering::Fundamental => "fundamental",
-        Rendering::Shape => "shape",
-        Rendering::Texture => "texture",
-    }
 }
 
 /// Families in the order of their first row, the unseen ones last.
@@ -391,7 +343,7 @@ fn families(rows: &[Row]) -> Vec<&str> {
 }
 
 /// Mean, least and largest of a family's rows of one rendering.
-pub fn spread(
+fn spread(
     rows: &[Row],
     engine: Engine,
     family: &str,
@@ -413,7 +365,7 @@ pub fn spread(
 /// nearly all of it, and where there is one the random part brings the spectrum no further away.
 fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bool {
     let of = |value: fn(&Row) -> f64| {
-        RENDERINGS.map(|rendering| spread(rows, engine, family, rendering, value))
+        RENDERINGS.map(|(_, rendering)| spread(rows, engine, family, rendering, value))
     };
     let ([Some(fundamental), Some(shape), _], [_, Some(plain), Some(rough)]) =
         (of(|row| row.coherence), of(|row| row.distance_db))
@@ -426,92 +378,69 @@ fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bo
         && (!has_grain || rough.0 <= plain.0 + GOAL_DB)
 }
 
-#[derive(Serialize)]
-struct Record<'a> {
-    surface: &'a str,
-    family: &'a str,
-    unseen: bool,
-    engine: &'static str,
-    arm_mm_s: Short,
-    hand_mm_s: Short,
-    delay_ms: Short,
-    rendering: &'static str,
-    coherence: Fixed<3>,
-    distance_db: Fixed<2>,
-}
-
 impl Study for Measured {
     const NAME: &'static str = "texture";
 
     fn table(&self) -> Option<Table> {
-        let mut table = Table::new(&[
+        const HEADS: [&str; 6] = [
             "surfaces",
             "engine",
             "rendering",
             "coherence:",
             "least to most:",
             "spectral distance, dB:",
-        ]);
-        let engines = [Engine::Native, Engine::Elf];
-        let families = families(&self.rows);
-        for (family, engine) in families
-            .iter()
-            .flat_map(|family| engines.map(|engine| (*family, engine)))
-        {
-            for rendering in RENDERINGS {
-                let of =
-                    |value: fn(&Row) -> f64| spread(&self.rows, engine, family, rendering, value);
-                let (Some((mean, least, most)), Some((distance, ..))) =
-                    (of(|row| row.coherence), of(|row| row.distance_db))
-                else {
-                    continue;
-                };
-                table.row([
-                    family.to_owned(),
-                    engine.name().to_owned(),
-                    word(rendering).to_owned(),
-                    number(mean, 2),
-                    format!("{least:.2} to {most:.2}"),
-                    number(distance, 1),
-                ]);
+        ];
+        let mut rows = Vec::new();
+        let mut add = |cells: [String; 6]| rows.push(Record::of(&HEADS, cells));
+        for family in families(&self.rows) {
+            for engine in [Engine::Native, Engine::Elf] {
+                for (word, rendering) in RENDERINGS {
+                    let of = |value: fn(&Row) -> f64| {
+                        spread(&self.rows, engine, family, rendering, value)
+                    };
+                    let measured = of(|row| row.coherence).zip(of(|row| row.distance_db));
+                    let Some(((mean, least, most), (distance, ..))) = measured else {
+                        continue;
+                    };
+                    let range = format!("{least:.2} to {most:.2}");
+                    let [family, engine, word] = [family, engine.name(), word].map(str::to_owned);
+                    let (mean, distance) = (number(mean, 2), number(distance, 1));
+                    add([family, engine, word, mean, range, distance]);
+                }
             }
         }
         for pair in &self.pairs {
-            for (rendering, answer) in RENDERINGS.iter().zip(&pair.answers) {
-                table.row([
+            for ((word, _), answer) in RENDERINGS.iter().zip(&pair.answers) {
+                let [right, low, high] =
+                    [answer.right, answer.interval.low, answer.interval.high].map(|x| 100.0 * x);
+                add([
                     format!("{} or {}", pair.one, pair.other),
                     Engine::Native.name().to_owned(),
-                    word(*rendering).to_owned(),
-                    format!("told apart {:.0} %", 100.0 * answer.right),
-                    format!(
-                        "{:.0} to {:.0} %",
-                        100.0 * answer.interval.low,
-                        100.0 * answer.interval.high
-                    ),
+                    (*word).to_owned(),
+                    format!("told apart {right:.0} %"),
+                    format!("{low:.0} to {high:.0} %"),
                     "–".to_owned(),
                 ]);
             }
         }
-        Some(table)
+        Some(rows.into_iter().collect())
     }
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let records = self.rows.iter().map(|row| Record {
-            surface: &row.surface,
-            family: &row.family,
-            unseen: row.unseen,
-            engine: row.engine.name(),
-            arm_mm_s: Short(row.speeds_mm_s.0),
-            hand_mm_s: Short(row.speeds_mm_s.1),
-            delay_ms: Short(row.delay_ms),
-            rendering: word(row.rendering),
-            coherence: row.coherence.into(),
-            distance_db: row.distance_db.into(),
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let rows = self.rows.iter().map(|row| {
+            Record::default()
+                .with("surface", &*row.surface)
+                .with("family", &*row.family)
+                .with("unseen", short(row.unseen))
+                .with("engine", row.engine.name())
+                .with("arm_mm_s", short(row.speeds_mm_s.0))
+                .with("hand_mm_s", short(row.speeds_mm_s.1))
+                .with("delay_ms", short(row.delay_ms))
+                .with("rendering", super::word_of_rendering(row.rendering))
+                .with("coherence", fixed(row.coherence, 3))
+                .with("distance_db", fixed(row.distance_db, 2))
         });
-        Ok(vec![
-            ("", csv_text(records)?),
-            ("-pairs", observer::csv(&self.pairs)?),
-        ])
+        vec![("", csv(rows)), ("-pairs", observer::csv_of(&self.pairs))]
     }
 
     fn picture(&self) -> String {
@@ -519,12 +448,10 @@ impl Study for Measured {
     }
 
     fn is_met(&self) -> bool {
-        let families = families(&self.rows);
-        families.into_iter().all(|family| {
-            [Engine::Native, Engine::Elf]
-                .into_iter()
-                .all(|engine| is_carried(&self.rows, engine, family, family.contains("rough")))
-        })
+        let is_carried =
+            |family: &str, engine| is_carried(&self.rows, engine, family, family.contains("rough"));
+        let mut families = families(&self.rows).into_iter();
+        families.all(|of| is_carried(of, Engine::Native) && is_carried(of, Engine::Elf))
     }
 }
 
@@ -543,7 +470,7 @@ mod tests {
                     engine: Engine::Native,
                     speeds_mm_s: (60.0, 40.0),
                     delay_ms: 0.0,
-                    rendering: RENDERINGS[at],
+                    rendering: RENDERINGS[at].1,
                     coherence: coherences[at],
                     distance_db: distances[at],
                 })

@@ -3,15 +3,13 @@
 //! A scene is run once, by the native engine; the scans that its sensor board was given are then given to
 //! every contestant, and what it says of λ every tenth millisecond is judged as the board's estimates are.
 
-use firmware_sensor::{SCANS_PER_SAMPLE, Sensor};
+use firmware_sensor::{SCANS_PER_SAMPLE, Scan, Sensor};
 use protocol::{Contact, Estimate, GAUGES, GaugeHealth, Range, SensorConfiguration};
 
-use hil_sim_core::judge::Summary;
-use hil_sim_core::judge::estimates;
 use hil_sim_core::judge::truth::Truth;
+use hil_sim_core::judge::{Summary, estimates};
 use hil_sim_core::native;
 use hil_sim_core::plant::surface::Surface;
-use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::recording::{EstimateRecord, Recording};
 use hil_sim_core::scene::{Scene, SceneError};
 
@@ -19,27 +17,25 @@ use super::baselines::Rival;
 use super::baselines::adapter::{Answer, Entrant};
 use super::baselines::registry::{Visitor, show_all};
 use super::fourier::RealFft;
-use super::pitch::{mcleod, yin};
+use super::parts::{RIVALS_FROM, SETTINGS_FROM};
+use super::pitch::{mcleod, operations_of_mcleod, operations_of_yin, yin};
 use super::settings::{SETTINGS, Setting};
+use crate::study::Progress;
 
 /// Who runs.
-pub enum Contestant {
-    /// The firmware's sensor, with a setting.
-    Ours(Setting),
-    /// Another method.
-    Rival {
-        /// Its name.
-        method: &'static str,
-        /// Its window in ms; the notch's memory in ms, the PLL's bandwidth in Hz.
-        value: u16,
-        /// Its cost.
-        work: Work,
-        /// Makes one.
-        start: Box<dyn Fn() -> Box<dyn Run> + Send + Sync>,
-    },
+pub struct Contestant {
+    pub method: &'static str,
+    /// The knob that is swept, and its value.
+    pub knob: &'static str,
+    pub value: u16,
+    /// If it is the firmware's.
+    pub setting: Option<Setting>,
+    pub work: Work,
+    /// Makes one, for the sensor of a scene.
+    start: Box<dyn Fn(SensorConfiguration) -> Box<dyn Run> + Send + Sync>,
 }
 
-/// How a rival's cost is known.
+/// How its cost is known.
 #[derive(Clone, Copy, Debug)]
 pub enum Work {
     /// It runs on the board: the part of this number there.
@@ -49,21 +45,13 @@ pub enum Work {
 }
 
 /// Something that answers while scans come.
-pub trait Run {
+trait Run {
     /// Takes a millisecond.
-    fn step(
-        &mut self,
-        scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE],
-        encoder: u16,
-    ) -> Option<Answer>;
+    fn step(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer>;
 }
 
 impl<R: Rival> Run for Entrant<R> {
-    fn step(
-        &mut self,
-        scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE],
-        encoder: u16,
-    ) -> Option<Answer> {
+    fn step(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer> {
         Entrant::step(self, scans, encoder)
     }
 }
@@ -75,11 +63,7 @@ struct Board {
 }
 
 impl Run for Board {
-    fn step(
-        &mut self,
-        scans: &[firmware_sensor::Scan; SCANS_PER_SAMPLE],
-        encoder: u16,
-    ) -> Option<Answer> {
+    fn step(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer> {
         self.instant_us += 1_000;
         let output = self.sensor.step(self.instant_us, scans, encoder);
         output.estimate.map(|estimate| Answer {
@@ -90,139 +74,81 @@ impl Run for Board {
 }
 
 impl Contestant {
-    /// The method's name.
-    pub fn method(&self) -> &'static str {
-        match self {
-            Self::Ours(setting) => setting.method_name(),
-            Self::Rival { method, .. } => method,
-        }
-    }
-
-    /// The knob that is swept.
-    pub fn knob(&self) -> &'static str {
-        match self {
-            Self::Ours(setting) => setting.knob_name(),
-            Self::Rival { method: "PLL", .. } => "bandwidth_hz",
-            Self::Rival {
-                method: "Pei–Tseng notch",
-                ..
-            } => "memory_ms",
-            Self::Rival { .. } => "window_ms",
-        }
-    }
-
-    /// Its value.
-    pub fn value(&self) -> u16 {
-        match self {
-            Self::Ours(setting) => setting.value,
-            Self::Rival { value, .. } => *value,
-        }
-    }
-
-    /// The setting, if it is one of ours.
-    pub fn setting(&self) -> Option<Setting> {
-        match self {
-            Self::Ours(setting) => Some(*setting),
-            Self::Rival { .. } => None,
-        }
-    }
-
-    fn start(&self, scene: SensorConfiguration) -> Box<dyn Run> {
-        match self {
-            Self::Ours(setting) => Box::new(Board {
-                sensor: Sensor::new(setting.on(scene)),
-                instant_us: 0,
+    /// The firmware's sensor with a setting, whose cost is that of a part.
+    pub fn ours(setting: Setting, part: u32) -> Self {
+        Self {
+            method: setting.method_name(),
+            knob: setting.knob_name(),
+            value: setting.value,
+            setting: Some(setting),
+            work: Work::Part(part),
+            start: Box::new(move |scene| {
+                Box::new(Board {
+                    sensor: Sensor::new(setting.on(scene)),
+                    instant_us: 0,
+                })
             }),
-            Self::Rival { start, .. } => start(),
+        }
+    }
+
+    fn rival<R: Rival + 'static>(
+        method: &'static str,
+        value: u16,
+        work: Work,
+        rival: fn() -> R,
+    ) -> Self {
+        Self {
+            method,
+            knob: match method {
+                "PLL" => "bandwidth_hz",
+                "Pei–Tseng notch" => "memory_ms",
+                _ => "window_ms",
+            },
+            value,
+            setting: None,
+            work,
+            start: Box::new(move |_| Box::new(Entrant::new(rival()))),
         }
     }
 }
 
 /// All contestants: ours, the rivals that run on the board, the others.
 pub fn contestants() -> Vec<Contestant> {
-    let mut field = Field(SETTINGS.map(Contestant::Ours).into());
+    let ours = (SETTINGS_FROM..).zip(SETTINGS);
+    let mut field = Field(ours.map(|(part, of)| Contestant::ours(of, part)).collect());
     show_all::<RealFft>(&mut field);
-    field.guest(
-        "YIN",
-        160,
-        super::pitch::operations_of_yin::<160>,
-        yin::<160>,
-    );
-    field.guest(
-        "YIN",
-        320,
-        super::pitch::operations_of_yin::<320>,
-        yin::<320>,
-    );
-    field.guest(
-        "McLeod",
-        160,
-        super::pitch::operations_of_mcleod::<160, 256>,
-        mcleod::<160, 256>,
-    );
-    field.guest(
-        "McLeod",
-        320,
-        super::pitch::operations_of_mcleod::<320, 512>,
-        mcleod::<320, 512>,
-    );
+    let [yin_160, yin_320] = [operations_of_yin::<160>, operations_of_yin::<320>];
+    let mcleod_160 = Work::Operations(operations_of_mcleod::<160, 256>);
+    let mcleod_320 = Work::Operations(operations_of_mcleod::<320, 512>);
+    field.0.extend([
+        Contestant::rival("YIN", 160, Work::Operations(yin_160), yin::<160>),
+        Contestant::rival("YIN", 320, Work::Operations(yin_320), yin::<320>),
+        Contestant::rival("McLeod", 160, mcleod_160, mcleod::<160, 256>),
+        Contestant::rival("McLeod", 320, mcleod_320, mcleod::<320, 512>),
+    ]);
     field.0
 }
 
 struct Field(Vec<Contestant>);
 
-impl Field {
-    fn guest<R: Rival + 'static>(
-        &mut self,
-        method: &'static str,
-        value: u16,
-        operations: fn() -> u64,
-        rival: fn() -> R,
-    ) {
-        self.enter(method, value, Work::Operations(operations), rival);
-    }
-
-    fn enter<R: Rival + 'static>(
-        &mut self,
-        method: &'static str,
-        value: u16,
-        work: Work,
-        rival: fn() -> R,
-    ) {
-        self.0.push(Contestant::Rival {
-            method,
-            value,
-            work,
-            start: Box::new(move || Box::new(Entrant::new(rival()))),
-        });
-    }
-}
-
 impl Visitor for Field {
     fn visit<R: Rival + 'static>(&mut self, method: &'static str, value: u16, rival: fn() -> R) {
         let before = (self.0.len() - SETTINGS.len()) as u32;
-        let work = Work::Part(super::parts::RIVALS_FROM + before);
-        self.enter(method, value, work, rival);
+        let work = Work::Part(RIVALS_FROM + before);
+        self.0.push(Contestant::rival(method, value, work, rival));
     }
 }
 
-/// Runs every contestant over every scene, on all cores: for each scene, in the order given, a summary
-/// for each contestant, in theirs. What is said before `from_s` of a scene, in s, is not judged. `done` is
-/// told after each scene.
-///
-/// # Errors
-/// If a scene can't be run.
+/// Runs every contestant over every scene: for each scene, in the order given, a summary
+/// for each contestant, in theirs. What is said before `from_s` of a scene is not judged.
 pub fn run(
     contestants: &[Contestant],
     scenes: &[&Scene],
     from_s: impl Fn(&Scene) -> f64 + Sync,
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Vec<Vec<Summary>>, SceneError> {
-    on_all_cores(scenes, |scene| {
-        let result = run_scene(contestants, scene, from_s(scene));
-        done();
-        result
-    })
+    progress.begin(scenes.len());
+    progress.each(scenes, |scene| run_scene(contestants, scene, from_s(scene)))
 }
 
 fn run_scene(
@@ -234,19 +160,14 @@ fn run_scene(
     let surface = Surface::new(&scene.surface, 0.0);
     let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
     let truth = Truth::new(&scene.name, "", &wavelength_mm);
-    Ok(contestants
-        .iter()
-        .map(|contestant| {
-            recording.estimates = answers(
-                &mut *contestant.start(scene.sensor_configuration()),
-                &recording,
-            );
-            recording
-                .estimates
-                .retain(|record| record.made_ns as f64 * 1e-9 >= from_s);
-            estimates::judge(&truth, &recording).1
-        })
-        .collect())
+    let summary = |contestant: &Contestant| {
+        let mut started = (contestant.start)(scene.sensor_configuration());
+        let mut answers = answers(&mut *started, &recording);
+        answers.retain(|record| record.made_ns as f64 * 1e-9 >= from_s);
+        recording.estimates = answers;
+        estimates::judge(&truth, &recording).1
+    };
+    Ok(contestants.iter().map(summary).collect())
 }
 
 fn answers(contestant: &mut dyn Run, recording: &Recording) -> Vec<EstimateRecord> {
@@ -418,11 +339,11 @@ mod tests {
         let scenes = [Scene::constant(2.0, 50.0), Scene::constant(3.0, 70.0)];
         let scenes: Vec<&Scene> = scenes.iter().collect();
         let field = contestants();
-        let first = run(&field, &scenes, |_| 0.0, || {}).unwrap();
-        assert_eq!(first, run(&field, &scenes, |_| 0.0, || {}).unwrap());
+        let first = run(&field, &scenes, |_| 0.0, &()).unwrap();
+        assert_eq!(first, run(&field, &scenes, |_| 0.0, &()).unwrap());
         assert_eq!(first.len(), 2);
         let backwards: Vec<&Scene> = scenes.iter().rev().copied().collect();
-        let second = run(&field, &backwards, |_| 0.0, || {}).unwrap();
+        let second = run(&field, &backwards, |_| 0.0, &()).unwrap();
         assert_eq!(first[0], second[1]);
         assert_eq!(first[0].len(), field.len());
     }

@@ -5,40 +5,42 @@
 //!
 //! Intervals are by the bootstrap over surfaces: estimates of one surface depend on each other.
 
-pub mod picture;
-pub mod strangers;
+mod picture;
+mod strangers;
+
+use std::collections::BTreeMap;
 
 use protocol::SensorConfiguration;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::Serialize;
 
 use crate::psychophysics::interval::{Interval, middle};
-use crate::study::{Fixed, Study, csv_text};
+use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 
 /// Relative error within which an estimate is right.
-pub const RIGHT: f64 = 0.05;
+const RIGHT: f64 = 0.05;
 /// Relative error above which it is wrong, if it is stood by.
-pub const WRONG: f64 = 0.1;
+const WRONG: f64 = 0.1;
 /// Goal of the expected calibration error.
-pub const GOAL: f64 = 0.05;
+const GOAL: f64 = 0.05;
 /// Bins of the diagram, equally wide.
-pub const BINS: usize = 10;
+const BINS: usize = 10;
 /// Levels of confidence: whole percents, 0 to 100.
-pub const LEVELS: usize = 101;
+const LEVELS: usize = 101;
+/// Levels of the printed table, in percent.
+const TOLD: [usize; 8] = [0, 50, 70, 80, 85, 90, 95, 98];
 /// Surfaces are drawn anew so often for the intervals.
 const RESAMPLES: usize = 1_000;
 const SEED: u64 = 1;
 
-/// Estimates of one surface that fell into a bin.
+/// Estimates that fell into a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bin {
-    /// How many.
-    pub estimates: u32,
+struct Bin {
+    estimates: u32,
     /// Their confidence, added up.
-    pub confidence: f64,
+    confidence: f64,
     /// How many of them were right.
-    pub right: u32,
+    right: u32,
 }
 
 impl Bin {
@@ -49,7 +51,7 @@ impl Bin {
     }
 
     /// Mean confidence and share of right ones; none if it is empty.
-    pub fn means(&self) -> Option<(f64, f64)> {
+    fn means(&self) -> Option<(f64, f64)> {
         let count = f64::from(self.estimates);
         (self.estimates > 0).then(|| (self.confidence / count, f64::from(self.right) / count))
     }
@@ -57,26 +59,26 @@ impl Bin {
 
 /// What came of a surface.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tally {
-    /// Its class, for tables.
-    pub class: &'static str,
+struct Tally {
+    /// For tables.
+    class: &'static str,
     /// Whether any λ is right there.
-    pub has_a_period: bool,
+    has_a_period: bool,
     /// Estimates with a λ while the arm moved, by confidence.
-    pub bins: [Bin; BINS],
+    bins: [Bin; BINS],
     /// Estimates that count for the levels, with a λ or without.
-    pub counted: u32,
+    counted: u32,
     /// Of those, the ones with a λ, by confidence in whole percents, rounded down: within 5 %.
-    pub right: [u32; LEVELS],
+    right: [u32; LEVELS],
     /// More than 10 % off, or any λ where there is no period.
-    pub wrong: [u32; LEVELS],
+    wrong: [u32; LEVELS],
     /// All.
-    pub said: [u32; LEVELS],
+    said: [u32; LEVELS],
 }
 
 impl Tally {
     /// Before anything was said.
-    pub fn new(class: &'static str, has_a_period: bool) -> Self {
+    fn new(class: &'static str, has_a_period: bool) -> Self {
         Self {
             class,
             has_a_period,
@@ -90,16 +92,17 @@ impl Tally {
 
     /// Counts an estimate: its confidence, 0 to 1, and its relative error (any, but infinite where there is no
     /// period).
-    pub fn heard(&mut self, confidence: f32, error: f64) {
+    fn heard(&mut self, confidence: f32, error: f64) {
         let confidence = f64::from(confidence).clamp(0.0, 1.0);
-        let bin = &mut self.bins[((confidence * BINS as f64) as usize).min(BINS - 1)];
-        bin.estimates += 1;
-        bin.confidence += confidence;
-        bin.right += u32::from(error.abs() <= RIGHT);
+        self.bins[((confidence * BINS as f64) as usize).min(BINS - 1)].add(&Bin {
+            estimates: 1,
+            confidence,
+            right: u32::from(error.abs() <= RIGHT),
+        });
     }
 
     /// Counts an estimate for the levels; none if it has no λ.
-    pub fn judged(&mut self, said: Option<(f32, f64)>) {
+    fn judged(&mut self, said: Option<(f32, f64)>) {
         self.counted += 1;
         let Some((confidence, error)) = said else {
             return;
@@ -112,53 +115,52 @@ impl Tally {
     }
 }
 
-/// A bin over all surfaces.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bar {
-    /// All of its estimates.
-    pub bin: Bin,
-    /// Where the share of right ones may really lie.
-    pub interval: Option<Interval>,
-}
-
 /// What a level of confidence gives, as shares of the estimates that count.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Level {
-    /// Estimates from this confidence on, in percent, are stood by.
-    pub percent: u8,
+struct Level {
+    /// Estimates from this confidence on are stood by.
+    percent: u8,
     /// Surfaces with a period: within 5 %.
-    pub right: f64,
+    right: f64,
     /// The same: more than 10 % off.
-    pub wrong: f64,
+    wrong: f64,
     /// The same: nothing is stood by.
-    pub silent: f64,
+    silent: f64,
     /// Surfaces without a period: anything is stood by.
-    pub plain: f64,
+    plain: f64,
 }
 
 /// The whole answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability {
     /// Surfaces asked.
-    pub surfaces: usize,
-    /// The bins, by rising confidence.
-    pub bars: Vec<Bar>,
+    surfaces: usize,
+    /// The bins of all surfaces by rising confidence, each with where its share of right ones may really lie.
+    bars: Vec<(Bin, Option<Interval>)>,
     /// Expected calibration error: the mean distance of a bin's share of right ones from its mean
     /// confidence, each bin weighing as much as it has estimates. None without any.
-    pub error: Option<f64>,
+    error: Option<f64>,
     /// Where it may really lie.
-    pub error_interval: Option<Interval>,
+    error_interval: Option<Interval>,
     /// The levels 0 to 100 %.
-    pub levels: Vec<Level>,
+    levels: Vec<Level>,
     /// The classes and their estimates, those of one class as one bin.
-    pub classes: Vec<(&'static str, Bin)>,
+    classes: Vec<(&'static str, Bin)>,
+}
+
+/// Asks the firmware's sensor about the surfaces of these seeds.
+pub fn measure(seeds: &[u64], progress: &impl Progress) -> Reliability {
+    Reliability::of(&strangers::ask(
+        seeds,
+        SensorConfiguration::DEFAULT,
+        progress,
+    ))
 }
 
 impl Reliability {
-    /// Of these surfaces.
-    pub fn of(tallies: &[Tally]) -> Self {
+    fn of(tallies: &[Tally]) -> Self {
         let mut draws = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        let mut shares: [Vec<f64>; BINS] = std::array::from_fn(|_| Vec::new());
+        let mut shares = [const { Vec::new() }; BINS];
         let mut errors = Vec::new();
         for _ in 0..RESAMPLES {
             let drawn = (0..tallies.len()).map(|_| &tallies[draws.random_range(0..tallies.len())]);
@@ -171,14 +173,7 @@ impl Reliability {
         let bins = sum(tallies.iter());
         Self {
             surfaces: tallies.len(),
-            bars: bins
-                .into_iter()
-                .zip(shares)
-                .map(|(bin, shares)| Bar {
-                    bin,
-                    interval: middle(shares),
-                })
-                .collect(),
+            bars: bins.into_iter().zip(shares.map(middle)).collect(),
             error: calibration_error(&bins),
             error_interval: middle(errors),
             levels: levels(tallies),
@@ -186,79 +181,110 @@ impl Reliability {
         }
     }
 
-    /// Whether the goal is met; not without any estimate.
-    pub fn meets_goal(&self) -> bool {
-        self.error.is_some_and(|error| error <= GOAL)
+    /// The calibration error's interval, as it stands behind it; nothing without any estimate.
+    fn told_interval(&self) -> String {
+        let ends = |interval: Interval| format!(" ({:.3}–{:.3})", interval.low, interval.high);
+        self.error_interval.map_or(String::new(), ends)
     }
 }
 
-/// A bin, a level or a class.
-#[derive(Default, Serialize)]
-struct Record {
-    what: &'static str,
-    of: String,
-    estimates: Option<u32>,
-    confidence: Fixed<5>,
-    right: Fixed<5>,
-    low: Fixed<5>,
-    high: Fixed<5>,
-    wrong: Fixed<5>,
-    silent: Fixed<5>,
-    plain: Fixed<5>,
+/// A bin of a range or a class, for a table.
+fn told(of: &'static str, which: &str, bin: &Bin) -> Record {
+    let (confidence, share) = bin.means().unzip();
+    Record::default()
+        .with(of, which)
+        .with("estimates:", short(bin.estimates))
+        .with("mean confidence:", number(confidence, 3))
+        .with("within 5 %:", number(share, 3))
 }
 
-impl Record {
-    fn of_bin(what: &'static str, of: String, bin: &Bin, interval: Option<Interval>) -> Self {
-        let (confidence, right) = bin.means().unzip();
-        let ends = interval.map(|interval| (interval.low, interval.high));
-        let (low, high) = ends.unzip();
-        Self {
-            what,
-            of,
-            estimates: Some(bin.estimates),
-            confidence: confidence.into(),
-            right: right.into(),
-            low: low.into(),
-            high: high.into(),
-            ..Self::default()
-        }
-    }
-
-    fn of_level(level: &Level) -> Self {
-        Self {
-            what: "level",
-            of: level.percent.to_string(),
-            right: level.right.into(),
-            wrong: level.wrong.into(),
-            silent: level.silent.into(),
-            plain: level.plain.into(),
-            ..Self::default()
-        }
-    }
+/// A bin, a class or a level, for the CSV.
+fn record(
+    what: &str,
+    of: &str,
+    bin: Option<&Bin>,
+    ends: Option<Interval>,
+    level: Option<&Level>,
+) -> Record {
+    let (confidence, right) = bin.and_then(Bin::means).unzip();
+    Record::default()
+        .with("what", what)
+        .with("of", of)
+        .with("estimates", bin.map(|bin| short(bin.estimates)))
+        .with("confidence", fixed(confidence, 5))
+        .with("right", fixed(right.or(level.map(|level| level.right)), 5))
+        .with("low", fixed(ends.map(|ends| ends.low), 5))
+        .with("high", fixed(ends.map(|ends| ends.high), 5))
+        .with("wrong", fixed(level.map(|level| level.wrong), 5))
+        .with("silent", fixed(level.map(|level| level.silent), 5))
+        .with("plain", fixed(level.map(|level| level.plain), 5))
 }
 
 impl Study for Reliability {
     const NAME: &'static str = "confidence";
 
-    /// The bins, then the levels, then the classes.
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let bins = self.bars.iter().enumerate().map(|(index, bar)| {
-            let from = format!("{:.1}", index as f64 / BINS as f64);
-            Record::of_bin("bin", from, &bar.bin, bar.interval)
+    /// The bins, the calibration error, some levels and the classes, as Markdown.
+    fn text(&self) -> Option<String> {
+        let bins = self
+            .bars
+            .iter()
+            .enumerate()
+            .map(|(index, (bin, interval))| {
+                let end = |index: usize| index as f64 / BINS as f64;
+                let interval = interval.map(|of| format!("{:.3}–{:.3}", of.low, of.high));
+                let range = format!("{:.1}–{:.1}", end(index), end(index + 1));
+                told("confidence", &range, bin)
+                    .with("95 % interval", interval.unwrap_or("–".to_owned()))
+            });
+        let levels = TOLD.map(|level| &self.levels[level]).map(|level| {
+            Record::default()
+                .with("stood by from:", format!("{} %", level.percent))
+                .with("right:", number(level.right, 3))
+                .with("wrong:", number(level.wrong, 4))
+                .with("silent:", number(level.silent, 3))
+                .with("without a period: stood by:", number(level.plain, 4))
         });
-        let levels = self.levels.iter().map(Record::of_level);
+        let classes = self
+            .classes
+            .iter()
+            .map(|(class, bin)| told("class", class, bin));
+        Some(format!(
+            "{}\n\nExpected calibration error over {} surfaces: {}{}; goal {GOAL}.\n\n{}\n\n{}\n",
+            Table::from_iter(bins),
+            self.surfaces,
+            number(self.error, 3),
+            self.told_interval(),
+            Table::from_iter(levels),
+            Table::from_iter(classes),
+        ))
+    }
+
+    /// The bins, then the levels, then the classes.
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let bins = self
+            .bars
+            .iter()
+            .enumerate()
+            .map(|(index, (bin, interval))| {
+                let from = format!("{:.1}", index as f64 / BINS as f64);
+                record("bin", &from, Some(bin), *interval, None)
+            });
+        let levels = self.levels.iter().map(|level| {
+            let percent = level.percent.to_string();
+            record("level", &percent, None, None, Some(level))
+        });
         let classes = self.classes.iter();
-        let classes =
-            classes.map(|(class, bin)| Record::of_bin("class", (*class).to_owned(), bin, None));
-        Ok(vec![("", csv_text(bins.chain(levels).chain(classes))?)])
+        let classes = classes.map(|(class, bin)| record("class", class, Some(bin), None, None));
+        vec![("", csv(bins.chain(levels).chain(classes)))]
     }
 
     fn picture(&self) -> String {
         picture::draw(self, SensorConfiguration::DEFAULT.valid_percent)
     }
 
+    /// Not without any estimate.
     fn is_met(&self) -> bool {
-        self.meets_goal()
+        self.error.is_some_and(|error| error <= GOAL)
     }
 }
 
@@ -284,46 +310,35 @@ fn calibration_error(bins: &[Bin]) -> Option<f64> {
 }
 
 fn levels(tallies: &[Tally]) -> Vec<Level> {
-    let counted = |has_a_period: bool| -> f64 {
-        let those = tallies.iter().filter(|t| t.has_a_period == has_a_period);
-        those.map(|tally| f64::from(tally.counted)).sum::<f64>()
-    };
     let from = |has_a_period: bool, level: usize, which: fn(&Tally) -> &[u32; LEVELS]| -> f64 {
-        let those = tallies.iter().filter(|t| t.has_a_period == has_a_period);
-        let count: u64 = those
-            .flat_map(|tally| &which(tally)[level..])
-            .map(|count| u64::from(*count))
-            .sum();
-        let all = counted(has_a_period);
+        let those = || tallies.iter().filter(|t| t.has_a_period == has_a_period);
+        let counts = those().flat_map(|tally| &which(tally)[level..]);
+        let count: u64 = counts.map(|count| u64::from(*count)).sum();
+        let all: f64 = those().map(|tally| f64::from(tally.counted)).sum();
         if all > 0.0 { count as f64 / all } else { 0.0 }
     };
-    (0..LEVELS)
-        .map(|level| Level {
-            percent: level as u8,
-            right: from(true, level, |tally| &tally.right),
-            wrong: from(true, level, |tally| &tally.wrong),
-            silent: 1.0 - from(true, level, |tally| &tally.said),
-            plain: from(false, level, |tally| &tally.said),
-        })
-        .collect()
+    let level = |level: usize| Level {
+        percent: level as u8,
+        right: from(true, level, |tally| &tally.right),
+        wrong: from(true, level, |tally| &tally.wrong),
+        silent: 1.0 - from(true, level, |tally| &tally.said),
+        plain: from(false, level, |tally| &tally.said),
+    };
+    (0..LEVELS).map(level).collect()
 }
 
 /// Each class's estimates as one bin, in the classes' order of appearance by name.
 fn classes(tallies: &[Tally]) -> Vec<(&'static str, Bin)> {
-    let mut classes = std::collections::BTreeMap::<_, Bin>::new();
+    let mut classes = BTreeMap::<_, Bin>::new();
     for tally in tallies {
         // Those with a period first.
         let class = classes
             .entry((!tally.has_a_period, tally.class))
             .or_default();
-        for bin in &tally.bins {
-            class.add(bin);
-        }
+        tally.bins.iter().for_each(|bin| class.add(bin));
     }
-    classes
-        .into_iter()
-        .map(|((_, class), bin)| (class, bin))
-        .collect()
+    let classes = classes.into_iter();
+    classes.map(|((_, class), bin)| (class, bin)).collect()
 }
 
 #[cfg(test)]
@@ -358,11 +373,11 @@ mod tests {
             "{:?}",
             reliability.error
         );
-        assert!(reliability.meets_goal());
+        assert!(reliability.is_met());
         // Of ten intervals of 95 %, two that miss are already rare (9 %), three very (1 %).
-        let missed = reliability.bars.iter().filter(|bar| {
-            let confidence = bar.bin.means().unwrap().0;
-            let interval = bar.interval.unwrap();
+        let missed = reliability.bars.iter().filter(|(bin, interval)| {
+            let confidence = bin.means().unwrap().0;
+            let interval = interval.unwrap();
             !(interval.low..=interval.high).contains(&confidence)
         });
         assert!(missed.count() < 3);
@@ -377,7 +392,7 @@ mod tests {
         assert!((error - 1.0 / 6.0).abs() < 0.014, "{error}");
         let interval = reliability.error_interval.unwrap();
         assert!((interval.low..=interval.high).contains(&error));
-        assert!(!reliability.meets_goal());
+        assert!(!reliability.is_met());
     }
 
     #[test]
@@ -404,9 +419,9 @@ mod tests {
     fn nothing_said_is_no_answer_and_misses_the_goal() {
         let silent = Reliability::of(&[Tally::new("flat", false)]);
         assert_eq!(silent.error, None);
-        assert!(!silent.meets_goal());
+        assert!(!silent.is_met());
         // The columns, the bins, the levels and a class.
-        let csv = &silent.csvs().unwrap()[0].1;
+        let csv = &silent.csvs()[0].1;
         assert_eq!(csv.lines().count(), 1 + BINS + LEVELS + 1);
     }
 }

@@ -6,10 +6,9 @@ use std::path::Path;
 use hil_sim_boards::ElfError;
 use hil_sim_boards::cost::{Taken, measure_example};
 
-use super::benchmark::{Contestant, Work};
+use super::benchmark::Work;
 use super::fourier::operations_of_transform;
-use super::parts::{FRONT, SETTINGS_FROM, TRANSFORM};
-use super::settings::SETTINGS;
+use super::parts::{FRONT, TRANSFORM};
 
 /// Milliseconds from one answer to the next.
 const MS_PER_ANSWER: f64 =
@@ -24,54 +23,37 @@ pub struct Cost {
     pub worst: Option<f64>,
 }
 
-/// The counts of the example `estimator_cost`.
-#[derive(Clone, Debug)]
-pub struct Costs {
-    parts: BTreeMap<u64, Taken>,
-}
+/// The counts of the example `estimator_cost`, part by part.
+pub struct Costs(BTreeMap<u64, Taken>);
 
 impl Costs {
     /// Runs that example's ELF on an emulated board.
-    ///
-    /// # Errors
-    /// If it can't be read, or does not come to its end.
     pub fn count(path: &Path) -> Result<Self, ElfError> {
-        let parts = measure_example(path, "firmware-sensor --example estimator_cost")?;
-        Ok(Self { parts })
+        measure_example(path, "firmware-sensor --example estimator_cost").map(Self)
     }
 
-    /// What a contestant costs; none if its part is missing in the ELF. `index` is its place among the
-    /// settings, if it is ours.
+    /// What a contestant costs; none if its part is missing in the ELF.
     ///
     /// The crates of YIN and McLeod need an allocator and a standard library. Their arithmetic is counted
     /// on the host, and an operation of theirs taken to cost as many instructions as one of a real
     /// Fourier transform does: the board's count of `microfft`'s over the operations of `realfft`'s at
     /// the same length. (Most of what either detector does is Fourier transforms.)
-    pub fn of(&self, index: usize, contestant: &Contestant) -> Option<Cost> {
-        let work = match contestant {
-            Contestant::Ours(_) if index < SETTINGS.len() => {
-                Work::Part(SETTINGS_FROM + index as u32)
-            }
-            Contestant::Ours(_) => return None,
-            Contestant::Rival { work, .. } => *work,
-        };
+    pub fn of(&self, work: Work) -> Option<Cost> {
         match work {
             Work::Part(part) => self.part(part),
-            Work::Operations(operations) => Some(Cost {
-                mean: self.part(FRONT)?.mean
-                    + operations() as f64 * self.instructions_per_operation()? / MS_PER_ANSWER,
-                worst: None,
-            }),
+            Work::Operations(operations) => {
+                let per_operation = self.part(TRANSFORM)?.mean / operations_of_transform() as f64;
+                Some(Cost {
+                    mean: self.part(FRONT)?.mean
+                        + operations() as f64 * per_operation / MS_PER_ANSWER,
+                    worst: None,
+                })
+            }
         }
     }
 
-    /// Instructions on the board for one arithmetic operation, all that goes with it included.
-    pub fn instructions_per_operation(&self) -> Option<f64> {
-        Some(self.part(TRANSFORM)?.mean / operations_of_transform() as f64)
-    }
-
     fn part(&self, part: u32) -> Option<Cost> {
-        let taken = self.parts.get(&u64::from(part))?;
+        let taken = self.0.get(&u64::from(part))?;
         Some(Cost {
             mean: taken.total as f64 / taken.pieces as f64,
             worst: Some(taken.largest as f64),

@@ -8,7 +8,7 @@ use hil_sim_core::scene::{Contact, Gauges, Kinematic, Motion, Scene, SceneError}
 use super::bound::Tone;
 
 /// Every family: its folder, and its title in the chart.
-pub const FAMILIES: [(&str, &str); 11] = [
+const FAMILIES: [(&str, &str); 11] = [
     ("table-1-20-db", "Table I, 20 dB"),
     ("table-1-0-db", "Table I, 0 dB"),
     ("off-grid", "λ = 0.8–5 mm"),
@@ -39,33 +39,18 @@ pub enum FamilyError {
     /// A folder can't be read.
     #[error(
         "{}: can't be read: give the folder of the families with --scenes, hil-sim/scenes/estimation",
-        path.display()
+        .0.display()
     )]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A folder that no family is made of.
-    #[error("{}: is no family: there are {}", path.display(), folders().join(", "))]
-    Unknown {
-        /// The folder, or a file among them.
-        path: PathBuf,
-    },
+    Folder(PathBuf, #[source] std::io::Error),
+    /// A folder that no family is made of, or a file among them.
+    #[error("{}: is no family: there are {}", .0.display(), FAMILIES.map(|of| of.0).join(", "))]
+    Unknown(PathBuf),
     /// A family without a scene.
-    #[error("{}: holds no scene: a family needs one .toml file or more", path.display())]
-    Empty {
-        /// The folder.
-        path: PathBuf,
-    },
+    #[error("{}: holds no scene: a family needs one .toml file or more", .0.display())]
+    Empty(PathBuf),
     /// A scene can't be used.
     #[error(transparent)]
     Scene(#[from] SceneError),
-}
-
-fn folders() -> Vec<&'static str> {
-    FAMILIES.iter().map(|(folder, _)| *folder).collect()
 }
 
 /// Reads all families below `root`, where nothing else may be.
@@ -74,45 +59,35 @@ fn folders() -> Vec<&'static str> {
 /// If a folder is missing, unknown or empty, or a scene can't be used.
 pub fn load(root: &Path) -> Result<Vec<Family>, FamilyError> {
     for path in entries(root)? {
-        let known = path
-            .file_name()
-            .is_some_and(|name| folders().iter().any(|folder| name == *folder));
-        if !known {
-            return Err(FamilyError::Unknown { path });
+        let name = path.file_name().unwrap_or_default();
+        if FAMILIES.iter().all(|(folder, _)| name != *folder) {
+            return Err(FamilyError::Unknown(path));
         }
     }
-    FAMILIES
-        .into_iter()
-        .map(|(folder, title)| {
-            let path = root.join(folder);
-            let mut scenes = Vec::new();
-            for file in entries(&path)? {
-                if file.extension().is_some_and(|ending| ending == "toml") {
-                    scenes.push(Scene::load(&file)?);
-                }
-            }
-            if scenes.is_empty() {
-                return Err(FamilyError::Empty { path });
-            }
-            Ok(Family {
-                folder,
-                title,
-                scenes,
-            })
+    let load = |(folder, title)| {
+        let path = root.join(folder);
+        let files = entries(&path)?.into_iter();
+        let files = files.filter(|file| file.extension().is_some_and(|ending| ending == "toml"));
+        let scenes = files.map(|file| Scene::load(&file));
+        let scenes: Vec<Scene> = scenes.collect::<Result<_, _>>()?;
+        if scenes.is_empty() {
+            return Err(FamilyError::Empty(path));
+        }
+        Ok(Family {
+            folder,
+            title,
+            scenes,
         })
-        .collect()
+    };
+    FAMILIES.into_iter().map(load).collect()
 }
 
 /// What a folder holds, in the order of the names.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, FamilyError> {
-    let error = |source| FamilyError::Folder {
-        path: folder.to_owned(),
-        source,
-    };
-    let mut paths = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(error)? {
-        paths.push(entry.map_err(error)?.path());
-    }
+    let error = |source| FamilyError::Folder(folder.to_owned(), source);
+    let entries = std::fs::read_dir(folder).map_err(error)?;
+    let paths = entries.map(|entry| entry.map(|entry| entry.path()).map_err(error));
+    let mut paths: Vec<PathBuf> = paths.collect::<Result<_, _>>()?;
     paths.sort();
     Ok(paths)
 }
@@ -120,17 +95,19 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, FamilyError> {
 impl Family {
     /// The loosest bound on the RMS error that its scenes expect, in percent.
     pub fn goal_percent(&self) -> Option<f64> {
-        let bounds = self
-            .scenes
-            .iter()
-            .filter_map(|scene| scene.expect.wavelength_rms_percent);
+        let scenes = self.scenes.iter();
+        let bounds = scenes.filter_map(|scene| scene.expect.wavelength_rms_percent);
         bounds.reduce(f64::max)
     }
 
-    /// The root of the mean square over the scenes of the Cramér–Rao bound in percent, over a window
-    /// that depends on λ in mm and v in mm/s, in s, each gauge's slope unknown or not. None unless every scene is a steady tone in white
+    /// The root of the mean square over the scenes of the Cramér–Rao bound in percent, over a window in s
+    /// that depends on λ in mm and v in mm/s, each gauge's slope unknown or not. None unless every scene is a steady tone in white
     /// noise on sound gauges, which is what the bound is of.
-    pub fn bound_percent(&self, slope: bool, window_s: impl Fn(f64, f64) -> f64) -> Option<f64> {
+    pub(super) fn bound_percent(
+        &self,
+        slope: bool,
+        window_s: impl Fn(f64, f64) -> f64,
+    ) -> Option<f64> {
         let mut squares = 0.0;
         for scene in &self.scenes {
             let tone = Tone {
@@ -259,6 +236,6 @@ mod tests {
     #[test]
     fn a_folder_that_is_no_family_is_refused() {
         let error = load(&root().join("..")).unwrap_err();
-        assert!(matches!(error, FamilyError::Unknown { .. }), "{error}");
+        assert!(matches!(error, FamilyError::Unknown(_)), "{error}");
     }
 }

@@ -3,13 +3,12 @@
 use super::bank;
 use super::family::Family;
 use super::result::{BenchmarkResult, Entry, WINDOWS, Window};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::font::{Anchor, Font};
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
-use crate::output::plot::palette::{BLACK, BLUE, GREEN, GREY, INK, OCHRE, PURPLE, SOFT, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Point, Shape, Stroke, Symbol};
+use crate::output::plot::palette::{
+    BLACK, BLUE, Colour, GREEN, GREY, INK, OCHRE, PURPLE, SOFT, VERMILION,
+};
+use crate::output::plot::{
+    Anchor, Axis, Font, Key, Mark, Panel, Point, Shape, Stroke, Symbol, in_threes,
+};
 use crate::study::Study;
 
 /// What methods look like: no two share shape and colour.
@@ -35,26 +34,19 @@ const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 /// Words beside marks.
 const ASIDE: Font = Font::new(10.0);
 
-/// Draws it.
-pub fn draw(result: &BenchmarkResult) -> String {
-    let mut page = Page::default();
-    page.note(
-        "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated Cortex-M4F. \
+fn draw(result: &BenchmarkResult) -> String {
+    let note = "Down and to the left is better. Cost: ADC scans to λ, counted in the ELF on an emulated Cortex-M4F. \
          Ring: default; hollow: cost estimated; faint: valid share below ½. Bound: Cramér–Rao’s over 8 λ, 80 ms \
-         and 160 ms.",
-    );
+         and 160 ms.";
     let methods = LOOKS.map(|(name, symbol)| (Key::Symbol(symbol.hollow(estimated(name))), name));
-    let mut legend = methods.to_vec();
-    legend.extend([
-        (
-            Key::Line(knob_line("waves", BLUE)),
-            "spectrum: fits of 2–8 λ",
-        ),
-        (Key::Line(knob_line("gauges", BLUE)), "1, 3, 5 gauges"),
-        (Key::Line(BOUND), "bound"),
-        (Key::Line(BUDGET_LINE), "5 % of the M4F"),
-    ]);
-    page.legend(&legend);
+    let lines = [
+        (knob_line("waves", BLUE), "spectrum: fits of 2–8 λ"),
+        (knob_line("gauges", BLUE), "1, 3, 5 gauges"),
+        (BOUND, "bound"),
+        (BUDGET_LINE, "5 % of the M4F"),
+    ];
+    let lines = lines.map(|(stroke, words)| (Key::Line(stroke), words));
+    let legend = [&methods[..], &lines].concat();
     let families = result.families.iter().enumerate();
     let mut panels: Vec<Panel> = families
         .map(|(index, family)| match family.folder {
@@ -63,8 +55,7 @@ pub fn draw(result: &BenchmarkResult) -> String {
         })
         .collect();
     panels.push(against_settling(result));
-    page.panels(3, &[PANEL_HEIGHT], &panels);
-    page.finish()
+    in_threes(note, &legend, &panels)
 }
 
 /// The family whose settling time counts.
@@ -85,7 +76,13 @@ fn budget() -> Mark {
 /// How long each takes to settle, over its cost.
 fn settling(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let title = format!("{}: settled within 10 %, ms", family.title);
-    let goals = goals_ms(family);
+    let goals = family
+        .scenes
+        .iter()
+        .filter_map(|scene| scene.expect.settling_ms);
+    let mut goals: Vec<f64> = goals.collect();
+    goals.sort_by(f64::total_cmp);
+    goals.dedup();
     let goals = goals
         .iter()
         .map(|ms| Mark::Level(*ms, format!("goal {ms} ms")));
@@ -117,17 +114,14 @@ fn errors(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let goal = family
         .goal_percent()
         .map(|percent| Mark::Level(percent, format!("goal {percent} %")));
-    Panel::new(
-        format!("{}: RMS error, %", family.title),
-        &cost,
-        &error_axis(),
-    )
-    .with([budget()])
-    .with(bounds.flatten())
-    .with(goal)
-    .with(marks(result, index, &error_axis(), |entry| {
-        Some((entry.cost?.mean, entry.scores[index].rms_percent?))
-    }))
+    let title = format!("{}: RMS error, %", family.title);
+    Panel::new(title, &cost, &error_axis())
+        .with([budget()])
+        .with(bounds.flatten())
+        .with(goal)
+        .with(marks(result, index, &error_axis(), |entry| {
+            Some((entry.cost?.mean, entry.scores[index].rms_percent?))
+        }))
 }
 
 /// The first family's error over the time to settle, the fits' lengths beside their marks.
@@ -145,29 +139,12 @@ fn against_settling(result: &BenchmarkResult) -> Panel {
     };
     let fits = result.entries.iter().filter(|entry| entry.knob == "waves");
     let lengths = fits.filter_map(|entry| {
-        let words = format!("{} λ", entry.value);
-        Some(Mark::Words(
-            ASIDE.at(Anchor::Middle),
-            place(entry)?,
-            (0.0, 19.0),
-            words,
-        ))
+        let (font, words) = (ASIDE.at(Anchor::Middle), format!("{} λ", entry.value));
+        Some(Mark::Words(font, place(entry)?, (0.0, 19.0), words))
     });
-    let lengths: Vec<Mark> = lengths.collect();
     panel
         .with(marks(result, 0, &error_axis(), place))
         .with(lengths)
-}
-
-fn goals_ms(family: &Family) -> Vec<f64> {
-    let mut goals: Vec<f64> = family
-        .scenes
-        .iter()
-        .filter_map(|scene| scene.expect.settling_ms)
-        .collect();
-    goals.sort_by(f64::total_cmp);
-    goals.dedup();
-    goals
 }
 
 /// Lines along the knobs, then every mark; `family` is whose valid share makes one faint.
@@ -180,16 +157,13 @@ fn marks(
     // A time beyond an even axis is left out; an error beyond its edge stands at it.
     let at = |entry: &Entry| place(entry).filter(|point| y.logarithmic || point.1 <= y.high);
     let mut marks = Vec::new();
-    for pair in result.entries.windows(2) {
-        let [from, to] = [&pair[0], &pair[1]];
-        if (from.method, from.knob) != (to.method, to.knob) {
-            continue;
-        }
-        if let (Some(start), Some(end), Some(look)) = (at(from), at(to), look(from.method)) {
-            marks.push(Mark::Line(
-                knob_line(from.knob, look.colour),
-                vec![start, end],
-            ));
+    for [from, to] in result.entries.array_windows() {
+        let is_sweep = (from.method, from.knob) == (to.method, to.knob);
+        if let (true, Some(start), Some(end), Some(look)) =
+            (is_sweep, at(from), at(to), look(from.method))
+        {
+            let stroke = knob_line(from.knob, look.colour);
+            marks.push(Mark::Line(stroke, vec![start, end]));
         }
     }
     for entry in &result.entries {
@@ -222,7 +196,7 @@ fn estimated(method: &str) -> bool {
     matches!(method, "YIN" | "McLeod")
 }
 
-fn knob_line(knob: &str, colour: crate::output::plot::palette::Colour) -> Stroke {
+fn knob_line(knob: &str, colour: Colour) -> Stroke {
     Stroke::new(colour, 1.3).dashed(match knob {
         "candidates" => "1.5 2.5",
         "gauges" => "6 3",
@@ -233,8 +207,8 @@ fn knob_line(knob: &str, colour: crate::output::plot::palette::Colour) -> Stroke
 impl Study for BenchmarkResult {
     const NAME: &'static str = "estimators";
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        Ok(vec![("", self.csv()?)])
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        vec![("", self.csv())]
     }
 
     fn picture(&self) -> String {
@@ -252,11 +226,7 @@ mod tests {
     #[test]
     fn every_method_of_the_contest_has_a_look() {
         for contestant in contestants() {
-            assert!(
-                look(contestant.method()).is_some(),
-                "{}",
-                contestant.method()
-            );
+            assert!(look(contestant.method).is_some(), "{}", contestant.method);
         }
     }
 
@@ -270,10 +240,10 @@ mod tests {
             ..Score::default()
         };
         let entries = contestants().into_iter().map(|contestant| Entry {
-            method: contestant.method(),
-            knob: contestant.knob(),
-            value: contestant.value(),
-            setting: contestant.setting(),
+            method: contestant.method,
+            knob: contestant.knob,
+            value: contestant.value,
+            setting: contestant.setting,
             cost: Some(Cost {
                 mean: 5_000.0,
                 worst: None,
@@ -281,7 +251,7 @@ mod tests {
             scores: vec![score.clone(); families.len()],
         });
         let entries = entries.collect();
-        crate::output::plot::fits::assert_fits(
+        crate::output::plot::tests::assert_fits(
             "estimators",
             &draw(&BenchmarkResult { families, entries }),
         );

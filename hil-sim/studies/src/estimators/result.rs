@@ -1,23 +1,20 @@
-//! The contest's result, and its CSV.
+//! Every estimator's scores and cost, and their CSV.
 
 use protocol::SensorConfiguration;
-use serde::Serialize;
 
 use super::bound::{WAVES, window_mm};
 use super::costs::Cost;
 use super::family::Family;
 use super::score::Score;
 use super::settings::Setting;
-use crate::study::{Fixed, csv_text};
+use crate::study::{Record, csv, fixed, short};
 
 /// A contestant's row.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// The method's name.
     pub method: &'static str,
-    /// The knob that is swept.
+    /// The knob that is swept, and its value.
     pub knob: &'static str,
-    /// Its value.
     pub value: u16,
     /// What the sensor board is set to, if it is one of ours.
     pub setting: Option<Setting>,
@@ -36,13 +33,11 @@ impl Entry {
     }
 }
 
-/// Everything that the chart shows.
+/// Everything that the chart shows: the families, and the contestants, knobs in order.
 #[derive(Clone, Debug)]
 pub struct BenchmarkResult {
-    /// The families.
-    pub families: Vec<Family>,
-    /// The contestants, knobs in order.
-    pub entries: Vec<Entry>,
+    pub(super) families: Vec<Family>,
+    pub(super) entries: Vec<Entry>,
 }
 
 /// The windows that the Cramér–Rao bound is drawn for.
@@ -70,84 +65,64 @@ impl Window {
 }
 
 /// A contestant's score in a family, or the bound on it. Empty fields were not to be had.
-#[derive(Default, Serialize)]
-struct Record<'a> {
-    family: &'a str,
-    method: &'a str,
-    knob: &'a str,
-    value: Option<u16>,
-    instructions_per_ms: Fixed<0>,
-    worst_ms_instructions: Fixed<0>,
-    cost: &'a str,
-    rms_percent: Fixed<4>,
-    worst_rms_percent: Fixed<4>,
-    worst_scene: &'a str,
-    valid_share: Fixed<4>,
-    wrong_share: Fixed<5>,
-    settling_ms: Fixed<1>,
-    longest_settling_ms: Fixed<1>,
+fn record(
+    family: &Family,
+    (method, knob, value): (&str, &str, u16),
+    cost: Option<Cost>,
+    score: &Score,
+) -> Record {
+    let known = cost.map(|cost| {
+        if cost.worst.is_some() {
+            "counted"
+        } else {
+            "estimated"
+        }
+    });
+    let (worst_percent, worst_scene) = score.worst.clone().unzip();
+    Record::default()
+        .with("family", family.folder)
+        .with("method", method)
+        .with("knob", knob)
+        .with("value", (!knob.is_empty()).then(|| short(value)))
+        .with("instructions_per_ms", fixed(cost.map(|cost| cost.mean), 0))
+        .with(
+            "worst_ms_instructions",
+            fixed(cost.and_then(|cost| cost.worst), 0),
+        )
+        .with("cost", known)
+        .with("rms_percent", fixed(score.rms_percent, 4))
+        .with("worst_rms_percent", fixed(worst_percent, 4))
+        .with("worst_scene", worst_scene)
+        .with("valid_share", fixed(score.valid_share, 4))
+        .with("wrong_share", fixed(score.wrong_share, 5))
+        .with("settling_ms", fixed(score.settling_ms, 1))
+        .with("longest_settling_ms", fixed(score.longest_settling_ms, 1))
 }
 
-impl<'a> Record<'a> {
-    fn of(family: &Family, entry: &'a Entry, score: &'a Score) -> Self {
-        let cost = entry.cost;
-        let worst = score.worst.as_ref();
-        Self {
-            family: family.folder,
-            method: entry.method,
-            knob: entry.knob,
-            value: (!entry.knob.is_empty()).then_some(entry.value),
-            instructions_per_ms: cost.map(|cost| cost.mean).into(),
-            worst_ms_instructions: cost.and_then(|cost| cost.worst).into(),
-            cost: match cost {
-                None => "",
-                Some(Cost { worst: None, .. }) => "estimated",
-                Some(_) => "counted",
-            },
-            rms_percent: score.rms_percent.into(),
-            worst_rms_percent: worst.map(|worst| worst.0).into(),
-            worst_scene: worst.map_or("", |worst| &worst.1),
-            valid_share: score.valid_share.into(),
-            wrong_share: score.wrong_share.into(),
-            settling_ms: score.settling_ms.into(),
-            longest_settling_ms: score.longest_settling_ms.into(),
-        }
-    }
-
-    fn of_bound(family: &Family, window: Window) -> Option<Self> {
-        let (knob, value) = match window {
-            Window::Waves(waves) => ("waves", waves.into()),
-            Window::Ms(ms) => ("window_ms", ms),
-        };
-        Some(Self {
-            family: family.folder,
-            method: "Cramér–Rao",
-            knob,
-            value: Some(value),
-            rms_percent: window.bound_percent(family)?.into(),
-            ..Self::default()
-        })
-    }
+fn record_of_bound(family: &Family, window: Window) -> Option<Record> {
+    let (knob, value) = match window {
+        Window::Waves(waves) => ("waves", waves.into()),
+        Window::Ms(ms) => ("window_ms", ms),
+    };
+    let score = Score {
+        rms_percent: Some(window.bound_percent(family)?),
+        ..Score::default()
+    };
+    Some(record(family, ("Cramér–Rao", knob, value), None, &score))
 }
 
 impl BenchmarkResult {
     /// A line for each contestant and family, and for each bound.
-    ///
-    /// # Errors
-    /// If a line cannot be written, which nothing should bring about.
-    pub fn csv(&self) -> Result<String, csv::Error> {
-        let records = self
-            .families
-            .iter()
-            .enumerate()
-            .flat_map(|(index, family)| {
-                let entries = self.entries.iter();
-                let scored =
-                    entries.map(move |entry| Record::of(family, entry, &entry.scores[index]));
-                let bounds = WINDOWS.into_iter();
-                scored.chain(bounds.filter_map(|window| Record::of_bound(family, window)))
+    pub fn csv(&self) -> String {
+        let of_family = |(index, family)| {
+            let scored = self.entries.iter().map(move |entry| {
+                let of = (entry.method, entry.knob, entry.value);
+                record(family, of, entry.cost, &entry.scores[index])
             });
-        csv_text(records)
+            let bounds = WINDOWS.into_iter();
+            scored.chain(bounds.filter_map(move |window| record_of_bound(family, window)))
+        };
+        csv(self.families.iter().enumerate().flat_map(of_family))
     }
 }
 
@@ -203,7 +178,7 @@ mod tests {
                 entry("YIN", "", None),
             ],
         };
-        let csv = &result.csv().unwrap();
+        let csv = &result.csv();
         let lines: Vec<&str> = csv.lines().skip(1).collect();
         assert_eq!(lines.len(), 4 + WINDOWS.len());
         assert_eq!(

@@ -6,7 +6,7 @@ use hil_sim_core::scene::Scene;
 /// A family's summaries as one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Root of the mean square, over the scenes with a valid estimate, of their RMS errors in %.
+    /// Root of the mean square, over the scenes with a valid estimate, of their RMS errors.
     pub rms_percent: Option<f64>,
     /// The largest of them, and its scene.
     pub worst: Option<(f64, String)>,
@@ -14,7 +14,7 @@ pub struct Score {
     pub valid_share: Option<f64>,
     /// Mean of the shares of estimates that are valid and more than 10 % off.
     pub wrong_share: Option<f64>,
-    /// Mean time to settle after the boundary in ms; none unless it settled in every scene.
+    /// Mean time to settle after the boundary; none unless it settled in every scene.
     pub settling_ms: Option<f64>,
     /// The longest of them.
     pub longest_settling_ms: Option<f64>,
@@ -23,23 +23,17 @@ pub struct Score {
 impl Score {
     /// The score of these scenes' summaries.
     pub fn new<'a>(scenes: &[Scene], summaries: impl Iterator<Item = &'a Summary> + Clone) -> Self {
-        let errors = summaries
-            .clone()
-            .zip(scenes)
-            .filter_map(|(summary, scene)| Some((summary.rms_percent?, scene.name.clone())));
+        let errors = summaries.clone().zip(scenes);
+        let errors = errors.filter_map(|(of, scene)| Some((of.rms_percent?, scene.name.clone())));
         let squares = errors.clone().map(|(rms, _)| rms * rms);
-        let settling: Option<Vec<f64>> = summaries
-            .clone()
-            .map(|summary| summary.settling_ms)
-            .collect();
+        let settling = summaries.clone().map(|summary| summary.settling_ms);
+        let settling: Option<Vec<f64>> = settling.collect();
         Self {
             rms_percent: mean(squares).map(f64::sqrt),
             worst: errors.reduce(|one, other| if other.0 > one.0 { other } else { one }),
             valid_share: mean(summaries.clone().filter_map(|summary| summary.valid_share)),
             wrong_share: mean(summaries.filter_map(|summary| summary.wrong_share)),
-            settling_ms: settling
-                .as_ref()
-                .and_then(|times| mean(times.iter().copied())),
+            settling_ms: mean(settling.iter().flatten().copied()),
             longest_settling_ms: settling.and_then(|times| times.into_iter().reduce(f64::max)),
         }
     }

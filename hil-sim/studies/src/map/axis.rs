@@ -1,6 +1,7 @@
 //! An axis of a map: steps of one scene setting, or of several at once.
 
 use super::knob::{Knob, Setting};
+use crate::output::plot::axis::round_step;
 
 /// How an axis' steps follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,22 +30,19 @@ pub struct Step {
 pub struct Axis {
     /// The quantity and its unit.
     pub label: &'static str,
-    /// How its steps follow each other.
-    pub scale: Scale,
+    pub(super) scale: Scale,
     /// Its steps, upwards.
-    pub steps: Vec<Step>,
+    pub(super) steps: Vec<Step>,
     /// Steps that belong together, of a named axis: a name for every so many.
-    pub groups: Vec<(String, usize)>,
+    pub(super) groups: Vec<(String, usize)>,
 }
 
 impl Axis {
     /// `count` steps from `first` to `last` by the same ratio, to three digits.
     pub fn log(label: &'static str, knob: Knob, first: f64, last: f64, count: usize) -> Self {
         let ratio = last / first;
-        let values = (0..count).map(|step| {
-            let exact = first * ratio.powf(step as f64 / (count - 1) as f64);
-            three_digits(exact)
-        });
+        let along = (0..count).map(|step| step as f64 / (count - 1) as f64);
+        let values = along.map(|share| three_digits(first * ratio.powf(share)));
         Self::numbers(label, Scale::Log, knob, 1.0, values)
     }
 
@@ -55,7 +53,7 @@ impl Axis {
 
     /// `count` steps from `first` to `last` by the same difference.
     pub fn linear(label: &'static str, knob: Knob, first: f64, last: f64, count: usize) -> Self {
-        Self::linear_in(label, knob, 1.0, first, last, count)
+        Self::linear_in(label, knob, 1.0, first..last, count)
     }
 
     /// As [`Axis::linear`], the axis in a unit that is so many of the setting's.
@@ -63,12 +61,12 @@ impl Axis {
         label: &'static str,
         knob: Knob,
         unit: f64,
-        first: f64,
-        last: f64,
+        range: std::ops::Range<f64>,
         count: usize,
     ) -> Self {
         let values = (0..count).map(|step| {
-            let exact = first + (last - first) * step as f64 / (count - 1) as f64;
+            let wide = range.end - range.start;
+            let exact = range.start + wide * step as f64 / (count - 1) as f64;
             (exact * 1e6).round() / 1e6
         });
         Self::numbers(label, Scale::Linear, knob, unit, values)
@@ -81,17 +79,15 @@ impl Axis {
         unit: f64,
         values: impl Iterator<Item = f64>,
     ) -> Self {
-        let steps = values
-            .map(|at| Step {
-                at,
-                label: at.to_string(),
-                settings: vec![knob.at(at * unit)],
-            })
-            .collect();
+        let step = |at: f64| Step {
+            at,
+            label: at.to_string(),
+            settings: vec![knob.at(at * unit)],
+        };
         Self {
             label,
             scale,
-            steps,
+            steps: values.map(step).collect(),
             groups: Vec::new(),
         }
     }
@@ -125,10 +121,13 @@ impl Axis {
 
     /// The CSV's columns for this axis.
     pub fn columns(&self) -> impl Iterator<Item = &'static str> {
-        let first = self.steps.first();
-        first
-            .into_iter()
-            .flat_map(|step| step.settings.iter().map(|setting| setting.knob.column()))
+        let first = self.steps.iter().take(1);
+        first.flat_map(|step| step.settings.iter().map(|setting| setting.knob.column))
+    }
+
+    /// How many steps there are, and what [`Axis::nearest`] takes, in words.
+    pub fn told(&self) -> String {
+        format!("{} steps, {}", self.steps.len(), self.places())
     }
 
     /// The step's own name: of a named axis its values, of any other its number.
@@ -141,7 +140,7 @@ impl Axis {
     }
 
     /// What [`Axis::nearest`] takes, for a message.
-    pub fn places(&self) -> String {
+    pub(super) fn places(&self) -> String {
         match (self.scale, self.steps.first(), self.steps.last()) {
             (Scale::Named, ..) => {
                 let places: Vec<String> = self.steps.iter().map(|step| self.place(step)).collect();
@@ -173,10 +172,8 @@ impl Axis {
         };
         let after = self.steps.partition_point(|step| step.at <= value);
         let from = after.max(1).min(self.steps.len().checked_sub(1)?) - 1;
-        let (low, high) = (
-            scaled(self.steps[from].at),
-            scaled(self.steps.get(from + 1)?.at),
-        );
+        let (before, next) = (&self.steps[from], self.steps.get(from + 1)?);
+        let (low, high) = (scaled(before.at), scaled(next.at));
         let along = from as f64 + (scaled(value) - low) / (high - low);
         along.is_finite().then_some(along)
     }
@@ -190,35 +187,23 @@ impl Axis {
         let within = |value: &f64| *value >= first * 0.999 && *value <= last * 1.001;
         let values: Vec<f64> = match self.scale {
             Scale::Named => {
-                return self
-                    .steps
-                    .iter()
-                    .map(|step| (step.at, step.label.clone()))
-                    .collect();
+                let steps = self.steps.iter();
+                return steps.map(|step| (step.at, step.label.clone())).collect();
             }
             Scale::Log => (-3..4)
-                .flat_map(|decade| {
-                    [1.0, 2.0, 5.0].map(|digit| three_digits(digit * 10f64.powi(decade)))
-                })
+                .flat_map(|decade| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(decade)))
+                .map(three_digits)
                 .filter(within)
                 .collect(),
             Scale::Linear => {
-                let least = (last - first) / 6.0;
-                let decade = 10f64.powf(least.log10().floor());
-                let step = [1.0, 2.0, 5.0, 10.0]
-                    .map(|digit| digit * decade)
-                    .into_iter()
-                    .find(|step| *step >= least)
-                    .unwrap_or(least);
+                let step = round_step((last - first) / 6.0);
                 let from = (first / step - 1e-9).ceil() as i64;
                 let to = (last / step + 1e-9).floor() as i64;
                 (from..=to).map(|n| three_digits(n as f64 * step)).collect()
             }
         };
-        values
-            .into_iter()
-            .map(|value| (value, value.to_string().replace('-', "−")))
-            .collect()
+        let label = |value: f64| (value, value.to_string().replace('-', "−"));
+        values.into_iter().map(label).collect()
     }
 }
 
@@ -233,7 +218,7 @@ mod tests {
 
     #[test]
     fn log_steps_have_one_ratio_and_three_digits() {
-        let axis = Axis::log("", Knob::Speed, 3.0, 200.0, 5);
+        let axis = Axis::log("", Knob::SPEED, 3.0, 200.0, 5);
         let labels: Vec<&str> = axis.steps.iter().map(|step| &*step.label).collect();
         // 3 · (200/3)^(n/4)
         assert_eq!(labels, ["3", "8.57", "24.5", "70", "200"]);
@@ -241,7 +226,7 @@ mod tests {
 
     #[test]
     fn linear_steps_are_exact_in_either_unit() {
-        let axis = Axis::linear_in("", Knob::Skew, 1000.0, -5.0, 5.0, 21);
+        let axis = Axis::linear_in("", Knob::SKEW, 1000.0, -5.0..5.0, 21);
         assert_eq!(axis.steps[11].at, 0.5);
         assert_eq!(axis.steps[11].settings[0].value, "500");
         assert_eq!(axis.steps[10].settings[0].value, "0");
@@ -249,14 +234,14 @@ mod tests {
 
     #[test]
     fn the_nearest_step_is_found_on_the_axis_own_scale() {
-        let log = Axis::log("", Knob::Speed, 1.0, 100.0, 3);
+        let log = Axis::log("", Knob::SPEED, 1.0, 100.0, 3);
         // The middle between 1 and 10 is √10.
         assert_eq!(log.nearest("3.1"), Some(0));
         assert_eq!(log.nearest("3.2"), Some(1));
         assert_eq!(log.nearest("1e9"), Some(2));
         assert_eq!(log.nearest("-1"), None);
         assert_eq!(log.nearest("fast"), None);
-        let listed = Axis::listed("", Knob::Encoder, &[5.0, 10.0, 15.0, 200.0]);
+        let listed = Axis::listed("", Knob::ENCODER, &[5.0, 10.0, 15.0, 200.0]);
         assert_eq!(listed.nearest("15"), Some(2));
         // √(5 · 10) is the middle of the first two.
         let along = listed.along(50f64.sqrt()).unwrap();
@@ -266,11 +251,11 @@ mod tests {
     #[test]
     fn ticks_are_round_and_on_the_axis() {
         let texts = |axis: Axis| -> Vec<String> { axis.ticks().into_iter().map(|t| t.1).collect() };
-        let log = Axis::log("", Knob::Wavelength, 0.7, 6.0, 9);
+        let log = Axis::log("", Knob::WAVELENGTH, 0.7, 6.0, 9);
         assert_eq!(texts(log), ["1", "2", "5"]);
-        let linear = Axis::linear("", Knob::Snr, -10.0, 40.0, 11);
+        let linear = Axis::linear("", Knob::SNR, -10.0, 40.0, 11);
         assert_eq!(texts(linear), ["−10", "0", "10", "20", "30", "40"]);
-        let hum = Axis::linear("", Knob::Hum, 0.0, 1.0, 11);
+        let hum = Axis::linear("", Knob::HUM, 0.0, 1.0, 11);
         assert_eq!(texts(hum), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
     }
 }

@@ -25,7 +25,6 @@ pub struct Fingerprints<'a> {
 }
 
 impl<'a> Fingerprints<'a> {
-    /// The keys of a map.
     pub fn new(map: &'a Map) -> Self {
         Self {
             map,
@@ -33,16 +32,11 @@ impl<'a> Fingerprints<'a> {
         }
     }
 
-    /// The key of a method: a fraction of a second the first time.
-    ///
-    /// # Errors
-    /// If this version does not know the method, or cannot run the map.
+    /// The key of a method: a fraction of a second the first time. An error if this version does not know the method, or
+    /// cannot run the map.
     pub fn of(&mut self, method: &str) -> Result<u64, SceneError> {
-        let map = self.map;
-        self.known
-            .entry(method.to_owned())
-            .or_insert_with(|| key(map, method))
-            .clone()
+        let known = self.known.entry(method.to_owned());
+        known.or_insert_with(|| key(self.map, method)).clone()
     }
 }
 

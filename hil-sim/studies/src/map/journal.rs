@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::Map;
-use super::error::MapError;
+use super::error::{MapError, NOT_WRITTEN};
 use super::fingerprint::Fingerprints;
 use super::row::{Row, header, rank};
 
@@ -28,10 +28,6 @@ pub struct Journal<'a> {
 impl<'a> Journal<'a> {
     /// Opens the file or makes it, and reads what is in it. With `renew`, rows of another grid or version
     /// are thrown away instead of refused.
-    ///
-    /// # Errors
-    /// If another process has it open, if it holds anything else than rows of this map and version, or
-    /// if it cannot be read and written.
     pub fn open(
         map: &'a Map,
         path: &Path,
@@ -39,36 +35,24 @@ impl<'a> Journal<'a> {
         renew: bool,
     ) -> Result<(Self, Rows), MapError> {
         let lock = lock(path)?;
-        let mut rows = Rows::new();
-        if path.exists() {
-            let content = read(map, path, keys, renew)?;
-            rows = content.rows;
-            if !content.sound {
-                replace(map, path, keys, &rows)?;
-            }
+        let (rows, is_sound) = if path.exists() {
+            read(map, path, keys, renew)?
         } else {
+            (Rows::new(), false)
+        };
+        if !is_sound {
             replace(map, path, keys, &rows)?;
         }
-        let file = OpenOptions::new()
-            .append(true)
-            .open(path)
-            .map_err(MapError::file(
-                path,
-                "cannot be written: give another --out",
-            ))?;
+        let file = OpenOptions::new().append(true).open(path);
         let journal = Self {
             map,
             path: path.to_owned(),
-            file,
+            file: file.map_err(MapError::file(path, NOT_WRITTEN))?,
             _lock: lock,
         };
         Ok((journal, rows))
     }
 
-    /// Adds a row.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn append(&mut self, row: &Row, keys: &mut Fingerprints) -> Result<(), MapError> {
         let line = line(self.map, row, keys)?;
         self.file.write_all(line.as_bytes()).map_err(MapError::file(
@@ -78,9 +62,6 @@ impl<'a> Journal<'a> {
     }
 
     /// Writes all rows anew, sorted. The file is replaced at once, not piece by piece.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn sort(&mut self, rows: &Rows, keys: &mut Fingerprints) -> Result<(), MapError> {
         replace(self.map, &self.path, keys, rows)
     }
@@ -91,75 +72,48 @@ impl<'a> Journal<'a> {
 pub fn lock(path: &Path) -> Result<File, MapError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let lock_path = path.with_file_name(format!(".{name}.lock"));
-    let file = OpenOptions::new()
+    let mut options = OpenOptions::new();
+    let file = options
         .create(true)
         .truncate(false)
         .write(true)
-        .open(&lock_path)
-        .map_err(MapError::file(
-            &lock_path,
-            "cannot be written: give another --out",
-        ))?;
+        .open(&lock_path);
+    let file = file.map_err(MapError::file(&lock_path, NOT_WRITTEN))?;
+    let no_locks = "cannot be locked: give an --out on a file system with locks";
     match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(MapError::Busy {
-            path: path.to_owned(),
-        }),
-        Err(TryLockError::Error(source)) => Err(MapError::File {
-            path: lock_path,
-            doing: "cannot be locked: give an --out on a file system with locks",
-            source,
-        }),
+        Err(TryLockError::WouldBlock) => Err(MapError::Busy(path.to_owned())),
+        Err(TryLockError::Error(source)) => Err(MapError::File(lock_path, no_locks, source)),
     }
 }
 
-/// What is in a CSV file.
-pub struct Content {
-    /// Its rows. Of two for the same run, the first.
-    pub rows: Rows,
-    /// Whether there is nothing else in it: no cut-off line, nothing that `renew` passed over.
-    pub sound: bool,
-}
-
-/// Reads a CSV file. A last line without an end is passed over; with `renew`, so is whatever is not of
-/// this grid and version.
-///
-/// # Errors
-/// If it cannot be read, or holds anything else.
+/// Reads a CSV file: its rows (of two for the same run, the first), and whether there is nothing else in it. A last line
+/// without an end is passed over; with `renew`, so is whatever is not of this grid and version.
 pub fn read(
     map: &Map,
     path: &Path,
     keys: &mut Fingerprints,
     renew: bool,
-) -> Result<Content, MapError> {
+) -> Result<(Rows, bool), MapError> {
     let bytes = fs::read(path).map_err(MapError::file(path, "cannot be read"))?;
-    let whole = bytes
-        .iter()
-        .rposition(|byte| *byte == b'\n')
-        .map_or(0, |end| end + 1);
+    let end = bytes.iter().rposition(|byte| *byte == b'\n');
+    let whole = end.map_or(0, |end| end + 1);
     let text = String::from_utf8_lossy(&bytes[..whole]);
-    let foreign = |line: usize, what: String| MapError::Foreign {
-        path: path.to_owned(),
-        line,
-        what,
-    };
-    let mut content = Content {
-        rows: Rows::new(),
-        sound: whole == bytes.len() && whole > 0,
-    };
-    let expected = header(map);
-    for (index, line) in text.lines().enumerate() {
-        if index == 0 {
-            if line != expected.trim_end() {
-                if renew {
-                    content.sound = false;
-                    break;
-                }
-                let what = format!("the header is not that of {}", map.name);
-                return Err(foreign(1, what));
-            }
-            continue;
+    let foreign = |line: usize, what| MapError::Foreign(path.to_owned(), line, what);
+    let mut rows = Rows::new();
+    let mut is_sound = whole == bytes.len() && whole > 0;
+    let mut lines = text.lines().enumerate();
+    if lines
+        .next()
+        .is_some_and(|(_, line)| line != header(map).trim_end())
+    {
+        if renew {
+            return Ok((rows, false));
         }
+        let what = format!("the header is not that of {}", map.name);
+        return Err(foreign(1, what));
+    }
+    for (index, line) in lines {
         let row = Row::parse(map, line).and_then(|(row, key)| match keys.of(&row.method) {
             Ok(own) if own == key => Ok(row),
             Ok(own) => Err(format!(
@@ -169,16 +123,13 @@ pub fn read(
         });
         match row {
             Ok(row) => {
-                content
-                    .rows
-                    .entry((row.method.clone(), row.cell))
-                    .or_insert(row);
+                rows.entry((row.method.clone(), row.cell)).or_insert(row);
             }
-            Err(_) if renew => content.sound = false,
+            Err(_) if renew => is_sound = false,
             Err(what) => return Err(foreign(index + 1, what)),
         }
     }
-    Ok(content)
+    Ok((rows, is_sound))
 }
 
 /// Replaces a CSV file by one with these rows, sorted by method and cell.
@@ -191,18 +142,12 @@ fn replace(map: &Map, path: &Path, keys: &mut Fingerprints, rows: &Rows) -> Resu
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let new = path.with_file_name(format!(".{name}.new"));
-    fs::write(&new, text)
-        .and_then(|()| fs::rename(&new, path))
-        .map_err(MapError::file(
-            path,
-            "cannot be written: give another --out",
-        ))
+    let written = fs::write(&new, text).and_then(|()| fs::rename(&new, path));
+    written.map_err(MapError::file(path, NOT_WRITTEN))
 }
 
 fn line(map: &Map, row: &Row, keys: &mut Fingerprints) -> Result<String, MapError> {
-    let key = keys.of(&row.method).map_err(|source| MapError::Scene {
-        map: map.name,
-        source,
-    })?;
+    let key = keys.of(&row.method);
+    let key = key.map_err(|source| MapError::Scene(map.name, source))?;
     Ok(row.line(map, key))
 }

@@ -2,54 +2,80 @@
 
 /// The scene's sections that knobs write to, in the order they are written.
 pub const SECTIONS: [&str; 5] = ["surface", "motion", "arm", "contact", "gauges"];
-/// The highest speed of every reversing motion, in mm/s: the paper's (Okamoto et al. 2009, Fig. 7).
-pub const AMPLITUDE_MM_S: f64 = 70.0;
 
-/// Something that a map changes, named as the CSV's column: a scene's key, mostly.
+/// Something that a map changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knob {
-    /// λ in mm of the one specimen.
-    Wavelength,
-    /// v in mm/s, constant.
-    Speed,
-    /// Hz of a sinusoidal v of [`AMPLITUDE_MM_S`].
-    Reversal,
-    /// The arm encoder's resolution in µm.
-    Encoder,
-    /// `none`, `mild`, `strong` or `severe`.
-    Friction,
-    /// Whether the tangential force is measured.
-    Tangential,
-    /// dB.
-    Snr,
-    /// How late the gauges' samples are in µs.
-    Skew,
-    /// Relative to the fundamental.
-    SecondHarmonic,
-    /// Relative to the fundamental at unit gain.
-    Hum,
-    /// RMS of 1/f noise, relative to the fundamental at unit gain.
-    Pink,
-    /// RMS of heights at random, relative to the fundamental.
-    Random,
-    /// Amplitude of a second wave, relative to the fundamental.
-    SecondWave,
-    /// Its wavelength over λ.
-    SecondRatio,
-    /// Share of missing ridges.
-    Worn,
+pub struct Knob {
+    /// The scene's, one of [`SECTIONS`].
+    pub section: &'static str,
+    /// The CSV's: a scene's key, mostly.
+    pub column: &'static str,
+    /// The section's lines, with `$` for the value; nothing if the column is the key.
+    lines: &'static str,
 }
 
 /// A knob and what it is turned to, as TOML writes it (texts without quotes).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// What is changed.
     pub knob: Knob,
-    /// To what.
     pub value: String,
 }
 
+const fn key(section: &'static str, column: &'static str) -> Knob {
+    lines(section, column, "")
+}
+
+const fn lines(section: &'static str, column: &'static str, lines: &'static str) -> Knob {
+    Knob {
+        section,
+        column,
+        lines,
+    }
+}
+
 impl Knob {
+    /// λ of the one specimen.
+    pub const WAVELENGTH: Self = lines(
+        "surface",
+        "wavelength_mm",
+        "specimens = [{ wavelength_mm = $ }]\n",
+    );
+    /// v, constant.
+    pub const SPEED: Self = lines(
+        "motion",
+        "speed_mm_s",
+        "kind = \"constant\"\nspeed_mm_s = $\n",
+    );
+    /// Of a sinusoidal v of the paper's highest speed (Okamoto et al. 2009, Fig. 7).
+    pub const REVERSAL: Self = lines(
+        "motion",
+        "frequency_hz",
+        "kind = \"sinusoid\"\namplitude_mm_s = 70.0\nfrequency_hz = $\n",
+    );
+    /// The arm encoder's resolution.
+    pub const ENCODER: Self = key("arm", "encoder_um");
+    /// `none`, `mild`, `strong` or `severe`.
+    pub const FRICTION: Self = lines("contact", "friction", "friction = \"$\"\n");
+    /// Whether the tangential force is measured.
+    pub const TANGENTIAL: Self = key("gauges", "tangential");
+    pub const SNR: Self = key("gauges", "snr_db");
+    /// How late the gauges' samples are.
+    pub const SKEW: Self = key("gauges", "skew_us");
+    /// Relative to the fundamental.
+    pub const SECOND_HARMONIC: Self = key("gauges", "second_harmonic");
+    /// Relative to the fundamental at unit gain.
+    pub const HUM: Self = key("gauges", "hum_50_hz");
+    /// RMS of 1/f noise, relative to the fundamental at unit gain.
+    pub const PINK: Self = key("gauges", "pink");
+    /// RMS of heights at random, relative to the fundamental.
+    pub const RANDOM: Self = key("surface", "random");
+    /// Amplitude of a second wave, relative to the fundamental.
+    pub const SECOND_WAVE: Self = key("surface", "second_wave");
+    /// Its wavelength over λ.
+    pub const SECOND_RATIO: Self = key("surface", "second_ratio");
+    /// Share of missing ridges.
+    pub const WORN: Self = key("surface", "worn");
+
     /// The knob turned to a number.
     pub fn at(self, value: f64) -> Setting {
         // Adding 0 takes the sign off −0.
@@ -63,56 +89,14 @@ impl Knob {
             value: value.to_owned(),
         }
     }
+}
 
-    /// The CSV's column.
-    pub const fn column(self) -> &'static str {
-        match self {
-            Knob::Wavelength => "wavelength_mm",
-            Knob::Speed => "speed_mm_s",
-            Knob::Reversal => "frequency_hz",
-            Knob::Encoder => "encoder_um",
-            Knob::Friction => "friction",
-            Knob::Tangential => "tangential",
-            Knob::Snr => "snr_db",
-            Knob::Skew => "skew_us",
-            Knob::SecondHarmonic => "second_harmonic",
-            Knob::Hum => "hum_50_hz",
-            Knob::Pink => "pink",
-            Knob::Random => "random",
-            Knob::SecondWave => "second_wave",
-            Knob::SecondRatio => "second_ratio",
-            Knob::Worn => "worn",
-        }
-    }
-
-    /// The scene's section, one of [`SECTIONS`].
-    pub const fn section(self) -> &'static str {
-        match self {
-            Knob::Wavelength | Knob::Random | Knob::SecondWave | Knob::SecondRatio | Knob::Worn => {
-                "surface"
-            }
-            Knob::Speed | Knob::Reversal => "motion",
-            Knob::Encoder => "arm",
-            Knob::Friction => "contact",
-            Knob::Tangential
-            | Knob::Snr
-            | Knob::Skew
-            | Knob::SecondHarmonic
-            | Knob::Hum
-            | Knob::Pink => "gauges",
-        }
-    }
-
-    /// The section's lines for a value.
-    pub fn entries(self, value: &str) -> String {
-        match self {
-            Knob::Wavelength => format!("specimens = [{{ wavelength_mm = {value} }}]\n"),
-            Knob::Speed => format!("kind = \"constant\"\nspeed_mm_s = {value}\n"),
-            Knob::Reversal => format!(
-                "kind = \"sinusoid\"\namplitude_mm_s = {AMPLITUDE_MM_S:.1}\nfrequency_hz = {value}\n"
-            ),
-            Knob::Friction => format!("friction = \"{value}\"\n"),
-            _ => format!("{} = {value}\n", self.column()),
+impl Setting {
+    /// The section's lines.
+    pub fn entries(&self) -> String {
+        match self.knob.lines {
+            "" => format!("{} = {}\n", self.knob.column, self.value),
+            lines => lines.replace('$', &self.value),
         }
     }
 }

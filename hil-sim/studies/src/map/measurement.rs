@@ -26,9 +26,6 @@ pub struct Measurement {
 
 impl Measurement {
     /// Runs a scene on the native engine and judges it meanwhile.
-    ///
-    /// # Errors
-    /// If the scene cannot be run.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
@@ -36,16 +33,15 @@ impl Measurement {
         let mut judge = estimates::Judge::new(&truth);
         native::run_before(scene, &mut judge)?;
         let (judged, summary) = judge.finish();
-        let count = |which: fn(&JudgedEstimate) -> bool| {
-            judged.iter().filter(|estimate| which(estimate)).count() as u32
-        };
+        let count =
+            |which: fn(&&JudgedEstimate) -> bool| judged.iter().filter(which).count() as u32;
         Ok(Self {
             rms_percent: summary.rms_percent.map(four_decimals),
             bias_percent: summary.bias_percent.map(four_decimals),
             valid_share: summary.valid_share.map(four_decimals),
             estimates: judged.len() as u32,
             valid: count(|estimate| estimate.valid),
-            wrong: count(JudgedEstimate::is_wrong),
+            wrong: count(|estimate| estimate.is_wrong()),
         })
     }
 

@@ -5,12 +5,8 @@ use super::journal::Rows;
 use super::measurement::Measurement;
 use super::ramp::{LEVELS, Ramp, level};
 use super::{DURATION_S, Map};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::{Cells, Mark};
-use crate::output::plot::page::{Key, Page};
 use crate::output::plot::palette::{INK, PAPER};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{HATCH, Stroke};
+use crate::output::plot::{Axis, Cells, HATCH, Key, Mark, Page, Panel, Stroke};
 
 const PANEL_HEIGHT: f64 = 190.0;
 /// A named axis needs room for its words.
@@ -273,7 +269,7 @@ mod tests {
     #[test]
     fn the_texts_of_every_map_stay_within_its_picture() {
         for map in crate::map::catalogue() {
-            crate::output::plot::fits::assert_fits(
+            crate::output::plot::tests::assert_fits(
                 map.name,
                 &draw(&map, &crate::map::METHODS, &Rows::new()),
             );

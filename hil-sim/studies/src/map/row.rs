@@ -7,11 +7,9 @@ use super::measurement::Measurement;
 /// One run of one cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The cell's number.
     pub cell: usize,
-    /// The method, as scenes write it.
+    /// As scenes write it.
     pub method: String,
-    /// What came of it.
     pub measurement: Measurement,
 }
 
@@ -71,11 +69,8 @@ impl Row {
             return Err(format!("{} columns, not {all}", fields.len()));
         }
         let bad = |name: &str, field: &str| format!("{name} is {field:?}");
-        let cell = fields[0]
-            .parse()
-            .ok()
-            .filter(|cell| *cell < map.len())
-            .ok_or_else(|| bad(BEFORE[0], fields[0]))?;
+        let cell = fields[0].parse().ok().filter(|cell| *cell < map.len());
+        let cell = cell.ok_or_else(|| bad(BEFORE[0], fields[0]))?;
         let method = fields[1].to_owned();
         let (given, measured) = fields[BEFORE.len()..].split_at(parameters);
         if given != map.parameters(cell) {
@@ -101,13 +96,11 @@ impl Row {
             wrong: count(5)?,
         };
         let key = u64::from_str_radix(measured[7], 16).map_err(|_| bad(AFTER[7], measured[7]))?;
-        Ok((
-            Self {
-                cell,
-                method,
-                measurement,
-            },
-            key,
-        ))
+        let row = Self {
+            cell,
+            method,
+            measurement,
+        };
+        Ok((row, key))
     }
 }

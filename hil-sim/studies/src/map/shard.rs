@@ -9,15 +9,14 @@ use super::error::MapError;
 /// shards do too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which, from 1 on.
+    /// From 1 on.
     number: usize,
-    /// Of how many.
     of: usize,
 }
 
 impl Shard {
     /// How many shards there are.
-    pub fn count(self) -> usize {
+    pub(super) fn count(self) -> usize {
         self.of
     }
 
@@ -48,9 +47,7 @@ impl FromStr for Shard {
             Some((number, of)) if (1..=of).contains(&number) && of <= 9_999 => {
                 Ok(Self { number, of })
             }
-            _ => Err(MapError::BadShard {
-                text: text.to_owned(),
-            }),
+            _ => Err(MapError::BadShard(text.to_owned())),
         }
     }
 }

@@ -1,11 +1,13 @@
 //! From a map to its files: what is measured already is read, what is missing is run.
 
+use std::collections::BTreeSet;
 use std::fs;
+use std::io;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use super::Map;
-use super::error::MapError;
+use super::error::{MapError, NOT_WRITTEN};
 use super::fingerprint::Fingerprints;
 use super::journal;
 use super::journal::{Journal, Rows};
@@ -13,7 +15,8 @@ use super::measurement::Measurement;
 use super::picture;
 use super::row::{Row, rank};
 use super::shard::Shard;
-use super::words;
+use super::{summary, words};
+use crate::study::Record;
 use hil_sim_core::run::batch::in_order;
 use hil_sim_core::scene::Scene;
 
@@ -43,15 +46,15 @@ pub struct Survey<'a> {
     missing: Vec<(usize, String)>,
 }
 
-/// A map's files.
+/// A map that was made.
 #[derive(Clone, Debug)]
-pub struct Files {
-    /// The measurements.
-    pub csv: PathBuf,
-    /// The picture; none of a shard.
-    pub picture: Option<PathBuf>,
-    /// Where each method fails, in sentences; none of a shard.
-    pub words: Option<PathBuf>,
+pub struct Made {
+    /// Its files: the measurements and, unless it is a shard, the picture, and where each method fails, in sentences.
+    pub files: Vec<PathBuf>,
+    /// A line for each method that has every cell, for a table of several maps.
+    pub lines: Vec<Record>,
+    /// The sentences.
+    pub words: String,
 }
 
 impl Plan {
@@ -76,10 +79,9 @@ impl<'a> Survey<'a> {
     /// # Errors
     /// If a method is unknown, or a file cannot be used or is another process'.
     pub fn open(map: &'a Map, plan: &'a Plan) -> Result<Self, MapError> {
-        fs::create_dir_all(&plan.folder).map_err(MapError::file(
-            &plan.folder,
-            "cannot be made: give another --out",
-        ))?;
+        let made = fs::create_dir_all(&plan.folder);
+        let doing = "cannot be made: give another --out";
+        made.map_err(MapError::file(&plan.folder, doing))?;
         let name = match plan.shard {
             Some(shard) => format!("{}.{shard}.csv", map.name),
             None => format!("{}.csv", map.name),
@@ -87,28 +89,23 @@ impl<'a> Survey<'a> {
         let path = plan.folder.join(name);
         let mut keys = Fingerprints::new(map);
         for method in &plan.methods {
-            keys.of(method).map_err(|source| MapError::Scene {
-                map: map.name,
-                source,
-            })?;
+            let key = keys.of(method);
+            key.map_err(|source| MapError::Scene(map.name, source))?;
         }
         let (journal, mut rows) = Journal::open(map, &path, &mut keys, plan.renew)?;
         if plan.shard.is_none() {
             for (shard, _) in shards(map, &plan.folder)? {
                 // One that is still at work is not waited for, nor its cells run twice.
                 let _lock = journal::lock(&shard)?;
-                for (run, row) in journal::read(map, &shard, &mut keys, plan.renew)?.rows {
+                for (run, row) in journal::read(map, &shard, &mut keys, plan.renew)?.0 {
                     rows.entry(run).or_insert(row);
                 }
             }
         }
         let cells = (0..map.len()).filter(|cell| plan.shard.is_none_or(|shard| shard.holds(*cell)));
-        let missing = cells
-            .flat_map(|cell| {
-                plan.methods
-                    .iter()
-                    .map(move |method| (cell, method.clone()))
-            })
+        let methods = plan.methods.iter();
+        let runs = cells.flat_map(|cell| methods.clone().map(move |of| (cell, of.clone())));
+        let missing = runs
             .filter(|(cell, method)| !rows.contains_key(&(method.clone(), *cell)))
             .collect();
         Ok(Self {
@@ -138,14 +135,9 @@ impl<'a> Survey<'a> {
         let found = shards(self.map, &self.plan.folder)?;
         let of = found.iter().map(|(_, of)| *of).max();
         let shards = of.map_or("there are no shards' files".to_owned(), |of| {
-            let mut numbers: Vec<usize> =
-                self.missing.iter().map(|(cell, _)| cell % of + 1).collect();
-            numbers.sort_unstable();
-            numbers.dedup();
-            let names: Vec<String> = numbers
-                .iter()
-                .map(|number| format!("{number}/{of}"))
-                .collect();
+            let numbers = self.missing.iter().map(|(cell, _)| cell % of + 1);
+            let numbers: BTreeSet<usize> = numbers.collect();
+            let names: Vec<String> = numbers.iter().map(|n| format!("{n}/{of}")).collect();
             format!("of the shards {}", names.join(", "))
         });
         Err(MapError::Incomplete {
@@ -173,27 +165,19 @@ impl<'a> Survey<'a> {
             .iter()
             .map(|(cell, method)| scene(map, *cell, method))
             .collect::<Result<_, _>>()?;
-        in_order(
-            &scenes,
-            self.plan.threads,
-            Measurement::of,
-            |index, measurement| {
-                let measurement = measurement.map_err(|source| MapError::Scene {
-                    map: map.name,
-                    source,
-                })?;
-                let (cell, method) = missing[index].clone();
-                let row = Row {
-                    cell,
-                    method,
-                    measurement,
-                };
-                journal.append(&row, keys)?;
-                rows.insert((row.method.clone(), row.cell), row);
-                step();
-                Ok(())
-            },
-        )?;
+        let ran = |index: usize, measurement: Result<Measurement, _>| {
+            let (cell, method) = missing[index].clone();
+            let row = Row {
+                cell,
+                method,
+                measurement: measurement.map_err(|source| MapError::Scene(map.name, source))?,
+            };
+            journal.append(&row, keys)?;
+            rows.insert((row.method.clone(), row.cell), row);
+            step();
+            Ok(())
+        };
+        in_order(&scenes, self.plan.threads, Measurement::of, ran)?;
         missing.clear();
         Ok(())
     }
@@ -202,34 +186,34 @@ impl<'a> Survey<'a> {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn finish(mut self) -> Result<(Files, Rows), MapError> {
+    pub fn finish(mut self) -> Result<Made, MapError> {
         self.journal.sort(&self.rows, &mut self.keys)?;
-        let mut files = Files {
-            csv: self.path,
-            picture: None,
-            words: None,
+        let Self {
+            map, rows, path, ..
+        } = &self;
+        let methods = whole_methods(map, rows);
+        let lines = methods
+            .iter()
+            .map(|method| summary::line(map, method, rows));
+        let mut made = Made {
+            files: vec![path.clone()],
+            lines: lines.collect(),
+            words: words::text(map, &methods, rows),
         };
         if self.plan.shard.is_none() {
-            let methods = whole_methods(self.map, &self.rows);
-            let write = |ending: &str, text: String| {
-                let path = files.csv.with_extension(ending);
-                let written = fs::write(&path, text);
-                written.map_err(MapError::file(
-                    &path,
-                    "cannot be written: give another --out",
-                ))?;
-                Ok(Some(path))
-            };
-            let picture = write("svg", picture::draw(self.map, &methods, &self.rows))?;
-            let words = write("md", words::text(self.map, &methods, &self.rows))?;
-            (files.picture, files.words) = (picture, words);
+            let picture = picture::draw(map, &methods, rows);
+            for (ending, text) in [("svg", &picture), ("md", &made.words)] {
+                let path = path.with_extension(ending);
+                fs::write(&path, text).map_err(MapError::file(&path, NOT_WRITTEN))?;
+                made.files.push(path);
+            }
         }
-        Ok((files, self.rows))
+        Ok(made)
     }
 }
 
 /// The methods that have every cell, in the pictures' order.
-pub fn whole_methods<'r>(map: &Map, rows: &'r Rows) -> Vec<&'r str> {
+fn whole_methods<'r>(map: &Map, rows: &'r Rows) -> Vec<&'r str> {
     let mut methods: Vec<&str> = rows.keys().map(|(method, _)| method.as_str()).collect();
     methods.dedup();
     methods.retain(|method| {
@@ -240,18 +224,16 @@ pub fn whole_methods<'r>(map: &Map, rows: &'r Rows) -> Vec<&'r str> {
 }
 
 fn scene(map: &Map, cell: usize, method: &str) -> Result<Scene, MapError> {
-    map.scene(cell, method).map_err(|source| MapError::Scene {
-        map: map.name,
-        source,
-    })
+    let scene = map.scene(cell, method);
+    scene.map_err(|source| MapError::Scene(map.name, source))
 }
 
 /// The files of a map's shards in a folder, each with how many shards there are, in order.
 fn shards(map: &Map, folder: &Path) -> Result<Vec<(PathBuf, usize)>, MapError> {
-    let reading = || MapError::file(folder, "cannot be read");
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     let mut found = Vec::new();
-    for entry in fs::read_dir(folder).map_err(reading())? {
-        let path = entry.map_err(reading())?.path();
+    for entry in entries.map_err(MapError::file(folder, "cannot be read"))? {
+        let path = entry.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let part = name
             .strip_prefix(map.name)

@@ -9,7 +9,6 @@ use super::error::MapError;
 use super::journal;
 use super::knob::Knob;
 use super::measurement::Measurement;
-use super::survey::{Files, whole_methods};
 use super::*;
 use hil_sim_core::judge::outcome::Outcome;
 
@@ -19,9 +18,9 @@ fn small() -> Map {
         name: "small",
         title: "Small",
         conditions: "20 dB",
-        x: Axis::linear("speed v in mm/s", Knob::Speed, 30.0, 70.0, 2),
-        y: Axis::log("wavelength λ in mm", Knob::Wavelength, 1.0, 4.0, 3),
-        base: vec![Knob::Snr.at(20.0)],
+        x: Axis::linear("speed v in mm/s", Knob::SPEED, 30.0, 70.0, 2),
+        y: Axis::log("wavelength λ in mm", Knob::WAVELENGTH, 1.0, 4.0, 3),
+        base: vec![Knob::SNR.at(20.0)],
     }
 }
 
@@ -40,11 +39,11 @@ fn plan(test: &str) -> Plan {
     }
 }
 
-fn make(map: &Map, plan: &Plan) -> Result<(usize, Files), MapError> {
+fn make(map: &Map, plan: &Plan) -> Result<(usize, Vec<PathBuf>), MapError> {
     let mut survey = Survey::open(map, plan)?;
     let mut runs = 0;
     survey.run(|| runs += 1)?;
-    Ok((runs, survey.finish()?.0))
+    Ok((runs, survey.finish()?.files))
 }
 
 fn refusal(map: &Map, plan: &Plan) -> String {
@@ -120,7 +119,7 @@ fn a_map_is_measured_written_and_drawn() {
     let (map, plan) = (small(), plan("whole"));
     let (runs, files) = make(&map, &plan).unwrap();
     assert_eq!(runs, 6);
-    let csv = fs::read_to_string(&files.csv).unwrap();
+    let csv = fs::read_to_string(&files[0]).unwrap();
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(
         lines[0],
@@ -128,12 +127,12 @@ fn a_map_is_measured_written_and_drawn() {
     );
     assert_eq!(lines.len(), 7);
     assert!(lines[6].starts_with("5,counting,70,4,"), "{}", lines[6]);
-    let svg = fs::read_to_string(files.picture.unwrap()).unwrap();
+    let svg = fs::read_to_string(&files[1]).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
     for label in ["speed v in mm/s", "wavelength λ in mm", "counting"] {
         assert!(svg.contains(label), "{label}");
     }
-    let words = fs::read_to_string(files.words.unwrap()).unwrap();
+    let words = fs::read_to_string(&files[2]).unwrap();
     assert!(words.contains("\n- counting is valid for "), "{words}");
 }
 
@@ -141,16 +140,16 @@ fn a_map_is_measured_written_and_drawn() {
 fn a_map_that_is_there_is_not_run_again() {
     let (map, plan) = (small(), plan("again"));
     let (_, files) = make(&map, &plan).unwrap();
-    let first = fs::read(&files.csv).unwrap();
+    let first = fs::read(&files[0]).unwrap();
     assert_eq!(make(&map, &plan).unwrap().0, 0);
-    assert_eq!(fs::read(&files.csv).unwrap(), first);
+    assert_eq!(fs::read(&files[0]).unwrap(), first);
 }
 
 #[test]
 fn a_map_that_was_stopped_anywhere_comes_to_the_same_file() {
     let (map, plan) = (small(), plan("stopped"));
     let (_, files) = make(&map, &plan).unwrap();
-    let whole = fs::read(&files.csv).unwrap();
+    let whole = fs::read(&files[0]).unwrap();
     let rows: Vec<&[u8]> = whole.split_inclusive(|byte| *byte == b'\n').collect();
     // Rows in another order, the last one or the header cut off at several places, and nothing at all.
     let some = [rows[0], rows[5], rows[2], rows[4]].concat();
@@ -164,11 +163,11 @@ fn a_map_that_was_stopped_anywhere_comes_to_the_same_file() {
         some.len() - 1,
         some.len(),
     ] {
-        fs::write(&files.csv, &some[..end]).unwrap();
+        fs::write(&files[0], &some[..end]).unwrap();
         let there = some[..end].iter().filter(|byte| **byte == b'\n').count();
         let (runs, _) = make(&map, &plan).unwrap();
         assert_eq!(runs, 6 - there.saturating_sub(1), "cut at {end}");
-        assert_eq!(fs::read(&files.csv).unwrap(), whole, "cut at {end}");
+        assert_eq!(fs::read(&files[0]).unwrap(), whole, "cut at {end}");
     }
 }
 
@@ -176,20 +175,15 @@ fn a_map_that_was_stopped_anywhere_comes_to_the_same_file() {
 fn shards_come_to_the_same_file_as_the_whole() {
     let (map, mut plan) = (small(), plan("shards"));
     let (_, files) = make(&map, &plan).unwrap();
-    let whole = fs::read(&files.csv).unwrap();
-    fs::remove_file(&files.csv).unwrap();
+    let whole = fs::read(&files[0]).unwrap();
+    fs::remove_file(&files[0]).unwrap();
     for number in 1..=3 {
         let text = format!("{number}/4");
         plan.shard = Some(text.parse().unwrap());
         let (_, files) = make(&map, &plan).unwrap();
-        let name = files
-            .csv
-            .file_name()
-            .unwrap()
-            .to_string_lossy()
-            .into_owned();
+        let name = files[0].file_name().unwrap().to_string_lossy().into_owned();
         assert_eq!(name, format!("small.{number}-of-4.csv"));
-        assert!(files.picture.is_none());
+        assert_eq!(files.len(), 1, "no picture");
     }
     plan.shard = None;
     let survey = Survey::open(&map, &plan).unwrap();
@@ -202,17 +196,17 @@ fn shards_come_to_the_same_file_as_the_whole() {
     drop(survey);
     let (runs, files) = make(&map, &plan).unwrap();
     assert_eq!(runs, 1);
-    assert_eq!(fs::read(&files.csv).unwrap(), whole);
+    assert_eq!(fs::read(&files[0]).unwrap(), whole);
 }
 
 #[test]
 fn a_file_of_another_grid_or_version_is_refused_and_renewed_if_asked() {
     let (map, mut plan) = (small(), plan("foreign"));
     let (_, files) = make(&map, &plan).unwrap();
-    let whole = fs::read_to_string(&files.csv).unwrap();
+    let whole = fs::read_to_string(&files[0]).unwrap();
     let key = whole.lines().nth(1).unwrap().rsplit(',').next().unwrap();
     let other = Map {
-        base: vec![Knob::Snr.at(21.0)],
+        base: vec![Knob::SNR.at(21.0)],
         ..small()
     };
     for (what, line, text) in [
@@ -238,9 +232,9 @@ fn a_file_of_another_grid_or_version_is_refused_and_renewed_if_asked() {
         }),
     ] {
         assert_ne!(text, whole);
-        fs::write(&files.csv, text).unwrap();
+        fs::write(&files[0], text).unwrap();
         let refusal = refusal(&map, &plan);
-        let at = format!("{}:{line}: ", files.csv.display());
+        let at = format!("{}:{line}: ", files[0].display());
         assert!(
             refusal.starts_with(&at) && refusal.contains(what) && refusal.contains("--renew"),
             "{refusal}"
@@ -248,7 +242,7 @@ fn a_file_of_another_grid_or_version_is_refused_and_renewed_if_asked() {
         plan.renew = true;
         make(&map, &plan).unwrap();
         plan.renew = false;
-        assert_eq!(fs::read_to_string(&files.csv).unwrap(), whole);
+        assert_eq!(fs::read_to_string(&files[0]).unwrap(), whole);
     }
     assert!(refusal(&other, &plan).contains("measured on another grid"));
 }
@@ -277,9 +271,10 @@ fn methods_are_added_to_a_map_without_running_the_others_again() {
     let mut survey = Survey::open(&map, &plan).unwrap();
     assert_eq!(survey.missing(), 6);
     survey.run(|| {}).unwrap();
-    let (_, rows) = survey.finish().unwrap();
+    let made = survey.finish().unwrap();
+    let methods: Vec<&str> = made.lines.iter().map(|line| &*line.cells[1].1).collect();
     // Those that maps compare by default come first.
-    assert_eq!(whole_methods(&map, &rows), ["counting", "default"]);
+    assert_eq!(methods, ["counting", "default"]);
     plan.methods = vec!["divination".into()];
     assert_eq!(refusal(&map, &plan), "map small");
 }

@@ -6,7 +6,7 @@ use super::journal::Rows;
 use super::measurement::Measurement;
 
 /// A method is silent at a place if it is valid for less of the time in motion than this.
-pub const SPEAKS: f64 = 0.5;
+const SPEAKS: f64 = 0.5;
 /// Most of the estimates that may be wrong.
 pub const WRONG_SHARE: f64 = 0.001;
 
@@ -156,25 +156,20 @@ fn ranges(axis: &Axis, steps: &[usize]) -> String {
             _ => runs.push((step, step)),
         }
     }
-    let texts: Vec<String> = runs
-        .into_iter()
-        .map(|(first, last)| match first == last {
-            true => label(first),
-            false => format!("{} to {}", label(first), label(last)),
-        })
-        .collect();
+    let text = |(first, last)| match first == last {
+        true => label(first),
+        false => format!("{} to {}", label(first), label(last)),
+    };
+    let texts: Vec<String> = runs.into_iter().map(text).collect();
     texts.join(", ")
 }
 
 /// What a cell is.
 pub fn settings(map: &Map, cell: usize) -> String {
-    let settings: Vec<String> = map
-        .columns()
-        .iter()
-        .zip(map.parameters(cell))
-        .map(|(column, value)| format!("{column} = {value}"))
-        .collect();
-    settings.join(", ")
+    let settings = map
+        .own(cell)
+        .map(|of| format!("{} = {}", of.knob.column, of.value));
+    settings.collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -191,8 +186,8 @@ mod tests {
             name: "small",
             title: "Small",
             conditions: "",
-            x: Axis::linear("speed v in mm/s", Knob::Speed, 30.0, 70.0, 3),
-            y: Axis::listed("wavelength λ in mm", Knob::Wavelength, &[1.0, 4.0]),
+            x: Axis::linear("speed v in mm/s", Knob::SPEED, 30.0, 70.0, 3),
+            y: Axis::listed("wavelength λ in mm", Knob::WAVELENGTH, &[1.0, 4.0]),
             base: Vec::new(),
         }
     }

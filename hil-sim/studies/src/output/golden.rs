@@ -8,8 +8,8 @@
 //! ```
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene_file::line::line_of;
@@ -26,42 +26,22 @@ const HEADER: &str = "\
 pub enum GoldenError {
     /// The file cannot be read.
     #[error(
-        "{0}: cannot be read: {source}: make it with hil-sim golden renew --file {0} SCENES...",
-        path.display()
+        "{path}: cannot be read: {}: make it with hil-sim golden renew --file {path} SCENES...",
+        .1, path = .0.display()
     )]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file holds something else.
-    #[error("{}:{line}: {what}: mend it, or make it anew with hil-sim golden renew", path.display())]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-        /// The line.
-        line: usize,
-        /// What is wrong.
-        what: String,
-    },
+    Unreadable(PathBuf, #[source] io::Error),
+    /// The file holds something else, at this line.
+    #[error("{}:{}: {}: mend it, or make it anew with hil-sim golden renew", .0.display(), .1, .2)]
+    Foreign(PathBuf, usize, String),
     /// The file cannot be written.
-    #[error("{}: cannot be written: {source}: give a file in a folder that exists", path.display())]
-    NotWritten {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    #[error("{}: cannot be written: {}: give a file in a folder that exists", .0.display(), .1)]
+    NotWritten(PathBuf, #[source] io::Error),
     /// A scene's file is nowhere.
-    #[error("{}: cannot be found: {source}: give the name of a scene", path.display())]
-    NoScene {
-        /// The scene's file.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    #[error("{}: cannot be found: {}: give the name of a scene", .0.display(), .1)]
+    NoScene(PathBuf, #[source] io::Error),
 }
+
+type Hashes = BTreeMap<String, BTreeMap<String, String>>;
 
 /// What a run has to do with the golden hash of its scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,7 +62,7 @@ pub struct Golden {
     folder: PathBuf,
     text: String,
     /// By scene and engine.
-    hashes: BTreeMap<String, BTreeMap<String, String>>,
+    hashes: Hashes,
 }
 
 impl Golden {
@@ -91,38 +71,24 @@ impl Golden {
     /// # Errors
     /// If it cannot be read, or is no such file.
     pub fn read(path: &Path) -> Result<Self, GoldenError> {
-        let text = fs::read_to_string(path).map_err(|source| GoldenError::Unreadable {
-            path: path.to_owned(),
-            source,
+        let unreadable = |source| GoldenError::Unreadable(path.to_owned(), source);
+        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let foreign = |line, what| GoldenError::Foreign(path.to_owned(), line, what);
+        let hashes: Hashes = toml::from_str(&text).map_err(|error| {
+            let before = &text.as_bytes()[..error.span().map_or(0, |at| at.start.min(text.len()))];
+            let lines = before.iter().filter(|&&byte| byte == b'\n');
+            foreign(1 + lines.count(), error.message().to_owned())
         })?;
-        let foreign = |at: usize, what: String| GoldenError::Foreign {
-            path: path.to_owned(),
-            line: 1 + text.as_bytes()[..at.min(text.len())]
-                .iter()
-                .filter(|&&byte| byte == b'\n')
-                .count(),
-            what,
-        };
-        let hashes: BTreeMap<String, BTreeMap<String, String>> =
-            toml::from_str(&text).map_err(|error| {
-                foreign(
-                    error.span().map_or(0, |span| span.start),
-                    error.message().to_owned(),
-                )
-            })?;
         for (scene, engines) in &hashes {
             for (engine, hash) in engines {
                 let is_hash = hash.len() == 16 && hash.bytes().all(|byte| byte.is_ascii_hexdigit());
                 let is_engine = [Engine::Native, Engine::Elf]
-                    .iter()
-                    .any(|known| known.name() == engine);
+                    .map(Engine::name)
+                    .contains(&&**engine);
                 if !is_hash || !is_engine {
                     let line = line_of(&text, &[scene, engine]).unwrap_or(1);
-                    return Err(GoldenError::Foreign {
-                        path: path.to_owned(),
-                        line,
-                        what: format!("{engine} = {hash:?} is no hash of native or elf"),
-                    });
+                    let what = format!("{engine} = {hash:?} is no hash of native or elf");
+                    return Err(foreign(line, what));
                 }
             }
         }
@@ -135,33 +101,19 @@ impl Golden {
     /// As [`Golden::read`], and if its folder does not exist.
     pub fn open(path: &Path) -> Result<Self, GoldenError> {
         match Self::read(path) {
-            Err(GoldenError::Unreadable { source, .. })
-                if source.kind() == std::io::ErrorKind::NotFound =>
-            {
-                Self::with(path, String::new(), BTreeMap::new())
+            Err(GoldenError::Unreadable(_, source)) if source.kind() == io::ErrorKind::NotFound => {
+                Self::with(path, String::new(), Hashes::new())
             }
             read => read,
         }
     }
 
-    fn with(
-        path: &Path,
-        text: String,
-        hashes: BTreeMap<String, BTreeMap<String, String>>,
-    ) -> Result<Self, GoldenError> {
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let folder = folder
-            .canonicalize()
-            .map_err(|source| GoldenError::NotWritten {
-                path: path.to_owned(),
-                source,
-            })?;
+    fn with(path: &Path, text: String, hashes: Hashes) -> Result<Self, GoldenError> {
+        let folder = path.parent().filter(|folder| *folder != Path::new(""));
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize();
         Ok(Self {
             path: path.to_owned(),
-            folder,
+            folder: folder.map_err(|source| GoldenError::NotWritten(path.to_owned(), source))?,
             text,
             hashes,
         })
@@ -177,29 +129,22 @@ impl Golden {
     /// # Errors
     /// If there is no such scene.
     pub fn name(&self, scene: &Path) -> Result<String, GoldenError> {
-        let scene = scene
-            .canonicalize()
-            .map_err(|source| GoldenError::NoScene {
-                path: scene.to_owned(),
-                source,
-            })?;
-        let same = self
-            .folder
-            .components()
-            .zip(scene.components())
-            .take_while(|(one, other)| one == other)
-            .count();
-        let up = self.folder.components().skip(same).map(|_| "..".to_owned());
-        let down = scene
-            .components()
+        let no_scene = |source| GoldenError::NoScene(scene.to_owned(), source);
+        let scene = scene.canonicalize().map_err(no_scene)?;
+        let (own, its) = (self.folder.components(), scene.components());
+        let alike = own.clone().zip(its.clone());
+        let same = alike.take_while(|(one, other)| one == other).count();
+        let up = own.skip(same).map(|_| "..".into());
+        let down = its
             .skip(same)
-            .map(|part| part.as_os_str().to_string_lossy().into_owned());
+            .map(|part| part.as_os_str().to_string_lossy());
         Ok(up.chain(down).collect::<Vec<_>>().join("/"))
     }
 
     /// What a run's hash has to do with the golden one of the scene of that name.
     pub fn standing(&self, name: &str, engine: Engine, hash: u64) -> Comparison {
-        match self.hash(name, engine) {
+        let golden = self.hashes.get(name).and_then(|of| of.get(engine.name()));
+        match golden {
             None => Comparison::Missing,
             Some(golden) if *golden == format!("{hash:016x}") => Comparison::Same,
             Some(golden) => {
@@ -230,31 +175,25 @@ impl Golden {
             }
             text.push('\n');
         }
-        fs::write(&self.path, text.trim_end().to_owned() + "\n").map_err(|source| {
-            GoldenError::NotWritten {
-                path: self.path.clone(),
-                source,
-            }
-        })
-    }
-
-    fn hash(&self, name: &str, engine: Engine) -> Option<&String> {
-        self.hashes.get(name)?.get(engine.name())
+        let written = fs::write(&self.path, text.trim_end().to_owned() + "\n");
+        written.map_err(|source| GoldenError::NotWritten(self.path.clone(), source))
     }
 }
 
 /// What to say of a run whose hash is not the golden one; none if it is.
 pub fn complaint(standing: &Comparison, hash: u64, golden: &Golden, name: &str) -> Option<String> {
     let path = golden.path().display();
-    match standing {
-        Comparison::Same => None,
-        Comparison::Missing => Some(format!(
-            "golden: {path} has no hash of {name}: look at the run, then hil-sim golden renew"
-        )),
-        Comparison::Other(golden, _) => Some(format!(
+    Some(match standing {
+        Comparison::Same => return None,
+        Comparison::Missing => {
+            format!(
+                "golden: {path} has no hash of {name}: look at the run, then hil-sim golden renew"
+            )
+        }
+        Comparison::Other(golden, _) => format!(
             "golden: {hash:016x} is not {golden} of {path}: the run has changed: look at what and why, and if it is meant, hil-sim golden renew"
-        )),
-    }
+        ),
+    })
 }
 
 #[cfg(test)]

@@ -121,7 +121,7 @@ impl<'a> SceneResult<'a> {
 
     /// The object of one run, without faults, contact and events: of a scene's name, and of how λ was estimated,
     /// as the scene writes it.
-    pub fn new(name: &'a str, method: &'a str, ran: &Ran, verdict: &'a Verdict) -> Self {
+    fn new(name: &'a str, method: &'a str, ran: &Ran, verdict: &'a Verdict) -> Self {
         Self {
             name,
             engine: ran.engine.name(),
@@ -142,20 +142,8 @@ impl<'a> SceneResult<'a> {
     }
 }
 
-/// The JSON of several runs: a list, indented, a line for each estimate, closed by a line break.
-///
-/// # Errors
-/// None in practice: there are no maps here whose keys are not text.
-pub fn to_json(results: &[SceneResult]) -> serde_json::Result<String> {
-    let mut bytes = Vec::new();
-    let mut out = serde_json::Serializer::with_formatter(&mut bytes, Lines::default());
-    results.serialize(&mut out)?;
-    bytes.push(b'\n');
-    // A serializer of JSON writes nothing but UTF-8.
-    String::from_utf8(bytes).map_err(serde::ser::Error::custom)
-}
-
-/// The same list, written object by object, so that none has to be kept.
+/// The JSON of several runs: a list, indented, a line for each estimate, closed by a line break. It is written object by
+/// object, so that none has to be kept.
 #[derive(Debug, Default)]
 pub struct JsonList {
     begun: bool,
@@ -187,6 +175,16 @@ mod tests {
     use hil_sim_core::judge::judge;
     use hil_sim_core::judge::synthetic::Run;
     use hil_sim_core::judge::truth::Truth;
+
+    /// The list, written at once.
+    fn to_json(results: &[SceneResult]) -> serde_json::Result<String> {
+        let mut bytes = Vec::new();
+        let mut out = serde_json::Serializer::with_formatter(&mut bytes, Lines::default());
+        results.serialize(&mut out)?;
+        bytes.push(b'\n');
+        // A serializer of JSON writes nothing but UTF-8.
+        String::from_utf8(bytes).map_err(serde::ser::Error::custom)
+    }
 
     fn parsed(run: &Run) -> Value {
         let truth = Truth::new("a scene", "counting", &*run.surface_mm);

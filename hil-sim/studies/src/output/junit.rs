@@ -1,14 +1,15 @@
 //! JUnit XML of runs, for whatever shows test results: a case for each scene, in one suite for the engine.
 
+use std::path::Path;
 use std::time::Duration;
 
-use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
+pub use quick_junit::TestCase;
+use quick_junit::{NonSuccessKind, Report, SerializeError, TestCaseStatus, TestSuite};
 
 use hil_sim_core::run::recording::Engine;
 
 /// What became of a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Fate {
+pub enum Fate<'a> {
     /// It ran.
     Ran {
         /// Wall time in s.
@@ -16,73 +17,68 @@ pub enum Fate {
         /// The run's hash.
         hash: u64,
         /// The line that was printed of it.
-        row: String,
+        row: &'a str,
         /// A line for each expectation that was not met.
-        unmet: Vec<String>,
+        unmet: &'a [String],
     },
     /// It could not be run, and why.
-    Unusable(String),
+    Unusable(&'a str),
     /// It was not run, because another one could not be.
     Skipped,
 }
 
-/// A scene, and what became of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Case {
-    /// The scene's file.
-    pub file: String,
-    /// The scene's name; the file's if it could not be read.
-    pub name: String,
-    /// What became of it.
-    pub fate: Fate,
-}
-
-/// The report on these scenes.
+/// The report on these cases.
 ///
 /// # Errors
 /// None in practice: text is written to memory.
-pub fn xml(engine: Engine, cases: &[Case]) -> Result<String, SerializeError> {
+pub fn xml(
+    engine: Engine,
+    cases: impl IntoIterator<Item = TestCase>,
+) -> Result<String, SerializeError> {
     let mut suite = TestSuite::new(format!("hil-sim {}", engine.name()));
-    suite.add_test_cases(cases.iter().map(case));
+    suite.add_test_cases(cases);
     let mut report = Report::new("hil-sim");
     report.add_test_suite(suite);
     report.to_string()
 }
 
-fn case(case: &Case) -> TestCase {
-    let status = match &case.fate {
-        Fate::Ran { unmet, .. } if unmet.is_empty() => TestCaseStatus::success(),
+/// The case of a scene's file, and of its name, which is the file's if it could not be read.
+pub fn case(file: &Path, name: &str, fate: &Fate) -> TestCase {
+    let not_passed = |kind, what: &str, message: String| {
+        let mut status = TestCaseStatus::non_success(kind);
+        status.set_type(what).set_message(message);
+        status
+    };
+    let status = match fate {
+        Fate::Ran { unmet: [], .. } => TestCaseStatus::success(),
         Fate::Ran { unmet, .. } => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status
-                .set_type("not as expected")
-                .set_message(unmet.join("; "))
-                .set_description(unmet.join("\n"));
+            let kind = NonSuccessKind::Failure;
+            let mut status = not_passed(kind, "not as expected", unmet.join("; "));
+            status.set_description(unmet.join("\n"));
             status
         }
-        Fate::Unusable(reason) => {
-            let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-            status
-                .set_type("cannot be used")
-                .set_message(reason.clone());
-            status
-        }
+        Fate::Unusable(reason) => not_passed(
+            NonSuccessKind::Error,
+            "cannot be used",
+            (*reason).to_owned(),
+        ),
         Fate::Skipped => {
             let mut status = TestCaseStatus::skipped();
             status.set_message("another scene cannot be used");
             status
         }
     };
-    let mut test = TestCase::new(case.name.clone(), status);
-    test.set_classname(case.file.clone());
-    test.add_property(("file", case.file.as_str()));
+    let file = file.display().to_string();
+    let mut test = TestCase::new(name, status);
+    test.add_property(("file", file.as_str()));
+    test.set_classname(file);
     if let Fate::Ran {
         wall_s, hash, row, ..
-    } = &case.fate
+    } = fate
     {
         test.set_time(Duration::try_from_secs_f64(*wall_s).unwrap_or_default());
         test.add_property(("hash", format!("{hash:016x}").as_str()));
-        test.set_system_out(row.clone());
+        test.set_system_out(*row);
     }
     test
 }
@@ -93,23 +89,20 @@ mod tests {
 
     #[test]
     fn each_fate_is_a_case_that_can_be_read_back() {
-        let of = |name: &str, fate| Case {
-            file: format!("scenes/{name}.toml"),
-            name: name.to_owned(),
-            fate,
-        };
-        let ran = |unmet: &[&str]| Fate::Ran {
+        let of = |name: &str, fate| case(format!("scenes/{name}.toml").as_ref(), name, &fate);
+        let unmet = ["mean_mm: 3 is not \"within\" 1 & 2", "x: y"].map(str::to_owned);
+        let ran = |unmet| Fate::Ran {
             wall_s: 0.25,
             hash: 0xabc,
-            row: "a <row> & \u{1b}more".to_owned(),
-            unmet: unmet.iter().map(|&line| line.to_owned()).collect(),
+            row: "a <row> & \u{1b}more",
+            unmet,
         };
         let text = xml(
             Engine::Native,
-            &[
+            [
                 of("good", ran(&[])),
-                of("bad", ran(&["mean_mm: 3 is not \"within\" 1 & 2", "x: y"])),
-                of("ugly", Fate::Unusable("x.toml:1: <name>".to_owned())),
+                of("bad", ran(&unmet)),
+                of("ugly", Fate::Unusable("x.toml:1: <name>")),
                 of("other", Fate::Skipped),
             ],
         )

@@ -1,8 +1,6 @@
 //! A run for a person to look at: one HTML file that needs nothing else.
 
 pub(crate) mod crossings;
-mod faults;
-mod figure;
 mod plots;
 mod senses;
 mod tables;
@@ -12,12 +10,28 @@ use std::fmt::Write;
 
 use crate::output::escape::escape;
 use crate::output::json::ContactResult;
-use crate::output::report::figure::Figure;
+use crate::output::plot::palette::{Colour, style_rules};
+use crate::output::plot::{Axis, Mark, Panel, WIDTH, chart};
 use hil_sim_core::judge::Verdict;
 use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::run::recording::Recording;
+
+/// A chart with what is to be said beside it.
+struct Figure {
+    title: String,
+    /// What each colour means.
+    legend: Vec<(Colour, &'static str)>,
+    svg: String,
+    /// What else the reader must know.
+    note: String,
+}
+
+/// A chart as wide as the page, of a height.
+fn draw(height: f64, x: &Axis, y: &Axis, marks: Vec<Mark>) -> String {
+    chart(WIDTH, height, &Panel::new("", x, y).with(marks))
+}
 
 /// One scene's part of the report.
 #[derive(Clone)]
@@ -57,17 +71,17 @@ pub fn html(chapters: &[Chapter]) -> String {
          <meta name=viewport content=\"width=device-width, initial-scale=1\">\n\
          <title>Ridgelink: simulated runs</title>\n<style>\n{}{}</style>\n\
          <h1>Ridgelink: simulated runs</h1>\n{}",
-        crate::output::plot::palette::style_rules(),
+        style_rules(),
         include_str!("report/style.css"),
         tables::index(chapters),
     );
     for (at, chapter) in chapters.iter().enumerate() {
-        write_chapter(&mut page, at, chapter, &plots::figures(chapter));
+        write_chapter(&mut page, at, chapter);
     }
     page
 }
 
-fn write_chapter(page: &mut String, at: usize, chapter: &Chapter, figures: &[Figure]) {
+fn write_chapter(page: &mut String, at: usize, chapter: &Chapter) {
     let Chapter {
         truth, recording, ..
     } = chapter;
@@ -89,43 +103,36 @@ fn write_chapter(page: &mut String, at: usize, chapter: &Chapter, figures: &[Fig
         let _ = writeln!(page, "<p class=unmet>Not as expected: {}</p>", escape(line));
     }
     *page += &tables::summary(chapter);
-    for figure in figures {
-        write_figure(page, figure);
+    for figure in plots::figures(chapter) {
+        write_figure(page, &figure);
     }
-    *page += &faults::table(chapter.findings);
+    *page += &tables::faults(chapter.findings);
     *page += &tables::counters(chapter);
     *page += &tables::log(chapter);
     *page += "</section>\n";
 }
 
-fn write_figure(page: &mut String, figure: &Figure) {
-    let _ = writeln!(
-        page,
-        "<figure><figcaption>{}</figcaption>",
-        escape(&figure.title)
-    );
-    if !figure.legend.is_empty() {
-        *page += "<ul class=legend>";
-        for (colour, text) in &figure.legend {
-            let _ = write!(
-                page,
-                "<li><i style=\"background:var(--{})\"></i>{}</li>",
-                colour.name,
-                escape(text)
-            );
-        }
-        *page += "</ul>\n";
+/// What each colour means, as HTML; nothing if there is none.
+pub(crate) fn legend(entries: &[(Colour, &str)]) -> String {
+    if entries.is_empty() {
+        return String::new();
     }
-    let title = escape(&figure.title);
-    let svg = figure.svg.replacen(
-        "<svg ",
-        &format!("<svg role=img aria-label=\"{title}\" "),
-        1,
-    );
+    let item = |(colour, text): &(Colour, &str)| {
+        let (name, text) = (colour.name, escape(text));
+        format!("<li><i style=\"background:var(--{name})\"></i>{text}</li>")
+    };
+    let items: String = entries.iter().map(item).collect();
+    format!("<ul class=legend>{items}</ul>\n")
+}
+
+fn write_figure(page: &mut String, figure: &Figure) {
+    let (title, note) = (escape(&figure.title), escape(&figure.note));
+    let legend = legend(&figure.legend);
+    let named = format!("<svg role=img aria-label=\"{title}\" ");
+    let svg = figure.svg.replacen("<svg ", &named, 1);
     let _ = writeln!(
         page,
-        "<div class=wide>{svg}</div>\n<p>{}</p></figure>",
-        escape(&figure.note)
+        "<figure><figcaption>{title}</figcaption>\n{legend}<div class=wide>{svg}</div>\n<p>{note}</p></figure>"
     );
 }
 
@@ -168,7 +175,7 @@ mod tests {
         for svg in page.split("<svg ").skip(1) {
             let (svg, _) = svg.split_once("</svg>").unwrap();
             let svg = svg.replace("role=img", "");
-            crate::output::plot::fits::assert_fits("report", &format!("<svg {svg}</svg>"));
+            crate::output::plot::tests::assert_fits("report", &format!("<svg {svg}</svg>"));
         }
     }
 

@@ -3,108 +3,67 @@
 use std::fmt::Write;
 
 use crate::output::escape::escape;
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{WIDTH, chart};
 use crate::output::plot::palette::Colour;
-use crate::output::plot::panel::Panel;
-use crate::psychophysics::tables::Table;
+use crate::output::plot::{Axis, Mark, Panel, WIDTH, chart};
+use crate::output::report::legend;
+use crate::study::Table;
 
 /// Width of a chart for a phone: text is of one size in it and in one for a page.
 const NARROW: f64 = 525.0;
 
 /// A figure or a table.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Exhibit {
     /// Its place on the page: "fig-5".
     pub id: &'static str,
-    /// Its heading.
-    pub title: String,
+    pub title: &'static str,
     /// What the paper says of it, and gives.
     pub paper: String,
     /// Two sentences: what is seen, and where ours differs.
     pub seen: String,
     /// What of that a run could also have contradicted.
     pub conclusions: Vec<Conclusion>,
-    /// What is shown.
     pub parts: Vec<Part>,
-    /// Its CSVs: names and texts.
-    pub csvs: Vec<(String, String)>,
+    /// Names and texts.
+    pub csvs: Vec<(&'static str, String)>,
     /// CSVs of the experiments with people that belong to it.
     pub shared: &'static [&'static str],
 }
 
-/// A conclusion, and whether these runs bear it out.
+/// A conclusion in a sentence, and whether these runs bear it out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Conclusion {
-    /// In a sentence.
     pub claim: &'static str,
-    /// Whether it holds.
     pub holds: bool,
-}
-
-impl Exhibit {
-    /// What these runs do not bear out, with the exhibit's name before it.
-    pub fn contradicted(&self) -> impl Iterator<Item = String> {
-        let name = self.title.split(':').next().unwrap_or_default();
-        let lost = self
-            .conclusions
-            .iter()
-            .filter(|conclusion| !conclusion.holds);
-        lost.map(move |conclusion| format!("{name}: {}", conclusion.claim))
-    }
 }
 
 /// Something shown.
 #[derive(Clone, Debug)]
 pub enum Part {
-    /// A chart.
     Chart {
-        /// What it is of.
         caption: String,
-        /// What each colour means.
-        legend: Vec<(Colour, String)>,
-        /// As wide as a page.
+        /// What each colour means, as HTML.
+        legend: String,
+        /// As wide as a page, and as a phone.
         broad: String,
-        /// As wide as a phone.
         narrow: String,
     },
-    /// A table.
-    Table {
-        /// What it is of.
-        caption: String,
-        /// Its heads.
-        heads: Vec<String>,
-        /// Its rows, the first cell of each its head.
-        rows: Vec<Vec<String>>,
-    },
-}
-
-impl From<Table> for Part {
-    fn from(table: Table) -> Self {
-        Self::Table {
-            caption: table.caption.to_owned(),
-            heads: table.heads,
-            rows: table.rows,
-        }
-    }
+    /// The first cell of each row is its head.
+    Table(Table),
 }
 
 impl Part {
     /// Draws a chart.
     pub(super) fn chart(
         caption: impl Into<String>,
-        legend: &[(Colour, &str)],
+        entries: &[(Colour, &str)],
         (height, x, y): (f64, &Axis, &Axis),
         marks: impl IntoIterator<Item = Mark>,
     ) -> Self {
         let panel = Panel::new("", x, y).with(marks);
         Self::Chart {
             caption: caption.into(),
-            legend: legend
-                .iter()
-                .map(|&(colour, text)| (colour, text.to_owned()))
-                .collect(),
+            legend: legend(entries),
             broad: chart(WIDTH, height, &panel),
             narrow: chart(NARROW, height, &panel),
         }
@@ -119,77 +78,61 @@ impl Part {
                 narrow,
             } => {
                 let caption = escape(caption);
-                let _ = writeln!(page, "<h3>{caption}</h3>");
-                if !legend.is_empty() {
-                    *page += "<ul class=legend>";
-                    for (colour, text) in legend {
-                        let (name, text) = (colour.name, escape(text));
-                        let _ = write!(
-                            page,
-                            "<li><i style=\"background:var(--{name})\"></i>{text}</li>"
-                        );
-                    }
-                    *page += "</ul>\n";
-                }
+                let _ = write!(page, "<h3>{caption}</h3>\n{legend}");
                 for (class, svg) in [("broad", broad), ("narrow", narrow)] {
                     let named = format!("<svg role=\"img\" aria-label=\"{caption}\" ");
                     let svg = svg.replacen("<svg ", &named, 1);
                     let _ = writeln!(page, "<div class={class}>{svg}</div>");
                 }
             }
-            Part::Table {
-                caption,
-                heads,
-                rows,
-            } => {
-                let _ = write!(
+            Part::Table(table) => {
+                let head = |head| format!("<th scope=col>{}</th>", escape(head));
+                let row = |cells: Vec<String>| {
+                    let head = format!("<th scope=row>{}</th>", cells[0]);
+                    let cells = cells[1..].iter().map(|cell| format!("<td>{cell}</td>"));
+                    format!("<tr>{head}{}</tr>\n", cells.collect::<String>())
+                };
+                let rows = table.rows.iter();
+                let rows =
+                    rows.map(|of| row(of.cells.iter().map(|(_, text)| escape(text)).collect()));
+                let _ = writeln!(
                     page,
-                    "<div class=wide><table><caption>{}</caption><thead><tr>",
-                    escape(caption)
+                    "<div class=wide><table><caption>{}</caption><thead><tr>{}</tr></thead>\n\
+                     <tbody>{}</tbody></table></div>",
+                    escape(table.caption),
+                    table.heads().map(head).collect::<String>(),
+                    rows.collect::<String>(),
                 );
-                for head in heads {
-                    let _ = write!(page, "<th scope=col>{}</th>", escape(head));
-                }
-                *page += "</tr></thead>\n<tbody>";
-                for row in rows {
-                    *page += "<tr>";
-                    for (at, cell) in row.iter().enumerate() {
-                        let cell = escape(cell);
-                        let _ = match at {
-                            0 => write!(page, "<th scope=row>{cell}</th>"),
-                            _ => write!(page, "<td>{cell}</td>"),
-                        };
-                    }
-                    *page += "</tr>\n";
-                }
-                *page += "</tbody></table></div>\n";
             }
         }
     }
 }
 
 impl Exhibit {
+    /// What it is called: "Fig. 5".
+    pub(super) fn name(&self) -> &'static str {
+        self.title.split(':').next().unwrap_or_default()
+    }
+
+    /// What these runs do not bear out, with the exhibit's name before it.
+    pub fn contradicted(&self) -> impl Iterator<Item = String> {
+        let lost = self.conclusions.iter().filter(|one| !one.holds);
+        lost.map(|one| format!("{}: {}", self.name(), one.claim))
+    }
+
     /// Writes it on a page whose CSVs lie in `folder`.
     pub(super) fn write(&self, page: &mut String, folder: &str) {
-        let Self {
-            id,
-            title,
-            paper,
-            seen,
-            ..
-        } = self;
+        let (title, paper, seen) = (escape(self.title), escape(&self.paper), escape(&self.seen));
         let _ = writeln!(
             page,
-            "<section class=exhibit id={id}>\n<h2>{}</h2>\n<p class=soft>{}</p>\n<p>{}</p>",
-            escape(title),
-            escape(paper),
-            escape(seen),
+            "<section class=exhibit id={}>\n<h2>{title}</h2>\n<p class=soft>{paper}</p>\n<p>{seen}</p>",
+            self.id
         );
         for line in self.contradicted() {
+            let line = escape(&line);
             let _ = writeln!(
                 page,
-                "<p class=warning>Not borne out by these runs: {}</p>",
-                escape(&line)
+                "<p class=warning>Not borne out by these runs: {line}</p>"
             );
         }
         *page += "<div class=card>\n";
@@ -197,7 +140,7 @@ impl Exhibit {
             part.write(page);
         }
         *page += "</div>\n<p class=soft>Numbers:";
-        let own = self.csvs.iter().map(|(name, _)| name.as_str());
+        let own = self.csvs.iter().map(|(name, _)| *name);
         for name in own.chain(self.shared.iter().copied()) {
             let _ = write!(page, " <a href=\"{0}/{name}\">{name}</a>", escape(folder));
         }
@@ -206,10 +149,8 @@ impl Exhibit {
 }
 
 /// A number with so many decimals, or a dash.
-pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("–".into(), |value| {
-        format!("{value:.decimals$}").replace('-', "−")
-    })
+pub(super) fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
+    crate::study::number(value, decimals).replace('-', "−")
 }
 
 #[cfg(test)]
@@ -220,16 +161,12 @@ mod tests {
     fn a_conclusion_that_the_runs_contradict_stands_on_the_page() {
         let exhibit = |holds| Exhibit {
             id: "fig-6",
-            title: "Fig. 6: accuracy".into(),
-            paper: String::new(),
-            seen: String::new(),
+            title: "Fig. 6: accuracy",
             conclusions: vec![Conclusion {
                 claim: "the count is worse",
                 holds,
             }],
-            parts: Vec::new(),
-            csvs: Vec::new(),
-            shared: &[],
+            ..Exhibit::default()
         };
         let written = |holds| {
             let mut page = String::new();

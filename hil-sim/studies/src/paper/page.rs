@@ -5,8 +5,7 @@ use std::fmt::Write;
 use crate::output::escape::escape;
 use crate::output::plot::palette::style_rules;
 use crate::paper::Exhibit;
-use crate::psychophysics::DISCLAIMER;
-use crate::psychophysics::study::Study;
+use crate::psychophysics::{DISCLAIMER, Study};
 use hil_sim_core::run::recording::Recording;
 
 /// The page. Its CSVs lie in `folder`, beside it.
@@ -29,10 +28,7 @@ pub(super) fn html(
         "elf" => "the flashed ELFs on emulated boards (engine elf)",
         _ => "the firmware's libraries on a computer (engine native), not on the ELFs",
     };
-    let virtual_s: f64 = recordings
-        .iter()
-        .map(|recording| recording.duration_s)
-        .sum();
+    let virtual_s: f64 = recordings.iter().map(|run| run.duration_s).sum();
     let _ = writeln!(
         page,
         "<p>Tables I to IV and Figs 4 to 8 of Okamoto, Konyo, Maeno and Tadokoro, <i>Roughness feeling \
@@ -49,13 +45,8 @@ pub(super) fn html(
     );
     page += "<nav><ul>";
     for exhibit in exhibits {
-        let name = exhibit.title.split(':').next().unwrap_or_default();
-        let _ = write!(
-            page,
-            "<li><a href=\"#{}\">{}</a></li>",
-            exhibit.id,
-            escape(name)
-        );
+        let name = escape(exhibit.name());
+        let _ = write!(page, "<li><a href=\"#{}\">{name}</a></li>", exhibit.id);
     }
     page += "</ul></nav>\n";
     for exhibit in exhibits {

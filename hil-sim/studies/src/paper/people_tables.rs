@@ -1,11 +1,9 @@
 //! Tables II to IV: the experiments with people, simulated.
 
-use crate::paper::exhibit::{Exhibit, number};
-use crate::psychophysics::pairs::mean_share;
-use crate::psychophysics::published::TABLE_3;
-use crate::psychophysics::study::Study;
-use crate::psychophysics::tables;
-use crate::psychophysics::tables::span;
+use crate::paper::exhibit::{Exhibit, Part, number};
+use crate::psychophysics::{
+    Study, TABLE_3, felt, glimpses, limens, mean_share, mosteller_tests, scores, shares, span,
+};
 
 pub(super) fn table_2(study: &Study) -> Exhibit {
     let added_mm = study
@@ -15,7 +13,7 @@ pub(super) fn table_2(study: &Study) -> Exhibit {
         .fold(0.0, f64::max);
     Exhibit {
         id: "table-2",
-        title: "Table II: limens by the method of limits".into(),
+        title: "Table II: limens by the method of limits",
         paper: format!(
             "Three subjects, λ given to the display, steps of 0.2 mm, two series either way. Our observers have the \
              paper's limens as 75 % points; \"95 %\" is the middle of {} experiments of that size, \"clean\" their mean \
@@ -28,10 +26,9 @@ pub(super) fn table_2(study: &Study) -> Exhibit {
              put in came out, through real voltages; the rest of the difference is the method's, in which the first \
              answer of its kind decides."
         ),
-        conclusions: Vec::new(),
-        parts: vec![tables::limens(study).into()],
-        csvs: Vec::new(),
+        parts: vec![Part::Table(limens(study))],
         shared: &["table-2.csv"],
+        ..Exhibit::default()
     }
 }
 
@@ -43,7 +40,7 @@ pub(super) fn table_3(study: &Study) -> Exhibit {
     let sticking = study.contender("counting-mild").and_then(|c| c.mean_share);
     Exhibit {
         id: "table-3",
-        title: "Table III: shares of correct answers in paired comparison".into(),
+        title: "Table III: shares of correct answers in paired comparison",
         paper: format!(
             "One subject, ten trials a pair. Ours: {} trials, Wilson's 95 % intervals (for the mean: the middle 95 % \
              of {} such experiments), all with the same rubs of each specimen: another seed, which is another hand, \
@@ -60,16 +57,13 @@ pub(super) fn table_3(study: &Study) -> Exhibit {
             share("counting-mild"),
             span(sticking),
             share("default"),
-            number(Some(100.0 * mean_share(&TABLE_3)), 1),
+            number(100.0 * mean_share(&TABLE_3), 1),
         ),
-        conclusions: Vec::new(),
-        parts: vec![
-            tables::shares(study).into(),
-            tables::felt(study).into(),
-            tables::glimpses(study).into(),
-        ],
-        csvs: Vec::new(),
+        parts: [shares(study), felt(study), glimpses(study)]
+            .map(Part::Table)
+            .into(),
         shared: &["table-3.csv", "felt.csv", "waves.csv"],
+        ..Exhibit::default()
     }
 }
 
@@ -77,7 +71,7 @@ pub(super) fn table_4(study: &Study) -> Exhibit {
     let recount = &study.recount;
     Exhibit {
         id: "table-4",
-        title: "Table IV: Thurstone's Case V, and Mosteller's test".into(),
+        title: "Table IV: Thurstone's Case V, and Mosteller's test",
         paper: "The paper says that the model fits, since 8.72 is below 14.07, the critical value of 7 degrees of \
                 freedom."
             .into(),
@@ -92,9 +86,8 @@ pub(super) fn table_4(study: &Study) -> Exhibit {
             100.0 * recount.rejected_though_true,
             recount.simulated.p,
         ),
-        conclusions: Vec::new(),
-        parts: vec![tables::scores(study).into(), tables::mosteller(study).into()],
-        csvs: Vec::new(),
+        parts: [scores(study), mosteller_tests(study)].map(Part::Table).into(),
         shared: &["table-4.csv", "mosteller.csv"],
+        ..Exhibit::default()
     }
 }

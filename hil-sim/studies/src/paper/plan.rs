@@ -3,23 +3,20 @@
 use protocol::Method;
 
 use crate::paper::published::{CELLS_MM, SPEEDS_MM_S};
-use crate::psychophysics::bench::Job;
-use crate::psychophysics::hand;
-use crate::psychophysics::study;
-use crate::psychophysics::study::{Plan, SNR_DB};
+use crate::psychophysics::{self, FREQUENCY_HZ, Job, PEAK_MM_S, Plan, SNR_DB};
 use hil_sim_core::judge::JudgedEstimate;
 use hil_sim_core::judge::estimates::judge;
 use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::run::recording::Recording;
 use hil_sim_core::scene::{Estimator, Gauges, Kinematic, Motion, Scene, Specimen};
 
-/// The paper's two seconds of estimates, and what filters and boards need before, in s.
-pub const CELL_S: f64 = 2.3;
-/// What the two seconds leave out at the beginning, in s.
-pub const SETTLED_S: f64 = 0.3;
+/// The paper's two seconds of estimates, and what filters and boards need before.
+const CELL_S: f64 = 2.3;
+/// What the two seconds leave out at the beginning.
+const SETTLED_S: f64 = 0.3;
 /// λ and v of the seven points that Fig. 6 has beside Table I's: the paper does not say which it took; these
 /// fill the gaps between Table I's frequencies.
-pub const FURTHER: [(f64, f64); 7] = [
+const FURTHER: [(f64, f64); 7] = [
     (1.0, 40.0),
     (1.0, 45.0),
     (1.0, 55.0),
@@ -28,26 +25,24 @@ pub const FURTHER: [(f64, f64); 7] = [
     (2.0, 40.0),
     (2.0, 56.0),
 ];
-/// Fig. 5: the window in ms, λ, the hand's peak and its frequency.
+/// The gauge that is counted.
+pub const COUNTED_GAUGE: usize = 2;
+/// Fig. 5: A, λ, the hand's peak α and its frequency fᵥ.
 pub const FIG_5_WINDOW_MS: u16 = 200;
-/// Fig. 5: λ in mm.
 pub const FIG_5_MM: f64 = 2.0;
-/// Fig. 5: α in mm/s.
 pub const FIG_5_PEAK_MM_S: f64 = 100.0;
-/// Fig. 5: fᵥ in Hz.
 pub const FIG_5_HAND_HZ: f64 = 1.0;
-/// Fig. 7: λ in mm. Its hand is [`hand::PEAK_MM_S`] and [`hand::FREQUENCY_HZ`].
+/// Fig. 7: λ. Its hand is that of the experiments with people.
 pub const FIG_7_MM: f64 = 2.0;
-/// Fig. 8: where the specimens meet, in mm.
+/// Fig. 8: the specimens, and where they meet.
+pub const FIG_8_MM: [f64; 2] = [1.0, 4.0];
 pub const FIG_8_BOUNDARY_MM: f64 = 60.0;
-/// Fig. 8: the speed in mm/s, which the paper does not give: the highest of Table I's. (At 50 mm/s a window
+/// Fig. 8: the speed, which the paper does not give: the highest of Table I's. (At 50 mm/s a window
 /// holds exactly two crossings of 4 mm, and a count does not roam.)
 pub const FIG_8_SPEED_MM_S: f64 = 70.0;
-/// Fig. 8: the specimens, in mm.
-pub const FIG_8_MM: [f64; 2] = [1.0, 4.0];
 
 /// λ and v of Table I's cells and Fig. 6's further points.
-pub fn cells() -> impl Iterator<Item = (f64, f64)> {
+fn cells() -> impl Iterator<Item = (f64, f64)> {
     let table_1 = SPEEDS_MM_S
         .into_iter()
         .flat_map(|speed| CELLS_MM.map(|mm| (mm, speed)));
@@ -57,7 +52,7 @@ pub fn cells() -> impl Iterator<Item = (f64, f64)> {
 /// All jobs: those of the experiments with people, then the rest.
 pub fn jobs(plan: &Plan) -> Vec<Job> {
     let seed = plan.seed;
-    let mut jobs = study::jobs(plan);
+    let mut jobs = psychophysics::jobs(plan);
     jobs.extend([fig_7(seed), fig_5(seed), fig_8(seed)].map(Job::pair));
     jobs.extend(cells().map(|(mm, speed_mm_s)| {
         Job::pair(Scene {
@@ -98,13 +93,13 @@ fn fig_7(seed: u64) -> Scene {
     Scene {
         name: "paper-fig-7".into(),
         seed,
-        duration_s: 3.0 / hand::FREQUENCY_HZ,
+        duration_s: 3.0 / FREQUENCY_HZ,
         motion: Motion::Sinusoid {
-            amplitude_mm_s: hand::PEAK_MM_S,
-            frequency_hz: hand::FREQUENCY_HZ,
+            amplitude_mm_s: PEAK_MM_S,
+            frequency_hz: FREQUENCY_HZ,
         },
         gauges: noisy(),
-        ..Scene::constant(FIG_7_MM, hand::PEAK_MM_S)
+        ..Scene::constant(FIG_7_MM, PEAK_MM_S)
     }
 }
 
@@ -116,27 +111,20 @@ fn fig_8(seed: u64) -> Scene {
         gauges: noisy(),
         ..Scene::constant(FIG_8_MM[0], FIG_8_SPEED_MM_S)
     };
-    scene.surface.specimens = vec![
-        Specimen {
-            wavelength_mm: FIG_8_MM[0],
-            length_mm: FIG_8_BOUNDARY_MM,
-        },
-        Specimen {
-            wavelength_mm: FIG_8_MM[1],
-            length_mm: f64::INFINITY,
-        },
-    ];
+    let specimens = FIG_8_MM.into_iter().zip([FIG_8_BOUNDARY_MM, f64::INFINITY]);
+    let specimen = |(wavelength_mm, length_mm)| Specimen {
+        wavelength_mm,
+        length_mm,
+    };
+    scene.surface.specimens = specimens.map(specimen).collect();
     scene
 }
 
 /// A constant speed over one specimen.
 #[derive(Clone, Copy)]
 pub struct Cell<'a> {
-    /// λ in mm.
     pub wavelength_mm: f64,
-    /// v in mm/s.
     pub speed_mm_s: f64,
-    /// The run.
     pub recording: &'a Recording,
 }
 
@@ -144,11 +132,8 @@ pub struct Cell<'a> {
 pub struct Runs<'a> {
     /// The experiments with people.
     pub people: &'a [Recording],
-    /// Fig. 7.
     pub fig_7: &'a Recording,
-    /// Fig. 5.
     pub fig_5: &'a Recording,
-    /// Fig. 8.
     pub fig_8: &'a Recording,
     /// Table I's cells, speed by speed, then Fig. 6's further points.
     pub cells: Vec<Cell<'a>>,
@@ -160,7 +145,7 @@ impl<'a> Runs<'a> {
     /// # Panics
     /// If there are fewer recordings than jobs.
     pub fn new(plan: &Plan, recordings: &'a [Recording]) -> Self {
-        let (people, rest) = recordings.split_at(study::jobs(plan).len());
+        let (people, rest) = recordings.split_at(psychophysics::jobs(plan).len());
         let [fig_7, fig_5, fig_8, rest @ ..] = rest else {
             panic!("a recording for each job");
         };
@@ -194,6 +179,11 @@ impl Cell<'_> {
         estimates.retain(|estimate| estimate.t_s >= SETTLED_S);
         estimates
     }
+}
+
+/// λ̂, if the default estimator stands by it.
+pub fn valid_mm(estimate: &JudgedEstimate) -> Option<f64> {
+    estimate.wavelength_mm.filter(|_| estimate.valid)
 }
 
 /// A run's estimates beside the truth.

@@ -5,25 +5,25 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Sampling frequency of equation (10), in Hz.
-pub const SAMPLE_RATE_HZ: f64 = 1_000.0;
-/// Standard deviation of the noise in λe that the paper took, in mm.
-pub const NOISE_MM: f64 = 1.0;
-/// Reciprocating frequency that the paper took to find A, in Hz.
+/// Sampling frequency of equation (10).
+const SAMPLE_RATE_HZ: f64 = 1_000.0;
+/// Standard deviation of the noise in λe that the paper took.
+const NOISE_MM: f64 = 1.0;
+/// Reciprocating frequency that the paper took to find A.
 pub const HAND_HZ: f64 = 1.0;
-/// The window that the paper arrived at, in s.
+/// The window that the paper arrived at.
 pub const WINDOW_S: f64 = 0.080;
 
 /// A sinusoidal hand over a surface, counted over a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rub {
-    /// A in s; A fᵥ at most 1/2.
+    /// A; A fᵥ at most 1/2.
     pub window_s: f64,
-    /// λ in mm.
+    /// λ.
     pub wavelength_mm: f64,
-    /// α in mm/s.
+    /// α.
     pub peak_mm_s: f64,
-    /// fᵥ in Hz.
+    /// fᵥ.
     pub hand_hz: f64,
 }
 

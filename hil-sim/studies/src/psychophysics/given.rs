@@ -7,22 +7,26 @@ use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration};
 
 use crate::psychophysics::hand::{FREQUENCY_HZ, PEAK_MM_S};
 use crate::psychophysics::presented::{ACTUATOR, Felt};
-use hil_sim_boards::display_alone;
-use hil_sim_boards::display_alone::{DisplayBench, SensorMessage};
+use hil_sim_boards::display_alone::{self, DisplayBench, SensorMessage};
 use hil_sim_boards::{ElfError, Firmware};
+use hil_sim_core::judge::seconds;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::run::digest::Digest;
 use hil_sim_core::run::fault_evidence::FaultEvidence;
 use hil_sim_core::run::recording::{Engine, OutputRecord, Recording, TickRecord};
 use hil_sim_core::scene::Motion;
 
-/// A stroke to and fro, in s.
+/// A stroke to and fro.
 const PERIOD_S: f64 = 1.0 / FREQUENCY_HZ;
-/// What is not looked at after λ changed, in s: the display has to hear of it, and glides.
+/// What is not looked at after λ changed: the display has to hear of it, and glides.
 const LEARNS_S: f64 = 0.1;
 /// Estimates come every so many ticks, at 2 kHz.
 const TICKS_PER_ESTIMATE: u64 = 20;
 const TICK_NS: u64 = 500_000;
+const HAND: Motion = Motion::Sinusoid {
+    amplitude_mm_s: PEAK_MM_S,
+    frequency_hz: FREQUENCY_HZ,
+};
 
 /// Wavelengths to be presented, in mm, one after the other.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,31 +43,23 @@ impl StimulusSequence {
     }
 
     /// Virtual time that it takes, in s: the first stroke to and fro is for the board to start.
-    pub fn duration_s(&self) -> f64 {
+    fn duration_s(&self) -> f64 {
         PERIOD_S * (self.wavelengths_mm.len() + 1) as f64
-    }
-
-    fn hand() -> Motion {
-        Motion::Sinusoid {
-            amplitude_mm_s: PEAK_MM_S,
-            frequency_hz: FREQUENCY_HZ,
-        }
     }
 
     fn wavelength_mm(&self, t_s: f64) -> f64 {
         let place = (t_s / PERIOD_S - 1.0).max(0.0) as usize;
-        let last = self.wavelengths_mm.len() - 1;
-        self.wavelengths_mm[place.min(last)]
+        self.wavelengths_mm[place.min(self.wavelengths_mm.len() - 1)]
     }
 
     /// Runs it on the display's ELF.
     pub(super) fn on_elf(&self, firmware: &Firmware) -> Result<Recording, ElfError> {
         let course = self.clone();
-        let alone = DisplayBench {
+        let bench = DisplayBench {
             surface: Box::new(move |t_s| SensorMessage::of(course.wavelength_mm(t_s))),
-            ..DisplayBench::new(Self::hand(), self.wavelengths_mm[0], self.duration_s())
+            ..DisplayBench::new(HAND, self.wavelengths_mm[0], self.duration_s())
         };
-        display_alone::run(alone, firmware).map(|run| run.recording)
+        display_alone::run(bench, firmware).map(|run| run.recording)
     }
 
     /// Runs it on the display's library: an estimate is heard in the tick in which it is made.
@@ -72,13 +68,11 @@ impl StimulusSequence {
             .expect("the default is in its ranges");
         let mut display = Display::new(&settings, None);
         display.started(Ok(()));
-        let hand = Self::hand();
         let mut recording = empty(self.duration_s());
-        let ticks = (self.duration_s() * 1e9) as u64 / TICK_NS;
-        for tick in 0..ticks {
+        for tick in 0..(self.duration_s() * 1e9) as u64 / TICK_NS {
             let at_ns = tick * TICK_NS;
-            let t_s = at_ns as f64 * 1e-9;
-            let position_mm = hand.position_mm(t_s);
+            let t_s = seconds(at_ns);
+            let position_mm = HAND.position_mm(t_s);
             let encoder = encoder(position_mm);
             recording.ticks.push(TickRecord {
                 at_ns,
@@ -95,7 +89,7 @@ impl StimulusSequence {
             if tick.is_multiple_of(TICKS_PER_ESTIMATE) {
                 let said = SensorMessage::of(self.wavelength_mm(t_s));
                 let sequence = (tick / TICKS_PER_ESTIMATE) as u32;
-                let velocity_mm_s = hand.velocity_mm_s(t_s);
+                let velocity_mm_s = HAND.velocity_mm_s(t_s);
                 display.on_estimate(&said.estimate(sequence, at_ns / 1_000, velocity_mm_s));
             }
         }
@@ -107,12 +101,11 @@ impl StimulusSequence {
 
     /// What each wavelength of the course felt like, in order; none where nothing was felt.
     pub fn felt(&self, recording: &Recording) -> Vec<Option<Felt>> {
-        (1..=self.wavelengths_mm.len())
-            .map(|place| {
-                let from_s = PERIOD_S * place as f64;
-                Felt::of(recording, ACTUATOR, from_s + LEARNS_S, from_s + PERIOD_S)
-            })
-            .collect()
+        let felt = |place| {
+            let from_s = PERIOD_S * place as f64;
+            Felt::of(recording, ACTUATOR, from_s + LEARNS_S, from_s + PERIOD_S)
+        };
+        (1..=self.wavelengths_mm.len()).map(felt).collect()
     }
 }
 

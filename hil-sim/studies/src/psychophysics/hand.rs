@@ -1,47 +1,41 @@
 //! How the hand rubs while an observer compares.
 
-use std::sync::Arc;
+use std::f64::consts::PI;
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use hil_sim_core::scene::{Motion, Series};
+use crate::display::through;
+use hil_sim_core::scene::Motion;
 
-/// The paper's Fig. 7: the highest speed in mm/s, and strokes to and fro a second.
+/// The paper's Fig. 7: the highest speed, and strokes to and fro a second.
 pub const PEAK_MM_S: f64 = 70.0;
-/// The paper's Fig. 7: strokes to and fro a second.
 pub const FREQUENCY_HZ: f64 = 0.83;
 /// How much faster or slower a stroke may be, and longer or shorter last: a guess. Nobody rubs alike twice.
 const VARIES: f64 = 0.3;
-/// Between two rows of the motion, in s.
+/// Between two rows of the motion.
 const ROW_S: f64 = 1e-3;
 
 /// Strokes to and fro from x = 0 on, each a half sine of speed about Fig. 7's, for `duration_s`.
 pub fn strokes(seed: u64, duration_s: f64) -> Motion {
     let mut draws = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut about = |value: f64| value * (1.0 + VARIES * (2.0 * draws.random::<f64>() - 1.0));
-    let mut series = Series {
-        at: vec![0.0],
-        values: vec![0.0],
-        width: 1,
-    };
+    let (mut at, mut values) = (vec![0.0], vec![0.0]);
     let (mut begun_row, mut begun_mm, mut forwards) = (0u32, 0.0, 1.0);
     while f64::from(begun_row) * ROW_S < duration_s {
         let rows = (0.5 / about(FREQUENCY_HZ) / ROW_S).round().max(1.0);
-        let length_mm = forwards * about(PEAK_MM_S) * 2.0 / std::f64::consts::PI * rows * ROW_S;
+        let length_mm = forwards * about(PEAK_MM_S) * 2.0 / PI * rows * ROW_S;
         let rows = rows as u32;
         for row in 1..=rows {
-            let phase = std::f64::consts::PI * f64::from(row) / f64::from(rows);
-            series.at.push(f64::from(begun_row + row) * ROW_S);
-            series
-                .values
-                .push(begun_mm + length_mm * 0.5 * (1.0 - phase.cos()));
+            let phase = PI * f64::from(row) / f64::from(rows);
+            at.push(f64::from(begun_row + row) * ROW_S);
+            values.push(begun_mm + length_mm * 0.5 * (1.0 - phase.cos()));
         }
         begun_row += rows;
         begun_mm += length_mm;
         forwards = -forwards;
     }
-    Motion::Recorded(Arc::new(series))
+    through(at, values)
 }
 
 #[cfg(test)]

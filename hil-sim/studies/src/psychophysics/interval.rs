@@ -6,14 +6,12 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use crate::psychophysics::normal;
 
 /// The confidence of all intervals.
-pub const CONFIDENCE: f64 = 0.95;
+const CONFIDENCE: f64 = 0.95;
 
 /// An interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
-    /// Its lower end.
     pub low: f64,
-    /// Its upper end.
     pub high: f64,
 }
 

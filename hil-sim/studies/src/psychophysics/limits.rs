@@ -15,10 +15,9 @@ use crate::psychophysics::thresholds::Skin;
 
 /// How far from the standard a series begins, in steps.
 const SPAN_STEPS: usize = 8;
-/// The shortest comparison, in steps from 0.
-pub const SHORTEST_STEP: usize = 2;
-/// The longest comparison, in steps from 0.
-pub const LONGEST_STEP: usize = 28;
+/// The shortest and the longest comparison, in steps from 0.
+const SHORTEST_STEP: usize = 2;
+const LONGEST_STEP: usize = 28;
 
 /// The wavelengths of all comparison stimuli, in mm, among them the standards.
 pub fn comparisons_mm() -> Vec<f64> {
@@ -44,16 +43,13 @@ pub fn table(
     glimpse: IntegrationWindow,
     seed: u64,
 ) -> [Limens; 4] {
-    let mut observers: Vec<Observer> = skins
-        .iter()
-        .zip(0u64..)
-        .map(|(&skin, subject)| Observer::new(skin, glimpse, seed ^ subject << 56))
-        .collect();
+    let observer =
+        |(&skin, subject): (&Skin, u64)| Observer::new(skin, glimpse, seed ^ subject << 56);
+    let mut observers: Vec<Observer> = skins.iter().zip(0..).map(observer).collect();
     TABLE_2.map(|Limens { standard_mm, .. }| {
-        let each: Vec<(f64, f64)> = observers
-            .iter_mut()
-            .map(|observer| subject(observer, stimuli, standard_mm))
-            .collect();
+        let subjects = observers.iter_mut();
+        let each = subjects.map(|observer| subject(observer, stimuli, standard_mm));
+        let each: Vec<(f64, f64)> = each.collect();
         let limens: Vec<f64> = each.iter().map(|(low, high)| 0.5 * (high - low)).collect();
         Limens {
             standard_mm,

@@ -15,11 +15,8 @@ pub const GLIMPSE_S: f64 = 0.1;
 /// What a comparison feels like beside the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// Shorter.
     Shorter,
-    /// Neither shorter nor longer.
     Equal,
-    /// Longer.
     Longer,
 }
 
@@ -72,18 +69,13 @@ impl Observer {
     /// The share of trials in the long run in which `other` feels longer than `one`: the mean over `pairs`
     /// pairs of glimpses of what the skin makes of each. Never just 0 or 1.
     pub fn share_choosing_other(&mut self, one: &Felt, other: &Felt, pairs: u32) -> f64 {
-        let sum: f64 = (0..pairs)
-            .map(|_| {
-                let one_mm = one.glimpse_mm(self.draws.random(), self.glimpse);
-                let other_mm = other.glimpse_mm(self.draws.random(), self.glimpse);
-                let deviation_mm = self
-                    .skin
-                    .deviation_mm(one_mm)
-                    .hypot(self.skin.deviation_mm(other_mm));
-                normal::cdf((other_mm - one_mm) / deviation_mm)
-            })
-            .sum();
-        sum / f64::from(pairs)
+        let shares = (0..pairs).map(|_| {
+            let one_mm = one.glimpse_mm(self.draws.random(), self.glimpse);
+            let other_mm = other.glimpse_mm(self.draws.random(), self.glimpse);
+            let [of_one, of_other] = [one_mm, other_mm].map(|mm| self.skin.deviation_mm(mm));
+            normal::cdf((other_mm - one_mm) / of_one.hypot(of_other))
+        });
+        shares.sum::<f64>() / f64::from(pairs)
     }
 }
 

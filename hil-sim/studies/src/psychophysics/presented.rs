@@ -18,19 +18,17 @@ pub const ACTUATOR: usize = 24;
 /// One wave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wave {
-    /// When its first crest was, in s.
+    /// When its first crest was, and its last.
     pub from_s: f64,
-    /// When its last crest was, in s.
     pub to_s: f64,
-    /// How far the hand went meanwhile, in mm: the wavelength presented.
+    /// How far the hand went meanwhile: the wavelength presented.
     pub wavelength_mm: f64,
     /// The hand's stroke that it is of, counted from the first.
     pub stroke: usize,
 }
 
 impl Wave {
-    /// How long it lasted, in s.
-    pub fn lasts_s(&self) -> f64 {
+    fn lasts_s(&self) -> f64 {
         self.to_s - self.from_s
     }
 }
@@ -38,7 +36,7 @@ impl Wave {
 /// The waves of a stimulus, in order, at least one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Felt {
-    waves: Vec<Wave>,
+    pub waves: Vec<Wave>,
     /// When each wave ends, in s of waves alone.
     ends_s: Vec<f64>,
 }
@@ -58,11 +56,9 @@ impl Felt {
     /// What an actuator of a run presents between two instants, in s; none if not one wave is felt.
     pub fn of(recording: &Recording, actuator: usize, from_s: f64, to_s: f64) -> Option<Self> {
         let hand = Track::of_hand(recording);
-        let points: Vec<(f64, f64)> = recording
-            .outputs
-            .iter()
-            .map(|output| (seconds(output.at_ns), volts(output.words[actuator])))
-            .collect();
+        let outputs = recording.outputs.iter();
+        let points = outputs.map(|output| (seconds(output.at_ns), volts(output.words[actuator])));
+        let points: Vec<(f64, f64)> = points.collect();
         let mut waves = Vec::new();
         for (stroke, (first_s, last_s)) in hand.strokes().into_iter().enumerate() {
             let first = points.partition_point(|point| point.0 < first_s.max(from_s));
@@ -74,10 +70,11 @@ impl Felt {
         Self::new(waves)
     }
 
-    fn new(waves: Vec<Wave>) -> Option<Self> {
-        let ends_s = waves.iter().scan(0.0, |end_s, wave| {
-            *end_s += wave.lasts_s();
-            Some(*end_s)
+    pub(super) fn new(waves: Vec<Wave>) -> Option<Self> {
+        let mut end_s = 0.0;
+        let ends_s = waves.iter().map(|wave| {
+            end_s += wave.lasts_s();
+            end_s
         });
         let ends_s = ends_s.collect();
         (!waves.is_empty()).then_some(Self { waves, ends_s })
@@ -97,33 +94,8 @@ impl Felt {
         }
     }
 
-    /// A stimulus whose waves have a relative deviation, evenly spread over the quantiles of a normal one.
-    #[cfg(test)]
-    pub(super) fn noisy(wavelength_mm: f64, deviation: f64) -> Self {
-        const WAVES: u32 = 199;
-        let waves = (0..WAVES).map(|index| {
-            let quantile = (f64::from(index) + 0.5) / f64::from(WAVES);
-            Wave {
-                from_s: f64::from(index),
-                to_s: f64::from(index + 1),
-                wavelength_mm: wavelength_mm
-                    * (1.0 + deviation * crate::psychophysics::normal::quantile(quantile)),
-                stroke: 0,
-            }
-        });
-        Self {
-            ends_s: (1..=WAVES).map(f64::from).collect(),
-            waves: waves.collect(),
-        }
-    }
-
-    /// All waves.
-    pub fn waves(&self) -> &[Wave] {
-        &self.waves
-    }
-
     /// How long waves are felt, in s.
-    pub fn lasts_s(&self) -> f64 {
+    fn lasts_s(&self) -> f64 {
         self.ends_s.last().copied().unwrap_or(0.0)
     }
 
@@ -144,12 +116,9 @@ impl Felt {
     }
 
     fn mean(&self, value: impl Fn(f64) -> f64) -> f64 {
-        let sum: f64 = self
-            .waves
-            .iter()
-            .map(|wave| wave.lasts_s() * value(wave.wavelength_mm))
-            .sum();
-        sum / self.lasts_s()
+        let waves = self.waves.iter();
+        let all = waves.map(|wave| wave.lasts_s() * value(wave.wavelength_mm));
+        all.sum::<f64>() / self.lasts_s()
     }
 
     /// What is felt from a share of the time on, 0 to 1, of a glimpse: travel over waves, in mm.
@@ -251,7 +220,7 @@ mod tests {
     #[test]
     fn a_clean_stimulus_presents_its_wavelength_at_every_wave() {
         let felt = felt(&Run::swinging(70.0, 0.83, 2.0));
-        for wave in felt.waves() {
+        for wave in &felt.waves {
             assert!((wave.wavelength_mm - 2.0).abs() < WAVE_MM, "{wave:?}");
         }
         assert!((felt.mean_mm() - 2.0).abs() < WAVE_MM);

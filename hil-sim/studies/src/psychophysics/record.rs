@@ -8,32 +8,24 @@ use crate::psychophysics::published::{SAMPLES_MM, TABLE_3, TABLE_4};
 use crate::psychophysics::recount::Recount;
 use crate::psychophysics::study::{Column, Compared, Study};
 use crate::psychophysics::tables;
-use crate::study::csv_text_under;
+use crate::study::{Record, csv, short};
 
 /// The study as JSON, with what it does not show.
 ///
 /// # Errors
 /// If a number cannot be written, which none should bring about.
 pub fn json(study: &Study) -> serde_json::Result<String> {
-    let Recount {
-        scale,
-        half_an_answer,
-        left_out,
-        as_it_is,
-        simulated,
-        rejected_though_true,
-        ..
-    } = &study.recount;
+    let recount = &study.recount;
     let mut value = serde_json::to_value(study)?;
     if let Value::Object(fields) = &mut value {
         fields.insert("disclaimer".into(), DISCLAIMER.into());
         let recount = json!({
-            "scores": scale.scores,
-            "test": half_an_answer,
-            "test_without_the_cell": left_out,
-            "test_with_the_cell_at_one": as_it_is,
-            "test_by_simulation": simulated,
-            "rejected_though_true": rejected_though_true,
+            "scores": recount.scale.scores,
+            "test": recount.half_an_answer,
+            "test_without_the_cell": recount.left_out,
+            "test_with_the_cell_at_one": recount.as_it_is,
+            "test_by_simulation": recount.simulated,
+            "rejected_though_true": recount.rejected_though_true,
         });
         fields.insert("paper_recounted".into(), recount);
     }
@@ -41,139 +33,128 @@ pub fn json(study: &Study) -> serde_json::Result<String> {
 }
 
 /// The study's CSVs: names and texts.
-///
-/// # Errors
-/// If a row cannot be written, which none should bring about.
-pub fn csvs(study: &Study) -> Result<Vec<(&'static str, String)>, csv::Error> {
-    Ok(vec![
-        ("table-2.csv", table_2(&study.limens)?),
-        ("table-3.csv", table_3(&study.methods)?),
-        ("table-4.csv", table_4(study)?),
-        ("mosteller.csv", mosteller(study)?),
-        ("felt.csv", felt(study)?),
-        ("waves.csv", waves(study)?),
-    ])
+pub fn csvs(study: &Study) -> Vec<(&'static str, String)> {
+    vec![
+        ("table-2.csv", table_2(&study.limens)),
+        ("table-3.csv", table_3(&study.methods)),
+        ("table-4.csv", table_4(study)),
+        ("mosteller.csv", mosteller(study)),
+        ("felt.csv", felt(study)),
+        ("waves.csv", waves(study)),
+    ]
 }
 
-fn ends(interval: Option<Interval>) -> (Option<f64>, Option<f64>) {
-    (interval.map(|i| i.low), interval.map(|i| i.high))
+impl Record {
+    /// The same with an interval's ends, empty if there is none.
+    fn between(self, [low, high]: [&'static str; 2], interval: Option<Interval>) -> Self {
+        self.with(low, interval.map(|i| i.low))
+            .with(high, interval.map(|i| i.high))
+    }
 }
 
-fn table_2(columns: &[Column]) -> Result<String, csv::Error> {
-    let header = [
-        "standard_mm",
-        "quantity",
-        "paper_mm",
-        "once_mm",
-        "low_mm",
-        "high_mm",
-        "mean_mm",
-        "clean_mean_mm",
-    ];
-    let rows = columns.iter().flat_map(|column| {
+fn table_2(columns: &[Column]) -> String {
+    csv(columns.iter().flat_map(|column| {
         column.lines().map(|line| {
             let [paper, once, mean, clean] = line.each_mm;
-            let of = (column.paper.standard_mm, line.name);
-            (of, paper, once, ends(line.interval), mean, clean)
+            Record::default()
+                .with("standard_mm", column.paper.standard_mm)
+                .with("quantity", line.name)
+                .with("paper_mm", paper)
+                .with("once_mm", once)
+                .between(["low_mm", "high_mm"], line.interval)
+                .with("mean_mm", mean)
+                .with("clean_mean_mm", clean)
         })
-    });
-    csv_text_under(&header, rows)
+    }))
 }
 
-fn table_3(methods: &[Compared]) -> Result<String, csv::Error> {
-    let header = [
-        "method",
-        "shorter_mm",
-        "longer_mm",
-        "correct",
-        "trials",
-        "share",
-        "wilson_low",
-        "wilson_high",
-        "guessing_p",
-        "long_run_share",
-    ];
+fn table_3(methods: &[Compared]) -> String {
     let paper = TABLE_3.iter().map(|pair| ("paper", pair, None));
     let ours = methods.iter().flat_map(|compared| {
         let pairs = compared.once.iter().zip(&compared.long_run);
         pairs.map(|(pair, long_run)| (compared.method, pair, Some(long_run.share())))
     });
-    let rows = paper.chain(ours).map(|(method, pair, long_run)| {
-        let samples = (SAMPLES_MM[pair.shorter], SAMPLES_MM[pair.longer]);
-        let interval = ends(Some(wilson(pair.correct, pair.trials)));
+    csv(paper.chain(ours).map(|(method, pair, long_run)| {
+        let interval = wilson(pair.correct, pair.trials);
         let by_chance = guessing(pair.correct as u32, pair.trials as u32);
-        let counts = (pair.correct, pair.trials, pair.share());
-        (method, samples, counts, interval, by_chance, long_run)
-    });
-    csv_text_under(&header, rows)
+        Record::default()
+            .with("method", method)
+            .with("shorter_mm", SAMPLES_MM[pair.shorter])
+            .with("longer_mm", SAMPLES_MM[pair.longer])
+            .with("correct", pair.correct)
+            .with("trials", pair.trials)
+            .with("share", pair.share())
+            .between(["wilson_low", "wilson_high"], Some(interval))
+            .with("guessing_p", by_chance)
+            .with("long_run_share", long_run)
+    }))
 }
 
-fn table_4(study: &Study) -> Result<String, csv::Error> {
-    let header = [
-        "method",
-        "wavelength_mm",
-        "printed_score",
-        "score",
-        "low",
-        "high",
-        "long_run_score",
-    ];
+fn table_4(study: &Study) -> String {
     let Recount {
         scale, intervals, ..
     } = &study.recount;
-    let samples = || SAMPLES_MM.into_iter().enumerate();
-    let paper = samples().map(|(sample, wavelength_mm)| {
-        let (printed, score) = (Some(TABLE_4[sample]), Some(scale.scores[sample]));
-        let of = ("paper", wavelength_mm, printed);
-        (of, score, ends(intervals[sample]), None)
+    let paper = (
+        "paper",
+        Some(&TABLE_4[..]),
+        Some(&scale.scores),
+        intervals,
+        &[][..],
+    );
+    let ours = study.methods.iter().map(|of| {
+        let (scores, long_run) = (of.scores.as_ref(), &of.long_run_scores[..]);
+        (of.method, None, scores, &of.score_intervals, long_run)
     });
-    let ours = study.methods.iter().flat_map(|compared| {
-        samples().map(|(sample, wavelength_mm)| {
-            let score = compared.scores.as_ref().map(|scores| scores[sample]);
-            let of = (compared.method, wavelength_mm, None);
-            let long_run = compared.long_run_scores.get(sample).copied();
-            (of, score, ends(compared.score_intervals[sample]), long_run)
+    let all = [paper].into_iter().chain(ours);
+    csv(
+        all.flat_map(|(method, printed, scores, intervals, long_run)| {
+            (0..SAMPLES_MM.len()).map(move |sample| {
+                Record::default()
+                    .with("method", method)
+                    .with("wavelength_mm", SAMPLES_MM[sample])
+                    .with("printed_score", printed.map(|scores| scores[sample]))
+                    .with("score", scores.map(|scores| scores[sample]))
+                    .between(["low", "high"], intervals[sample])
+                    .with("long_run_score", long_run.get(sample).copied())
+            })
+        }),
+    )
+}
+
+fn mosteller(study: &Study) -> String {
+    csv(tables::tests(study).into_iter().map(|(of, test)| {
+        Record::default()
+            .with("of", of)
+            .with("chi_square", test.chi_square)
+            .with("freedom", short(test.freedom))
+            .with("critical", test.critical)
+            .with("p", test.p)
+            .with("rejected", short(test.rejects()))
+    }))
+}
+
+fn felt(study: &Study) -> String {
+    csv(study.stimuli().map(|(method, stimulus)| {
+        Record::default()
+            .with("method", method)
+            .with("wavelength_mm", stimulus.wavelength_mm)
+            .with("waves", short(stimulus.waves))
+            .with("presented_mean_mm", stimulus.mean_mm)
+            .with("error_rms_percent", stimulus.error_percent)
+            .with("scatter_rms_percent", stimulus.scatter_percent)
+    }))
+}
+
+fn waves(study: &Study) -> String {
+    csv(study.stimuli().flat_map(|(method, stimulus)| {
+        stimulus.felt.waves.iter().map(move |wave| {
+            Record::default()
+                .with("method", method)
+                .with("wavelength_mm", stimulus.wavelength_mm)
+                .with("stroke", short(wave.stroke))
+                .with("from_s", wave.from_s)
+                .with("to_s", wave.to_s)
+                .with("presented_mm", wave.wavelength_mm)
         })
-    });
-    csv_text_under(&header, paper.chain(ours))
-}
-
-fn mosteller(study: &Study) -> Result<String, csv::Error> {
-    let header = ["of", "chi_square", "freedom", "critical", "p", "rejected"];
-    let tests = tables::tests(study);
-    let rows = tests
-        .into_iter()
-        .map(|(of, test)| (of, test, test.rejects()));
-    csv_text_under(&header, rows)
-}
-
-fn felt(study: &Study) -> Result<String, csv::Error> {
-    let header = [
-        "method",
-        "wavelength_mm",
-        "waves",
-        "presented_mean_mm",
-        "error_rms_percent",
-        "scatter_rms_percent",
-    ];
-    csv_text_under(&header, study.stimuli())
-}
-
-fn waves(study: &Study) -> Result<String, csv::Error> {
-    let header = [
-        "method",
-        "wavelength_mm",
-        "stroke",
-        "from_s",
-        "to_s",
-        "presented_mm",
-    ];
-    let rows = study.stimuli().flat_map(|(method, stimulus)| {
-        let waves = stimulus.felt().waves().iter();
-        waves.map(move |wave| {
-            let (of, span) = ((method, stimulus.wavelength_mm), (wave.from_s, wave.to_s));
-            (of, wave.stroke, span, wave.wavelength_mm)
-        })
-    });
-    csv_text_under(&header, rows)
+    }))
 }

@@ -64,18 +64,15 @@ fn drawn(
     share: impl Fn(&Pair) -> f64,
     draws: &mut Xoshiro256PlusPlus,
 ) -> Vec<Pair> {
-    let answered = |pair: &Pair, draws: &mut Xoshiro256PlusPlus| {
+    let again = |pair: &Pair| {
         let share = share(pair);
         let answers = (0..pair.trials as u32).filter(|_| draws.random::<f64>() < share);
-        answers.count() as f64
-    };
-    pairs
-        .iter()
-        .map(|pair| Pair {
-            correct: answered(pair, draws),
+        Pair {
+            correct: answers.count() as f64,
             ..*pair
-        })
-        .collect()
+        }
+    };
+    pairs.iter().map(again).collect()
 }
 
 /// The middle 95 % of each score over a parametric bootstrap: each pair's answers are drawn anew from the
@@ -97,13 +94,12 @@ fn tests_of(truth: &Scale, repetitions: u32, seed: u64) -> Vec<Test> {
     let mut draws = Xoshiro256PlusPlus::seed_from_u64(seed);
     let scores = &truth.scores;
     let share = |pair: &Pair| normal::cdf(scores[pair.longer] - scores[pair.shorter]);
-    (0..repetitions)
-        .filter_map(|_| {
-            let drawn = drawn(&TABLE_3, share, &mut draws);
-            let scale = scale(SAMPLES_MM.len(), &drawn).ok()?;
-            test(&scale.scores, &drawn, Extreme::HalfAnAnswer)
-        })
-        .collect()
+    let test_of_one = |_| {
+        let drawn = drawn(&TABLE_3, share, &mut draws);
+        let scale = scale(SAMPLES_MM.len(), &drawn).ok()?;
+        test(&scale.scores, &drawn, Extreme::HalfAnAnswer)
+    };
+    (0..repetitions).filter_map(test_of_one).collect()
 }
 
 /// What χ² is above in 5 % of the tests.
@@ -111,8 +107,7 @@ fn upper_end(tests: &[Test]) -> Option<f64> {
     let mut all: Vec<f64> = tests.iter().map(|test| test.chi_square).collect();
     all.sort_by(f64::total_cmp);
     let last = all.len().checked_sub(1)?;
-    all.get(((1.0 - LEVEL) * last as f64).round() as usize)
-        .copied()
+    Some(all[((1.0 - LEVEL) * last as f64).round() as usize])
 }
 
 #[cfg(test)]

@@ -6,10 +6,10 @@ use protocol::{Method, SensorConfiguration};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::psychophysics::bench::Job;
 use crate::psychophysics::given::StimulusSequence;
 use crate::psychophysics::hand;
 use crate::psychophysics::interval::{Interval, mean, middle, wilson};
+use crate::psychophysics::job::Job;
 use crate::psychophysics::limits;
 use crate::psychophysics::mosteller::{Extreme, Test, test};
 use crate::psychophysics::observer::GLIMPSE_S;
@@ -21,37 +21,33 @@ use crate::psychophysics::published::{Limens, SAMPLES_MM, TABLE_2, TRIALS};
 use crate::psychophysics::recount::Recount;
 use crate::psychophysics::thresholds::Skin;
 use crate::psychophysics::thurstone::{Scale, scale};
-use hil_sim_core::run::recording::{Engine, Recording};
+use hil_sim_core::run::recording::Recording;
 use hil_sim_core::scene::{Estimator, Scene};
 
 /// How often the experiments are repeated for intervals.
-pub const REPETITIONS: u32 = 2_000;
-/// The gauges' noise while pairs are compared, in dB.
+const REPETITIONS: u32 = 2_000;
+/// The gauges' noise while pairs are compared.
 pub const SNR_DB: f64 = 20.0;
 /// The bits of a seed that a scene's file may have: its numbers are signed.
 const SCENE_SEED: u64 = u64::MAX >> 1;
-/// How long each specimen is rubbed, in s. All repetitions are of the same rubs: what another hand would change,
+/// How long each specimen is rubbed. All repetitions are of the same rubs: what another hand would change,
 /// another seed shows.
 const RUB_S: f64 = 4.0;
-/// From when on it is felt, in s: the boards have started.
+/// From when on it is felt: the boards have started.
 const FELT_FROM_S: f64 = 0.5;
 /// What the seeds of Table II, its clean twin, Table III, its long run and its repetitions have of their own.
 const SALTS: [u64; 5] = [0x11 << 32, 0x22 << 32, 0x33 << 32, 0x44 << 32, 0x55 << 32];
 
 /// Somebody whose wavelengths are compared: an estimator over specimens of some friction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Contender {
-    /// The estimator.
-    pub method: Method,
-    /// How sticky its specimens are.
-    pub friction: Friction,
-    /// What it is called.
-    pub name: &'static str,
+struct Contender {
+    method: Method,
+    friction: Friction,
+    name: &'static str,
 }
 
 /// Who is compared: the paper's count and the boards' default, with the plan's friction. Where that is none,
 /// the count also meets specimens that stick a little, which the paper blames for its errors.
-pub fn contenders(plan: &Plan) -> Vec<Contender> {
+fn contenders(plan: &Plan) -> Vec<Contender> {
     let contender = |method, friction, name| Contender {
         method,
         friction,
@@ -95,6 +91,9 @@ pub enum Friction {
 }
 
 impl Friction {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::None, Self::Mild, Self::Strong];
+
     /// As scenes have it.
     pub const fn name(self) -> &'static str {
         match self {
@@ -121,51 +120,46 @@ impl Default for Plan {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{stimulus}: the actuators did not vibrate for one whole wave: nothing can be felt")]
 pub struct Silent {
-    /// What was to be felt.
-    pub stimulus: String,
+    stimulus: String,
 }
 
 /// The results.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
     /// What ran the firmware.
-    pub engine: &'static str,
-    /// All chance came from it.
-    pub seed: u64,
-    /// Trials of each pair.
-    pub trials: u32,
-    /// Repetitions of each experiment.
-    pub repetitions: u32,
-    /// How sticky the specimens were.
-    pub friction: &'static str,
-    /// For how long a sensation is gathered, in s.
-    pub glimpse_s: f64,
+    pub(crate) engine: &'static str,
+    pub(crate) seed: u64,
+    pub(crate) trials: u32,
+    pub(crate) repetitions: u32,
+    pub(crate) friction: &'static str,
+    /// For how long a sensation is gathered.
+    pub(crate) glimpse_s: f64,
     /// The stimuli of Table II.
-    pub given: Vec<Stimulus>,
+    given: Vec<Stimulus>,
     /// Table II.
-    pub limens: Vec<Column>,
+    pub(crate) limens: Vec<Column>,
     /// Tables III and IV, for each of [`contenders`].
-    pub methods: Vec<Compared>,
+    pub(crate) methods: Vec<Compared>,
     /// The paper's Tables III and IV, counted again.
     #[serde(skip)]
-    pub recount: Recount,
+    pub(crate) recount: Recount,
 }
 
 /// What a stimulus felt like.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stimulus {
-    /// The wavelength that it was to present, in mm.
+    /// What it was to present.
     pub wavelength_mm: f64,
     /// The waves that were felt.
     pub waves: usize,
-    /// The mean wavelength presented, in mm.
+    /// The mean wavelength presented.
     pub mean_mm: f64,
-    /// Root mean square of its error over time, in %.
+    /// Root mean square of its error over time.
     pub error_percent: f64,
-    /// Root mean square of its distance from its mean over time, in %.
+    /// Root mean square of its distance from its mean over time.
     pub scatter_percent: f64,
     #[serde(skip)]
-    felt: Felt,
+    pub felt: Felt,
 }
 
 /// A column of Table II.
@@ -179,23 +173,18 @@ pub struct Column {
     pub mean: Limens,
     /// The same if every stimulus were without error.
     pub clean: Limens,
-    /// The middle 95 % of the repetitions' lower limens, in mm.
+    /// The middle 95 % of the repetitions' lower, upper and discrimination limens, in mm.
     pub lower: Option<Interval>,
-    /// Of their upper limens.
     pub upper: Option<Interval>,
-    /// Of their discrimination limens.
     pub limen: Option<Interval>,
 }
 
 /// A line of a column: its name, the paper's, one experiment's, all repetitions' and the clean ones' mean, in
 /// mm, and the middle 95 % of the repetitions.
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// What it is of.
     pub name: &'static str,
     /// Paper, once, mean, clean.
     pub each_mm: [f64; 4],
-    /// The middle 95 %.
     pub interval: Option<Interval>,
 }
 
@@ -299,23 +288,18 @@ impl Stimulus {
     fn new(wavelength_mm: f64, felt: Felt) -> Self {
         Self {
             wavelength_mm,
-            waves: felt.waves().len(),
+            waves: felt.waves.len(),
             mean_mm: felt.mean_mm(),
             error_percent: felt.error_percent(wavelength_mm),
             scatter_percent: felt.scatter_percent(),
             felt,
         }
     }
-
-    /// Its waves.
-    pub fn felt(&self) -> &Felt {
-        &self.felt
-    }
 }
 
 impl Study {
     /// Every stimulus with who made it.
-    pub fn stimuli(&self) -> impl Iterator<Item = (&'static str, &Stimulus)> {
+    pub(crate) fn stimuli(&self) -> impl Iterator<Item = (&'static str, &Stimulus)> {
         let given = self.given.iter().map(|stimulus| ("given", stimulus));
         given.chain(self.methods.iter().flat_map(|compared| {
             let samples = compared.samples.iter();
@@ -324,7 +308,7 @@ impl Study {
     }
 
     /// The contender of a name.
-    pub fn contender(&self, name: &str) -> Option<&Compared> {
+    pub(crate) fn contender(&self, name: &str) -> Option<&Compared> {
         self.methods.iter().find(|compared| compared.method == name)
     }
 
@@ -338,20 +322,15 @@ impl Study {
     pub fn new(plan: Plan, recordings: &[Recording]) -> Result<Self, Silent> {
         let (given, rubbed) = recordings.split_at(courses().len());
         let given = given_stimuli(given)?;
-        let mut methods = Vec::new();
-        for (contender, recordings) in contenders(&plan)
-            .into_iter()
+        let contenders = contenders(&plan).into_iter();
+        let methods = contenders
             .zip(rubbed.chunks(SAMPLES_MM.len()))
-        {
-            methods.push(Compared::new(contender.name, plan, recordings)?);
-        }
+            .map(|(contender, recordings)| Compared::new(contender.name, plan, recordings));
+        let methods = methods.collect::<Result<_, _>>()?;
         let recount = Recount::new(plan.repetitions, plan.seed)
             .expect("the paper's Table III ties all samples together");
         Ok(Self {
-            engine: recordings
-                .first()
-                .map_or(Engine::Native, |r| r.engine)
-                .name(),
+            engine: recordings[0].engine.name(),
             seed: plan.seed,
             trials: plan.trials,
             repetitions: plan.repetitions,
@@ -370,58 +349,42 @@ fn given_stimuli(recordings: &[Recording]) -> Result<Vec<Stimulus>, Silent> {
         .into_iter()
         .zip(recordings)
         .flat_map(|(course, recording)| course.felt(recording));
-    limits::comparisons_mm()
-        .into_iter()
-        .zip(felt)
-        .map(|(mm, felt)| {
-            let stimulus = || format!("the display's stimulus of {mm} mm");
-            let felt = felt.ok_or_else(|| Silent {
-                stimulus: stimulus(),
-            })?;
-            Ok(Stimulus::new(mm, felt))
-        })
-        .collect()
+    let given = limits::comparisons_mm().into_iter().zip(felt);
+    let stimulus = |(mm, felt): (f64, Option<Felt>)| {
+        let felt = felt.ok_or_else(|| Silent {
+            stimulus: format!("the display's stimulus of {mm} mm"),
+        })?;
+        Ok(Stimulus::new(mm, felt))
+    };
+    given.map(stimulus).collect()
 }
 
 fn columns(plan: Plan, given: &[Stimulus]) -> Vec<Column> {
     let glimpse = IntegrationWindow::Seconds(GLIMPSE_S);
     let real: Vec<Felt> = given.iter().map(|stimulus| stimulus.felt.clone()).collect();
-    let clean: Vec<Felt> = given
-        .iter()
-        .map(|stimulus| Felt::steady(stimulus.wavelength_mm))
-        .collect();
+    let clean = given.iter().map(|of| Felt::steady(of.wavelength_mm));
+    let clean: Vec<Felt> = clean.collect();
     let tables = |stimuli: &[Felt], salt: u64| -> Vec<[Limens; 4]> {
-        (0..=u64::from(plan.repetitions))
-            .map(|repetition| {
-                let seed = plan.seed ^ salt ^ repetition;
-                limits::table(stimuli, &Skin::subjects(), glimpse, seed)
-            })
-            .collect()
+        let seeds = (0..=u64::from(plan.repetitions)).map(|n| plan.seed ^ salt ^ n);
+        let tables = seeds.map(|seed| limits::table(stimuli, &Skin::subjects(), glimpse, seed));
+        tables.collect()
     };
     let (real, clean) = (tables(&real, SALTS[0]), tables(&clean, SALTS[1]));
-    TABLE_2
-        .into_iter()
-        .enumerate()
-        .map(|(column, paper)| {
-            let spread = |value: fn(&Limens) -> f64| {
-                middle(
-                    real[1..]
-                        .iter()
-                        .map(|table| value(&table[column]))
-                        .collect(),
-                )
-            };
-            Column {
-                paper,
-                once: real[0][column],
-                mean: averaged(&real[1..], column),
-                clean: averaged(&clean[1..], column),
-                lower: spread(|limens| limens.lower_mm),
-                upper: spread(|limens| limens.upper_mm),
-                limen: spread(|limens| limens.limen_mm),
-            }
-        })
-        .collect()
+    let column = |(column, paper): (usize, Limens)| {
+        let spread = |value: fn(&Limens) -> f64| {
+            middle(real[1..].iter().map(|of| value(&of[column])).collect())
+        };
+        Column {
+            paper,
+            once: real[0][column],
+            mean: averaged(&real[1..], column),
+            clean: averaged(&clean[1..], column),
+            lower: spread(|limens| limens.lower_mm),
+            upper: spread(|limens| limens.upper_mm),
+            limen: spread(|limens| limens.limen_mm),
+        }
+    };
+    TABLE_2.into_iter().enumerate().map(column).collect()
 }
 
 fn averaged(tables: &[[Limens; 4]], column: usize) -> Limens {
@@ -464,20 +427,25 @@ impl Compared {
         let scaled = scale(SAMPLES_MM.len(), &once);
         let in_the_long_run = long_run(glimpse);
         // A share in the long run is never just 1.
-        let long_run_scores = scale(SAMPLES_MM.len(), &in_the_long_run)
+        let long_run_scores = scale(SAMPLES_MM.len(), &in_the_long_run);
+        let long_run_scores = long_run_scores
             .map(|scale| scale.scores)
             .unwrap_or_default();
+        let wilson = once.iter().map(|pair| wilson(pair.correct, pair.trials));
+        let of_once = scaled.as_ref().ok();
+        let spread = |sample: usize| {
+            middle(
+                scales
+                    .iter()
+                    .map(|(scale, _)| scale.scores[sample])
+                    .collect(),
+            )
+        };
         Ok(Self {
             method,
-            wilson: once
-                .iter()
-                .map(|pair| wilson(pair.correct, pair.trials))
-                .collect(),
+            wilson: wilson.collect(),
             mean_share: middle(again.iter().map(|table| mean_share(table)).collect()),
-            test: scaled
-                .as_ref()
-                .ok()
-                .and_then(|scale| test(&scale.scores, &once, Extreme::HalfAnAnswer)),
+            test: of_once.and_then(|scale| test(&scale.scores, &once, Extreme::HalfAnAnswer)),
             left_out: match &scaled {
                 Ok(scale) => scale.left_out,
                 Err(refused) => refused.left_out,
@@ -486,16 +454,7 @@ impl Compared {
             scores: scaled.ok().map(|scale| scale.scores),
             long_run_test: test(&long_run_scores, &in_the_long_run, Extreme::AsItIs),
             long_run_scores,
-            score_intervals: (0..SAMPLES_MM.len())
-                .map(|sample| {
-                    middle(
-                        scales
-                            .iter()
-                            .map(|(scale, _)| scale.scores[sample])
-                            .collect(),
-                    )
-                })
-                .collect(),
+            score_intervals: (0..SAMPLES_MM.len()).map(spread).collect(),
             scaled: scales.len() as f64 / again.len() as f64,
             rejected: Some(mean(rejected)).filter(|share| share.is_finite()),
             by_glimpse: [IntegrationWindow::Wave, glimpse, IntegrationWindow::Stroke]
@@ -510,7 +469,8 @@ impl Compared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::psychophysics::bench::Bench;
+    use crate::bench::Bench;
+    use crate::psychophysics::run;
 
     const PLAN: Plan = Plan {
         seed: 1,
@@ -520,7 +480,7 @@ mod tests {
     };
 
     fn study() -> Study {
-        let recordings = Bench::Native.run(&jobs(&PLAN), |_| {}).unwrap();
+        let recordings = run(&Bench::Native, &jobs(&PLAN), |_| {}).unwrap();
         Study::new(PLAN, &recordings).unwrap()
     }
 
@@ -564,7 +524,7 @@ mod tests {
 
     #[test]
     fn one_seed_gives_one_study() {
-        let recordings = Bench::Native.run(&jobs(&PLAN), |_| {}).unwrap();
+        let recordings = run(&Bench::Native, &jobs(&PLAN), |_| {}).unwrap();
         assert_eq!(Study::new(PLAN, &recordings), Study::new(PLAN, &recordings));
     }
 }

@@ -9,46 +9,7 @@ use crate::psychophysics::published::{
     CHI_SQUARE, CRITICAL, FREEDOM, SAMPLES_MM, TABLE_3, TABLE_4,
 };
 use crate::psychophysics::study::{Compared, Study};
-
-/// A table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Table {
-    /// What it is of.
-    pub caption: &'static str,
-    /// Its heads.
-    pub heads: Vec<String>,
-    /// Its rows, the first cell of each its head.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    fn new(caption: &'static str, heads: &[&str], rows: Vec<Vec<String>>) -> Self {
-        Self {
-            caption,
-            heads: heads.iter().map(|&head| head.to_owned()).collect(),
-            rows,
-        }
-    }
-
-    /// In columns for a terminal: the first to the left, the others to the right.
-    fn text(&self) -> String {
-        let lines = || std::iter::once(&self.heads).chain(&self.rows);
-        let width = |column: usize| {
-            let widths = lines().filter_map(|line| Some(line.get(column)?.chars().count()));
-            widths.max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..self.heads.len()).map(width).collect();
-        let line = |cells: &Vec<String>| {
-            let cells = cells.iter().zip(&widths).enumerate();
-            let padded = cells.map(|(column, (cell, &width))| match column {
-                0 => format!("{cell:<width$}"),
-                _ => format!("{cell:>width$}"),
-            });
-            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-        };
-        lines().map(line).collect()
-    }
-}
+use crate::study::{Record, Table, short};
 
 /// A number with so many decimals.
 fn fixed(value: f64, decimals: usize) -> String {
@@ -67,49 +28,38 @@ pub fn span(interval: Option<Interval>) -> String {
     })
 }
 
-/// A row: its head, then its cells.
-fn row(head: impl Into<String>, cells: impl IntoIterator<Item = String>) -> Vec<String> {
-    std::iter::once(head.into()).chain(cells).collect()
-}
-
 /// What the stimuli felt like.
 pub fn felt(study: &Study) -> Table {
-    let heads = [
-        "λ from",
-        "λ, mm",
-        "waves",
-        "mean, mm",
-        "error, rms %",
-        "scatter, rms %",
-    ];
-    let shown = study
-        .stimuli()
-        .filter(|(_, stimulus)| SAMPLES_MM.contains(&stimulus.wavelength_mm));
+    let stimuli = study.stimuli();
+    let shown = stimuli.filter(|(_, stimulus)| SAMPLES_MM.contains(&stimulus.wavelength_mm));
     let rows = shown.map(|(method, stimulus)| {
-        let cells = [
-            stimulus.wavelength_mm.to_string(),
-            stimulus.waves.to_string(),
-            fixed(stimulus.mean_mm, 3),
-            fixed(stimulus.error_percent, 2),
-            fixed(stimulus.scatter_percent, 2),
-        ];
-        row(method, cells)
+        Record::default()
+            .with("λ from", method)
+            .with("λ, mm", short(stimulus.wavelength_mm))
+            .with("waves", short(stimulus.waves))
+            .with("mean, mm", fixed(stimulus.mean_mm, 3))
+            .with("error, rms %", fixed(stimulus.error_percent, 2))
+            .with("scatter, rms %", fixed(stimulus.scatter_percent, 2))
     });
-    let caption = "What the actuators' voltages present, wave by wave";
-    Table::new(caption, &heads, rows.collect())
+    Table::from_iter(rows).called("What the actuators' voltages present, wave by wave")
 }
 
 /// Table II.
 pub fn limens(study: &Study) -> Table {
-    let heads = ["standard", "paper", "ours", "95 %", "mean", "clean"];
     let rows = study.limens.iter().flat_map(|column| {
         column.lines().map(|line| {
             let [paper, once, mean, clean] = line.each_mm.map(|mm| fixed(mm, 3));
             let head = format!("{} mm: {}", column.paper.standard_mm, line.name);
-            row(head, [paper, once, span(line.interval), mean, clean])
+            Record::default()
+                .with("standard", head)
+                .with("paper", paper)
+                .with("ours", once)
+                .with("95 %", span(line.interval))
+                .with("mean", mean)
+                .with("clean", clean)
         })
     });
-    Table::new("Limens in mm", &heads, rows.collect())
+    Table::from_iter(rows).called("Limens in mm")
 }
 
 /// Table III.
@@ -118,134 +68,138 @@ pub fn shares(study: &Study) -> Table {
         let interval = span(Some(wilson(pair.correct, pair.trials)));
         format!("{} ({interval})", fixed(pair.share(), 2))
     };
-    let methods = &study.methods;
-    let heads = methods.iter().flat_map(|of| [of.method, "long run"]);
-    let heads: Vec<&str> = ["pair, mm", "paper"].into_iter().chain(heads).collect();
     let pairs = TABLE_3.iter().enumerate().map(|(at, paper)| {
-        let ours = methods.iter().flat_map(|of| {
-            let long_run = fixed(of.long_run[at].share(), 4);
-            [cell(&of.once[at]), long_run]
-        });
         let [shorter, longer] = [paper.shorter, paper.longer].map(|at| SAMPLES_MM[at]);
-        let cells = std::iter::once(cell(paper)).chain(ours);
-        row(format!("{shorter} : {longer}"), cells)
+        let row = Record::default()
+            .with("pair, mm", format!("{shorter} : {longer}"))
+            .with("paper", cell(paper));
+        study.methods.iter().fold(row, |row, of| {
+            let long_run = fixed(of.long_run[at].share(), 4);
+            row.with(of.method, cell(&of.once[at]))
+                .with("long run", long_run)
+        })
     });
-    let means = methods.iter().flat_map(|of| {
+    let means = Record::default()
+        .with("pair, mm", "mean")
+        .with("paper", fixed(mean_share(&TABLE_3), 3));
+    let means = study.methods.iter().fold(means, |row, of| {
         let once = fixed(mean_share(&of.once), 3);
-        let long_run = fixed(mean_share(&of.long_run), 4);
-        [format!("{once} ({})", span(of.mean_share)), long_run]
+        let once = format!("{once} ({})", span(of.mean_share));
+        row.with(of.method, once)
+            .with("long run", fixed(mean_share(&of.long_run), 4))
     });
-    let of_paper = fixed(mean_share(&TABLE_3), 3);
-    let mean = row("mean", std::iter::once(of_paper).chain(means));
-    let rows = pairs.chain(std::iter::once(mean)).collect();
-    Table::new("Shares of correct answers", &heads, rows)
+    Table::from_iter(pairs.chain([means])).called("Shares of correct answers")
 }
 
 /// Mean shares by how long a sensation is gathered.
 pub fn glimpses(study: &Study) -> Table {
     let rows = study.methods.iter().map(|compared| {
-        let shares = compared.by_glimpse.map(|share| fixed(share, 4));
-        row(compared.method, shares)
+        let [wave, taken, stroke] = compared.by_glimpse.map(|share| fixed(share, 4));
+        Record::default()
+            .with("λ from", compared.method)
+            .with("one wave", wave)
+            .with("0.1 s (taken above)", taken)
+            .with("a stroke", stroke)
     });
-    Table::new(
-        "Mean share in the long run, by how long a sensation is gathered",
-        &["λ from", "one wave", "0.1 s (taken above)", "a stroke"],
-        rows.collect(),
-    )
+    Table::from_iter(rows).called("Mean share in the long run, by how long a sensation is gathered")
 }
 
 /// Table IV.
 pub fn scores(study: &Study) -> Table {
-    let scores = |head: String, scores: &[f64]| row(head, scores.iter().map(|&s| fixed(s, 4)));
+    const HEADS: [&str; 5] = ["", "1 mm", "2 mm", "3 mm", "4 mm"];
+    let row = |head: String, scores: &mut dyn Iterator<Item = Option<f64>>| {
+        let cells = scores.map(|score| number(score, 4));
+        Record::of(&HEADS, [head].into_iter().chain(cells))
+    };
+    let known = |head: String, scores: &[f64]| row(head, &mut scores.iter().copied().map(Some));
     let ends = |intervals: &[Option<Interval>]| {
-        let end = |end: fn(Interval) -> f64| {
-            let ends = intervals.iter().map(|i| number(i.map(end), 4));
-            ends.collect::<Vec<_>>()
+        let end = |head: &str, end: fn(Interval) -> f64| {
+            row(head.to_owned(), &mut intervals.iter().map(|i| i.map(end)))
         };
-        [
-            row("  95 % from", end(|i| i.low)),
-            row("       to", end(|i| i.high)),
-        ]
+        [end("  95 % from", |i| i.low), end("       to", |i| i.high)]
     };
     let recount = &study.recount;
     let mut rows = vec![
-        scores("paper, printed".into(), &TABLE_4),
-        scores("paper, recounted".into(), &recount.scale.scores),
+        known("paper, printed".into(), &TABLE_4),
+        known("paper, recounted".into(), &recount.scale.scores),
     ];
     rows.extend(ends(&recount.intervals));
     for compared in &study.methods {
         let method = compared.method;
         let once = format!("{method}, once");
         rows.push(match &compared.scores {
-            Some(of) => scores(once, of),
-            None => row(once, SAMPLES_MM.map(|_| number(None, 4))),
+            Some(of) => known(once, of),
+            None => row(once, &mut SAMPLES_MM.into_iter().map(|_| None)),
         });
         rows.extend(ends(&compared.score_intervals));
-        let long_run = &compared.long_run_scores;
-        rows.push(scores(format!("{method}, long run"), long_run));
+        rows.push(known(
+            format!("{method}, long run"),
+            &compared.long_run_scores,
+        ));
     }
-    Table::new("Scores", &["", "1 mm", "2 mm", "3 mm", "4 mm"], rows)
+    Table::from_iter(rows).called("Scores")
 }
 
 /// Mosteller's tests by what they are of: the paper's numbers counted again, then every contender's.
 pub fn tests(study: &Study) -> Vec<(String, Test)> {
     let recount = &study.recount;
-    let mut tests = vec![
-        (
-            "paper, cell of 1.00 as 0.95".to_owned(),
-            recount.half_an_answer,
-        ),
-        (
-            "paper, the same by simulation".to_owned(),
-            recount.simulated,
-        ),
-        ("paper, cell of 1.00 left out".to_owned(), recount.left_out),
-        ("paper, cell of 1.00 as it is".to_owned(), recount.as_it_is),
+    let of_paper = [
+        ("paper, cell of 1.00 as 0.95", recount.half_an_answer),
+        ("paper, the same by simulation", recount.simulated),
+        ("paper, cell of 1.00 left out", recount.left_out),
+        ("paper, cell of 1.00 as it is", recount.as_it_is),
     ];
-    for compared in &study.methods {
+    let of_paper = of_paper.map(|(of, test)| (of.to_owned(), test));
+    let ours = study.methods.iter().flat_map(|compared| {
         let of = [
             ("once", compared.test),
             ("long run", compared.long_run_test),
         ];
         let made = of.into_iter().filter_map(|(of, test)| Some((of, test?)));
-        tests.extend(made.map(|(of, test)| (format!("{}, {of}", compared.method), test)));
-    }
-    tests
+        made.map(|(of, test)| (format!("{}, {of}", compared.method), test))
+    });
+    of_paper.into_iter().chain(ours).collect()
+}
+
+const fn verdict(rejects: bool) -> &'static str {
+    if rejects { "rejected" } else { "not rejected" }
 }
 
 /// Mosteller's tests, below what the paper printed.
-pub fn mosteller(study: &Study) -> Table {
-    let verdict = |rejects| if rejects { "rejected" } else { "not rejected" };
-    let cells = |chi_square, freedom: u32, critical, p, rejects| {
-        [
-            fixed(chi_square, 2),
-            freedom.to_string(),
-            fixed(critical, 2),
-            number(p, 3),
-            verdict(rejects).to_owned(),
-        ]
+pub fn mosteller_tests(study: &Study) -> Table {
+    let row = |of: String, chi_square, freedom: u32, critical, p, rejects| {
+        Record::default()
+            .with("", of)
+            .with("χ²", fixed(chi_square, 2))
+            .with("freedom", short(freedom))
+            .with("critical, 5 %", fixed(critical, 2))
+            .with("p", number(p, 3))
+            .with("Case V", verdict(rejects))
     };
-    let printed = cells(CHI_SQUARE, FREEDOM, CRITICAL, None, false);
+    let printed = "paper, printed".to_owned();
+    let printed = row(printed, CHI_SQUARE, FREEDOM, CRITICAL, None, false);
     let ours = tests(study).into_iter().map(|(of, test)| {
-        let Test {
-            chi_square,
-            freedom,
-            critical,
-            p,
-            ..
-        } = test;
+        let rejects = test.rejects();
         row(
             of,
-            cells(chi_square, freedom, critical, Some(p), test.rejects()),
+            test.chi_square,
+            test.freedom,
+            test.critical,
+            Some(test.p),
+            rejects,
         )
     });
-    let rows = std::iter::once(row("paper, printed", printed)).chain(ours);
-    let heads = ["", "χ²", "freedom", "critical, 5 %", "p", "Case V"];
-    Table::new("Mosteller's χ²", &heads, rows.collect())
+    Table::from_iter([printed].into_iter().chain(ours)).called("Mosteller's χ²")
 }
 
 /// The whole study.
 pub fn text(study: &Study) -> String {
+    let Study {
+        repetitions,
+        trials,
+        glimpse_s,
+        ..
+    } = study;
     let tables = [
         (
             "What the actuators' voltages present: the hand's travel for each wave, over all strokes. (Where it \
@@ -256,27 +210,25 @@ pub fn text(study: &Study) -> String {
         (
             format!(
                 "Table II, method of limits, limens in mm: three observers, two ascending and two descending \
-                 series each, λ given to the display. \"95 %\" is the middle of {} such experiments, \"clean\" \
-                 their mean were the stimuli without error.",
-                study.repetitions
+                 series each, λ given to the display. \"95 %\" is the middle of {repetitions} such experiments, \"clean\" \
+                 their mean were the stimuli without error."
             ),
             limens(study),
         ),
         (
             format!(
-                "Table III, paired comparison, {} trials a pair ({} in the paper): share of correct answers, \
+                "Table III, paired comparison, {trials} trials a pair ({} in the paper): share of correct answers, \
                  Wilson's 95 % interval, and where the share goes in the long run. The mean's interval is the \
-                 middle 95 % of {} such experiments, all with the same rubs of these specimens: another --seed is \
+                 middle 95 % of {repetitions} such experiments, all with the same rubs of these specimens: another --seed is \
                  another hand and other noise, which moves the counts' means by some hundredths.",
-                study.trials, TABLE_3[0].trials, study.repetitions
+                TABLE_3[0].trials
             ),
             shares(study),
         ),
         (
             format!(
-                "Mean share in the long run if a sensation is gathered over one wave, {} s (taken above, a \
-                 guess), a stroke:",
-                study.glimpse_s
+                "Mean share in the long run if a sensation is gathered over one wave, {glimpse_s} s (taken above, a \
+                 guess), a stroke:"
             ),
             glimpses(study),
         ),
@@ -287,30 +239,26 @@ pub fn text(study: &Study) -> String {
         ),
         (
             "Mosteller's test of Case V; in the long run as if its shares were of so many trials:".to_owned(),
-            mosteller(study),
+            mosteller_tests(study),
         ),
     ];
-    let tables = tables
-        .into_iter()
-        .map(|(words, table)| format!("{}\n\n{}\n", wrapped(&words), table.text()));
-    let scaled = study
-        .methods
-        .iter()
-        .map(|of| wrapped(&scaled(of, study)) + "\n");
+    let tables = tables.map(|(words, table)| format!("{}\n\n{}\n", wrapped(&words), table.text()));
+    let scaled = study.methods.iter();
+    let scaled = scaled.map(|of| wrapped(&scaled_text(of, study)) + "\n");
     format!(
         "The paper's experiments with people, simulated: engine {}, seed {}, friction {}.\n{}\n\n{}{}\n{}",
         study.engine,
         study.seed,
         study.friction,
         wrapped(DISCLAIMER),
-        tables.collect::<String>(),
+        tables.concat(),
         scaled.collect::<String>(),
         recount(study),
     )
 }
 
 /// How often comparisons with a contender have a scale, and why this one has none.
-fn scaled(compared: &Compared, study: &Study) -> String {
+fn scaled_text(compared: &Compared, study: &Study) -> String {
     let none = compared.no_scale.as_deref();
     let none = none.map_or(String::new(), |reason| format!("once: {reason}; "));
     let rejected = compared.rejected.map_or(String::new(), |rejected| {
@@ -350,11 +298,7 @@ fn said(test: &Test) -> String {
         test.freedom,
         test.critical,
         test.p,
-        if test.rejects() {
-            "rejected"
-        } else {
-            "not rejected"
-        }
+        verdict(test.rejects()),
     )
 }
 

@@ -64,15 +64,10 @@ impl Skin {
     }
 
     fn between(&self, wavelength_mm: f64, value: impl Fn(&Point) -> f64) -> f64 {
-        let after = self
-            .points
-            .partition_point(|point| point.standard_mm <= wavelength_mm);
-        let (Some(before), Some(next)) = (
-            after.checked_sub(1).map(|before| &self.points[before]),
-            self.points.get(after),
-        ) else {
-            let nearest = &self.points[after.min(self.points.len() - 1)];
-            return value(nearest);
+        let points = &self.points;
+        let after = points.partition_point(|point| point.standard_mm <= wavelength_mm);
+        let (Some(before), Some(next)) = (points[..after].last(), points.get(after)) else {
+            return value(&points[after.min(points.len() - 1)]);
         };
         let share = (wavelength_mm - before.standard_mm) / (next.standard_mm - before.standard_mm);
         value(before) + share * (value(next) - value(before))

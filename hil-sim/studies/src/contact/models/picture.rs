@@ -1,16 +1,11 @@
 //! The picture: error over speed, a panel for each case.
 
 use super::{Row, cases};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{
     BLUE, BROWN, GREEN, INK, ORANGE, PURPLE, SKY, SOFT, VERMILION, VIOLET,
 };
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
-use hil_sim_core::scene::ContactModel;
-use hil_sim_core::scene::Integrator;
+use crate::output::plot::{Axis, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
+use hil_sim_core::scene::{ContactModel, Integrator};
 
 /// Errors below are drawn there.
 const LEAST_PERCENT: f64 = 1e-5;
@@ -48,48 +43,40 @@ fn integrators() -> impl Iterator<Item = Integrator> {
     all.filter(|integrator| *integrator != Integrator::Radau)
 }
 
-/// Draws it.
 pub fn draw(rows: &[Row]) -> String {
-    let mut page = Page::default();
-    page.note(
-        "Contact models: error to the reference, in %, over speed on one core; 50 mm/s, or 100 mm/s at 8 Hz. \
-         Full: a rung as it is; hollow, joined: by steps, 250 µs on the right, 1 µs on the left.",
-    );
-    let rungs = ContactModel::ALL
-        .iter()
-        .filter(|rung| **rung != ContactModel::Reference);
+    let note = "Contact models: error to the reference, in %, over speed on one core; 50 mm/s, or 100 mm/s at 8 Hz. \
+         Full: a rung as it is; hollow, joined: by steps, 250 µs on the right, 1 µs on the left.";
+    let rungs = ContactModel::ALL.iter();
+    let rungs = rungs.filter(|rung| **rung != ContactModel::Reference);
     let mut legend: Vec<(Key, &str)> = rungs
         .map(|rung| (Key::Symbol(of_rung(*rung)), rung.name()))
         .collect();
     legend.extend(integrators().map(|of| (Key::Symbol(of_integrator(of)), of.name())));
     legend.push((Key::Line(REFERENCE), "the reference’s speed"));
-    page.legend(&legend);
     let x = Axis::decades(1.0, 1e5, "virtual seconds per second");
     let y = Axis::decades(LEAST_PERCENT, 1_000.0, "");
-    let panels: Vec<Panel> = cases()
-        .iter()
-        .map(|case| {
-            let here: Vec<&Row> = rows.iter().filter(|row| row.case == case.name).collect();
-            Panel::new(case.name, &x, &y).with(marks(&here))
-        })
-        .collect();
-    page.panels(3, &[PANEL_HEIGHT], &panels);
-    page.finish()
+    let panels = cases().map(|case| {
+        let here: Vec<&Row> = rows.iter().filter(|row| row.case == case.name).collect();
+        Panel::new(case.name, &x, &y).with(marks(&here))
+    });
+    in_threes(note, &legend, &panels)
 }
 
 fn marks(rows: &[&Row]) -> Vec<Mark> {
     let at = |row: &&Row| Some((row.pace, row.error_percent?));
+    let by = |integrator| move |row: &&&Row| row.entrant.integrator == integrator;
     let mut marks = Vec::new();
     for integrator in integrators() {
-        let of_it = rows
+        let steps: Vec<_> = rows
             .iter()
-            .filter(|row| row.entrant.integrator == Some(integrator));
-        let steps: Vec<_> = of_it.filter_map(at).collect();
+            .filter(by(Some(integrator)))
+            .filter_map(at)
+            .collect();
         let symbol = of_integrator(integrator);
         marks.push(Mark::thin(symbol.colour, steps.clone()));
         marks.push(Mark::Symbols(symbol, steps));
     }
-    for row in rows.iter().filter(|row| row.entrant.integrator.is_none()) {
+    for row in rows.iter().filter(by(None)) {
         match row.entrant.rung {
             ContactModel::Reference => {
                 marks.push(Mark::Upright(REFERENCE, row.pace, String::new()));
@@ -121,6 +108,6 @@ mod tests {
                     })
             })
             .collect();
-        crate::output::plot::fits::assert_fits("models", &draw(&rows));
+        crate::output::plot::tests::assert_fits("models", &draw(&rows));
     }
 }

@@ -3,12 +3,8 @@
 use super::{
     BRISTLES_N_PER_M, CLINGING_STEPS_S, FINGERTIP_N_PER_M, Map, Outcome, SWINGING_STEPS_S, Test,
 };
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::{Cells, Mark};
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::INK;
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::Stroke;
+use crate::output::plot::{Axis, Cells, Key, Mark, PANEL_HEIGHT, Page, Panel, Stroke};
 
 /// What became of a fingertip: its fill, and words.
 const OUTCOMES: [(Outcome, &str, &str); 4] = [
@@ -23,7 +19,6 @@ const OUTCOMES: [(Outcome, &str, &str); 4] = [
 ];
 const LIMIT: Stroke = Stroke::new(INK, 1.6);
 
-/// Draws it.
 pub fn draw(maps: &[Map]) -> String {
     let mut page = Page::default();
     page.note(
@@ -94,6 +89,6 @@ mod tests {
                 })
             })
             .collect();
-        crate::output::plot::fits::assert_fits("stability", &draw(&maps));
+        crate::output::plot::tests::assert_fits("stability", &draw(&maps));
     }
 }

@@ -1,49 +1,35 @@
 //! The picture: cycles and ms over the delay, and both voltages about a reversal.
 
 use super::{Row, SHOWN_MS, SHOWN_S, stimulus_v};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{BLUE, INK, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{Axis, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 
 const OURS: Symbol = Symbol::new(BLUE, Shape::Circle).faded(0.9);
 const RELAYED: Symbol = Symbol::new(VERMILION, Shape::Square).faded(0.9);
 const DUE: Stroke = Stroke::new(INK, 0.8).dashed("3 2");
 
-/// Draws it.
 pub fn draw(rows: &[Row]) -> String {
-    let mut page = Page::default();
-    page.note(
-        "Stimulus against the motion it belongs to: v = 70 sin(2π 0.83 t) mm/s, λ = 2 mm. \
-         Ours: the display’s ELF. Relayed: what the remote finger feels, sent back, with no other fault.",
-    );
-    page.legend(&[
+    let note = "Stimulus against the motion it belongs to: v = 70 sin(2π 0.83 t) mm/s, λ = 2 mm. \
+         Ours: the display’s ELF. Relayed: what the remote finger feels, sent back, with no other fault.";
+    let bad = "ours with 20 % loss and 50 ms jitter";
+    let legend = [
         (Key::Symbol(OURS), "ours (measured)"),
-        (
-            Key::Symbol(OURS.hollow(true)),
-            "ours with 20 % loss and 50 ms jitter",
-        ),
+        (Key::Symbol(OURS.hollow(true)), bad),
         (Key::Symbol(RELAYED), "relayed over the network (model)"),
         (Key::Line(DUE), "due"),
-    ]);
+    ];
     let x = Axis::even(0.0, 500.0, 100.0, "the link’s one-way delay, ms");
     let cycles = Axis::decades(0.0001, 20.0, "");
     let ms = Axis::decades(0.1, 2_000.0, "");
-    page.panels(
-        3,
-        &[PANEL_HEIGHT],
-        &[
-            Panel::new("phase error, RMS, cycles", &x, &cycles).with(over_delay(rows, |row| {
-                (row.ours_cycles, row.relayed_cycles)
-            })),
-            Panel::new("stimulus behind its motion, ms", &x, &ms)
-                .with(over_delay(rows, |row| (row.ours_ms, row.relayed_ms))),
-            voltages(rows),
-        ],
-    );
-    page.finish()
+    let panels = [
+        Panel::new("phase error, RMS, cycles", &x, &cycles).with(over_delay(rows, |row| {
+            (row.ours_cycles, row.relayed_cycles)
+        })),
+        Panel::new("stimulus behind its motion, ms", &x, &ms)
+            .with(over_delay(rows, |row| (row.ours_ms, row.relayed_ms()))),
+        voltages(rows),
+    ];
+    in_threes(note, &legend, &panels)
 }
 
 /// Ours and the relayed one, where they have a value that a logarithmic axis can show.
@@ -56,13 +42,9 @@ fn over_delay(rows: &[Row], value: impl Fn(&Row) -> (Option<f64>, f64)) -> Vec<M
         let symbol = OURS.hollow(row.link.loss > 0.0);
         Some(Mark::symbol(symbol, (row.link.delay_ms, value(row).0?)))
     });
-    [
-        Mark::Line(Stroke::new(VERMILION, 1.2), relayed.clone()),
-        Mark::Symbols(RELAYED, relayed),
-    ]
-    .into_iter()
-    .chain(ours)
-    .collect()
+    let line = Mark::Line(Stroke::new(VERMILION, 1.2), relayed.clone());
+    let relayed = [line, Mark::Symbols(RELAYED, relayed)];
+    relayed.into_iter().chain(ours).collect()
 }
 
 fn voltages(rows: &[Row]) -> Panel {
@@ -78,11 +60,9 @@ fn voltages(rows: &[Row]) -> Panel {
     };
     let title = format!("V, at {SHOWN_MS} ms each way, about a reversal");
     let measured = shown.map(|row| Mark::held(Stroke::new(BLUE, 1.2), &row.drawn, &SHOWN_S));
+    let relayed = Mark::Line(Stroke::new(VERMILION, 1.2), drawn(2e-3 * SHOWN_MS));
     Panel::new(title, &x, &y)
-        .with([
-            Mark::Line(Stroke::new(VERMILION, 1.2), drawn(2e-3 * SHOWN_MS)),
-            Mark::Line(DUE, drawn(0.0)),
-        ])
+        .with([relayed, Mark::Line(DUE, drawn(0.0))])
         .with(measured)
 }
 
@@ -103,10 +83,9 @@ mod tests {
             ours_ms: Some(0.7),
             edge_ms: Some(0.1),
             relayed_cycles: 0.01 * delay_ms,
-            relayed_ms: 2.0 * delay_ms,
             begins_cycles: 0.0,
             drawn: vec![(SHOWN_S.start, 5.0), (SHOWN_S.end, -5.0)],
         });
-        crate::output::plot::fits::assert_fits("delay", &draw(&rows));
+        crate::output::plot::tests::assert_fits("delay", &draw(&rows));
     }
 }

@@ -1,13 +1,10 @@
 //! The picture: a spectrum, the worst spur over frequency, and the means.
 
-use super::{GOAL_DBC, GOAL_MEAN_MV, Hand, Row, SHOWN_HZ, levels_dbc};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::font::{Anchor, Font};
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
+use std::f64::consts::PI;
+
+use super::{GOAL_DBC, GOAL_MEAN_MV, Hand, Row, SHOWN_HZ};
 use crate::output::plot::palette::{BLUE, GREEN, INK, ORANGE, PURPLE, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{Anchor, Axis, Font, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 use protocol::Mode;
 
 /// What rate and mode are called and look like.
@@ -21,26 +18,16 @@ fn look(row: &Row) -> (&'static str, Symbol) {
     (name, Symbol::new(colour, shape))
 }
 
-/// Draws it.
 pub fn draw(rows: &[Row]) -> String {
-    let mut page = Page::default();
-    page.note(
-        "From the LDAC edges of the display’s ELF. Full: the hand moves by whole encoder counts a tick; \
-         hollow: between whole counts, where the encoder’s steps show.",
-    );
+    let note = "From the LDAC edges of the display’s ELF. Full: the hand moves by whole encoder counts a tick; \
+         hollow: between whole counts, where the encoder’s steps show.";
     let mut legend: Vec<(Key, &str)> = Vec::new();
     for (name, symbol) in rows.iter().map(look) {
         if legend.iter().all(|known| known.1 != name) {
             legend.push((Key::Symbol(symbol), name));
         }
     }
-    page.legend(&legend);
-    page.panels(
-        3,
-        &[PANEL_HEIGHT],
-        &[spectra(rows), spurs(rows), means(rows)],
-    );
-    page.finish()
+    in_threes(note, &legend, &[spectra(rows), spurs(rows), means(rows)])
 }
 
 fn goal() -> Mark {
@@ -64,7 +51,7 @@ fn spectra(rows: &[Row]) -> Panel {
         let Some(row) = shown else { continue };
         let font = Font::new(10.0).coloured(colour).at(Anchor::End);
         panel = panel.with([
-            Mark::Line(Stroke::new(colour, 0.8), levels_dbc(row)),
+            Mark::Line(Stroke::new(colour, 0.8), row.levels_dbc()),
             Mark::Words(font, (1_000.0, dbc), (-4.0, 0.0), words.to_owned()),
         ]);
     }
@@ -87,10 +74,9 @@ fn means(rows: &[Row]) -> Panel {
     let x = Axis::decades(0.4, 250.0, "stimulus, or the hand’s strokes, Hz");
     let y = Axis::decades(0.01, 10_000.0, "");
     // A sine's own mean over a second that is no whole number of cycles: 5 V / πf at most.
-    let own: Vec<_> = (0..=60)
+    let own = (0..=60)
         .map(|step| 4.0 * (250.0f64 / 4.0).powf(f64::from(step) / 60.0))
-        .map(|f| (f, 5_000.0 / (std::f64::consts::PI * f)))
-        .collect();
+        .map(|f| (f, 5_000.0 / (PI * f)));
     let words = "any second: 5 V/πf of the sine itself".to_owned();
     let measured = rows.iter().map(|row| {
         let (frequency_hz, hollow) = match row.hand {
@@ -103,7 +89,7 @@ fn means(rows: &[Row]) -> Panel {
     Panel::new("mean of the worst channel, whole cycles, mV", &x, &y)
         .with([
             Mark::Level(GOAL_MEAN_MV, format!("goal {GOAL_MEAN_MV} mV")),
-            Mark::Line(Stroke::new(INK, 1.2).dashed("6 4"), own),
+            Mark::Line(Stroke::new(INK, 1.2).dashed("6 4"), own.collect()),
             Mark::Words(Font::new(10.0), (5.2, 1_100.0), (0.0, 0.0), words),
         ])
         .with(measured)
@@ -143,6 +129,6 @@ mod tests {
             row(4_000, Mode::Uniform, Hand::Whole),
             row(4_000, Mode::Travelling, stroke),
         ];
-        crate::output::plot::fits::assert_fits("purity", &draw(&rows));
+        crate::output::plot::tests::assert_fits("purity", &draw(&rows));
     }
 }

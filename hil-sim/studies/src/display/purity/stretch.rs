@@ -1,14 +1,14 @@
 //! One run's stimuli, one after the other: the hand goes on at another speed over another λ.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use super::Hand;
+use crate::display::through;
 use hil_sim_boards::display_alone::{SensorMessage, Surface};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
-use hil_sim_core::scene::{Motion, Series};
+use hil_sim_core::scene::Motion;
 
-/// Before the first stretch, in s: the board starts and is configured.
+/// Before the first stretch: the board starts and is configured.
 const BEGINNING_S: f64 = 0.1;
 /// Points a second by which a stroke is drawn, in straight lines between them.
 const POINTS_HZ: f64 = 4_000.0;
@@ -46,34 +46,22 @@ impl Stretch {
     }
 }
 
-/// Stretches in their order.
+/// Stretches in their order, each with its beginning in s.
 pub struct StimulusSequence {
-    stretches: Vec<(f64, Stretch)>,
-    ends_s: f64,
+    pub stretches: Vec<(f64, Stretch)>,
+    pub ends_s: f64,
 }
 
 impl StimulusSequence {
     pub fn new(stretches: Vec<Stretch>) -> Self {
         let mut ends_s = BEGINNING_S;
-        let stretches = stretches
-            .into_iter()
-            .map(|stretch| {
-                let from_s = ends_s;
-                ends_s += stretch.lasts_s;
-                (from_s, stretch)
-            })
-            .collect();
+        let begin = |stretch: Stretch| {
+            let from_s = ends_s;
+            ends_s += stretch.lasts_s;
+            (from_s, stretch)
+        };
+        let stretches = stretches.into_iter().map(begin).collect();
         Self { stretches, ends_s }
-    }
-
-    pub fn ends_s(&self) -> f64 {
-        self.ends_s
-    }
-
-    pub fn stretches(&self) -> impl Iterator<Item = (f64, &Stretch)> {
-        self.stretches
-            .iter()
-            .map(|(from_s, stretch)| (*from_s, stretch))
     }
 
     /// The hand: at rest, then through all stretches.
@@ -98,22 +86,15 @@ impl StimulusSequence {
         }
         at.push(self.ends_s);
         values.push(position_mm);
-        Motion::Recorded(Arc::new(Series {
-            at,
-            values,
-            width: 1,
-        }))
+        through(at, values)
     }
 
     /// λ of the stretch that is on.
     pub fn surface(&self) -> Surface {
-        let stretches: Vec<(f64, f64)> = self
-            .stretches()
-            .map(|(from_s, stretch)| (from_s, stretch.wavelength_mm))
-            .collect();
+        let stretches = self.stretches.clone();
         Box::new(move |t_s| {
             let next = stretches.partition_point(|&(from_s, _)| from_s <= t_s);
-            SensorMessage::of(stretches[next.max(1) - 1].1)
+            SensorMessage::of(stretches[next.max(1) - 1].1.wavelength_mm)
         })
     }
 }
@@ -140,7 +121,7 @@ mod tests {
             lasts_s: 3.0,
         };
         let course = StimulusSequence::new(vec![steady, stroke, steady]);
-        assert!((course.ends_s() - 7.1).abs() < 1e-12);
+        assert!((course.ends_s - 7.1).abs() < 1e-12);
         let hand = course.hand();
         assert_eq!(hand.velocity_mm_s(0.05), 0.0);
         assert!((hand.velocity_mm_s(1.0) - 40.0).abs() < 1e-9);

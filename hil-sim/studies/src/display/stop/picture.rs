@@ -2,19 +2,15 @@
 
 use std::ops::Range;
 
-use super::{GOAL_MS, RESTS_S, SPEED_MM_S, Stop};
-use crate::output::plot::axis::{Axis, short};
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::Page;
+use super::{GOAL_MS, RESTS_S, SPEED_MM_S, Stop, WATCHED};
+use crate::output::plot::axis::short;
 use crate::output::plot::palette::{BLUE, SOFT, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::Stroke;
+use crate::output::plot::{Axis, Mark, Page, Panel, Stroke};
 
 /// What is drawn, in s from the last count.
 pub const SHOWN_S: Range<f64> = -0.06..RESTS_S + 0.12;
 /// The first part, on a wider scale of time.
 const CLOSE_S: Range<f64> = -0.03..0.04;
-
 const INSTANT: Stroke = Stroke::new(SOFT, 1.2).dashed("4 3");
 
 /// Draws the first stop.
@@ -28,9 +24,8 @@ pub fn draw(stops: &[Stop]) -> String {
         None => "never at 0 V while the hand rests".to_owned(),
     };
     page.note(&format!(
-        "The hand stops dead from {SPEED_MM_S} mm/s with channel {} at a crest of {:.2} V, rests, and \
+        "The hand stops dead from {SPEED_MM_S} mm/s with channel {WATCHED} at a crest of {:.2} V, rests, and \
          goes on: {told}.",
-        super::WATCHED,
         stop.crest_v
     ));
     let times = [(CLOSE_S, 0.01), (SHOWN_S, 0.1)].map(|(shown, step)| milliseconds(&shown, step));
@@ -40,19 +35,15 @@ pub fn draw(stops: &[Stop]) -> String {
         Mark::held(Stroke::new(colour, 1.3), values, &(time.low..time.high))
     };
     let hand = times.each_ref().map(|time| {
-        Panel::new(
-            "hand, mm/s (encoder counts a tick)",
-            &time.wordless(),
-            &speed,
-        )
-        .with([line(&stop.speeds, time, VERMILION)])
+        let title = "hand, mm/s (encoder counts a tick)";
+        Panel::new(title, &time.wordless(), &speed).with([line(&stop.speeds, time, VERMILION)])
     });
     let volts = times.each_ref().map(|time| {
         // Where time is short, there is no room for words.
-        let words = |words| if time.high == CLOSE_S.end { words } else { "" };
+        let words = |words: &str| if time.high == CLOSE_S.end { words } else { "" }.to_owned();
         Panel::new("voltage, V", time, &voltage).with([
-            Mark::Upright(INSTANT, 0.0, words("last count").to_owned()),
-            Mark::Upright(INSTANT, 1e-3 * GOAL_MS, words("goal 20 ms").to_owned()),
+            Mark::Upright(INSTANT, 0.0, words("last count")),
+            Mark::Upright(INSTANT, 1e-3 * GOAL_MS, words("goal 20 ms")),
             line(&stop.voltages, time, BLUE),
         ])
     });
@@ -66,9 +57,12 @@ fn milliseconds(shown: &Range<f64>, step_s: f64) -> Axis {
     let last = (shown.end / step_s).floor() as i32;
     let ticks = (first..=last)
         .map(|tick| f64::from(tick) * step_s)
-        .map(|at_s| (at_s, short((at_s * 1e3).round())))
-        .collect();
-    Axis::named("ms from the last encoder count", shown.clone(), ticks)
+        .map(|at_s| (at_s, short((at_s * 1e3).round())));
+    Axis::named(
+        "ms from the last encoder count",
+        shown.clone(),
+        ticks.collect(),
+    )
 }
 
 #[cfg(test)]
@@ -79,7 +73,6 @@ mod tests {
         let stop = |watched_ms| Stop {
             rate_hz: 2_000,
             mode: protocol::Mode::Uniform,
-            last_count_s: 1.0,
             crest_v: 4.97,
             watched_ms,
             all_ms: watched_ms,
@@ -90,7 +83,7 @@ mod tests {
             voltages: vec![(SHOWN_S.start, 5.0), (0.01, 0.0)],
         };
         for watched_ms in [None, Some(14.5)] {
-            crate::output::plot::fits::assert_fits("stop", &draw(&[stop(watched_ms)]));
+            crate::output::plot::tests::assert_fits("stop", &draw(&[stop(watched_ms)]));
         }
     }
 }

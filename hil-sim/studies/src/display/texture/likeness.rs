@@ -8,7 +8,7 @@ use realfft::num_complex::Complex;
 /// Samples a second: the display's ticks.
 pub const TICKS_HZ: f64 = 2_000.0;
 /// What is looked at, in Hz.
-pub const BAND_HZ: (f64, f64) = (5.0, 200.0);
+const BAND_HZ: (f64, f64) = (5.0, 200.0);
 /// Third octaves in it.
 pub const THIRDS: usize = 16;
 /// A third octave so far below the whole counts as that far, in dB.
@@ -20,21 +20,16 @@ const HOP: usize = SEGMENT / 2;
 /// The spectra of half-overlapping segments under a Hann window.
 pub fn segments(signal: &[f64]) -> Vec<Vec<Complex<f64>>> {
     let transform = RealFftPlanner::new().plan_fft_forward(SEGMENT);
-    signal
-        .windows(SEGMENT)
-        .step_by(HOP)
-        .map(|segment| {
-            let mut windowed: Vec<f64> = segment
-                .iter()
-                .enumerate()
-                .map(|(n, x)| x * (0.5 - 0.5 * (TAU * n as f64 / SEGMENT as f64).cos()))
-                .collect();
-            let mut lines = transform.make_output_vec();
-            let transformed = transform.process(&mut windowed, &mut lines);
-            debug_assert!(transformed.is_ok(), "the lengths agree");
-            lines
-        })
-        .collect()
+    let hann = |n: usize| 0.5 - 0.5 * (TAU * n as f64 / SEGMENT as f64).cos();
+    let transformed = |segment: &[f64]| {
+        let windowed = segment.iter().enumerate().map(|(n, x)| x * hann(n));
+        let mut lines = transform.make_output_vec();
+        let done = transform.process(&mut windowed.collect::<Vec<_>>(), &mut lines);
+        debug_assert!(done.is_ok(), "the lengths agree");
+        lines
+    };
+    let segments = signal.windows(SEGMENT).step_by(HOP);
+    segments.map(transformed).collect()
 }
 
 /// Lines of [`BAND_HZ`].
@@ -76,11 +71,8 @@ pub fn thirds_where(signal: &[f64], counts: impl Fn(f64) -> bool) -> [f64; THIRD
     let per_hz = SEGMENT as f64 / TICKS_HZ;
     let mut powers = [0.0; THIRDS];
     let middle_s = |n: usize| (n * HOP + SEGMENT / 2) as f64 / TICKS_HZ;
-    let counted = segments(signal)
-        .into_iter()
-        .enumerate()
-        .filter(|(n, _)| counts(middle_s(*n)));
-    for (_, segment) in counted {
+    let segments = segments(signal).into_iter().enumerate();
+    for (_, segment) in segments.filter(|(n, _)| counts(middle_s(*n))) {
         for line in lines() {
             let octaves = (line as f64 / per_hz / BAND_HZ.0).log2();
             powers[((3.0 * octaves) as usize).min(THIRDS - 1)] += segment[line].norm_sqr();
@@ -92,12 +84,8 @@ pub fn thirds_where(signal: &[f64], counts: impl Fn(f64) -> bool) -> [f64; THIRD
 
 /// RMS of the difference, in dB.
 pub fn distance_db(one: &[f64; THIRDS], other: &[f64; THIRDS]) -> f64 {
-    let squares: f64 = one
-        .iter()
-        .zip(other)
-        .map(|(one, other)| (one - other).powi(2))
-        .sum();
-    (squares / THIRDS as f64).sqrt()
+    let squares = one.iter().zip(other).map(|(a, b)| (a - b).powi(2));
+    (squares.sum::<f64>() / THIRDS as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -1,15 +1,11 @@
 //! The picture: coherence and spectral distance by family, and pairs of surfaces told apart, each rendering beside the
 //! others.
 
-use super::{Measured, RENDERINGS, families, spread, word};
+use super::{Measured, RENDERINGS, Row, families, spread};
 use hil_sim_core::run::recording::Engine;
 
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, Page};
 use crate::output::plot::palette::{BLUE, GREEN, SOFT, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{Axis, Key, Mark, Page, Panel, Shape, Stroke, Symbol};
 
 const SYMBOLS: [Symbol; 3] = [
     Symbol::new(VERMILION, Shape::Square),
@@ -22,80 +18,59 @@ const HEIGHT: f64 = 220.0;
 const LEAST_TOP_DB: f64 = 12.0;
 const STEP_DB: f64 = 2.0;
 
-/// Draws it.
 pub fn draw(measured: &Measured) -> String {
+    let Measured { rows, pairs } = measured;
     let mut page = Page::default();
-    page.note(if measured.pairs.is_empty() {
+    page.note(if pairs.is_empty() {
         "What the actuators play against what recorded gauges felt at the hand’s place, 5–200 Hz; the hand as fast as the \
          arm, and faster. Symbols: means; lines: least to most. Firmware libraries."
     } else {
         "What the actuators play against the surface under the operator’s hand, 5–200 Hz; arm and hand at different \
          speeds. Symbols: means; lines: least to most. Firmware libraries; simulated observer."
     });
-    let keys = RENDERINGS
-        .iter()
-        .zip(SYMBOLS)
-        .map(|(rendering, symbol)| (Key::Symbol(symbol), word(*rendering)))
-        .collect::<Vec<_>>();
+    let keys = [0, 1, 2].map(|at| (Key::Symbol(SYMBOLS[at]), RENDERINGS[at].0));
     page.legend(&keys);
-    let families = families(&measured.rows);
-    let names: Vec<String> = families.iter().map(|&name| name.to_owned()).collect();
-    let by_family = |value: fn(&super::Row) -> f64| {
-        marks(families.len(), |place, rendering| {
-            spread(
-                &measured.rows,
-                Engine::Native,
-                families[place],
-                RENDERINGS[rendering],
-                value,
-            )
+    let families = families(rows);
+    let by_family = places(families.iter().map(|&name| name.to_owned()));
+    let of_family = |value: fn(&Row) -> f64| {
+        marks(families.len(), |place, at| {
+            let rendering = RENDERINGS[at].1;
+            spread(rows, Engine::Native, families[place], rendering, value)
         })
     };
-    let pairs = marks(measured.pairs.len(), |place, rendering| {
-        let answer = measured.pairs[place].answers.get(rendering)?;
-        Some((answer.right, answer.interval.low, answer.interval.high))
-    });
-    let labels: Vec<String> = measured
-        .pairs
-        .iter()
-        .map(|pair| format!("{} / {}", pair.one, pair.other))
-        .collect();
-    let furthest_db = measured.rows.iter().map(|row| row.distance_db);
+    let furthest_db = rows.iter().map(|row| row.distance_db);
     let top_db = furthest_db.fold(LEAST_TOP_DB, f64::max);
     let top_db = (top_db / STEP_DB).ceil() * STEP_DB;
+    let (share, db) = (
+        Axis::even(0.0, 1.0, 0.2, ""),
+        Axis::even(0.0, top_db, STEP_DB, ""),
+    );
+    let coherence = "coherence with the surface, share of its power";
     let mut panels = vec![
-        Panel::new(
-            "coherence with the surface, share of its power",
-            &places(&names),
-            &Axis::even(0.0, 1.0, 0.2, ""),
-        )
-        .with(by_family(|row| row.coherence)),
-        Panel::new(
-            "distance of the spectra, dB",
-            &places(&names),
-            &Axis::even(0.0, top_db, STEP_DB, ""),
-        )
-        .with(by_family(|row| row.distance_db)),
+        Panel::new(coherence, &by_family, &share).with(of_family(|row| row.coherence)),
+        Panel::new("distance of the spectra, dB", &by_family, &db)
+            .with(of_family(|row| row.distance_db)),
     ];
-    if !measured.pairs.is_empty() {
+    if !pairs.is_empty() {
+        let names = pairs.iter().map(|of| format!("{} / {}", of.one, of.other));
         let told_apart = Panel::new(
             "pairs of 2 mm told apart, share of choices",
-            &places(&labels),
+            &places(names),
             &Axis::even(0.5, 1.0, 0.1, ""),
         );
-        panels.push(told_apart.with(pairs));
+        panels.push(told_apart.with(marks(pairs.len(), |place, at| {
+            let answer = pairs[place].answers.get(at)?;
+            Some((answer.right, answer.interval.low, answer.interval.high))
+        })));
     }
     page.panels(1, &vec![HEIGHT; panels.len()], &panels);
     page.finish()
 }
 
 /// An axis with a name at each whole number.
-fn places(names: &[String]) -> Axis {
-    let ticks = (0..)
-        .map(f64::from)
-        .zip(names.iter().cloned())
-        .collect::<Vec<_>>();
-    Axis::named("", -0.5..names.len() as f64 - 0.5, ticks)
+fn places(names: impl Iterator<Item = String>) -> Axis {
+    let ticks: Vec<(f64, String)> = (0..).map(f64::from).zip(names).collect();
+    Axis::named("", -0.5..ticks.len() as f64 - 0.5, ticks)
 }
 
 /// Symbols and spreads of the renderings beside each other at each place.
@@ -116,7 +91,7 @@ fn marks(count: usize, value: impl Fn(usize, usize) -> Option<(f64, f64, f64)>) 
 #[cfg(test)]
 mod tests {
     use super::super::observer::{Answer, Pair};
-    use super::super::{Row, surfaces};
+    use super::super::surfaces;
     use super::*;
     use crate::psychophysics::interval::Interval;
 
@@ -126,7 +101,7 @@ mod tests {
             .into_iter()
             .chain(surfaces::unseen())
             .flat_map(|ground| {
-                RENDERINGS.map(|rendering| Row {
+                RENDERINGS.map(|(_, rendering)| Row {
                     surface: ground.name.clone(),
                     family: ground.family.to_owned(),
                     unseen: ground.unseen,
@@ -157,6 +132,6 @@ mod tests {
             };
             6
         ];
-        crate::output::plot::fits::assert_fits("texture", &draw(&Measured { rows, pairs }));
+        crate::output::plot::tests::assert_fits("texture", &draw(&Measured { rows, pairs }));
     }
 }

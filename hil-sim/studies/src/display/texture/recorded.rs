@@ -6,15 +6,14 @@
 
 use std::ops::Range;
 
-use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::{Gauges, Motion, Scene, SceneError, Series, Waveform};
-use protocol::{GAUGES, Rendering};
+use protocol::GAUGES;
 
 use super::likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
-use super::{Measured, RENDERINGS, Row, SHIFTS, is_carried, played, said};
+use super::{Measured, RENDERINGS, Row, SHIFTS, families, is_carried, played, said};
 use crate::jury::folder::Entry;
-use crate::study::{Study, Table};
+use crate::study::{Progress, Study, Table};
 
 /// By then the sensor stands by λ, in s.
 const FROM_S: f64 = 1.0;
@@ -72,24 +71,21 @@ pub enum RecordedError {
 #[derive(Clone, Debug)]
 pub struct Recorded(Measured);
 
-/// Measures the scenes of a folder's list; `done` is told of each.
+/// Measures the scenes of a folder's list.
 ///
 /// # Errors
 /// The first that cannot be judged, before any is run.
 pub fn measure(
     scenes: &[(Entry, Scene)],
-    done: impl Fn() + Sync,
+    progress: &impl Progress,
 ) -> Result<Recorded, RecordedError> {
     let takes = scenes.iter().map(|(entry, scene)| Take::new(entry, scene));
     let takes: Vec<Take> = takes.collect::<Result<_, _>>()?;
     if takes.iter().all(|take| take.wavelength_mm == 0.0) {
         return Err(RecordedError::NoPeriod);
     }
-    let rows = on_all_cores(&takes, |take| {
-        let rows = take.rows();
-        done();
-        rows
-    })?;
+    progress.begin(takes.len());
+    let rows = progress.each(&takes, Take::rows)?;
     Ok(Recorded(Measured {
         rows: rows.into_iter().flatten().collect(),
         pairs: Vec::new(),
@@ -140,28 +136,23 @@ impl<'a> Take<'a> {
         for hand in self.hands() {
             let place_mm = |t_s: f64| self.place_mm(&hand, t_s);
             let played = RENDERINGS
-                .map(|rendering| played(&said, place_mm, &hand.looked_at, rendering, 0.0));
-            for (rendering, (coherence, distance_db)) in
-                RENDERINGS.into_iter().zip(self.likeness(&hand, &played))
-            {
-                rows.push(self.row(&hand, rendering, coherence, distance_db));
-            }
+                .map(|(_, rendering)| played(&said, place_mm, &hand.looked_at, rendering, 0.0));
+            let likeness = RENDERINGS.into_iter().zip(self.likeness(&hand, &played));
+            rows.extend(
+                likeness.map(|((_, rendering), (coherence, distance_db))| Row {
+                    surface: self.entry.name.clone(),
+                    family: self.entry.family.clone(),
+                    unseen: true,
+                    engine: Engine::Native,
+                    speeds_mm_s: (to_a_tenth(self.speed_mm_s()), to_a_tenth(hand.speed_mm_s)),
+                    delay_ms: 0.0,
+                    rendering,
+                    coherence,
+                    distance_db,
+                }),
+            );
         }
         Ok(rows)
-    }
-
-    fn row(&self, hand: &Hand, rendering: Rendering, coherence: f64, distance_db: f64) -> Row {
-        Row {
-            surface: self.entry.name.clone(),
-            family: self.entry.family.clone(),
-            unseen: true,
-            engine: Engine::Native,
-            speeds_mm_s: (to_a_tenth(self.speed_mm_s()), to_a_tenth(hand.speed_mm_s)),
-            delay_ms: 0.0,
-            rendering,
-            coherence,
-            distance_db,
-        }
     }
 
     /// Coherence and distance of each rendering, at each gauge's best shift of place, means over the gauges.
@@ -307,9 +298,10 @@ impl Study for Recorded {
         self.0.table()
     }
 
-    fn csvs(&self) -> Result<Vec<(&'static str, String)>, csv::Error> {
-        let rows = self.0.csvs()?.into_iter();
-        Ok(rows.filter(|(kind, _)| kind.is_empty()).collect())
+    fn csvs(&self) -> Vec<(&'static str, String)> {
+        let mut csvs = self.0.csvs();
+        csvs.truncate(1);
+        csvs
     }
 
     fn picture(&self) -> String {
@@ -318,7 +310,7 @@ impl Study for Recorded {
 
     fn is_met(&self) -> bool {
         let rows = &self.0.rows;
-        let mut families = super::families(rows).into_iter();
+        let mut families = families(rows).into_iter();
         families.all(|family| is_carried(rows, Engine::Native, family, true))
     }
 }

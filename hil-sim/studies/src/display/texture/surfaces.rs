@@ -22,20 +22,17 @@ const UNSEEN: u64 = 6;
 /// A surface.
 #[derive(Clone, Debug)]
 pub struct Ground {
-    /// What it is called, and its family.
     pub name: String,
-    /// See `name`.
     pub family: &'static str,
     /// Drawn by dice whose seeds nobody chose by what came of them.
     pub unseen: bool,
-    /// λ in mm.
     pub wavelength_mm: f64,
     /// Amplitude and phase in rad of each partial, from the fundamental on.
-    pub partials: [(f64, f64); PARTIALS],
+    partials: [(f64, f64); PARTIALS],
     /// RMS of the grain, the fundamental's amplitude being 1; flat in octaves from 0.25 to 2 waves a mm.
-    pub grain: f64,
-    /// The grain's seed.
-    pub seed: u64,
+    grain: f64,
+    /// The grain's.
+    seed: u64,
 }
 
 impl Ground {
@@ -56,29 +53,24 @@ impl Ground {
     /// As a scene has it: measured heights over x.
     pub fn surface(&self) -> Surface {
         let mut draws = Xoshiro256PlusPlus::seed_from_u64(self.seed);
-        let grains: Vec<(f64, f64)> = (0..GRAINS)
-            .map(|_| {
-                let per_mm = 0.25 * 2_f64.powf(3.0 * draws.random::<f64>());
-                (TAU * per_mm, TAU * draws.random::<f64>())
-            })
-            .collect();
+        let grains = [(); GRAINS].map(|()| {
+            let per_mm = 0.25 * 2_f64.powf(3.0 * draws.random::<f64>());
+            (TAU * per_mm, TAU * draws.random::<f64>())
+        });
         let amplitude = self.grain * (2.0 / GRAINS as f64).sqrt();
         let height = |x_mm: f64| {
             let theta = TAU * x_mm / self.wavelength_mm;
-            let wave: f64 = (1..)
+            let waves = (1..)
                 .zip(&self.partials)
-                .map(|(n, (amplitude, ahead))| amplitude * (f64::from(n) * theta + ahead).sin())
-                .sum();
-            let grain: f64 = grains
+                .map(|(n, (amplitude, ahead))| amplitude * (f64::from(n) * theta + ahead).sin());
+            let grain = grains
                 .iter()
-                .map(|(wavenumber, phase)| (wavenumber * x_mm + phase).sin())
-                .sum();
-            wave + amplitude * grain
+                .map(|(wavenumber, phase)| (wavenumber * x_mm + phase).sin());
+            waves.sum::<f64>() + amplitude * grain.sum::<f64>()
         };
         let rows = (2.0 * REACH_MM / ROW_MM) as usize;
-        let at: Vec<f64> = (0..=rows)
-            .map(|row| row as f64 * ROW_MM - REACH_MM)
-            .collect();
+        let at = (0..=rows).map(|row| row as f64 * ROW_MM - REACH_MM);
+        let at: Vec<f64> = at.collect();
         let values = at.iter().map(|&x_mm| height(x_mm)).collect();
         Surface {
             specimens: vec![Specimen {

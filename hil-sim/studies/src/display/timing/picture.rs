@@ -1,17 +1,20 @@
 //! The picture: how the edges are spread about their median, and hand to output over the link's delay.
 
 use super::{GOAL_MS, Row};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{BLUE, INK, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{Axis, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 
 /// Bars of the histogram.
 const BARS: usize = 80;
-/// The jitter that is shown on either side, in µs, at least.
-const SIDE_US: f64 = 0.5;
+/// Jitters that may be shown on either side, and the distance of ticks, in µs.
+const SIDES_US: [(f64, f64); 6] = [
+    (0.5, 0.25),
+    (1.0, 0.5),
+    (2.0, 1.0),
+    (5.0, 2.5),
+    (10.0, 5.0),
+    (50.0, 25.0),
+];
 /// The least share of edges that is shown, in percent.
 const LEAST_PERCENT: f64 = 0.01;
 
@@ -23,21 +26,15 @@ fn look(rate_hz: u32) -> Symbol {
     }
 }
 
-/// Draws it.
 pub fn draw(rows: &[Row]) -> String {
-    let mut page = Page::default();
-    page.note(
-        "From the LDAC edges of the display’s ELF, fifty distinct channels, the hand at up to 70 mm/s.",
-    );
+    let note = "From the LDAC edges of the display’s ELF, fifty distinct channels, the hand at up to 70 mm/s.";
     let hollow = Symbol::new(INK, Shape::Circle).hollow(true);
-    page.legend(&[
+    let bad = "hollow: 20 % loss and 50 ms jitter on the link";
+    let legend = [
         (Key::Symbol(look(2_000)), "2 kHz"),
         (Key::Symbol(look(4_000)), "4 kHz"),
-        (
-            Key::Symbol(hollow),
-            "hollow: 20 % loss and 50 ms jitter on the link",
-        ),
-    ]);
+        (Key::Symbol(hollow), bad),
+    ];
     let x = Axis::even(0.0, 500.0, 100.0, "the link’s one-way delay, ms");
     let longest = rows.iter().map(|row| row.reaction.max_ms);
     let highest = longest.fold(1.0, f64::max);
@@ -51,18 +48,14 @@ pub fn draw(rows: &[Row]) -> String {
     let ends = rows
         .iter()
         .flat_map(|row| [row.reaction.max_ms, row.reaction.p50_ms].map(|ms| over_delay(row, ms)));
-    page.panels(
-        3,
-        &[PANEL_HEIGHT],
-        &[
-            histogram(rows),
-            Panel::new("hand to output, p99, ms", &x, &y)
-                .with([Mark::Level(GOAL_MS, format!("goal at 2 kHz: {GOAL_MS} ms"))])
-                .with(p99),
-            Panel::new("hand to output, p50 and longest, ms", &x, &y).with(ends),
-        ],
-    );
-    page.finish()
+    let panels = [
+        histogram(rows),
+        Panel::new("hand to output, p99, ms", &x, &y)
+            .with([Mark::Level(GOAL_MS, format!("goal at 2 kHz: {GOAL_MS} ms"))])
+            .with(p99),
+        Panel::new("hand to output, p50 and longest, ms", &x, &y).with(ends),
+    ];
+    in_threes(note, &legend, &panels)
 }
 
 /// Shares of the edges over their distance from the median one, the fair link's of each rate.
@@ -73,18 +66,9 @@ fn histogram(rows: &[Row]) -> Panel {
     };
     let shown: Vec<&Row> = [2_000, 4_000].into_iter().filter_map(of_rate).collect();
     let jitter = shown.iter().map(|row| row.edges.jitter.max_us);
-    let farthest = jitter.fold(SIDE_US, f64::max);
-    let (side, step) = [
-        (0.5, 0.25),
-        (1.0, 0.5),
-        (2.0, 1.0),
-        (5.0, 2.5),
-        (10.0, 5.0),
-        (50.0, 25.0),
-    ]
-    .into_iter()
-    .find(|(side, _)| *side >= farthest)
-    .unwrap_or((farthest.ceil(), farthest.ceil() / 2.0));
+    let farthest = jitter.fold(SIDES_US[0].0, f64::max);
+    let wide_enough = SIDES_US.into_iter().find(|(side, _)| *side >= farthest);
+    let (side, step) = wide_enough.unwrap_or((farthest.ceil(), farthest.ceil() / 2.0));
     let x = Axis::even(-side, side, step, "LDAC edge, µs from the median one");
     let y = Axis::decades(LEAST_PERCENT, 100.0, "");
     let lines = shown.into_iter().map(|row| {
@@ -137,7 +121,7 @@ mod tests {
         };
         for max_ms in [0.9, 12.0] {
             let rows = [row(2_000, 0.0, max_ms), row(4_000, 500.0, max_ms)];
-            crate::output::plot::fits::assert_fits("timing", &draw(&rows));
+            crate::output::plot::tests::assert_fits("timing", &draw(&rows));
         }
     }
 }

@@ -1,13 +1,11 @@
 //! The picture: the reliability diagram, and what a level of confidence gives and costs.
 
 use super::{BINS, Level, Reliability};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::font::{Anchor, Font};
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{BLUE, GREEN, GREY, SOFT, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{
+    Anchor, Axis, Font, Key, Mark, PANEL_HEIGHT, Page, Panel, Shape, Stroke, Symbol,
+};
+use crate::study::number;
 
 const SHARE: Symbol = Symbol::new(BLUE, Shape::Circle);
 const RIGHT: Stroke = Stroke::new(GREEN, 2.0);
@@ -23,17 +21,11 @@ const LEAST_PERCENT: f64 = 0.01;
 /// Draws it, with a line at the level in percent that is the default.
 pub fn draw(reliability: &Reliability, default: u8) -> String {
     let mut page = Page::default();
-    let error = reliability
-        .error
-        .map_or("–".to_owned(), |error| format!("{error:.3}"));
-    let interval = reliability
-        .error_interval
-        .map_or(String::new(), |interval| {
-            format!(" ({:.3}–{:.3})", interval.low, interval.high)
-        });
     page.title(&format!(
-        "{} surfaces drawn by strangers; expected calibration error {error}{interval}, goal 0.05",
-        reliability.surfaces
+        "{} surfaces drawn by strangers; expected calibration error {}{}, goal 0.05",
+        reliability.surfaces,
+        number(reliability.error, 3),
+        reliability.told_interval(),
     ));
     page.note("Bars: 95 %, surfaces drawn anew. Numbers below: a bin’s share of the estimates, %.");
     page.legend(&[
@@ -49,10 +41,8 @@ pub fn draw(reliability: &Reliability, default: u8) -> String {
     let level = Axis::even(0.0, 1.0, 0.2, "confidence from which on λ is stood by");
     let default = || Mark::Upright(DEFAULT, f64::from(default) / 100.0, String::new());
     let curve = |stroke, value: fn(&Level) -> f64| {
-        let points = reliability
-            .levels
-            .iter()
-            .map(|level| (f64::from(level.percent) / 100.0, value(level)));
+        let levels = reliability.levels.iter();
+        let points = levels.map(|level| (f64::from(level.percent) / 100.0, value(level)));
         Mark::Line(stroke, points.collect())
     };
     let panels = [
@@ -78,23 +68,19 @@ pub fn draw(reliability: &Reliability, default: u8) -> String {
 fn bars(reliability: &Reliability) -> Vec<Mark> {
     let diagonal = Stroke::new(SOFT, 1.2).dashed("6 4");
     let mut marks = vec![Mark::Line(diagonal, vec![(0.0, 0.0), (1.0, 1.0)])];
-    let estimates = reliability.bars.iter().map(|bar| bar.bin.estimates);
+    let estimates = reliability.bars.iter().map(|(bin, _)| bin.estimates);
     let all: f64 = estimates.map(f64::from).sum();
-    for (index, bar) in reliability.bars.iter().enumerate() {
-        let Some((confidence, share)) = bar.bin.means() else {
+    for (index, (bin, interval)) in reliability.bars.iter().enumerate() {
+        let Some((confidence, share)) = bin.means() else {
             continue;
         };
-        if let Some(interval) = bar.interval {
+        if let Some(interval) = interval {
             let ends = ((confidence, interval.low), (confidence, interval.high));
             marks.push(Mark::Segments(Stroke::new(BLUE, 1.5), vec![ends]));
         }
         marks.push(Mark::symbol(SHARE, (confidence, share)));
-        let part = 100.0 * f64::from(bar.bin.estimates) / all;
-        let words = if part < 9.95 {
-            format!("{part:.1}")
-        } else {
-            format!("{part:.0}")
-        };
+        let part = 100.0 * f64::from(bin.estimates) / all;
+        let words = number(part, if part < 9.95 { 1 } else { 0 });
         let middle = ((index as f64 + 0.5) / BINS as f64, 0.0);
         let font = Font::new(9.0).at(Anchor::Middle);
         marks.push(Mark::Words(font, middle, (0.0, -3.0), words));
@@ -116,6 +102,6 @@ mod tests {
         }
         let svg = draw(&Reliability::of(&[tally]), 90);
         assert_eq!(svg.matches("<circle").count(), 3);
-        crate::output::plot::fits::assert_fits("confidence", &svg);
+        crate::output::plot::tests::assert_fits("confidence", &svg);
     }
 }

@@ -7,23 +7,19 @@ use protocol::SensorConfiguration;
 
 use super::Tally;
 use crate::jury::stranger::{Record, Trial};
-use hil_sim_core::run::batch::on_all_cores;
+use crate::study::Progress;
 
 /// Slower than this, in mm/s, the arm rests.
 const MOVING_MM_S: f32 = 5.0;
 
-/// What came of each surface, in the seeds' order. `done` is told after each.
-pub fn ask(seeds: &[u64], sensor: SensorConfiguration, done: impl Fn() + Sync) -> Vec<Tally> {
-    let asked = on_all_cores(seeds, |&seed| {
+/// What came of each surface, in the seeds' order.
+pub fn ask(seeds: &[u64], sensor: SensorConfiguration, progress: &impl Progress) -> Vec<Tally> {
+    progress.begin(seeds.len());
+    let Ok(tallies) = progress.each(seeds, |&seed| {
         let trial = Trial::draw(seed);
-        let tally = listen(&trial, &trial.record(), sensor);
-        done();
-        Ok::<_, Infallible>(tally)
+        Ok::<_, Infallible>(listen(&trial, &trial.record(), sensor))
     });
-    match asked {
-        Ok(tallies) => tallies,
-        Err(never) => match never {},
-    }
+    tallies
 }
 
 fn listen(trial: &Trial, record: &Record, sensor: SensorConfiguration) -> Tally {
@@ -64,8 +60,8 @@ mod tests {
     #[test]
     fn every_surface_is_asked_in_the_seeds_order_and_the_same_each_time() {
         let seeds = [1, 2, 3];
-        let tallies = ask(&seeds, SensorConfiguration::DEFAULT, || {});
-        assert_eq!(tallies, ask(&seeds, SensorConfiguration::DEFAULT, || {}));
+        let tallies = ask(&seeds, SensorConfiguration::DEFAULT, &());
+        assert_eq!(tallies, ask(&seeds, SensorConfiguration::DEFAULT, &()));
         for (tally, &seed) in tallies.iter().zip(&seeds) {
             let class = Trial::draw(seed).class;
             assert_eq!(

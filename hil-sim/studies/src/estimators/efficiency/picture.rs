@@ -1,12 +1,8 @@
 //! The picture: error over bound, and both, over frequency.
 
 use super::{Cell, MEAN_GOAL, Row, WORST_GOAL};
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
-use crate::output::plot::page::{Key, PANEL_HEIGHT, Page};
 use crate::output::plot::palette::{BLUE, INK, VERMILION};
-use crate::output::plot::panel::Panel;
-use crate::output::plot::svg::{Shape, Stroke, Symbol};
+use crate::output::plot::{Axis, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 
 /// The profiles, their looks and what a legend calls them.
 const PROFILES: [(&str, Symbol, &str); 2] = [
@@ -21,13 +17,10 @@ const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 
 /// The estimator's error over the Cramér–Rao bound, over frequency.
 pub fn draw(rows: &[Row]) -> String {
-    let mut page = Page::default();
-    page.note(
-        "The default estimator’s RMS error over the Cramér–Rao bound for the 8 λ that it fits; steady \
-         speed, 20 dB, a minute or more a mark.",
-    );
+    let note = "The default estimator’s RMS error over the Cramér–Rao bound for the 8 λ that it fits; steady \
+         speed, 20 dB, a minute or more a mark.";
     let profiles = PROFILES.map(|(_, symbol, words)| (Key::Symbol(symbol), words));
-    page.legend(&[&profiles[..], &[(Key::Line(BOUND), "the bound")]].concat());
+    let legend = [&profiles[..], &[(Key::Line(BOUND), "the bound")]].concat();
     let frequency = Axis::decades(4.0, 125.0, "v/λ, Hz");
     let error = Axis::decades(0.005, 0.2, "");
     let ratio = Axis::even(0.8, 2.0, 0.2, "");
@@ -58,8 +51,7 @@ pub fn draw(rows: &[Row]) -> String {
             .with([Mark::Line(BOUND, bound.collect())])
             .with(symbols(5, |cell| cell.rms_percent)),
     ];
-    page.panels(3, &[PANEL_HEIGHT], &panels);
-    page.finish()
+    in_threes(note, &legend, &panels)
 }
 
 #[cfg(test)]
@@ -80,6 +72,6 @@ mod tests {
                 bound_percent: 0.05,
             }],
         });
-        crate::output::plot::fits::assert_fits("bound", &draw(&rows));
+        crate::output::plot::tests::assert_fits("bound", &draw(&rows));
     }
 }

@@ -21,7 +21,7 @@ impl Lines {
     pub fn in_a_list() -> Self {
         Self {
             depth: 1,
-            filled: false,
+            ..Self::default()
         }
     }
 

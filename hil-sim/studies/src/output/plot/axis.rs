@@ -52,11 +52,7 @@ impl Axis {
 
     /// An axis of equal ratios with a tick at every decade, and at 2 and 5 where there is room.
     pub fn decades(low: f64, high: f64, label: &str) -> Self {
-        let steps: &[f64] = if high / low < 1e3 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
+        let steps = &[1.0, 2.0, 5.0][..if high / low < 1e3 { 3 } else { 1 }];
         let decades = low.log10().floor() as i32..=high.log10().floor() as i32;
         let ticks = decades
             .flat_map(|decade| steps.iter().map(move |step| step * 10f64.powi(decade)))
@@ -104,11 +100,6 @@ impl Axis {
         };
         share.clamp(0.0, 1.0)
     }
-
-    /// Whether a value has a place of its own on it.
-    pub fn holds(&self, value: f64) -> bool {
-        (self.low..=self.high).contains(&value)
-    }
 }
 
 /// The least of 1, 2 and 5 times a power of ten that is not below a number.
@@ -131,11 +122,8 @@ fn steps(first: f64, last: f64, step: f64) -> Vec<(f64, String)> {
         .map(|index| first + f64::from(index) * step)
         .map(|value| {
             // What binary leaves of 0 is to have no sign.
-            let value = if value.abs() < 1e-9 * step {
-                0.0
-            } else {
-                value
-            };
+            let is_zero = value.abs() < 1e-9 * step;
+            let value = if is_zero { 0.0 } else { value };
             (value, with_minus(format!("{value:.decimals$}")))
         })
         .collect()

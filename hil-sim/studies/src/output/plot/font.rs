@@ -72,30 +72,18 @@ const OTHERS: [(char, u16, u16); 37] = [
 /// Which point of a text stands at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// Its beginning.
     Start,
-    /// Its middle.
     Middle,
-    /// Its end.
     End,
 }
 
 impl Anchor {
-    /// As SVG's `text-anchor` has it.
-    pub const fn name(self) -> &'static str {
+    /// As SVG's `text-anchor` has it, and how much of a text's width lies before its place.
+    pub const fn told(self) -> (&'static str, f64) {
         match self {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
-        }
-    }
-
-    /// How much of a text's width lies before its place.
-    pub const fn share_before(self) -> f64 {
-        match self {
-            Anchor::Start => 0.0,
-            Anchor::Middle => 0.5,
-            Anchor::End => 1.0,
+            Anchor::Start => ("start", 0.0),
+            Anchor::Middle => ("middle", 0.5),
+            Anchor::End => ("end", 1.0),
         }
     }
 }
@@ -105,13 +93,9 @@ impl Anchor {
 pub struct Font {
     /// Height of a line without leading, in the picture's units.
     pub size: f64,
-    /// Whether it is bold.
     pub bold: bool,
-    /// Whether it is slanted.
     pub italic: bool,
-    /// Its colour.
     pub colour: Colour,
-    /// Which point of it stands at its place.
     pub anchor: Anchor,
 }
 
@@ -127,12 +111,10 @@ impl Font {
         }
     }
 
-    /// The same in bold.
     pub const fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
-    /// The same slanted.
     pub const fn italic(self) -> Self {
         Self {
             italic: true,
@@ -145,7 +127,6 @@ impl Font {
         self.coloured(SOFT)
     }
 
-    /// The same in a colour.
     pub const fn coloured(self, colour: Colour) -> Self {
         Self { colour, ..self }
     }

@@ -9,7 +9,7 @@ use crate::output::plot::palette::Colour;
 /// Something on a panel. A point is a value of x and one of y.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {
-    /// A line through points.
+    /// Through points.
     Line(Stroke, Vec<Point>),
     /// Separate lines.
     Segments(Stroke, Vec<(Point, Point)>),
@@ -36,7 +36,6 @@ pub enum Mark {
 /// A panel in equal cells. Where a cell has no fill there is a hatch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
-    /// Cells in a row.
     pub columns: usize,
     /// Each cell's fill by its place in `fills`: row by row, from the bottom up.
     pub cells: Vec<Option<usize>>,
@@ -45,17 +44,14 @@ pub struct Cells {
 }
 
 impl Mark {
-    /// A line through points.
     pub fn line(colour: Colour, points: Vec<Point>) -> Self {
         Self::Line(Stroke::new(colour, 2.0), points)
     }
 
-    /// A thinner line through points.
     pub fn thin(colour: Colour, points: Vec<Point>) -> Self {
         Self::Line(Stroke::new(colour, 1.0), points)
     }
 
-    /// A dot at each point.
     pub fn dots(colour: Colour, points: Vec<Point>) -> Self {
         Self::Dots(Stroke::new(colour, 5.0), points)
     }
@@ -67,10 +63,8 @@ impl Mark {
 
     /// Upright strokes at x, from one y to another.
     pub fn strokes(colour: Colour, places: &[f64], height: Range<f64>) -> Self {
-        let segments = places
-            .iter()
-            .map(|&x| ((x, height.start), (x, height.end)))
-            .collect();
+        let stroke = |&x| ((x, height.start), (x, height.end));
+        let segments = places.iter().map(stroke).collect();
         Self::Segments(Stroke::new(colour, 1.5), segments)
     }
 
@@ -78,10 +72,8 @@ impl Mark {
     pub fn held(stroke: Stroke, values: &[Point], shown: &Range<f64>) -> Self {
         let before = values.partition_point(|value| value.0 < shown.start);
         let until = values.partition_point(|value| value.0 <= shown.end);
-        let first = before
-            .checked_sub(1)
-            .map(|before| (shown.start, values[before].1));
-        let mut line: Vec<Point> = first.into_iter().collect();
+        let last = values[..before].last();
+        let mut line: Vec<Point> = last.map(|last| (shown.start, last.1)).into_iter().collect();
         for &(x, value) in &values[before..until] {
             line.extend(line.last().map(|last| (x, last.1)));
             line.push((x, value));
@@ -90,7 +82,6 @@ impl Mark {
         Self::Line(stroke, line)
     }
 
-    /// A symbol at one point.
     pub fn symbol(symbol: Symbol, point: Point) -> Self {
         Self::Symbols(symbol, vec![point])
     }

@@ -8,11 +8,11 @@ use crate::output::plot::palette::{INK, PAPER};
 /// As wide as a README shows a picture.
 pub const WIDTH: f64 = 1_000.0;
 /// Around everything.
-pub const MARGIN: f64 = 12.0;
+const MARGIN: f64 = 12.0;
 /// Height of a panel between its axes.
 pub const PANEL_HEIGHT: f64 = 178.0;
 /// Size of a panel's words.
-pub const SIZE: f64 = 11.0;
+const SIZE: f64 = 11.0;
 /// Size of words about the whole page, and from one line of them to the next.
 const NOTE_SIZE: f64 = 12.0;
 const NOTE_LINE: f64 = 18.0;
@@ -22,7 +22,6 @@ const LEGEND_GAP: f64 = 18.0;
 /// What stands before the words of a legend.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Key {
-    /// A symbol.
     Symbol(Symbol),
     /// A piece of a line.
     Line(Stroke),
@@ -46,6 +45,11 @@ impl Key {
             Key::Line(stroke) => svg.segments(stroke, [((left, middle), (left + wide, middle))]),
             Key::Fill(fill) => {
                 let (top, high) = (middle - 6.0, 12.0);
+                let (right, bottom) = (left + wide, top + high);
+                let (above, below) = (
+                    [(left, top), (right, top)],
+                    [(right, bottom), (left, bottom)],
+                );
                 svg.rectangles(
                     fill,
                     [Frame {
@@ -55,14 +59,7 @@ impl Key {
                         high,
                     }],
                 );
-                let (right, bottom) = (left + wide, top + high);
-                let edge = [
-                    (left, top),
-                    (right, top),
-                    (right, bottom),
-                    (left, bottom),
-                    (left, top),
-                ];
+                let edge = [&above[..], &below, &above[..1]].concat();
                 svg.line(&Stroke::new(INK, 0.6), &edge);
             }
         }
@@ -79,7 +76,7 @@ fn least_room(panel: &Panel) -> Room {
     }
 }
 
-/// A page.
+/// Words, legends and panels, one below the other.
 #[derive(Clone, Debug)]
 pub struct Page {
     svg: Svg,
@@ -97,7 +94,6 @@ impl Default for Page {
 }
 
 impl Page {
-    /// A heading.
     pub fn title(&mut self, words: &str) {
         self.paragraph(&Font::new(15.0).bold(), 22.0, words);
     }
@@ -137,10 +133,9 @@ impl Page {
         let rooms: Vec<Room> = (0..columns)
             .map(|column| {
                 let of_column = panels.iter().skip(column).step_by(columns);
-                of_column.fold(Room::default(), |room, panel| {
-                    room.max(panel.room(SIZE, f64::INFINITY))
-                        .max(least_room(panel))
-                })
+                of_column
+                    .flat_map(|panel| [panel.room(SIZE, f64::INFINITY), least_room(panel)])
+                    .fold(Room::default(), Room::max)
             })
             .collect();
         let taken: f64 = rooms.iter().map(|room| room.left + room.right).sum();
@@ -153,35 +148,43 @@ impl Page {
                 .fold(Room::default(), Room::max);
             let (top, mut left) = (self.top + needed.above, MARGIN);
             for (panel, of_column) in panels.iter().zip(&rooms) {
-                let (above, below) = (needed.above, needed.below);
+                let Room {
+                    left: before,
+                    right,
+                    ..
+                } = *of_column;
                 let room = Room {
-                    above,
-                    below,
-                    ..*of_column
+                    left: before,
+                    right,
+                    ..needed
                 };
                 left += room.left;
-                panel.draw(
-                    &mut self.svg,
-                    &Frame {
-                        left,
-                        top,
-                        wide,
-                        high,
-                    },
-                    &room,
-                    SIZE,
-                );
+                let frame = Frame {
+                    left,
+                    top,
+                    wide,
+                    high,
+                };
+                panel.draw(&mut self.svg, &frame, &room, SIZE);
                 left += wide + room.right;
             }
             self.top = top + high + needed.below;
         }
     }
 
-    /// The picture.
     pub fn finish(self) -> String {
-        self.svg
-            .finish(WIDTH, (self.top + MARGIN).ceil(), Some(PAPER))
+        let high = (self.top + MARGIN).ceil();
+        self.svg.finish(WIDTH, high, Some(PAPER))
     }
+}
+
+/// A picture of three panels in a row, or more rows, under words and a legend.
+pub fn in_threes(note: &str, legend: &[(Key, &str)], panels: &[Panel]) -> String {
+    let mut page = Page::default();
+    page.note(note);
+    page.legend(legend);
+    page.panels(3, &[PANEL_HEIGHT], panels);
+    page.finish()
 }
 
 /// A chart by itself, for a page of HTML that says what it shows: of a width and a height, its words of a size
@@ -223,6 +226,6 @@ mod tests {
         let one_line = page.top;
         page.legend(&vec![entry; 9]);
         assert!(page.top >= one_line + 2.0 * NOTE_LINE);
-        crate::output::plot::fits::assert_fits("legend", &page.finish());
+        crate::output::plot::tests::assert_fits("legend", &page.finish());
     }
 }

@@ -1,6 +1,7 @@
 //! A panel: a title, two axes, and marks between them.
 
 use std::fmt::Write;
+use std::ops::Range;
 
 use super::axis::Axis;
 use super::font::{Anchor, Font};
@@ -11,7 +12,7 @@ use crate::output::plot::palette::{Colour, GRID, INK, SOFT};
 /// How far to the left of its frame a title begins, and a label of x may.
 const OUTDENT: f64 = 8.0;
 
-/// A panel.
+/// A title, two axes, and marks between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// What is shown, above it; nothing if a heading says it.
@@ -50,7 +51,6 @@ impl Room {
 }
 
 impl Panel {
-    /// An empty one.
     pub fn new(title: impl Into<String>, x: &Axis, y: &Axis) -> Self {
         Self {
             title: title.into(),
@@ -111,18 +111,16 @@ impl Panel {
             baseline -= 1.3 * title_font(size).size;
         }
         let in_cells = self.marks.iter().any(|mark| matches!(mark, Mark::Cells(_)));
-        for mark in &self.marks {
-            if let Mark::Shade(..) = mark {
-                on_page.mark(svg, mark);
-            }
+        let is_behind = |mark: &&Mark| matches!(mark, Mark::Shade(..));
+        let (behind, before): (Vec<&Mark>, Vec<&Mark>) = self.marks.iter().partition(is_behind);
+        for mark in behind {
+            on_page.mark(svg, mark);
         }
         if !in_cells {
             on_page.grid(svg);
         }
-        for mark in &self.marks {
-            if !matches!(mark, Mark::Shade(..)) {
-                on_page.mark(svg, mark);
-            }
+        for mark in before {
+            on_page.mark(svg, mark);
         }
         on_page.axes(svg, room, in_cells);
     }
@@ -185,13 +183,11 @@ impl OnPage<'_> {
         let font = Font::new(size);
         if in_cells {
             // Cells hide a grid: ticks stand outside.
-            let corners = [
-                (left, top),
-                (left, bottom),
-                (right, bottom),
-                (right, top),
-                (left, top),
-            ];
+            let (on_left, on_right) = (
+                [(left, top), (left, bottom)],
+                [(right, bottom), (right, top)],
+            );
+            let corners = [&on_left[..], &on_right, &on_left[..1]].concat();
             svg.line(&Stroke::new(INK, 0.8), &corners);
             let below = x.ticks.iter().map(|tick| self.x(tick.0));
             let beside = y.ticks.iter().map(|tick| self.y(tick.0));
@@ -209,10 +205,8 @@ impl OnPage<'_> {
         }
         let beside = left - 0.6 * size;
         let labels = y.ticks.iter().map(|tick| (beside, tick));
-        let groups = y
-            .groups
-            .iter()
-            .map(|group| (beside - self.panel.labels(size), group));
+        let further = beside - self.panel.labels(size);
+        let groups = y.groups.iter().map(|group| (further, group));
         for (right, (value, label)) in labels.chain(groups) {
             let place = (right, self.y(*value) + 0.36 * size);
             svg.text(place, &font.at(Anchor::End), label);
@@ -232,10 +226,11 @@ impl OnPage<'_> {
         match mark {
             Mark::Line(stroke, points) => svg.line(stroke, &self.points(points)),
             Mark::Segments(stroke, segments) => {
-                let segments = segments
-                    .iter()
-                    .map(|&(from, to)| (self.at(from), self.at(to)));
-                svg.segments(stroke, segments);
+                let segments = segments.iter();
+                svg.segments(
+                    stroke,
+                    segments.map(|&(from, to)| (self.at(from), self.at(to))),
+                );
             }
             Mark::Dots(stroke, points) => svg.dots(stroke, self.points(points)),
             Mark::Symbols(symbol, points) => {
@@ -247,10 +242,8 @@ impl OnPage<'_> {
             Mark::Bars(colour, bars) => self.bars(svg, *colour, bars.iter().cloned()),
             Mark::Shade(colour, stretches) => {
                 let height = self.panel.y.low..self.panel.y.high;
-                let bars = stretches
-                    .iter()
-                    .map(|stretch| (stretch.clone(), height.clone()));
-                self.bars(svg, *colour, bars);
+                let bars = stretches.iter().cloned();
+                self.bars(svg, *colour, bars.map(|bar| (bar, height.clone())));
             }
             Mark::Cells(cells) => self.cells(svg, cells),
             Mark::Level(value, words) => {
@@ -279,7 +272,7 @@ impl OnPage<'_> {
     /// Words that stay within the panel.
     fn words(&self, svg: &mut Svg, font: &Font, (x, baseline): Point, words: &str) {
         let width = font.width(words);
-        let before = font.anchor.share_before() * width;
+        let before = font.anchor.told().1 * width;
         let first = (x - before)
             .min(self.frame.right() - 2.0 - width)
             .max(self.frame.left + 2.0);
@@ -290,13 +283,11 @@ impl OnPage<'_> {
         &self,
         svg: &mut Svg,
         colour: Colour,
-        bars: impl Iterator<Item = (std::ops::Range<f64>, std::ops::Range<f64>)>,
+        bars: impl Iterator<Item = (Range<f64>, Range<f64>)>,
     ) {
         let frames = bars.map(|(across, up)| {
-            let ((left, bottom), (right, top)) = (
-                self.at((across.start, up.start)),
-                self.at((across.end, up.end)),
-            );
+            let (left, bottom) = self.at((across.start, up.start));
+            let (right, top) = self.at((across.end, up.end));
             Frame {
                 left,
                 top,
@@ -335,9 +326,7 @@ impl OnPage<'_> {
         );
         svg.group(&scaled, |svg| {
             for (path, fill) in paths.iter().zip(&cells.fills) {
-                if !path.is_empty() {
-                    svg.path(path, &format!("fill=\"{fill}\""));
-                }
+                svg.path(path, &format!("fill=\"{fill}\""));
             }
         });
     }

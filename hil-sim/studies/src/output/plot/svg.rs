@@ -12,9 +12,7 @@ pub type Point = (f64, f64);
 /// What lines look like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Their colour.
     pub colour: Colour,
-    /// How wide they are.
     pub width: f64,
     /// Lengths of dashes and gaps, as SVG has them; nothing for a line without gaps.
     pub dash: &'static str,
@@ -50,9 +48,7 @@ impl Stroke {
 /// Shapes of symbols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// A disc.
     Circle,
-    /// A square on its side.
     Square,
     /// A triangle that points upwards.
     Up,
@@ -65,9 +61,7 @@ pub enum Shape {
 /// What a measured point looks like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symbol {
-    /// Its colour.
     pub colour: Colour,
-    /// Its shape.
     pub shape: Shape,
     /// Whether only its edge is coloured.
     pub hollow: bool,
@@ -100,23 +94,17 @@ impl Symbol {
 /// A rectangle of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// Its left edge.
     pub left: f64,
-    /// Its upper edge.
     pub top: f64,
-    /// Its width.
     pub wide: f64,
-    /// Its height.
     pub high: f64,
 }
 
 impl Frame {
-    /// Its right edge.
     pub fn right(&self) -> f64 {
         self.left + self.wide
     }
 
-    /// Its lower edge.
     pub fn bottom(&self) -> f64 {
         self.top + self.high
     }
@@ -155,20 +143,13 @@ impl Svg {
         if words.is_empty() {
             return;
         }
-        let bold = if font.bold {
-            " font-weight=\"bold\""
-        } else {
-            ""
-        };
-        let italic = if font.italic {
-            " font-style=\"italic\""
-        } else {
-            ""
-        };
+        let attribute = |is_set, text: &'static str| if is_set { text } else { "" };
+        let bold = attribute(font.bold, " font-weight=\"bold\"");
+        let italic = attribute(font.italic, " font-style=\"italic\"");
         let _ = writeln!(
             self.elements,
             "<text {attributes} text-anchor=\"{}\" font-size=\"{}\"{bold}{italic} fill=\"{}\">{}</text>",
-            font.anchor.name(),
+            font.anchor.told().0,
             font.size,
             font.colour.light,
             escape(words)
@@ -181,12 +162,10 @@ impl Svg {
         for (index, (x, y)) in points.iter().enumerate() {
             let _ = write!(path, "{}{x:.1} {y:.1}", if index == 0 { 'M' } else { 'L' });
         }
-        if !path.is_empty() {
-            self.path(
-                &path,
-                &format!("stroke-linejoin=\"round\" {}", stroke.attributes()),
-            );
-        }
+        self.path(
+            &path,
+            &format!("stroke-linejoin=\"round\" {}", stroke.attributes()),
+        );
     }
 
     /// Separate lines from one point to another each.
@@ -199,12 +178,10 @@ impl Svg {
         for (from, to) in segments {
             let _ = write!(path, "M{:.1} {:.1}L{:.1} {:.1}", from.0, from.1, to.0, to.1);
         }
-        if !path.is_empty() {
-            self.path(
-                &path,
-                &format!("stroke-linecap=\"square\" {}", stroke.attributes()),
-            );
-        }
+        self.path(
+            &path,
+            &format!("stroke-linecap=\"square\" {}", stroke.attributes()),
+        );
     }
 
     /// Dots of a diameter: as one path, which is a tenth of as many circles.
@@ -213,29 +190,25 @@ impl Svg {
         for (x, y) in points {
             let _ = write!(path, "M{x:.1} {y:.1}h0");
         }
-        if !path.is_empty() {
-            self.path(
-                &path,
-                &format!("stroke-linecap=\"round\" {}", stroke.attributes()),
-            );
-        }
+        self.path(
+            &path,
+            &format!("stroke-linecap=\"round\" {}", stroke.attributes()),
+        );
     }
 
     /// Filled rectangles: the fill as SVG has it.
     pub fn rectangles(&mut self, fill: &str, frames: impl IntoIterator<Item = Frame>) {
         let mut path = String::new();
-        for Frame {
-            left,
-            top,
-            wide,
-            high,
-        } in frames
-        {
+        for of in frames {
+            let Frame {
+                left,
+                top,
+                wide,
+                high,
+            } = of;
             let _ = write!(path, "M{left:.2} {top:.2}h{wide:.2}v{high:.2}h-{wide:.2}z");
         }
-        if !path.is_empty() {
-            self.path(&path, &format!("fill=\"{fill}\""));
-        }
+        self.path(&path, &format!("fill=\"{fill}\""));
     }
 
     /// A symbol around a point.
@@ -268,8 +241,11 @@ impl Svg {
         );
     }
 
-    /// A path by its commands and further attributes.
+    /// A path by its commands, if there are any, and further attributes.
     pub fn path(&mut self, commands: &str, attributes: &str) {
+        if commands.is_empty() {
+            return;
+        }
         let _ = writeln!(self.elements, "<path {attributes} d=\"{commands}\"/>");
     }
 
@@ -305,9 +281,7 @@ const HATCH_PATTERN: &str = "<defs><pattern id=\"hatch\" width=\"6\" height=\"6\
     <rect width=\"1.5\" height=\"6\" fill=\"#9aa1a9\"/></pattern></defs>\n";
 
 fn polygon(x: f64, y: f64, corners: &[Point]) -> String {
-    let points: Vec<String> = corners
-        .iter()
-        .map(|(across, down)| format!("{:.1},{:.1}", x + across, y + down))
-        .collect();
+    let corner = |(across, down): &Point| format!("{:.1},{:.1}", x + across, y + down);
+    let points: Vec<String> = corners.iter().map(corner).collect();
     format!("<polygon points=\"{}\"", points.join(" "))
 }

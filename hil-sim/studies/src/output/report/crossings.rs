@@ -1,10 +1,14 @@
 //! The gauge signal as the sensor sees it: its own filters, run over the recorded codes.
 
+use std::ops::Range;
+
 use firmware_sensor::SCANS_PER_SAMPLE;
 use firmware_sensor::bandpass::{BAND, BandPass, ORDER};
 use firmware_sensor::crossing::Crossing;
 use firmware_sensor::decimate::{AntiAlias, History};
 
+use crate::output::plot::palette::{FIRST, REFUSED};
+use crate::output::plot::{Axis, Mark};
 use hil_sim_core::judge::seconds;
 use hil_sim_core::run::recording::ScanRecord;
 
@@ -17,8 +21,19 @@ pub struct Banded {
     pub impulses: Vec<f64>,
 }
 
-/// Runs the sensor's filters over one gauge's scans, up to `until_s`.
-pub fn banded(scans: &[ScanRecord], gauge: usize, until_s: f64) -> Banded {
+impl Banded {
+    /// A chart's axis of the signal with room for the impulses below, and its marks.
+    pub fn drawn(&self) -> (Axis, [Mark; 2]) {
+        let swings = self.samples.iter().map(|sample| sample.1.abs());
+        let peak = swings.fold(1.0, f64::max) * 1.1;
+        let axis = Axis::round("signal in ADC steps", -1.4 * peak..peak);
+        let impulses = Mark::strokes(REFUSED, &self.impulses, -1.35 * peak..-1.1 * peak);
+        (axis, [impulses, Mark::line(FIRST, self.samples.clone())])
+    }
+}
+
+/// Runs the sensor's filters over one gauge's scans, and keeps what is of a stretch of time in s.
+pub fn banded(scans: &[ScanRecord], gauge: usize, within_s: &Range<f64>) -> Banded {
     let mut banded = Banded::default();
     let Some(first) = scans.first() else {
         return banded;
@@ -31,15 +46,19 @@ pub fn banded(scans: &[ScanRecord], gauge: usize, until_s: f64) -> Banded {
     let (groups, _) = scans.as_chunks::<SCANS_PER_SAMPLE>();
     for group in groups {
         let t_s = seconds(group[SCANS_PER_SAMPLE - 1].at_ns);
-        if t_s > until_s {
+        if t_s >= within_s.end {
             break;
         }
         let sample = anti_alias.step(&mut history, &group.map(|scan| scan.codes));
         let y = band_pass.step(&mut lane, sample[gauge]);
-        if crossing.step(y) {
-            banded.impulses.push(t_s);
+        let is_impulse = crossing.step(y);
+        if t_s < within_s.start {
+            continue;
         }
         banded.samples.push((t_s, f64::from(y)));
+        if is_impulse {
+            banded.impulses.push(t_s);
+        }
     }
     banded
 }
@@ -52,18 +71,17 @@ mod tests {
     #[test]
     fn a_sine_of_25_hz_gives_fifty_impulses_a_second() {
         let recording = Run::steady(50.0, 2.0).record();
-        let banded = banded(&recording.scans, 2, 1.5);
-        let within = banded
-            .impulses
-            .iter()
-            .filter(|t_s| (0.5..1.5).contains(*t_s))
-            .count();
-        assert!((49..=51).contains(&within), "{within}");
-        assert_eq!(banded.samples.len(), 1_500);
+        // Times are of the end of a millisecond, the last one's just below 1.5 s.
+        let after = banded(&recording.scans, 2, &(0.5..1.5)).impulses.len();
+        assert!((49..=51).contains(&after), "{after}");
+        assert_eq!(
+            banded(&recording.scans, 2, &(0.0..1.5)).samples.len(),
+            1_500
+        );
     }
 
     #[test]
     fn no_scans_give_no_signal() {
-        assert_eq!(banded(&[], 0, 1.0), Banded::default());
+        assert_eq!(banded(&[], 0, &(0.0..1.0)), Banded::default());
     }
 }

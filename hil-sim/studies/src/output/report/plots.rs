@@ -4,41 +4,38 @@ use std::ops::Range;
 
 use protocol::{Contact, GAUGES, Mode};
 
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{FIRST, QUIET, REFUSED, SECOND, SHADE};
-use crate::output::report::Chapter;
+use crate::output::plot::{Axis, Mark};
 use crate::output::report::crossings::banded;
-use crate::output::report::figure::{Figure, draw};
 use crate::output::report::senses;
 use crate::output::report::senses::stretches;
 use crate::output::report::thin::{DOTS, LINE_POINTS, stride, thin};
+use crate::output::report::{Chapter, Figure, draw};
 use hil_sim_core::judge::track::Track;
 use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::judge::{JudgedEstimate, seconds};
 use hil_sim_core::run::recording::{Recording, volts};
 
-/// What the gauge signal's chart shows of a run, in s.
+/// What the gauge signal's chart shows of a run, and the voltages'.
 const SIGNAL_S: f64 = 0.5;
-/// What the voltages' chart shows of a run, in s.
 const VOLTAGE_S: f64 = 0.2;
 /// Actuators shown when all have the same phase: both ends of the array and its middle.
 const UNIFORM: [usize; 3] = [0, 24, 49];
 /// Actuators shown when the pattern travels: every other one of the middle row.
 const TRAVELLING: [usize; 5] = [20, 22, 24, 26, 28];
-/// Distance between two actuators' zero lines, in V: 5 V up, 5 V down and a gap.
+/// Distance between two actuators' zero lines: 5 V up, 5 V down and a gap.
 const LANE_V: f64 = 13.0;
-/// How long, in s, a fingertip that sticks is worth a shade.
+/// How long a fingertip that sticks is worth a shade.
 const HELD_S: f64 = 0.049;
-/// A difference between hand and arm worth a line of its own, in mm.
+/// A difference between hand and arm worth a line of its own.
 const APART_MM: f64 = 0.1;
 
 /// All charts of a run, in order.
-pub fn figures(chapter: &Chapter) -> Vec<Figure> {
+pub fn figures(chapter: &Chapter) -> [Figure; 5] {
     let Chapter {
         truth, recording, ..
     } = chapter;
-    vec![
+    [
         signal(truth, recording),
         wavelength(chapter),
         senses::figure(chapter),
@@ -51,38 +48,14 @@ pub fn figures(chapter: &Chapter) -> Vec<Figure> {
 fn signal(truth: &Truth, recording: &Recording) -> Figure {
     let window = middle(recording.duration_s, SIGNAL_S);
     let gauge = usize::from(truth.sensor.counted_gauge).min(GAUGES - 1);
-    let banded = banded(&recording.scans, gauge, window.end);
-    let samples: Vec<_> = banded
-        .samples
-        .into_iter()
-        .filter(|sample| window.contains(&sample.0))
-        .collect();
-    let impulses: Vec<f64> = banded
-        .impulses
-        .into_iter()
-        .filter(|t_s| window.contains(t_s))
-        .collect();
-    let peak = samples
-        .iter()
-        .map(|sample| sample.1.abs())
-        .fold(1.0, f64::max)
-        * 1.1;
-    let marks = vec![
-        Mark::strokes(REFUSED, &impulses, -1.35 * peak..-1.1 * peak),
-        Mark::line(FIRST, samples),
-    ];
+    let (y, marks) = banded(&recording.scans, gauge, &window).drawn();
     Figure {
         title: format!("Gauge {gauge} behind the band-pass"),
         legend: vec![
             (FIRST, "signal, 5–100 Hz"),
             (REFUSED, "impulse at each zero crossing"),
         ],
-        svg: draw(
-            310.0,
-            &Axis::round("time in s", window),
-            &Axis::round("signal in ADC steps", -1.4 * peak..peak),
-            marks,
-        ),
+        svg: draw(310.0, &Axis::round("time in s", window), &y, marks.into()),
         note: "The sensor's own filters, run over the recorded codes.".into(),
     }
 }
@@ -90,43 +63,30 @@ fn signal(truth: &Truth, recording: &Recording) -> Figure {
 /// λ̂ against the truth.
 fn wavelength(chapter: &Chapter) -> Figure {
     let Chapter {
-        truth,
-        recording,
-        verdict,
-        ..
+        truth, recording, ..
     } = chapter;
+    let estimates = &chapter.verdict.estimates;
     let arm = Track::of_arm(recording);
     let truths: Vec<(f64, f64)> = thin(arm.points(), LINE_POINTS)
         .into_iter()
         .filter_map(|(t_s, x_mm)| Some((t_s, truth.wavelength_at(x_mm)?)))
         .collect();
-    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NAN, f64::max);
-    let valid = &mut verdict
-        .estimates
-        .iter()
-        .filter(|e| e.valid)
-        .filter_map(|e| e.wavelength_mm);
-    let true_mm = largest(&mut truths.iter().map(|point| point.1));
-    let count = &mut verdict
-        .estimates
-        .iter()
-        .filter(|e| speaks(e) && truth.counts_beside())
-        .filter_map(|e| e.counted_mm);
+    let largest = |value: &dyn Fn(&JudgedEstimate) -> Option<f64>| {
+        estimates.iter().filter_map(value).fold(f64::NAN, f64::max)
+    };
+    let valid_mm = largest(&|e| e.wavelength_mm.filter(|_| e.valid));
+    let count_mm = largest(&|e| e.counted_mm.filter(|_| speaks(e) && truth.counts_beside()));
+    let true_mm = truths.iter().map(|point| point.1).fold(f64::NAN, f64::max);
     // Guesses at a near standstill can be huge: they stay at the upper edge.
-    let shown_mm = (1.1 * largest(valid).max(largest(count))).min(2.0 * true_mm);
+    let shown_mm = (1.1 * valid_mm.max(count_mm)).min(2.0 * true_mm);
     let top_mm = (1.25 * true_mm).max(shown_mm);
     let y = Axis::round("wavelength λ in mm", 0.0..top_mm);
     let dots = |valid: bool| {
-        let points: Vec<_> = verdict
-            .estimates
-            .iter()
-            .filter(|estimate| estimate.valid == valid)
-            .filter_map(|e| Some((e.t_s, e.wavelength_mm?.min(y.high))))
-            .collect();
-        thin(&points, DOTS)
+        let of_kind = estimates.iter().filter(|estimate| estimate.valid == valid);
+        let points = of_kind.filter_map(|e| Some((e.t_s, e.wavelength_mm?.min(y.high))));
+        thin(&points.collect::<Vec<_>>(), DOTS)
     };
-    let nth = stride(verdict.estimates.len(), DOTS);
-    let mut held = stretches(&verdict.estimates, |e| match e.contact {
+    let mut held = stretches(estimates, |e| match e.contact {
         Contact::Stick | Contact::StickSlip => Some(()),
         Contact::Slip | Contact::Unknown => None,
     });
@@ -148,7 +108,7 @@ fn wavelength(chapter: &Chapter) -> Figure {
     }
     if truth.counts_beside() {
         legend.push((QUIET, "the paper's count beside it, A = 80 ms, in T1"));
-        let lines = counted(&verdict.estimates, y.high);
+        let lines = counted(estimates, y.high);
         marks.extend(lines.into_iter().map(|line| Mark::thin(QUIET, line)));
     }
     marks.extend([
@@ -157,7 +117,7 @@ fn wavelength(chapter: &Chapter) -> Figure {
         Mark::line(SECOND, with_steps(&truths)),
     ]);
     let mut note = String::from("What lies above the chart is drawn at its upper edge.");
-    if nth > 1 {
+    if stride(estimates.len(), DOTS) > 1 {
         note += " Of many estimates only some are drawn.";
     }
     Figure {
@@ -172,15 +132,13 @@ fn wavelength(chapter: &Chapter) -> Figure {
 fn counted(estimates: &[JudgedEstimate], top_mm: f64) -> Vec<Vec<(f64, f64)>> {
     let thinned = thin(estimates, LINE_POINTS);
     let lines = thinned.chunk_by(|one, next| speaks(one) && speaks(next));
-    lines
-        .map(|line| {
-            let points = line.iter().filter(|estimate| speaks(estimate));
-            points
-                .filter_map(|e| Some((e.t_s, e.counted_mm?.min(top_mm))))
-                .collect::<Vec<_>>()
-        })
-        .filter(|line| !line.is_empty())
-        .collect()
+    let lines = lines.map(|line| -> Vec<(f64, f64)> {
+        let points = line.iter().filter(|estimate| speaks(estimate));
+        points
+            .filter_map(|e| Some((e.t_s, e.counted_mm?.min(top_mm))))
+            .collect()
+    });
+    lines.filter(|line| !line.is_empty()).collect()
 }
 
 /// Whether the paper's count has a λ that the paper would go by.
@@ -193,85 +151,70 @@ fn velocity(truth: &Truth, recording: &Recording) -> Figure {
     let hand = Track::of_hand(recording);
     let arm = Track::of_arm(recording);
     let velocities = |track: &Track| -> Vec<(f64, f64)> {
-        thin(track.points(), LINE_POINTS)
-            .into_iter()
+        let points = thin(track.points(), LINE_POINTS).into_iter();
+        points
             .filter_map(|(t_s, _)| Some((t_s, track.velocity_mm_s(t_s)?)))
             .collect()
     };
     let of_hand = velocities(&hand);
     let apart = of_hand.iter().any(|&(t_s, _)| {
-        let (hand_mm, arm_mm) = (hand.position_mm(t_s), arm.position_mm(t_s));
-        hand_mm
-            .zip(arm_mm)
-            .is_some_and(|(hand, arm)| (hand - arm).abs() > APART_MM)
+        let both_mm = hand.position_mm(t_s).zip(arm.position_mm(t_s));
+        both_mm.is_some_and(|(hand, arm)| (hand - arm).abs() > APART_MM)
     });
     let mut legend = vec![(FIRST, "hand"), (SHADE, "range T2: v(t)·v(t − A) < 0")];
-    let mut marks = vec![Mark::Shade(
-        SHADE,
-        range_t2(&of_hand, &hand, truth.window_s()),
-    )];
+    let turns = range_t2(&of_hand, &hand, truth.window_s());
+    let mut marks = vec![Mark::Shade(SHADE, turns)];
     let of_arm = if apart { velocities(&arm) } else { Vec::new() };
     let speeds = of_hand.iter().chain(&of_arm).map(|point| point.1);
-    let (low, high) = speeds.fold((0.0, 0.0), |(low, high): (f64, f64), v| {
-        (low.min(v), high.max(v))
-    });
+    let low = speeds.clone().fold(0.0, f64::min);
+    let high = speeds.fold(0.0, f64::max);
     if apart {
         legend.insert(1, (SECOND, "arm"));
         marks.push(Mark::line(SECOND, of_arm));
     }
     marks.push(Mark::line(FIRST, of_hand));
     let margin = 0.1 * (high - low).max(1.0);
+    let y = Axis::round("velocity v in mm/s", low - margin..high + margin);
     Figure {
         title: "Rubbing velocity".into(),
         legend,
-        svg: draw(
-            250.0,
-            &whole(recording),
-            &Axis::round("velocity v in mm/s", low - margin..high + margin),
-            marks,
-        ),
+        svg: draw(250.0, &whole(recording), &y, marks),
         note: format!("The window A is {:.0} ms.", 1e3 * truth.window_s()),
     }
 }
 
 /// Some actuators' voltages, one above the other.
 fn voltages(truth: &Truth, recording: &Recording) -> Figure {
-    let shown: &[usize] = match truth.display.mode {
-        Mode::Uniform => &UNIFORM,
-        Mode::Travelling => &TRAVELLING,
+    let (shown, title): (&[usize], _) = match truth.display.mode {
+        Mode::Uniform => (&UNIFORM, "Voltages of three actuators, all in phase"),
+        Mode::Travelling => (
+            &TRAVELLING,
+            "Voltages along the middle row, a travelling pattern",
+        ),
     };
     let window = around_the_outputs(recording);
     let zero_v = |lane: usize| -(lane as f64) * LANE_V;
-    let marks: Vec<Mark> = shown
-        .iter()
-        .enumerate()
-        .map(|(lane, &actuator)| {
-            let colour = if lane % 2 == 0 { FIRST } else { SECOND };
-            Mark::line(colour, held(recording, actuator, &window, zero_v(lane)))
-        })
-        .collect();
-    let labels = shown
-        .iter()
-        .enumerate()
-        .flat_map(|(lane, actuator)| {
-            let zero_v = zero_v(lane);
-            [
-                (zero_v, format!("#{actuator}: 0")),
-                (zero_v + 5.0, "+5".into()),
-                (zero_v - 5.0, "−5".into()),
-            ]
-        })
-        .collect();
+    let lanes = || shown.iter().enumerate();
+    let marks = lanes().map(|(lane, &actuator)| {
+        let colour = if lane % 2 == 0 { FIRST } else { SECOND };
+        Mark::line(colour, held(recording, actuator, &window, zero_v(lane)))
+    });
+    let labels = lanes().flat_map(|(lane, actuator)| {
+        let zero_v = zero_v(lane);
+        [
+            (zero_v, format!("#{actuator}: 0")),
+            (zero_v + 5.0, "+5".into()),
+            (zero_v - 5.0, "−5".into()),
+        ]
+    });
     let range = zero_v(shown.len() - 1) - 5.5..5.5;
-    let y = Axis::named("actuator: voltage in V", range, labels);
+    let y = Axis::named("actuator: voltage in V", range, labels.collect());
     let height = 75.0 + 100.0 * shown.len() as f64;
+    let x = Axis::round("time in s", window.clone());
     Figure {
-        title: match truth.display.mode {
-            Mode::Uniform => "Voltages of three actuators, all in phase".into(),
-            Mode::Travelling => "Voltages along the middle row, a travelling pattern".into(),
-        },
+        title: title.into(),
         legend: Vec::new(),
-        svg: draw(height, &Axis::round("time in s", window), &y, marks),
+        svg: draw(height, &x, &y, marks.collect()),
         note: "Held from one LDAC edge to the next, as the DACs hold it.".into(),
     }
 }
@@ -289,13 +232,11 @@ fn middle(duration_s: f64, length_s: f64) -> Range<f64> {
 
 /// [`VOLTAGE_S`] around the middle one of all output changes: there it vibrates, if anywhere.
 fn around_the_outputs(recording: &Recording) -> Range<f64> {
-    match recording.outputs.get(recording.outputs.len() / 2) {
-        Some(output) => {
-            let start_s = (seconds(output.at_ns) - 0.5 * VOLTAGE_S).max(0.0);
-            start_s..start_s + VOLTAGE_S
-        }
-        None => middle(recording.duration_s, VOLTAGE_S),
-    }
+    let middle_one = recording.outputs.get(recording.outputs.len() / 2);
+    middle_one.map_or(middle(recording.duration_s, VOLTAGE_S), |output| {
+        let start_s = (seconds(output.at_ns) - 0.5 * VOLTAGE_S).max(0.0);
+        start_s..start_s + VOLTAGE_S
+    })
 }
 
 /// An actuator's voltage in a stretch of time as the steps that it is, moved by `zero_v`.

@@ -1,16 +1,13 @@
 //! What the sensor says of its contact and of its gauges, over time: a strip for each.
 
-use std::fmt::Write;
 use std::ops::Range;
 
 use protocol::{Contact, GAUGES, GaugeHealth};
 
-use crate::output::plot::axis::Axis;
-use crate::output::plot::mark::Mark;
 use crate::output::plot::palette::{Colour, FIRST, QUIET, REFUSED, SECOND, SHADE};
-use crate::output::report::Chapter;
-use crate::output::report::figure::{Figure, draw};
+use crate::output::plot::{Axis, Mark};
 use crate::output::report::thin::{DOTS, stride};
+use crate::output::report::{Chapter, Figure, draw};
 use hil_sim_core::judge::JudgedEstimate;
 
 /// From one estimate to the next, in s.
@@ -33,43 +30,36 @@ const OF_GAUGES: [(Colour, &str); 3] = [
 /// The strips: the contact above, the gauges below.
 pub fn figure(chapter: &Chapter) -> Figure {
     let estimates = &chapter.verdict.estimates;
-    let mut labels = vec![(GAUGES as f64, "contact".to_owned())];
+    let top = GAUGES as f64;
+    let gauges = (0..GAUGES).map(|gauge| (lane(gauge), format!("gauge {gauge}")));
+    let labels = [(top, "contact".to_owned())].into_iter().chain(gauges);
+    let y = Axis::named("", -0.5..top + 0.5, labels.collect());
     let contact = stretches(estimates, |e| of_contact(e.contact));
-    let mut filled: Vec<_> = OF_CONTACT
-        .into_iter()
-        .enumerate()
-        .map(|(kind, look)| (look, bars(&contact, kind, GAUGES as f64)))
-        .collect();
-    for (kind, look) in OF_GAUGES.into_iter().enumerate() {
+    let of_contact = |(kind, look)| (look, bars(&contact, kind, top));
+    let of_gauges = |(kind, look)| {
         let bars = (0..GAUGES).flat_map(|gauge| {
             let stretches = stretches(estimates, |e| Some(of_gauge(e, gauge)));
             bars(&stretches, kind, lane(gauge))
         });
-        filled.push((look, bars.collect()));
-    }
-    labels.extend((0..GAUGES).map(|gauge| (lane(gauge), format!("gauge {gauge}"))));
-    let y = Axis::named("", -0.5..GAUGES as f64 + 0.5, labels);
-    filled.retain(|(_, bars)| !bars.is_empty());
-    let legend = filled.iter().map(|(look, _)| *look).collect();
-    let marks = filled
-        .into_iter()
-        .map(|((colour, _), bars)| Mark::Bars(colour, bars))
-        .collect();
+        (look, bars.collect())
+    };
+    let contact = OF_CONTACT.into_iter().enumerate().map(of_contact);
+    let gauges = OF_GAUGES.into_iter().enumerate().map(of_gauges);
+    let (legend, marks) = contact
+        .chain(gauges)
+        .filter(|(_, bars)| !bars.is_empty())
+        .map(|(look, bars)| (look, Mark::Bars(look.0, bars)))
+        .unzip();
     let mut note = String::from("Where there is no strip, the sensor cannot tell.");
     let nth = stride(estimates.len(), DOTS);
     if nth > 1 {
-        // Writing to a String cannot fail.
-        let _ = write!(note, " Of {nth} estimates the one that says most is drawn.");
+        note += &format!(" Of {nth} estimates the one that says most is drawn.");
     }
+    let x = Axis::round("time in s", 0.0..chapter.recording.duration_s);
     Figure {
         title: "Contact and gauges, by the sensor's word".into(),
         legend,
-        svg: draw(
-            210.0,
-            &Axis::round("time in s", 0.0..chapter.recording.duration_s),
-            &y,
-            marks,
-        ),
+        svg: draw(210.0, &x, &y, marks),
         note,
     }
 }
@@ -104,9 +94,8 @@ fn bars(
     kind: usize,
     height: f64,
 ) -> Vec<(Range<f64>, Range<f64>)> {
-    stretches
-        .iter()
-        .filter(|stretch| stretch.1 == kind)
+    let of_kind = stretches.iter().filter(|stretch| stretch.1 == kind);
+    of_kind
         .map(|(stretch, _)| (stretch.clone(), height - HALF..height + HALF))
         .collect()
 }

@@ -1,17 +1,17 @@
 //! The tables of the report.
 
-use std::fmt::Write;
-
 use protocol::{GAUGES, GaugeHealth, RoleCounters, Status};
 use serde::Serialize;
 use serde_json::Value;
 
 use crate::output::escape::escape;
 use crate::output::report::Chapter;
+use hil_sim_core::judge::fault::Finding;
+use hil_sim_core::judge::reaction::Reaction;
 use hil_sim_core::judge::{JudgedEstimate, words};
 
 /// Log lines shown, at most.
-pub const LOG_LINES: usize = 200;
+const LOG_LINES: usize = 200;
 
 /// A number with so many decimals and its unit, or a dash.
 fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
@@ -20,74 +20,98 @@ fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
     })
 }
 
+/// A share in percent, or a dash.
+fn percent(share: Option<f64>, decimals: usize) -> String {
+    number(share.map(|share| 100.0 * share), decimals, " %")
+}
+
+/// A row: its head, then its cells, all of them HTML.
+fn row(head: &str, cells: &[String]) -> String {
+    let cells: String = cells
+        .iter()
+        .map(|cell| format!("<td>{cell}</td>"))
+        .collect();
+    format!("<tr><th scope=row>{head}</th>{cells}</tr>\n")
+}
+
+fn heads(heads: &[&str]) -> String {
+    heads
+        .iter()
+        .map(|head| format!("<th>{head}</th>"))
+        .collect()
+}
+
 /// One line per scene, each leading to its chapter.
 pub fn index(chapters: &[Chapter]) -> String {
-    let mut rows = String::new();
-    for (at, chapter) in chapters.iter().enumerate() {
+    let line = |(at, chapter): (usize, &Chapter)| {
         let Chapter {
             truth,
             recording,
             verdict,
+            unmet,
             ..
         } = chapter;
         let (summary, actuators) = (&verdict.summary, &verdict.actuators);
-        let _ = writeln!(
-            rows,
-            "<tr><th scope=row><a href=\"#scene-{at}\">{}</a></th><td>{}</td><td>{}</td><td>{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            escape(truth.name),
-            if chapter.unmet.is_empty() {
-                ""
-            } else {
-                "<span class=unmet>unmet</span>"
-            },
-            recording.engine.name(),
-            escape(truth.method),
-            number(summary.mean_mm, 3, " mm"),
-            number(summary.rms_percent, 2, " %"),
-            number(summary.wrong_share.map(|share| 100.0 * share), 2, " %"),
-            number(summary.felt_right_share.map(|share| 100.0 * share), 1, " %"),
-            number(summary.felt_wrong_share.map(|share| 100.0 * share), 2, " %"),
-            number(actuators.frequency_hz, 3, " Hz"),
-            number(actuators.truth_hz, 3, " Hz"),
-            number(recording.realtime_factor(), 1, " ×"),
-        );
-    }
+        let unmet = if unmet.is_empty() {
+            ""
+        } else {
+            "<span class=unmet>unmet</span>"
+        };
+        row(
+            &format!("<a href=\"#scene-{at}\">{}</a>", escape(truth.name)),
+            &[
+                unmet.to_owned(),
+                recording.engine.name().to_owned(),
+                escape(truth.method),
+                number(summary.mean_mm, 3, " mm"),
+                number(summary.rms_percent, 2, " %"),
+                percent(summary.wrong_share, 2),
+                percent(summary.felt_right_share, 1),
+                percent(summary.felt_wrong_share, 2),
+                number(actuators.frequency_hz, 3, " Hz"),
+                number(actuators.truth_hz, 3, " Hz"),
+                number(recording.realtime_factor(), 1, " ×"),
+            ],
+        )
+    };
+    let rows: String = chapters.iter().enumerate().map(line).collect();
+    let heads = heads(&[
+        "scene",
+        "",
+        "engine",
+        "method",
+        "mean λ̂",
+        "RMS error",
+        "valid, wrong",
+        "felt right",
+        "felt wrong",
+        "actuators",
+        "v/λ̂",
+        "real time",
+    ]);
     format!(
-        "<div class=wide><table><thead><tr><th>scene</th><th></th><th>engine</th><th>method</th><th>mean λ̂</th>\
-         <th>RMS error</th><th>valid, wrong</th><th>felt right</th><th>felt wrong</th><th>actuators</th><th>v/λ̂</th><th>real time</th></tr></thead>\n\
-         <tbody>{rows}</tbody></table></div>\n"
+        "<div class=wide><table><thead><tr>{heads}</tr></thead>\n<tbody>{rows}</tbody></table></div>\n"
     )
 }
 
 /// What the run came to: the numbers of the JSON, in words.
 pub fn summary(chapter: &Chapter) -> String {
     let (s, a) = (&chapter.verdict.summary, &chapter.verdict.actuators);
-    let percent = |share: Option<f64>| number(share.map(|share| 100.0 * share), 1, " %");
-    let reaction = |choose: fn(&hil_sim_core::judge::reaction::Reaction) -> f64| {
-        number(a.hand_to_output.as_ref().map(choose), 3, " ms")
-    };
-    let millivolts = |value: Option<f64>| number(value.map(|v| 1e3 * v), 2, " mV");
+    let reaction =
+        |choose: fn(&Reaction) -> f64| number(a.hand_to_output.as_ref().map(choose), 3, " ms");
+    let needed = s.rendering_needed.map_or("–", |rendering| rendering.name());
     let estimates = [
         ("RMS error of λ̂", number(s.rms_percent, 2, " %")),
         ("bias of λ̂", number(s.bias_percent, 2, " %")),
         ("mean λ̂", number(s.mean_mm, 4, " mm")),
-        ("valid while in motion", percent(s.valid_share)),
-        (
-            "valid and more than 10 % off",
-            number(s.wrong_share.map(|share| 100.0 * share), 2, " %"),
-        ),
-        ("felt right while in motion", percent(s.felt_right_share)),
+        ("valid while in motion", percent(s.valid_share, 1)),
+        ("valid and more than 10 % off", percent(s.wrong_share, 2)),
+        ("felt right while in motion", percent(s.felt_right_share, 1)),
         (
             "felt and more than 10 % off",
-            number(s.felt_wrong_share.map(|share| 100.0 * share), 2, " %"),
+            percent(s.felt_wrong_share, 2),
         ),
-        (
-            "rendering that the surface needs",
-            s.rendering_needed
-                .map_or("–", |rendering| rendering.name())
-                .to_owned(),
-        ),
+        ("rendering that the surface needs", needed.to_owned()),
         (
             "RMS error of the paper's count in T1",
             number(s.counted_rms_percent, 2, " %"),
@@ -98,20 +122,16 @@ pub fn summary(chapter: &Chapter) -> String {
         ),
         ("from estimate to display", number(s.latency_ms, 2, " ms")),
     ];
+    let cycles = |value| number(value, 4, " cycles");
+    let mean_mv = number(a.mean_v.map(|v| 1e3 * v), 2, " mV");
     let actuators = [
         ("frequency", number(a.frequency_hz, 4, " Hz")),
         ("v/λ̂", number(a.truth_hz, 4, " Hz")),
-        (
-            "phase error, RMS",
-            number(a.phase_error_rms_cycles, 4, " cycles"),
-        ),
-        (
-            "phase error, mean",
-            number(a.phase_error_mean_cycles, 4, " cycles"),
-        ),
+        ("phase error, RMS", cycles(a.phase_error_rms_cycles)),
+        ("phase error, mean", cycles(a.phase_error_mean_cycles)),
         ("largest step", number(a.max_step_v, 3, " V")),
         ("largest natural step", number(a.natural_step_v, 3, " V")),
-        ("worst channel mean", millivolts(a.mean_v)),
+        ("worst channel mean", mean_mv),
         ("worst skew", number(a.skew_us, 3, " µs")),
         ("hand to output, median", reaction(|r| r.p50_ms)),
         ("hand to output, p99", reaction(|r| r.p99_ms)),
@@ -128,15 +148,14 @@ pub fn summary(chapter: &Chapter) -> String {
 /// What the sensor says of the contact and of each gauge, as shares of the estimates.
 fn senses(estimates: &[JudgedEstimate]) -> Vec<(&'static str, String)> {
     const NAMES: [&str; GAUGES] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4"];
-    let mut lines = vec![(
-        "contact",
-        shares(estimates.iter().map(|e| words::of_contact(e.contact))),
-    )];
+    let contact = estimates.iter().map(|e| words::of_contact(e.contact));
+    let mut lines = vec![("contact", shares(contact))];
     let lags = estimates.iter().filter_map(|e| e.lag_um);
     if let Some(most) = lags.map(i32::unsigned_abs).max() {
+        let most_mm = f64::from(most) * 1e-3;
         lines.push((
             "largest lag behind the arm",
-            number(Some(f64::from(most) * 1e-3), 3, " mm"),
+            number(Some(most_mm), 3, " mm"),
         ));
     }
     for (gauge, name) in NAMES.into_iter().enumerate() {
@@ -164,112 +183,130 @@ fn shares(said: impl Iterator<Item = &'static str>) -> String {
         return number(None, 0, "");
     }
     counts.sort_by_key(|&(_, count)| std::cmp::Reverse(count));
-    let share = |count: usize| 100.0 * count as f64 / total as f64;
-    let words: Vec<String> = counts
-        .into_iter()
-        .map(|(word, count)| match count {
-            all if all == total => word.to_owned(),
-            some if share(some) < 0.05 => format!("{word} below 0.1 %"),
-            some => format!("{word} {:.1} %", share(some)),
-        })
-        .collect();
+    let told = |(word, count): (&str, usize)| {
+        let share = 100.0 * count as f64 / total as f64;
+        match share {
+            _ if count == total => word.to_owned(),
+            ..0.05 => format!("{word} below 0.1 %"),
+            _ => format!("{word} {share:.1} %"),
+        }
+    };
+    let words: Vec<String> = counts.into_iter().map(told).collect();
     words.join(", ")
 }
 
 fn facts(caption: &str, facts: &[(&str, String)]) -> String {
-    let rows = facts.iter().fold(String::new(), |mut rows, (name, value)| {
-        let _ = writeln!(rows, "<tr><th scope=row>{name}</th><td>{value}</td></tr>");
-        rows
-    });
+    let rows = facts
+        .iter()
+        .map(|(name, value)| row(name, std::slice::from_ref(value)));
+    let rows: String = rows.collect();
     format!("<table><caption>{caption}</caption><tbody>\n{rows}</tbody></table>\n")
 }
 
 /// The counters of both ends.
 pub fn counters(chapter: &Chapter) -> String {
     let ends = [
-        ("sensor", chapter.recording.sensor_status),
-        ("display", chapter.recording.display_status),
+        ("sensor", "Sensor board", chapter.recording.sensor_status),
+        ("display", "Display board", chapter.recording.display_status),
     ];
-    let mut html = String::new();
-    let ports: Vec<_> = ends
+    let heard = ends
         .iter()
-        .filter_map(|(end, status)| Some((end, (*status)?)))
-        .flat_map(|(end, Status { peer, console, .. })| {
-            [
-                (format!("{end}, peer"), fields(&peer)),
-                (format!("{end}, console"), fields(&console)),
-            ]
-        })
-        .collect();
-    if let Some((_, first)) = ports.first() {
-        let heads = ports.iter().fold(String::new(), |mut heads, (port, _)| {
-            let _ = write!(heads, "<th>{port}</th>");
-            heads
+        .filter_map(|(end, _, status)| Some((end, (*status)?)));
+    let ports = heard.flat_map(|(end, Status { peer, console, .. })| {
+        [
+            (format!("{end}, peer"), fields(&peer)),
+            (format!("{end}, console"), fields(&console)),
+        ]
+    });
+    let (names, ports): (Vec<String>, Vec<_>) = ports.unzip();
+    let mut html = String::new();
+    if let Some(first) = ports.first() {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let heads = heads(&names);
+        let rows = first.iter().enumerate().map(|(at, (name, _))| {
+            let values: Vec<String> = ports.iter().map(|fields| fields[at].1.clone()).collect();
+            row(name, &values)
         });
-        let mut rows = String::new();
-        for (at, (name, _)) in first.iter().enumerate() {
-            let _ = write!(rows, "<tr><th scope=row>{}</th>", name.replace('_', " "));
-            for (_, fields) in &ports {
-                let _ = write!(rows, "<td>{}</td>", fields[at].1);
-            }
-            rows += "</tr>\n";
-        }
-        let _ = write!(
-            html,
+        let rows: String = rows.collect();
+        html += &format!(
             "<div class=wide><table><caption>Ports</caption><thead><tr><th></th>{heads}</tr></thead>\
              <tbody>\n{rows}</tbody></table></div>\n"
         );
     }
     html += "<div class=pair>";
-    for (end, status) in ends {
+    for (end, caption, status) in ends {
         let Some(status) = status else {
-            let _ = write!(html, "<p>No counters arrived from the {end} board.</p>");
+            html += &format!("<p>No counters arrived from the {end} board.</p>");
             continue;
         };
-        let mut all = vec![
-            (
-                "uptime".to_owned(),
-                number(Some(status.uptime_us as f64 * 1e-6), 3, " s"),
-            ),
-            ("last reset".to_owned(), format!("{:?}", status.reset)),
-            (
-                "watchdog resets".to_owned(),
-                status.watchdog_resets.to_string(),
-            ),
+        let uptime_s = status.uptime_us as f64 * 1e-6;
+        let own = [
+            ("uptime", number(Some(uptime_s), 3, " s")),
+            ("last reset", format!("{:?}", status.reset)),
+            ("watchdog resets", status.watchdog_resets.to_string()),
         ];
         let role = match status.role {
             RoleCounters::Sensor(counters) => fields(&counters),
             RoleCounters::Display(counters) => fields(&counters),
         };
-        all.extend(
-            role.into_iter()
-                .map(|(name, value)| (name.replace('_', " "), value)),
-        );
-        let all: Vec<(&str, String)> = all
-            .iter()
-            .map(|(name, value)| (name.as_str(), value.clone()))
-            .collect();
-        html += &facts(
-            if end == "sensor" {
-                "Sensor board"
-            } else {
-                "Display board"
-            },
-            &all,
-        );
+        let role = role.iter().map(|(name, value)| (&**name, value.clone()));
+        let all: Vec<(&str, String)> = own.into_iter().chain(role).collect();
+        html += &facts(caption, &all);
     }
     html + "</div>\n"
 }
 
-/// A structure's fields and their values: a counter added to it appears without a change here.
+/// A structure's fields in words, and their values: a counter added to it appears without a change here.
 fn fields(counters: &impl Serialize) -> Vec<(String, String)> {
-    match serde_json::to_value(counters) {
-        Ok(Value::Object(fields)) => fields
-            .into_iter()
-            .map(|(name, value)| (name, value.to_string()))
-            .collect(),
-        _ => Vec::new(),
+    let Ok(Value::Object(fields)) = serde_json::to_value(counters) else {
+        return Vec::new();
+    };
+    let field = |(name, value): (String, Value)| (name.replace('_', " "), value.to_string());
+    fields.into_iter().map(field).collect()
+}
+
+/// A line for each fault; nothing if there are none.
+pub fn faults(findings: &[Finding]) -> String {
+    if findings.is_empty() {
+        return String::new();
     }
+    let ms = |ms: Option<f64>| ms.map_or("–".to_owned(), |ms| format!("{ms:.2} ms"));
+    let line = |finding: &Finding| {
+        let of_kind = finding.fault.kind.row();
+        let unmet = finding.unmet().join("; ");
+        let unmet = match &*unmet {
+            "" => unmet,
+            _ => format!("<span class=unmet>{}</span>", escape(&unmet)),
+        };
+        let again = if finding.drives_again { "yes" } else { "no" };
+        row(
+            of_kind.name,
+            &[
+                format!("{:.3} s", finding.fault.at_s),
+                of_kind.class.name().to_owned(),
+                ms(finding.detected_ms()),
+                escape(&finding.sign),
+                ms(finding.safe_ms()),
+                again.to_owned(),
+                unmet,
+            ],
+        )
+    };
+    let rows: String = findings.iter().map(line).collect();
+    let heads = heads(&[
+        "kind",
+        "at",
+        "expected",
+        "first sign after",
+        "sign",
+        "0 V after",
+        "drives again",
+        "",
+    ]);
+    format!(
+        "<div class=wide><table><caption>Faults</caption><thead><tr>{heads}</tr></thead><tbody>\n\
+         {rows}</tbody></table></div>\n"
+    )
 }
 
 /// The first lines of the boards' log.
@@ -278,19 +315,11 @@ pub fn log(chapter: &Chapter) -> String {
     if lines.is_empty() {
         return String::new();
     }
-    let shown =
-        lines
-            .iter()
-            .take(LOG_LINES)
-            .fold(String::new(), |mut text, (at_ns, board, line)| {
-                let _ = writeln!(
-                    text,
-                    "{:>11.6} {board:<8}{}",
-                    *at_ns as f64 / 1e9,
-                    escape(line)
-                );
-                text
-            });
+    let shown = lines.iter().take(LOG_LINES).map(|(at_ns, board, line)| {
+        let at_s = *at_ns as f64 / 1e9;
+        format!("{at_s:>11.6} {board:<8}{}\n", escape(line))
+    });
+    let shown: String = shown.collect();
     let shown_count = lines.len().min(LOG_LINES);
     format!(
         "<details><summary>Log, {shown_count} of {} lines</summary><pre>{shown}</pre></details>\n",

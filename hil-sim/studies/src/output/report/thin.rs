@@ -7,11 +7,8 @@ pub const DOTS: usize = 800;
 
 /// Every nth of the items, n as small as leaves no more than `most`.
 pub fn thin<T: Copy>(items: &[T], most: usize) -> Vec<T> {
-    items
-        .iter()
-        .copied()
-        .step_by(stride(items.len(), most))
-        .collect()
+    let every = stride(items.len(), most);
+    items.iter().copied().step_by(every).collect()
 }
 
 /// The n of [`thin`].

@@ -1,4 +1,4 @@
-//! Whether text stays within its picture: with [`SPARE`] more room than it takes in DejaVu Sans.
+//! Whether text stays within its picture: with `SPARE` more room than it takes in DejaVu Sans.
 
 use roxmltree::{Document, Node};
 
