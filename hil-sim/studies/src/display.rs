@@ -92,6 +92,10 @@ fn bad(delay_ms: f64) -> Link {
     }
 }
 
+pub(crate) fn seconds(at_ns: u64) -> f64 {
+    at_ns as f64 * 1e-9
+}
+
 /// A hand that goes through these places in mm at these instants in s.
 pub(crate) fn through(at: Vec<f64>, values: Vec<f64>) -> Motion {
     Motion::Recorded(Arc::new(Series {

@@ -18,13 +18,13 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::timing::{STROKE, WAVELENGTH_MM};
-use super::{bad, late};
+use super::{bad, late, seconds};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::edges::edges;
 use hil_sim_core::judge::truth::Truth;
-use hil_sim_core::judge::{actuators, seconds};
+use hil_sim_core::judge::actuators;
 use hil_sim_core::run::recording::volts;
 use hil_sim_core::scene::{Link, Motion};
 use protocol::DisplayConfiguration;

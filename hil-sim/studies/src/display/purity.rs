@@ -10,12 +10,11 @@ mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::{PLAIN_TEXTURE, configured, word_of_mode};
+use super::{PLAIN_TEXTURE, configured, seconds, word_of_mode};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::judge::mean::{Held, about_a_second_s};
-use hil_sim_core::judge::seconds;
 use hil_sim_core::judge::spectrum::{Spectrum, spectra};
 use hil_sim_core::plant::motion::MM_PER_COUNT;
 use hil_sim_core::run::recording::{ACTUATORS, Recording, volts};

@@ -10,11 +10,10 @@ use std::ops::Range;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use super::{configured, through, word_of_mode};
+use super::{configured, seconds, through, word_of_mode};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
-use hil_sim_core::judge::seconds;
 use hil_sim_core::plant::motion::MM_PER_COUNT;
 use hil_sim_core::run::recording::{ACTUATORS, OutputRecord, Recording, volts};
 use hil_sim_core::scene::Motion;

@@ -27,7 +27,6 @@ use std::ops::Range;
 
 use firmware_display::{Display, Senses, Settings};
 use hil_sim_boards::{ElfError, Firmwares};
-use hil_sim_core::judge::seconds;
 use hil_sim_core::native;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::plant::surface;
@@ -37,7 +36,7 @@ use hil_sim_core::run::recording::{Engine, volts};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
 
-use super::{RENDERINGS, through};
+use super::{RENDERINGS, seconds, through};
 use crate::bench::BenchError;
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};

@@ -5,11 +5,11 @@
 use firmware_display::{Display, Senses, Settings};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration};
 
+use crate::display::seconds;
 use crate::psychophysics::hand::{FREQUENCY_HZ, PEAK_MM_S};
 use crate::psychophysics::presented::{ACTUATOR, Felt};
 use hil_sim_boards::display_alone::{self, DisplayBench, SensorMessage};
 use hil_sim_boards::{ElfError, Firmware};
-use hil_sim_core::judge::seconds;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::run::digest::Digest;
 use hil_sim_core::run::fault_evidence::FaultEvidence;
