@@ -173,10 +173,6 @@ impl EngineName {
 }
 
 impl Arguments {
-    /// Does what was asked for.
-    ///
-    /// # Errors
-    /// If a scene or a file cannot be used.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::Run(run) => run.execute(),

@@ -142,7 +142,6 @@ impl Budget {
     }
 }
 
-/// What a column is called, and what was counted.
 type Column = (String, Counted);
 
 fn print(columns: &[Column]) {
@@ -203,7 +202,6 @@ fn print(columns: &[Column]) {
     say!("{}", Table::from_iter(rows));
 }
 
-/// The share of the board's instructions.
 fn percent(counted: &Counted) -> f64 {
     100.0 * counted.total as f64 / counted.counted_s / BUDGET as f64
 }

@@ -45,7 +45,6 @@ pub(super) struct Campaign {
 }
 
 impl Campaign {
-    /// Tries everything and prints the table.
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let plan = Plan {
             kinds: self.kinds()?,
@@ -153,7 +152,6 @@ fn line(tally: &Tally) -> String {
     )
 }
 
-/// The values of a trial's keys, in words.
 fn keys(trial: &Trial) -> String {
     let fault = &trial.finding.fault;
     let keys = fault.kind.row().keys.iter().zip(fault.values);

@@ -5,7 +5,6 @@ use std::process::ExitCode;
 use super::say::say;
 use hil_sim_core::scene::fault::catalogue::{Lasts, Needs, Row, rows};
 
-/// Prints the list.
 pub(super) fn execute() -> ExitCode {
     let list: Vec<String> = rows().iter().map(entry).collect();
     say!("{}", list.join("\n"));

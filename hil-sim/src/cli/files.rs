@@ -45,13 +45,11 @@ impl<'a> Results<'a> {
         path.map(Self::create).transpose()
     }
 
-    /// Writes everything at once.
     pub fn write(mut self, text: &str) -> anyhow::Result<()> {
         let written = self.file.write_all(text.as_bytes());
         written.with_context(|| self.path.display().to_string())
     }
 
-    /// Writes everything at once, as JSON.
     pub fn write_json(self, content: &impl serde::Serialize) -> anyhow::Result<()> {
         self.write(&(serde_json::to_string_pretty(content)? + "\n"))
     }

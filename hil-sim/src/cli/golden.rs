@@ -133,7 +133,6 @@ impl What {
         self.way.accepted(self.way.load(&files))
     }
 
-    /// Runs each scene so often, one after the other in turn.
     fn run(&self, scenes: &[Loaded], repeat: u32) -> anyhow::Result<Vec<Seen>> {
         let ready = self.way.ready()?;
         let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();

@@ -8,7 +8,6 @@ use std::process::ExitCode;
 use super::say::say;
 use anyhow::Context;
 
-/// What a first scene looks like.
 const FIRST: &str = include_str!("first_scene.toml");
 
 #[derive(Debug, clap::Args)]

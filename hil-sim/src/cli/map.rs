@@ -101,7 +101,6 @@ impl Maps {
     }
 }
 
-/// Makes one map.
 fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Made> {
     let mut survey = Survey::open(map, plan)?;
     if merge {

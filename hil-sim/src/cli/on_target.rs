@@ -27,9 +27,6 @@ fn jumpers() -> impl TypedValueParser<Value = Jumper> {
 
 impl OnTarget {
     /// Runs it, prints what it logs, and returns whether it ended well.
-    ///
-    /// # Errors
-    /// If it can't be run, or never ends itself.
     pub fn execute(&self) -> anyhow::Result<ExitCode> {
         let jumpers: Vec<Jumper> = Jumper::ALL
             .into_iter()

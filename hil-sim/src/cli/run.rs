@@ -231,7 +231,6 @@ fn row(name: &str, judgement: &Judgement) -> String {
     )
 }
 
-/// A multiple of real time, with decimals where they matter.
 fn pace(factor: Option<f64>) -> String {
     let matter = factor.is_some_and(|factor| factor < 10.0);
     number(factor, if matter { 2 } else { 0 })

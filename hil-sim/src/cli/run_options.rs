@@ -43,11 +43,8 @@ enum Annotate {
     Off,
 }
 
-/// A scene with its file.
 pub(super) struct Loaded {
-    /// The file, as it was named.
     pub path: PathBuf,
-    /// What is in it.
     pub scene: Scene,
 }
 

@@ -34,9 +34,6 @@ impl Bench {
     }
 
     /// Runs a scene.
-    ///
-    /// # Errors
-    /// If it can't be run.
     pub fn run(&self, scene: &Scene) -> Result<Recording, BenchError> {
         Ok(match self {
             Self::Native => native::run(scene)?,
@@ -45,9 +42,6 @@ impl Bench {
     }
 
     /// The hash of a scene's run.
-    ///
-    /// # Errors
-    /// If it can't be run.
     pub fn hash(&self, scene: &Scene) -> Result<u64, BenchError> {
         Ok(match self {
             Self::Native => native::run_before(scene, &mut ())?.hash,

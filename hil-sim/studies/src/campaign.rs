@@ -213,9 +213,6 @@ impl Shift {
     }
 
     /// Runs it.
-    ///
-    /// # Errors
-    /// If the boards can't be run.
     pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
         let (recording, _) = hil_sim_boards::run(&self.scene, firmwares)?;
         let tried = self

@@ -30,9 +30,6 @@ use score::Score;
 pub use result::BenchmarkResult;
 
 /// Counts what every contestant costs, by the ELF of the example `estimator_cost`, and scores it on every family.
-///
-/// # Errors
-/// If the ELF or a scene can't be run.
 pub fn compare(
     families: Vec<Family>,
     cost_elf: &Path,

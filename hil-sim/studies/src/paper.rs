@@ -53,9 +53,6 @@ pub struct Report {
 
 /// Makes the report of what [`jobs`] left, in its order. The page links its CSVs in `folder`, which lies
 /// beside it.
-///
-/// # Errors
-/// If a run is too empty.
 pub fn report(plan: Plan, recordings: &[Recording], folder: &str) -> Result<Report, PaperError> {
     let runs = plan::Runs::new(&plan, recordings);
     let study = Study::new(plan, runs.people)?;

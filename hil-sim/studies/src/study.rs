@@ -41,9 +41,6 @@ pub trait Progress: Sync {
     fn step(&self);
 
     /// Does `work` on each input, on all cores, and tells of each.
-    ///
-    /// # Errors
-    /// The first of `work`'s, by the inputs' order.
     fn each<I: Sync, O: Send, E: Send>(
         &self,
         inputs: &[I],

@@ -20,13 +20,9 @@ const MOST_MM_S: f64 = 300.0;
 
 /// Something that came in.
 pub enum Input {
-    /// A key that means something.
     Key(KeyCode),
-    /// A line.
     Line(String),
-    /// Somebody wants to know.
     Help,
-    /// It is enough.
     Quit,
 }
 
@@ -40,7 +36,6 @@ pub fn has_terminal() -> bool {
 pub struct Raw(());
 
 impl Raw {
-    /// Enters that state.
     pub fn enter() -> io::Result<Self> {
         enable_raw_mode()?;
         Ok(Self(()))
@@ -67,7 +62,6 @@ pub fn on_signals(events: Sender<Input>) -> io::Result<()> {
     Ok(())
 }
 
-/// Hands on keys.
 pub fn on_keys(events: Sender<Input>) {
     thread::spawn(move || {
         while let Ok(event) = event::read() {
@@ -108,7 +102,6 @@ pub fn on_lines(events: Sender<Input>) {
     });
 }
 
-/// What keys have come to.
 #[derive(Debug, Default)]
 pub struct Keys {
     speed_mm_s: f64,
@@ -117,7 +110,6 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// What a key asks for, if anything.
     pub fn command(&mut self, key: KeyCode, bench: &Bench) -> Option<Command> {
         match key {
             KeyCode::Up => self.speed_mm_s = (self.speed_mm_s + STEP_MM_S).min(MOST_MM_S),

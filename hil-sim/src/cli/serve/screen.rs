@@ -14,7 +14,6 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Nothing shown yet; the terminal may be raw.
     pub fn new(is_raw: bool) -> Self {
         Self {
             is_raw,
@@ -23,7 +22,6 @@ impl Screen {
         }
     }
 
-    /// Shows the status in place of the last.
     pub fn show(&mut self, status: &str) {
         if !self.is_terminal {
             self.write(&format!("{status}\n"));
@@ -35,7 +33,6 @@ impl Screen {
         self.is_shown = true;
     }
 
-    /// Tells something that stays.
     pub fn tell(&mut self, text: &str) {
         self.clear();
         self.write(&format!("{text}\n"));

@@ -82,7 +82,6 @@ impl Tally {
     }
 }
 
-/// The median and the largest of some numbers.
 fn middle_and_worst(mut numbers: Vec<f64>) -> Option<[f64; 2]> {
     numbers.sort_by(f64::total_cmp);
     let middle = numbers.get(numbers.len() / 2)?;

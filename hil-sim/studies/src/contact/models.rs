@@ -29,7 +29,6 @@ const DURATION_S: f64 = 0.5;
 /// A run is repeated for so long at least, and the fastest one counts: others have the machine, too.
 const MEASURED: Duration = Duration::from_millis(60);
 
-/// What is rubbed, and how.
 #[derive(Clone, Debug)]
 struct Case {
     name: &'static str,
@@ -57,7 +56,6 @@ pub struct Row {
     error_percent: Option<f64>,
 }
 
-/// The cases: a border, a hand that shakes, friction.
 fn cases() -> [Case; 3] {
     let steady = Scene::constant(2.0, 50.0);
     let mut border = steady.clone();
@@ -148,7 +146,6 @@ impl Case {
     }
 }
 
-/// What is felt along a case, scan by scan.
 fn felt(case: &Case, textures: &Textures, contact: scene::Contact) -> Vec<Felt> {
     fn scans(case: &Case, contact: scene::Contact, texture: &impl Texture) -> Vec<Felt> {
         let Scene { force, motion, .. } = &case.scene;

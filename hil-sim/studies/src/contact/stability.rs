@@ -84,7 +84,6 @@ pub struct Map {
     rows: Vec<MapRow>,
 }
 
-/// One stiffness.
 #[derive(Clone, Debug)]
 struct MapRow {
     stiffness_n_per_m: f64,
@@ -150,7 +149,6 @@ fn allowed_s(test: Test, integrator: Integrator, stiffness_n_per_m: f64) -> f64 
     }
 }
 
-/// What becomes of a fingertip in steps of `step_s`.
 fn outcome(test: Test, integrator: Integrator, stiffness_n_per_m: f64, step_s: f64) -> Outcome {
     match test {
         Test::LuGre => cling(integrator, stiffness_n_per_m, step_s),

@@ -37,7 +37,6 @@ const SHOWN_S: Range<f64> = 5.2..5.75;
 /// hundredth of a cycle, two ticks.
 const GOAL_CYCLES: f64 = 0.01;
 const GOAL_MS: f64 = 1.0;
-/// The amplitude of both.
 const AMPLITUDE_V: f64 = 5.0;
 
 /// A delay, and what came of it.
@@ -59,9 +58,6 @@ pub struct Row {
 }
 
 /// Measures all rows.
-///
-/// # Errors
-/// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     quick: bool,
@@ -151,7 +147,6 @@ fn stimulus_v(t_s: f64, late_s: f64, begins_cycles: f64) -> f64 {
 }
 
 impl Row {
-    /// Whether our stimulus is in step, and in time.
     fn is_met(&self) -> bool {
         self.ours_cycles.is_some_and(|cycles| cycles <= GOAL_CYCLES)
             && self.ours_ms.is_some_and(|ms| ms <= GOAL_MS)

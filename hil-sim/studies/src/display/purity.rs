@@ -26,7 +26,6 @@ const GOAL_DBC: f64 = -80.0;
 const GOAL_MEAN_MV: f64 = 5.0;
 /// Spurs are looked for from 0 Hz to this.
 const HIGHEST_HZ: f64 = 1_000.0;
-/// The stimuli.
 const FREQUENCIES_HZ: [f64; 12] = [
     5.0, 7.3, 10.4, 14.2, 20.6, 28.7, 40.0, 57.4, 80.6, 113.3, 160.7, 200.0,
 ];
@@ -57,7 +56,6 @@ enum Hand {
 /// A stimulus, and what came of it.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// Updates per second.
     rate_hz: u32,
     mode: Mode,
     hand: Hand,
@@ -81,7 +79,6 @@ pub struct Row {
     spectrum: Option<Spectrum>,
 }
 
-/// One run of the ELF.
 struct Plan {
     rate: UpdateRate,
     mode: Mode,
@@ -90,9 +87,6 @@ struct Plan {
 
 /// Measures all rows; quick: two stimuli and a stroke at 2 kHz. With another rendering than the fundamental the
 /// surface is told to be a sine and nothing else, so that what is not the sine is still the display's own.
-///
-/// # Errors
-/// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     rendering: Rendering,

@@ -30,14 +30,12 @@ const CREST_FROM_S: f64 = 1.5;
 const RESTS_S: f64 = 0.4;
 /// How long it goes on then.
 const GOES_ON_S: f64 = 0.6;
-/// The channel that is watched.
 const WATCHED: usize = 24;
 const ZERO: u16 = 0x8000;
 
 /// A stop, and what came of it.
 #[derive(Clone, Debug)]
 pub struct Stop {
-    /// Updates per second.
     rate_hz: u32,
     mode: Mode,
     /// The watched channel's voltage at the tick of the last count.
@@ -59,9 +57,6 @@ pub struct Stop {
 }
 
 /// Measures a stop for each rate and mode.
-///
-/// # Errors
-/// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     quick: bool,
@@ -197,7 +192,6 @@ fn largest_step_v(outputs: &[OutputRecord], within_ns: Range<u64>) -> f64 {
 }
 
 impl Stop {
-    /// Whether every channel came to 0 V in time.
     fn is_met(&self) -> bool {
         self.all_ms.is_some_and(|ms| ms <= GOAL_MS)
     }

@@ -55,7 +55,6 @@ const SNR_DB: f64 = 20.0;
 const RUBS_S: f64 = 8.5;
 const LOOKS_S: (f64, f64) = (4.0, 8.0);
 const DRIFT_MM_S: f64 = 3.0;
-/// Rows of a motion.
 const ROW_S: f64 = 1e-3;
 /// What partials may cost of a family's coherence in the mean, what they have to give where there is no grain, and by how
 /// many dB the random part may take a rough family's spectrum further away.
@@ -89,7 +88,6 @@ impl Stroke {
     }
 }
 
-/// A surface, rubbed and played.
 #[derive(Clone, Debug)]
 struct Row {
     surface: String,
@@ -97,14 +95,11 @@ struct Row {
     /// Whether nobody looked at it while this was made.
     unseen: bool,
     engine: Engine,
-    /// Highest speeds of arm and hand.
     speeds_mm_s: (f64, f64),
-    /// The link's.
     delay_ms: f64,
     rendering: Rendering,
     /// Share of the surface's power that is coherent with what is played, 0 to 1.
     coherence: f64,
-    /// Between the spectra.
     distance_db: f64,
 }
 
@@ -125,9 +120,6 @@ struct Case {
 }
 
 /// Measures everything, or a little of it.
-///
-/// # Errors
-/// If a scene can't be run.
 pub fn measure(
     firmwares: &Firmwares,
     quick: bool,
@@ -256,7 +248,6 @@ fn said(scene: &Scene) -> Result<Vec<TimedMessage>, SceneError> {
     Ok(ear.0)
 }
 
-/// The surface, rubbed by the arm.
 fn scene(case: &Case) -> Scene {
     Scene {
         seed: case.seed,

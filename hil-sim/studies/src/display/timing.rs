@@ -29,22 +29,16 @@ const FROM_NS: u64 = 100_000_000;
 /// A link, and what came of it.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// Updates per second.
     rate_hz: u32,
     link: Link,
     edges: Edges,
-    /// From the hand to the outputs.
     reaction: Reaction,
     /// Estimates sent, and of them those that arrived.
     estimates: (usize, usize),
-    /// As the board counts them.
     deadline_misses: u32,
 }
 
 /// Measures all rows: delays, and 20 % loss with 50 ms jitter on some.
-///
-/// # Errors
-/// If the ELF can't be run.
 pub fn measure(
     firmware: &Firmware,
     quick: bool,

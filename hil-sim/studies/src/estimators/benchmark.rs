@@ -22,16 +22,12 @@ use super::pitch::{mcleod, operations_of_mcleod, operations_of_yin, yin};
 use super::settings::{SETTINGS, Setting};
 use crate::study::Progress;
 
-/// Who runs.
 pub struct Contestant {
     pub method: &'static str,
-    /// The knob that is swept, and its value.
     pub knob: &'static str,
     pub value: u16,
-    /// If it is the firmware's.
     pub setting: Option<Setting>,
     pub work: Work,
-    /// Makes one, for the sensor of a scene.
     start: Box<dyn Fn(SensorConfiguration) -> Box<dyn Run> + Send + Sync>,
 }
 
@@ -44,9 +40,7 @@ pub enum Work {
     Operations(fn() -> u64),
 }
 
-/// Something that answers while scans come.
 trait Run {
-    /// Takes a millisecond.
     fn step(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], encoder: u16) -> Option<Answer>;
 }
 
@@ -56,7 +50,6 @@ impl<R: Rival> Run for Entrant<R> {
     }
 }
 
-/// The firmware's sensor among the others.
 struct Board {
     sensor: Sensor,
     instant_us: u64,
@@ -112,7 +105,6 @@ impl Contestant {
     }
 }
 
-/// All contestants: ours, the rivals that run on the board, the others.
 pub fn contestants() -> Vec<Contestant> {
     let ours = (SETTINGS_FROM..).zip(SETTINGS);
     let mut field = Field(ours.map(|(part, of)| Contestant::ours(of, part)).collect());

@@ -33,13 +33,10 @@ const TOLD: [usize; 8] = [0, 50, 70, 80, 85, 90, 95, 98];
 const RESAMPLES: usize = 1_000;
 const SEED: u64 = 1;
 
-/// Estimates that fell into a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bin {
     estimates: u32,
-    /// Their confidence, added up.
     confidence: f64,
-    /// How many of them were right.
     right: u32,
 }
 
@@ -57,10 +54,8 @@ impl Bin {
     }
 }
 
-/// What came of a surface.
 #[derive(Clone, Debug, PartialEq)]
 struct Tally {
-    /// For tables.
     class: &'static str,
     /// Whether any λ is right there.
     has_a_period: bool,
@@ -77,7 +72,6 @@ struct Tally {
 }
 
 impl Tally {
-    /// Before anything was said.
     fn new(class: &'static str, has_a_period: bool) -> Self {
         Self {
             class,
@@ -118,7 +112,6 @@ impl Tally {
 /// What a level of confidence gives, as shares of the estimates that count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Level {
-    /// Estimates from this confidence on are stood by.
     percent: u8,
     /// Surfaces with a period: within 5 %.
     right: f64,
@@ -133,16 +126,13 @@ struct Level {
 /// The whole answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reliability {
-    /// Surfaces asked.
     surfaces: usize,
     /// The bins of all surfaces by rising confidence, each with where its share of right ones may really lie.
     bars: Vec<(Bin, Option<Interval>)>,
     /// Expected calibration error: the mean distance of a bin's share of right ones from its mean
     /// confidence, each bin weighing as much as it has estimates. None without any.
     error: Option<f64>,
-    /// Where it may really lie.
     error_interval: Option<Interval>,
-    /// The levels 0 to 100 %.
     levels: Vec<Level>,
     /// The classes and their estimates, those of one class as one bin.
     classes: Vec<(&'static str, Bin)>,
@@ -181,14 +171,12 @@ impl Reliability {
         }
     }
 
-    /// The calibration error's interval, as it stands behind it; nothing without any estimate.
     fn told_interval(&self) -> String {
         let ends = |interval: Interval| format!(" ({:.3}–{:.3})", interval.low, interval.high);
         self.error_interval.map_or(String::new(), ends)
     }
 }
 
-/// A bin of a range or a class, for a table.
 fn told(of: &'static str, which: &str, bin: &Bin) -> Record {
     let (confidence, share) = bin.means().unzip();
     Record::default()
@@ -198,7 +186,6 @@ fn told(of: &'static str, which: &str, bin: &Bin) -> Record {
         .with("within 5 %:", number(share, 3))
 }
 
-/// A bin, a class or a level, for the CSV.
 fn record(
     what: &str,
     of: &str,
@@ -223,7 +210,6 @@ fn record(
 impl Study for Reliability {
     const NAME: &'static str = "confidence";
 
-    /// The bins, the calibration error, some levels and the classes, as Markdown.
     fn text(&self) -> Option<String> {
         let bins = self
             .bars
@@ -259,7 +245,6 @@ impl Study for Reliability {
         ))
     }
 
-    /// The bins, then the levels, then the classes.
     fn csvs(&self) -> Vec<(&'static str, String)> {
         let bins = self
             .bars
@@ -282,13 +267,11 @@ impl Study for Reliability {
         picture::draw(self, SensorConfiguration::DEFAULT.valid_percent)
     }
 
-    /// Not without any estimate.
     fn is_met(&self) -> bool {
         self.error.is_some_and(|error| error <= GOAL)
     }
 }
 
-/// All surfaces' bins as one's.
 fn sum<'a>(tallies: impl Iterator<Item = &'a Tally>) -> [Bin; BINS] {
     tallies.fold([Bin::default(); BINS], |mut bins, tally| {
         for (bin, more) in bins.iter_mut().zip(&tally.bins) {

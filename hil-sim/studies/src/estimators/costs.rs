@@ -17,7 +17,6 @@ const MS_PER_ANSWER: f64 =
 /// Instructions of everything from the ADC's scans to λ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
-    /// A millisecond, on average.
     pub mean: f64,
     /// In the worst millisecond; none if estimated.
     pub worst: Option<f64>,
@@ -27,7 +26,6 @@ pub struct Cost {
 pub struct Costs(BTreeMap<u64, Taken>);
 
 impl Costs {
-    /// Runs that example's ELF on an emulated board.
     pub fn count(path: &Path) -> Result<Self, ElfError> {
         measure_example(path, "firmware-sensor --example estimator_cost").map(Self)
     }

@@ -39,18 +39,15 @@ const ASKED: [(u8, &[usize]); 2] = [(0b00001, &[0]), (0b11111, &[0, 1, 2, 3, 4])
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cell {
     wavelength_mm: f64,
-    /// How long it was rubbed.
     duration_s: f64,
     /// The estimator's error; none if it was never valid.
     rms_percent: Option<f64>,
-    /// The part of it that stays.
     bias_percent: Option<f64>,
     valid_share: f64,
     bound_percent: f64,
 }
 
 impl Cell {
-    /// Error over bound.
     fn ratio(&self) -> Option<f64> {
         Some(self.rms_percent? / self.bound_percent)
     }
@@ -59,23 +56,18 @@ impl Cell {
 /// A frequency's cells, one for each wavelength, by rising λ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// "sine" or "trapezoid".
     profile: &'static str,
-    /// How many were asked.
     gauges: usize,
-    /// v/λ.
     frequency_hz: f64,
     cells: Vec<Cell>,
 }
 
 impl Row {
-    /// RMS error in %, over the cells.
     fn rms_percent(&self) -> Option<f64> {
         let errors: Option<Vec<f64>> = self.cells.iter().map(|cell| cell.rms_percent).collect();
         errors.map(|errors| root_mean_square(&errors))
     }
 
-    /// The bound in %, over the cells.
     fn bound_percent(&self) -> f64 {
         let bounds: Vec<f64> = self.cells.iter().map(|cell| cell.bound_percent).collect();
         root_mean_square(&bounds)
@@ -100,9 +92,6 @@ fn standing(rows: &[Row], gauges: usize) -> Option<(f64, f64)> {
 }
 
 /// Measures all rows.
-///
-/// # Errors
-/// If a scene can't be run.
 pub fn measure(progress: &impl Progress) -> Result<Vec<Row>, SceneError> {
     let of_profile = |(_, profile): &_| {
         let of_frequency = |hz| WAVELENGTHS_MM.map(|mm| scene(profile, mm, hz));

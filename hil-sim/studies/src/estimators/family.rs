@@ -82,7 +82,6 @@ pub fn load(root: &Path) -> Result<Vec<Family>, FamilyError> {
     FAMILIES.into_iter().map(load).collect()
 }
 
-/// What a folder holds, in the order of the names.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, FamilyError> {
     let error = |source| FamilyError::Folder(folder.to_owned(), source);
     let entries = std::fs::read_dir(folder).map_err(error)?;

@@ -40,7 +40,6 @@ impl Transform for RealFft {
     }
 }
 
-/// Operations of one transform.
 pub fn operations_of_transform() -> u64 {
     let transform = RealFftPlanner::<Tally>::new().plan_fft_forward(LENGTH);
     let (mut samples, mut lines, mut scratch) = (

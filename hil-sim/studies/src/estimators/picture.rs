@@ -73,7 +73,6 @@ fn budget() -> Mark {
     Mark::Upright(BUDGET_LINE, BUDGET, String::new())
 }
 
-/// How long each takes to settle, over its cost.
 fn settling(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let title = format!("{}: settled within 10 %, ms", family.title);
     let goals = family
@@ -95,7 +94,6 @@ fn settling(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
         }))
 }
 
-/// Each one's error over its cost.
 fn errors(result: &BenchmarkResult, index: usize, family: &Family) -> Panel {
     let cost = cost_axis();
     let bounds = WINDOWS.into_iter().filter_map(|window| {

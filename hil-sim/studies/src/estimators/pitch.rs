@@ -65,17 +65,14 @@ impl<const N: usize, D: PitchDetector<f32>> Rival for Pitch<N, D> {
     }
 }
 
-/// Operations of one answer of YIN.
 pub fn operations_of_yin<const N: usize>() -> u64 {
     operations_of::<N>(YINDetector::new(N, 0), YIN_CLARITY)
 }
 
-/// Operations of one answer of McLeod's method.
 pub fn operations_of_mcleod<const N: usize, const LENGTH: usize>() -> u64 {
     operations_of::<N>(McLeodDetector::new(N, LENGTH - N), MCLEOD_CLARITY)
 }
 
-/// A tone of 25 Hz without its mean, heard.
 fn operations_of<const N: usize>(mut detector: impl PitchDetector<Tally>, clarity: f32) -> u64 {
     let tone: Vec<Tally> = (0..N)
         .map(|ms| Tally((std::f32::consts::TAU * 0.025 * ms as f32).sin()))

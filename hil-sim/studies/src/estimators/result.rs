@@ -9,18 +9,14 @@ use super::score::Score;
 use super::settings::Setting;
 use crate::study::{Record, csv, fixed, short};
 
-/// A contestant's row.
 #[derive(Clone, Debug)]
 pub struct Entry {
     pub method: &'static str,
-    /// The knob that is swept, and its value.
     pub knob: &'static str,
     pub value: u16,
     /// What the sensor board is set to, if it is one of ours.
     pub setting: Option<Setting>,
-    /// What it costs on the board.
     pub cost: Option<Cost>,
-    /// A score for each family.
     pub scores: Vec<Score>,
 }
 
@@ -46,9 +42,7 @@ pub const WINDOWS: [Window; 3] = [Window::Waves(WAVES), Window::Ms(80), Window::
 /// A window of the bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Window {
-    /// So many waves of travel, each gauge's slope unknown too.
     Waves(u8),
-    /// A time.
     Ms(u16),
 }
 

@@ -3,7 +3,6 @@
 use hil_sim_core::judge::Summary;
 use hil_sim_core::scene::Scene;
 
-/// A family's summaries as one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Score {
     /// Root of the mean square, over the scenes with a valid estimate, of their RMS errors.
@@ -21,7 +20,6 @@ pub struct Score {
 }
 
 impl Score {
-    /// The score of these scenes' summaries.
     pub fn new<'a>(scenes: &[Scene], summaries: impl Iterator<Item = &'a Summary> + Clone) -> Self {
         let errors = summaries.clone().zip(scenes);
         let errors = errors.filter_map(|(of, scene)| Some((of.rms_percent?, scene.name.clone())));

@@ -3,23 +3,17 @@
 use super::knob::{Knob, Setting};
 use crate::output::plot::axis::round_step;
 
-/// How an axis' steps follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// By the same difference.
     Linear,
-    /// By the same ratio.
     Log,
-    /// Each for itself, with a name.
     Named,
 }
 
-/// A column or a row of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// Its place on the axis, in the axis' unit; its number if the axis is named.
     pub at: f64,
-    /// What is written at it.
     pub label: String,
     /// What it changes in the scene; the same knobs in every step of an axis.
     pub settings: Vec<Setting>,
@@ -31,7 +25,6 @@ pub struct Axis {
     /// The quantity and its unit.
     pub label: &'static str,
     pub(super) scale: Scale,
-    /// Its steps, upwards.
     pub(super) steps: Vec<Step>,
     /// Steps that belong together, of a named axis: a name for every so many.
     pub(super) groups: Vec<(String, usize)>,
@@ -207,7 +200,6 @@ impl Axis {
     }
 }
 
-/// The number to three significant digits.
 fn three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

@@ -126,9 +126,6 @@ pub fn catalogue() -> Vec<Map> {
 }
 
 /// The map of a name.
-///
-/// # Errors
-/// If there is none; the error names those that there are.
 pub fn find(name: &str) -> Result<Map, MapError> {
     let maps = catalogue();
     let known: Vec<&str> = maps.iter().map(|map| map.name).collect();

@@ -14,7 +14,6 @@ pub enum MapError {
     /// A shard's text is not of the form i/n.
     #[error("{0}: no shard: give i/n with 1 ≤ i ≤ n ≤ 9999, such as 3/8 for the third of eight")]
     BadShard(String),
-    /// There is no such place on a map's axis, which takes these.
     #[error("{text}: {map} has no such place along its axis \"{axis}\": give {places}")]
     #[allow(missing_docs, reason = "the message says what they are")]
     NoSuchPlace {
@@ -35,7 +34,6 @@ pub enum MapError {
     /// A line of a CSV is not of this map, or not of this version.
     #[error("{}:{}: {}: delete the file or move it away, give another --out, or give --renew to measure anew what does not fit", .0.display(), .1, .2)]
     Foreign(PathBuf, usize, String),
-    /// Runs (a cell with a method) of some shards are not there to be merged into a file.
     #[error("{}: {missing} of {all} runs are missing ({shards}): run those first, or leave --merge out to run them here", path.display())]
     #[allow(missing_docs, reason = "the message says what they are")]
     Incomplete {
@@ -50,7 +48,6 @@ pub enum MapError {
 pub(super) const NOT_WRITTEN: &str = "cannot be written: give another --out";
 
 impl MapError {
-    /// Wraps an error of the file system.
     pub(super) fn file(path: &Path, doing: &'static str) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.to_owned();
         move |source| Self::File(path, doing, source)

@@ -3,10 +3,8 @@
 /// The scene's sections that knobs write to, in the order they are written.
 pub const SECTIONS: [&str; 5] = ["surface", "motion", "arm", "contact", "gauges"];
 
-/// Something that a map changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knob {
-    /// The scene's, one of [`SECTIONS`].
     pub section: &'static str,
     /// The CSV's: a scene's key, mostly.
     pub column: &'static str,
@@ -34,13 +32,11 @@ const fn lines(section: &'static str, column: &'static str, lines: &'static str)
 }
 
 impl Knob {
-    /// λ of the one specimen.
     pub const WAVELENGTH: Self = lines(
         "surface",
         "wavelength_mm",
         "specimens = [{ wavelength_mm = $ }]\n",
     );
-    /// v, constant.
     pub const SPEED: Self = lines(
         "motion",
         "speed_mm_s",
@@ -52,14 +48,11 @@ impl Knob {
         "frequency_hz",
         "kind = \"sinusoid\"\namplitude_mm_s = 70.0\nfrequency_hz = $\n",
     );
-    /// The arm encoder's resolution.
     pub const ENCODER: Self = key("arm", "encoder_um");
     /// `none`, `mild`, `strong` or `severe`.
     pub const FRICTION: Self = lines("contact", "friction", "friction = \"$\"\n");
-    /// Whether the tangential force is measured.
     pub const TANGENTIAL: Self = key("gauges", "tangential");
     pub const SNR: Self = key("gauges", "snr_db");
-    /// How late the gauges' samples are.
     pub const SKEW: Self = key("gauges", "skew_us");
     /// Relative to the fundamental.
     pub const SECOND_HARMONIC: Self = key("gauges", "second_harmonic");
@@ -73,16 +66,13 @@ impl Knob {
     pub const SECOND_WAVE: Self = key("surface", "second_wave");
     /// Its wavelength over λ.
     pub const SECOND_RATIO: Self = key("surface", "second_ratio");
-    /// Share of missing ridges.
     pub const WORN: Self = key("surface", "worn");
 
-    /// The knob turned to a number.
     pub fn at(self, value: f64) -> Setting {
         // Adding 0 takes the sign off −0.
         self.is(&(value + 0.0).to_string())
     }
 
-    /// The knob turned to a word.
     pub fn is(self, value: &str) -> Setting {
         Setting {
             knob: self,
@@ -92,7 +82,6 @@ impl Knob {
 }
 
 impl Setting {
-    /// The section's lines.
     pub fn entries(&self) -> String {
         match self.knob.lines {
             "" => format!("{} = {}\n", self.knob.column, self.value),

@@ -10,15 +10,12 @@ use hil_sim_core::scene::{Scene, SceneError};
 /// The estimates of a run in a few numbers, percentages and shares to the CSV's four decimals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measurement {
-    /// [`estimates::Summary::rms_percent`].
     pub rms_percent: Option<f64>,
-    /// [`estimates::Summary::bias_percent`].
     pub bias_percent: Option<f64>,
     /// [`estimates::Summary::valid_share`]; none if v never exceeds [`estimates::MOTION_MM_S`].
     pub valid_share: Option<f64>,
     /// Estimates made, the first ones included, which have nothing to go by.
     pub estimates: u32,
-    /// Those that the estimator stands by.
     pub valid: u32,
     /// Those of the valid that are more than [`estimates::SETTLED`] off.
     pub wrong: u32,

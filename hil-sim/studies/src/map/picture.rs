@@ -16,7 +16,6 @@ const BAR_HEIGHT: f64 = 11.0;
 /// Around cells that are above a quantity's line: white below dark, to be seen on every colour.
 const BORDER: [Stroke; 2] = [Stroke::new(PAPER, 2.8), Stroke::new(INK, 1.2)];
 
-/// Something shown of every cell.
 struct Quantity {
     title: &'static str,
     ramp: Ramp,
@@ -24,7 +23,6 @@ struct Quantity {
     value: fn(&Measurement) -> Option<f64>,
     /// Share of the way along the ramp.
     share: fn(f64) -> f64,
-    /// Labels of the colour bar.
     ticks: &'static [(f64, &'static str)],
     /// Cells above it are set off by a line.
     line: Option<f64>,
@@ -165,7 +163,6 @@ fn colour_bar(quantity: &Quantity) -> Panel {
         .with(line)
 }
 
-/// The cells of one method and quantity.
 fn marks(map: &Map, quantity: &Quantity, values: &[Option<f64>]) -> Vec<Mark> {
     let (columns, rows) = (map.x.steps.len(), map.y.steps.len());
     let shown = |column: usize, row: usize| values[map.cell(column, row)];

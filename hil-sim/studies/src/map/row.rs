@@ -4,11 +4,9 @@ use super::METHODS;
 use super::Map;
 use super::measurement::Measurement;
 
-/// One run of one cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     pub cell: usize,
-    /// As scenes write it.
     pub method: String,
     pub measurement: Measurement,
 }
@@ -25,7 +23,6 @@ const AFTER: [&str; 8] = [
     "key",
 ];
 
-/// The CSV's header.
 pub fn header(map: &Map) -> String {
     let mut names = BEFORE.to_vec();
     names.extend(map.columns());
@@ -40,7 +37,6 @@ pub fn rank(method: &str) -> (usize, &str) {
 }
 
 impl Row {
-    /// The row's line, with the key of its map and method.
     pub fn line(&self, map: &Map, key: u64) -> String {
         let number =
             |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));

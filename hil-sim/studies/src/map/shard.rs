@@ -15,7 +15,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// How many shards there are.
     pub(super) fn count(self) -> usize {
         self.of
     }
@@ -26,7 +25,6 @@ impl Shard {
     }
 }
 
-/// As in file names: `3-of-8`.
 impl fmt::Display for Shard {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}-of-{}", self.number, self.of)

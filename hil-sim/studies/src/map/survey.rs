@@ -59,9 +59,6 @@ pub struct Made {
 
 impl Plan {
     /// Checks that every scene of a map can be run.
-    ///
-    /// # Errors
-    /// The first refusal.
     pub fn check(&self, map: &Map) -> Result<(), MapError> {
         for method in &self.methods {
             for cell in 0..map.len() {
@@ -75,9 +72,6 @@ impl Plan {
 impl<'a> Survey<'a> {
     /// Opens a map's CSV in the plan's folder and finds out what is missing. Without a shard, what the
     /// folder has of shards counts as there.
-    ///
-    /// # Errors
-    /// If a method is unknown, or a file cannot be used or is another process'.
     pub fn open(map: &'a Map, plan: &'a Plan) -> Result<Self, MapError> {
         let made = fs::create_dir_all(&plan.folder);
         let doing = "cannot be made: give another --out";
@@ -125,9 +119,6 @@ impl<'a> Survey<'a> {
     }
 
     /// That nothing is missing.
-    ///
-    /// # Errors
-    /// If something is: how much, and of which shards.
     pub fn complete(&self) -> Result<(), MapError> {
         if self.missing.is_empty() {
             return Ok(());
@@ -149,9 +140,6 @@ impl<'a> Survey<'a> {
     }
 
     /// Runs what is missing. Every finished run is in the file before `step` is called.
-    ///
-    /// # Errors
-    /// If a scene cannot be run or the file not be written.
     pub fn run(&mut self, mut step: impl FnMut()) -> Result<(), MapError> {
         let Self {
             map,
@@ -183,9 +171,6 @@ impl<'a> Survey<'a> {
     }
 
     /// Sorts the CSV and, of a whole map, draws the picture and writes the sentences.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
     pub fn finish(mut self) -> Result<Made, MapError> {
         self.journal.sort(&self.rows, &mut self.keys)?;
         let Self {

@@ -10,7 +10,6 @@ const SPEAKS: f64 = 0.5;
 /// Most of the estimates that may be wrong.
 pub const WRONG_SHARE: f64 = 0.001;
 
-/// A place with what was measured there.
 struct Place<'r> {
     cell: usize,
     measured: &'r Measurement,
@@ -164,7 +163,6 @@ fn ranges(axis: &Axis, steps: &[usize]) -> String {
     texts.join(", ")
 }
 
-/// What a cell is.
 pub fn settings(map: &Map, cell: usize) -> String {
     let settings = map
         .own(cell)

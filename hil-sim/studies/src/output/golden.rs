@@ -61,15 +61,11 @@ pub struct Golden {
     /// The file's folder, as the system calls it.
     folder: PathBuf,
     text: String,
-    /// By scene and engine.
     hashes: Hashes,
 }
 
 impl Golden {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// If it cannot be read, or is no such file.
     pub fn read(path: &Path) -> Result<Self, GoldenError> {
         let unreadable = |source| GoldenError::Unreadable(path.to_owned(), source);
         let text = fs::read_to_string(path).map_err(unreadable)?;
@@ -96,9 +92,6 @@ impl Golden {
     }
 
     /// Reads a file, or begins one if there is none.
-    ///
-    /// # Errors
-    /// As [`Golden::read`], and if its folder does not exist.
     pub fn open(path: &Path) -> Result<Self, GoldenError> {
         match Self::read(path) {
             Err(GoldenError::Unreadable(_, source)) if source.kind() == io::ErrorKind::NotFound => {
@@ -125,9 +118,6 @@ impl Golden {
     }
 
     /// What a scene is called in the file: its place from the file's folder, with `/`.
-    ///
-    /// # Errors
-    /// If there is no such scene.
     pub fn name(&self, scene: &Path) -> Result<String, GoldenError> {
         let no_scene = |source| GoldenError::NoScene(scene.to_owned(), source);
         let scene = scene.canonicalize().map_err(no_scene)?;
@@ -163,9 +153,6 @@ impl Golden {
     }
 
     /// Writes the file.
-    ///
-    /// # Errors
-    /// If the system does not.
     pub fn write(&self) -> Result<(), GoldenError> {
         let mut text = HEADER.to_owned();
         for (scene, engines) in &self.hashes {

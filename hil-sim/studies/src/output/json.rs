@@ -151,9 +151,6 @@ pub struct JsonList {
 
 impl JsonList {
     /// Writes the next run.
-    ///
-    /// # Errors
-    /// If it cannot be written.
     pub fn write(&mut self, result: &SceneResult, out: &mut impl Write) -> io::Result<()> {
         let begun = std::mem::replace(&mut self.begun, true);
         out.write_all(if begun { b",\n  " } else { b"[\n  " })?;

@@ -28,9 +28,6 @@ pub enum Fate<'a> {
 }
 
 /// The report on these cases.
-///
-/// # Errors
-/// None in practice: text is written to memory.
 pub fn xml(
     engine: Engine,
     cases: impl IntoIterator<Item = TestCase>,

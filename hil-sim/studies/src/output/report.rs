@@ -28,7 +28,6 @@ struct Figure {
     note: String,
 }
 
-/// A chart as wide as the page, of a height.
 fn draw(height: f64, x: &Axis, y: &Axis, marks: Vec<Mark>) -> String {
     chart(WIDTH, height, &Panel::new("", x, y).with(marks))
 }

@@ -11,7 +11,6 @@ use crate::study::Table;
 /// Width of a chart for a phone: text is of one size in it and in one for a page.
 const NARROW: f64 = 525.0;
 
-/// A figure or a table.
 #[derive(Clone, Debug, Default)]
 pub struct Exhibit {
     /// Its place on the page: "fig-5".
@@ -37,12 +36,10 @@ pub struct Conclusion {
     pub holds: bool,
 }
 
-/// Something shown.
 #[derive(Clone, Debug)]
 pub enum Part {
     Chart {
         caption: String,
-        /// What each colour means, as HTML.
         legend: String,
         /// As wide as a page, and as a phone.
         broad: String,
@@ -53,7 +50,6 @@ pub enum Part {
 }
 
 impl Part {
-    /// Draws a chart.
     pub(super) fn chart(
         caption: impl Into<String>,
         entries: &[(Colour, &str)],

@@ -128,9 +128,7 @@ pub struct Cell<'a> {
     pub recording: &'a Recording,
 }
 
-/// What the jobs left.
 pub struct Runs<'a> {
-    /// The experiments with people.
     pub people: &'a [Recording],
     pub fig_7: &'a Recording,
     pub fig_5: &'a Recording,
@@ -141,9 +139,6 @@ pub struct Runs<'a> {
 
 impl<'a> Runs<'a> {
     /// Sorts what [`jobs`] left.
-    ///
-    /// # Panics
-    /// If there are fewer recordings than jobs.
     pub fn new(plan: &Plan, recordings: &'a [Recording]) -> Self {
         let (people, rest) = recordings.split_at(psychophysics::jobs(plan).len());
         let [fig_7, fig_5, fig_8, rest @ ..] = rest else {
@@ -167,7 +162,6 @@ impl<'a> Runs<'a> {
 }
 
 impl Cell<'_> {
-    /// v/λ in Hz.
     pub fn frequency_hz(&self) -> f64 {
         self.speed_mm_s / self.wavelength_mm
     }

@@ -28,14 +28,12 @@ const HAND: Motion = Motion::Sinusoid {
     frequency_hz: FREQUENCY_HZ,
 };
 
-/// Wavelengths to be presented, in mm, one after the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StimulusSequence {
     wavelengths_mm: Vec<f64>,
 }
 
 impl StimulusSequence {
-    /// A course of these.
     pub fn new(wavelengths_mm: &[f64]) -> Self {
         Self {
             wavelengths_mm: wavelengths_mm.to_vec(),
@@ -52,7 +50,6 @@ impl StimulusSequence {
         self.wavelengths_mm[place.min(self.wavelengths_mm.len() - 1)]
     }
 
-    /// Runs it on the display's ELF.
     pub(super) fn on_elf(&self, firmware: &Firmware) -> Result<Recording, ElfError> {
         let course = self.clone();
         let bench = DisplayBench {

@@ -8,7 +8,6 @@ use crate::psychophysics::normal;
 /// The confidence of all intervals.
 const CONFIDENCE: f64 = 0.95;
 
-/// An interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     pub low: f64,

@@ -16,7 +16,6 @@ pub enum Job {
 }
 
 impl Job {
-    /// A scene with both boards.
     pub(crate) fn pair(scene: Scene) -> Self {
         Self::Pair(Box::new(scene))
     }
@@ -32,9 +31,6 @@ impl Job {
 
 /// Runs all jobs, as many at a time as there are cores, and returns what they left, in their order.
 /// `done` is told after each.
-///
-/// # Errors
-/// The first job's that failed.
 pub fn run(
     bench: &Bench,
     jobs: &[Job],

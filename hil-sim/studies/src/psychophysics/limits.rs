@@ -29,7 +29,6 @@ fn step_mm(step: usize) -> f64 {
     (10.0 * step as f64 * STEP_MM).round() / 10.0
 }
 
-/// Which way a series goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Direction {
     Up,

@@ -27,9 +27,7 @@ pub enum Extreme {
 /// The test's result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Test {
-    /// χ².
     pub chi_square: f64,
-    /// Degrees of freedom.
     pub freedom: u32,
     /// What χ² is above in 5 % of the cases, if Case V holds.
     pub critical: f64,

@@ -5,7 +5,6 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// Φ⁻¹(0.75): a limen that is a 75 % point is so many standard deviations.
 pub const PROBABLE_ERROR: f64 = 0.674_489_750_196_081_7;
 
-/// Φ(x).
 pub fn cdf(x: f64) -> f64 {
     Normal::standard().cdf(x)
 }

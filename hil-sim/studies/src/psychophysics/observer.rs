@@ -12,7 +12,6 @@ use crate::psychophysics::thresholds::Skin;
 /// [`crate::psychophysics::study`] says what a shorter and a longer one would change.
 pub const GLIMPSE_S: f64 = 0.1;
 
-/// What a comparison feels like beside the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     Shorter,

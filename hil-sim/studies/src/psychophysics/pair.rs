@@ -7,23 +7,18 @@ use crate::psychophysics::normal;
 /// The answers to one pair of samples, by their numbers in order of wavelength.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Pair {
-    /// The sample with the shorter wavelength.
     pub shorter: usize,
-    /// The sample with the longer one.
     pub longer: usize,
     /// Trials in which the longer one was called longer; a fraction of them in the long run.
     pub correct: f64,
-    /// All trials.
     pub trials: f64,
 }
 
 impl Pair {
-    /// The share of correct answers.
     pub fn share(&self) -> f64 {
         self.correct / self.trials
     }
 
-    /// The share of correct answers as a normal deviate.
     pub fn deviate(&self) -> f64 {
         normal::quantile(self.share())
     }

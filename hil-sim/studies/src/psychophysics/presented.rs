@@ -44,11 +44,9 @@ pub struct Felt {
 /// For how long a sensation is gathered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IntegrationWindow {
-    /// One wave.
     Wave,
     /// So many s, or until the stroke ends.
     Seconds(f64),
-    /// All of the stroke.
     Stroke,
 }
 
@@ -94,12 +92,10 @@ impl Felt {
         }
     }
 
-    /// How long waves are felt, in s.
     fn lasts_s(&self) -> f64 {
         self.ends_s.last().copied().unwrap_or(0.0)
     }
 
-    /// The mean over time, in mm.
     pub fn mean_mm(&self) -> f64 {
         self.mean(|mm| mm)
     }
@@ -156,7 +152,6 @@ impl Felt {
     }
 }
 
-/// A crossing of 0 V.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     t_s: f64,
@@ -166,7 +161,6 @@ struct Crossing {
     peak_v: f64,
 }
 
-/// The waves of one stroke's voltage.
 fn of_stroke(points: &[(f64, f64)], hand: &Track, stroke: usize) -> Vec<Wave> {
     let mut crossings = Vec::new();
     let mut peak_v = 0.0f64;

@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use crate::psychophysics::pair::Pair;
 
-/// The four specimens' wavelengths, in mm.
 pub const SAMPLES_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// The subjects of Table II.
 pub const SUBJECTS: usize = 3;
@@ -18,15 +17,11 @@ pub const TRIALS: u32 = 10;
 /// A column of Table II, in mm: averages over three subjects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limens {
-    /// The standard stimulus.
     pub standard_mm: f64,
-    /// The average lower limen.
     pub lower_mm: f64,
-    /// The average upper limen.
     pub upper_mm: f64,
     /// The average discrimination limen: half of what lies between them.
     pub limen_mm: f64,
-    /// Its standard deviation.
     pub deviation_mm: f64,
 }
 
@@ -46,7 +41,6 @@ const fn limens(
     }
 }
 
-/// Table II.
 pub const TABLE_2: [Limens; 4] = [
     limens(1.0, 0.82, 1.28, 0.23, 0.095),
     limens(2.0, 1.78, 2.14, 0.18, 0.10),
@@ -73,9 +67,7 @@ pub const TABLE_3: [Pair; 6] = [
     pair(2, 3, 7),
 ];
 
-/// Table IV: Thurstone's Case V scores.
 pub const TABLE_4: [f64; 4] = [0.0, 0.5461, 1.092, 1.449];
-/// The paper's χ² of Mosteller's test.
 pub const CHI_SQUARE: f64 = 8.72;
 /// The degrees of freedom that the paper took.
 pub const FREEDOM: u32 = 7;

@@ -11,9 +11,6 @@ use crate::psychophysics::tables;
 use crate::study::{Record, csv, short};
 
 /// The study as JSON, with what it does not show.
-///
-/// # Errors
-/// If a number cannot be written, which none should bring about.
 pub fn json(study: &Study) -> serde_json::Result<String> {
     let recount = &study.recount;
     let mut value = serde_json::to_value(study)?;

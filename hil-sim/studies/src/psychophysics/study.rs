@@ -126,21 +126,16 @@ pub struct Silent {
 /// The results.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
-    /// What ran the firmware.
     pub(crate) engine: &'static str,
     pub(crate) seed: u64,
     pub(crate) trials: u32,
     pub(crate) repetitions: u32,
     pub(crate) friction: &'static str,
-    /// For how long a sensation is gathered.
     pub(crate) glimpse_s: f64,
-    /// The stimuli of Table II.
     given: Vec<Stimulus>,
-    /// Table II.
     pub(crate) limens: Vec<Column>,
     /// Tables III and IV, for each of [`contenders`].
     pub(crate) methods: Vec<Compared>,
-    /// The paper's Tables III and IV, counted again.
     #[serde(skip)]
     pub(crate) recount: Recount,
 }
@@ -148,11 +143,8 @@ pub struct Study {
 /// What a stimulus felt like.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stimulus {
-    /// What it was to present.
     pub wavelength_mm: f64,
-    /// The waves that were felt.
     pub waves: usize,
-    /// The mean wavelength presented.
     pub mean_mm: f64,
     /// Root mean square of its error over time.
     pub error_percent: f64,
@@ -162,7 +154,6 @@ pub struct Stimulus {
     pub felt: Felt,
 }
 
-/// A column of Table II.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Column {
     /// The paper's.
@@ -208,11 +199,8 @@ impl Column {
 /// What comparisons with one estimator came to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compared {
-    /// The contender's name.
     pub method: &'static str,
-    /// What the specimens felt like.
     pub samples: Vec<Stimulus>,
-    /// Table III, once.
     pub once: Vec<Pair>,
     /// Wilson's interval of each of its shares.
     pub wilson: Vec<Interval>,
@@ -222,11 +210,9 @@ pub struct Compared {
     pub mean_share: Option<Interval>,
     /// Table IV of Table III, if it has one.
     pub scores: Option<Vec<f64>>,
-    /// Pairs that it leaves out.
     pub left_out: usize,
     /// Why there is none.
     pub no_scale: Option<String>,
-    /// Mosteller's test of it.
     pub test: Option<Test>,
     /// Table IV of the long run.
     pub long_run_scores: Vec<f64>,
@@ -298,7 +284,6 @@ impl Stimulus {
 }
 
 impl Study {
-    /// Every stimulus with who made it.
     pub(crate) fn stimuli(&self) -> impl Iterator<Item = (&'static str, &Stimulus)> {
         let given = self.given.iter().map(|stimulus| ("given", stimulus));
         given.chain(self.methods.iter().flat_map(|compared| {
@@ -307,7 +292,6 @@ impl Study {
         }))
     }
 
-    /// The contender of a name.
     pub(crate) fn contender(&self, name: &str) -> Option<&Compared> {
         self.methods.iter().find(|compared| compared.method == name)
     }

@@ -11,7 +11,6 @@ use crate::psychophysics::published::{
 use crate::psychophysics::study::{Compared, Study};
 use crate::study::{Record, Table, short};
 
-/// A number with so many decimals.
 fn fixed(value: f64, decimals: usize) -> String {
     format!("{value:.decimals$}").replace('-', "−")
 }
@@ -28,7 +27,6 @@ pub fn span(interval: Option<Interval>) -> String {
     })
 }
 
-/// What the stimuli felt like.
 pub fn felt(study: &Study) -> Table {
     let stimuli = study.stimuli();
     let shown = stimuli.filter(|(_, stimulus)| SAMPLES_MM.contains(&stimulus.wavelength_mm));
@@ -44,7 +42,6 @@ pub fn felt(study: &Study) -> Table {
     Table::from_iter(rows).called("What the actuators' voltages present, wave by wave")
 }
 
-/// Table II.
 pub fn limens(study: &Study) -> Table {
     let rows = study.limens.iter().flat_map(|column| {
         column.lines().map(|line| {
@@ -62,7 +59,6 @@ pub fn limens(study: &Study) -> Table {
     Table::from_iter(rows).called("Limens in mm")
 }
 
-/// Table III.
 pub fn shares(study: &Study) -> Table {
     let cell = |pair: &Pair| {
         let interval = span(Some(wilson(pair.correct, pair.trials)));
@@ -91,7 +87,6 @@ pub fn shares(study: &Study) -> Table {
     Table::from_iter(pairs.chain([means])).called("Shares of correct answers")
 }
 
-/// Mean shares by how long a sensation is gathered.
 pub fn glimpses(study: &Study) -> Table {
     let rows = study.methods.iter().map(|compared| {
         let [wave, taken, stroke] = compared.by_glimpse.map(|share| fixed(share, 4));
@@ -104,7 +99,6 @@ pub fn glimpses(study: &Study) -> Table {
     Table::from_iter(rows).called("Mean share in the long run, by how long a sensation is gathered")
 }
 
-/// Table IV.
 pub fn scores(study: &Study) -> Table {
     const HEADS: [&str; 5] = ["", "1 mm", "2 mm", "3 mm", "4 mm"];
     let row = |head: String, scores: &mut dyn Iterator<Item = Option<f64>>| {
@@ -165,7 +159,6 @@ const fn verdict(rejects: bool) -> &'static str {
     if rejects { "rejected" } else { "not rejected" }
 }
 
-/// Mosteller's tests, below what the paper printed.
 pub fn mosteller_tests(study: &Study) -> Table {
     let row = |of: String, chi_square, freedom: u32, critical, p, rejects| {
         Record::default()

@@ -58,7 +58,6 @@ impl Skin {
         self.between(standard_mm, |point| point.constant_error_mm)
     }
 
-    /// The standard deviation of one sensation of a wavelength, in mm.
     pub fn deviation_mm(&self, wavelength_mm: f64) -> f64 {
         self.limen_mm(wavelength_mm) / (PROBABLE_ERROR * std::f64::consts::SQRT_2)
     }

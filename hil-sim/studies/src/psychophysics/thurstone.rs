@@ -8,19 +8,16 @@ use thiserror::Error;
 
 use crate::psychophysics::pair::Pair;
 
-/// There is no scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
     "no scale: without the {left_out} pairs that were always answered alike, nothing ties sample {sample} to the first"
 )]
 pub struct Unconnected {
-    /// Pairs left out.
     pub left_out: usize,
     /// The first sample that has no tie, counted from 1.
     pub sample: usize,
 }
 
-/// A scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scale {
     /// The score of each sample; the first is 0.

@@ -12,7 +12,6 @@ const LEAST_PERCENT: f64 = 1e-5;
 /// How the speed of the reference is drawn.
 const REFERENCE: Stroke = Stroke::new(SOFT, 1.2).dashed("4 3");
 
-/// What a rung that is solved exactly looks like.
 fn of_rung(rung: ContactModel) -> Symbol {
     let colour = match rung {
         ContactModel::Kinematic => SKY,
@@ -24,7 +23,6 @@ fn of_rung(rung: ContactModel) -> Symbol {
     Symbol::new(colour, Shape::Circle)
 }
 
-/// What an integrator looks like.
 fn of_integrator(integrator: Integrator) -> Symbol {
     let (colour, shape) = match integrator {
         Integrator::Euler => (PURPLE, Shape::Up),
@@ -37,7 +35,6 @@ fn of_integrator(integrator: Integrator) -> Symbol {
     Symbol::new(colour, shape).hollow(true)
 }
 
-/// All but the reference's.
 fn integrators() -> impl Iterator<Item = Integrator> {
     let all = Integrator::ALL.iter().copied();
     all.filter(|integrator| *integrator != Integrator::Radau)

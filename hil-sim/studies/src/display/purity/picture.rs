@@ -7,7 +7,6 @@ use crate::output::plot::palette::{BLUE, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use crate::output::plot::{Anchor, Axis, Font, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 use protocol::Mode;
 
-/// What rate and mode are called and look like.
 fn look(row: &Row) -> (&'static str, Symbol) {
     let (name, colour, shape) = match (row.rate_hz, row.mode) {
         (2_000, Mode::Uniform) => ("2 kHz, uniform", BLUE, Shape::Circle),

@@ -13,11 +13,9 @@ const BEGINNING_S: f64 = 0.1;
 /// Points a second by which a stroke is drawn, in straight lines between them.
 const POINTS_HZ: f64 = 4_000.0;
 
-/// A stimulus, for a while.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
     pub hand: Hand,
-    /// Speed of a steady hand.
     pub speed_mm_s: f64,
     pub wavelength_mm: f64,
     pub lasts_s: f64,
@@ -31,7 +29,6 @@ impl Stretch {
         }
     }
 
-    /// Travel since the stretch's beginning.
     fn travel_mm(&self, t_s: f64) -> f64 {
         match self.hand {
             Hand::Whole | Hand::Between => self.speed_mm_s * t_s,
@@ -89,7 +86,6 @@ impl StimulusSequence {
         through(at, values)
     }
 
-    /// λ of the stretch that is on.
     pub fn surface(&self) -> Surface {
         let stretches = self.stretches.clone();
         Box::new(move |t_s| {

@@ -51,7 +51,6 @@ pub fn draw(stops: &[Stop]) -> String {
     page.finish()
 }
 
-/// An axis of s that is labelled in ms.
 fn milliseconds(shown: &Range<f64>, step_s: f64) -> Axis {
     let first = (shown.start / step_s).ceil() as i32;
     let last = (shown.end / step_s).floor() as i32;

@@ -32,7 +32,6 @@ pub fn segments(signal: &[f64]) -> Vec<Vec<Complex<f64>>> {
     segments.map(transformed).collect()
 }
 
-/// Lines of [`BAND_HZ`].
 fn lines() -> impl Iterator<Item = usize> {
     let per_hz = SEGMENT as f64 / TICKS_HZ;
     (BAND_HZ.0 * per_hz).ceil() as usize..=(BAND_HZ.1 * per_hz).floor() as usize

@@ -74,7 +74,6 @@ pub fn runs(quick: bool) -> usize {
     2 * seeds(quick) as usize * couples().len()
 }
 
-/// All pairs, told apart.
 pub fn pairs(quick: bool, progress: &impl Progress) -> Result<Vec<Pair>, SceneError> {
     let (arm, hand) = SPEEDS[0];
     let couples = couples();
@@ -106,7 +105,6 @@ pub fn pairs(quick: bool, progress: &impl Progress) -> Result<Vec<Pair>, SceneEr
     Ok(told.map(pair).collect())
 }
 
-/// The levels of each rendering of a case.
 fn felt(case: &Case) -> Result<[Levels; RENDERINGS.len()], SceneError> {
     let said = said(&scene(case))?;
     let delay_ms = DELAY_MS * case.seed as f64;
@@ -148,7 +146,6 @@ fn mean_db(presentations: &[Levels]) -> Levels {
     })
 }
 
-/// The share of right choices between two of these levels.
 fn right(one: &Levels, other: &Levels) -> f64 {
     let heard = one.iter().zip(other);
     let difference = heard
@@ -157,7 +154,6 @@ fn right(one: &Levels, other: &Levels) -> f64 {
     cdf(difference / LIMEN_DB * PROBABLE_ERROR)
 }
 
-/// The pairs as CSV.
 pub fn csv_of(pairs: &[Pair]) -> String {
     csv(pairs.iter().flat_map(|pair| {
         let answers = RENDERINGS.iter().zip(&pair.answers);

@@ -72,9 +72,6 @@ pub enum RecordedError {
 pub struct Recorded(Measured);
 
 /// Measures the scenes of a folder's list.
-///
-/// # Errors
-/// The first that cannot be judged, before any is run.
 pub fn measure(
     scenes: &[(Entry, Scene)],
     progress: &impl Progress,
@@ -230,7 +227,6 @@ impl<'a> Take<'a> {
     }
 }
 
-/// A hand on a recording's ground.
 struct Hand {
     /// Where it begins, at [`FROM_S`]; None: it moves with the arm.
     from_mm: Option<f64>,

@@ -19,7 +19,6 @@ const GRAINS: usize = 120;
 /// Unseen surfaces of each kind.
 const UNSEEN: u64 = 6;
 
-/// A surface.
 #[derive(Clone, Debug)]
 pub struct Ground {
     pub name: String,
@@ -31,7 +30,6 @@ pub struct Ground {
     partials: [(f64, f64); PARTIALS],
     /// RMS of the grain, the fundamental's amplitude being 1; flat in octaves from 0.25 to 2 waves a mm.
     grain: f64,
-    /// The grain's.
     seed: u64,
 }
 
@@ -98,7 +96,6 @@ fn ridges(share: f64) -> [(f64, f64); PARTIALS] {
     })
 }
 
-/// A sine.
 pub fn sine(grain: f64) -> Ground {
     let (name, family) = if grain > 0.0 {
         ("rough sine", "rough")

@@ -4,7 +4,6 @@ use super::{GOAL_MS, Row};
 use crate::output::plot::palette::{BLUE, INK, VERMILION};
 use crate::output::plot::{Axis, Key, Mark, Panel, Shape, Stroke, Symbol, in_threes};
 
-/// Bars of the histogram.
 const BARS: usize = 80;
 /// Jitters that may be shown on either side, and the distance of ticks, in µs.
 const SIDES_US: [(f64, f64); 6] = [

@@ -15,7 +15,6 @@ const PROFILES: [(&str, Symbol, &str); 2] = [
 ];
 const BOUND: Stroke = Stroke::new(INK, 1.2).dashed("6 4");
 
-/// The estimator's error over the Cramér–Rao bound, over frequency.
 pub fn draw(rows: &[Row]) -> String {
     let note = "The default estimator’s RMS error over the Cramér–Rao bound for the 8 λ that it fits; steady \
          speed, 20 dB, a minute or more a mark.";

@@ -8,7 +8,6 @@ use serde_json::ser::Formatter;
 /// the list of scenes, and the counters of one end.
 const DEEPEST: usize = 3;
 
-/// Where the writing is.
 #[derive(Debug, Default)]
 pub struct Lines {
     depth: usize,

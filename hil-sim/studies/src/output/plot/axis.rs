@@ -2,14 +2,11 @@
 
 use std::ops::Range;
 
-/// An axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// The quantity and its unit; nothing if the title says it.
     pub label: String,
-    /// The value at its beginning.
     pub low: f64,
-    /// The value at its end.
     pub high: f64,
     /// Whether equal ratios, and not equal differences, are equally long.
     pub logarithmic: bool,

@@ -88,7 +88,6 @@ impl Anchor {
     }
 }
 
-/// How text looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Font {
     /// Height of a line without leading, in the picture's units.

@@ -9,21 +9,16 @@ use crate::output::plot::palette::Colour;
 /// Something on a panel. A point is a value of x and one of y.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {
-    /// Through points.
     Line(Stroke, Vec<Point>),
-    /// Separate lines.
     Segments(Stroke, Vec<(Point, Point)>),
     /// Dots without an edge, of the stroke's width.
     Dots(Stroke, Vec<Point>),
-    /// A symbol at each point.
     Symbols(Symbol, Vec<Point>),
-    /// A ring around a point.
     Ring(Stroke, Point),
     /// Rectangles: stretches of x and of y.
     Bars(Colour, Vec<(Range<f64>, Range<f64>)>),
     /// Stretches of x over the whole height, behind the grid.
     Shade(Colour, Vec<Range<f64>>),
-    /// The whole panel in cells.
     Cells(Cells),
     /// A line across, with words on it.
     Level(f64, String),
@@ -39,7 +34,6 @@ pub struct Cells {
     pub columns: usize,
     /// Each cell's fill by its place in `fills`: row by row, from the bottom up.
     pub cells: Vec<Option<usize>>,
-    /// Fills, as SVG has them.
     pub fills: Vec<String>,
 }
 

@@ -23,9 +23,7 @@ const LEGEND_GAP: f64 = 18.0;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Key {
     Symbol(Symbol),
-    /// A piece of a line.
     Line(Stroke),
-    /// A box of a fill, as SVG has it.
     Fill(String),
 }
 
@@ -76,7 +74,6 @@ fn least_room(panel: &Panel) -> Room {
     }
 }
 
-/// Words, legends and panels, one below the other.
 #[derive(Clone, Debug)]
 pub struct Page {
     svg: Svg,
@@ -98,7 +95,6 @@ impl Page {
         self.paragraph(&Font::new(15.0).bold(), 22.0, words);
     }
 
-    /// Words about the whole page.
     pub fn note(&mut self, words: &str) {
         self.paragraph(&Font::new(NOTE_SIZE).soft(), NOTE_LINE, words);
     }

@@ -6,9 +6,7 @@ use std::fmt::Write;
 /// A colour by its role: drawn as `light`, shown as `dark` where the reader prefers that.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour {
-    /// The style sheet's variable.
     pub name: &'static str,
-    /// As drawn, `#rrggbb`.
     pub light: &'static str,
     dark: &'static str,
 }

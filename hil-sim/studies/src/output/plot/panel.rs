@@ -12,34 +12,25 @@ use crate::output::plot::palette::{Colour, GRID, INK, SOFT};
 /// How far to the left of its frame a title begins, and a label of x may.
 const OUTDENT: f64 = 8.0;
 
-/// A title, two axes, and marks between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// What is shown, above it; nothing if a heading says it.
     pub title: String,
-    /// From left to right.
     pub x: Axis,
-    /// From the bottom up.
     pub y: Axis,
-    /// In the order in which they are drawn.
     pub marks: Vec<Mark>,
 }
 
 /// The room that a panel's words take around its axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Room {
-    /// For the words of y.
     pub left: f64,
-    /// For the title.
     pub above: f64,
-    /// For what a label of x reaches beyond it.
     pub right: f64,
-    /// For the words of x.
     pub below: f64,
 }
 
 impl Room {
-    /// What is enough for both.
     pub fn max(self, other: Self) -> Self {
         Self {
             left: self.left.max(other.left),
@@ -60,7 +51,6 @@ impl Panel {
         }
     }
 
-    /// The same with more marks.
     pub fn with(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         self.marks.extend(marks);
         self
@@ -136,7 +126,6 @@ fn title_font(size: f64) -> Font {
     Font::new(size + 1.0).bold()
 }
 
-/// A panel in its place.
 struct OnPage<'a> {
     panel: &'a Panel,
     frame: &'a Frame,
@@ -269,7 +258,6 @@ impl OnPage<'_> {
         }
     }
 
-    /// Words that stay within the panel.
     fn words(&self, svg: &mut Svg, font: &Font, (x, baseline): Point, words: &str) {
         let width = font.width(words);
         let before = font.anchor.told().1 * width;

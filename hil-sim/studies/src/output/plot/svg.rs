@@ -9,7 +9,6 @@ use crate::output::plot::palette::{Colour, PAPER};
 /// A point of a picture: right and down from its upper left corner.
 pub type Point = (f64, f64);
 
-/// What lines look like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     pub colour: Colour,
@@ -19,7 +18,6 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// A line without gaps.
     pub const fn new(colour: Colour, width: f64) -> Self {
         Self {
             colour,
@@ -28,7 +26,6 @@ impl Stroke {
         }
     }
 
-    /// The same with dashes.
     pub const fn dashed(self, dash: &'static str) -> Self {
         Self { dash, ..self }
     }
@@ -45,20 +42,15 @@ impl Stroke {
     }
 }
 
-/// Shapes of symbols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     Circle,
     Square,
-    /// A triangle that points upwards.
     Up,
-    /// A triangle that points downwards.
     Down,
-    /// A square on its corner.
     Diamond,
 }
 
-/// What a measured point looks like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symbol {
     pub colour: Colour,
@@ -70,7 +62,6 @@ pub struct Symbol {
 }
 
 impl Symbol {
-    /// A full symbol.
     pub const fn new(colour: Colour, shape: Shape) -> Self {
         Self {
             colour,
@@ -80,18 +71,15 @@ impl Symbol {
         }
     }
 
-    /// The same, hollow or not.
     pub const fn hollow(self, hollow: bool) -> Self {
         Self { hollow, ..self }
     }
 
-    /// The same, so opaque.
     pub const fn faded(self, opacity: f64) -> Self {
         Self { opacity, ..self }
     }
 }
 
-/// A rectangle of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame {
     pub left: f64,
@@ -117,7 +105,6 @@ pub struct Svg {
 }
 
 impl Svg {
-    /// A line of text.
     pub fn text(&mut self, (x, y): Point, font: &Font, words: &str) {
         self.words(&format!("x=\"{x:.1}\" y=\"{y:.1}\""), font, words);
     }
@@ -133,7 +120,6 @@ impl Svg {
         self.words(&place, font, words);
     }
 
-    /// A line of text that reads upwards.
     pub fn text_upwards(&mut self, (x, y): Point, font: &Font, words: &str) {
         let place = format!("transform=\"translate({x:.1} {y:.1}) rotate(-90)\"");
         self.words(&place, font, words);
@@ -156,7 +142,6 @@ impl Svg {
         );
     }
 
-    /// A line through points.
     pub fn line(&mut self, stroke: &Stroke, points: &[Point]) {
         let mut path = String::new();
         for (index, (x, y)) in points.iter().enumerate() {
@@ -168,7 +153,6 @@ impl Svg {
         );
     }
 
-    /// Separate lines from one point to another each.
     pub fn segments(
         &mut self,
         stroke: &Stroke,
@@ -211,7 +195,6 @@ impl Svg {
         self.path(&path, &format!("fill=\"{fill}\""));
     }
 
-    /// A symbol around a point.
     pub fn symbol(&mut self, (x, y): Point, symbol: &Symbol) {
         let shape = match symbol.shape {
             Shape::Circle => format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\""),
@@ -232,7 +215,6 @@ impl Svg {
         );
     }
 
-    /// A ring around a point.
     pub fn ring(&mut self, (x, y): Point, stroke: &Stroke) {
         let _ = writeln!(
             self.elements,
@@ -249,7 +231,6 @@ impl Svg {
         let _ = writeln!(self.elements, "<path {attributes} d=\"{commands}\"/>");
     }
 
-    /// A group of elements, each of which is drawn by `inner`.
     pub fn group(&mut self, attributes: &str, inner: impl FnOnce(&mut Self)) {
         let _ = writeln!(self.elements, "<g {attributes}>");
         inner(self);

@@ -30,7 +30,6 @@ const HELD_S: f64 = 0.049;
 /// A difference between hand and arm worth a line of its own.
 const APART_MM: f64 = 0.1;
 
-/// All charts of a run, in order.
 pub fn figures(chapter: &Chapter) -> [Figure; 5] {
     let Chapter {
         truth, recording, ..
@@ -183,7 +182,6 @@ fn velocity(truth: &Truth, recording: &Recording) -> Figure {
     }
 }
 
-/// Some actuators' voltages, one above the other.
 fn voltages(truth: &Truth, recording: &Recording) -> Figure {
     let (shown, title): (&[usize], _) = match truth.display.mode {
         Mode::Uniform => (&UNIFORM, "Voltages of three actuators, all in phase"),
@@ -219,7 +217,6 @@ fn voltages(truth: &Truth, recording: &Recording) -> Figure {
     }
 }
 
-/// The time of the whole run.
 fn whole(recording: &Recording) -> Axis {
     Axis::round("time in s", 0.0..recording.duration_s)
 }

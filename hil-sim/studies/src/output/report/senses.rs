@@ -64,12 +64,10 @@ pub fn figure(chapter: &Chapter) -> Figure {
     }
 }
 
-/// The height of a gauge's strip: the first on top.
 fn lane(gauge: usize) -> f64 {
     (GAUGES - 1 - gauge) as f64
 }
 
-/// The place in [`OF_CONTACT`].
 fn of_contact(contact: Contact) -> Option<usize> {
     match contact {
         Contact::Unknown => None,
@@ -79,7 +77,6 @@ fn of_contact(contact: Contact) -> Option<usize> {
     }
 }
 
-/// The place in [`OF_GAUGES`].
 fn of_gauge(estimate: &JudgedEstimate, gauge: usize) -> usize {
     let takes_part = estimate.gauges_used >> gauge & 1 == 1;
     match estimate.health[gauge] {

@@ -20,7 +20,6 @@ fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
     })
 }
 
-/// A share in percent, or a dash.
 fn percent(share: Option<f64>, decimals: usize) -> String {
     number(share.map(|share| 100.0 * share), decimals, " %")
 }
@@ -41,7 +40,6 @@ fn heads(heads: &[&str]) -> String {
         .collect()
 }
 
-/// One line per scene, each leading to its chapter.
 pub fn index(chapters: &[Chapter]) -> String {
     let line = |(at, chapter): (usize, &Chapter)| {
         let Chapter {
@@ -203,7 +201,6 @@ fn facts(caption: &str, facts: &[(&str, String)]) -> String {
     format!("<table><caption>{caption}</caption><tbody>\n{rows}</tbody></table>\n")
 }
 
-/// The counters of both ends.
 pub fn counters(chapter: &Chapter) -> String {
     let ends = [
         ("sensor", "Sensor board", chapter.recording.sensor_status),
@@ -265,7 +262,6 @@ fn fields(counters: &impl Serialize) -> Vec<(String, String)> {
     fields.into_iter().map(field).collect()
 }
 
-/// A line for each fault; nothing if there are none.
 pub fn faults(findings: &[Finding]) -> String {
     if findings.is_empty() {
         return String::new();
@@ -309,7 +305,6 @@ pub fn faults(findings: &[Finding]) -> String {
     )
 }
 
-/// The first lines of the boards' log.
 pub fn log(chapter: &Chapter) -> String {
     let lines = &chapter.recording.log;
     if lines.is_empty() {

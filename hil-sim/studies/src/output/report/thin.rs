@@ -1,8 +1,6 @@
 //! Fewer points where nobody could see them all.
 
-/// Points that a line on a chart is worth, at most.
 pub const LINE_POINTS: usize = 1_500;
-/// Dots that a chart is worth, at most.
 pub const DOTS: usize = 800;
 
 /// Every nth of the items, n as small as leaves no more than `most`.
@@ -11,7 +9,6 @@ pub fn thin<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     items.iter().copied().step_by(every).collect()
 }
 
-/// The n of [`thin`].
 pub fn stride(length: usize, most: usize) -> usize {
     length.div_ceil(most).max(1)
 }
