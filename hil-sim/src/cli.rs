@@ -7,6 +7,7 @@ use std::thread;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim_boards::{Firmware, FirmwareError, Firmwares};
+use hil_sim_core::run::batch;
 use hil_sim_core::run::recording::Engine;
 use hil_sim_studies::bench::Bench;
 use hil_sim_studies::study::number;
@@ -209,6 +210,24 @@ fn threads(jobs: usize) -> NonZero<usize> {
     NonZero::new(jobs)
         .or_else(|| thread::available_parallelism().ok())
         .unwrap_or(NonZero::<usize>::MIN)
+}
+
+/// What `work` makes of each of these, in their order, so many at a time and under a bar; or its first error.
+fn under_bar<I: Sync, O: Send, E: Send>(
+    inputs: &[I],
+    threads: NonZero<usize>,
+    things: &str,
+    work: impl Fn(&I) -> Result<O, E> + Sync,
+) -> Result<Vec<O>, E> {
+    let bar = progress(inputs.len() as u64, things);
+    let mut made = Vec::new();
+    batch::in_order(inputs, threads, work, |_, one| {
+        made.push(one?);
+        bar.inc(1);
+        Ok(())
+    })?;
+    bar.finish_and_clear();
+    Ok(made)
 }
 
 /// A bar for so many things, on standard error; none if that is not a terminal.

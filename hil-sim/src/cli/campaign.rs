@@ -5,8 +5,6 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::bail;
-use hil_sim_boards::ElfError;
-use hil_sim_core::run::batch;
 use hil_sim_core::scene::fault::Kind;
 use hil_sim_studies::campaign::{Plan, Shift, Tally, Trial, unmet};
 use hil_sim_studies::display::rendering_of_word;
@@ -15,7 +13,7 @@ use protocol::Rendering;
 
 use super::files::Results;
 use super::say::say;
-use super::{Elves, number, progress, status, threads};
+use super::{Elves, number, status, threads, under_bar};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Campaign {
@@ -58,16 +56,9 @@ impl Campaign {
 
         let shifts = plan.shifts();
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
-        let bar = progress(shifts.len() as u64, "scenes");
         let started = Instant::now();
-        let mut trials = Vec::new();
         let work = |shift: &Shift| shift.run(&firmwares);
-        batch::in_order(&shifts, threads(self.jobs.max(1)), work, |_, tried| {
-            trials.extend(tried?);
-            bar.inc(1);
-            Ok::<_, ElfError>(())
-        })?;
-        bar.finish_and_clear();
+        let trials = under_bar(&shifts, threads(self.jobs.max(1)), "scenes", work)?.concat();
         let tallies = plan.kinds.iter().map(|&kind| Tally::of(kind, &trials));
         let tallies: Vec<Tally> = tallies.collect();
 

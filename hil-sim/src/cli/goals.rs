@@ -5,14 +5,13 @@ use std::process::ExitCode;
 
 use hil_sim_core::judge::Summary;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
-use hil_sim_core::run::batch::on_all_cores;
 use hil_sim_core::scene::Scene;
 use hil_sim_studies::bench::Bench;
 use hil_sim_studies::estimators::family::{self, Family};
 use hil_sim_studies::study::{Record, Table, short};
 
 use super::say::say;
-use super::{Elves, EngineName, number, progress, status};
+use super::{Elves, EngineName, number, status, threads, under_bar};
 
 /// Every family of scenes, judged by what its scenes expect, as a table
 #[derive(Debug, clap::Args)]
@@ -63,17 +62,13 @@ impl Goals {
 
 /// Runs the scenes, on all cores: an emulated pair keeps two of them half busy.
 fn run(scenes: &[&Scene], bench: &Bench) -> anyhow::Result<Vec<Judged>> {
-    let bar = progress(scenes.len() as u64, "scenes");
-    let judged = on_all_cores(scenes, |&scene| {
+    under_bar(scenes, threads(0), "scenes", |&scene| {
         let judgement = match bench {
             Bench::Native => Judgement::of(scene, false)?,
             Bench::Elf(_) => Outcome::new(scene.clone(), bench.run(scene)?).judgement(false),
         };
-        bar.inc(1);
         Ok((judgement.verdict.summary, judgement.unmet))
-    });
-    bar.finish_and_clear();
-    judged
+    })
 }
 
 fn row(family: &Family, summaries: &[Summary]) -> Record {

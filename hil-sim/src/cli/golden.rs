@@ -5,13 +5,12 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use hil_sim_core::run::batch;
 use hil_sim_studies::output::golden::{Comparison, Golden, complaint};
 
 use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
-use super::{progress, status};
+use super::{status, under_bar};
 
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Command {
@@ -136,20 +135,19 @@ impl What {
     fn run(&self, scenes: &[Loaded], repeat: u32) -> anyhow::Result<Vec<Seen>> {
         let ready = self.way.ready()?;
         let inputs: Vec<usize> = (0..repeat).flat_map(|_| 0..scenes.len()).collect();
-        let bar = progress(inputs.len() as u64, "runs");
+        let hash = |&index: &usize| {
+            let Loaded { path, scene } = &scenes[index];
+            let hash = ready.hash(scene);
+            hash.with_context(|| path.display().to_string())
+        };
+        let hashes = under_bar(&inputs, self.way.threads(), "runs", hash)?;
         let mut seen = vec![Seen::new(); scenes.len()];
-        let work = |&index: &usize| ready.hash(&scenes[index].scene);
-        batch::in_order(&inputs, self.way.threads(), work, |at, hash| {
-            let hash = hash.with_context(|| scenes[inputs[at]].path.display().to_string())?;
-            bar.inc(1);
-            let hashes = &mut seen[inputs[at]];
-            match hashes.iter_mut().find(|(other, _)| *other == hash) {
+        for (index, hash) in inputs.into_iter().zip(hashes) {
+            match seen[index].iter_mut().find(|(other, _)| *other == hash) {
                 Some((_, count)) => *count += 1,
-                None => hashes.push((hash, 1)),
+                None => seen[index].push((hash, 1)),
             }
-            anyhow::Ok(())
-        })?;
-        bar.finish_and_clear();
+        }
         Ok(seen)
     }
 }

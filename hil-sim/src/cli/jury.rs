@@ -8,7 +8,6 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::ValueEnum;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
-use hil_sim_core::run::batch;
 use hil_sim_core::scene::{Estimator, Scene};
 use hil_sim_studies::bench::Bench;
 use hil_sim_studies::jury::counts::Counts;
@@ -26,7 +25,7 @@ use serde::Serialize;
 use super::files::Results;
 use super::run_options;
 use super::say::say;
-use super::{Elves, EngineName, progress, threads};
+use super::{Elves, EngineName, threads, under_bar};
 
 /// Surfaces named as the worst.
 const WORST: usize = 8;
@@ -169,19 +168,11 @@ impl Jury {
     fn find_weights(&self) -> anyhow::Result<()> {
         let seeds = self.seeds();
         let purpose = seeds.purpose()?.name();
-        let bar = progress(self.surfaces, "surfaces");
+        let cases_of = |&seed: &u64| Ok(Cases::of(&Trial::draw(seed).record()));
         let mut cases = Cases::default();
-        let Ok(()) = batch::in_order(
-            &seeds.all(),
-            threads(self.jobs),
-            |&seed| Cases::of(&Trial::draw(seed).record()),
-            |_, of_one| {
-                bar.inc(1);
-                cases.extend(of_one);
-                Ok::<_, Infallible>(())
-            },
-        );
-        bar.finish_and_clear();
+        for of_one in self.of_surfaces(cases_of) {
+            cases.extend(of_one);
+        }
         let last = self.seed.saturating_add(self.surfaces - 1);
         say!("seeds {}–{last} ({purpose})", self.seed);
         for (name, weights) in [
@@ -199,6 +190,12 @@ impl Jury {
             first: self.seed,
             count: self.surfaces,
         }
+    }
+
+    /// What `work` makes of each seed's surface.
+    fn of_surfaces<O: Send>(&self, work: impl Fn(&u64) -> Result<O, Infallible> + Sync) -> Vec<O> {
+        let Ok(made) = under_bar(&self.seeds().all(), threads(self.jobs), "surfaces", work);
+        made
     }
 
     fn judge_strangers(&self, json: Option<Results>) -> anyhow::Result<()> {
@@ -224,30 +221,18 @@ impl Jury {
         }
         .method_name();
 
-        let bar = progress(self.surfaces, "surfaces");
-        let mut trials = Vec::new();
-        let work = |&seed: &u64| {
+        let trials = self.of_surfaces(|&seed| {
             let trial = Trial::draw(seed);
-            (trial, play(&trial.record(), sensor, &settings))
-        };
-        let Ok(()) = batch::in_order(
-            &seeds.all(),
-            threads(self.jobs),
-            work,
-            |_, (trial, Played { said, felt })| {
-                bar.inc(1);
-                trials.push(Judged {
-                    seed: trial.seed,
-                    class: trial.class.name(),
-                    traits: trial.traits(),
-                    said,
-                    felt,
-                    trial,
-                });
-                Ok::<_, Infallible>(())
-            },
-        );
-        bar.finish_and_clear();
+            let Played { said, felt } = play(&trial.record(), sensor, &settings);
+            Ok(Judged {
+                seed,
+                class: trial.class.name(),
+                traits: trial.traits(),
+                said,
+                felt,
+                trial,
+            })
+        });
 
         let last = self.seed.saturating_add(self.surfaces - 1);
         say!(
@@ -296,15 +281,8 @@ impl Jury {
             }
         }
         let bench = self.engine.bench(&self.elves)?;
-        let bar = progress(scenes.len() as u64, "scenes");
         let work = |(entry, scene): &(Entry, Scene)| judge_scene(&bench, entry, scene);
-        let mut judged = Vec::new();
-        batch::in_order(&scenes, threads(self.jobs), work, |_, result| {
-            bar.inc(1);
-            judged.push(result?);
-            anyhow::Ok(())
-        })?;
-        bar.finish_and_clear();
+        let judged = under_bar(&scenes, threads(self.jobs), "scenes", work)?;
 
         let engine = self.engine.engine().name();
         say!(

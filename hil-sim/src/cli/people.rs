@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use hil_sim_studies::psychophysics::{Friction, Plan, Study, csvs, jobs, json, run, text};
+use hil_sim_studies::psychophysics::{FRICTIONS, Plan, Study, csvs, jobs, json, run, text};
 
 use super::files::write_all;
 use super::say::{self, say};
@@ -25,7 +25,7 @@ pub(super) struct People {
     /// How sticky the specimens of Table III are. With friction the fingertip sticks and slips, and its
     /// tangential channel is fitted
     #[arg(long, default_value = "none", value_parser = frictions())]
-    friction: Friction,
+    friction: &'static str,
     /// Where to write a CSV for each table
     #[arg(long, value_name = "FOLDER", default_value = "target/people")]
     out: PathBuf,
@@ -36,12 +36,9 @@ pub(super) struct People {
     elves: Elves,
 }
 
-fn frictions() -> impl TypedValueParser<Value = Friction> {
-    PossibleValuesParser::new(Friction::ALL.map(Friction::name)).map(|name| {
-        let mut all = Friction::ALL.into_iter();
-        all.find(|friction| friction.name() == name)
-            .expect("only these are taken")
-    })
+fn frictions() -> impl TypedValueParser<Value = &'static str> {
+    let named = |name: String| FRICTIONS.into_iter().find(|of| *of == name);
+    PossibleValuesParser::new(FRICTIONS).map(move |name| named(name).expect("one of them"))
 }
 
 impl People {

@@ -16,7 +16,7 @@
 //! the paper's subjects', and what experiments of the paper's size can tell at all. It proves nothing on
 //! people: an observer who was given Table II's limens has them, and one who integrates, tires, learns or
 //! attends otherwise would answer otherwise. Whether the fingertip on the specimen sticks and slips, which the
-//! paper holds responsible for part of its errors, is a choice ([`Friction`]), and how much it does a
+//! paper holds responsible for part of its errors, is a choice ([`FRICTIONS`]), and how much it does a
 //! guess.
 
 mod given;
@@ -40,7 +40,7 @@ mod thurstone;
 
 pub use job::{Job, run};
 pub use record::{csvs, json};
-pub use study::{Friction, Plan, Silent, Study, jobs};
+pub use study::{FRICTIONS, Plan, Silent, Study, jobs};
 pub use tables::text;
 
 pub(crate) use hand::{FREQUENCY_HZ, PEAK_MM_S};

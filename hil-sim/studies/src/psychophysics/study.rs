@@ -41,7 +41,7 @@ const SALTS: [u64; 5] = [0x11 << 32, 0x22 << 32, 0x33 << 32, 0x44 << 32, 0x55 <<
 /// Somebody whose wavelengths are compared: an estimator over specimens of some friction.
 struct Contender {
     method: Method,
-    friction: Friction,
+    friction: &'static str,
     name: &'static str,
 }
 
@@ -58,8 +58,8 @@ fn contenders(plan: &Plan) -> Vec<Contender> {
         contender(Method::Counting, plan.friction, "counting"),
         contender(default, plan.friction, "default"),
     ];
-    if plan.friction == Friction::None {
-        let sticks = contender(Method::Counting, Friction::Mild, "counting-mild");
+    if plan.friction == FRICTIONS[0] {
+        let sticks = contender(Method::Counting, FRICTIONS[1], "counting-mild");
         contenders.insert(1, sticks);
     }
     contenders
@@ -74,35 +74,13 @@ pub struct Plan {
     pub trials: u32,
     /// Repetitions of each experiment, for intervals.
     pub repetitions: u32,
-    /// How sticky the specimens of Table III are.
-    pub friction: Friction,
+    /// How sticky the specimens of Table III are, one of [`FRICTIONS`].
+    pub friction: &'static str,
 }
 
-/// How sticky specimens are: the `friction` of a scene's contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Friction {
-    /// The fingertip slides.
-    #[default]
-    None,
-    /// It sticks and slips a little. The tangential channel is then fitted, which the default estimator uses.
-    Mild,
-    /// It sticks and slips; the same.
-    Strong,
-}
-
-impl Friction {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::None, Self::Mild, Self::Strong];
-
-    /// As scenes have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Friction::None => "none",
-            Friction::Mild => "mild",
-            Friction::Strong => "strong",
-        }
-    }
-}
+/// How sticky specimens may be: the `friction` of a scene's contact. From the second on the fingertip sticks and
+/// slips, and the tangential channel is fitted, which the default estimator uses.
+pub const FRICTIONS: [&str; 3] = ["none", "mild", "strong"];
 
 impl Default for Plan {
     /// As big as the paper's, on specimens that do not stick.
@@ -111,7 +89,7 @@ impl Default for Plan {
             seed: 1,
             trials: TRIALS,
             repetitions: REPETITIONS,
-            friction: Friction::None,
+            friction: FRICTIONS[0],
         }
     }
 }
@@ -247,8 +225,8 @@ fn courses() -> [StimulusSequence; 2] {
 
 /// A specimen under a hand that strokes to and fro; the same hand and noise for every estimator.
 fn rubbed(wavelength_mm: f64, contender: &Contender, plan: &Plan) -> Scene {
-    let friction = contender.friction.name();
-    let tangential = contender.friction != Friction::None;
+    let friction = contender.friction;
+    let tangential = friction != FRICTIONS[0];
     let text = format!(
         "name = \"people-{}-{wavelength_mm}mm\"\nseed = {}\nduration_s = {RUB_S}\n\
          [surface]\nspecimens = [{{ wavelength_mm = {wavelength_mm:.1} }}]\n\
@@ -318,7 +296,7 @@ impl Study {
             seed: plan.seed,
             trials: plan.trials,
             repetitions: plan.repetitions,
-            friction: plan.friction.name(),
+            friction: plan.friction,
             glimpse_s: GLIMPSE_S,
             limens: columns(plan, &given),
             given,
@@ -460,7 +438,7 @@ mod tests {
         seed: 1,
         trials: 10,
         repetitions: 200,
-        friction: Friction::None,
+        friction: FRICTIONS[0],
     };
 
     fn study() -> Study {
