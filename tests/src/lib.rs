@@ -16,6 +16,7 @@ pub mod recorded;
 pub mod relay;
 pub mod run;
 pub mod sensing;
+pub mod stack;
 pub mod swift_board;
 pub mod terminal;
 pub mod utterance;

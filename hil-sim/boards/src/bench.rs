@@ -21,6 +21,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use protocol::Role;
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 pub use command::{Command, NoCommand};
 pub use pace::Pace;
@@ -45,7 +46,8 @@ const LINGERS: Duration = Duration::from_millis(500);
 const LOOKS: Duration = Duration::from_millis(5);
 
 /// One of a bench's ports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Display, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum PortName {
     /// The sensor board's console.
     SensorConsole,
@@ -63,25 +65,11 @@ pub enum PortName {
 
 impl PortName {
     /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::SensorConsole,
-        Self::DisplayConsole,
-        Self::SensorLink,
-        Self::DisplayLink,
-        Self::SensorRtt,
-        Self::DisplayRtt,
-    ];
+    pub const ALL: [Self; 6] = *Self::VARIANTS.as_array().unwrap();
 
     /// Its name in the bench's folder.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SensorConsole => "sensor-console",
-            Self::DisplayConsole => "display-console",
-            Self::SensorLink => "sensor-link",
-            Self::DisplayLink => "display-link",
-            Self::SensorRtt => "sensor-rtt",
-            Self::DisplayRtt => "display-rtt",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// Whether it has a baud rate.
@@ -92,12 +80,6 @@ impl PortName {
     /// Whether it is there only if the boards are not joined.
     const fn is_link(self) -> bool {
         matches!(self, Self::SensorLink | Self::DisplayLink)
-    }
-}
-
-impl std::fmt::Display for PortName {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str(self.name())
     }
 }
 

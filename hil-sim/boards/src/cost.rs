@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rigless::emulator::{
-    self, Access, AccessKind, Driver, Hit, HitKind, Host, Settled, Start, Stop, Watch,
+    Access, AccessKind, Driver, Hit, HitKind, Host, Settled, Start, Stop, Watch,
 };
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::time::VirtualNanos;
 
+use super::ElfError;
+use super::firmware::read_elf;
 use super::nucleo::{Nucleo, Pins};
-use super::{ElfError, FirmwareError};
 use crate::cycles::{CycleMeter, Estimate};
 use crate::instructions::instructions;
 
@@ -25,11 +26,18 @@ const DONE: u64 = 999;
 /// Virtual time after which a firmware that has not come to its end is given up.
 const LIMIT: VirtualNanos = VirtualNanos(60_000_000_000);
 
+/// What is said of a board without a role.
+pub(super) const BOARD: &str = "bare";
+
 /// Nothing on the pins.
 #[derive(Debug)]
 pub(super) struct Bare;
 
 impl Pins for Bare {
+    type Records = ();
+
+    fn take_records(&mut self, _part: &mut Stm32f427) {}
+
     fn on_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) -> u16 {
         0
     }
@@ -177,34 +185,24 @@ fn run(
     package: &'static str,
     metered_from: Option<u64>,
 ) -> Result<BTreeMap<u64, Taken>, ElfError> {
-    let board = |reason: String| ElfError::Board {
-        board: "bare",
-        reason,
-    };
-    let elf = std::fs::read(path).map_err(|source| {
-        ElfError::Firmware(FirmwareError::Missing {
-            path: path.to_owned(),
-            package,
-            source,
-        })
-    })?;
+    let elf = read_elf(path, package)?;
     let mut marks = Marks::default();
     if let Some(from) = metered_from {
-        let code = instructions(&elf)
-            .ok_or_else(|| board("its code can't be read: it has no mapping symbols".to_owned()))?;
+        let code = instructions(&elf).ok_or("its code can't be read: it has no mapping symbols");
+        let code = code.map_err(ElfError::board(BOARD))?;
         marks.meter = Some(CycleMeter::new(&code, Estimate::Most));
         marks.metered_from = from;
         marks.code = code.into_iter().map(|(address, _)| address).collect();
     }
-    let image = Image::new(path, elf, None).map_err(|error| board(error.to_string()))?;
-    let nucleo = Nucleo::new(Bare, |_| {}).map_err(|error| board(error.to_string()))?;
-    let session =
-        Session::new(Box::new(nucleo), 0, LIMIT).map_err(|error| board(error.to_string()))?;
-    let finished = emulator::run(session, &Start::new(&[image]), marks)
-        .map_err(|error| board(error.to_string()))?;
+    let image = Image::new(path, elf, None).map_err(ElfError::board(BOARD))?;
+    let board = Nucleo::new(Bare, |_| {}).map_err(ElfError::board(BOARD))?;
+    let finished = board
+        .run(&Start::new(&[image]), LIMIT, marks)
+        .map_err(ElfError::board(BOARD))?;
     if finished.driver.done {
         Ok(finished.driver.taken)
     } else {
-        Err(board(format!("{} never came to its end", path.display())))
+        let never = format!("{} never came to its end", path.display());
+        Err(ElfError::board(BOARD)(never))
     }
 }

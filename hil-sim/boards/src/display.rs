@@ -187,13 +187,6 @@ impl DisplayPins {
         BUTTON.drive(part, 0, Some(Level::Low));
     }
 
-    /// What the run leaves, once it is over.
-    pub fn leave(&mut self, part: &mut Stm32f427) -> DisplayRecords {
-        let errors = |chip| on_bus(part, chip).chip.counters().faults;
-        self.records.dac_frame_errors = (0..CHIPS).map(errors).sum();
-        std::mem::take(&mut self.records)
-    }
-
     /// Whether CLR is low.
     pub fn is_clear(&self) -> bool {
         self.clear != Some(Level::High)
@@ -211,70 +204,6 @@ impl DisplayPins {
         self.follow_load(part, at_ns);
     }
 
-    /// Puts a wire of these pins wrong, or right.
-    pub fn miswire(&mut self, part: &mut Stm32f427, at_ns: u64, mistake: Mistake, wrong: bool) {
-        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
-        match mistake {
-            Mistake::HandSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
-            Mistake::HandOpen => self.encoder = or_sound(EncoderWires::Open),
-            Mistake::StopOpen => self.set_stop_button(part, at_ns, wrong),
-            Mistake::LoadHigh => self.set_load_stuck(part, at_ns, wrong.then_some(Level::High)),
-            Mistake::ClearLow => {
-                self.clear_stuck = wrong;
-                self.follow_clear(part, at_ns);
-            }
-            Mistake::AlarmLow => {
-                self.alarm_stuck = wrong;
-                self.follow_alarm(part, at_ns);
-            }
-            Mistake::SelectOpen => {
-                self.with_chip(part, at_ns, CHIP, |dac| dac.defects.deaf = wrong);
-            }
-            Mistake::SdiOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdi_open = wrong),
-            Mistake::SdoOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdo_open = wrong),
-            _ => {}
-        }
-    }
-
-    /// `fault` of a scene begins, or ends: what of it is at the pins.
-    pub fn break_by(&mut self, part: &mut Stm32f427, fault: &Fault, begins: bool, at_ns: u64) {
-        let chip = fault.values[0] as usize;
-        match fault.kind {
-            Kind::EmergencyStop => self.set_stop_button(part, at_ns, begins),
-            Kind::LdacStuck => {
-                self.set_load_stuck(part, at_ns, begins.then_some(Level::High));
-            }
-            Kind::ClearStuckLow => {
-                self.clear_stuck = begins;
-                self.follow_clear(part, at_ns);
-            }
-            Kind::DacIgnoresWords => {
-                self.with_chip(part, at_ns, chip, |dac| dac.defects.deaf = begins);
-            }
-            Kind::DacAlarm => {
-                self.with_chip(part, at_ns, chip, |dac| dac.defects.overheated = begins);
-            }
-            Kind::DacPowerLost if begins => {
-                self.with_chip(part, at_ns, chip, Dac81416::reset);
-            }
-            // With all power gone nothing that was broken is so any more: the next fault is another
-            // day's.
-            Kind::PowerCycle if begins => {
-                self.clear_stuck = false;
-                self.set_load_stuck(part, at_ns, None);
-                self.set_stop_button(part, at_ns, false);
-                for chip in 0..CHIPS {
-                    self.with_chip(part, at_ns, chip, |dac| {
-                        dac.defects = Defects::default();
-                        dac.reset();
-                    });
-                }
-                self.follow_clear(part, at_ns);
-            }
-            _ => {}
-        }
-    }
-
     /// Does something to the `nth` chip, and lets its voltages and its alarm be seen.
     ///
     /// # Panics
@@ -290,13 +219,6 @@ impl DisplayPins {
         self.record(part, at_ns);
         self.follow_alarm(part, at_ns);
         result
-    }
-
-    /// The firmware wrote to `address`: it may have raised LDAC.
-    pub fn on_write(&mut self, part: &mut Stm32f427, address: u64, _value: u64, at_ns: u64) {
-        if (TIM3.base..TIM3.base + TIM3_SIZE).contains(&address) {
-            self.follow_load(part, at_ns);
-        }
     }
 
     /// Puts what TIM3's channel 1 says on LDAC's wire.
@@ -405,6 +327,14 @@ fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
 }
 
 impl Pins for DisplayPins {
+    type Records = DisplayRecords;
+
+    fn take_records(&mut self, part: &mut Stm32f427) -> DisplayRecords {
+        let errors = |chip| on_bus(part, chip).chip.counters().faults;
+        self.records.dac_frame_errors = (0..CHIPS).map(errors).sum();
+        std::mem::take(&mut self.records)
+    }
+
     fn on_trigger(&mut self, _part: &mut Stm32f427, at_ns: u64) -> u16 {
         let position_mm = self.world.hand_position_mm(at_ns as f64 * 1e-9);
         let counted = self.hand.counts(at_ns, encoder(position_mm));
@@ -429,5 +359,74 @@ impl Pins for DisplayPins {
     fn on_stop(&mut self, part: &mut Stm32f427, at_ns: u64) {
         self.follow_load(part, at_ns);
         self.follow_clear(part, at_ns);
+    }
+
+    fn on_write(&mut self, part: &mut Stm32f427, address: u64, _value: u64, at_ns: u64) {
+        // It may have raised LDAC.
+        if (TIM3.base..TIM3.base + TIM3_SIZE).contains(&address) {
+            self.follow_load(part, at_ns);
+        }
+    }
+
+    fn miswire(&mut self, part: &mut Stm32f427, at_ns: u64, mistake: Mistake, wrong: bool) {
+        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
+        match mistake {
+            Mistake::HandSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
+            Mistake::HandOpen => self.encoder = or_sound(EncoderWires::Open),
+            Mistake::StopOpen => self.set_stop_button(part, at_ns, wrong),
+            Mistake::LoadHigh => self.set_load_stuck(part, at_ns, wrong.then_some(Level::High)),
+            Mistake::ClearLow => {
+                self.clear_stuck = wrong;
+                self.follow_clear(part, at_ns);
+            }
+            Mistake::AlarmLow => {
+                self.alarm_stuck = wrong;
+                self.follow_alarm(part, at_ns);
+            }
+            Mistake::SelectOpen => {
+                self.with_chip(part, at_ns, CHIP, |dac| dac.defects.deaf = wrong);
+            }
+            Mistake::SdiOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdi_open = wrong),
+            Mistake::SdoOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdo_open = wrong),
+            _ => {}
+        }
+    }
+
+    fn break_by(&mut self, part: &mut Stm32f427, fault: &Fault, begins: bool, at_ns: u64) {
+        let chip = fault.values[0] as usize;
+        match fault.kind {
+            Kind::EmergencyStop => self.set_stop_button(part, at_ns, begins),
+            Kind::LdacStuck => {
+                self.set_load_stuck(part, at_ns, begins.then_some(Level::High));
+            }
+            Kind::ClearStuckLow => {
+                self.clear_stuck = begins;
+                self.follow_clear(part, at_ns);
+            }
+            Kind::DacIgnoresWords => {
+                self.with_chip(part, at_ns, chip, |dac| dac.defects.deaf = begins);
+            }
+            Kind::DacAlarm => {
+                self.with_chip(part, at_ns, chip, |dac| dac.defects.overheated = begins);
+            }
+            Kind::DacPowerLost if begins => {
+                self.with_chip(part, at_ns, chip, Dac81416::reset);
+            }
+            // With all power gone nothing that was broken is so any more: the next fault is another
+            // day's.
+            Kind::PowerCycle if begins => {
+                self.clear_stuck = false;
+                self.set_load_stuck(part, at_ns, None);
+                self.set_stop_button(part, at_ns, false);
+                for chip in 0..CHIPS {
+                    self.with_chip(part, at_ns, chip, |dac| {
+                        dac.defects = Defects::default();
+                        dac.reset();
+                    });
+                }
+                self.follow_clear(part, at_ns);
+            }
+            _ => {}
+        }
     }
 }

@@ -9,6 +9,7 @@
 //! The far end speaks through a real [`protocol::Port`]. Its first words, up to the board's answer to the
 //! configuration, go through fair weather; every estimate goes through the run's own.
 
+use std::mem;
 use std::time::Instant;
 
 use protocol::actuators::{ACTUATOR_BLOCK, ACTUATORS, Actuator, DEFAULT_ACTUATORS};
@@ -17,25 +18,21 @@ use protocol::{
     Estimate, GaugeHealth, Hello, MAX_FRAME, Message, Peer, Port, Range, Role, Safety, Status,
     Texture,
 };
-use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
-use rigless::session::Session;
-use rigless::time::VirtualNanos;
+use rigless::emulator::{Host, Settled};
 
-use super::board_pins::BoardPins;
 use super::display::DisplayPins;
+use super::lockstep::{BoardHook, Lockstep, QuantumContext};
 use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
 use super::recorder::WARM_UP_NS;
 use super::rtt::Log;
-use super::{ElfError, Firmware};
+use super::wire::TimedByte;
+use super::{ElfError, Firmware, pair, recorder};
 use hil_sim_core::link::impairments::{BYTE_NS, Impairments};
 use hil_sim_core::plant::fault::hand::HandFault;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::decoder::MessageDecoder;
 use hil_sim_core::run::digest::Digest;
-use hil_sim_core::run::fault_evidence::FaultEvidence;
-use hil_sim_core::run::recording::{
-    Arrival, Arrivals, Engine, EstimateRecord, Recording, TickRecord,
-};
+use hil_sim_core::run::recording::{Arrival, Engine, EstimateRecord, Recording, TickRecord};
 use hil_sim_core::scene::{Link, Motion, Scene};
 
 /// How often the far end looks at what it has heard and has to say.
@@ -43,8 +40,6 @@ const LOOK_NS: u64 = 1_000_000;
 const ESTIMATE_NS: u64 = 1_000_000_000 / firmware_sensor::ESTIMATE_RATE_HZ as u64;
 /// Estimates to a texture.
 const ESTIMATES_PER_TEXTURE: usize = 5;
-/// How often the log is read: well before the 1 KiB of RTT are full.
-const LOG_NS: u64 = 10_000_000;
 /// How long the far end waits for an answer before it asks again.
 const PATIENCE_NS: u64 = 50_000_000;
 /// As in the lockstep of a pair.
@@ -160,7 +155,7 @@ pub struct AloneRun {
 }
 
 /// Somebody who looks on while the board runs.
-pub(super) trait BoardHook: Send + 'static {
+pub(super) trait Watcher: Send + 'static {
     /// The run has come to an instant at which the far end is served, each millisecond.
     fn on_look(&mut self, _at_ns: u64, _host: &mut dyn Host) {}
 
@@ -168,7 +163,7 @@ pub(super) trait BoardHook: Send + 'static {
     fn on_settled(&mut self, _settled: &Settled) {}
 }
 
-impl BoardHook for () {}
+impl Watcher for () {}
 
 /// Runs `firmware` as `alone` says.
 ///
@@ -178,125 +173,70 @@ pub fn run(alone: DisplayBench, firmware: &Firmware) -> Result<AloneRun, ElfErro
     run_before(alone, firmware, ()).map(|(run, ())| run)
 }
 
-/// The same, before a witness, who is given back.
-pub(super) fn run_before<W: BoardHook>(
+/// The same, before a watcher, who is given back.
+pub(super) fn run_before<W: Watcher>(
     alone: DisplayBench,
     firmware: &Firmware,
-    witness: W,
+    watcher: W,
 ) -> Result<(AloneRun, W), ElfError> {
-    const BOARD: &str = "display";
-    let board_error = |reason: String| ElfError::Board {
-        board: BOARD,
-        reason,
-    };
-    let end_ns = (alone.duration_s * 1e9).ceil() as u64;
-    let duration_s = alone.duration_s;
-    let world = World::new(&Scene {
+    let board = Role::Display.name();
+    let scene = Scene {
         motion: alone.hand.clone(),
-        duration_s,
+        duration_s: alone.duration_s,
         ..Scene::constant(2.0, 50.0)
-    })?;
-    let board = Nucleo::new(
-        DisplayPins::new(world, HandFault::new(&[])),
-        DisplayPins::fit,
-    )
-    .map_err(|error| board_error(error.to_string()))?;
-    let images = [firmware.image.clone()];
-    let session = Session::new(
-        Box::new(board.running(&images, firmware.processor.clone())),
-        0,
-        VirtualNanos(LOOK_NS),
-    )
-    .map_err(|error| board_error(error.to_string()))?;
-    let driver = Solo {
-        far: ScriptedSensor::new(alone),
-        log: Log::find(&firmware.elf),
-        next_look_ns: LOOK_NS,
-        next_log_ns: LOG_NS,
-        end_ns,
-        warm: None,
-        witness,
     };
+    let pins = DisplayPins::new(World::new(&scene)?, HandFault::new(&[]));
+    let update_rate = alone.configuration.update_rate;
+    let far = ScriptedSensor::new(alone, Log::find(&firmware.elf), watcher);
     let started = Instant::now();
-    let mut finished = emulator::run(session, &Start::new(&images), driver)
-        .map_err(|error| board_error(error.to_string()))?;
-    let ended = Instant::now();
-    let at_ns = finished.stop.map_or(0, |stop| stop.at.0);
-    if at_ns < end_ns {
-        return Err(ElfError::Stopped {
-            board: BOARD,
-            at_s: at_ns as f64 * 1e-9,
-            duration_s,
-            reason: format!("{:?}", finished.stop),
-        });
-    }
-    if let Some(unmapped) = finished.session.unmapped().first() {
-        return Err(ElfError::Unmapped {
-            board: BOARD,
-            address: unmapped.address,
-        });
-    }
-    let resets = finished.session.resets().len();
-    let (pins, part) = finished.session.board_mut().pins();
-    let left = pins.leave(part);
-    let Solo {
-        far,
-        log,
-        warm,
-        witness,
-        ..
-    } = finished.driver;
+    let finished = pair::drive(
+        Role::Display,
+        Nucleo::new(pins, DisplayPins::fit),
+        firmware,
+        Lockstep::alone(&scene, Role::Display, &firmware.elf, LOOK_NS, far),
+        scene.duration_s,
+    )?;
+    let (left, far) = (finished.records, finished.witness);
+    let (warm_up_s, wall_s) = recorder::pace(started, far.warm, Instant::now());
+    let wrong = |reason| ElfError::Configuration { board, reason };
     let Some(configured_ns) = far.configured_ns else {
-        return Err(ElfError::Configuration {
-            board: BOARD,
-            reason: far
-                .refused
-                .unwrap_or_else(|| "it has not answered by the end: run it for longer".to_owned()),
-        });
+        let no_answer = || "it has not answered by the end: run it for longer".to_owned();
+        return Err(wrong(far.refused.unwrap_or_else(no_answer)));
     };
-    if let Some(reason) = wrong_rate(&left.ticks, far.alone.configuration.update_rate.hz()) {
-        return Err(ElfError::Configuration {
-            board: BOARD,
-            reason,
-        });
+    if let Some(reason) = wrong_rate(&left.ticks, update_rate.hz()) {
+        return Err(wrong(reason));
     }
     let mut digest = Digest::default();
     digest.outputs(&left.outputs);
-    let (begun, warm_up_s) = match warm {
-        Some(warm) => (warm, WARM_UP_NS as f64 * 1e-9),
-        None => (started, 0.0),
+    let log = far.log.map(|log| log.lines()).unwrap_or_default();
+    let mut recording = Recording {
+        warm_up_s,
+        wall_s,
+        hash: digest.finish(),
+        ticks: left.ticks,
+        estimates: far.estimates,
+        arrived: far.arrived,
+        outputs: left.outputs,
+        display_status: far.statuses.last().map(|&(_, status)| status),
+        log: log
+            .into_iter()
+            .map(|(at_ns, line)| (at_ns, board, line))
+            .collect(),
+        ..Recording::empty(Engine::Elf, scene.duration_s)
     };
-    let log = log.map(|log| log.lines()).unwrap_or_default();
+    recording.match_arrivals();
     let run = AloneRun {
+        recording,
         configured_ns,
         motions: far.motions,
-        instructions: finished.stop.map_or(0, |stop| stop.instruction_count),
-        resets,
+        instructions: finished.instructions,
+        resets: finished.resets.len(),
         clears: left.clears,
         dac_frame_errors: left.dac_frame_errors,
-        recording: Recording {
-            engine: Engine::Elf,
-            duration_s,
-            warm_up_s,
-            wall_s: (ended - begun).as_secs_f64(),
-            hash: digest.finish(),
-            signs: FaultEvidence::default(),
-            scans: Vec::new(),
-            ticks: left.ticks,
-            estimates: far.estimates,
-            arrived: far.arrived,
-            outputs: left.outputs,
-            sensor_status: None,
-            display_status: far.statuses.last().map(|&(_, status)| status),
-            log: log
-                .into_iter()
-                .map(|(at_ns, line)| (at_ns, BOARD, line))
-                .collect(),
-        },
         statuses: far.statuses,
         safety: far.safety,
     };
-    Ok((run, witness))
+    Ok((run, far.watcher))
 }
 
 /// What is wrong with the rate of the last two ticks, if it is not the one asked for.
@@ -311,7 +251,7 @@ fn wrong_rate(ticks: &[TickRecord], rate_hz: u32) -> Option<String> {
 }
 
 /// The scripted sensor, and the way from it to the board.
-struct ScriptedSensor {
+struct ScriptedSensor<W> {
     alone: DisplayBench,
     port: Port,
     weather: Impairments,
@@ -324,14 +264,19 @@ struct ScriptedSensor {
     heard: MessageDecoder,
     estimates: Vec<EstimateRecord>,
     arrived: Vec<Arrival>,
-    arrivals: Arrivals,
     statuses: Vec<(u64, Status)>,
     safety: Vec<Safety>,
     motions: u64,
+    /// What the board has said since the last look.
+    sent: Vec<u8>,
+    log: Option<Log>,
+    /// When the emulator had run for [`WARM_UP_NS`].
+    warm: Option<Instant>,
+    watcher: W,
 }
 
-impl ScriptedSensor {
-    fn new(alone: DisplayBench) -> Self {
+impl<W> ScriptedSensor<W> {
+    fn new(alone: DisplayBench, log: Option<Log>, watcher: W) -> Self {
         Self {
             weather: Impairments::new(&alone.link, alone.seed, TO_DISPLAY),
             alone,
@@ -344,10 +289,13 @@ impl ScriptedSensor {
             heard: MessageDecoder::default(),
             estimates: Vec::new(),
             arrived: Vec::new(),
-            arrivals: Arrivals::default(),
             statuses: Vec::new(),
             safety: Vec::new(),
             motions: 0,
+            sent: Vec::new(),
+            log,
+            warm: None,
+            watcher,
         }
     }
 
@@ -356,8 +304,7 @@ impl ScriptedSensor {
     fn look(&mut self, board: &mut Nucleo<DisplayPins>, now_ns: u64) {
         // Nobody is on the console.
         board.wire(CONSOLE_UART).take_sent();
-        let sent = board.wire(PEER_UART).take_sent();
-        self.hear(&sent, now_ns);
+        self.hear(now_ns);
         self.configure(now_ns);
         if self.configured_ns.is_some() && now_ns >= self.next_estimate_ns {
             self.estimate(now_ns);
@@ -365,8 +312,8 @@ impl ScriptedSensor {
         self.speak(board, now_ns);
     }
 
-    fn hear(&mut self, sent: &[(u64, u8)], now_ns: u64) {
-        let bytes: Vec<u8> = sent.iter().map(|&(_, byte)| byte).collect();
+    fn hear(&mut self, now_ns: u64) {
+        let bytes = mem::take(&mut self.sent);
         let mut report: Option<ConfigurationReport> = None;
         let Self {
             statuses,
@@ -468,89 +415,44 @@ impl ScriptedSensor {
         self.heard.hear(&arrived);
         for said in self.heard.take() {
             if let Message::Estimate(estimate) = said.message {
-                let arrival = Arrival {
+                self.arrived.push(Arrival {
                     at_ns: said.at_ns,
                     estimate,
-                };
-                self.arrivals.note(&mut self.estimates, &arrival);
-                self.arrived.push(arrival);
+                });
             }
         }
     }
 }
 
-struct Solo<W> {
-    far: ScriptedSensor,
-    log: Option<Log>,
-    next_look_ns: u64,
-    next_log_ns: u64,
-    end_ns: u64,
-    /// When the emulator had run for [`WARM_UP_NS`].
-    warm: Option<Instant>,
-    witness: W,
-}
+impl<W: Watcher> BoardHook<DisplayPins> for ScriptedSensor<W> {
+    fn sent(&mut self, _board: &mut Nucleo<DisplayPins>, sent: &[TimedByte]) {
+        self.sent.extend(sent.iter().map(|&(_, byte)| byte));
+    }
 
-impl<W: BoardHook> Driver<Nucleo<DisplayPins>> for Solo<W> {
-    fn on_settled(
-        &mut self,
-        session: &mut Session<Nucleo<DisplayPins>>,
-        _host: &mut dyn Host,
-        settled: Settled,
-    ) {
-        self.witness.on_settled(&settled);
-        if let Settled::Access {
-            access:
-                Access {
-                    kind: AccessKind::Write,
-                    address,
-                    value,
-                    virtual_time,
-                    ..
-                },
-            ..
-        } = settled
-        {
-            <DisplayPins as BoardPins>::on_write(
-                session.board_mut(),
-                address,
-                value,
-                virtual_time.0,
-            );
+    fn heard(&mut self, _due_ns: u64, _byte: u8) {}
+
+    fn attend(&mut self, between: QuantumContext<'_, DisplayPins>) {
+        let now_ns = between.now_ns;
+        self.look(between.session.board_mut(), now_ns);
+        self.watcher.on_look(now_ns, between.host);
+        if self.warm.is_none() && now_ns >= WARM_UP_NS {
+            self.warm = Some(Instant::now());
         }
     }
 
-    fn on_stop(
-        &mut self,
-        session: &mut Session<Nucleo<DisplayPins>>,
-        stop: Stop,
-        host: &mut dyn Host,
-    ) -> Option<VirtualNanos> {
-        let now_ns = stop.at.0;
-        if now_ns >= self.next_log_ns {
-            self.next_log_ns = now_ns + LOG_NS;
-            if let Some(log) = &mut self.log {
-                log.read(now_ns, host);
-            }
+    fn log(&mut self, now_ns: u64, host: &mut dyn Host) {
+        if let Some(log) = &mut self.log {
+            log.read(now_ns, host);
         }
-        if now_ns >= self.next_look_ns {
-            self.far.look(session.board_mut(), now_ns);
-            self.witness.on_look(now_ns, host);
-            if now_ns >= self.end_ns || self.far.refused.is_some() {
-                return None;
-            }
-            if self.warm.is_none() && now_ns >= WARM_UP_NS {
-                self.warm = Some(Instant::now());
-            }
-            self.next_look_ns += LOOK_NS;
-        }
-        let due_ns = session
-            .board_mut()
-            .wire(PEER_UART)
-            .next_due()
-            .filter(|&due_ns| due_ns > now_ns);
-        Some(VirtualNanos(due_ns.map_or(self.next_look_ns, |due_ns| {
-            due_ns.min(self.next_look_ns)
-        })))
+    }
+
+    fn settled(&mut self, settled: &Settled) {
+        self.watcher.on_settled(settled);
+    }
+
+    fn is_over(&self, now_ns: u64) -> bool {
+        let end_ns = (self.alone.duration_s * 1e9).ceil() as u64;
+        now_ns >= end_ns || self.refused.is_some()
     }
 }
 

@@ -108,11 +108,7 @@ impl Firmware {
             Role::Display => "firmware-display",
             _ => "firmware-sensor",
         };
-        let elf = std::fs::read(path).map_err(|source| FirmwareError::Missing {
-            path: path.to_owned(),
-            package,
-            source,
-        })?;
+        let elf = read_elf(path, package)?;
         let no_elf = |reason: String| FirmwareError::NoElf {
             path: path.to_owned(),
             reason,
@@ -152,6 +148,15 @@ impl Firmware {
             processor: None,
         })
     }
+}
+
+/// Reads the ELF at `path`, which `cargo build -p` and `package` make.
+pub(super) fn read_elf(path: &Path, package: &'static str) -> Result<Vec<u8>, FirmwareError> {
+    std::fs::read(path).map_err(|source| FirmwareError::Missing {
+        path: path.to_owned(),
+        package,
+        source,
+    })
 }
 
 /// The two firmwares of a pair.

@@ -10,8 +10,7 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::{ADC3, RCC, TIM3};
 
-use super::board_pins::BoardPins;
-use super::nucleo::Nucleo;
+use super::nucleo::{Nucleo, Pins};
 use super::traps::{Trap, Traps};
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::scene::Scene;
@@ -96,7 +95,7 @@ impl Injector {
     }
 
     /// Does what is due; true if power has been cut.
-    pub fn act<P: BoardPins>(
+    pub fn act<P: Pins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,
@@ -110,7 +109,8 @@ impl Injector {
                 is_cut |= begins;
                 self.power(session, stop, host, begins);
             }
-            P::break_pins(session.board_mut(), &fault, begins, stop.at.0);
+            let (pins, part) = session.board_mut().pins();
+            pins.break_by(part, &fault, begins, stop.at.0);
             if !self.injure(session, stop, host, &fault, begins) {
                 self.failed.get_or_insert(fault.kind);
             }
@@ -118,7 +118,7 @@ impl Injector {
         is_cut
     }
 
-    fn power<P: BoardPins>(
+    fn power<P: Pins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,
@@ -141,7 +141,7 @@ impl Injector {
     }
 
     /// What is done to the processor; false if it can't be.
-    fn injure<P: BoardPins>(
+    fn injure<P: Pins>(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         stop: Stop,

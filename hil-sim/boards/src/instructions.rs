@@ -16,7 +16,7 @@ use rigless::emulator::{Access, AccessKind, Hit, HitKind, Host, Settled, Watch};
 use super::{ElfError, Firmware};
 use crate::cycles::{CycleMeter, Estimate};
 use crate::display_alone;
-use crate::display_alone::{BoardHook, DisplayBench};
+use crate::display_alone::{DisplayBench, Watcher};
 
 /// Instructions that a board retires in a second, as the emulator counts them.
 pub const BUDGET: u64 = super::nucleo::INSTRUCTIONS_PER_SECOND.get();
@@ -150,7 +150,7 @@ struct WatchedCode {
     refused: usize,
 }
 
-impl BoardHook for WatchedCode {
+impl Watcher for WatchedCode {
     fn on_look(&mut self, at_ns: u64, host: &mut dyn Host) {
         if at_ns < self.from_ns {
             return;
@@ -264,7 +264,7 @@ const WORDS_DMA: std::ops::Range<u64> = 0x4002_6410..0x4002_64D0;
 
 /// Each instruction of an ELF, with its first two halfwords: Thumb code between the mapping symbols $t and $d, in which
 /// one whose first halfword begins with 0b11101, 0b11110 or 0b11111 has two.
-pub(super) fn instructions(elf: &[u8]) -> Option<Vec<(u64, [u16; 2])>> {
+pub fn instructions(elf: &[u8]) -> Option<Vec<(u64, [u16; 2])>> {
     let file = object::File::parse(elf).ok()?;
     let mut marks: BTreeMap<u64, bool> = BTreeMap::new();
     for symbol in file.symbols() {

@@ -12,6 +12,7 @@ use rigless::soc::stm32f427::generated::TIM4;
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::time::VirtualNanos;
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::nucleo::{CNT, ITR_OF_TIM3, PEER_UART, Pins, TIM3, TIM4_INDEX};
 use super::sensor;
@@ -22,7 +23,8 @@ const TIM1: usize = 0;
 const TIM2: usize = 0;
 
 /// A jumper wire, or two that make one loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Jumper {
     /// D6 (PE9), TIM1's channel 1, to D36 (PB10), TIM2's channel 3.
     Pulse,
@@ -40,30 +42,16 @@ pub enum Jumper {
 
 impl Jumper {
     /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Pulse,
-        Self::Load,
-        Self::EncoderA,
-        Self::EncoderB,
-        Self::Serial,
-        Self::Spi,
-    ];
+    pub const ALL: [Self; 6] = *Self::VARIANTS.as_array().unwrap();
 
     /// Its name in commands.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pulse => "pulse",
-            Self::Load => "load",
-            Self::EncoderA => "encoder-a",
-            Self::EncoderB => "encoder-b",
-            Self::Serial => "serial",
-            Self::Spi => "spi",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// The jumper of a name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|jumper| jumper.name() == name)
+        name.parse().ok()
     }
 }
 
@@ -199,6 +187,10 @@ fn load(part: &mut Stm32f427) -> Level {
 }
 
 impl Pins for Jig {
+    type Records = ();
+
+    fn take_records(&mut self, _part: &mut Stm32f427) {}
+
     /// The encoder is what the wires make of it: it stays where it is.
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
         let count = part.peek(VirtualNanos(at_ns), TIM4.base + CNT, Width::W32);
@@ -220,6 +212,10 @@ impl Pins for Jig {
     }
 
     fn on_stop(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        self.follow(part, at_ns);
+    }
+
+    fn on_write(&mut self, part: &mut Stm32f427, _address: u64, _value: u64, at_ns: u64) {
         self.follow(part, at_ns);
     }
 }

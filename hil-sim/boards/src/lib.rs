@@ -3,7 +3,6 @@
 
 #[cfg(target_os = "linux")]
 pub mod bench;
-mod board_pins;
 mod console;
 pub mod cost;
 pub mod cycles;
@@ -23,7 +22,6 @@ mod rtt;
 pub mod semihosted;
 mod sensor;
 pub mod soak;
-pub mod stack;
 mod terminal;
 mod traps;
 mod wire;
@@ -43,9 +41,7 @@ use display::DisplayRecords;
 use hil_sim_core::run::decoder::{MessageDecoder, TimedMessage};
 use hil_sim_core::run::digest::Digest;
 use hil_sim_core::run::fault_evidence::FaultEvidence;
-use hil_sim_core::run::recording::{
-    Arrival, Arrivals, Engine, EstimateRecord, Recording, ScanRecord,
-};
+use hil_sim_core::run::recording::{Arrival, Engine, EstimateRecord, Recording, ScanRecord};
 use hil_sim_core::scene::{Scene, SceneError};
 use pair::Finished;
 use recorder::Recorder;
@@ -112,6 +108,16 @@ pub enum ElfError {
     },
 }
 
+impl ElfError {
+    /// What the emulator said of a board.
+    fn board<E: ToString>(board: &'static str) -> impl Fn(E) -> Self {
+        move |error| Self::Board {
+            board,
+            reason: error.to_string(),
+        }
+    }
+}
+
 /// What only the `elf` engine knows, beside the [`Recording`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct BoardFacts {
@@ -167,11 +173,7 @@ pub fn run_at(
         sensor_told: sensor.witness.told("sensor")?,
         display_told: display.witness.told("display")?,
     };
-    let (begun, warm_up_s) = match sensor.witness.warm {
-        Some(warm) => (warm, WARM_UP_NS as f64 * 1e-9),
-        None => (started, 0.0),
-    };
-    let pace = (warm_up_s, (ended - begun).as_secs_f64());
+    let pace = recorder::pace(started, sensor.witness.warm, ended);
     Ok((record(scene, sensor, display, pace), facts))
 }
 
@@ -208,18 +210,13 @@ fn record(
             });
         }
     }
-    let mut arrived = Vec::new();
-    let mut arrivals = Arrivals::default();
-    for TimedMessage { at_ns, message } in heard.messages() {
-        if let Message::Estimate(estimate) = *message {
-            let arrival = Arrival {
-                at_ns: *at_ns,
-                estimate,
-            };
-            arrivals.note(&mut estimates, &arrival);
-            arrived.push(arrival);
-        }
-    }
+    let arrived = heard.messages().filter_map(|heard| match heard.message {
+        Message::Estimate(estimate) => Some(Arrival {
+            at_ns: heard.at_ns,
+            estimate,
+        }),
+        _ => None,
+    });
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
     for (board, witness) in [("sensor", &sensor.witness), ("display", &display.witness)] {
         log.extend(
@@ -235,7 +232,7 @@ fn record(
     let mut resets = sensor.resets;
     resets.extend(display.resets);
     resets.sort_by_key(|reset| reset.at_ns);
-    Recording {
+    let mut recording = Recording {
         engine: Engine::Elf,
         duration_s: scene.duration_s,
         warm_up_s,
@@ -244,7 +241,7 @@ fn record(
         scans: sensor.records,
         ticks: display.records.ticks,
         estimates,
-        arrived,
+        arrived: arrived.collect(),
         outputs: display.records.outputs,
         sensor_status,
         display_status,
@@ -255,7 +252,9 @@ fn record(
             resets,
             clears_ns: display.records.clears_ns,
         },
-    }
+    };
+    recording.match_arrivals();
+    recording
 }
 
 /// What the sensor's clock is ahead of the scene's, from the first estimate and the scan that it ends with.

@@ -4,13 +4,12 @@
 use std::sync::mpsc::{Receiver, SyncSender};
 
 use protocol::Role;
-use rigless::emulator::{Access, AccessKind, Driver, Host, Settled, Stop};
+use rigless::emulator::{Driver, Host, Settled, Stop};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
-use super::board_pins::BoardPins;
 use super::injector::Injector;
-use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
+use super::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use super::wire::TimedByte;
 use hil_sim_core::link::channel::LinkChannel;
 use hil_sim_core::plant::fault::clock::Clock;
@@ -23,14 +22,14 @@ pub const QUANTUM_NS: u64 = 500_000;
 /// How often the boards hand each other their bytes. It is shorter than what a byte takes, so that neither
 /// waits for what the other says in the portion before it needs it: the one that has more to do just then
 /// falls behind by a portion and catches up in the next.
-pub(super) const PORTION_NS: u64 = QUANTUM_NS / 2;
+const PORTION_NS: u64 = QUANTUM_NS / 2;
 /// Portions of the other board's that may lie ready: what it is ahead by at most.
 pub(super) const PORTIONS_READY: usize = 3;
 /// How often the log is read: well before the 1 KiB of RTT are full.
 const LOG_PERIOD_NS: u64 = 10_000_000;
 
 /// A board between two quanta.
-pub struct QuantumContext<'a, P: BoardPins> {
+pub struct QuantumContext<'a, P: Pins> {
     /// The board, as it is run.
     pub session: &'a mut Session<Nucleo<P>>,
     /// What runs it.
@@ -45,7 +44,7 @@ pub struct QuantumContext<'a, P: BoardPins> {
 
 /// What stands beside one board of a pair and makes something of what it sees: all instants are the
 /// scene's clock's.
-pub trait BoardHook<P: BoardPins>: Send + 'static {
+pub trait BoardHook<P: Pins>: Send + 'static {
     /// The quantum that ends at `now_ns` is over; nothing of it has been exchanged yet.
     fn begin(&mut self, _now_ns: u64) {}
 
@@ -67,6 +66,9 @@ pub trait BoardHook<P: BoardPins>: Send + 'static {
     /// The log is to be read.
     fn log(&mut self, now_ns: u64, host: &mut dyn Host);
 
+    /// Every access, stop and hit, once the models have settled.
+    fn settled(&mut self, _settled: &Settled) {}
+
     /// The board has lost its power.
     fn restart(&mut self) {}
 
@@ -82,9 +84,13 @@ pub struct Cable {
     pub from_peer: Receiver<Vec<TimedByte>>,
 }
 
-/// Runs one board of a pair.
+/// Runs one board, of a pair or alone.
 pub struct Lockstep<W> {
-    cable: Cable,
+    /// None if it is alone.
+    cable: Option<Cable>,
+    /// How often bytes are exchanged, and how often the witness has its turn.
+    portion_ns: u64,
+    quantum_ns: u64,
     /// What the peer's bytes go through.
     way: LinkChannel,
     /// What the scene's delay leaves of [`QUANTUM_NS`].
@@ -109,8 +115,25 @@ pub struct Lockstep<W> {
 }
 
 impl<W> Lockstep<W> {
-    /// The driver of the board of `role` in `scene`, which runs `elf`.
+    /// The driver of the board of `role` in `scene`, which runs `elf` beside another one.
     pub fn new(scene: &Scene, role: Role, elf: &[u8], cable: Cable, witness: W) -> Self {
+        let spans_ns = (PORTION_NS, QUANTUM_NS);
+        Self::with(scene, role, elf, Some(cable), spans_ns, witness)
+    }
+
+    /// The driver of a board without a peer but the witness, whose turn comes each `quantum_ns`.
+    pub fn alone(scene: &Scene, role: Role, elf: &[u8], quantum_ns: u64, witness: W) -> Self {
+        Self::with(scene, role, elf, None, (quantum_ns, quantum_ns), witness)
+    }
+
+    fn with(
+        scene: &Scene,
+        role: Role,
+        elf: &[u8],
+        cable: Option<Cable>,
+        (portion_ns, quantum_ns): (u64, u64),
+        witness: W,
+    ) -> Self {
         let delay_ns = (scene.link.delay_ms * 1e6).round() as u64;
         let clock = match role {
             Role::Sensor => Clock::new(&scene.faults),
@@ -118,13 +141,15 @@ impl<W> Lockstep<W> {
         };
         Self {
             cable,
+            portion_ns,
+            quantum_ns,
             way: LinkChannel::new(scene, role),
             more_ns: QUANTUM_NS.saturating_sub(delay_ns),
             injector: Injector::new(scene, role, elf, clock.clone()),
             clock,
             sent: Vec::new(),
-            next_exchange_ns: PORTION_NS,
-            next_quantum_ns: QUANTUM_NS,
+            next_exchange_ns: portion_ns,
+            next_quantum_ns: quantum_ns,
             next_log_ns: LOG_PERIOD_NS,
             resets: 0,
             witness,
@@ -138,6 +163,11 @@ impl<W> Lockstep<W> {
         &self.clock
     }
 
+    /// When the board is to stop first.
+    pub fn first_stop(&self) -> VirtualNanos {
+        VirtualNanos(self.portion_ns)
+    }
+
     /// What breaks the board.
     pub fn injector(&self) -> &Injector {
         &self.injector
@@ -145,7 +175,7 @@ impl<W> Lockstep<W> {
 
     /// Gives the other board what this one has sent in the portion that ends at `now_ns`, and takes what it
     /// sent in the one before; false if it is gone.
-    fn exchange<P: BoardPins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
+    fn exchange<P: Pins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool
     where
         W: BoardHook<P>,
     {
@@ -159,22 +189,24 @@ impl<W> Lockstep<W> {
             self.witness.sent(board, &self.sent);
             self.sent.clear();
         }
-        // At the end of a run the other board may be gone already, with all that it had to say said: only
-        // what does not come tells that it failed.
-        let _ = self.cable.to_peer.send(portion);
-        // Nothing came before the first portion.
-        if self.next_exchange_ns > PORTION_NS {
-            let Ok(received) = self.cable.from_peer.recv() else {
-                self.abandoned = true;
-                return false;
-            };
-            if self.witness.is_joined(now_ns) {
-                for (at_ns, byte) in received {
-                    self.way.push(at_ns + self.more_ns, byte);
+        if let Some(cable) = &self.cable {
+            // At the end of a run the other board may be gone already, with all that it had to say said: only
+            // what does not come tells that it failed.
+            let _ = cable.to_peer.send(portion);
+            // Nothing came before the first portion.
+            if self.next_exchange_ns > self.portion_ns {
+                let Ok(received) = cable.from_peer.recv() else {
+                    self.abandoned = true;
+                    return false;
+                };
+                if self.witness.is_joined(now_ns) {
+                    for (at_ns, byte) in received {
+                        self.way.push(at_ns + self.more_ns, byte);
+                    }
                 }
             }
         }
-        while let Some((due_ns, byte)) = self.way.pop(now_ns + PORTION_NS) {
+        while let Some((due_ns, byte)) = self.way.pop(now_ns + self.portion_ns) {
             if self.injector.is_off {
                 continue;
             }
@@ -186,7 +218,7 @@ impl<W> Lockstep<W> {
     }
 
     /// What comes next, by the board's clock.
-    fn next_stop<P: BoardPins>(&self, board: &mut Nucleo<P>, local_ns: u64) -> VirtualNanos {
+    fn next_stop<P: Pins>(&self, board: &mut Nucleo<P>, local_ns: u64) -> VirtualNanos {
         let mut next_ns = self.clock.local_ns(self.next_exchange_ns);
         let due = [PEER_UART, CONSOLE_UART].map(|uart| board.wire(uart).next_due());
         for due_ns in due.into_iter().chain([self.injector.next_ns()]).flatten() {
@@ -198,27 +230,15 @@ impl<W> Lockstep<W> {
     }
 }
 
-impl<P: BoardPins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
+impl<P: Pins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         _host: &mut dyn Host,
         settled: Settled,
     ) {
-        if let Settled::Access {
-            access:
-                Access {
-                    kind: AccessKind::Write,
-                    address,
-                    value,
-                    virtual_time,
-                    ..
-                },
-            ..
-        } = settled
-        {
-            P::on_write(session.board_mut(), address, value, virtual_time.0);
-        }
+        self.witness.settled(&settled);
+        session.board_mut().follow(&settled);
     }
 
     fn on_stop(
@@ -246,7 +266,7 @@ impl<P: BoardPins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
             if !self.exchange(session.board_mut(), now_ns) {
                 return None;
             }
-            self.next_exchange_ns += PORTION_NS;
+            self.next_exchange_ns += self.portion_ns;
         }
         if now_ns >= self.next_quantum_ns {
             self.witness.attend(QuantumContext {
@@ -261,7 +281,7 @@ impl<P: BoardPins, W: BoardHook<P>> Driver<Nucleo<P>> for Lockstep<W> {
                 self.is_done = true;
                 return None;
             }
-            self.next_quantum_ns += QUANTUM_NS;
+            self.next_quantum_ns += self.quantum_ns;
         }
         Some(self.next_stop(session.board_mut(), board_ns))
     }

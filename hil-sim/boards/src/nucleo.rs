@@ -9,10 +9,13 @@ use std::num::{NonZeroU32, NonZeroU64};
 
 use rigless::chip::uart::Rate;
 use rigless::device::{ErasedDevice, Level, ResetCause};
-use rigless::emulator::ProcessorConstructor;
+use rigless::emulator::{
+    self, Access, AccessKind, Driver, Finished, ProcessorConstructor, Settled, Start,
+};
 use rigless::image::Image;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
+use rigless::session::Session;
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::rcc::{Register, csr};
@@ -22,6 +25,8 @@ use rigless::time::VirtualNanos;
 
 use super::wire::Wire;
 use crate::processor_pool;
+use crate::wiring::Mistake;
+use hil_sim_core::scene::fault::Fault;
 
 /// What the ST-LINK puts on OSC_IN.
 const ST_LINK_CLOCK_HZ: u64 = 8_000_000;
@@ -52,6 +57,12 @@ const ARR: u64 = 0x2C;
 
 /// What is wired to a board's pins.
 pub trait Pins: Debug + Send + 'static {
+    /// What is written down at the pins.
+    type Records: Send;
+
+    /// Takes what has been written down since the last call.
+    fn take_records(&mut self, part: &mut Stm32f427) -> Self::Records;
+
     /// TIM3 triggered at `at_ns`, for the `nth` time: the encoder's counter at this instant.
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16;
 
@@ -63,6 +74,15 @@ pub trait Pins: Debug + Send + 'static {
 
     /// At every stop of the emulation.
     fn on_stop(&mut self, _part: &mut Stm32f427, _at_ns: u64) {}
+
+    /// The firmware wrote `value` to a peripheral's register.
+    fn on_write(&mut self, _part: &mut Stm32f427, _address: u64, _value: u64, _at_ns: u64) {}
+
+    /// `fault` of a scene begins, or ends: what of it is at the pins.
+    fn break_by(&mut self, _part: &mut Stm32f427, _fault: &Fault, _begins: bool, _at_ns: u64) {}
+
+    /// A wire at the pins is put wrong, or right. Those between the boards are not at the pins.
+    fn miswire(&mut self, _part: &mut Stm32f427, _at_ns: u64, _mistake: Mistake, _wrong: bool) {}
 }
 
 /// A board.
@@ -114,6 +134,37 @@ impl<P: Pins> Nucleo<P> {
             program: Some(processor_pool::program(images)),
             processor: make,
             ..self
+        }
+    }
+
+    /// Runs from power-up until `driver`, which is asked for the first time at `first_stop`, ends it.
+    pub fn run<D: Driver<Self> + 'static>(
+        self,
+        start: &Start<'_>,
+        first_stop: VirtualNanos,
+        driver: D,
+    ) -> Result<Finished<Self, D>, String> {
+        let session =
+            Session::new(Box::new(self), 0, first_stop).map_err(|error| error.to_string())?;
+        emulator::run(session, start, driver).map_err(|error| error.to_string())
+    }
+
+    /// Lets the pins follow what the firmware writes.
+    pub fn follow(&mut self, settled: &Settled) {
+        if let Settled::Access {
+            access:
+                Access {
+                    kind: AccessKind::Write,
+                    address,
+                    value,
+                    virtual_time,
+                    ..
+                },
+            ..
+        } = *settled
+        {
+            let (pins, part) = self.pins();
+            pins.on_write(part, address, value, virtual_time.0);
         }
     }
 

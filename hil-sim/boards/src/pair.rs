@@ -4,14 +4,11 @@ use std::sync::mpsc::sync_channel;
 use std::thread;
 
 use protocol::Role;
-use rigless::emulator::{self, Start};
-use rigless::session::Session;
-use rigless::time::VirtualNanos;
+use rigless::emulator::Start;
 
-use super::board_pins::BoardPins;
 use super::display::DisplayPins;
-use super::lockstep::{BoardHook, Cable, Lockstep, PORTION_NS, PORTIONS_READY};
-use super::nucleo::Nucleo;
+use super::lockstep::{BoardHook, Cable, Lockstep, PORTIONS_READY};
+use super::nucleo::{Nucleo, Pins};
 use super::sensor::SensorPins;
 use super::traps::Traps;
 use super::{ElfError, Firmware, Firmwares};
@@ -39,7 +36,7 @@ pub struct Finished<R, W> {
     pub resets: Vec<Reset>,
 }
 
-type Left<P, W> = Finished<<P as BoardPins>::Records, W>;
+type Left<P, W> = Finished<<P as Pins>::Records, W>;
 /// What the sensor board leaves behind, and the display board.
 pub type Both<S, D> = (Left<SensorPins, S>, Left<DisplayPins, D>);
 
@@ -107,7 +104,8 @@ fn is_abandoned(error: &ElfError) -> bool {
     matches!(error, ElfError::Stopped { reason, .. } if reason == ABANDONED)
 }
 
-fn drive<P: BoardPins, W: BoardHook<P>>(
+/// Runs one board to its end.
+pub(super) fn drive<P: Pins, W: BoardHook<P>>(
     role: Role,
     board: Result<Nucleo<P>, rigless::soc::Error>,
     firmware: &Firmware,
@@ -115,19 +113,14 @@ fn drive<P: BoardPins, W: BoardHook<P>>(
     duration_s: f64,
 ) -> Result<Left<P, W>, ElfError> {
     let name = role.name();
-    let board_error = |reason: String| ElfError::Board {
-        board: name,
-        reason,
-    };
-    let board = board.map_err(|error| board_error(error.to_string()))?;
+    let board = board.map_err(ElfError::board(name))?;
     let mut images = vec![firmware.image.clone()];
     images.extend(driver.injector().traps().and_then(Traps::image));
-    let first_stop = VirtualNanos(PORTION_NS);
     let board = board.running(&images, firmware.processor.clone());
-    let session = Session::new(Box::new(board), 0, first_stop)
-        .map_err(|error| board_error(error.to_string()))?;
-    let mut finished = emulator::run(session, &Start::new(&images), driver)
-        .map_err(|error| board_error(error.to_string()))?;
+    let first_stop = driver.first_stop();
+    let mut finished = board
+        .run(&Start::new(&images), first_stop, driver)
+        .map_err(ElfError::board(name))?;
     let at_ns = finished.stop.map_or(0, |stop| stop.at.0);
     if !finished.driver.is_done {
         let reason = if finished.driver.abandoned {
@@ -165,8 +158,9 @@ fn drive<P: BoardPins, W: BoardHook<P>>(
         is_injected: cuts_ns.contains(&reset.at.0),
     });
     let resets = resets.collect();
+    let (pins, part) = finished.session.board_mut().pins();
     Ok(Finished {
-        records: P::take_records(finished.session.board_mut()),
+        records: pins.take_records(part),
         witness: finished.driver.witness,
         clock,
         instructions: finished.stop.map_or(0, |stop| stop.instruction_count),

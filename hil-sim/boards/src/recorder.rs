@@ -6,10 +6,9 @@ use protocol::Role;
 use rigless::emulator::Host;
 
 use super::ElfError;
-use super::board_pins::BoardPins;
 use super::console::{ConsoleHost, Told};
 use super::lockstep::{BoardHook, QuantumContext};
-use super::nucleo::Nucleo;
+use super::nucleo::{Nucleo, Pins};
 use super::rtt::Log;
 use super::terminal;
 use super::terminal::Terminal;
@@ -18,6 +17,13 @@ use hil_sim_core::scene::Scene;
 
 /// Virtual time by which the emulator has met, and translated, all of the firmware that a run needs.
 pub const WARM_UP_NS: u64 = 500_000_000;
+
+/// The virtual time in s at the beginning of a run that is not counted, and the wall time that the rest took, in s.
+pub(super) fn pace(started: Instant, warm: Option<Instant>, ended: Instant) -> (f64, f64) {
+    let warm_up_s = warm.map_or(0.0, |_| WARM_UP_NS as f64 * 1e-9);
+    let counted = ended - warm.unwrap_or(started);
+    (warm_up_s, counted.as_secs_f64())
+}
 
 /// Stands beside a board for as long as its scene lasts.
 pub struct Recorder {
@@ -75,7 +81,7 @@ impl Recorder {
     }
 }
 
-impl<P: BoardPins> BoardHook<P> for Recorder {
+impl<P: Pins> BoardHook<P> for Recorder {
     fn sent(&mut self, _board: &mut Nucleo<P>, sent: &[TimedByte]) {
         self.sent.extend_from_slice(sent);
     }

@@ -3,17 +3,18 @@
 
 use std::path::Path;
 
-use rigless::emulator::{self, Access, AccessKind, Driver, Host, Settled, Start, Stop};
+use rigless::emulator::{Driver, Host, Settled, Start, Stop};
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::time::VirtualNanos;
 
-use super::cost::Bare;
+use super::ElfError;
+use super::cost::{BOARD, Bare};
+use super::firmware::read_elf;
 use super::jig::{Jig, Jumper};
 use super::nucleo::{Nucleo, Pins};
 use super::rtt::Log;
-use super::{ElfError, FirmwareError};
 
 /// Virtual time after which a program that has not come to its end is given up, in s.
 const LIMIT_S: u64 = 120;
@@ -31,49 +32,20 @@ pub struct Said {
     pub is_done: bool,
 }
 
-/// What of a board's pins follows what a program writes to a peripheral.
-trait Followed: Pins {
-    fn on_write(board: &mut Nucleo<Self>, at_ns: u64)
-    where
-        Self: Sized;
-}
-
-impl Followed for Bare {
-    fn on_write(_board: &mut Nucleo<Self>, _at_ns: u64) {}
-}
-
-impl Followed for Jig {
-    fn on_write(board: &mut Nucleo<Self>, at_ns: u64) {
-        let (jig, part) = board.pins();
-        jig.follow(part, at_ns);
-    }
-}
-
 struct Listener {
     console: Vec<u8>,
     log: Option<Log>,
     limit: VirtualNanos,
 }
 
-impl<P: Followed> Driver<Nucleo<P>> for Listener {
+impl<P: Pins> Driver<Nucleo<P>> for Listener {
     fn on_settled(
         &mut self,
         session: &mut Session<Nucleo<P>>,
         _host: &mut dyn Host,
         settled: Settled,
     ) {
-        if let Settled::Access {
-            access:
-                Access {
-                    kind: AccessKind::Write,
-                    virtual_time,
-                    ..
-                },
-            ..
-        } = settled
-        {
-            P::on_write(session.board_mut(), virtual_time.0);
-        }
+        session.board_mut().follow(&settled);
     }
 
     fn on_stop(
@@ -110,22 +82,13 @@ pub fn run_with(path: &Path, package: &'static str, jumpers: &[Jumper]) -> Resul
     })
 }
 
-fn run_on<P: Followed>(
+fn run_on<P: Pins>(
     path: &Path,
     package: &'static str,
     pins: P,
     fit: impl FnOnce(&mut Stm32f427),
 ) -> Result<Said, ElfError> {
-    const BOARD: &str = "bare";
-    let board = |reason: String| ElfError::Board {
-        board: BOARD,
-        reason,
-    };
-    let elf = std::fs::read(path).map_err(|source| FirmwareError::Missing {
-        path: path.to_owned(),
-        package,
-        source,
-    })?;
+    let elf = read_elf(path, package)?;
     let limit = VirtualNanos(LIMIT_S * 1_000_000_000);
     let listener = Listener {
         console: Vec::new(),
@@ -137,14 +100,13 @@ fn run_on<P: Followed>(
     } else {
         limit
     };
-    let image = [Image::new(path, elf, None).map_err(|error| board(error.to_string()))?];
-    let nucleo = Nucleo::new(pins, fit).map_err(|error| board(error.to_string()))?;
-    let session =
-        Session::new(Box::new(nucleo), 0, first).map_err(|error| board(error.to_string()))?;
+    let image = [Image::new(path, elf, None).map_err(ElfError::board(BOARD))?];
     let mut start = Start::new(&image);
     start.semihosting = true;
-    let finished =
-        emulator::run(session, &start, listener).map_err(|error| board(error.to_string()))?;
+    let finished = Nucleo::new(pins, fit)
+        .map_err(ElfError::board(BOARD))?
+        .run(&start, first, listener)
+        .map_err(ElfError::board(BOARD))?;
     let listener = finished.driver;
     let console = String::from_utf8_lossy(&listener.console).into_owned();
     let log: Vec<String> = listener.log.map_or_else(Vec::new, |log| {

@@ -55,7 +55,7 @@ pub struct SensorPins {
     /// What the arm makes of the speed that it is asked for: 1, unless its wires are wrong.
     drive_sign: f64,
     /// Every scan converted so far.
-    pub scans: Vec<ScanRecord>,
+    scans: Vec<ScanRecord>,
 }
 
 impl SensorPins {
@@ -87,30 +87,9 @@ impl SensorPins {
         self.world.wavelength_mm(self.position_mm)
     }
 
-    /// Puts a wire of these pins wrong, or right.
-    pub fn miswire(&mut self, mistake: Mistake, wrong: bool) {
-        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
-        match mistake {
-            Mistake::ArmSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
-            Mistake::ArmOpen => self.encoder = or_sound(EncoderWires::Open),
-            Mistake::PwmOpen => self.drive_sign = if wrong { 0.0 } else { 1.0 },
-            Mistake::ArmBackwards => self.drive_sign = if wrong { -1.0 } else { 1.0 },
-            Mistake::GaugeOpen => self.held = wrong.then_some(HIGHEST_CODE),
-            Mistake::GaugeShort => self.held = wrong.then_some(MID_RAIL),
-            _ => {}
-        }
-    }
-
     /// Wires up what the part itself has to know.
     pub fn fit(part: &mut Stm32f427) {
         part.adc[ADC].set_reference(REFERENCE_UV);
-    }
-
-    /// The firmware wrote `value` to `address`: a scan that software starts, if that is what it makes.
-    pub fn on_write(&mut self, part: &mut Stm32f427, address: u64, value: u64, at_ns: u64) {
-        if address == ADC3.base + CR2 && value & CR2_SWSTART != 0 {
-            self.present(part, at_ns);
-        }
     }
 
     /// Puts the voltages of `local_ns`, by the board's clock, on the pins for the scan that begins; returns the arm's encoder.
@@ -164,6 +143,12 @@ fn microvolts(code: u16) -> u32 {
 }
 
 impl Pins for SensorPins {
+    type Records = Vec<ScanRecord>;
+
+    fn take_records(&mut self, _part: &mut Stm32f427) -> Vec<ScanRecord> {
+        std::mem::take(&mut self.scans)
+    }
+
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {
         let command_mm_s = self.command_mm_s(part);
         let t_s = self.clock.true_ns(at_ns) as f64 * 1e-9;
@@ -173,6 +158,26 @@ impl Pins for SensorPins {
 
     fn after_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) {
         start_scan(part, at_ns);
+    }
+
+    fn on_write(&mut self, part: &mut Stm32f427, address: u64, value: u64, at_ns: u64) {
+        // A scan that software starts, if that is what it makes.
+        if address == ADC3.base + CR2 && value & CR2_SWSTART != 0 {
+            self.present(part, at_ns);
+        }
+    }
+
+    fn miswire(&mut self, _part: &mut Stm32f427, _at_ns: u64, mistake: Mistake, wrong: bool) {
+        let or_sound = |wires| if wrong { wires } else { EncoderWires::Sound };
+        match mistake {
+            Mistake::ArmSwapped => self.encoder = or_sound(EncoderWires::Exchanged),
+            Mistake::ArmOpen => self.encoder = or_sound(EncoderWires::Open),
+            Mistake::PwmOpen => self.drive_sign = if wrong { 0.0 } else { 1.0 },
+            Mistake::ArmBackwards => self.drive_sign = if wrong { -1.0 } else { 1.0 },
+            Mistake::GaugeOpen => self.held = wrong.then_some(HIGHEST_CODE),
+            Mistake::GaugeShort => self.held = wrong.then_some(MID_RAIL),
+            _ => {}
+        }
     }
 }
 

@@ -12,11 +12,10 @@ use rigless::emulator::Host;
 
 pub use tally::Check;
 
-use super::board_pins::BoardPins;
 use super::console::ConsoleHost;
 use super::display::DisplayPins;
 use super::lockstep::{BoardHook, QuantumContext};
-use super::nucleo::Nucleo;
+use super::nucleo::{Nucleo, Pins};
 use super::pair;
 use super::pair::Finished;
 use super::rtt::Log;
@@ -145,7 +144,7 @@ fn scene(soak: &Soak, end_ns: u64, hand: Motion) -> Scene {
 }
 
 /// What is taken from a board's pins at the end of every quantum.
-trait Drained: BoardPins {
+trait Drained: Pins {
     fn drain(board: &mut Nucleo<Self>, outputs: &mut Outputs)
     where
         Self: Sized;
@@ -153,14 +152,16 @@ trait Drained: BoardPins {
 
 impl Drained for SensorPins {
     fn drain(board: &mut Nucleo<Self>, _outputs: &mut Outputs) {
-        board.pins().0.scans.clear();
+        let (pins, part) = board.pins();
+        pins.take_records(part);
     }
 }
 
 impl Drained for DisplayPins {
     fn drain(board: &mut Nucleo<Self>, outputs: &mut Outputs) {
-        let records = Self::take_records(board);
-        let loads = super::display::loads(board.pins().1);
+        let (pins, part) = board.pins();
+        let records = pins.take_records(part);
+        let loads = super::display::loads(part);
         outputs.take(records, loads);
     }
 }

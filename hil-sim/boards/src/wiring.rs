@@ -3,6 +3,7 @@
 //! A mistake stays until it is put right. Unlike a scene's fault, it is there when the boards start.
 
 use protocol::Role;
+use strum::{EnumString, IntoStaticStr, VariantArray};
 
 /// The gauge that [`Mistake::GaugeOpen`] and [`Mistake::GaugeShort`] are of.
 pub const GAUGE: usize = 2;
@@ -10,7 +11,8 @@ pub const GAUGE: usize = 2;
 pub const CHIP: usize = 1;
 
 /// A wire that is open, at a level, or in another's place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Mistake {
     /// The boards' TX are joined, and their RX: neither hears the other.
     LinkStraight,
@@ -47,63 +49,25 @@ pub enum Mistake {
     /// ALMOUT (D3) is at ground.
     AlarmLow,
     /// LDAC (D16) is held high.
+    #[strum(serialize = "ldac-high")]
     LoadHigh,
     /// CLR (D6 of the display board) is at ground.
+    #[strum(serialize = "clr-low")]
     ClearLow,
 }
 
 impl Mistake {
     /// All of them.
-    pub const ALL: [Self; 19] = [
-        Self::LinkStraight,
-        Self::SensorTxOpen,
-        Self::DisplayTxOpen,
-        Self::NoGround,
-        Self::HandSwapped,
-        Self::HandOpen,
-        Self::ArmSwapped,
-        Self::ArmOpen,
-        Self::PwmOpen,
-        Self::ArmBackwards,
-        Self::GaugeOpen,
-        Self::GaugeShort,
-        Self::StopOpen,
-        Self::SdiOpen,
-        Self::SdoOpen,
-        Self::SelectOpen,
-        Self::AlarmLow,
-        Self::LoadHigh,
-        Self::ClearLow,
-    ];
+    pub const ALL: [Self; 19] = *Self::VARIANTS.as_array().unwrap();
 
     /// Its name in commands.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::LinkStraight => "link-straight",
-            Self::SensorTxOpen => "sensor-tx-open",
-            Self::DisplayTxOpen => "display-tx-open",
-            Self::NoGround => "no-ground",
-            Self::HandSwapped => "hand-swapped",
-            Self::HandOpen => "hand-open",
-            Self::ArmSwapped => "arm-swapped",
-            Self::ArmOpen => "arm-open",
-            Self::PwmOpen => "pwm-open",
-            Self::ArmBackwards => "arm-backwards",
-            Self::GaugeOpen => "gauge-open",
-            Self::GaugeShort => "gauge-short",
-            Self::StopOpen => "stop-open",
-            Self::SdiOpen => "sdi-open",
-            Self::SdoOpen => "sdo-open",
-            Self::SelectOpen => "select-open",
-            Self::AlarmLow => "alarm-low",
-            Self::LoadHigh => "ldac-high",
-            Self::ClearLow => "clr-low",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// The mistake of a name.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|mistake| mistake.name() == name)
+        name.parse().ok()
     }
 
     /// Whether the wire is one between the boards.
@@ -125,16 +89,7 @@ impl Mistake {
             | Self::ArmBackwards
             | Self::GaugeOpen
             | Self::GaugeShort => matches!(role, Role::Sensor),
-            Self::SensorTxOpen
-            | Self::HandSwapped
-            | Self::HandOpen
-            | Self::StopOpen
-            | Self::SdiOpen
-            | Self::SdoOpen
-            | Self::SelectOpen
-            | Self::AlarmLow
-            | Self::LoadHigh
-            | Self::ClearLow => matches!(role, Role::Display),
+            _ => matches!(role, Role::Display),
         }
     }
 }

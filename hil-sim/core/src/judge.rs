@@ -25,12 +25,9 @@ pub mod truth;
 mod voltage;
 pub mod words;
 
-use protocol::{Estimate, Role};
-
 use crate::judge::truth::Truth;
-use crate::run::decoder::TimedMessage;
-use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{Arrival, OutputRecord, Recording, ScanRecord, TickRecord};
+use crate::run::observer::{RunEvent, RunObserver, replay_to};
+use crate::run::recording::Recording;
 
 pub use actuators::{Actuators, Held};
 pub use estimates::{JudgedEstimate, Summary};
@@ -101,36 +98,22 @@ impl<'a> Judge<'a> {
 }
 
 impl RunObserver for Judge<'_> {
-    fn scan(&mut self, scan: &ScanRecord) {
-        self.estimates.scan(scan);
-    }
-
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.estimates.on_estimate(made_ns, estimate);
-    }
-
-    fn tick(&mut self, tick: &TickRecord) {
-        self.actuators.tick(tick);
-        let waves = Waves {
-            in_force_per_mm: self.actuators.in_force_per_mm(),
-            under_mm: self.estimates.under_mm(),
-        };
-        self.felt.tick(tick, waves);
-        self.needed.tick(tick);
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.actuators.output(output);
-        self.felt.output(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.estimates.received(arrival);
-        self.actuators.received(arrival);
-    }
-
-    fn said(&mut self, role: Role, said: &TimedMessage) {
-        self.needed.said(role, said);
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.estimates.see(event);
+        self.actuators.see(event);
+        match event {
+            RunEvent::Tick(tick) => {
+                let waves = Waves {
+                    in_force_per_mm: self.actuators.in_force_per_mm(),
+                    under_mm: self.estimates.under_mm(),
+                };
+                self.felt.tick(tick, waves);
+                self.needed.tick(tick);
+            }
+            RunEvent::Output(output) => self.felt.output(output),
+            RunEvent::Said(role, said) => self.needed.said(role, said),
+            _ => {}
+        }
     }
 }
 

@@ -20,10 +20,9 @@ use crate::plant::motion::encoder;
 use crate::plant::world::World;
 use crate::run::decoder::TimedMessage;
 use crate::run::digest::Digest;
-use crate::run::fault_evidence::FaultEvidence;
-use crate::run::observer::RunObserver;
+use crate::run::observer::{RunEvent, RunObserver};
 use crate::run::recording::{
-    Arrival, Arrivals, Engine, EstimateRecord, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
+    Arrival, Engine, OutputRecord, Ran, Recording, ScanRecord, TickRecord,
 };
 use crate::scene::fault::Fault;
 use crate::scene::fault::catalogue::Needs;
@@ -31,8 +30,8 @@ use crate::scene::{Scene, SceneError};
 use firmware_display::{Display, Senses};
 use firmware_sensor::{Drive, SCANS_PER_SAMPLE, Scan, Sensor};
 use protocol::{
-    CHANNELS, DisplayState, Estimate, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause,
-    Role, RoleCounters, Safety, SensorCounters, Status,
+    CHANNELS, DisplayState, Hello, MAX_FRAME, Message, Port, PortCounters, ResetCause, Role,
+    RoleCounters, Safety, SensorCounters, Status,
 };
 
 const STEP_NS: u64 = 1_000_000_000 / firmware_sensor::SCAN_RATE_HZ as u64;
@@ -57,9 +56,10 @@ const fn number(text: &str) -> u8 {
 /// # Errors
 /// If the scene cannot be run.
 pub fn run(scene: &Scene) -> Result<Recording, SceneError> {
-    let mut tape = Tape::new(scene.duration_s);
-    let ran = run_before(scene, &mut tape)?;
-    Ok(tape.into_recording(ran))
+    let mut recording = Recording::empty(Engine::Native, scene.duration_s);
+    let ran = run_before(scene, &mut recording)?;
+    recording.end(&ran);
+    Ok(recording)
 }
 
 /// Runs a scene before an onlooker; nothing else is kept.
@@ -223,10 +223,10 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             now_ns,
             |due_ns, message| match message {
                 Message::Estimate(estimate) => {
-                    onlooker.received(&Arrival {
+                    onlooker.see(RunEvent::Received(&Arrival {
                         at_ns: due_ns,
                         estimate,
-                    });
+                    }));
                     display.on_estimate(&estimate);
                 }
                 Message::Texture(texture) => display.on_texture(&texture),
@@ -242,12 +242,12 @@ impl<'o, O: RunObserver> Pair<'o, O> {
         let codes = self.world.codes(t_s, position_mm);
         let codes = self.gauges.apply(now_ns, codes);
         let encoder = self.world.arm_encoder(t_s, position_mm);
-        self.onlooker.scan(&ScanRecord {
+        self.onlooker.see(RunEvent::Scan(&ScanRecord {
             at_ns: now_ns,
             codes,
             encoder,
             position_mm,
-        });
+        }));
         let place = (step % SCANS_PER_SAMPLE as u64) as usize;
         self.scans[place] = codes;
         if place + 1 < SCANS_PER_SAMPLE {
@@ -263,7 +263,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
         }
         if let Some(estimate) = output.estimate {
             self.say(Role::Sensor, now_ns, Message::Estimate(estimate));
-            self.onlooker.on_estimate(now_ns, &estimate);
+            self.onlooker.see(RunEvent::Estimate(now_ns, &estimate));
             let sent = self
                 .sensor_end
                 .send(now_ns, &Message::Estimate(estimate), &mut self.digest);
@@ -285,11 +285,11 @@ impl<'o, O: RunObserver> Pair<'o, O> {
     fn tick(&mut self, now_ns: u64, t_s: f64) {
         let position_mm = self.world.hand_position_mm(t_s);
         let encoder = self.hand.counts(now_ns, encoder(position_mm));
-        self.onlooker.tick(&TickRecord {
+        self.onlooker.see(RunEvent::Tick(&TickRecord {
             at_ns: now_ns,
             encoder,
             position_mm,
-        });
+        }));
         if self.display.tick(encoder, &Senses::default()).send {
             let output = OutputRecord {
                 at_ns: now_ns,
@@ -297,7 +297,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
                 skew_ns: 0,
             };
             self.digest.output(&output);
-            self.onlooker.output(&output);
+            self.onlooker.see(RunEvent::Output(&output));
         }
         let state = self.display.state();
         if self.state.replace(state) != Some(state) {
@@ -343,7 +343,8 @@ impl<'o, O: RunObserver> Pair<'o, O> {
 
     /// Tells what a board says of itself.
     fn say(&mut self, role: Role, at_ns: u64, message: Message) {
-        self.onlooker.said(role, &TimedMessage { at_ns, message });
+        let said = TimedMessage { at_ns, message };
+        self.onlooker.see(RunEvent::Said(role, &said));
     }
 }
 
@@ -429,87 +430,6 @@ impl End {
             self.port
                 .receive(now_ns / 1_000, heard, |message| handle(due_ns, message));
             length = 0;
-        }
-    }
-}
-
-/// Writes everything down.
-struct Tape {
-    scans: Vec<ScanRecord>,
-    ticks: Vec<TickRecord>,
-    estimates: Vec<EstimateRecord>,
-    arrived: Vec<Arrival>,
-    arrivals: Arrivals,
-    outputs: Vec<OutputRecord>,
-    signs: FaultEvidence,
-}
-
-impl Tape {
-    /// An empty tape with room for `duration_s`.
-    fn new(duration_s: f64) -> Self {
-        let room = |rate_hz: u32| (duration_s * f64::from(rate_hz)).ceil() as usize + 1;
-        Self {
-            scans: Vec::with_capacity(room(firmware_sensor::SCAN_RATE_HZ)),
-            ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
-            estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
-            arrived: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
-            arrivals: Arrivals::default(),
-            outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
-            signs: FaultEvidence::default(),
-        }
-    }
-
-    fn into_recording(self, ran: Ran) -> Recording {
-        Recording {
-            engine: ran.engine,
-            duration_s: ran.duration_s,
-            warm_up_s: ran.warm_up_s,
-            wall_s: ran.wall_s,
-            hash: ran.hash,
-            scans: self.scans,
-            ticks: self.ticks,
-            estimates: self.estimates,
-            arrived: self.arrived,
-            outputs: self.outputs,
-            sensor_status: ran.sensor_status,
-            display_status: ran.display_status,
-            log: Vec::new(),
-            signs: self.signs,
-        }
-    }
-}
-
-impl RunObserver for Tape {
-    fn scan(&mut self, scan: &ScanRecord) {
-        self.scans.push(*scan);
-    }
-
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.estimates.push(EstimateRecord {
-            made_ns,
-            received_ns: None,
-            estimate: *estimate,
-        });
-    }
-
-    fn tick(&mut self, tick: &TickRecord) {
-        self.ticks.push(*tick);
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.outputs.push(*output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.arrivals.note(&mut self.estimates, arrival);
-        self.arrived.push(*arrival);
-    }
-
-    fn said(&mut self, role: Role, said: &TimedMessage) {
-        match role {
-            Role::Sensor => self.signs.sensor.push(said.clone()),
-            Role::Display => self.signs.display.push(said.clone()),
-            Role::Host => {}
         }
     }
 }

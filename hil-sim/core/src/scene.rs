@@ -19,6 +19,7 @@ use firmware_display::Settings;
 use protocol::{DisplayConfiguration, GAUGES, Method, Refusal, SensorConfiguration};
 
 use crate::scene::fault::Fault;
+use strum::{IntoStaticStr, VariantArray};
 
 pub use display::Display;
 pub use error::SceneError;
@@ -173,7 +174,8 @@ pub struct Contact {
 }
 
 /// The rungs of the ladder of contact models, the simplest first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum ContactModel {
     /// The fingertip is where the arm is, a point.
     Kinematic,
@@ -203,23 +205,11 @@ pub enum Solver {
 
 impl ContactModel {
     /// All of them, the simplest first.
-    pub const ALL: [Self; 5] = [
-        Self::Kinematic,
-        Self::Rigid,
-        Self::Viscoelastic,
-        Self::StickSlip,
-        Self::Reference,
-    ];
+    pub const ALL: [Self; 5] = *Self::VARIANTS.as_array().unwrap();
 
     /// As scenes call it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Kinematic => "kinematic",
-            Self::Rigid => "rigid",
-            Self::Viscoelastic => "viscoelastic",
-            Self::StickSlip => "stick-slip",
-            Self::Reference => "reference",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// Whether a gauge feels a patch, not a point.
@@ -254,7 +244,8 @@ impl Default for Contact {
 }
 
 /// `[contact] friction`: how sticky the surface is; see [`crate::plant::contact::Stribeck`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Friction {
     /// μs = 0.75.
     Mild,

@@ -6,8 +6,8 @@ use firmware_sensor::SCAN_RATE_HZ;
 use hil_sim_core::native;
 use hil_sim_core::plant::gauges::PLACES_MM;
 use hil_sim_core::plant::surface::{GRID_MM, Surface};
-use hil_sim_core::run::observer::RunObserver;
-use hil_sim_core::run::recording::{ACTUATORS, OutputRecord, ScanRecord, TickRecord, ZERO_VOLT};
+use hil_sim_core::run::observer::{RunEvent, RunObserver};
+use hil_sim_core::run::recording::{ACTUATORS, ZERO_VOLT};
 use hil_sim_core::scene::{Motion, Scene};
 use protocol::GAUGES;
 
@@ -118,28 +118,31 @@ struct Tape {
 }
 
 impl RunObserver for Tape {
-    fn scan(&mut self, scan: &ScanRecord) {
-        self.is_uneven |= scan.at_ns != self.scans * SCAN_NS;
-        self.scans += 1;
-        let sample = |code: u16| ((i32::from(code) - MID_CODE) * TO_16_BITS) as i16;
-        let [gauges @ .., force] = scan.codes;
-        self.gauges.extend(gauges.map(sample));
-        self.force.push(sample(force));
-        self.arm_um.push(micrometres(scan.position_mm));
-    }
-
-    fn tick(&mut self, tick: &TickRecord) {
-        self.hand_um.push(micrometres(tick.position_mm));
-        let words = self.last.unwrap_or([ZERO_VOLT; ACTUATORS]);
-        self.words.extend(words.map(sample_of));
-    }
-
-    /// In the same instant as the tick, if there is something to send.
-    fn output(&mut self, output: &OutputRecord) {
-        self.last = Some(output.words);
-        let tick = self.words.len().saturating_sub(ACTUATORS);
-        for (sample, word) in self.words[tick..].iter_mut().zip(output.words) {
-            *sample = sample_of(word);
+    fn see(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Scan(scan) => {
+                self.is_uneven |= scan.at_ns != self.scans * SCAN_NS;
+                self.scans += 1;
+                let sample = |code: u16| ((i32::from(code) - MID_CODE) * TO_16_BITS) as i16;
+                let [gauges @ .., force] = scan.codes;
+                self.gauges.extend(gauges.map(sample));
+                self.force.push(sample(force));
+                self.arm_um.push(micrometres(scan.position_mm));
+            }
+            RunEvent::Tick(tick) => {
+                self.hand_um.push(micrometres(tick.position_mm));
+                let words = self.last.unwrap_or([ZERO_VOLT; ACTUATORS]);
+                self.words.extend(words.map(sample_of));
+            }
+            // In the same instant as the tick, if there is something to send.
+            RunEvent::Output(output) => {
+                self.last = Some(output.words);
+                let tick = self.words.len().saturating_sub(ACTUATORS);
+                for (sample, word) in self.words[tick..].iter_mut().zip(output.words) {
+                    *sample = sample_of(word);
+                }
+            }
+            _ => {}
         }
     }
 }

@@ -1,8 +1,7 @@
 //! What the boards say of themselves: log lines by defmt, counters by Status.
 
-use hil_sim_boards::stack;
 use protocol::{PortCounters, ResetCause, RoleCounters, Status};
-use tests::elves;
+use tests::{elves, stack};
 
 use crate::PLAIN;
 use crate::bit_for_bit::RUBBED;

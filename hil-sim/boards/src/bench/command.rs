@@ -72,18 +72,14 @@ impl FromStr for Command {
         let (Some(verb), object, None) = (words.next(), words.next(), words.next()) else {
             return Err(refuse("give a command, such as pull sensor-console"));
         };
+        let one_of = |names: &[&str]| refuse(&format!("give one of {}", names.join(", ")));
         let port = || {
-            let named = |name: &PortName| object == Some(name.name());
-            PortName::ALL.into_iter().find(named).ok_or_else(|| {
-                let names = PortName::ALL.map(PortName::name).join(", ");
-                refuse(&format!("give one of {names}"))
-            })
+            let port = object.and_then(|name| name.parse().ok());
+            port.ok_or_else(|| one_of(&PortName::ALL.map(PortName::name)))
         };
         let mistake = || {
-            object.and_then(Mistake::from_name).ok_or_else(|| {
-                let names = Mistake::ALL.map(Mistake::name).join(", ");
-                refuse(&format!("give one of {names}"))
-            })
+            let mistake = object.and_then(Mistake::from_name);
+            mistake.ok_or_else(|| one_of(&Mistake::ALL.map(Mistake::name)))
         };
         match (verb, object) {
             ("pull", _) => Ok(Self::Pull(port()?)),

@@ -9,15 +9,15 @@ use std::time::Duration;
 use protocol::receiver::{Event, Receiver};
 use protocol::{Estimate, Message, Role};
 use rigless::emulator::Host;
+use rigless::soc::stm32f427::Stm32f427;
 
 use super::pace::Pacer;
 use super::socket::Socket;
 use super::{Command, PortName, lock};
-use crate::board_pins::BoardPins;
 use crate::console::ConsoleHost;
 use crate::display::DisplayPins;
 use crate::lockstep::{BoardHook, QUANTUM_NS, QuantumContext};
-use crate::nucleo::{CONSOLE_UART, Nucleo, PEER_UART};
+use crate::nucleo::{CONSOLE_UART, Nucleo, PEER_UART, Pins};
 use crate::rtt::Channel;
 use crate::sensor::SensorPins;
 use crate::wire::TimedByte;
@@ -125,55 +125,26 @@ impl Shared {
 }
 
 /// What differs between the two boards' pins.
-pub trait BenchPins: BoardPins {
+pub trait BenchPins: Pins {
     /// Shows what the pins have come to since the last call, and forgets it.
-    fn show(board: &mut Nucleo<Self>, shared: &Shared)
-    where
-        Self: Sized;
-
-    /// The emergency stop is pressed, or released.
-    fn press_stop(_board: &mut Nucleo<Self>, _at_ns: u64, _pressed: bool)
-    where
-        Self: Sized,
-    {
-    }
-
-    /// A wire at the pins is put wrong, or right. Those between the boards are not at the pins.
-    fn miswire(board: &mut Nucleo<Self>, at_ns: u64, mistake: Mistake, wrong: bool)
-    where
-        Self: Sized;
+    fn show(&mut self, part: &mut Stm32f427, shared: &Shared);
 }
 
 impl BenchPins for SensorPins {
-    fn show(board: &mut Nucleo<Self>, shared: &Shared) {
-        let (pins, _) = board.pins();
-        pins.scans.clear();
-        lock(&shared.sensed).wavelength_mm = pins.wavelength_mm();
-    }
-
-    fn miswire(board: &mut Nucleo<Self>, _at_ns: u64, mistake: Mistake, wrong: bool) {
-        board.pins().0.miswire(mistake, wrong);
+    fn show(&mut self, part: &mut Stm32f427, shared: &Shared) {
+        self.take_records(part);
+        lock(&shared.sensed).wavelength_mm = self.wavelength_mm();
     }
 }
 
 impl BenchPins for DisplayPins {
-    fn show(board: &mut Nucleo<Self>, shared: &Shared) {
-        let last = Self::take_records(board).outputs.pop();
+    fn show(&mut self, part: &mut Stm32f427, shared: &Shared) {
+        let last = self.take_records(part).outputs.pop();
         let mut outputs = lock(&shared.outputs);
-        outputs.is_clear = board.pins().0.is_clear();
+        outputs.is_clear = self.is_clear();
         if let Some(last) = last {
             outputs.volts = last.words.map(volts);
         }
-    }
-
-    fn press_stop(board: &mut Nucleo<Self>, at_ns: u64, pressed: bool) {
-        let (pins, part) = board.pins();
-        pins.set_stop_button(part, at_ns, pressed);
-    }
-
-    fn miswire(board: &mut Nucleo<Self>, at_ns: u64, mistake: Mistake, wrong: bool) {
-        let (pins, part) = board.pins();
-        pins.miswire(part, at_ns, mistake, wrong);
     }
 }
 
@@ -240,7 +211,7 @@ impl PortServer {
     }
 
     /// Goes on with setting the board up; true once that is done.
-    fn set_up<P: BoardPins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
+    fn set_up<P: Pins>(&mut self, board: &mut Nucleo<P>, now_ns: u64) -> bool {
         if let Some(host) = &mut self.setup {
             host.serve(board, now_ns);
             let reason = match host.told {
@@ -277,12 +248,15 @@ impl PortServer {
                 self.is_cut = wrong;
             }
             Mistake::NoGround => board.break_line(wrong),
-            _ => P::miswire(board, at_ns, mistake, wrong),
+            _ => {
+                let (pins, part) = board.pins();
+                pins.miswire(part, at_ns, mistake, wrong);
+            }
         }
     }
 
     /// Lets a port's bytes go both ways.
-    fn carry<P: BoardPins>(
+    fn carry<P: Pins>(
         &self,
         board: &mut Nucleo<P>,
         (uart, name): (usize, PortName),
@@ -344,7 +318,8 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
             is_on,
         } = between;
         let board = session.board_mut();
-        P::show(board, &self.shared);
+        let (pins, part) = board.pins();
+        pins.show(part, &self.shared);
         if self.set_up(board, now_ns) {
             let moment = (now_ns, is_on);
             let [console, link, rtt] = self.ports();
@@ -362,18 +337,18 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
             self.shared.stops.store(true, Ordering::Relaxed);
         }
         while let Some(order) = self.shared.next_order(self.role) {
-            match order {
-                Command::Reset(_) => session.reset_by_pin(stop.at, stop.instruction_count, host),
-                Command::Stop => P::press_stop(session.board_mut(), stop.at.0, true),
-                Command::Release => P::press_stop(session.board_mut(), stop.at.0, false),
-                Command::Wrong(mistake) => {
-                    self.miswire(session.board_mut(), stop.at.0, mistake, true);
+            let (mistake, wrong) = match order {
+                Command::Reset(_) => {
+                    session.reset_by_pin(stop.at, stop.instruction_count, host);
+                    continue;
                 }
-                Command::Right(mistake) => {
-                    self.miswire(session.board_mut(), stop.at.0, mistake, false);
-                }
-                _ => {}
-            }
+                Command::Stop => (Mistake::StopOpen, true),
+                Command::Release => (Mistake::StopOpen, false),
+                Command::Wrong(mistake) => (mistake, true),
+                Command::Right(mistake) => (mistake, false),
+                _ => continue,
+            };
+            self.miswire(session.board_mut(), stop.at.0, mistake, wrong);
         }
     }
 

@@ -117,8 +117,7 @@ impl Outputs {
 
 /// Frames that ended, of every sort.
 fn ended(counters: &PortCounters) -> u64 {
-    [
-        counters.received,
+    let bad = [
         counters.corrupt,
         counters.overlong,
         counters.late,
@@ -126,10 +125,8 @@ fn ended(counters: &PortCounters) -> u64 {
         counters.malformed,
         counters.foreign,
         counters.unheralded,
-    ]
-    .into_iter()
-    .map(u64::from)
-    .sum()
+    ];
+    u64::from(counters.received) + bad.map(u64::from).iter().sum::<u64>()
 }
 
 impl Side {
@@ -209,28 +206,27 @@ impl Side {
 struct Checks(Vec<Check>);
 
 impl Checks {
-    fn equal(&mut self, what: String, seen: u64, due: u64) {
-        self.0.push(Check {
-            what,
-            seen: format!("{seen}, due {due}"),
-            holds: seen == due,
-        });
+    fn add(&mut self, whose: &str, what: &str, seen: String, holds: bool) {
+        let what = format!("{whose}: {what}");
+        self.0.push(Check { what, seen, holds });
     }
 
-    fn none(&mut self, what: String, seen: u64) {
-        self.0.push(Check {
-            what,
-            seen: seen.to_string(),
-            holds: seen == 0,
-        });
+    /// What must be as often as is due.
+    fn equal(&mut self, whose: &str, what: &str, (seen, due): (u64, u64)) {
+        self.add(whose, what, format!("{seen}, due {due}"), seen == due);
     }
 
-    fn within(&mut self, what: String, seen: u64, (low, high): (u64, u64)) {
-        self.0.push(Check {
-            what,
-            seen: format!("{seen}, due {low} to {high}"),
-            holds: (low..=high).contains(&seen),
-        });
+    /// What must not be.
+    fn none(&mut self, whose: &str, seen: &[(&str, u64)]) {
+        for &(what, seen) in seen {
+            self.add(whose, what, seen.to_string(), seen == 0);
+        }
+    }
+
+    /// What must be so often.
+    fn within(&mut self, whose: &str, what: &str, seen: u64, (low, high): (u64, u64)) {
+        let holds = (low..=high).contains(&seen);
+        self.add(whose, what, format!("{seen}, due {low} to {high}"), holds);
     }
 }
 
@@ -246,6 +242,7 @@ pub(super) fn judge(sensor: Left, display: Left, crossed: u64) -> Soaked {
     }
     of_display(&mut checks, &display);
     let (said, outputs) = (&display.side, &display.outputs);
+    let heard = said.heard.counters();
     let counts = vec![
         ("boundaries that the hand went over", crossed),
         ("ticks of the display", outputs.ticks),
@@ -256,12 +253,9 @@ pub(super) fn judge(sensor: Left, display: Left, crossed: u64) -> Soaked {
         ("of those valid", said.heard_valid),
         ("motions sent", said.said_motions),
         ("of them heard", sensor.side.heard_motions),
-        (
-            "frames lost on the way to the display",
-            said.heard.counters().lost.into(),
-        ),
-        ("frames corrupt there", said.heard.counters().corrupt.into()),
-        ("frames late there", said.heard.counters().late.into()),
+        ("frames lost on the way to the display", heard.lost.into()),
+        ("frames corrupt there", heard.corrupt.into()),
+        ("frames late there", heard.late.into()),
         ("times that the stimulus was held", said.holds),
     ];
     Soaked {
@@ -271,46 +265,37 @@ pub(super) fn judge(sensor: Left, display: Left, crossed: u64) -> Soaked {
 }
 
 fn of_board(checks: &mut Checks, board: &Left) {
-    let name = board.name;
-    let side = &board.side;
-    checks.none(
-        format!("{name}: panics in its log"),
-        board.panics.len() as u64,
-    );
-    checks.none(format!("{name}: resets"), board.resets as u64);
-    checks.none(format!("{name}: times its uptime fell"), side.uptime_fell);
-    checks.none(
-        format!("{name}: configurations without an answer"),
-        u64::from(!board.told),
-    );
-    checks.none(
-        format!("{name}: statuses missing"),
-        u64::from(side.statuses < 2),
-    );
+    let (name, side) = (board.name, &board.side);
+    let before = [
+        ("panics in its log", board.panics.len() as u64),
+        ("resets", board.resets as u64),
+        ("times its uptime fell", side.uptime_fell),
+        ("configurations without an answer", u64::from(!board.told)),
+        ("statuses missing", u64::from(side.statuses < 2)),
+    ];
+    checks.none(name, &before);
     let Some(status) = side.last_status() else {
         return;
     };
-    checks.none(
-        format!("{name}: watchdog resets"),
-        u64::from(status.watchdog_resets) + u64::from(status.reset == ResetCause::Watchdog),
-    );
-    checks.none(
-        format!("{name}: statuses whose sent frames are not the wire's"),
-        side.miscounted_frames,
-    );
+    let bitten = u64::from(status.reset == ResetCause::Watchdog);
+    let of_status = [
+        (
+            "watchdog resets",
+            u64::from(status.watchdog_resets) + bitten,
+        ),
+        (
+            "statuses whose sent frames are not the wire's",
+            side.miscounted_frames,
+        ),
+    ];
+    checks.none(name, &of_status);
     for (port, counters) in [("peer", status.peer), ("console", status.console)] {
-        checks.none(
-            format!("{name}, {port}: frames dropped"),
-            counters.dropped.into(),
-        );
-        checks.none(
-            format!("{name}, {port}: overruns"),
-            counters.overruns.into(),
-        );
-        checks.none(
-            format!("{name}, {port}: line errors"),
-            counters.line_errors.into(),
-        );
+        let of_port = [
+            ("frames dropped", counters.dropped.into()),
+            ("overruns", counters.overruns.into()),
+            ("line errors", counters.line_errors.into()),
+        ];
+        checks.none(&format!("{name}, {port}"), &of_port);
     }
 }
 
@@ -318,121 +303,118 @@ fn of_board(checks: &mut Checks, board: &Left) {
 fn of_link(checks: &mut Checks, board: &Left, peer: &Left) {
     let Some(status) = board.status() else { return };
     let (name, twin) = (board.name, board.side.heard.counters());
-    for (what, seen, due) in [
-        ("received", status.peer.received, twin.received),
-        ("lost", status.peer.lost, twin.lost),
-        ("corrupt", status.peer.corrupt, twin.corrupt),
-        ("overlong", status.peer.overlong, twin.overlong),
-        ("late", status.peer.late, twin.late),
-        ("duplicated", status.peer.duplicated, twin.duplicated),
-        ("malformed", status.peer.malformed, twin.malformed),
-        ("foreign", status.peer.foreign, twin.foreign),
-        ("unheralded", status.peer.unheralded, twin.unheralded),
-    ] {
-        checks.equal(format!("{name}: frames {what}"), seen.into(), due.into());
+    let [seen, due] = [status.peer, twin].map(|counters| {
+        [
+            ("frames received", counters.received),
+            ("frames lost", counters.lost),
+            ("frames corrupt", counters.corrupt),
+            ("frames overlong", counters.overlong),
+            ("frames late", counters.late),
+            ("frames duplicated", counters.duplicated),
+            ("frames malformed", counters.malformed),
+            ("frames foreign", counters.foreign),
+            ("frames unheralded", counters.unheralded),
+        ]
+    });
+    for ((what, seen), (_, due)) in seen.into_iter().zip(due) {
+        checks.equal(name, what, (seen.into(), due.into()));
     }
     // What was sent came, came late, or left a gap; after silence nothing more shows a gap.
     let sent = peer.side.before_quiet;
-    let [received, late, lost, unheralded] =
-        [twin.received, twin.late, twin.lost, twin.unheralded].map(u64::from);
-    let accounted = received + late + lost + unheralded;
+    let accounted = [twin.received, twin.late, twin.lost, twin.unheralded];
     checks.within(
-        format!("{name}: of the peer's frames received, late, lost or unheralded"),
-        accounted,
+        name,
+        "of the peer's frames received, late, lost or unheralded",
+        accounted.map(u64::from).iter().sum(),
         (sent.saturating_sub(UNSEEN_AT_THE_END), sent),
     );
 }
 
 fn of_sensor(checks: &mut Checks, sensor: &Left, counters: &SensorCounters) {
-    checks.none(
-        "sensor: deadline misses".to_owned(),
-        counters.deadline_misses.into(),
-    );
-    checks.none(
-        "sensor: ADC overruns".to_owned(),
-        counters.adc_overruns.into(),
-    );
-    checks.none(
-        "sensor: DMA overruns".to_owned(),
-        counters.dma_overruns.into(),
-    );
+    let none = [
+        ("deadline misses", counters.deadline_misses.into()),
+        ("ADC overruns", counters.adc_overruns.into()),
+        ("DMA overruns", counters.dma_overruns.into()),
+    ];
+    checks.none("sensor", &none);
     // Those before the peer has greeted are counted and not sent.
     let said = sensor.side.said_estimates;
+    let due = (said.saturating_sub(110), said + 110);
     checks.within(
-        "sensor: estimates counted".to_owned(),
+        "sensor",
+        "estimates counted",
         counters.estimates.into(),
-        (said.saturating_sub(110), said + 110),
+        due,
     );
     // The latest of those that come within a sample is used; of a burst without a gap, which DMA hands on
     // at its end, the latest of all.
-    let samples = sensor.side.motion_samples;
-    checks.within(
-        "sensor: motions that reached the drive".to_owned(),
-        counters.motions.into(),
-        (samples / 2, sensor.side.heard_motions),
-    );
+    let due = (sensor.side.motion_samples / 2, sensor.side.heard_motions);
+    let what = "motions that reached the drive";
+    checks.within("sensor", what, counters.motions.into(), due);
 }
 
 fn of_display(checks: &mut Checks, display: &Left) {
     let (side, outputs) = (&display.side, &display.outputs);
-    checks.none(
-        "display: statuses whose ticks are not the timer's".to_owned(),
-        side.miscounted_ticks,
-    );
-    checks.none(
-        "display: edges at which channels did not change together".to_owned(),
-        outputs.skewed,
-    );
-    checks.none(
-        "display: frames that a converter did not understand".to_owned(),
-        outputs.dac_frame_errors,
-    );
-    checks.none("display: times that CLR fell".to_owned(), outputs.clears);
-    checks.none("display: trips".to_owned(), side.trips);
-    checks.none(
-        "display: ticks with a voltage though the hand rests".to_owned(),
-        outputs.standing,
-    );
-    checks.0.push(Check {
-        what: "display: largest step of a channel, V".to_owned(),
-        seen: format!("{:.3}, at most {LARGEST_STEP_V}", outputs.largest_step_v),
-        holds: outputs.largest_step_v <= LARGEST_STEP_V,
-    });
+    let none = [
+        (
+            "statuses whose ticks are not the timer's",
+            side.miscounted_ticks,
+        ),
+        (
+            "edges at which channels did not change together",
+            outputs.skewed,
+        ),
+        (
+            "frames that a converter did not understand",
+            outputs.dac_frame_errors,
+        ),
+        ("times that CLR fell", outputs.clears),
+        ("trips", side.trips),
+        (
+            "ticks with a voltage though the hand rests",
+            outputs.standing,
+        ),
+    ];
+    checks.none("display", &none);
+    let step_v = outputs.largest_step_v;
+    let seen = format!("{step_v:.3}, at most {LARGEST_STEP_V}");
+    let what = "largest step of a channel, V";
+    checks.add("display", what, seen, step_v <= LARGEST_STEP_V);
     let Some(RoleCounters::Display(counters)) = display.status().map(|status| status.role) else {
         return;
     };
-    for (what, count) in [
-        ("missed updates", counters.deadline_misses),
-        ("SPI errors", counters.spi_errors),
-        ("converter faults", counters.converter_faults),
-        ("CLR seen fallen", counters.clears),
-        ("encoder jumps", counters.encoder_jumps),
-        ("motions without room", counters.unheard),
-        ("estimates called a flood", counters.flooded),
-        (
-            "stopped at the end",
-            u32::from(matches!(counters.state, DisplayState::Stopped(_))),
-        ),
-    ] {
-        checks.none(format!("display: {what}"), count.into());
-    }
+    let is_stopped = matches!(counters.state, DisplayState::Stopped(_));
+    let none = [
+        ("missed updates", counters.deadline_misses.into()),
+        ("SPI errors", counters.spi_errors.into()),
+        ("converter faults", counters.converter_faults.into()),
+        ("CLR seen fallen", counters.clears.into()),
+        ("encoder jumps", counters.encoder_jumps.into()),
+        ("motions without room", counters.unheard.into()),
+        ("estimates called a flood", counters.flooded.into()),
+        ("stopped at the end", is_stopped.into()),
+    ];
+    checks.none("display", &none);
     if let Some((loads, updates)) = side.first_updates {
+        let due = u64::from(counters.updates - updates);
         checks.equal(
-            "display: LDAC edges for its updates".to_owned(),
-            outputs.loads - loads,
-            u64::from(counters.updates - updates),
+            "display",
+            "LDAC edges for its updates",
+            (outputs.loads - loads, due),
         );
     }
     // Two that come within a tick are one to the stimulus: the later.
-    let used = u64::from(counters.estimates)
-        + u64::from(counters.refused_estimates)
-        + u64::from(counters.implausible);
-    let valid = side.heard_valid;
-    checks.within(
-        "display: valid estimates followed, refused or implausible".to_owned(),
-        used,
-        (valid - valid / 20, side.heard_estimates),
+    let used = [
+        counters.estimates,
+        counters.refused_estimates,
+        counters.implausible,
+    ];
+    let due = (
+        side.heard_valid - side.heard_valid / 20,
+        side.heard_estimates,
     );
+    let what = "valid estimates followed, refused or implausible";
+    checks.within("display", what, used.map(u64::from).iter().sum(), due);
 }
 
 #[cfg(test)]

@@ -13,10 +13,8 @@ use crate::judge::standing::Standing;
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::truth::Truth;
 use crate::plant::motion::MM_PER_COUNT;
-use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{
-    ACTUATORS, Arrival, OutputRecord, Recording, TickRecord, WORD_V, volts,
-};
+use crate::run::observer::{RunEvent, RunObserver, replay_to};
+use crate::run::recording::{ACTUATORS, OutputRecord, Recording, TickRecord, WORD_V, volts};
 
 /// Voltage below which an actuator does not vibrate, in V.
 const STILL_V: f64 = 0.05;
@@ -185,13 +183,24 @@ impl Judge {
 }
 
 impl RunObserver for Judge {
+    fn see(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Tick(tick) => self.tick(tick),
+            RunEvent::Output(output) => self.output(output),
+            RunEvent::Received(_) => self.stimulus.see(event),
+            _ => {}
+        }
+    }
+}
+
+impl Judge {
     fn tick(&mut self, tick: &TickRecord) {
         if let Some(before_mm) = self.hand_mm.replace(tick.position_mm) {
             let travel_mm = (tick.position_mm - before_mm).abs();
             self.longest_mm = Some(self.longest_mm.unwrap_or(0.0).max(travel_mm));
         }
         self.reactions.tick(tick);
-        self.stimulus.tick(tick);
+        self.stimulus.see(RunEvent::Tick(tick));
         self.follow();
     }
 
@@ -203,11 +212,7 @@ impl RunObserver for Judge {
         self.skew_ns = self.skew_ns.max(output.skew_ns);
         self.peaks.add(&output.words);
         self.reactions.output(output, self.stimulus.shortest_mm());
-        self.stimulus.output(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.stimulus.received(arrival);
+        self.stimulus.see(RunEvent::Output(output));
     }
 }
 

@@ -9,7 +9,7 @@ use crate::judge::needed::Rendering;
 use crate::judge::track::interpolate;
 use crate::judge::truth::Truth;
 use crate::judge::{finite, mean, seconds, words};
-use crate::run::observer::{RunObserver, replay_to};
+use crate::run::observer::{RunEvent, RunObserver, replay_to};
 use crate::run::recording::{Arrival, EstimateRecord, Recording, ScanRecord};
 
 /// Speed from which on the arm counts as in motion, in mm/s.
@@ -239,6 +239,17 @@ impl<'a> Judge<'a> {
 }
 
 impl RunObserver for Judge<'_> {
+    fn see(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Scan(scan) => self.scan(scan),
+            RunEvent::Estimate(made_ns, estimate) => self.estimate(made_ns, estimate),
+            RunEvent::Received(arrival) => self.received(arrival),
+            _ => {}
+        }
+    }
+}
+
+impl Judge<'_> {
     fn scan(&mut self, scan: &ScanRecord) {
         let here @ (t_s, x_mm) = (seconds(scan.at_ns), scan.position_mm);
         match self.arm.replace(here) {
@@ -257,7 +268,7 @@ impl RunObserver for Judge<'_> {
         }
     }
 
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
+    fn estimate(&mut self, made_ns: u64, estimate: &Estimate) {
         let millimetres = |mm: Option<f32>| mm.map(f64::from).and_then(finite);
         self.travelling.push_back(EstimateRecord {
             made_ns,

@@ -9,8 +9,8 @@ use serde::Serialize;
 use crate::plant::contact::Contact;
 use crate::plant::skew::Skew;
 use crate::plant::surface::Surface;
-use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{Recording, ScanRecord};
+use crate::run::observer::{RunEvent, RunObserver, replay_to};
+use crate::run::recording::Recording;
 use crate::scene::{Follows, Gauges, Motion, Scene};
 
 /// Something that happened.
@@ -105,7 +105,8 @@ impl<'a> Events<'a> {
 }
 
 impl RunObserver for Events<'_> {
-    fn scan(&mut self, scan: &ScanRecord) {
+    fn see(&mut self, event: RunEvent<'_>) {
+        let RunEvent::Scan(scan) = event else { return };
         let t_s = scan.at_ns as f64 * 1e-9;
         if let Some(turns) = &mut self.turns {
             self.arm_reversals.extend(turns.scan(t_s, scan.position_mm));

@@ -14,13 +14,9 @@ mod step;
 #[cfg(test)]
 mod tests;
 
-use protocol::Role;
-
 use crate::judge::fault::monitor::FaultMonitor;
-use crate::run::decoder::TimedMessage;
-use crate::run::fault_evidence::Reset;
-use crate::run::observer::{RunObserver, replay_to};
-use crate::run::recording::{Arrival, OutputRecord, Recording, TickRecord};
+use crate::run::observer::{RunEvent, RunObserver, replay_to};
+use crate::run::recording::Recording;
 use crate::scene::Scene;
 
 pub use finding::Finding;
@@ -65,39 +61,7 @@ impl Judge {
 }
 
 impl RunObserver for Judge {
-    fn tick(&mut self, tick: &TickRecord) {
-        for monitor in &mut self.monitors {
-            monitor.tick(tick);
-        }
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        for monitor in &mut self.monitors {
-            monitor.output(output);
-        }
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        for monitor in &mut self.monitors {
-            monitor.received(arrival);
-        }
-    }
-
-    fn said(&mut self, role: Role, said: &TimedMessage) {
-        for monitor in &mut self.monitors {
-            monitor.said(role, said);
-        }
-    }
-
-    fn reset(&mut self, reset: &Reset) {
-        for monitor in &mut self.monitors {
-            monitor.reset(reset);
-        }
-    }
-
-    fn cleared(&mut self, at_ns: u64) {
-        for monitor in &mut self.monitors {
-            monitor.cleared(at_ns);
-        }
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.monitors[..].see(event);
     }
 }

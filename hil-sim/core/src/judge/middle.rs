@@ -155,8 +155,8 @@ mod tests {
     use crate::judge::stimulus::{Stimulus, Told};
     use crate::judge::synthetic::Run;
     use crate::judge::truth::Truth;
-    use crate::run::observer::{RunObserver, replay_to};
-    use crate::run::recording::{ACTUATORS, Arrival, OutputRecord, TickRecord, WORD_V, volts};
+    use crate::run::observer::{RunEvent, RunObserver, replay_to};
+    use crate::run::recording::{ACTUATORS, WORD_V, volts};
 
     /// For each stroke, the instants in s and the voltage of actuator 0 about its middle.
     struct Strokes {
@@ -166,17 +166,9 @@ mod tests {
     }
 
     impl RunObserver for Strokes {
-        fn tick(&mut self, tick: &TickRecord) {
-            self.stimulus.tick(tick);
+        fn see(&mut self, event: RunEvent<'_>) {
+            self.stimulus.see(event);
             self.follow();
-        }
-
-        fn output(&mut self, output: &OutputRecord) {
-            self.stimulus.output(output);
-        }
-
-        fn received(&mut self, arrival: &Arrival) {
-            self.stimulus.received(arrival);
         }
     }
 

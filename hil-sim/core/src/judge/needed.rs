@@ -7,6 +7,8 @@
 
 use protocol::texture::{LOWEST_BAND_PER_MM, UNITY};
 use protocol::{Message, Role, Texture};
+use serde::Serialize;
+use strum::{IntoStaticStr, VariantArray};
 
 use crate::run::decoder::TimedMessage;
 use crate::run::recording::TickRecord;
@@ -21,8 +23,11 @@ const MOTION_MM_S: f64 = 5.0;
 const FELT_HZ: std::ops::RangeInclusive<f64> = 2.0..=200.0;
 
 /// How much of the surface there is to be played.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Rendering {
     /// The fundamental alone.
     Fundamental,
@@ -33,15 +38,9 @@ pub enum Rendering {
 }
 
 impl Rendering {
-    const ALL: [Self; 3] = [Self::Fundamental, Self::Shape, Self::Texture];
-
     /// As scenes and the JSON have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fundamental => "fundamental",
-            Self::Shape => "shape",
-            Self::Texture => "texture",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 
@@ -95,21 +94,17 @@ impl Judge {
 
 /// The rendering that a surface needs under a hand of this speed.
 fn needed(texture: &Texture, wavelength_mm: f64, speed_mm_s: f64) -> Rendering {
-    let played =
-        Rendering::ALL.map(|rendering| played(texture, wavelength_mm, speed_mm_s, rendering));
+    let played = |rendering| played(texture, wavelength_mm, speed_mm_s, rendering);
     let differ = |one: (f64, f64), other: (f64, f64)| {
         let db = 10.0 * (other.0 / one.0).log10();
         db.abs() >= LIMEN_DB || (other.1 / one.1 - 1.0).abs() >= WEBER
     };
-    Rendering::ALL
-        .into_iter()
-        .enumerate()
-        .find(|(at, _)| {
-            !played[at + 1..]
-                .iter()
-                .any(|&more| differ(played[*at], more))
-        })
-        .map_or(Rendering::Texture, |(_, rendering)| rendering)
+    let is_enough = |rendering: &&Rendering| {
+        let mut more = Rendering::VARIANTS.iter().filter(|more| more > rendering);
+        !more.any(|&more| differ(played(**rendering), played(more)))
+    };
+    let enough = Rendering::VARIANTS.iter().find(is_enough);
+    enough.copied().unwrap_or(Rendering::Texture)
 }
 
 /// Power and mean frequency in Hz of what a rendering plays.

@@ -1,7 +1,5 @@
 //! A scene that was run, judged.
 
-use protocol::{Estimate, Role};
-
 use crate::judge;
 use crate::judge::Verdict;
 use crate::judge::event::{Event, Events, events};
@@ -11,10 +9,7 @@ use crate::judge::fault::{Finding, judge};
 use crate::judge::truth::Truth;
 use crate::native;
 use crate::plant::surface::Surface;
-use crate::run::decoder::TimedMessage;
-use crate::run::fault_evidence::Reset;
-use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, Ran, Recording, ScanRecord, TickRecord};
+use crate::run::recording::{Ran, Recording};
 use crate::scene::{Scene, SceneError};
 
 /// A run and what came of it.
@@ -95,69 +90,21 @@ impl Judgement {
     pub fn of(scene: &Scene, with_events: bool) -> Result<Self, SceneError> {
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
-        let mut judges = Judges {
-            run: judge::Judge::new(&truth(scene, &wavelength_mm)),
-            faults: fault::Judge::new(scene),
-            events: with_events.then(|| Events::new(scene)),
-        };
+        let mut judges = (
+            judge::Judge::new(&truth(scene, &wavelength_mm)),
+            fault::Judge::new(scene),
+            with_events.then(|| Events::new(scene)),
+        );
         let ran = native::run_before(scene, &mut judges)?;
-        let verdict = judges.run.finish();
-        let findings = judges.faults.finish();
+        let (run, faults, events) = judges;
+        let (verdict, findings) = (run.finish(), faults.finish());
         Ok(Self {
             ran,
             unmet: unmet(scene, &verdict, &findings),
             verdict,
             findings,
-            events: judges.events.map(Events::finish).unwrap_or_default(),
+            events: events.map(Events::finish).unwrap_or_default(),
         })
-    }
-}
-
-/// All who judge a run.
-struct Judges<'a> {
-    run: judge::Judge<'a>,
-    faults: fault::Judge,
-    events: Option<Events<'a>>,
-}
-
-impl RunObserver for Judges<'_> {
-    fn scan(&mut self, scan: &ScanRecord) {
-        self.run.scan(scan);
-        if let Some(events) = &mut self.events {
-            events.scan(scan);
-        }
-    }
-
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.run.on_estimate(made_ns, estimate);
-    }
-
-    fn tick(&mut self, tick: &TickRecord) {
-        self.run.tick(tick);
-        self.faults.tick(tick);
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.run.output(output);
-        self.faults.output(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.run.received(arrival);
-        self.faults.received(arrival);
-    }
-
-    fn said(&mut self, role: Role, said: &TimedMessage) {
-        self.run.said(role, said);
-        self.faults.said(role, said);
-    }
-
-    fn reset(&mut self, reset: &Reset) {
-        self.faults.reset(reset);
-    }
-
-    fn cleared(&mut self, at_ns: u64) {
-        self.faults.cleared(at_ns);
     }
 }
 

@@ -7,8 +7,8 @@ use protocol::DisplayConfiguration;
 use crate::judge::seconds;
 use crate::judge::trust::Trust;
 use crate::judge::truth::Truth;
-use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
+use crate::run::observer::{RunEvent, RunObserver};
+use crate::run::recording::{Arrival, TickRecord, ZERO_VOLT};
 
 /// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
 const TICKS_KEPT: usize = 8;
@@ -121,6 +121,19 @@ impl DuePhase {
 }
 
 impl RunObserver for DuePhase {
+    fn see(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Received(arrival) => self.received(arrival),
+            RunEvent::Output(output) => {
+                self.loud = output.words.iter().any(|&word| word != ZERO_VOLT);
+            }
+            RunEvent::Tick(tick) => self.tick(tick),
+            _ => {}
+        }
+    }
+}
+
+impl DuePhase {
     fn received(&mut self, arrival: &Arrival) {
         if self
             .last_tick_ns
@@ -130,10 +143,6 @@ impl RunObserver for DuePhase {
         } else {
             self.arrived.push_back(*arrival);
         }
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.loud = output.words.iter().any(|&word| word != ZERO_VOLT);
     }
 
     fn tick(&mut self, tick: &TickRecord) {
@@ -235,19 +244,14 @@ mod tests {
     }
 
     impl RunObserver for Asking {
-        fn tick(&mut self, tick: &TickRecord) {
-            self.due.tick(tick);
-            if seconds(tick.at_ns) > self.t_s && self.answer.is_none() {
+        fn see(&mut self, event: RunEvent<'_>) {
+            self.due.see(event);
+            if let RunEvent::Tick(tick) = event
+                && seconds(tick.at_ns) > self.t_s
+                && self.answer.is_none()
+            {
                 self.answer = Some(self.due.at(self.t_s));
             }
-        }
-
-        fn output(&mut self, output: &OutputRecord) {
-            self.due.output(output);
-        }
-
-        fn received(&mut self, arrival: &Arrival) {
-            self.due.received(arrival);
         }
     }
 

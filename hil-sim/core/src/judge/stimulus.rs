@@ -4,8 +4,7 @@ use crate::judge::phase::{Due, DuePhase};
 use crate::judge::track::Turns;
 use crate::judge::truth::Truth;
 use crate::judge::voltage::{Edge, Edges};
-use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord};
+use crate::run::observer::{RunEvent, RunObserver};
 
 /// What a tick tells of the stimulus.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,20 +69,17 @@ impl Stimulus {
 }
 
 impl RunObserver for Stimulus {
-    fn tick(&mut self, tick: &TickRecord) {
-        if self.turns.turned(tick.position_mm) {
+    fn see(&mut self, event: RunEvent<'_>) {
+        if let RunEvent::Tick(tick) = event
+            && self.turns.turned(tick.position_mm)
+        {
             self.turned_cycles = self.due.last().map(|due| due.travelled_cycles);
         }
-        self.due.tick(tick);
-        self.known_s = self.due.last().map_or(self.known_s, |due| due.t_s);
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.due.output(output);
-        self.edges.add(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.due.received(arrival);
+        self.due.see(event);
+        match event {
+            RunEvent::Tick(_) => self.known_s = self.due.last().map_or(self.known_s, |due| due.t_s),
+            RunEvent::Output(output) => self.edges.add(output),
+            _ => {}
+        }
     }
 }

@@ -1,108 +1,147 @@
 //! What is told of a run while it goes on: to whoever writes it down, or judges it.
 //!
 //! ```text
-//! native ─┬──────────────────────────────────┐
-//!         └─> Tape ─> Recording ─> retell ───┼─> judges
-//! elf ──────────────> Recording ─> retell ───┘
+//! native ─┬─────────────────────────────┐
+//!         └─> Recording ─> replay_to ───┼─> judges
+//! elf ──────> Recording ─> replay_to ───┘
 //! ```
 //!
 //! A judge keeps only what it still needs, so that a run that is told to it directly needs no more memory
 //! the longer it lasts, but for its estimates and a few numbers for each cycle of the stimulus.
 
+use std::iter::Peekable;
+
 use protocol::{Estimate, Role};
 
 use crate::run::decoder::TimedMessage;
 use crate::run::fault_evidence::{FaultEvidence, Reset};
-use crate::run::recording::{Arrival, OutputRecord, Recording, ScanRecord, TickRecord};
+use crate::run::recording::{
+    Arrival, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
+};
 
-/// Is told of a run, in the order of time. Of one instant, what is further up here comes first. Nobody needs
-/// to listen to everything.
-pub trait RunObserver {
+/// What happens in a run. Of one instant, what is further up here comes first.
+#[derive(Clone, Copy, Debug)]
+pub enum RunEvent<'a> {
     /// An ADC scan.
-    fn scan(&mut self, _scan: &ScanRecord) {}
-
+    Scan(&'a ScanRecord),
     /// The sensor has made an estimate, at an instant in ns since the scene's start.
-    fn on_estimate(&mut self, _made_ns: u64, _estimate: &Estimate) {}
-
+    Estimate(u64, &'a Estimate),
     /// A tick of the display's.
-    fn tick(&mut self, _tick: &TickRecord) {}
-
+    Tick(&'a TickRecord),
     /// The outputs have changed.
-    fn output(&mut self, _output: &OutputRecord) {}
-
+    Output(&'a OutputRecord),
     /// An estimate has arrived at the display, be it the sensor's or a forged one: told then, or as late as at
     /// the display's next tick.
-    fn received(&mut self, _arrival: &Arrival) {}
-
+    Received(&'a Arrival),
     /// What a board sent, in which a fault may show.
-    fn said(&mut self, _role: Role, _said: &TimedMessage) {}
-
+    Said(Role, &'a TimedMessage),
     /// A board was reset.
-    fn reset(&mut self, _reset: &Reset) {}
-
+    Reset(&'a Reset),
     /// CLR fell, at an instant in ns since the scene's start.
-    fn cleared(&mut self, _at_ns: u64) {}
+    Cleared(u64),
+}
+
+/// Is told of a run, in the order of time.
+pub trait RunObserver {
+    /// Takes the next of what happens.
+    fn see(&mut self, event: RunEvent<'_>);
 }
 
 /// Nobody.
-impl RunObserver for () {}
+impl RunObserver for () {
+    fn see(&mut self, _event: RunEvent<'_>) {}
+}
+
+impl<O: RunObserver> RunObserver for [O] {
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.iter_mut().for_each(|observer| observer.see(event));
+    }
+}
+
+impl<O: RunObserver> RunObserver for Option<O> {
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.as_mut_slice().see(event);
+    }
+}
+
+/// All three.
+impl<A: RunObserver, B: RunObserver, C: RunObserver> RunObserver for (A, B, C) {
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.0.see(event);
+        self.1.see(event);
+        self.2.see(event);
+    }
+}
+
+/// Writes everything down.
+impl RunObserver for Recording {
+    fn see(&mut self, event: RunEvent<'_>) {
+        match event {
+            RunEvent::Scan(scan) => self.scans.push(*scan),
+            RunEvent::Estimate(made_ns, estimate) => self.estimates.push(EstimateRecord {
+                made_ns,
+                received_ns: None,
+                estimate: *estimate,
+            }),
+            RunEvent::Tick(tick) => self.ticks.push(*tick),
+            RunEvent::Output(output) => self.outputs.push(*output),
+            RunEvent::Received(arrival) => self.arrived.push(*arrival),
+            RunEvent::Said(Role::Sensor, said) => self.signs.sensor.push(said.clone()),
+            RunEvent::Said(Role::Display, said) => self.signs.display.push(said.clone()),
+            RunEvent::Said(Role::Host, _) => {}
+            RunEvent::Reset(reset) => self.signs.resets.push(*reset),
+            RunEvent::Cleared(at_ns) => self.signs.clears_ns.push(at_ns),
+        }
+    }
+}
 
 /// Tells of a run as it was recorded; what shows of faults comes at the end.
 pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
-    let made = &recording.estimates;
-    let mut scans = recording.scans.iter().peekable();
-    let mut made = made.iter().peekable();
-    let mut ticks = recording.ticks.iter().peekable();
-    let mut outputs = recording.outputs.iter().peekable();
-    let mut arrivals = recording.arrived.iter().peekable();
-    // What is over comes last.
-    const OVER_NS: u64 = u64::MAX;
-    loop {
-        let scan_ns = scans.peek().map_or(OVER_NS, |scan| scan.at_ns);
-        let made_ns = made.peek().map_or(OVER_NS, |record| record.made_ns);
-        let tick_ns = ticks.peek().map_or(OVER_NS, |tick| tick.at_ns);
-        let output_ns = outputs.peek().map_or(OVER_NS, |output| output.at_ns);
-        let arrival_ns = arrivals.peek().map_or(OVER_NS, |arrival| arrival.at_ns);
-        let next_ns = [scan_ns, made_ns, tick_ns, output_ns, arrival_ns]
-            .into_iter()
-            .fold(OVER_NS, u64::min);
-        if next_ns == OVER_NS {
-            break;
-        } else if scan_ns == next_ns {
-            if let Some(scan) = scans.next() {
-                to.scan(scan);
-            }
-        } else if made_ns == next_ns {
-            if let Some(record) = made.next() {
-                to.on_estimate(record.made_ns, &record.estimate);
-            }
-        } else if tick_ns == next_ns {
-            if let Some(tick) = ticks.next() {
-                to.tick(tick);
-            }
-        } else if output_ns == next_ns {
-            if let Some(output) = outputs.next() {
-                to.output(output);
-            }
-        } else if let Some(arrival) = arrivals.next() {
-            to.received(arrival);
-        }
+    type Events<'a> = Peekable<Box<dyn Iterator<Item = (u64, RunEvent<'a>)> + 'a>>;
+    let scans = recording.scans.iter();
+    let made = recording.estimates.iter();
+    let ticks = recording.ticks.iter();
+    let outputs = recording.outputs.iter();
+    let arrivals = recording.arrived.iter();
+    let mut all: [Events; 5] = [
+        Box::new(scans.map(|scan| (scan.at_ns, RunEvent::Scan(scan))))
+            as Box<dyn Iterator<Item = _>>,
+        Box::new(made.map(|made| {
+            (
+                made.made_ns,
+                RunEvent::Estimate(made.made_ns, &made.estimate),
+            )
+        })),
+        Box::new(ticks.map(|tick| (tick.at_ns, RunEvent::Tick(tick)))),
+        Box::new(outputs.map(|output| (output.at_ns, RunEvent::Output(output)))),
+        Box::new(arrivals.map(|arrival| (arrival.at_ns, RunEvent::Received(arrival)))),
+    ]
+    .map(Iterator::peekable);
+    // The first of those that come at the same instant.
+    while let Some((_, event)) = all
+        .iter_mut()
+        .filter_map(|events| Some((events.peek()?.0, events)))
+        .min_by_key(|&(at_ns, _)| at_ns)
+        .and_then(|(_, events)| events.next())
+    {
+        to.see(event);
     }
     retell_signs(&recording.signs, to);
 }
 
 /// Tells of what shows of faults alone.
 pub fn retell_signs(signs: &FaultEvidence, to: &mut impl RunObserver) {
-    for said in &signs.display {
-        to.said(Role::Display, said);
-    }
-    for said in &signs.sensor {
-        to.said(Role::Sensor, said);
+    for (role, said) in [
+        (Role::Display, &signs.display),
+        (Role::Sensor, &signs.sensor),
+    ] {
+        said.iter()
+            .for_each(|said| to.see(RunEvent::Said(role, said)));
     }
     for reset in &signs.resets {
-        to.reset(reset);
+        to.see(RunEvent::Reset(reset));
     }
     for &at_ns in &signs.clears_ns {
-        to.cleared(at_ns);
+        to.see(RunEvent::Cleared(at_ns));
     }
 }

@@ -99,31 +99,6 @@ impl Arrival {
     }
 }
 
-/// Finds what arrives among what was made: both come in their order, but for a few.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Arrivals {
-    last: usize,
-}
-
-impl Arrivals {
-    /// So far may the link put them out of order.
-    const REORDERED: usize = 4_096;
-
-    /// Notes at the estimate that this is when it was received. What comes again, and what the sensor has not
-    /// made so, is none.
-    pub fn note(&mut self, estimates: &mut [EstimateRecord], arrival: &Arrival) {
-        let from = self.last.saturating_sub(Self::REORDERED);
-        let until = estimates.len().min(self.last + Self::REORDERED);
-        let made = estimates.get_mut(from..until).unwrap_or_default();
-        let waits =
-            |record: &EstimateRecord| record.received_ns.is_none() && record.is(&arrival.estimate);
-        if let Some(place) = made.iter().position(waits) {
-            made[place].received_ns = Some(arrival.at_ns);
-            self.last = from + place;
-        }
-    }
-}
-
 /// The voltages after one LDAC edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OutputRecord {
@@ -208,6 +183,57 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Of a run that has not begun, with room for `duration_s`.
+    pub fn empty(engine: Engine, duration_s: f64) -> Self {
+        let room = |rate_hz: u32| (duration_s * f64::from(rate_hz)).ceil() as usize + 1;
+        Self {
+            engine,
+            duration_s,
+            warm_up_s: 0.0,
+            wall_s: 0.0,
+            hash: 0,
+            scans: Vec::with_capacity(room(firmware_sensor::SCAN_RATE_HZ)),
+            ticks: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
+            estimates: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
+            arrived: Vec::with_capacity(room(firmware_sensor::ESTIMATE_RATE_HZ)),
+            outputs: Vec::with_capacity(room(firmware_display::TICK_RATE_HZ)),
+            sensor_status: None,
+            display_status: None,
+            log: Vec::new(),
+            signs: FaultEvidence::default(),
+        }
+    }
+
+    /// The run is over.
+    pub fn end(&mut self, ran: &Ran) {
+        self.warm_up_s = ran.warm_up_s;
+        self.wall_s = ran.wall_s;
+        self.hash = ran.hash;
+        self.sensor_status = ran.sensor_status;
+        self.display_status = ran.display_status;
+        self.match_arrivals();
+    }
+
+    /// Notes at each estimate when it was received. Both come in their order, but for a few. What comes again, and
+    /// what the sensor has not made so, is none.
+    pub fn match_arrivals(&mut self) {
+        /// So far may the link put them out of order.
+        const REORDERED: usize = 4_096;
+        let mut last = 0_usize;
+        for arrival in &self.arrived {
+            let from = last.saturating_sub(REORDERED);
+            let until = self.estimates.len().min(last + REORDERED);
+            let made = self.estimates.get_mut(from..until).unwrap_or_default();
+            let waits = |record: &EstimateRecord| {
+                record.received_ns.is_none() && record.is(&arrival.estimate)
+            };
+            if let Some(place) = made.iter().position(waits) {
+                made[place].received_ns = Some(arrival.at_ns);
+                last = from + place;
+            }
+        }
+    }
+
     /// What is known of the run without its records.
     pub fn ran(&self) -> Ran {
         Ran {

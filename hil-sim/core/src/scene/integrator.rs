@@ -1,7 +1,10 @@
 //! How a fingertip's equations are brought from one instant to the next, by name.
 
+use strum::{IntoStaticStr, VariantArray};
+
 /// The ways from one instant to the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Integrator {
     /// Explicit Euler: along the slope at the beginning.
     Euler,
@@ -19,25 +22,11 @@ pub enum Integrator {
 
 impl Integrator {
     /// All of them, the plainest first.
-    pub const ALL: [Self; 6] = [
-        Self::Euler,
-        Self::SemiImplicit,
-        Self::Rk4,
-        Self::Implicit,
-        Self::Adaptive,
-        Self::Radau,
-    ];
+    pub const ALL: [Self; 6] = *Self::VARIANTS.as_array().unwrap();
 
     /// As scenes call it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Euler => "euler",
-            Self::SemiImplicit => "semi-implicit",
-            Self::Rk4 => "rk4",
-            Self::Implicit => "implicit",
-            Self::Adaptive => "adaptive",
-            Self::Radau => "radau",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// Whether it takes the steps it is told to; the others choose their own.

@@ -26,26 +26,8 @@ pub(super) fn read(
     mut table: Table<'_>,
     scenery: &Scenery<'_>,
 ) -> Result<(Contact, Option<String>), SceneError> {
-    let model = table.choice(
-        "model",
-        &[
-            ("auto", None),
-            ("kinematic", Some(ContactModel::Kinematic)),
-            ("rigid", Some(ContactModel::Rigid)),
-            ("viscoelastic", Some(ContactModel::Viscoelastic)),
-            ("stick-slip", Some(ContactModel::StickSlip)),
-            ("reference", Some(ContactModel::Reference)),
-        ],
-    )?;
-    let friction = table.choice(
-        "friction",
-        &[
-            ("none", None),
-            ("mild", Some(Friction::Mild)),
-            ("strong", Some(Friction::Strong)),
-            ("severe", Some(Friction::Severe)),
-        ],
-    )?;
+    let model = table.variant::<ContactModel>("model", "auto")?;
+    let friction = table.variant::<Friction>("friction", "none")?;
     match (model, friction) {
         (
             Some(
@@ -98,10 +80,7 @@ fn solver(
     friction: Option<Friction>,
     scenery: &Scenery<'_>,
 ) -> Result<Solver, SceneError> {
-    let integrators: Vec<(&str, Option<Integrator>)> = std::iter::once(("exact", None))
-        .chain(Integrator::ALL.map(|integrator| (integrator.name(), Some(integrator))))
-        .collect();
-    let integrator = table.choice("integrator", &integrators)?;
+    let integrator = table.variant::<Integrator>("integrator", "exact")?;
     let step_us = table.number("step_us", &STEP)?;
     let Some(integrator) = integrator else {
         return match step_us {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use protocol::GAUGES;
+use strum::VariantArray;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -272,6 +273,19 @@ impl<'t> Table<'t> {
             .collect();
         let give = names.join(" or ");
         Err(self.refuse(key, format!("\"{word}\" is unknown: give {give}")))
+    }
+
+    /// A variant by its name; none of them with the word `none`, or if the key is absent.
+    pub fn variant<T: VariantArray + Into<&'static str> + Copy>(
+        &mut self,
+        key: &'static str,
+        none: &str,
+    ) -> Result<Option<T>, SceneError> {
+        let named = T::VARIANTS
+            .iter()
+            .map(|&variant| (variant.into(), Some(variant)));
+        let words: Vec<_> = std::iter::once((none, None)).chain(named).collect();
+        self.choice(key, &words)
     }
 
     /// A list of gauge numbers, none of them twice.

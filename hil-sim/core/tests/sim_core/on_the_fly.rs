@@ -5,13 +5,12 @@ use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::judge::truth::Truth;
 use hil_sim_core::judge::{Held, Judge};
 use hil_sim_core::native;
-use hil_sim_core::run::observer::RunObserver;
-use hil_sim_core::run::recording::{Arrival, OutputRecord, ScanRecord, TickRecord};
+use hil_sim_core::run::observer::{RunEvent, RunObserver};
 use hil_sim_core::scene::fault::{Fault, Kind};
 use hil_sim_core::scene::{
     ArmDrive, Contact, Display, Follows, Friction, Gauges, Kinematic, Link, Motion, Scene, Specimen,
 };
-use protocol::{DisplayConfiguration, Estimate, Mode, UpdateRate};
+use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
 const SWING: Motion = Motion::Sinusoid {
     amplitude_mm_s: 70.0,
@@ -160,27 +159,13 @@ struct Weighing<'a> {
 }
 
 impl RunObserver for Weighing<'_> {
-    fn scan(&mut self, scan: &ScanRecord) {
-        self.judge.scan(scan);
-    }
-
-    fn on_estimate(&mut self, made_ns: u64, estimate: &Estimate) {
-        self.judge.on_estimate(made_ns, estimate);
-    }
-
-    fn tick(&mut self, tick: &TickRecord) {
-        self.judge.tick(tick);
-        let held = self.judge.held();
-        self.most.points = self.most.points.max(held.points);
-        self.most.cycles = self.most.cycles.max(held.cycles);
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.judge.output(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.judge.received(arrival);
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.judge.see(event);
+        if let RunEvent::Tick(_) = event {
+            let held = self.judge.held();
+            self.most.points = self.most.points.max(held.points);
+            self.most.cycles = self.most.cycles.max(held.cycles);
+        }
     }
 }
 

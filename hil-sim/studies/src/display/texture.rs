@@ -31,7 +31,7 @@ use hil_sim_core::native;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::plant::surface;
 use hil_sim_core::run::decoder::TimedMessage;
-use hil_sim_core::run::observer::RunObserver;
+use hil_sim_core::run::observer::{RunEvent, RunObserver};
 use hil_sim_core::run::recording::{Engine, volts};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
@@ -234,9 +234,10 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
 struct Ear(Vec<TimedMessage>);
 
 impl RunObserver for Ear {
-    fn said(&mut self, role: Role, said: &TimedMessage) {
-        let of_surface = matches!(said.message, Message::Estimate(_) | Message::Texture(_));
-        if role == Role::Sensor && of_surface {
+    fn see(&mut self, event: RunEvent<'_>) {
+        if let RunEvent::Said(Role::Sensor, said) = event
+            && matches!(said.message, Message::Estimate(_) | Message::Texture(_))
+        {
             self.0.push(said.clone());
         }
     }

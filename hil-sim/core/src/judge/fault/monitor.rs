@@ -12,9 +12,7 @@ use super::step::Step;
 use crate::judge::truth::Truth;
 use crate::plant::motion::MM_PER_COUNT;
 use crate::run::decoder::TimedMessage;
-use crate::run::fault_evidence::Reset;
-use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord};
+use crate::run::observer::{RunEvent, RunObserver};
 use crate::scene::fault::{Class, Fault, Kind, Sign};
 use crate::scene::{Follows, Scene};
 
@@ -324,38 +322,6 @@ impl FaultMonitor {
         }
     }
 
-    fn see(&mut self, at_ns: u64, sign: Sign, words: String) {
-        match self.seen.iter_mut().find(|(seen, ..)| *seen == sign) {
-            Some(seen) if seen.1 <= at_ns => {}
-            Some(seen) => *seen = (sign, at_ns, words),
-            None => self.seen.push((sign, at_ns, words)),
-        }
-    }
-}
-
-impl RunObserver for FaultMonitor {
-    fn tick(&mut self, tick: &TickRecord) {
-        self.conduct.tick(tick);
-        if let Some(step) = &mut self.step {
-            step.tick(tick);
-        }
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.outputs.add(output);
-        self.conduct.output(output);
-        if let Some(step) = &mut self.step {
-            step.output(output);
-        }
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.conduct.received(arrival);
-        if let Some(step) = &mut self.step {
-            step.received(arrival);
-        }
-    }
-
     fn said(&mut self, role: Role, said: &TimedMessage) {
         match said.message {
             Message::Estimate(_) if role == Role::Sensor => {
@@ -375,29 +341,42 @@ impl RunObserver for FaultMonitor {
             voice.note(said);
         } else if self.due_ns.contains(&said.at_ns) {
             for (sign, words) in voice.signs(&self.fault, &said.message) {
-                self.see(said.at_ns, sign, format!("{}: {words}", role.name()));
+                self.note(said.at_ns, sign, format!("{}: {words}", role.name()));
             }
         }
     }
 
-    fn reset(&mut self, reset: &Reset) {
-        if let Some(step) = &mut self.step
-            && reset.role == Role::Display
-        {
-            step.restart(reset.at_ns);
-        }
-        if self.due_ns.contains(&reset.at_ns) {
-            self.resets += usize::from(reset.role == Role::Display);
-            if !reset.is_injected {
-                let words = format!("{} reset", reset.role.name());
-                self.see(reset.at_ns, Sign::Reset(reset.role), words);
-            }
+    fn note(&mut self, at_ns: u64, sign: Sign, words: String) {
+        match self.seen.iter_mut().find(|(seen, ..)| *seen == sign) {
+            Some(seen) if seen.1 <= at_ns => {}
+            Some(seen) => *seen = (sign, at_ns, words),
+            None => self.seen.push((sign, at_ns, words)),
         }
     }
+}
 
-    fn cleared(&mut self, at_ns: u64) {
-        if self.due_ns.contains(&at_ns) {
-            self.see(at_ns, Sign::ClearFell, "CLR fell".to_owned());
+impl RunObserver for FaultMonitor {
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.step.see(event);
+        match event {
+            RunEvent::Tick(tick) => self.conduct.tick(tick),
+            RunEvent::Output(output) => {
+                self.outputs.add(output);
+                self.conduct.output(output);
+            }
+            RunEvent::Received(arrival) => self.conduct.received(arrival),
+            RunEvent::Said(role, said) => self.said(role, said),
+            RunEvent::Reset(reset) if self.due_ns.contains(&reset.at_ns) => {
+                self.resets += usize::from(reset.role == Role::Display);
+                if !reset.is_injected {
+                    let words = format!("{} reset", reset.role.name());
+                    self.note(reset.at_ns, Sign::Reset(reset.role), words);
+                }
+            }
+            RunEvent::Cleared(at_ns) if self.due_ns.contains(&at_ns) => {
+                self.note(at_ns, Sign::ClearFell, "CLR fell".to_owned());
+            }
+            _ => {}
         }
     }
 }

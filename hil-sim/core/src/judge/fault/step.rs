@@ -3,15 +3,15 @@
 use std::mem;
 use std::ops::Range;
 
-use protocol::Rendering;
+use protocol::{Rendering, Role};
 
 use crate::judge::phase_error::Demodulator;
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::truth::Truth;
 use crate::judge::voltage::Edge;
 use crate::judge::{mean, seconds};
-use crate::run::observer::RunObserver;
-use crate::run::recording::{Arrival, OutputRecord, TickRecord, volts};
+use crate::run::observer::{RunEvent, RunObserver};
+use crate::run::recording::volts;
 
 /// So long before a fault tells from where the phase goes on, in ns: a display that has started again counts from
 /// another place than the scene.
@@ -70,7 +70,7 @@ impl Step {
     }
 
     /// The display has begun to count anew.
-    pub fn restart(&mut self, at_ns: u64) {
+    fn restart(&mut self, at_ns: u64) {
         if at_ns < self.judged_ns.start {
             self.restarted_s = seconds(at_ns);
         }
@@ -149,16 +149,12 @@ impl Step {
 }
 
 impl RunObserver for Step {
-    fn tick(&mut self, tick: &TickRecord) {
-        self.stimulus.tick(tick);
-        self.follow();
-    }
-
-    fn output(&mut self, output: &OutputRecord) {
-        self.stimulus.output(output);
-    }
-
-    fn received(&mut self, arrival: &Arrival) {
-        self.stimulus.received(arrival);
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.stimulus.see(event);
+        match event {
+            RunEvent::Tick(_) => self.follow(),
+            RunEvent::Reset(reset) if reset.role == Role::Display => self.restart(reset.at_ns),
+            _ => {}
+        }
     }
 }

@@ -1,11 +1,12 @@
 //! Recordings of displays that answer a fault well, or badly.
 
-use protocol::{DisplayState, Hold, Message, Rendering, Safety, Trip};
+use protocol::{DisplayState, Hold, Message, Rendering, Role, Safety, Trip};
 
 use super::*;
 use crate::judge::synthetic::{Run, word_of};
-use crate::run::fault_evidence::FaultEvidence;
-use crate::run::recording::{ACTUATORS, ZERO_VOLT, volts};
+use crate::run::decoder::TimedMessage;
+use crate::run::fault_evidence::{FaultEvidence, Reset};
+use crate::run::recording::{ACTUATORS, OutputRecord, ZERO_VOLT, volts};
 use crate::scene::fault::{Fault, Kind};
 
 const MS: u64 = 1_000_000;

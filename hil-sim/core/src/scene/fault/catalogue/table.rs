@@ -41,7 +41,7 @@ const PAST_STATUS_S: f64 = 1.1;
 const STALE_S: f64 = 0.7;
 /// The next estimate comes within 10 ms, and is valid unless the hand has just turned.
 const AGAIN_MS: Option<f64> = Some(300.0);
-const PAST_STALE_S: f64 = STALE_S + 0.35;
+const PAST_STALE_S: f64 = 1.05;
 /// A watchdog that is no longer fed has bitten.
 const WATCHDOG_MS: Option<f64> = Some(520.0);
 

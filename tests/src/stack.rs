@@ -8,9 +8,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use hil_sim_boards::instructions::instructions;
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
-
-use crate::instructions::instructions;
 
 /// What the processor pushes for an exception, with floating point and the alignment (ARMv7-M, B1.5.6).
 const EXCEPTION_BYTES: u32 = 26 * 4 + 4;
