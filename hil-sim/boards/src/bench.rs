@@ -395,11 +395,6 @@ impl Bench {
         Ok(())
     }
 
-    /// The speed that the hand was told last, in mm/s; none if it follows the scene.
-    pub fn hand_goes(&self) -> Option<f64> {
-        self.hand.goes()
-    }
-
     /// What the display's converters put out.
     pub fn outputs(&self) -> Outputs {
         *lock(&self.shared.outputs)

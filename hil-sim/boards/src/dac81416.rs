@@ -199,7 +199,7 @@ impl Dac81416 {
             self.take_single(address, u16::from_be_bytes([high, low]));
         } else {
             self.counters.malformed += 1;
-            self.fault(Fault::Length { bytes: length });
+            self.fault(Fault::Length(length));
         }
     }
 
@@ -304,7 +304,7 @@ impl Dac81416 {
             let [high, low] = value.to_be_bytes();
             self.answer = Some([command, high, low]);
         } else {
-            self.fault(Fault::NoRegister { address });
+            self.fault(Fault::NoRegister(address));
         }
     }
 
@@ -315,21 +315,19 @@ impl Dac81416 {
         };
         let first = command & ADDRESS;
         if command & READ != 0 {
-            self.fault(Fault::ReadWhileStreaming { address: first });
+            self.fault(Fault::ReadWhileStreaming(first));
             return;
         }
         if length < 3 || length.is_multiple_of(2) {
             self.counters.malformed += 1;
-            self.fault(Fault::PartialWord { bytes: length });
+            self.fault(Fault::PartialWord(length));
         }
         let room = (usize::from(DAC15) + 1).saturating_sub(first.into());
         // A frame of a single word may be for any register; only longer ones can run over the end.
         let whole = (length - 1) / 2;
         let words = whole.min(room.max(1));
         if whole > words {
-            self.fault(Fault::BeyondLastChannel {
-                words: whole - words,
-            });
+            self.fault(Fault::BeyondLastChannel(whole - words));
         }
         for (address, word) in (first..).zip(data.chunks_exact(2).take(words)) {
             self.write(address, u16::from_be_bytes([word[0], word[1]]));
@@ -339,7 +337,7 @@ impl Dac81416 {
     fn write(&mut self, address: u8, data: u16) {
         match address {
             NOP => {}
-            DEVICEID | STATUS => self.fault(Fault::ReadOnly { address }),
+            DEVICEID | STATUS => self.fault(Fault::ReadOnly(address)),
             TRIGGER => self.trigger(data),
             BRDCAST => {
                 self.registers[usize::from(BRDCAST)] = data;
@@ -351,7 +349,7 @@ impl Dac81416 {
             }
             DAC0..=DAC15 => self.write_channel((address - DAC0).into(), data),
             SPICONFIG..=DACRANGE3 | OFFSET0..=OFFSET3 => self.configure(address, data),
-            _ => self.fault(Fault::NoRegister { address }),
+            _ => self.fault(Fault::NoRegister(address)),
         }
     }
 
@@ -365,14 +363,14 @@ impl Dac81416 {
         };
         let bits = data & left_out;
         if bits != 0 {
-            self.fault(Fault::NotModelled { address, bits });
+            self.fault(Fault::NotModelled(address, bits));
         }
         if (DACRANGE0..=DACRANGE3).contains(&address) {
             let first = 4 * usize::from(DACRANGE3 - address);
             for channel in first..first + 4 {
                 if self.range(channel).is_none() {
                     let code = self.range_code(channel);
-                    self.fault(Fault::NoRange { channel, code });
+                    self.fault(Fault::NoRange(channel, code));
                 }
             }
             if self.clr_low {
@@ -397,7 +395,7 @@ impl Dac81416 {
         if self.clr_low {
             // To say what is so anyway does no harm.
             if word != self.registers[usize::from(address)] {
-                self.fault(Fault::HeldByClear { address });
+                self.fault(Fault::HeldByClear(address));
             }
             return;
         }

@@ -94,15 +94,14 @@ pub fn check(scene: &Scene) -> Result<(), SceneError> {
     let needs_boards = |fault: &Fault| fault.kind.row().needs == Needs::Boards;
     match scene.faults.iter().position(needs_boards) {
         None => Ok(()),
-        Some(at) => Err(SceneError {
-            file: scene.name.clone(),
-            line: None,
-            key: format!("fault[{at}].kind"),
-            message: format!(
+        Some(at) => Err(SceneError::of(
+            &scene.name,
+            format!("fault[{at}].kind"),
+            format!(
                 "\"{}\" breaks a board, and this engine has none: give --engine elf",
                 scene.faults[at].kind.name()
             ),
-        }),
+        )),
     }
 }
 
@@ -350,12 +349,9 @@ impl<'o, O: RunObserver> Pair<'o, O> {
 
 /// A display whose converters have started, set as the scene asks.
 fn display_of(scene: &Scene) -> Result<Display, SceneError> {
-    let settings = scene.display_settings().map_err(|refusal| SceneError {
-        file: scene.name.clone(),
-        line: None,
-        key: "display".to_owned(),
-        message: refusal.to_string(),
-    })?;
+    let settings = scene
+        .display_settings()
+        .map_err(|refusal| SceneError::of(&scene.name, "display", refusal.to_string()))?;
     let mut display = Display::new(&settings, None);
     display.started(Ok(()));
     Ok(display)

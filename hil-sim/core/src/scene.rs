@@ -8,7 +8,6 @@ mod error;
 pub mod fault;
 mod integrator;
 mod motion;
-mod note;
 mod series;
 mod waveform;
 mod windowed_sinc;
@@ -25,7 +24,6 @@ pub use display::Display;
 pub use error::SceneError;
 pub use integrator::Integrator;
 pub use motion::{LiveHand, Motion};
-pub use note::Note;
 pub use series::Series;
 pub use waveform::Waveform;
 
@@ -64,7 +62,7 @@ pub struct Scene {
     /// What must come out.
     pub expect: Expect,
     /// What its author should know, though it runs.
-    pub notes: Vec<Note>,
+    pub notes: Vec<SceneError>,
 }
 
 /// `[surface]`: specimens side by side along x.

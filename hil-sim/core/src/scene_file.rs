@@ -20,8 +20,14 @@ use crate::scene::{Scene, SceneError};
 impl Scene {
     /// Reads and checks a scene and every file it names.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|error| SceneError::unreadable(path, &error))?;
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            let message = "give the name of a scene (TOML, UTF-8)";
+            SceneError::of(
+                path.display(),
+                "",
+                format!("cannot be read: {error}: {message}"),
+            )
+        })?;
         read::read(path, &text)
     }
 

@@ -3,55 +3,24 @@
 /// Something a driver should not have done. The chip goes on, and so does the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A frame outside of streaming mode was not 24 bits long: ignored.
-    Length {
-        /// Bytes in the frame.
-        bytes: usize,
-    },
-    /// A streaming frame did not end with a whole word: the rest was ignored.
-    PartialWord {
-        /// Bytes in the frame.
-        bytes: usize,
-    },
-    /// A streaming frame went on behind DAC15: the rest was ignored.
-    BeyondLastChannel {
-        /// Words ignored.
-        words: usize,
-    },
+    /// A frame outside of streaming mode was not 24 bits long but so many bytes: ignored.
+    Length(usize),
+    /// A streaming frame of so many bytes did not end with a whole word: the rest was ignored.
+    PartialWord(usize),
+    /// A streaming frame went on behind DAC15: so many words were ignored.
+    BeyondLastChannel(usize),
     /// A byte came while the chip was not selected: ignored.
     NotSelected,
-    /// A read in streaming mode, where SDO is silent.
-    ReadWhileStreaming {
-        /// The register.
-        address: u8,
-    },
+    /// A read of a register in streaming mode, where SDO is silent.
+    ReadWhileStreaming(u8),
     /// A write to a register that cannot be written: ignored.
-    ReadOnly {
-        /// The register.
-        address: u8,
-    },
-    /// No such register: ignored.
-    NoRegister {
-        /// The address.
-        address: u8,
-    },
-    /// A code that is no range; such a channel stays at 0 V.
-    NoRange {
-        /// The channel.
-        channel: usize,
-        /// The four bits written.
-        code: u8,
-    },
-    /// A channel's word was written while CLR was low: ignored.
-    HeldByClear {
-        /// The register.
-        address: u8,
-    },
-    /// Something was switched on that this model leaves out.
-    NotModelled {
-        /// The register.
-        address: u8,
-        /// The bits that were set.
-        bits: u16,
-    },
+    ReadOnly(u8),
+    /// No register has this address: ignored.
+    NoRegister(u8),
+    /// A channel was given a code of four bits that is no range; it stays at 0 V.
+    NoRange(usize, u8),
+    /// The word in a channel's register was written while CLR was low: ignored.
+    HeldByClear(u8),
+    /// Bits of a register were set that switch on something that this model leaves out.
+    NotModelled(u8, u16),
 }

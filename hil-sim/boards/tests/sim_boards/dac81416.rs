@@ -144,13 +144,7 @@ fn a_code_that_is_no_range_is_a_fault_and_zero_volts() {
     let mut chip = running();
     write(&mut chip, r::DACRANGE3 - 1, 0x9993);
     write(&mut chip, r::BRDCAST, 0xFFFF);
-    assert_eq!(
-        chip.faults(),
-        [Fault::NoRange {
-            channel: 4,
-            code: 3
-        }]
-    );
+    assert_eq!(chip.faults(), [Fault::NoRange(4, 3)]);
     assert_eq!(chip.voltage(4), 0.0);
     assert!(chip.voltage(5) > 4.9);
 }
@@ -259,13 +253,10 @@ fn streaming_stops_behind_the_last_channel() {
         [0, 1, 14, 15].map(|channel| chip.word(channel)),
         [ZERO_VOLTS, ZERO_VOLTS, 1, 2]
     );
-    assert_eq!(chip.faults(), [Fault::BeyondLastChannel { words: 2 }]);
+    assert_eq!(chip.faults(), [Fault::BeyondLastChannel(2)]);
     // However long a frame is.
     frame(&mut chip, &[0x10; 1_001]);
-    assert_eq!(
-        chip.faults()[1],
-        Fault::BeyondLastChannel { words: 500 - 16 }
-    );
+    assert_eq!(chip.faults()[1], Fault::BeyondLastChannel(500 - 16));
 }
 
 #[test]
@@ -274,12 +265,7 @@ fn sdo_is_silent_while_streaming_and_speaks_again_after_it() {
     write(&mut chip, r::SPICONFIG, STREAMING);
     frame(&mut chip, &[0x80 | r::DEVICEID, 0, 0]);
     assert_eq!(frame(&mut chip, &[r::NOP, 0, 0]), [0xFF; 3]);
-    assert_eq!(
-        chip.faults(),
-        [Fault::ReadWhileStreaming {
-            address: r::DEVICEID
-        }]
-    );
+    assert_eq!(chip.faults(), [Fault::ReadWhileStreaming(r::DEVICEID)]);
     // One word for SPICONFIG is a stream too.
     write(&mut chip, r::SPICONFIG, ACTIVE);
     assert_eq!(read(&mut chip, r::DEVICEID), PRODUCT << 2);
@@ -324,12 +310,7 @@ fn clr_holds_every_channel_at_zero_volts_and_leaves_it_there() {
     write(&mut chip, r::DAC0 + 15, ZERO_VOLTS);
     pulse_ldac(&mut chip);
     assert_eq!(voltages(&chip), [0.0; CHANNELS]);
-    assert_eq!(
-        chip.faults(),
-        [Fault::HeldByClear {
-            address: r::DAC0 + 15
-        }]
-    );
+    assert_eq!(chip.faults(), [Fault::HeldByClear(r::DAC0 + 15)]);
 
     chip.clr(false);
     pulse_ldac(&mut chip);
@@ -368,7 +349,7 @@ fn frames_of_a_wrong_length_are_ignored_and_counted() {
     let before = chip.counters();
     for bytes in [1, 2, 4, 27, 500] {
         frame(&mut chip, &vec![r::DAC0; bytes]);
-        assert_eq!(chip.faults().last(), Some(&Fault::Length { bytes }));
+        assert_eq!(chip.faults().last(), Some(&Fault::Length(bytes)));
     }
     assert_eq!(voltages(&chip), [0.0; CHANNELS]);
     assert_eq!(chip.counters().malformed, before.malformed + 5);
@@ -388,10 +369,7 @@ fn half_a_word_at_the_end_of_a_stream_is_ignored_and_counted() {
     frame(&mut chip, &[r::DAC0]);
     assert_eq!(
         chip.faults(),
-        [
-            Fault::PartialWord { bytes: 4 },
-            Fault::PartialWord { bytes: 1 }
-        ]
+        [Fault::PartialWord(4), Fault::PartialWord(1)]
     );
     assert_eq!(chip.counters().malformed, 2);
 }
@@ -409,19 +387,11 @@ fn what_cannot_be_written_or_is_left_out_is_a_fault() {
         chip.faults(),
         [
             Fault::NotSelected,
-            Fault::ReadOnly {
-                address: r::DEVICEID
-            },
-            Fault::NoRegister { address: 0x3E },
-            Fault::NoRegister { address: 0x3E },
-            Fault::NotModelled {
-                address: r::SPICONFIG,
-                bits: 1 << 4
-            },
-            Fault::NotModelled {
-                address: r::GENCONFIG,
-                bits: 1
-            },
+            Fault::ReadOnly(r::DEVICEID),
+            Fault::NoRegister(0x3E),
+            Fault::NoRegister(0x3E),
+            Fault::NotModelled(r::SPICONFIG, 1 << 4),
+            Fault::NotModelled(r::GENCONFIG, 1),
         ]
     );
     assert_eq!(read(&mut chip, r::DEVICEID), PRODUCT << 2);

@@ -78,11 +78,6 @@ impl World {
         self.motion.position_mm(t_s)
     }
 
-    /// How fast it moves, in mm/s.
-    pub fn hand_velocity_mm_s(&self, t_s: f64) -> f64 {
-        self.motion.velocity_mm_s(t_s)
-    }
-
     /// The true wavelength at `x_mm`, in mm: under the fingertip's middle if x is where it touches.
     pub fn wavelength_mm(&self, x_mm: f64) -> f64 {
         self.surface.wavelength_mm(x_mm)

@@ -1,7 +1,5 @@
 //! Why a scene cannot be used, and what to do about it.
 
-use std::path::Path;
-
 /// What is wrong with a scene or with a file it names: `file:line: key: what is wrong: what to do`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{}: {}{message}", file, line.map(|line| format!(":{line}")).unwrap_or_default(), if key.is_empty() { String::new() } else { format!("{key}: ") })]
@@ -18,13 +16,17 @@ pub struct SceneError {
 }
 
 impl SceneError {
-    /// A scene file that cannot be read at all.
-    pub(crate) fn unreadable(path: &Path, error: &std::io::Error) -> Self {
+    /// Of a file as a whole.
+    pub(crate) fn of(
+        file: impl ToString,
+        key: impl Into<String>,
+        message: impl Into<String>,
+    ) -> Self {
         Self {
-            file: path.display().to_string(),
+            file: file.to_string(),
             line: None,
-            key: String::new(),
-            message: format!("cannot be read: {error}: give the name of a scene (TOML, UTF-8)"),
+            key: key.into(),
+            message: message.into(),
         }
     }
 }

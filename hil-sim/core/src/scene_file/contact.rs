@@ -1,6 +1,5 @@
 //! `[contact]`, and what `"auto"` makes of it.
 
-use super::bounds::STEP;
 use super::table::Table;
 use crate::plant::contact::{EVENT_STEP_S, Stribeck, select, stability};
 use crate::scene::{
@@ -81,7 +80,7 @@ fn solver(
     scenery: &Scenery<'_>,
 ) -> Result<Solver, SceneError> {
     let integrator = table.variant::<Integrator>("integrator", "exact")?;
-    let step_us = table.number("step_us", &STEP)?;
+    let step_us = table.number("step_us")?;
     let Some(integrator) = integrator else {
         return match step_us {
             None => Ok(Solver::Exact),

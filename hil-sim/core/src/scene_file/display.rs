@@ -90,7 +90,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
 /// The actuators of a CSV file: one row each, in their order.
 fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError> {
     let furthest_um = f64::from(FURTHEST_UM);
-    let rows = series(table, &HEADERS, |before, row| {
+    let rows = series(table, &HEADERS, &|before, row| {
         let expected = before.map_or(0.0, |before| before[0] + 1.0);
         let whole = |value: f64| value.fract() == 0.0 && value.abs() <= furthest_um;
         let place = || {

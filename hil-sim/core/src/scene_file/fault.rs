@@ -1,6 +1,5 @@
 //! `[[fault]]`: what breaks, and when.
 
-use super::bounds::{DURATION, INSTANT};
 use super::table::Table;
 use crate::scene::SceneError;
 use crate::scene::fault::{Fault, Kind, Lasts, MOST_KEYS};
@@ -13,7 +12,7 @@ pub(super) fn read(tables: Vec<Table<'_>>, duration_s: f64) -> Result<Vec<Fault>
 }
 
 fn one(mut table: Table<'_>, duration_s: f64) -> Result<Fault, SceneError> {
-    let at_s = table.needed_number("at_s", &INSTANT)?;
+    let at_s = table.needed_number("at_s")?;
     if at_s >= duration_s {
         let message = format!("comes after the scene's end at {duration_s} s: give less");
         return Err(table.refuse("at_s", message));
@@ -30,7 +29,7 @@ fn one(mut table: Table<'_>, duration_s: f64) -> Result<Fault, SceneError> {
     let for_s = match row.lasts {
         Lasts::Once => None,
         Lasts::For(_) | Lasts::ForGood => {
-            let for_s = table.number("for_s", &DURATION)?;
+            let for_s = table.number("for_s")?;
             for_s.or(row.lasts.default_s())
         }
     };

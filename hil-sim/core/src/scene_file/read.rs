@@ -5,11 +5,7 @@ use std::sync::Arc;
 
 use protocol::{GAUGES, Method};
 
-use super::bounds::{
-    AMPLITUDE, BOUND, DAMPING, DELAY, DURATION, ENCODER_STEP, FORCE_SCALE, FREQUENCY, HUM, INSTANT,
-    LAG, LENGTH, MAINS_OFF, MOST_SPEED_MM_S, PLACE, RATIO, RELATIVE, RESONANCE, SHARE, SKEW, SNR,
-    SPEED, STIFFNESS, WAVELENGTH, WORN,
-};
+use super::bounds::Bounds;
 use super::contact;
 use super::contact::Scenery;
 use super::display;
@@ -19,7 +15,7 @@ use crate::plant::gauges::PLACES_MM;
 use crate::scene::Series;
 use crate::scene::{
     ArmDrive, Contact, Estimator, Expect, Follows, Force, Gauges, Irregularity, Kinematic, Link,
-    Motion, Note, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
+    Motion, Profile, Resonance, Scene, SceneError, Specimen, Stiffness, Surface,
 };
 
 pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
@@ -29,7 +25,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
 
     let name = name(&mut root, path)?;
     let seed = root.whole("seed", 0, i64::MAX as u64)?.unwrap_or(1);
-    let duration_s = root.number("duration_s", &DURATION)?.unwrap_or(3.0);
+    let duration_s = root.number("duration_s")?.unwrap_or(3.0);
     let surface = surface(root.table("surface")?, seed)?;
     let motion = motion(root.table("motion")?, duration_s)?;
     let arm = arm(root.table("arm")?)?;
@@ -105,8 +101,8 @@ fn surface(mut table: Table<'_>, seed: u64) -> Result<Surface, SceneError> {
     let rows = table.tables("specimens")?;
     let last = rows.len().saturating_sub(1);
     for (index, mut row) in rows.into_iter().enumerate() {
-        let wavelength_mm = row.needed_number("wavelength_mm", &WAVELENGTH)?;
-        let length_mm = row.number("length_mm", &LENGTH)?;
+        let wavelength_mm = row.needed_number("wavelength_mm")?;
+        let length_mm = row.number("length_mm")?;
         let length_mm = match length_mm {
             _ if index == last => f64::INFINITY,
             Some(length_mm) => length_mm,
@@ -129,7 +125,7 @@ fn surface(mut table: Table<'_>, seed: u64) -> Result<Surface, SceneError> {
             "there are none: give one or more, such as [{ wavelength_mm = 2.0 }]",
         ));
     }
-    let start_mm = table.number("start_mm", &PLACE)?.unwrap_or(0.0);
+    let start_mm = table.number("start_mm")?.unwrap_or(0.0);
     let kind = table.choice(
         "profile",
         &[("trapezoid", 't'), ("sine", 's'), ("recorded", 'r')],
@@ -158,8 +154,8 @@ fn surface(mut table: Table<'_>, seed: u64) -> Result<Surface, SceneError> {
 
 fn irregularity(table: &mut Table<'_>, seed: u64) -> Result<Irregularity, SceneError> {
     let none = Irregularity::NONE;
-    let second_wave = table.number("second_wave", &SHARE)?;
-    let second_ratio = table.number("second_ratio", &RATIO)?;
+    let second_wave = table.number("second_wave")?;
+    let second_ratio = table.number("second_ratio")?;
     if second_ratio.is_some() && second_wave.is_none() {
         return Err(table.refuse(
             "second_ratio",
@@ -167,10 +163,10 @@ fn irregularity(table: &mut Table<'_>, seed: u64) -> Result<Irregularity, SceneE
         ));
     }
     Ok(Irregularity {
-        random: table.number("random", &RELATIVE)?.unwrap_or(none.random),
+        random: table.number("random")?.unwrap_or(none.random),
         second_wave: second_wave.unwrap_or(none.second_wave),
         second_ratio: second_ratio.unwrap_or(none.second_ratio),
-        worn: table.number("worn", &WORN)?.unwrap_or(none.worn),
+        worn: table.number("worn")?.unwrap_or(none.worn),
         seed,
     })
 }
@@ -180,12 +176,13 @@ const POSITIONS: &[&str] = &["t_s,x_mm"];
 
 /// Whether a hand can have come from one row to the next.
 fn check_position(before: Option<&[f64]>, row: &[f64]) -> Result<(), (usize, String)> {
-    if !(PLACE.allows)(row[1]) {
-        return Err((1, format!("is out of reach: give {}", PLACE.give)));
+    let place = Bounds::of("start_mm");
+    if !place.allow(row[1]) {
+        return Err((1, format!("is out of reach: give {}", place.give)));
     }
     let Some(before) = before else { return Ok(()) };
     let speed_mm_s = (row[1] - before[1]) / (row[0] - before[0]);
-    if speed_mm_s.abs() <= MOST_SPEED_MM_S {
+    if Bounds::of("speed_mm_s").allow(speed_mm_s) {
         Ok(())
     } else {
         Err((
@@ -201,11 +198,15 @@ impl Motion {
     /// # Errors
     /// If it can't be read, or is no hand's.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path).map_err(|error| SceneError {
-            message: format!("cannot be read: {error}: give a CSV file with the columns t_s,x_mm"),
-            ..SceneError::unreadable(path, &error)
+        let bytes = std::fs::read(path).map_err(|error| {
+            let message = "give a CSV file with the columns t_s,x_mm";
+            SceneError::of(
+                path.display(),
+                "",
+                format!("cannot be read: {error}: {message}"),
+            )
         })?;
-        let positions = Series::read(path, &bytes, POSITIONS, check_position)?;
+        let positions = Series::read(path, &bytes, POSITIONS, &check_position)?;
         Ok(Self::Recorded(Arc::new(positions)))
     }
 }
@@ -216,13 +217,13 @@ fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
         &[("constant", 'c'), ("sinusoid", 's'), ("recorded", 'r')],
     )? {
         'c' => {
-            let speed_mm_s = table.number("speed_mm_s", &SPEED)?.unwrap_or(50.0);
+            let speed_mm_s = table.number("speed_mm_s")?.unwrap_or(50.0);
             table.finish(" with kind = \"constant\"")?;
             Ok(Motion::Constant { speed_mm_s })
         }
         's' => {
-            let amplitude_mm_s = table.needed_number("amplitude_mm_s", &AMPLITUDE)?;
-            let frequency_hz = table.needed_number("frequency_hz", &FREQUENCY)?;
+            let amplitude_mm_s = table.needed_number("amplitude_mm_s")?;
+            let frequency_hz = table.needed_number("frequency_hz")?;
             table.finish(" with kind = \"sinusoid\"")?;
             Ok(Motion::Sinusoid {
                 amplitude_mm_s,
@@ -242,7 +243,7 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
         "follows",
         &[("motion", Follows::Motion), ("link", Follows::Link)],
     )?;
-    let lag_ms = table.number("lag_ms", &LAG)?.unwrap_or(0.0);
+    let lag_ms = table.number("lag_ms")?.unwrap_or(0.0);
     if lag_ms > 0.0 && follows == Follows::Motion {
         return Err(table.refuse(
             "lag_ms",
@@ -250,7 +251,7 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
         ));
     }
     let encoder_um = table
-        .number("encoder_um", &ENCODER_STEP)?
+        .number("encoder_um")?
         .map_or(ArmDrive::default().encoder_um, |um| um as u16);
     table.finish("")?;
     Ok(ArmDrive {
@@ -267,10 +268,10 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
     let force = Force {
         present: tangential.unwrap_or(defaults.present),
         n_per_v: table
-            .number("tangential_n_per_v", &FORCE_SCALE)?
+            .number("tangential_n_per_v")?
             .unwrap_or(defaults.n_per_v),
         stiffness_n_per_m: table
-            .number("stiffness_n_per_m", &STIFFNESS)?
+            .number("stiffness_n_per_m")?
             .unwrap_or(defaults.stiffness_n_per_m),
     };
     if kind == 'k' {
@@ -289,36 +290,36 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
 }
 
 fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
-    let resonance_hz = table.number("resonance_hz", &RESONANCE)?;
-    let damping = table.number("resonance_damping", &DAMPING)?;
+    let resonance_hz = table.number("resonance_hz")?;
+    let damping = table.number("resonance_damping")?;
     if damping.is_some() && resonance_hz.is_none() {
         return Err(table.refuse(
             "resonance_damping",
             "has nothing to damp: give resonance_hz too",
         ));
     }
-    let trouble_for_s = table.number("trouble_for_s", &INSTANT)?;
+    let trouble_for_s = table.number("trouble_for_s")?;
     let kinematic = Kinematic {
-        snr_db: table.number("snr_db", &SNR)?,
-        hum_50_hz: table.number("hum_50_hz", &HUM)?.unwrap_or(0.0),
-        hum_60_hz: table.number("hum_60_hz", &HUM)?.unwrap_or(0.0),
-        hum_off_hz: table.number("hum_off_hz", &MAINS_OFF)?.unwrap_or(0.0),
-        second_harmonic: table.number("second_harmonic", &SHARE)?.unwrap_or(0.0),
+        snr_db: table.number("snr_db")?,
+        hum_50_hz: table.number("hum_50_hz")?.unwrap_or(0.0),
+        hum_60_hz: table.number("hum_60_hz")?.unwrap_or(0.0),
+        hum_off_hz: table.number("hum_off_hz")?.unwrap_or(0.0),
+        second_harmonic: table.number("second_harmonic")?.unwrap_or(0.0),
         dead: table.gauges("dead")?,
         saturated: table.gauges("saturated")?,
         stuck: table.gauges("stuck")?,
         noisy: table.gauges("noisy")?,
         humming: table.gauges("humming")?,
-        trouble_from_s: table.number("trouble_from_s", &INSTANT)?.unwrap_or(0.0),
+        trouble_from_s: table.number("trouble_from_s")?.unwrap_or(0.0),
         trouble_for_s,
         resonance: resonance_hz.map(|hz| Resonance {
             hz,
             damping: damping.unwrap_or(0.15),
         }),
-        pink: table.number("pink", &RELATIVE)?.unwrap_or(0.0),
-        drift: table.number("drift", &RELATIVE)?.unwrap_or(0.0),
-        offset: table.number("offset", &RELATIVE)?.unwrap_or(0.0),
-        skew_us: table.number("skew_us", &SKEW)?.unwrap_or(0.0),
+        pink: table.number("pink")?.unwrap_or(0.0),
+        drift: table.number("drift")?.unwrap_or(0.0),
+        offset: table.number("offset")?.unwrap_or(0.0),
+        skew_us: table.number("skew_us")?.unwrap_or(0.0),
     };
     let lists = [
         ("dead", kinematic.dead),
@@ -358,11 +359,11 @@ fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
 
 fn link(mut table: Table<'_>) -> Result<Link, SceneError> {
     let link = Link {
-        delay_ms: table.number("delay_ms", &DELAY)?.unwrap_or(0.0),
-        jitter_ms: table.number("jitter_ms", &DELAY)?.unwrap_or(0.0),
-        loss: table.number("loss", &SHARE)?.unwrap_or(0.0),
-        reorder: table.number("reorder", &SHARE)?.unwrap_or(0.0),
-        corrupt: table.number("corrupt", &SHARE)?.unwrap_or(0.0),
+        delay_ms: table.number("delay_ms")?.unwrap_or(0.0),
+        jitter_ms: table.number("jitter_ms")?.unwrap_or(0.0),
+        loss: table.number("loss")?.unwrap_or(0.0),
+        reorder: table.number("reorder")?.unwrap_or(0.0),
+        corrupt: table.number("corrupt")?.unwrap_or(0.0),
     };
     table.finish("")?;
     Ok(link)
@@ -377,7 +378,7 @@ const NO_KNOB: &str =
 fn estimator(
     mut table: Table<'_>,
     force: &Force,
-    notes: &mut Vec<Note>,
+    notes: &mut Vec<SceneError>,
 ) -> Result<Estimator, SceneError> {
     let defaults = Estimator::default();
     let methods = [
@@ -388,7 +389,7 @@ fn estimator(
         ("counting-adapted", Method::AdaptedCounting),
     ];
     let method = if table.text("method")? == Some("bank") {
-        notes.push(table.note("method", BANK_IS_SPECTRUM));
+        notes.push(table.refuse("method", BANK_IS_SPECTRUM));
         Method::Spectrum
     } else {
         table.choice("method", &methods)?
@@ -415,7 +416,7 @@ fn estimator(
         .map_or(defaults.valid_percent, |percent| percent as u8);
     for key in ["travel_wavelengths", "candidates"] {
         if table.retired(key) {
-            notes.push(table.note(key, NO_KNOB));
+            notes.push(table.refuse(key, NO_KNOB));
         }
     }
     let stiffness = table.choice(
@@ -444,8 +445,8 @@ fn estimator(
 }
 
 fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
-    let mean_mm = table.number("mean_mm", &WAVELENGTH)?;
-    let mean_tolerance_mm = table.number("mean_tolerance_mm", &BOUND)?;
+    let mean_mm = table.number("mean_mm")?;
+    let mean_tolerance_mm = table.number("mean_tolerance_mm")?;
     if mean_tolerance_mm.is_some() && mean_mm.is_none() {
         return Err(table.refuse(
             "mean_tolerance_mm",
@@ -453,18 +454,18 @@ fn expect(mut table: Table<'_>) -> Result<Expect, SceneError> {
         ));
     }
     let expect = Expect {
-        wavelength_rms_percent: table.number("wavelength_rms_percent", &BOUND)?,
-        wavelength_bias_percent: table.number("wavelength_bias_percent", &BOUND)?,
+        wavelength_rms_percent: table.number("wavelength_rms_percent")?,
+        wavelength_bias_percent: table.number("wavelength_bias_percent")?,
         mean_mm,
         mean_tolerance_mm: mean_tolerance_mm.unwrap_or(0.03),
-        valid_share_min: table.number("valid_share_min", &SHARE)?,
-        wrong_share_max: table.number("wrong_share_max", &SHARE)?,
-        felt_right_share_min: table.number("felt_right_share_min", &SHARE)?,
-        felt_wrong_share_max: table.number("felt_wrong_share_max", &SHARE)?,
-        settling_ms: table.number("settling_ms", &BOUND)?,
-        latency_ms: table.number("latency_ms", &BOUND)?,
-        frequency_percent: table.number("frequency_percent", &BOUND)?,
-        phase_rms_cycles: table.number("phase_rms_cycles", &BOUND)?,
+        valid_share_min: table.number("valid_share_min")?,
+        wrong_share_max: table.number("wrong_share_max")?,
+        felt_right_share_min: table.number("felt_right_share_min")?,
+        felt_wrong_share_max: table.number("felt_wrong_share_max")?,
+        settling_ms: table.number("settling_ms")?,
+        latency_ms: table.number("latency_ms")?,
+        frequency_percent: table.number("frequency_percent")?,
+        phase_rms_cycles: table.number("phase_rms_cycles")?,
     };
     table.finish("")?;
     Ok(expect)

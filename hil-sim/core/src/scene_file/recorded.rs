@@ -10,7 +10,7 @@ mod inverse_filter;
 mod raster;
 mod resampler;
 mod source;
-mod tape;
+pub(super) mod tape;
 #[cfg(test)]
 mod tests;
 mod topic;
@@ -21,7 +21,6 @@ use std::sync::Arc;
 
 use protocol::GAUGES;
 
-use super::bounds::{FILE_INSTANT, OFFSET_V, PLACE, RATE, SCALE, SPACING};
 use super::table::{Column, Table};
 use crate::plant::gauges::{MID_RAIL_VOLTS, SCAN_RATE_HZ};
 use crate::plant::surface::GRID_MM;
@@ -51,21 +50,19 @@ const DENSE_S: f64 = 1.001e-3;
 const GAP: f64 = 1.6;
 /// What is kept before the scene's start and after its end, in s, for the resampler to look at.
 const AROUND_S: f64 = 3.0;
-const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+pub(super) const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 const PIN_VOLTS: std::ops::RangeInclusive<f64> = -0.3..=4.0;
 
 const TIME: Words = Words {
     column: "time",
     scale: "time_s_per_unit",
     every: "rate_hz",
-    every_bounds: &RATE,
     default: "t_s",
 };
 const LENGTH: Words = Words {
     column: "place",
     scale: "place_mm_per_unit",
     every: "mm_per_sample",
-    every_bounds: &SPACING,
     default: "x_mm",
 };
 
@@ -86,9 +83,9 @@ pub(super) fn gauges(
 ) -> Result<Arc<Waveform>, SceneError> {
     let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
     let source = Source::of(table, &TIME, &headers)?;
-    let start_s = table.number("start_s", &FILE_INSTANT)?.unwrap_or(0.0);
-    let scale = table.number("volts_per_unit", &SCALE)?;
-    let offset_v = table.number("offset_v", &OFFSET_V)?;
+    let start_s = table.number("start_s")?.unwrap_or(0.0);
+    let scale = table.number("volts_per_unit")?;
+    let offset_v = table.number("offset_v")?;
     let lines = on_lines(table)?;
     let filtered = table.boolean("filtered")? == Some(true);
     let is_own = source.is_plain() || source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
@@ -211,9 +208,9 @@ pub(super) fn motion(
     check: Check<'_>,
 ) -> Result<Arc<Series>, SceneError> {
     let source = Source::of(table, &TIME, headers)?;
-    let start_s = table.number("start_s", &FILE_INSTANT)?.unwrap_or(0.0);
-    let scale = table.number("mm_per_unit", &SCALE)?;
-    let offset_mm = table.number("offset_mm", &PLACE)?;
+    let start_s = table.number("start_s")?.unwrap_or(0.0);
+    let scale = table.number("mm_per_unit")?;
+    let offset_mm = table.number("offset_mm")?;
     let own = source.topic_or(GAUGE_TOPIC) == Some(GAUGE_TOPIC);
     let named_by_us = own && source.channels.is_none();
     let columns = single(table, &source, named_by_us.then_some(ARM_FIELD))?;
@@ -240,8 +237,8 @@ pub(super) fn motion(
 /// The heights of `[surface]`, one column; or with `felt_per_unit` what is felt there.
 pub(super) fn profile(table: &mut Table<'_>) -> Result<Profile, SceneError> {
     let source = Source::of(table, &LENGTH, &["x_mm,height"])?;
-    let shift_mm = table.number("shift_mm", &PLACE)?.unwrap_or(0.0);
-    let felt_per_unit = table.number("felt_per_unit", &SCALE)?;
+    let shift_mm = table.number("shift_mm")?.unwrap_or(0.0);
+    let felt_per_unit = table.number("felt_per_unit")?;
     let profile = match felt_per_unit {
         None => Profile::Recorded,
         Some(_) => Profile::Felt,

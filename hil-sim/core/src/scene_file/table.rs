@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::bounds::Bounds;
-use crate::scene::{Note, SceneError};
+use crate::scene::SceneError;
 
 /// The scene's text and where it came from.
 pub(super) struct Source<'t> {
@@ -99,20 +99,12 @@ impl<'t> Table<'t> {
             .error(offset, &self.path_of(key), message.into())
     }
 
-    /// A word about `key`, which is no reason to refuse the scene.
-    pub fn note(&self, key: &str, message: &str) -> Note {
-        let SceneError {
-            file,
-            line,
-            key,
-            message,
-        } = self.refuse(key, message);
-        Note {
-            file,
-            line,
-            key,
-            message,
-        }
+    /// A refusal of the file that `file` names.
+    pub fn unreadable(&self, path: &Path, error: &std::io::Error) -> SceneError {
+        let path = path.display();
+        let message =
+            format!("{path} cannot be read: {error}: names are relative to the scene's own folder");
+        self.refuse("file", message)
     }
 
     /// Whether there is `key`, which earlier versions asked for. Whatever it holds is let pass.
@@ -133,62 +125,31 @@ impl<'t> Table<'t> {
     /// A section. If it is absent, all its keys are.
     pub fn table(&mut self, key: &'static str) -> Result<Table<'t>, SceneError> {
         match self.get(key) {
-            None => Ok(Table {
-                source: self.source,
-                path: self.path_of(key),
-                offset: self.offset,
-                entries: None,
-                asked: Vec::new(),
-                retired: Vec::new(),
-            }),
+            None => Ok(self.inner(self.path_of(key), self.offset, None)),
             Some(value) => self.table_in(value, self.path_of(key)),
         }
     }
 
     /// The tables of an array; none if the key is absent.
     pub fn tables(&mut self, key: &'static str) -> Result<Vec<Table<'t>>, SceneError> {
-        let Some(value) = self.get(key) else {
-            return Ok(Vec::new());
-        };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(value, key, "an array of tables"));
-        };
-        let mut tables = Vec::with_capacity(items.len());
-        for (index, item) in items.iter().enumerate() {
-            tables.push(self.table_in(item, format!("{}[{index}]", self.path_of(key)))?);
-        }
-        Ok(tables)
+        let items = self.of_type(key, "an array of tables", |value| value.as_array())?;
+        let items = items.into_iter().flatten();
+        let tables = items
+            .enumerate()
+            .map(|(index, item)| self.table_in(item, format!("{}[{index}]", self.path_of(key))));
+        tables.collect()
     }
 
-    pub fn number(
-        &mut self,
-        key: &'static str,
-        bounds: &Bounds,
-    ) -> Result<Option<f64>, SceneError> {
-        let Some(value) = self.get(key) else {
-            return Ok(None);
-        };
-        let number = match value.get_ref() {
-            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
-            DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
-                .ok()
-                .map(|n| n as f64),
-            _ => return Err(self.wrong_type(value, key, "a number")),
-        };
-        let written = &self.source.text[value.span()];
-        match number {
-            Some(number) if number.is_finite() && (bounds.allows)(number) => Ok(Some(number)),
-            _ => Err(self.refuse(
-                key,
-                format!("{written} is not {}: give {}", bounds.what, bounds.give),
-            )),
-        }
+    /// A number within the key's [`Bounds`].
+    pub fn number(&mut self, key: &'static str) -> Result<Option<f64>, SceneError> {
+        self.bounded(key, Bounds::of(key))
     }
 
     /// A number that may not be absent.
-    pub fn needed_number(&mut self, key: &'static str, bounds: &Bounds) -> Result<f64, SceneError> {
-        self.number(key, bounds)?
-            .ok_or_else(|| self.refuse(key, format!("is missing: give {}", bounds.give)))
+    pub fn needed_number(&mut self, key: &'static str) -> Result<f64, SceneError> {
+        let give = &Bounds::of(key).give;
+        self.number(key)?
+            .ok_or_else(|| self.refuse(key, format!("is missing: give {give}")))
     }
 
     /// A number from `low` to `high`; only a whole one if `whole`.
@@ -199,12 +160,7 @@ impl<'t> Table<'t> {
         high: f64,
         whole: bool,
     ) -> Result<Option<f64>, SceneError> {
-        const ANY: Bounds = Bounds {
-            what: "a number",
-            give: "a number",
-            allows: |_| true,
-        };
-        let Some(number) = self.number(key, &ANY)? else {
+        let Some(number) = self.bounded(key, Bounds::of("any number"))? else {
             return Ok(None);
         };
         if (low..=high).contains(&number) && (!whole || number.fract() == 0.0) {
@@ -213,6 +169,31 @@ impl<'t> Table<'t> {
         let kind = if whole { "whole number" } else { "number" };
         let message = format!("{number} is out of range: give a {kind} from {low} to {high}");
         Err(self.refuse(key, message))
+    }
+
+    fn bounded(&mut self, key: &'static str, bounds: &Bounds) -> Result<Option<f64>, SceneError> {
+        let parsed = self.of_type(key, "a number", |value| match value {
+            DeValue::Float(float) => Some(float.as_str().parse::<f64>().ok()),
+            DeValue::Integer(integer) => {
+                let whole = i64::from_str_radix(integer.as_str(), integer.radix());
+                Some(whole.ok().map(|number| number as f64))
+            }
+            _ => None,
+        })?;
+        let Some(number) = parsed else {
+            return Ok(None);
+        };
+        match number.filter(|number| number.is_finite() && bounds.allow(*number)) {
+            Some(number) => Ok(Some(number)),
+            None => {
+                let span = self
+                    .entries
+                    .and_then(|entries| Some(entries.get(key)?.span()));
+                let written = &self.source.text[span.unwrap_or_default()];
+                let Bounds { what, give, .. } = bounds;
+                Err(self.refuse(key, format!("{written} is not {what}: give {give}")))
+            }
+        }
     }
 
     /// A whole number from `low` to `high`.
@@ -236,23 +217,25 @@ impl<'t> Table<'t> {
     }
 
     pub fn text(&mut self, key: &'static str) -> Result<Option<&'t str>, SceneError> {
-        let Some(value) = self.get(key) else {
-            return Ok(None);
-        };
-        match value.get_ref() {
-            DeValue::String(text) => Ok(Some(text)),
-            _ => Err(self.wrong_type(value, key, "a text in quotes")),
-        }
+        self.of_type(key, "a text in quotes", |value| value.as_str())
     }
 
     pub fn boolean(&mut self, key: &'static str) -> Result<Option<bool>, SceneError> {
+        self.of_type(key, "true or false", |value| value.as_bool())
+    }
+
+    /// What `parse` makes of a value, which has to be what is `wanted`.
+    fn of_type<T>(
+        &mut self,
+        key: &'static str,
+        wanted: &str,
+        parse: impl Fn(&'t DeValue<'t>) -> Option<T>,
+    ) -> Result<Option<T>, SceneError> {
         let Some(value) = self.get(key) else {
             return Ok(None);
         };
-        match value.get_ref() {
-            DeValue::Boolean(boolean) => Ok(Some(*boolean)),
-            _ => Err(self.wrong_type(value, key, "true or false")),
-        }
+        let parsed = parse(value.get_ref()).map(Some);
+        parsed.ok_or_else(|| self.wrong_type(value, key, wanted))
     }
 
     /// One of the words in `built`, the first if the key is absent.
@@ -291,13 +274,9 @@ impl<'t> Table<'t> {
     /// A list of gauge numbers, none of them twice.
     pub fn gauges(&mut self, key: &'static str) -> Result<[bool; GAUGES], SceneError> {
         let mut chosen = [false; GAUGES];
-        let Some(value) = self.get(key) else {
-            return Ok(chosen);
-        };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(value, key, "a list of gauge numbers, such as [0, 3]"));
-        };
-        for (index, item) in items.iter().enumerate() {
+        let wanted = "a list of gauge numbers, such as [0, 3]";
+        let items = self.of_type(key, wanted, |value| value.as_array())?;
+        for (index, item) in items.into_iter().flatten().enumerate() {
             let refuse = |what: &str| {
                 let written = &self.source.text[item.span()];
                 let path = format!("{}[{index}]", self.path_of(key));
@@ -319,25 +298,17 @@ impl<'t> Table<'t> {
 
     /// A column's name or number.
     pub fn column(&mut self, key: &'static str) -> Result<Option<Column<'t>>, SceneError> {
-        let Some(value) = self.get(key) else {
-            return Ok(None);
-        };
-        match column_of(value) {
-            Some(column) => Ok(Some(column)),
-            None => Err(self.wrong_type(value, key, "a column's name in quotes, or its number")),
-        }
+        self.of_type(key, "a column's name in quotes, or its number", column_of)
     }
 
     /// A list of columns' names or numbers; the same may be there several times.
     pub fn columns(&mut self, key: &'static str) -> Result<Option<Vec<Column<'t>>>, SceneError> {
-        let Some(value) = self.get(key) else {
+        let wanted = "a list of columns' names or numbers";
+        let Some(items) = self.of_type(key, wanted, |value| value.as_array())? else {
             return Ok(None);
         };
-        let DeValue::Array(items) = value.get_ref() else {
-            return Err(self.wrong_type(value, key, "a list of columns' names or numbers"));
-        };
         let columns = items.iter().enumerate().map(|(index, item)| {
-            column_of(item).ok_or_else(|| {
+            column_of(item.get_ref()).ok_or_else(|| {
                 let written = &self.source.text[item.span()];
                 let path = format!("{}[{index}]", self.path_of(key));
                 let message = format!(
@@ -384,17 +355,21 @@ impl<'t> Table<'t> {
         }
     }
 
+    fn inner(&self, path: String, offset: usize, entries: Option<&'t DeTable<'t>>) -> Table<'t> {
+        Table {
+            source: self.source,
+            path,
+            offset,
+            entries,
+            asked: Vec::new(),
+            retired: Vec::new(),
+        }
+    }
+
     fn table_in(&self, value: &'t Value<'t>, path: String) -> Result<Table<'t>, SceneError> {
         let offset = value.span().start;
         match value.get_ref() {
-            DeValue::Table(entries) => Ok(Table {
-                source: self.source,
-                path,
-                offset,
-                entries: Some(entries),
-                asked: Vec::new(),
-                retired: Vec::new(),
-            }),
+            DeValue::Table(entries) => Ok(self.inner(path, offset, Some(entries))),
             other => {
                 let message = format!("holds {}: give a table", kind_of(other));
                 Err(self.source.error(offset, &path, message))
@@ -410,8 +385,8 @@ impl<'t> Table<'t> {
     }
 }
 
-fn column_of<'t>(value: &'t Value<'t>) -> Option<Column<'t>> {
-    match value.get_ref() {
+fn column_of<'t>(value: &'t DeValue<'t>) -> Option<Column<'t>> {
+    match value {
         DeValue::String(name) => Some(Column::Named(name)),
         DeValue::Integer(integer) => usize::from_str_radix(integer.as_str(), integer.radix())
             .ok()

@@ -262,7 +262,7 @@ fn a_scene_of_the_banks_runs_by_its_successor_and_is_told_so_where_it_says_it() 
     );
     let scene = Scene::parse(Path::new("scenes/x.toml"), &text).unwrap();
     assert_eq!(scene.estimator, Estimator::default());
-    let notes: Vec<String> = scene.notes.iter().map(Note::to_string).collect();
+    let notes: Vec<String> = scene.notes.iter().map(ToString::to_string).collect();
     let knob = "no longer does anything: take it out; \"spectrum\" has waves and valid_percent";
     assert_eq!(
         notes,

@@ -12,11 +12,20 @@ use std::thread;
 use hil_sim_core::judge::event::{Kind, events};
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
-use hil_sim_core::plant::contact::select::{
-    BORDER_S, ENOUGH_BLIND_PERCENT, ENOUGH_COUNT_PERCENT, ENOUGH_PERCENT, ENOUGH_SHARE,
-};
 use hil_sim_core::scene::{Contact, ContactModel, Gauges, Scene};
 use protocol::Method;
+
+/// Change of λ̂'s RMS error that is no reason for a higher rung, in percent of λ.
+const ENOUGH_PERCENT: f64 = 0.25;
+/// The same as a share of the error, where that is more.
+const ENOUGH_SHARE: f64 = 0.25;
+/// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
+/// on single hops, and no two models of friction hop alike.
+const ENOUGH_BLIND_PERCENT: f64 = 2.5;
+/// The same in percent of λ of the paper's count: one impulse more or less in its window is as much and more.
+const ENOUGH_COUNT_PERCENT: f64 = 10.0;
+/// For so long after a border, in s, nothing is compared.
+const BORDER_S: f64 = 0.25;
 
 fn scenes_below(folder: &Path, found: &mut Vec<PathBuf>) {
     let mut entries: Vec<PathBuf> = std::fs::read_dir(folder)

@@ -8,7 +8,7 @@
 //! | none of these | `kinematic` |
 //!
 //! hil-sim/tests/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
-//! by less than [`ENOUGH_PERCENT`] or [`ENOUGH_SHARE`] of itself, whichever is more. And for each rung it
+//! by less than 0.25 % or a quarter of itself, whichever is more. And for each rung it
 //! has a scene that the rung below does not do. While a border passes, nothing is compared: for as long as
 //! two specimens are in an estimator's memory, its error hangs on one or two estimates, whichever the rung.
 
@@ -19,17 +19,6 @@ use crate::scene::{ContactModel, Friction, Gauges, Motion, Surface};
 
 use super::spring::Spring;
 
-/// Change of λ̂'s RMS error that is no reason for a higher rung, in percent of λ.
-pub const ENOUGH_PERCENT: f64 = 0.25;
-/// The same as a share of the error, where that is more.
-pub const ENOUGH_SHARE: f64 = 0.25;
-/// The same in percent of λ where the fingertip sticks and slips and no force channel says so: λ̂ then hangs
-/// on single hops, and no two models of friction hop alike.
-pub const ENOUGH_BLIND_PERCENT: f64 = 2.5;
-/// The same in percent of λ of the paper's count: one impulse more or less in its window is as much and more.
-pub const ENOUGH_COUNT_PERCENT: f64 = 10.0;
-/// For so long after a border, in s, nothing is compared.
-pub const BORDER_S: f64 = 0.25;
 /// Share of the strongest specimen's amplitude below which a patch weakens one so far that noise tells.
 pub const FAINT_SHARE: f64 = 0.3;
 /// A second harmonic above this share of the fundamental may pass for the wave itself; a patch feels less of

@@ -4,10 +4,9 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::super::bounds::{Bounds, FILE_INSTANT, SCALE};
 use super::super::csv_rows::CsvRows;
 use super::super::table::{Column, Table};
-use super::tape::{Check, Conversion, Tape};
+use super::tape::{Check, Conversion, Tape, plain, too_few};
 use super::topic;
 use super::topic::When;
 use super::wav::Wav;
@@ -23,7 +22,6 @@ pub struct Words {
     pub scale: &'static str,
     /// Says that the rows are evenly spaced, and how.
     pub every: &'static str,
-    pub every_bounds: &'static Bounds,
     pub default: &'static str,
 }
 
@@ -82,8 +80,8 @@ impl<'t> Source<'t> {
             channels: table.columns("channels")?,
             topic: table.text("topic")?,
             column: table.column(words.column)?,
-            per_unit: table.number(words.scale, &SCALE)?,
-            every: table.number(words.every, words.every_bounds)?.map(|every| {
+            per_unit: table.number(words.scale)?,
+            every: table.number(words.every)?.map(|every| {
                 if words.every == "rate_hz" {
                     every.recip()
                 } else {
@@ -91,12 +89,8 @@ impl<'t> Source<'t> {
                 }
             }),
             logged_s: (
-                table
-                    .number(LOGGED[0], &FILE_INSTANT)?
-                    .unwrap_or(f64::NEG_INFINITY),
-                table
-                    .number(LOGGED[1], &FILE_INSTANT)?
-                    .unwrap_or(f64::INFINITY),
+                table.number(LOGGED[0])?.unwrap_or(f64::NEG_INFINITY),
+                table.number(LOGGED[1])?.unwrap_or(f64::INFINITY),
             ),
             headers: headers.iter().map(|&header| header.to_owned()).collect(),
             format,
@@ -197,8 +191,17 @@ impl<'t> Source<'t> {
         let tape = |width| Tape::new(width, window, conversion);
         let tape = match self.format {
             Format::Csv(ref bytes) if is_plain => {
-                let rows = CsvRows::open(&self.path, bytes)?;
-                self.plain(rows, &tape, check)?
+                let otherwise = format!(
+                    ", or name other columns by channels and {} in the scene",
+                    self.words.column
+                );
+                plain(
+                    CsvRows::open(&self.path, bytes)?,
+                    &self.headers,
+                    &otherwise,
+                    &tape,
+                    check,
+                )?
             }
             Format::Csv(ref bytes) => {
                 let rows = CsvRows::open(&self.path, bytes)?;
@@ -286,35 +289,8 @@ impl<'t> Source<'t> {
             }
             // There are rows, but the scene is elsewhere: the section says so.
             Some(extent) if extent.0 < extent.1 => Ok((Series::empty(1), extent)),
-            _ => Err(SceneError {
-                file,
-                line: None,
-                key: String::new(),
-                message: format!("{} row(s) of numbers: give two or more", rows.at.len()),
-            }),
+            _ => Err(too_few(&file, &rows)),
         }
-    }
-
-    /// A CSV file whose columns are the scene's own.
-    fn plain(
-        &self,
-        rows: CsvRows<'_>,
-        tape: &dyn Fn(usize) -> Tape,
-        check: Check<'_>,
-    ) -> Result<Tape, SceneError> {
-        let header = rows.first().join(",");
-        if !self.headers.contains(&header) {
-            let message = format!(
-                "the first line is {header:?}: it must be {}, or name other columns by channels and {} in the scene",
-                self.headers.join(" or "),
-                self.words.column
-            );
-            return Err(rows.refuse(Some(1), message));
-        }
-        let columns: Vec<usize> = (0..rows.first().len()).collect();
-        let mut tape = tape(columns.len() - 1);
-        rows.each(&columns, false, |row| tape.take(row[0], &row[1..], check))?;
-        Ok(tape)
     }
 
     /// A CSV file of whatever columns.
@@ -391,13 +367,7 @@ impl<'t> Source<'t> {
 
 /// What the file is, by its first bytes; text is read as a whole.
 fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
-    let refuse_file = |error: std::io::Error| {
-        let message = format!(
-            "{} cannot be read: {error}: names are relative to the scene's own folder",
-            path.display()
-        );
-        table.refuse("file", message)
-    };
+    let refuse_file = |error: std::io::Error| table.unreadable(path, &error);
     let mut first = Vec::new();
     fs::File::open(path)
         .and_then(|file| file.take(8).read_to_end(&mut first))

@@ -1,7 +1,7 @@
 //! Rows as they are read from a file: scaled, checked, and cut to what a scene needs.
 
-use crate::scene::Series;
-use crate::scene_file::series::unsorted;
+use crate::scene::{SceneError, Series};
+use crate::scene_file::csv_rows::CsvRows;
 
 /// What a reader says of a row that is refused: index of the column, 0 being the time or place, and what to
 /// do.
@@ -19,6 +19,15 @@ pub struct Conversion {
     pub scale: f64,
     /// And this is added.
     pub offset: f64,
+}
+
+impl Conversion {
+    /// As they are.
+    pub const NONE: Self = Self {
+        shift: 0.0,
+        scale: 1.0,
+        offset: 0.0,
+    };
 }
 
 /// What is kept of a file.
@@ -60,7 +69,10 @@ impl Tape {
             .extend(raw.iter().map(|number| number * scale + offset));
         let before = self.first.is_some().then_some(&self.before[..]);
         if let Some(before) = before.filter(|before| self.row[0] <= before[0]) {
-            return Err((0, unsorted(before[0] - shift)));
+            let before = before[0] - shift;
+            let message =
+                format!("does not increase, after {before}: sort the rows, without doubles");
+            return Err((0, message));
         }
         check(before, &self.row)?;
         let (at, values) = (self.row[0], &self.row[1..]);
@@ -81,4 +93,31 @@ impl Tape {
     pub fn into_rows(self) -> Series {
         self.rows
     }
+}
+
+/// The rows of a CSV file whose first line must be one of `headers`; `otherwise` says what else can be done.
+pub fn plain<H: AsRef<str>>(
+    rows: CsvRows<'_>,
+    headers: &[H],
+    otherwise: &str,
+    tape: &dyn Fn(usize) -> Tape,
+    check: Check<'_>,
+) -> Result<Tape, SceneError> {
+    let header = rows.first().join(",");
+    let headers: Vec<&str> = headers.iter().map(AsRef::as_ref).collect();
+    if !headers.contains(&&*header) {
+        let wanted = headers.join(" or ");
+        let message = format!("the first line is {header:?}: it must be {wanted}{otherwise}");
+        return Err(rows.refuse(Some(1), message));
+    }
+    let columns: Vec<usize> = (0..rows.first().len()).collect();
+    let mut tape = tape(columns.len() - 1);
+    rows.each(&columns, false, |row| tape.take(row[0], &row[1..], check))?;
+    Ok(tape)
+}
+
+/// The refusal of a file with less than two rows.
+pub fn too_few(file: &str, rows: &Series) -> SceneError {
+    let message = format!("{} row(s) of numbers: give two or more", rows.at.len());
+    SceneError::of(file, "", message)
 }

@@ -38,12 +38,7 @@ pub fn each(
     (when, is_place, (from_s, to_s)): (When<'_>, bool, (f64, f64)),
     mut take: impl FnMut(f64, &[f64]) -> Result<(), Refusal>,
 ) -> Result<(), SceneError> {
-    let refuse = |key: String, message: String| SceneError {
-        file: path.display().to_string(),
-        line: None,
-        key,
-        message,
-    };
+    let refuse = |key: String, message: String| SceneError::of(path.display(), key, message);
     let file = File::open(path).map_err(|error| {
         refuse(
             String::new(),

@@ -24,7 +24,7 @@ impl Wav {
                 path: path_text,
                 reader,
             }),
-            Err(error) => Err(refuse(&path_text, String::new(), broken(&error))),
+            Err(error) => Err(SceneError::of(path_text, "", broken(&error))),
         }
     }
 
@@ -53,11 +53,12 @@ impl Wav {
         let path = self.path;
         let place = |frames: u64| format!("sample {frames} ({:.6} s)", frames as f64 / rate_hz);
         let mut each = |sample: hound::Result<f64>| {
-            let sample = sample.map_err(|error| refuse(&path, place(frames), broken(&error)))?;
+            let sample =
+                sample.map_err(|error| SceneError::of(&path, place(frames), broken(&error)))?;
             if !sample.is_finite() {
                 let key = format!("{}, channel {}", place(frames), frame.len());
                 let message = format!("{sample} is not finite: mend the recording");
-                return Err(refuse(&path, key, message));
+                return Err(SceneError::of(&path, key, message));
             }
             frame.push(sample);
             if frame.len() < usize::from(spec.channels) {
@@ -74,7 +75,7 @@ impl Wav {
                         row[column],
                     ),
                 };
-                refuse(&path, key, format!("{value} {message}"))
+                SceneError::of(&path, key, format!("{value} {message}"))
             })?;
             frame.clear();
             frames += 1;
@@ -97,13 +98,4 @@ fn broken(error: &hound::Error) -> String {
     format!(
         "cannot be read as WAV: {error}: give PCM of 8 to 32 bits or floats of 32 bits, and the whole file"
     )
-}
-
-fn refuse(path: &str, key: String, message: String) -> SceneError {
-    SceneError {
-        file: path.to_owned(),
-        line: None,
-        key,
-        message,
-    }
 }
