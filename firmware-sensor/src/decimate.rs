@@ -13,7 +13,7 @@ use protocol::CHANNELS;
 use crate::{MID_RAIL_CODE, SAMPLE_RATE_HZ, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
 /// Attenuation that the Kaiser window is made for, in dB.
-const ATTENUATION_DB: f64 = 80.0;
+pub const ATTENUATION_DB: f64 = 80.0;
 /// Half of the output's rate: what lies above would alias.
 const CUTOFF_HZ: f64 = SAMPLE_RATE_HZ as f64 / 2.0;
 
@@ -123,7 +123,8 @@ pub fn from_mid_rail(code: u16) -> f32 {
     (i32::from(code) - i32::from(MID_RAIL_CODE)) as f32
 }
 
-fn sinc(x: f64) -> f64 {
+/// sin πx / πx.
+pub fn sinc(x: f64) -> f64 {
     if x == 0.0 {
         1.0
     } else {
@@ -131,8 +132,8 @@ fn sinc(x: f64) -> f64 {
     }
 }
 
-/// The Kaiser window, 1 at 0, defined from −1 to 1.
-fn kaiser(x: f64) -> f64 {
+/// The Kaiser window of [`ATTENUATION_DB`], 1 at 0, defined from −1 to 1.
+pub fn kaiser(x: f64) -> f64 {
     bessel_i0(KAISER_BETA * libm::sqrt(1.0 - x * x)) / bessel_i0(KAISER_BETA)
 }
 

@@ -142,35 +142,26 @@ impl Options {
 
 /// Why a bench can't be set up, or does not stand any more.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ServeError {
     /// Another bench has the folder.
     #[error("{}: another bench stands here: stop it, or give another folder by --dir", path.display())]
-    Taken {
-        /// The folder.
-        path: PathBuf,
-    },
+    Taken { path: PathBuf },
     /// The folder can't be used.
     #[error("{}: can't be used for a bench's ports: {source}: give another folder by --dir", path.display())]
     Folder {
-        /// The folder, or what is in the way in it.
         path: PathBuf,
-        /// What the system said.
         source: std::io::Error,
     },
     /// There is no pseudo-terminal for a port.
     #[error("{name}: no pseudo-terminal: {source}: is /dev/pts mounted, and are there any left?")]
     Terminal {
-        /// The port.
         name: PortName,
-        /// What the system said.
         source: std::io::Error,
     },
     /// The port is not there.
     #[error("{name}: there is no such port while the boards are joined: set the bench up --apart")]
-    Joined {
-        /// The port.
-        name: PortName,
-    },
+    Joined { name: PortName },
     /// The scene has weather or faults on a wire that is not there.
     #[error(
         "the scene has weather or faults on the wire between the boards, and --apart takes it out: leave \
@@ -179,18 +170,12 @@ pub enum ServeError {
     Impairments,
     /// The wire is not there.
     #[error("{mistake}: there is no wire between the boards of a bench that is --apart")]
-    NoWire {
-        /// The mistake.
-        mistake: &'static str,
-    },
+    NoWire { mistake: &'static str },
     /// The scene has a host do wrong.
     #[error(
         "the scene's fault \"{kind}\" needs the console, which is yours on a bench: take it out"
     )]
-    Console {
-        /// The fault's kind.
-        kind: &'static str,
-    },
+    Console { kind: &'static str },
     /// The gauges are recorded.
     #[error(
         "the scene's gauges are recorded, and feel no other hand than the scene's: give a scene with \
@@ -203,11 +188,8 @@ pub enum ServeError {
     /// A board has stopped.
     #[error("the {board} board stopped at {at_s:.6} s: {reason}")]
     Stopped {
-        /// Which board.
         board: &'static str,
-        /// When, in virtual seconds.
         at_s: f64,
-        /// What was seen.
         reason: String,
     },
     /// It is over.

@@ -28,7 +28,6 @@ pub struct ConsoleHost {
     /// What is to be sent before the configuration that names it.
     described: Vec<Actuators>,
     wanted: Option<Configuration>,
-    /// When it last asked.
     asked_ns: Option<u64>,
     /// Whether the board, as it stands since its power came on, has answered.
     is_answered: bool,
@@ -177,7 +176,6 @@ impl ConsoleHost {
         }
     }
 
-    /// Everything that is to be said.
     fn take(&mut self) -> Vec<u8> {
         let mut all = Vec::new();
         let mut out = [0; MAX_FRAME];

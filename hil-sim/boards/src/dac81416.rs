@@ -29,7 +29,6 @@ pub const CHANNELS: usize = 16;
 /// DEVICEID's product field.
 pub const PRODUCT: u16 = 668;
 
-/// Address bit that reads.
 const READ: u8 = 0x80;
 /// Address bits; the one between them and [`READ`] does not matter.
 const ADDRESS: u8 = 0x3F;
@@ -68,7 +67,6 @@ pub struct Counters {
     pub faults: u64,
 }
 
-/// A channel's output range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     lowest_v: f64,

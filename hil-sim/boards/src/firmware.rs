@@ -13,6 +13,7 @@ const IDENTITY: &str = ".ridgelink";
 
 /// Why an ELF can't be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum FirmwareError {
     /// The file can't be read.
     #[error(
@@ -21,35 +22,21 @@ pub enum FirmwareError {
         path.display()
     )]
     Missing {
-        /// The file.
         path: PathBuf,
-        /// The package that makes it.
         package: &'static str,
-        /// What the system said.
         source: std::io::Error,
     },
     /// The file is no ELF.
     #[error("{}: is no ELF file ({reason}): give the firmware as the build left it", path.display())]
-    NoElf {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
+    NoElf { path: PathBuf, reason: String },
     /// The ELF does not say what it is.
     #[error("{}: has no {IDENTITY} section: it is no firmware of Ridgelink, or was stripped of it", path.display())]
-    NoIdentity {
-        /// The file.
-        path: PathBuf,
-    },
+    NoIdentity { path: PathBuf },
     /// The ELF is for the other board.
     #[error("{}: is the {found} board's firmware; the {wanted} board's is wanted: exchange the two", path.display())]
     WrongRole {
-        /// The file.
         path: PathBuf,
-        /// The role in the ELF.
         found: String,
-        /// The role wanted.
         wanted: &'static str,
     },
     /// The ELF was built from another protocol.
@@ -59,21 +46,13 @@ pub enum FirmwareError {
         path.display()
     )]
     OtherProtocol {
-        /// The file.
         path: PathBuf,
-        /// The protocol version in the ELF.
         found_version: u16,
-        /// The schema hash in the ELF.
         found_schema: u64,
     },
     /// The emulator can't place it.
     #[error("{}: {reason}", path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// What the emulator said.
-        reason: String,
-    },
+    Image { path: PathBuf, reason: String },
 }
 
 /// A firmware that may run.

@@ -246,10 +246,8 @@ impl WatchedCode {
     }
 }
 
-/// In this order.
 const ESTIMATES: [Estimate; 3] = [Estimate::Least, Estimate::Most, Estimate::Unaccelerated];
 
-/// One estimate.
 struct Timing {
     meter: CycleMeter,
     /// The cycles before the last tick's interrupt.
@@ -315,7 +313,6 @@ fn routines(functions: &BTreeMap<u64, String>) -> Vec<std::ops::Range<u64>> {
         .collect()
 }
 
-/// Where each function of an ELF begins.
 fn functions(elf: &[u8]) -> BTreeMap<u64, String> {
     let Ok(file) = object::File::parse(elf) else {
         return BTreeMap::new();
@@ -350,7 +347,6 @@ fn peripheral(address: u64) -> &'static str {
 
 type Reader<'a> = EndianSlice<'a, LittleEndian>;
 
-/// Whose an address is.
 struct Places<'a> {
     context: addr2line::Context<Reader<'a>>,
 }

@@ -64,7 +64,6 @@ struct Input {
     pin: u8,
     /// The alternate function that makes the pin the timer's.
     function: u8,
-    /// The level of an open wire.
     open: Level,
 }
 
@@ -132,36 +131,22 @@ impl Jig {
     }
 }
 
-const PULSE: Input = Input {
-    timer: TIM2,
-    channel: 3,
-    port: 1,
-    pin: 10,
-    function: 1,
-    open: Level::Low,
-};
-const LOAD: Input = Input {
-    timer: TIM2,
-    channel: 4,
-    port: 1,
-    pin: 11,
-    function: 1,
-    open: Level::High,
-};
+const fn input(timer: usize, channel: u8, pin: (usize, u8, u8), open: Level) -> Input {
+    Input {
+        timer,
+        channel,
+        port: pin.0,
+        pin: pin.1,
+        function: pin.2,
+        open,
+    }
+}
+
+const PULSE: Input = input(TIM2, 3, (1, 10, 1), Level::Low);
+const LOAD: Input = input(TIM2, 4, (1, 11, 1), Level::High);
 /// The encoder's inputs are pulled up.
-const ENCODER_A: Input = Input {
-    timer: TIM4_INDEX,
-    channel: 1,
-    port: 3,
-    pin: 12,
-    function: 2,
-    open: Level::High,
-};
-const ENCODER_B: Input = Input {
-    channel: 2,
-    pin: 13,
-    ..ENCODER_A
-};
+const ENCODER_A: Input = input(TIM4_INDEX, 1, (3, 12, 2), Level::High);
+const ENCODER_B: Input = input(TIM4_INDEX, 2, (3, 13, 2), Level::High);
 
 fn pin(number: u8) -> Pin {
     Pin::new(number).expect("a port has sixteen pins")

@@ -51,6 +51,7 @@ const SCANS_PER_ESTIMATE: usize =
 
 /// Why a run on emulated boards failed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ElfError {
     /// The scene's world can't be built.
     #[error(transparent)]
@@ -60,52 +61,31 @@ pub enum ElfError {
     Firmware(#[from] FirmwareError),
     /// A board could not be put together.
     #[error("the {board} board can't be emulated: {reason}")]
-    Board {
-        /// Which board.
-        board: &'static str,
-        /// What the emulator said.
-        reason: String,
-    },
+    Board { board: &'static str, reason: String },
     /// A board stopped before the scene's end.
     #[error("the {board} board stopped at {at_s:.6} s of {duration_s} s: {reason}")]
     Stopped {
-        /// Which board.
         board: &'static str,
-        /// When, in virtual seconds.
         at_s: f64,
-        /// How long the scene is.
         duration_s: f64,
-        /// What was seen.
         reason: String,
     },
     /// A board does not take the configuration that the scene asks for.
     #[error("the {board} board does not run as the scene asks: {reason}")]
-    Configuration {
-        /// Which board.
-        board: &'static str,
-        /// What it answered.
-        reason: String,
-    },
+    Configuration { board: &'static str, reason: String },
     /// A fault needs to know where something is in the firmware, and it is not to be found.
     #[error(
         "the {board} board can't be broken by \"{kind}\": its ELF does not show where: build it with symbols, as ./test does"
     )]
     Fault {
-        /// Which board.
         board: &'static str,
-        /// The fault's kind.
         kind: &'static str,
     },
     /// The firmware touched what the emulator has no model for.
     #[error(
         "the {board} board's firmware reached an address that no model answers for: {address:#010x}"
     )]
-    Unmapped {
-        /// Which board.
-        board: &'static str,
-        /// The address.
-        address: u64,
-    },
+    Unmapped { board: &'static str, address: u64 },
 }
 
 impl ElfError {

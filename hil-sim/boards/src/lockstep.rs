@@ -96,7 +96,6 @@ pub struct Lockstep<W> {
     /// What the scene's delay leaves of [`QUANTUM_NS`].
     more_ns: u64,
     injector: Injector,
-    /// The board's.
     clock: Clock,
     /// What the board has sent in this quantum's portions.
     sent: Vec<TimedByte>,
@@ -104,7 +103,6 @@ pub struct Lockstep<W> {
     next_exchange_ns: u64,
     next_quantum_ns: u64,
     next_log_ns: u64,
-    /// Resets seen so far.
     resets: usize,
     /// What makes something of it.
     pub witness: W,

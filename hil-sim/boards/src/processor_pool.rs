@@ -75,10 +75,8 @@ struct PooledProcessor {
     twin: Option<Box<dyn Processor>>,
     make: ProcessorConstructor,
     endian: Endian,
-    /// Its state before its first run.
     at_power_up: Vec<u8>,
     program: u64,
-    /// How many more runs it is kept for.
     runs_left: u32,
     /// What it has for memory while it has no run.
     ground: Vec<Page>,

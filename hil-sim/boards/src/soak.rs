@@ -30,7 +30,6 @@ use tally::{Outputs, Side};
 pub const QUIET_S: f64 = 3.0;
 /// The shortest run, in s.
 pub const SHORTEST_S: f64 = 10.0;
-/// How often progress is told.
 const TOLD_NS: u64 = 1_000_000_000;
 
 /// The run to be made.
@@ -244,7 +243,6 @@ impl Left {
         }
     }
 
-    /// Its last status.
     fn status(&self) -> Option<Status> {
         self.side.last_status()
     }

@@ -118,7 +118,6 @@ struct Pair<'o, O> {
     steps_per_tick: u64,
     sensor_end: End,
     display_end: End,
-    /// The sensor board's.
     clock: Clock,
     scan_count: u64,
     gauges: GaugeFaults,
@@ -280,7 +279,6 @@ impl<'o, O: RunObserver> Pair<'o, O> {
         }
     }
 
-    /// The display's output tick.
     fn tick(&mut self, now_ns: u64, t_s: f64) {
         let position_mm = self.world.hand_position_mm(t_s);
         let encoder = self.hand.counts(now_ns, encoder(position_mm));
@@ -377,7 +375,6 @@ impl End {
         }
     }
 
-    /// Says Hello if it is time to.
     fn greet(&mut self, now_ns: u64, digest: &mut Digest) {
         self.port.poll(now_ns / 1_000);
         self.flush(now_ns, digest);

@@ -65,7 +65,6 @@ impl Mismatch {
         Some(byte)
     }
 
-    /// The line's level.
     fn level(&self, at_ns: f64) -> bool {
         let bit = |&(begins_ns, bits): &(f64, u16)| {
             let bit = ((at_ns - begins_ns) / self.sent_bit_ns).floor();

@@ -22,7 +22,6 @@ pub struct Folder {
     _lock: File,
 }
 
-/// `bench.toml`.
 #[derive(Serialize)]
 struct BenchFile<'a> {
     sensor: BoardEntry<'a>,

@@ -235,7 +235,6 @@ impl PortServer {
         true
     }
 
-    /// Puts a wire wrong, or right.
     fn miswire<P: BenchPins>(
         &mut self,
         board: &mut Nucleo<P>,
@@ -255,7 +254,6 @@ impl PortServer {
         }
     }
 
-    /// Lets a port's bytes go both ways.
     fn carry<P: Pins>(
         &self,
         board: &mut Nucleo<P>,

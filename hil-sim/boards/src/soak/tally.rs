@@ -201,7 +201,6 @@ impl Side {
     }
 }
 
-/// Collects checks.
 #[derive(Default)]
 struct Checks(Vec<Check>);
 

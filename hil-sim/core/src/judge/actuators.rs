@@ -157,7 +157,6 @@ impl Judge {
         self.stimulus.in_force_per_mm()
     }
 
-    /// Takes what the stimulus tells.
     fn follow(&mut self) {
         while let Some(told) = self.stimulus.take() {
             match told {

@@ -5,7 +5,6 @@ use crate::judge::middle::Point;
 /// Share of the usual amplitude from which on a cycle counts as at full amplitude.
 const FULL: f64 = 0.95;
 
-/// An upward crossing of the middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Crossing {
     t_s: f64,
@@ -35,7 +34,6 @@ pub struct Cycles {
     open: Option<Open>,
 }
 
-/// A cycle that has not ended.
 #[derive(Clone, Debug)]
 struct Open {
     begins_cycles: f64,

@@ -26,7 +26,6 @@ pub struct Peaks([u16; ACTUATORS]);
 impl Peaks {
     /// Before the first output.
     pub const NONE: Self = Self([0; ACTUATORS]);
-    /// As far as they go.
     const FARTHEST: Self = Self([ZERO_VOLT; ACTUATORS]);
 
     /// Takes the next words.
@@ -65,7 +64,6 @@ struct Late {
     held: Held,
 }
 
-/// The words that were held.
 #[derive(Clone, Debug)]
 enum Held {
     Alike(u16),

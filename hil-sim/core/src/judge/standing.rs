@@ -26,7 +26,6 @@ pub struct Standing {
     turns: Option<u32>,
 }
 
-/// From one place to another.
 #[derive(Clone, Copy, Debug, Default)]
 struct Span {
     from: Option<Place>,

@@ -29,7 +29,7 @@ const FASTEST_ARM_UM_S: u32 = 20_000_000;
 
 /// What the estimates that arrived so far ask of a display. Instants are in ns since the scene's start, and fall by
 /// no more than a tick.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Trust {
     max_age_ns: u64,
     sequence: Option<u32>,
@@ -49,14 +49,7 @@ impl Trust {
     pub fn new(max_age_ms: u16) -> Self {
         Self {
             max_age_ns: u64::from(max_age_ms) * 1_000_000,
-            sequence: None,
-            held_mm: None,
-            surprise_mm: None,
-            trusted_ns: None,
-            bucket: (0.0, 0),
-            floods: false,
-            untrue_ns: VecDeque::new(),
-            distrusts: false,
+            ..Self::default()
         }
     }
 
@@ -179,7 +172,6 @@ fn differ(one_mm: f32, other_mm: f32, factor: f32) -> bool {
     one_mm > other_mm * factor || other_mm > one_mm * factor
 }
 
-/// Whether no sensor can have said this.
 fn is_absurd(estimate: &Estimate) -> bool {
     !(0.0..=1.0).contains(&estimate.confidence)
         || !(0.0..=LARGEST_AMPLITUDE_LSB).contains(&estimate.amplitude_lsb)

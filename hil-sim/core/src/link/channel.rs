@@ -28,7 +28,6 @@ pub struct LinkChannel {
     restarts_ns: VecDeque<u64>,
     /// Whether any fault makes it necessary to know what went by.
     listens: bool,
-    /// The frame so far.
     frame: Vec<u8>,
     /// Whether it is held until it is whole.
     holds_frame: bool,
@@ -39,7 +38,6 @@ pub struct LinkChannel {
     held_count: u64,
     /// When a fault that talks by itself may say its next byte.
     talk_ns: u64,
-    /// Stops said so far.
     stops: usize,
     out: VecDeque<(u64, u8)>,
     free_ns: u64,

@@ -3,47 +3,10 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, mpsc};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError, mpsc};
 use std::thread;
-
-/// What may be begun.
-struct Desk {
-    /// The next input.
-    next: usize,
-    /// Inputs below this one may be begun.
-    open: usize,
-}
-
-/// Lets the other threads end when one of them panics: nothing would open the desk for them.
-struct Alarm<'d>(&'d (Mutex<Desk>, Condvar));
-
-impl Drop for Alarm<'_> {
-    fn drop(&mut self) {
-        if thread::panicking() {
-            locked(&self.0.0).next = usize::MAX;
-            self.0.1.notify_all();
-        }
-    }
-}
-
-fn locked(desk: &Mutex<Desk>) -> MutexGuard<'_, Desk> {
-    desk.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The input to work on next; none if there is none any more. Waits until one may be begun.
-fn taken((desk, opened): &(Mutex<Desk>, Condvar), inputs: usize) -> Option<usize> {
-    let mut desk = locked(desk);
-    loop {
-        if desk.next >= inputs {
-            return None;
-        }
-        if desk.next < desk.open {
-            desk.next += 1;
-            return Some(desk.next - 1);
-        }
-        desk = opened.wait(desk).unwrap_or_else(PoisonError::into_inner);
-    }
-}
 
 /// Does `work` on each input on so many threads, and hands each result with its input's index to `finished`,
 /// on the calling thread and in the inputs' order. No thread is more than two inputs a thread ahead of what has
@@ -60,23 +23,30 @@ pub fn in_order<I: Sync, O: Send, E>(
     work: impl Fn(&I) -> O + Sync,
     mut finished: impl FnMut(usize, O) -> Result<(), E>,
 ) -> Result<(), E> {
-    let ahead = 2 * threads.get();
-    let desk = (
-        Mutex::new(Desk {
-            next: 0,
-            open: ahead,
-        }),
-        Condvar::new(),
-    );
-    let (sender, receiver) = mpsc::channel();
+    // One for each input that may be begun.
+    let (permit, permits) = mpsc::channel();
+    let allow = |permit: &mpsc::Sender<()>| permit.send(()).unwrap_or_default();
+    (0..2 * threads.get()).for_each(|_| allow(&permit));
+    let (permits, next) = (Mutex::new(permits), AtomicUsize::new(0));
+    let (sender, results) = mpsc::channel();
+    let is_permitted = || {
+        let permits = permits.lock().unwrap_or_else(PoisonError::into_inner);
+        permits.recv().is_ok()
+    };
     thread::scope(|scope| {
+        // Dropped at the end or at an error, whoever waits for one is done.
+        let permit = permit;
         for _ in 0..threads.get().min(inputs.len()) {
-            let (sender, desk, work) = (sender.clone(), &desk, &work);
+            let (sender, next, work, is_permitted) = (sender.clone(), &next, &work, &is_permitted);
             scope.spawn(move || {
-                let _alarm = Alarm(desk);
-                while let Some(index) = taken(desk, inputs.len()) {
+                while is_permitted() {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(input) = inputs.get(index) else {
+                        return;
+                    };
+                    let result = catch_unwind(AssertUnwindSafe(|| work(input)));
                     // Nobody listens any more after an error.
-                    if sender.send((index, work(&inputs[index]))).is_err() {
+                    if sender.send((index, result)).is_err() {
                         return;
                     }
                 }
@@ -85,19 +55,15 @@ pub fn in_order<I: Sync, O: Send, E>(
         drop(sender);
         let mut waiting = BTreeMap::new();
         let mut due = 0;
-        for (index, result) in receiver {
-            waiting.insert(index, result);
+        while due < inputs.len() {
+            let Ok((index, result)) = results.recv() else {
+                break;
+            };
+            waiting.insert(index, result.unwrap_or_else(|panic| resume_unwind(panic)));
             while let Some(result) = waiting.remove(&due) {
-                let handed = finished(due, result);
+                finished(due, result)?;
                 due += 1;
-                let mut now = locked(&desk.0);
-                now.open = due + ahead;
-                if handed.is_err() {
-                    now.next = usize::MAX;
-                }
-                drop(now);
-                desk.1.notify_all();
-                handed?;
+                allow(&permit);
             }
         }
         Ok(())

@@ -6,15 +6,12 @@
 //! band-limited: between the samples beside it the value swings by 0.15 of the step at most, by 0.02 from 7 samples
 //! on and by 0.01 from 13 on.
 
-use std::f64::consts::PI;
 use std::sync::LazyLock;
+
+use firmware_sensor::decimate::{kaiser, sinc};
 
 /// Samples on either side that a value depends on.
 pub const REACH: usize = 64;
-/// Attenuation that the Kaiser window is made for, in dB.
-const ATTENUATION_DB: f64 = 80.0;
-/// Kaiser's rule for the window's shape, for attenuations above 50 dB.
-const KAISER_BETA: f64 = 0.1102 * (ATTENUATION_DB - 8.7);
 /// Places between two samples for which the kernel is stored. Straight lines between them are off by
 /// (π / 512)² / 8 = 4.7e-6 of a tone's amplitude at most: of 1.65 V a hundredth of the ADC's step.
 const PLACES: usize = 512;
@@ -46,33 +43,6 @@ fn exactly(share: f64) -> Taps {
         *tap /= sum;
     }
     taps
-}
-
-fn sinc(x: f64) -> f64 {
-    if x == 0.0 {
-        1.0
-    } else {
-        libm::sin(PI * x) / (PI * x)
-    }
-}
-
-/// The Kaiser window, 1 at 0, and 0 beyond −1 to 1.
-fn kaiser(x: f64) -> f64 {
-    if x.abs() > 1.0 {
-        return 0.0;
-    }
-    bessel_i0(KAISER_BETA * (1.0 - x * x).sqrt()) / bessel_i0(KAISER_BETA)
-}
-
-/// The modified Bessel function of the first kind and order 0, by its power series.
-fn bessel_i0(x: f64) -> f64 {
-    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
-    while term > sum * f64::EPSILON {
-        term *= (x / (2.0 * k)) * (x / (2.0 * k));
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -45,10 +45,7 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
         Some(4_000) => UpdateRate::Hz4000,
         Some(_) => return Err(table.refuse("update_rate_hz", "is no rate: give 2000 or 4000")),
     };
-    let mut whole = |key, default: u16, low: u16, high: u16| {
-        let value = table.whole(key, low.into(), high.into())?;
-        Ok::<_, SceneError>(value.map_or(default, |value| value as u16))
-    };
+    let mut whole = |key, default: u16, low, high| table.whole_or(key, (low, high), default);
     // The ranges are the board's own.
     let configuration = DisplayConfiguration {
         mode,

@@ -394,12 +394,12 @@ fn estimator(
     } else {
         table.choice("method", &methods)?
     };
-    let window_ms = table
-        .whole("window_ms", 10, 200)?
-        .map_or(defaults.window_ms, |ms| ms as u16);
-    let counted_gauge = table
-        .whole("counted_gauge", 0, GAUGES as u64 - 1)?
-        .map_or(defaults.counted_gauge, |gauge| gauge as u8);
+    let window_ms = table.whole_or("window_ms", (10, 200), defaults.window_ms)?;
+    let counted_gauge = table.whole_or(
+        "counted_gauge",
+        (0, GAUGES as u64 - 1),
+        defaults.counted_gauge,
+    )?;
     let named = table.gauges("gauges")?;
     let gauges = match (table.contains("gauges"), named) {
         (false, _) => defaults.gauges,
@@ -408,12 +408,8 @@ fn estimator(
             return Err(table.refuse("gauges", "there are none: name one or more of 0 to 4"));
         }
     };
-    let waves = table
-        .whole("waves", 2, 8)?
-        .map_or(defaults.waves, |waves| waves as u8);
-    let valid_percent = table
-        .whole("valid_percent", 50, 99)?
-        .map_or(defaults.valid_percent, |percent| percent as u8);
+    let waves = table.whole_or("waves", (2, 8), defaults.waves)?;
+    let valid_percent = table.whole_or("valid_percent", (50, 99), defaults.valid_percent)?;
     for key in ["travel_wavelengths", "candidates"] {
         if table.retired(key) {
             notes.push(table.refuse(key, NO_KNOB));

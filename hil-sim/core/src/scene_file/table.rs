@@ -216,6 +216,19 @@ impl<'t> Table<'t> {
         }
     }
 
+    /// The same of a smaller type, `default` if the key is absent.
+    pub fn whole_or<T: TryFrom<u64>>(
+        &mut self,
+        key: &'static str,
+        (low, high): (u64, u64),
+        default: T,
+    ) -> Result<T, SceneError> {
+        let given = self.whole(key, low, high)?;
+        Ok(given
+            .and_then(|whole| T::try_from(whole).ok())
+            .unwrap_or(default))
+    }
+
     pub fn text(&mut self, key: &'static str) -> Result<Option<&'t str>, SceneError> {
         self.of_type(key, "a text in quotes", |value| value.as_str())
     }

@@ -12,7 +12,6 @@ use hil_sim_boards::display_alone::{self, DisplayBench, SensorMessage};
 use hil_sim_boards::{ElfError, Firmware};
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::run::digest::Digest;
-use hil_sim_core::run::fault_evidence::FaultEvidence;
 use hil_sim_core::run::recording::{Engine, OutputRecord, Recording, TickRecord};
 use hil_sim_core::scene::Motion;
 
@@ -65,7 +64,7 @@ impl StimulusSequence {
             .expect("the default is in its ranges");
         let mut display = Display::new(&settings, None);
         display.started(Ok(()));
-        let mut recording = empty(self.duration_s());
+        let mut recording = Recording::empty(Engine::Native, self.duration_s());
         for tick in 0..(self.duration_s() * 1e9) as u64 / TICK_NS {
             let at_ns = tick * TICK_NS;
             let t_s = seconds(at_ns);
@@ -103,25 +102,6 @@ impl StimulusSequence {
             Felt::of(recording, ACTUATOR, from_s + LEARNS_S, from_s + PERIOD_S)
         };
         (1..=self.wavelengths_mm.len()).map(felt).collect()
-    }
-}
-
-fn empty(duration_s: f64) -> Recording {
-    Recording {
-        engine: Engine::Native,
-        duration_s,
-        warm_up_s: 0.0,
-        wall_s: 0.0,
-        hash: 0,
-        scans: Vec::new(),
-        ticks: Vec::new(),
-        estimates: Vec::new(),
-        arrived: Vec::new(),
-        outputs: Vec::new(),
-        sensor_status: None,
-        display_status: None,
-        log: Vec::new(),
-        signs: FaultEvidence::default(),
     }
 }
 

@@ -42,7 +42,7 @@ pub(super) struct Misconduct {
 }
 
 /// Looks on from the scene's start, and judges while the fault is the only one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Conduct {
     /// When it is judged, in ns.
     judged_ns: Range<u64>,
@@ -97,13 +97,8 @@ impl Conduct {
             fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
             trust: Trust::new(configuration.max_age_ms),
             wavelength_mm: f64::INFINITY,
-            arrived: VecDeque::new(),
-            hand: None,
-            moves_since_ns: None,
             silent_since_ns: Some(0),
-            held_since: None,
-            free_since_ns: 0,
-            seen: Misconduct::default(),
+            ..Self::default()
         }
     }
 

@@ -185,7 +185,6 @@ impl Outputs {
         self.stuck[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
     }
 
-    /// Now all have to be at 0 V.
     fn look_late(&mut self) {
         self.late_ns = None;
         if let Some(words) = &self.words {

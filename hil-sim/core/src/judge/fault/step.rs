@@ -69,7 +69,6 @@ impl Step {
         }
     }
 
-    /// The display has begun to count anew.
     fn restart(&mut self, at_ns: u64) {
         if at_ns < self.judged_ns.start {
             self.restarted_s = seconds(at_ns);
@@ -85,7 +84,6 @@ impl Step {
         Some(mean(squares)?.sqrt())
     }
 
-    /// Takes the errors since the last silence.
     fn end_stretch(&mut self) {
         let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
         let standing = if self.is_unplaced {

@@ -27,7 +27,6 @@ pub(super) struct GaugeFault {
     noise: Xoshiro256PlusPlus,
 }
 
-/// What is wrong with a gauge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum GaugeFaultKind {
     None,

@@ -20,7 +20,6 @@ pub fn rows() -> &'static [Row] {
     &ROWS
 }
 
-/// The file.
 #[derive(Deserialize)]
 struct Catalogue {
     /// Signs that are named together.
@@ -63,7 +62,6 @@ fn text<'de, D: Deserializer<'de>>(from: D) -> Result<&'static str, D::Error> {
     Ok(String::deserialize(from)?.leak())
 }
 
-/// The same of a list.
 fn list<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<&'static [T], D::Error> {
     Ok(Vec::deserialize(from)?.leak())
 }

@@ -73,7 +73,6 @@ pub fn at_the_pins(samples: &Series) -> Series {
     }
 }
 
-/// What turns samples into scans.
 struct InverseFilter {
     filter: Filter,
     /// Weight of a sample in the scan that lies so many scans after it, from −4 · [`REACH`] on.
@@ -210,7 +209,6 @@ impl InverseFilter {
             .collect()
     }
 
-    /// What the filter makes of scans.
     fn filtered(&self, scans: &[f64]) -> Vec<f64> {
         let last = scans.len() as i64 - 1;
         (0..scans.len() as i64 / SCANS)

@@ -392,7 +392,6 @@ fn is_json(text: &[u8]) -> bool {
     text.trim_ascii_start().starts_with(b"{")
 }
 
-/// A file that is no texture.
 fn refuse(path: &Path, error: HjifError) -> SceneError {
     SceneError {
         file: path.display().to_string(),
