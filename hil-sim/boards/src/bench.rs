@@ -13,7 +13,8 @@ mod port_server;
 mod pty;
 mod socket;
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -149,16 +150,10 @@ pub enum ServeError {
     Taken { path: PathBuf },
     /// The folder can't be used.
     #[error("{}: can't be used for a bench's ports: {source}: give another folder by --dir", path.display())]
-    Folder {
-        path: PathBuf,
-        source: std::io::Error,
-    },
+    Folder { path: PathBuf, source: io::Error },
     /// There is no pseudo-terminal for a port.
     #[error("{name}: no pseudo-terminal: {source}: is /dev/pts mounted, and are there any left?")]
-    Terminal {
-        name: PortName,
-        source: std::io::Error,
-    },
+    Terminal { name: PortName, source: io::Error },
     /// The port is not there.
     #[error("{name}: there is no such port while the boards are joined: set the bench up --apart")]
     Joined { name: PortName },
@@ -195,6 +190,16 @@ pub enum ServeError {
     /// It is over.
     #[error("the bench is over")]
     Over,
+}
+
+impl ServeError {
+    /// What the system says of a folder, or of what is in the way in it.
+    fn folder(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |source| Self::Folder {
+            path: path.to_owned(),
+            source,
+        }
+    }
 }
 
 impl From<SceneError> for ServeError {
@@ -235,24 +240,17 @@ impl Bench {
     /// If the folder is another bench's or can't be used, a board can't be emulated or refuses what the
     /// scene asks, or the scene asks for what a bench can't do.
     pub fn start(options: Options, firmwares: &Firmwares) -> Result<Self, ServeError> {
-        let Options {
-            dir,
-            mut scene,
-            hand,
-            pace,
-            is_apart,
-            until_s,
-        } = options;
-        check(&scene, &hand, is_apart)?;
-        let folder = Arc::new(Folder::take(&dir)?);
+        let (mut scene, is_apart, until_s) = (options.scene, options.is_apart, options.until_s);
+        check(&scene, &options.hand, is_apart)?;
+        let folder = Arc::new(Folder::take(&options.dir)?);
         let has_recorded_gauges = matches!(scene.gauges, Gauges::Recorded(_));
-        let hand = Arc::new(live(&scene, hand));
+        let hand = Arc::new(live(&scene, options.hand));
         scene.motion = Motion::Live(hand.clone());
         scene.duration_s = until_s.unwrap_or(f64::INFINITY);
         let shared = Arc::new(Shared {
             sockets: PortName::ALL.map(|name| Socket::new(name, folder.clone())),
             is_apart,
-            waits: pace == Pace::Max,
+            waits: options.pace == Pace::Max,
             now_ns: AtomicU64::new(0),
             behind_us: AtomicU64::new(0),
             end_ns: AtomicU64::new(until_s.map_or(u64::MAX, |until_s| (until_s * 1e9) as u64)),
@@ -269,7 +267,7 @@ impl Bench {
         let display = beside(
             Role::Display,
             &firmwares.display.elf,
-            Some(Pacer::new(pace)),
+            Some(Pacer::new(options.pace)),
         );
         drop(ready);
         let runner = std::thread::spawn({

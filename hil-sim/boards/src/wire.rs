@@ -62,11 +62,9 @@ impl Peer for Wire {
     }
 
     fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {
-        let &(at, byte) = self.due.front()?;
-        if at > now.0 + SLACK_NS {
-            return None;
-        }
-        self.due.pop_front();
+        let (_, byte) = self
+            .due
+            .pop_front_if(|&mut (at, _)| at <= now.0 + SLACK_NS)?;
         (!self.is_deaf).then_some(byte.into())
     }
 }

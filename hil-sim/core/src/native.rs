@@ -178,12 +178,8 @@ impl<'o, O: RunObserver> Pair<'o, O> {
         self.sensor_hears(now_ns);
         if step > 0 && step.is_multiple_of(STEPS_PER_STATUS) {
             let (sensor, display) = self.statuses(now_ns);
-            self.say(Role::Sensor, now_ns, Message::Status(sensor));
-            self.say(Role::Display, now_ns, Message::Status(display));
-            self.sensor_end
-                .send(now_ns, &Message::Status(sensor), &mut self.digest);
-            self.display_end
-                .send(now_ns, &Message::Status(display), &mut self.digest);
+            self.tell(Role::Sensor, now_ns, Message::Status(sensor));
+            self.tell(Role::Display, now_ns, Message::Status(display));
         }
     }
 
@@ -260,18 +256,13 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             self.arm.command(t_s, self.command_mm_s());
         }
         if let Some(estimate) = output.estimate {
-            self.say(Role::Sensor, now_ns, Message::Estimate(estimate));
             self.onlooker.see(RunEvent::Estimate(now_ns, &estimate));
-            let sent = self
-                .sensor_end
-                .send(now_ns, &Message::Estimate(estimate), &mut self.digest);
+            let sent = self.tell(Role::Sensor, now_ns, Message::Estimate(estimate));
             self.sensor_counters.estimates =
                 self.sensor_counters.estimates.wrapping_add(u32::from(sent));
         }
         if let Some(texture) = output.texture {
-            let message = Message::Texture(texture);
-            self.say(Role::Sensor, now_ns, message.clone());
-            self.sensor_end.send(now_ns, &message, &mut self.digest);
+            self.tell(Role::Sensor, now_ns, Message::Texture(texture));
         }
         if let Some(gauges) = output.gauges {
             self.sensor_end
@@ -336,6 +327,17 @@ impl<'o, O: RunObserver> Pair<'o, O> {
                 RoleCounters::Display(self.display.counters()),
             ),
         )
+    }
+
+    /// Says a message, and tells of it. False if nobody listens yet.
+    fn tell(&mut self, role: Role, now_ns: u64, message: Message) -> bool {
+        let end = match role {
+            Role::Display => &mut self.display_end,
+            _ => &mut self.sensor_end,
+        };
+        let sent = end.send(now_ns, &message, &mut self.digest);
+        self.say(role, now_ns, message);
+        sent
     }
 
     /// Tells what a board says of itself.

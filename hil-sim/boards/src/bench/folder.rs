@@ -41,18 +41,15 @@ impl Folder {
     /// # Errors
     /// If another bench has it, or it can't be written to.
     pub fn take(path: &Path) -> Result<Self, ServeError> {
-        let refuse = |source| ServeError::Folder {
-            path: path.to_owned(),
-            source,
-        };
-        let path = std::path::absolute(path).map_err(refuse)?;
-        fs::create_dir_all(&path).map_err(refuse)?;
+        let refuse = ServeError::folder(path);
+        let path = std::path::absolute(path).map_err(&refuse)?;
+        fs::create_dir_all(&path).map_err(&refuse)?;
         let lock = OpenOptions::new()
             .create(true)
             .truncate(false)
             .write(true)
             .open(path.join(LOCK))
-            .map_err(refuse)?;
+            .map_err(&refuse)?;
         match lock.try_lock() {
             Ok(()) => Ok(Self { path, _lock: lock }),
             Err(TryLockError::WouldBlock) => Err(ServeError::Taken { path }),
@@ -76,11 +73,8 @@ impl Folder {
     /// If it can't be written.
     pub fn describe(&self, firmwares: &Firmwares) -> Result<(), ServeError> {
         let path = self.bench_file();
-        let refuse = |source| ServeError::Folder {
-            path: path.clone(),
-            source,
-        };
-        let absolute = |elf: &Path| std::path::absolute(elf).map_err(refuse);
+        let refuse = ServeError::folder(&path);
+        let absolute = |elf: &Path| std::path::absolute(elf).map_err(&refuse);
         let (sensor_elf, display_elf) = (
             absolute(&firmwares.sensor.path)?,
             absolute(&firmwares.display.path)?,
@@ -99,7 +93,7 @@ impl Folder {
         };
         let text = toml::to_string(&file).map_err(|error| refuse(io::Error::other(error)))?;
         let draft = self.path.join("bench.toml.new");
-        fs::write(&draft, text).map_err(refuse)?;
+        fs::write(&draft, text).map_err(&refuse)?;
         fs::rename(&draft, &path).map_err(refuse)
     }
 
@@ -109,16 +103,13 @@ impl Folder {
     /// If something else than a link is there, or the folder can't be written to.
     pub fn link(&self, name: PortName, target: &Path) -> Result<(), ServeError> {
         let path = self.port(name);
-        let refuse = |source| ServeError::Folder {
-            path: path.clone(),
-            source,
-        };
+        let refuse = ServeError::folder(&path);
         if fs::symlink_metadata(&path).is_ok_and(|there| !there.is_symlink()) {
             return Err(refuse(io::ErrorKind::AlreadyExists.into()));
         }
         let draft = path.with_extension("new");
         let _ = fs::remove_file(&draft);
-        symlink(target, &draft).map_err(refuse)?;
+        symlink(target, &draft).map_err(&refuse)?;
         fs::rename(&draft, &path).map_err(refuse)
     }
 

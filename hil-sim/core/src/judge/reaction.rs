@@ -61,30 +61,7 @@ struct Moved {
 struct Late {
     spread: Spread,
     travel_mm: f64,
-    held: Held,
-}
-
-#[derive(Clone, Debug)]
-enum Held {
-    Alike(u16),
-    Apart(Box<[u16; ACTUATORS]>),
-}
-
-impl Held {
-    fn new(words: &[u16; ACTUATORS]) -> Self {
-        if words.iter().all(|&word| word == words[0]) {
-            Self::Alike(words[0])
-        } else {
-            Self::Apart(Box::new(*words))
-        }
-    }
-
-    fn words(&self) -> [u16; ACTUATORS] {
-        match self {
-            Self::Alike(word) => [*word; ACTUATORS],
-            Self::Apart(words) => **words,
-        }
-    }
+    held: Box<[u16; ACTUATORS]>,
 }
 
 /// Measures every instant of movement while the stimulus is on.
@@ -140,7 +117,7 @@ impl Reactions {
                     self.late.push(Late {
                         spread,
                         travel_mm: moved.travel_mm,
-                        held: Held::new(held),
+                        held: Box::new(*held),
                     });
                 }
             }
@@ -152,15 +129,14 @@ impl Reactions {
     /// The times, with the `peaks` and the shortest λ̂ of the whole run; none without movement.
     pub fn finish(mut self, peaks: &Peaks, shortest_mm: Option<f64>) -> Option<Reaction> {
         for late in &self.late {
-            if !is_over_crests(&late.held.words(), peaks, late.travel_mm, shortest_mm) {
+            if !is_over_crests(&late.held, peaks, late.travel_mm, shortest_mm) {
                 *self.spreads.entry(late.spread).or_default() += 1;
             }
         }
         let longest_ns = self.spreads.keys().map(|spread| spread.longest_ns).max()? as f64;
-        let spreads: Vec<Weighed> = self.spreads.iter().map(Weighed::from).collect();
         Some(Reaction {
-            p50_ms: quantile_ns(&spreads, 0.5, longest_ns) * 1e-6,
-            p99_ms: quantile_ns(&spreads, 0.99, longest_ns) * 1e-6,
+            p50_ms: quantile_ns(&self.spreads, 0.5, longest_ns) * 1e-6,
+            p99_ms: quantile_ns(&self.spreads, 0.99, longest_ns) * 1e-6,
             max_ms: longest_ns * 1e-6,
         })
     }
@@ -187,30 +163,16 @@ fn is_over_crests(
     })
 }
 
-/// So much movement took times that are spread between two bounds, in ns.
-struct Weighed {
-    shortest_ns: f64,
-    longest_ns: f64,
-    count: f64,
-}
-
-impl From<(&Spread, &u64)> for Weighed {
-    fn from((spread, &count): (&Spread, &u64)) -> Self {
-        Self {
-            shortest_ns: spread.shortest_ns as f64,
-            longest_ns: spread.longest_ns as f64,
-            count: count as f64,
-        }
-    }
-}
-
 /// How closely a quantile is found, in ns.
 const CLOSE_NS: f64 = 1e-3;
 
 /// The time that a share of all movement stays below, found by halving.
-fn quantile_ns(spreads: &[Weighed], share: f64, longest_ns: f64) -> f64 {
+fn quantile_ns(spreads: &BTreeMap<Spread, u64>, share: f64, longest_ns: f64) -> f64 {
     let below = |ns: f64| -> f64 {
-        let spent = |s: &Weighed| s.count * (ns.clamp(s.shortest_ns, s.longest_ns) - s.shortest_ns);
+        let spent = |(spread, &count): (&Spread, &u64)| {
+            let shortest_ns = spread.shortest_ns as f64;
+            count as f64 * (ns.clamp(shortest_ns, spread.longest_ns as f64) - shortest_ns)
+        };
         spreads.iter().map(spent).sum()
     };
     let due = share * below(longest_ns);

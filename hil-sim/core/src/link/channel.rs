@@ -102,10 +102,7 @@ impl LinkChannel {
             return self.weather.pop(now_ns);
         }
         self.advance(now_ns);
-        match self.out.front() {
-            Some(&(due_ns, _)) if due_ns <= now_ns => self.out.pop_front(),
-            _ => None,
-        }
+        self.out.pop_front_if(|&mut (due_ns, _)| due_ns <= now_ns)
     }
 
     /// When the next byte arrives, or may do so.
@@ -134,12 +131,10 @@ impl LinkChannel {
             if next_ns > now_ns {
                 return;
             }
-            if self
+            let restart = self
                 .restarts_ns
-                .front()
-                .is_some_and(|&restart_ns| restart_ns <= next_ns)
-            {
-                self.restarts_ns.pop_front();
+                .pop_front_if(|restart_ns| *restart_ns <= next_ns);
+            if restart.is_some() {
                 self.forger = Forger::new();
                 self.history.clear();
                 self.held.clear();
@@ -184,13 +179,8 @@ impl LinkChannel {
         }
         let frame = std::mem::take(&mut self.frame);
         self.history.push_back((at_ns, frame.clone()));
-        while self
-            .history
-            .front()
-            .is_some_and(|&(old_ns, _)| old_ns + HISTORY_NS < at_ns)
-        {
-            self.history.pop_front();
-        }
+        let is_old = |frame: &mut (u64, _)| frame.0 + HISTORY_NS < at_ns;
+        while self.history.pop_front_if(is_old).is_some() {}
         let fault = self.on(at_ns, changes_frames).next().copied();
         let passed = self.forger.pass(&frame, fault.as_ref());
         if is_cut || !self.holds_frame {

@@ -79,10 +79,7 @@ impl Impairments {
     /// The next byte that has arrived by `now_ns`, and when it did.
     #[inline]
     pub fn pop(&mut self, now_ns: u64) -> Option<(u64, u8)> {
-        match self.way.front() {
-            Some(&(due_ns, _)) if due_ns <= now_ns => self.way.pop_front(),
-            _ => None,
-        }
+        self.way.pop_front_if(|&mut (due_ns, _)| due_ns <= now_ns)
     }
 
     /// When the next byte arrives.

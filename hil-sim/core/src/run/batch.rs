@@ -156,7 +156,7 @@ mod tests {
         });
         assert_eq!(refused, Err(20));
         assert!(begun.into_inner() <= 25);
-        let panics = std::panic::catch_unwind(|| {
+        let panics = catch_unwind(|| {
             let work = |n: &usize| assert_ne!(*n, 20, "meant");
             let _: Result<(), ()> = in_order(&inputs, threads(2), work, |_, ()| Ok(()));
         });

@@ -1,6 +1,7 @@
 //! What a run leaves behind, the same from both engines: the ground on which it is judged.
 
 use protocol::{CHANNELS, Estimate, Status};
+use strum::IntoStaticStr;
 
 use crate::run::fault_evidence::FaultEvidence;
 
@@ -8,7 +9,8 @@ use crate::run::fault_evidence::FaultEvidence;
 pub const ACTUATORS: usize = 50;
 
 /// Which engine ran a scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Engine {
     /// The firmware's libraries, on the host.
     Native,
@@ -18,11 +20,8 @@ pub enum Engine {
 
 impl Engine {
     /// The engine's name on the command line and in the JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Engine::Native => "native",
-            Engine::Elf => "elf",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 

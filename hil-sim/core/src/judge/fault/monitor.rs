@@ -313,7 +313,7 @@ impl FaultMonitor {
             detected_ns: first.map(|&(_, at_ns, _)| at_ns - from_ns),
             sign: first.map(|(.., words)| words.clone()).unwrap_or_default(),
             safe_ns: outputs.safe_ns.map(|at_ns| at_ns - from_ns),
-            stuck: outputs.stuck,
+            stuck: outputs.stuck(),
             drives_again: outputs.drives_again,
             again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
             resets: self.resets,

@@ -27,8 +27,10 @@ pub(super) struct Outputs {
     until_ns: u64,
     /// When all have to be at 0 V, if they have to be.
     late_ns: Option<u64>,
-    was_driving: bool,
-    safe_ns: Option<u64>,
+    /// Whether the stimulus was on when the fault began.
+    pub was_driving: bool,
+    /// From when on all stayed at 0 V for the rest of the fault, in ns since the scene's start.
+    pub safe_ns: Option<u64>,
     /// What they hold; none before the first change.
     words: Option<[u16; ACTUATORS]>,
     /// Since when each is at one voltage, in ns.
@@ -39,10 +41,12 @@ pub(super) struct Outputs {
     silent_ns: Option<u64>,
     /// Whether they were at 0 V for longer than a wave that passes it.
     answered: bool,
-    drives_again: bool,
+    /// Whether any was driven after that.
+    pub drives_again: bool,
     limits: Limits,
     last_ns: u64,
-    beyond: Option<u64>,
+    /// When one went beyond the amplitude, or faster than any may, in ns since the scene's start.
+    pub beyond_ns: Option<u64>,
 }
 
 /// What no voltage may go beyond, whatever is broken.
@@ -77,20 +81,6 @@ impl Limits {
     }
 }
 
-/// The same, in short.
-pub(super) struct Answer {
-    /// Whether the stimulus was on when the fault began.
-    pub was_driving: bool,
-    /// From when on all outputs stayed at 0 V for the rest of the fault, in ns since the scene's start.
-    pub safe_ns: Option<u64>,
-    /// Outputs that were not at 0 V when they had to be, or stood at another voltage.
-    pub stuck: usize,
-    /// Whether any was driven after the fault had been answered by 0 V.
-    pub drives_again: bool,
-    /// When an output went beyond the amplitude, or faster than any may, in ns since the scene's start.
-    pub beyond_ns: Option<u64>,
-}
-
 impl Outputs {
     pub fn new(fault: &Fault, until_ns: u64, configuration: &DisplayConfiguration) -> Self {
         let from_ns = fault.begins_ns();
@@ -116,7 +106,7 @@ impl Outputs {
             drives_again: false,
             limits: Limits::of(configuration),
             last_ns: 0,
-            beyond: None,
+            beyond_ns: None,
         }
     }
 
@@ -168,7 +158,7 @@ impl Outputs {
                 .limits
                 .allow(before[actuator], words[actuator], after_ns)
             {
-                self.beyond.get_or_insert(at_ns);
+                self.beyond_ns.get_or_insert(at_ns);
             }
             if before[actuator] != words[actuator] {
                 self.stand(actuator, before[actuator], at_ns);
@@ -194,24 +184,19 @@ impl Outputs {
         }
     }
 
-    pub fn finish(mut self) -> Answer {
+    pub fn finish(mut self) -> Self {
         if self.late_ns.is_some() {
             self.look_late();
         }
-        for (actuator, word) in self
-            .words
-            .unwrap_or([ZERO_VOLT; ACTUATORS])
-            .into_iter()
-            .enumerate()
-        {
+        let words = self.words.unwrap_or([ZERO_VOLT; ACTUATORS]);
+        for (actuator, word) in words.into_iter().enumerate() {
             self.stand(actuator, word, self.until_ns);
         }
-        Answer {
-            was_driving: self.was_driving,
-            safe_ns: self.safe_ns,
-            stuck: self.stuck.iter().filter(|&&stuck| stuck).count(),
-            drives_again: self.drives_again,
-            beyond_ns: self.beyond,
-        }
+        self
+    }
+
+    /// How many were not at 0 V when they had to be, or stood at another voltage.
+    pub fn stuck(&self) -> usize {
+        self.stuck.iter().filter(|&&stuck| stuck).count()
     }
 }

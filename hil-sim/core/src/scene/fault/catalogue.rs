@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use protocol::{Hold, Role, Trip};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
+use strum::IntoStaticStr;
 use toml::{Table, Value};
 
 use super::Kind;
@@ -165,8 +166,9 @@ pub enum Needs {
 }
 
 /// What the display is to do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Class {
     /// 0 V for good: until its power goes.
     #[default]
@@ -267,13 +269,8 @@ impl Lasts {
 
 impl Class {
     /// Its name in the list and in the campaign's table.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Stops => "stops",
-            Self::Fades => "fades",
-            Self::Holds => "holds",
-            Self::Sensor => "sensor",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// Whether the display may drive again before its power has gone.
