@@ -10,11 +10,13 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::{ADC3, RCC, TIM3};
 
+use super::console::ConsoleHost;
 use super::nucleo::{Nucleo, Pins};
 use super::traps::{Trap, Traps};
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::scene::Scene;
-use hil_sim_core::scene::fault::{Fault, Kind};
+use hil_sim_core::scene::fault::catalogue::Needs;
+use hil_sim_core::scene::fault::{Class, Fault, Kind};
 
 /// RAM that loses what it holds without power: SRAM and CCM (RM0090, 2.3).
 const RAM: [(u64, u64); 2] = [(0x2000_0000, 192 << 10), (0x1000_0000, 64 << 10)];
@@ -216,27 +218,8 @@ impl Injector {
 
 /// Whether a kind breaks something on the board of `role`, other than its power.
 fn breaks(kind: Kind, role: Role) -> bool {
-    match kind {
-        Kind::SensorHang | Kind::SensorPanic | Kind::AdcStopped | Kind::UartOverrun => {
-            role == Role::Sensor
-        }
-        Kind::WireStuckLow
-        | Kind::EmergencyStop
-        | Kind::DacIgnoresWords
-        | Kind::DacPowerLost
-        | Kind::DacAlarm
-        | Kind::LdacStuck
-        | Kind::ClearStuckLow
-        | Kind::SpiStall
-        | Kind::DmaStall
-        | Kind::TickStopped
-        | Kind::OutputTaskStall
-        | Kind::ThreadStall
-        | Kind::BoardHang
-        | Kind::Panic
-        | Kind::HardFault
-        | Kind::StackOverflow
-        | Kind::MemoryChanged => role == Role::Display,
-        _ => false,
-    }
+    let row = kind.row();
+    let is_on_board = row.needs == Needs::Boards && !ConsoleHost::does(kind);
+    let is_sensors = row.class == Class::Sensor;
+    (is_on_board || kind == Kind::WireStuckLow) && is_sensors == (role == Role::Sensor)
 }

@@ -290,12 +290,7 @@ impl<'t> Table<'t> {
         let wanted = "a list of gauge numbers, such as [0, 3]";
         let items = self.of_type(key, wanted, |value| value.as_array())?;
         for (index, item) in items.into_iter().flatten().enumerate() {
-            let refuse = |what: &str| {
-                let written = &self.source.text[item.span()];
-                let path = format!("{}[{index}]", self.path_of(key));
-                self.source
-                    .error(item.span().start, &path, format!("{written} {what}"))
-            };
+            let refuse = |what: &str| self.refuse_item(key, index, item, what);
             let DeValue::Integer(integer) = item.get_ref() else {
                 return Err(refuse("is no gauge number: give whole numbers from 0 to 4"));
             };
@@ -307,6 +302,13 @@ impl<'t> Table<'t> {
             }
         }
         Ok(chosen)
+    }
+
+    fn refuse_item(&self, key: &str, index: usize, item: &Value<'_>, what: &str) -> SceneError {
+        let written = &self.source.text[item.span()];
+        let path = format!("{}[{index}]", self.path_of(key));
+        let message = format!("{written} {what}");
+        self.source.error(item.span().start, &path, message)
     }
 
     /// A column's name or number.
@@ -322,12 +324,8 @@ impl<'t> Table<'t> {
         };
         let columns = items.iter().enumerate().map(|(index, item)| {
             column_of(item.get_ref()).ok_or_else(|| {
-                let written = &self.source.text[item.span()];
-                let path = format!("{}[{index}]", self.path_of(key));
-                let message = format!(
-                    "{written} is no column: give its name in quotes, or its number, from 0 on"
-                );
-                self.source.error(item.span().start, &path, message)
+                let what = "is no column: give its name in quotes, or its number, from 0 on";
+                self.refuse_item(key, index, item, what)
             })
         });
         columns.collect::<Result<Vec<_>, _>>().map(Some)

@@ -1,8 +1,7 @@
 //! What a board's messages tell of a fault.
 
 use protocol::{
-    DisplayCounters, DisplayState, Estimate, GaugeHealth, Message, PortCounters, Role,
-    RoleCounters, SensorCounters, Status,
+    DisplayState, Estimate, GaugeHealth, Message, PortCounters, Role, RoleCounters, Status,
 };
 
 use crate::run::decoder::TimedMessage;
@@ -104,20 +103,17 @@ fn counted(
         .filter(|&(place, (_, count))| count > then.as_ref().map_or(0, |then| then[place].1))
         .map(|(_, (name, count))| (Sign::Counted(role, name), format!("{name} {count}")))
         .collect();
+    let since = |count: fn(&Status) -> u32| {
+        let before = before.as_ref().map_or(0, count);
+        count(status).wrapping_sub(before)
+    };
     // Pings are no fault of theirs: that so many came is what there is to see.
-    let heard = status
-        .console
-        .received
-        .wrapping_sub(before.map_or(0, |status| status.console.received));
+    let heard = since(|status| status.console.received);
     if fault.kind == Kind::ConsoleFlood && heard > FLOOD {
-        let words = format!("received {heard}");
-        signs.push((Sign::Counted(role, "received"), words));
+        signs.push((Sign::Counted(role, "received"), format!("received {heard}")));
     }
     // Whole frames that nobody took leave nothing but the gap.
-    let lost = status
-        .peer
-        .lost
-        .wrapping_sub(before.map_or(0, |status| status.peer.lost));
+    let lost = since(|status| status.peer.lost);
     if fault.kind == Kind::UartOverrun && lost > 0 {
         signs.push((Sign::Counted(role, "lost"), format!("lost {lost}")));
     }
@@ -147,39 +143,22 @@ fn port(counters: &PortCounters) -> Vec<(&'static str, u32)> {
 
 fn board(counters: &RoleCounters) -> Vec<(&'static str, u32)> {
     match counters {
-        RoleCounters::Display(DisplayCounters {
-            deadline_misses,
-            refused_estimates,
-            fades,
-            spi_errors,
-            implausible,
-            flooded,
-            encoder_jumps,
-            converter_faults,
-            clears,
-            unheard,
-            ..
-        }) => vec![
-            ("deadline_misses", *deadline_misses),
-            ("refused_estimates", *refused_estimates),
-            ("fades", *fades),
-            ("spi_errors", *spi_errors),
-            ("implausible", *implausible),
-            ("flooded", *flooded),
-            ("encoder_jumps", *encoder_jumps),
-            ("converter_faults", *converter_faults),
-            ("clears", *clears),
-            ("unheard", *unheard),
+        RoleCounters::Display(counters) => vec![
+            ("deadline_misses", counters.deadline_misses),
+            ("refused_estimates", counters.refused_estimates),
+            ("fades", counters.fades),
+            ("spi_errors", counters.spi_errors),
+            ("implausible", counters.implausible),
+            ("flooded", counters.flooded),
+            ("encoder_jumps", counters.encoder_jumps),
+            ("converter_faults", counters.converter_faults),
+            ("clears", counters.clears),
+            ("unheard", counters.unheard),
         ],
-        RoleCounters::Sensor(SensorCounters {
-            adc_overruns,
-            dma_overruns,
-            deadline_misses,
-            ..
-        }) => vec![
-            ("adc_overruns", *adc_overruns),
-            ("dma_overruns", *dma_overruns),
-            ("deadline_misses", *deadline_misses),
+        RoleCounters::Sensor(counters) => vec![
+            ("adc_overruns", counters.adc_overruns),
+            ("dma_overruns", counters.dma_overruns),
+            ("deadline_misses", counters.deadline_misses),
         ],
     }
 }

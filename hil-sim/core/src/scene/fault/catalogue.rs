@@ -297,6 +297,7 @@ mod tests {
             let kebab = |byte: u8| byte.is_ascii_lowercase() || byte == b'-';
             assert!(row.name.bytes().all(kebab), "{}", row.name);
             assert_eq!(Kind::from_name(row.name), Some(row.kind));
+            assert_eq!(row.kind.row().kind, row.kind);
         }
     }
 
