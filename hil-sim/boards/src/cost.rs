@@ -141,22 +141,10 @@ impl Driver<Nucleo<Bare>> for Marks {
     }
 }
 
-/// Instructions that each part of the ELF at `path` took, by the part's number.
+/// What each part of the ELF at `path` took, by the part's number.
 ///
 /// # Errors
 /// If the file can't be read or placed, or does not come to its end.
-pub fn count(path: &Path) -> Result<BTreeMap<u64, u64>, ElfError> {
-    let taken = measure(path)?;
-    Ok(taken
-        .into_iter()
-        .map(|(k, taken)| (k, taken.total))
-        .collect())
-}
-
-/// The same, piece by piece.
-///
-/// # Errors
-/// As [`count`].
 pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
     measure_example(path, "firmware-sensor --example filter_cost")
 }
@@ -164,7 +152,7 @@ pub fn measure(path: &Path) -> Result<BTreeMap<u64, Taken>, ElfError> {
 /// The same, with the cycles of the parts from `from` on, instruction by instruction: slow.
 ///
 /// # Errors
-/// As [`count`].
+/// As [`measure`].
 pub fn meter(path: &Path, from: u64) -> Result<BTreeMap<u64, Taken>, ElfError> {
     run(path, "firmware-sensor --example filter_cost", Some(from))
 }
@@ -172,7 +160,7 @@ pub fn meter(path: &Path, from: u64) -> Result<BTreeMap<u64, Taken>, ElfError> {
 /// The same of any ELF that leaves marks. `package` is what it is built with, behind `cargo build -p`.
 ///
 /// # Errors
-/// As [`count`].
+/// As [`measure`].
 pub fn measure_example(
     path: &Path,
     package: &'static str,

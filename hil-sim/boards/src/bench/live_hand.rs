@@ -88,12 +88,7 @@ impl DrivenHand {
         self.told().speed_mm_s = Some(speed_mm_s);
     }
 
-    /// The speed that it was told, in mm/s.
-    pub fn goes(&self) -> Option<f64> {
-        self.told().speed_mm_s
-    }
-
-    /// The same, and whether it is played backwards there.
+    /// Where in what is recorded an instant is, in s, and whether it is played backwards there.
     fn played(&self, t_s: f64) -> (f64, bool) {
         let Some((first_s, last_s)) = self.recorded_s else {
             return (t_s, false);

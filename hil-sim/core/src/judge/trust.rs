@@ -105,11 +105,6 @@ impl Trust {
         [flood, distrust, stale].into_iter().flatten()
     }
 
-    /// When the last estimate that was trusted came.
-    pub fn trusted_ns(&self) -> Option<u64> {
-        self.trusted_ns
-    }
-
     fn elapse(&mut self, at_ns: u64) {
         let (level, since_ns) = self.bucket;
         let run_out = FLOOD_HZ * at_ns.saturating_sub(since_ns) as f64 * 1e-9;

@@ -83,11 +83,6 @@ impl Finding {
         self.safe_ns.map(|ns| ns as f64 * 1e-6)
     }
 
-    /// [`Finding::again_ns`] in ms.
-    pub fn again_ms(&self) -> Option<f64> {
-        self.again_ns.map(|ns| ns as f64 * 1e-6)
-    }
-
     /// Whether the display drove again where it must not, or was reset more often than it may.
     pub fn is_restart_against_the_table(&self) -> bool {
         let row = self.fault.kind.row();

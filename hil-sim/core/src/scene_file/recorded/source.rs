@@ -179,14 +179,6 @@ impl<'t> Source<'t> {
         check: Check<'_>,
     ) -> Result<(Series, (f64, f64)), SceneError> {
         let is_plain = self.is_plain();
-        let mut distinct: Vec<Column<'t>> = Vec::new();
-        for &column in &columns {
-            if !distinct.contains(&column) {
-                distinct.push(column);
-            }
-        }
-        let place = |column: &Column<'t>| distinct.iter().position(|other| other == column);
-        let spread: Vec<usize> = columns.iter().filter_map(place).collect();
         let file = self.path.display().to_string();
         let tape = |width| Tape::new(width, window, conversion);
         let tape = match self.format {
@@ -205,10 +197,10 @@ impl<'t> Source<'t> {
             }
             Format::Csv(ref bytes) => {
                 let rows = CsvRows::open(&self.path, bytes)?;
-                self.chosen(table, rows, &distinct, &tape, check)?
+                self.chosen(table, rows, &columns, &tape, check)?
             }
             Format::Wav(wav) => {
-                let numbers = numbers(table, &distinct, wav.channels())?;
+                let numbers = numbers(table, &columns, wav.channels())?;
                 let step = self.every.unwrap_or_else(|| wav.rate_hz().recip());
                 let rate_hz = wav.rate_hz();
                 let mut tape = tape(numbers.len());
@@ -221,7 +213,7 @@ impl<'t> Source<'t> {
             Format::Hjif(ref file) => {
                 let texture = file.texture().map_err(|error| self.refuse(error))?;
                 let channels = texture.channels();
-                let [column] = distinct[..] else {
+                let [column] = columns[..] else {
                     return Err(table.refuse("channels", "names several: name one"));
                 };
                 let is_named = |channel: &Channel| match column {
@@ -243,7 +235,7 @@ impl<'t> Source<'t> {
                 tape
             }
             Format::Mcap => {
-                let fields = names(table, &distinct)?;
+                let fields = names(table, &columns)?;
                 let Some(topic) = self.topic.or((!own.0.is_empty()).then_some(own.0)) else {
                     let message = "is missing: name the topic whose messages are to be read";
                     return Err(table.refuse("topic", message));
@@ -279,14 +271,7 @@ impl<'t> Source<'t> {
         let extent = tape.extent();
         let rows = tape.into_rows();
         match extent {
-            Some(extent) if rows.at.len() >= 2 => {
-                let rows = if is_plain {
-                    rows
-                } else {
-                    spread_out(rows, &spread)
-                };
-                Ok((rows, extent))
-            }
+            Some(extent) if rows.at.len() >= 2 => Ok((rows, extent)),
             // There are rows, but the scene is elsewhere: the section says so.
             Some(extent) if extent.0 < extent.1 => Ok((Series::empty(1), extent)),
             _ => Err(too_few(&file, &rows)),
@@ -429,18 +414,4 @@ fn names<'t>(table: &Table<'_>, columns: &[Column<'t>]) -> Result<Vec<&'t str>, 
         }
     };
     columns.iter().map(name).collect()
-}
-
-/// The same rows, each column as often as it is wanted.
-fn spread_out(rows: Series, spread: &[usize]) -> Series {
-    let values = rows
-        .values
-        .chunks_exact(rows.width)
-        .flat_map(|row| spread.iter().map(|&column| row[column]))
-        .collect();
-    Series {
-        at: rows.at,
-        values,
-        width: spread.len(),
-    }
 }
