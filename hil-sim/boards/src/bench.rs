@@ -28,7 +28,6 @@ pub use command::{Command, NoCommand};
 pub use pace::Pace;
 pub use port_server::{Outputs, SensorView};
 
-use super::console::ConsoleHost;
 use super::pair;
 use super::{ElfError, Firmwares};
 use crate::bench::live_hand::DrivenHand;
@@ -429,11 +428,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 
 /// Whether a bench can do what `scene` asks.
 fn check(scene: &Scene, hand: &Hand, is_apart: bool) -> Result<(), ServeError> {
-    if let Some(fault) = scene
-        .faults
-        .iter()
-        .find(|fault| ConsoleHost::does(fault.kind))
-    {
+    if let Some(fault) = scene.faults.iter().find(|fault| fault.kind.is_of_host()) {
         let kind = fault.kind.name();
         return Err(ServeError::Console { kind });
     }

@@ -65,7 +65,7 @@ impl ConsoleHost {
             .map(|(first, &actuators)| Actuators { first, actuators });
         let mut faults: Vec<Fault> = faults
             .iter()
-            .filter(|fault| Self::does(fault.kind))
+            .filter(|fault| fault.kind.is_of_host())
             .copied()
             .collect();
         faults.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
@@ -102,16 +102,8 @@ impl ConsoleHost {
                 (differs.then_some(Configuration::Sensor(wanted)), &[][..])
             }
         };
-        let is_needed = wanted.is_some() || faults.iter().any(|fault| Self::does(fault.kind));
+        let is_needed = wanted.is_some() || faults.iter().any(|fault| fault.kind.is_of_host());
         is_needed.then(|| Self::new(wanted, described, faults))
-    }
-
-    /// Whether a kind of fault is a host's.
-    pub fn does(kind: Kind) -> bool {
-        matches!(
-            kind,
-            Kind::StopFromConsole | Kind::WrongConfiguration | Kind::ConsoleFlood
-        )
     }
 
     /// Whether it wants the board configured.

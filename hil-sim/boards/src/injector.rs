@@ -10,7 +10,6 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::generated::{ADC3, RCC, TIM3};
 
-use super::console::ConsoleHost;
 use super::nucleo::{Nucleo, Pins};
 use super::traps::{Trap, Traps};
 use hil_sim_core::plant::fault::clock::Clock;
@@ -219,7 +218,7 @@ impl Injector {
 /// Whether a kind breaks something on the board of `role`, other than its power.
 fn breaks(kind: Kind, role: Role) -> bool {
     let row = kind.row();
-    let is_on_board = row.needs == Needs::Boards && !ConsoleHost::does(kind);
+    let is_on_board = row.needs == Needs::Boards && !kind.is_of_host();
     let is_sensors = row.class == Class::Sensor;
     (is_on_board || kind == Kind::WireStuckLow) && is_sensors == (role == Role::Sensor)
 }

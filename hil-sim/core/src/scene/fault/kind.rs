@@ -73,6 +73,14 @@ impl Kind {
         &catalogue::rows()[self as usize]
     }
 
+    /// Whether a host on the display's console does it.
+    pub fn is_of_host(self) -> bool {
+        matches!(
+            self,
+            Self::StopFromConsole | Self::WrongConfiguration | Self::ConsoleFlood
+        )
+    }
+
     /// Its name in scenes.
     pub fn name(self) -> &'static str {
         self.row().name
