@@ -361,14 +361,14 @@ impl Dac81416 {
         };
         let bits = data & left_out;
         if bits != 0 {
-            self.fault(Fault::NotModelled(address, bits));
+            self.fault(Fault::NotModelled { address, bits });
         }
         if (DACRANGE0..=DACRANGE3).contains(&address) {
             let first = 4 * usize::from(DACRANGE3 - address);
             for channel in first..first + 4 {
                 if self.range(channel).is_none() {
                     let code = self.range_code(channel);
-                    self.fault(Fault::NoRange(channel, code));
+                    self.fault(Fault::NoRange { channel, code });
                 }
             }
             if self.clr_low {

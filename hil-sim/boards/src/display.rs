@@ -30,6 +30,7 @@ const ACTUATORS_PER_CHIP: usize = 13;
 const CHANNELS_PER_CHIP: usize = 16;
 /// Chip selects: D10 D9 D8 D7.
 const SELECTS: [(&str, u8); CHIPS] = [("GPIOD", 14), ("GPIOD", 15), ("GPIOF", 12), ("GPIOF", 13)];
+/// The place of SPI1 among the part's.
 const SPI: usize = 0;
 /// LDAC is D16 (PC6), channel 1 of TIM3; ALMOUT is D3 (PE13); the emergency stop is D4 (PF14).
 const LOAD: Line = Line(2, 6);

@@ -250,6 +250,7 @@ fn wrong_rate(ticks: &[TickRecord], rate_hz: u32) -> Option<String> {
     (!agrees).then(|| format!("it ticks at {seen_hz:.0} Hz, asked for {rate_hz}"))
 }
 
+/// The scripted sensor, and the way from it to the board.
 struct ScriptedSensor<W> {
     alone: DisplayBench,
     port: Port,

@@ -215,7 +215,8 @@ impl Injector {
     }
 }
 
-/// Whether a kind breaks something on the board of `role`, other than its power.
+/// Whether a kind breaks the board of `role`: each that needs boards does, but for what a host does on the console, and
+/// the wire that ends there.
 fn breaks(kind: Kind, role: Role) -> bool {
     let row = kind.row();
     let is_on_board = row.needs == Needs::Boards && !kind.is_of_host();

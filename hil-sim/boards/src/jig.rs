@@ -64,6 +64,7 @@ struct Input {
     pin: u8,
     /// The alternate function that makes the pin the timer's.
     function: u8,
+    /// The level of an open wire.
     open: Level,
 }
 
@@ -131,6 +132,7 @@ impl Jig {
     }
 }
 
+/// An input, its pin by its port, its number there and its alternate function.
 const fn input(timer: usize, channel: u8, pin: (usize, u8, u8), open: Level) -> Input {
     Input {
         timer,

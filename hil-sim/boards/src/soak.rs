@@ -30,7 +30,7 @@ use tally::{Outputs, Side};
 pub const QUIET_S: f64 = 3.0;
 /// The shortest run, in s.
 pub const SHORTEST_S: f64 = 10.0;
-const TOLD_NS: u64 = 1_000_000_000;
+const PROGRESS_EVERY_NS: u64 = 1_000_000_000;
 
 /// The run to be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +96,7 @@ pub fn run(
         log: Log::find(&firmware.elf),
         side: Side::default(),
         outputs: Outputs::default(),
-        next_told_ns: TOLD_NS,
+        next_told_ns: PROGRESS_EVERY_NS,
         quiet_ns,
         end_ns,
         progress: None,
@@ -195,7 +195,7 @@ impl<P: Drained> BoardHook<P> for Half {
         let now_ns = between.now_ns;
         self.console.serve(between.session.board_mut(), now_ns);
         if now_ns >= self.next_told_ns {
-            self.next_told_ns += TOLD_NS;
+            self.next_told_ns += PROGRESS_EVERY_NS;
             if let Some(progress) = &self.progress {
                 progress(now_ns as f64 * 1e-9);
             }

@@ -118,6 +118,7 @@ struct Pair<'o, O> {
     steps_per_tick: u64,
     sensor_end: End,
     display_end: End,
+    /// The sensor board's.
     clock: Clock,
     scan_count: u64,
     gauges: GaugeFaults,

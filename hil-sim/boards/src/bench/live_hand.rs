@@ -35,6 +35,7 @@ struct Told {
     stretches: VecDeque<Stretch>,
 }
 
+/// A stretch of even acceleration.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     position_mm: f64,

@@ -340,6 +340,7 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
                     session.reset_by_pin(stop.at, stop.instruction_count, host);
                     continue;
                 }
+                // A pressed stop is an open loop.
                 Command::Stop => (Mistake::StopOpen, true),
                 Command::Release => (Mistake::StopOpen, false),
                 Command::Wrong(mistake) => (mistake, true),

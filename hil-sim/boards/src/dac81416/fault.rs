@@ -2,6 +2,7 @@
 
 /// Something a driver should not have done. The chip goes on, and so does the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the variants say what their fields are")]
 pub enum Fault {
     /// A frame outside of streaming mode was not 24 bits long but so many bytes: ignored.
     Length(usize),
@@ -18,9 +19,9 @@ pub enum Fault {
     /// No register has this address: ignored.
     NoRegister(u8),
     /// A channel was given a code of four bits that is no range; it stays at 0 V.
-    NoRange(usize, u8),
+    NoRange { channel: usize, code: u8 },
     /// The word in a channel's register was written while CLR was low: ignored.
     HeldByClear(u8),
     /// Bits of a register were set that switch on something that this model leaves out.
-    NotModelled(u8, u16),
+    NotModelled { address: u8, bits: u16 },
 }

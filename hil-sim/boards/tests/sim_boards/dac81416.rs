@@ -144,7 +144,13 @@ fn a_code_that_is_no_range_is_a_fault_and_zero_volts() {
     let mut chip = running();
     write(&mut chip, r::DACRANGE3 - 1, 0x9993);
     write(&mut chip, r::BRDCAST, 0xFFFF);
-    assert_eq!(chip.faults(), [Fault::NoRange(4, 3)]);
+    assert_eq!(
+        chip.faults(),
+        [Fault::NoRange {
+            channel: 4,
+            code: 3
+        }]
+    );
     assert_eq!(chip.voltage(4), 0.0);
     assert!(chip.voltage(5) > 4.9);
 }
@@ -390,8 +396,14 @@ fn what_cannot_be_written_or_is_left_out_is_a_fault() {
             Fault::ReadOnly(r::DEVICEID),
             Fault::NoRegister(0x3E),
             Fault::NoRegister(0x3E),
-            Fault::NotModelled(r::SPICONFIG, 1 << 4),
-            Fault::NotModelled(r::GENCONFIG, 1),
+            Fault::NotModelled {
+                address: r::SPICONFIG,
+                bits: 1 << 4
+            },
+            Fault::NotModelled {
+                address: r::GENCONFIG,
+                bits: 1
+            },
         ]
     );
     assert_eq!(read(&mut chip, r::DEVICEID), PRODUCT << 2);

@@ -38,6 +38,7 @@ pub struct LinkChannel {
     held_count: u64,
     /// When a fault that talks by itself may say its next byte.
     talk_ns: u64,
+    /// Stops said so far.
     stops: usize,
     out: VecDeque<(u64, u8)>,
     free_ns: u64,

@@ -47,6 +47,7 @@ pub struct Patch {
     is_periodic: bool,
 }
 
+/// A specimen.
 #[derive(Clone, Debug)]
 struct Section {
     /// Where its pattern begins, in mm.

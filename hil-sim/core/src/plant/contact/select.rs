@@ -7,7 +7,7 @@
 //! | specimens so short that a patch lies on several, short waves beside long ones in noise, a strong second harmonic | `rigid` |
 //! | none of these | `kinematic` |
 //!
-//! hil-sim/tests/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
+//! hil-sim/core/tests/sim_core/ladder.rs runs every committed scene on its rung and on the next: λ̂'s RMS error changes
 //! by less than 0.25 % or a quarter of itself, whichever is more. And for each rung it
 //! has a scene that the rung below does not do. While a border passes, nothing is compared: for as long as
 //! two specimens are in an estimator's memory, its error hangs on one or two estimates, whichever the rung.

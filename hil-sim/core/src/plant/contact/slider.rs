@@ -226,6 +226,7 @@ impl Slider {
         found
     }
 
+    /// One step of sliding, Runge and Kutta's.
     fn step(&self, from: State, step_s: f64, arm_m_s: f64, sign: f64) -> State {
         let slope = |state: State| State {
             stretch_m: arm_m_s - state.velocity_m_s,
