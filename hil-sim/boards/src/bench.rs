@@ -6,12 +6,14 @@
 
 mod baud;
 mod command;
+mod computer;
 mod folder;
 pub mod live_hand;
 mod pace;
 mod port_server;
 mod pty;
 mod socket;
+pub mod surroundings;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -31,12 +33,14 @@ pub use port_server::{Outputs, SensorView};
 use super::pair;
 use super::{ElfError, Firmwares};
 use crate::bench::live_hand::DrivenHand;
+use computer::Computer;
 use folder::Folder;
 use hil_sim_core::link::channel::LinkChannel;
 use hil_sim_core::scene::{Gauges, Link, LiveHand, Motion, Scene, SceneError, Specimen};
 use pace::Pacer;
 use port_server::{PortServer, Shared};
 use socket::Socket;
+use surroundings::Surroundings;
 
 /// The folder that benches stand in by default.
 pub const DEFAULT_DIR: &str = "target/serve";
@@ -103,8 +107,10 @@ pub struct Options {
     pub scene: Scene,
     /// Who moves the hand.
     pub hand: Hand,
-    /// How fast time goes by.
+    /// How fast time goes by on this computer.
     pub pace: Pace,
+    /// Whose time it is and what the ports lead to; none: this computer's clock and pseudo-terminals.
+    pub surroundings: Option<Arc<dyn Surroundings>>,
     /// Whether the boards are not joined: each has its port to the peer in the folder, for two bridges.
     pub is_apart: bool,
     /// When it is over, in virtual seconds; none: when it is told to stop.
@@ -134,6 +140,7 @@ impl Options {
             scene,
             hand: Hand::Scene,
             pace: Pace::REAL,
+            surroundings: None,
             is_apart: false,
             until_s: None,
         }
@@ -246,8 +253,13 @@ impl Bench {
         let hand = Arc::new(live(&scene, options.hand));
         scene.motion = Motion::Live(hand.clone());
         scene.duration_s = until_s.unwrap_or(f64::INFINITY);
+        let surroundings = options
+            .surroundings
+            .unwrap_or_else(|| Arc::new(Computer::new(Pacer::new(options.pace))));
         let shared = Arc::new(Shared {
-            sockets: PortName::ALL.map(|name| Socket::new(name, folder.clone())),
+            sockets: PortName::ALL
+                .map(|name| Socket::new(name, folder.clone(), surroundings.clone())),
+            surroundings,
             is_apart,
             waits: options.pace == Pace::Max,
             now_ns: AtomicU64::new(0),
@@ -259,15 +271,10 @@ impl Bench {
             orders: Mutex::default(),
         });
         let (ready, is_ready) = channel();
-        let beside = |role, elf: &[u8], pacer| {
-            PortServer::new(&scene, role, elf, shared.clone(), ready.clone(), pacer)
-        };
-        let sensor = beside(Role::Sensor, &firmwares.sensor.elf, None);
-        let display = beside(
-            Role::Display,
-            &firmwares.display.elf,
-            Some(Pacer::new(options.pace)),
-        );
+        let beside =
+            |role, elf: &[u8]| PortServer::new(&scene, role, elf, shared.clone(), ready.clone());
+        let sensor = beside(Role::Sensor, &firmwares.sensor.elf);
+        let display = beside(Role::Display, &firmwares.display.elf);
         drop(ready);
         let runner = std::thread::spawn({
             let (shared, firmwares) = (shared.clone(), firmwares.clone());

@@ -11,8 +11,8 @@ use protocol::{Estimate, Message, Role};
 use rigless::emulator::Host;
 use rigless::soc::stm32f427::Stm32f427;
 
-use super::pace::Pacer;
 use super::socket::Socket;
+use super::surroundings::Surroundings;
 use super::{Command, PortName, lock};
 use crate::console::ConsoleHost;
 use crate::display::DisplayPins;
@@ -69,6 +69,7 @@ pub struct SensorView {
 #[derive(Debug)]
 pub struct Shared {
     pub sockets: [Socket; PortName::ALL.len()],
+    pub surroundings: Arc<dyn Surroundings>,
     /// Whether the boards are not joined.
     pub is_apart: bool,
     /// Whether a port's reader is waited for.
@@ -166,8 +167,6 @@ pub struct PortServer {
     is_broken: bool,
     /// Whether the wire from the other board's TX is not where it should be.
     is_cut: bool,
-    /// The wall clock, beside the one board that the other waits for.
-    pacer: Option<Pacer>,
 }
 
 impl PortServer {
@@ -178,7 +177,6 @@ impl PortServer {
         elf: &[u8],
         shared: Arc<Shared>,
         ready: Sender<Result<(), ElfError>>,
-        pacer: Option<Pacer>,
     ) -> Self {
         Self {
             role,
@@ -191,7 +189,6 @@ impl PortServer {
             sent: Vec::new(),
             is_broken: !scene.faults.is_empty(),
             is_cut: false,
-            pacer,
         }
     }
 
@@ -270,13 +267,20 @@ impl PortServer {
     }
 }
 
+impl Drop for PortServer {
+    fn drop(&mut self) {
+        self.shared.surroundings.leave();
+    }
+}
+
 impl<P: BenchPins> BoardHook<P> for PortServer {
     fn begin(&mut self, now_ns: u64) {
-        let Some(pacer) = &mut self.pacer else { return };
-        let behind = pacer.wait(now_ns);
-        self.shared
-            .behind_us
-            .store(behind.as_micros() as u64, Ordering::Relaxed);
+        let behind = self.shared.surroundings.wait(self.role, now_ns);
+        if self.role != Role::Display {
+            return;
+        }
+        let behind_us = behind.as_micros() as u64;
+        self.shared.behind_us.store(behind_us, Ordering::Relaxed);
         self.shared.now_ns.store(now_ns, Ordering::Relaxed);
         // The other board, which has not begun its next quantum, is told too.
         if self.shared.stops.load(Ordering::Relaxed) {

@@ -2,16 +2,20 @@
 
 use std::fs::File;
 use std::io::{Read, Write};
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use std::{io, str};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags};
 use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{
     OptionalActions, QueueSelector, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
 };
+
+use super::surroundings::Line;
 
 /// The near end. Nothing here waits, and nothing holds the far end open: that the last of those who had
 /// it has closed it is to be seen.
@@ -46,17 +50,18 @@ impl Pty {
         Ok(pty)
     }
 
-    /// What a client opens.
-    pub fn path(&self) -> &Path {
+    fn open_far(&self) -> io::Result<OwnedFd> {
+        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        Ok(rustix::fs::open(&self.path, flags, Mode::empty())?)
+    }
+}
+
+impl Line for Pty {
+    fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Takes what the clients have written, as far as it fits: how many bytes, or none if nobody has the
-    /// far end open.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn read(&self, bytes: &mut [u8]) -> io::Result<Option<usize>> {
+    fn read(&self, bytes: &mut [u8]) -> io::Result<Option<usize>> {
         match (&self.near).read(bytes) {
             Ok(count) => Ok(Some(count)),
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(Some(0)),
@@ -65,52 +70,35 @@ impl Pty {
         }
     }
 
-    /// Hands on what there is room for: how many bytes.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+    fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         match (&self.near).write(bytes) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(0),
             written => written,
         }
     }
 
-    /// The rate that a client has set, in baud.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn baud(&self) -> io::Result<u32> {
+    fn baud(&self) -> io::Result<u32> {
         Ok(tcgetattr(&self.near)?.output_speed())
     }
 
-    /// The last client has gone: what it has not read and that it wanted the port for itself alone is
-    /// forgotten, as a serial port's driver does.
-    ///
-    /// # Errors
-    /// What the system says; that the far end is busy if a client was killed that had it for itself.
-    pub fn forget_client(&self) -> io::Result<()> {
+    fn forget_client(&self) -> io::Result<()> {
         let far = self.open_far()?;
         ioctl_tiocnxcl(&far)?;
         tcflush(&far, QueueSelector::IFlush)?;
         Ok(())
     }
 
-    fn open_far(&self) -> io::Result<OwnedFd> {
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-        Ok(rustix::fs::open(&self.path, flags, Mode::empty())?)
-    }
-}
-
-impl AsFd for Pty {
-    fn as_fd(&self) -> std::os::fd::BorrowedFd<'_> {
-        self.near.as_fd()
+    fn wait_for_room(&self, limit: Duration) {
+        let limit = Timespec::try_from(limit).unwrap_or_default();
+        let mut room = [PollFd::new(&self.near, PollFlags::OUT)];
+        // What it says is found out by trying.
+        let _ = poll(&mut room, Some(&limit));
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
     use super::*;
 

@@ -4,11 +4,9 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-
 use super::baud::Mismatch;
 use super::folder::Folder;
-use super::pty::Pty;
+use super::surroundings::{Line, Surroundings};
 use super::{PortName, ServeError};
 use crate::lockstep::QUANTUM_NS;
 use crate::wire::TimedByte;
@@ -26,12 +24,13 @@ const WAITING_BYTES: usize = 64 << 10;
 pub struct Socket {
     name: PortName,
     folder: Arc<Folder>,
+    surroundings: Arc<dyn Surroundings>,
     cable: Mutex<Cable>,
 }
 
 #[derive(Debug, Default)]
 struct Cable {
-    pty: Option<Arc<Pty>>,
+    line: Option<Arc<dyn Line>>,
     /// Whether somebody has the port open.
     has_client: bool,
     /// What a client has not had room for.
@@ -53,11 +52,12 @@ struct Lines {
 }
 
 impl Socket {
-    /// A port of `folder`, without a cable.
-    pub fn new(name: PortName, folder: Arc<Folder>) -> Self {
+    /// A port of `folder`, without a cable yet.
+    pub fn new(name: PortName, folder: Arc<Folder>, surroundings: Arc<dyn Surroundings>) -> Self {
         Self {
             name,
             folder,
+            surroundings,
             cable: Mutex::default(),
         }
     }
@@ -72,7 +72,7 @@ impl Socket {
     /// If there is no pseudo-terminal to be had, or the folder can't be written to.
     pub fn plug(&self) -> Result<(), ServeError> {
         let mut cable = self.lock();
-        if cable.pty.is_none() {
+        if cable.line.is_none() {
             self.renew(&mut cable)?;
         }
         Ok(())
@@ -91,7 +91,7 @@ impl Socket {
 
     /// Whether a cable is plugged in.
     pub fn is_plugged(&self) -> bool {
-        self.lock().pty.is_some()
+        self.lock().line.is_some()
     }
 
     /// Whether somebody had the port open when it was looked at last.
@@ -105,12 +105,11 @@ impl Socket {
     }
 
     fn renew(&self, cable: &mut Cable) -> Result<(), ServeError> {
-        let pty = Pty::new(BAUD).map_err(|source| ServeError::Terminal {
-            name: self.name,
-            source,
-        })?;
-        self.folder.link(self.name, pty.path())?;
-        cable.pty = Some(Arc::new(pty));
+        let name = self.name;
+        let refuse = |source| ServeError::Terminal { name, source };
+        let line = self.surroundings.cable(name).map_err(refuse)?;
+        self.folder.link(self.name, line.path())?;
+        cable.line = Some(line);
         Ok(())
     }
 
@@ -118,10 +117,10 @@ impl Socket {
     /// line carries in a quantum, of which `taken` bytes are on their way already.
     pub fn carry(&self, now_ns: u64, sent: &[TimedByte], taken: usize) -> Vec<u8> {
         let mut cable = self.lock();
-        let Some(pty) = cable.pty.clone() else {
+        let Some(line) = cable.line.clone() else {
             return Vec::new();
         };
-        let heard = self.hear(&mut cable, &pty, now_ns, LINE_BYTES.saturating_sub(taken));
+        let heard = self.hear(&mut cable, &*line, now_ns, LINE_BYTES.saturating_sub(taken));
         if !cable.has_client {
             return heard;
         }
@@ -129,7 +128,7 @@ impl Socket {
         while !cable.waiting.is_empty() {
             let (bytes, _) = cable.waiting.as_slices();
             // A port that fails is one without a client, which the next reading shows.
-            let Ok(written @ 1..) = pty.write(bytes) else {
+            let Ok(written @ 1..) = line.write(bytes) else {
                 break;
             };
             cable.waiting.drain(..written);
@@ -143,7 +142,7 @@ impl Socket {
     }
 
     /// Takes up to `room` bytes from the client, and sees whether it is there.
-    fn hear(&self, cable: &mut Cable, pty: &Pty, now_ns: u64, room: usize) -> Vec<u8> {
+    fn hear(&self, cable: &mut Cable, line: &dyn Line, now_ns: u64, room: usize) -> Vec<u8> {
         let room = match &cable.mismatch {
             // At another rate a quantum holds another number of words.
             Some(lines) if lines.free_ns > now_ns as f64 => 0,
@@ -155,16 +154,16 @@ impl Socket {
         }
         let mut bytes = [0; LINE_BYTES];
         let room = room.min(LINE_BYTES);
-        let count = pty.read(&mut bytes[..room]).unwrap_or_default();
+        let count = line.read(&mut bytes[..room]).unwrap_or_default();
         let had_client = std::mem::replace(&mut cable.has_client, count.is_some());
         let Some(count) = count else {
             if had_client {
-                self.forget_client(cable, pty);
+                self.forget_client(cable, line);
             }
             return Vec::new();
         };
         if self.name.is_serial() {
-            cable.follow_baud(pty.baud().unwrap_or(BAUD));
+            cable.follow_baud(line.baud().unwrap_or(BAUD));
         }
         match &mut cable.mismatch {
             Some(lines) => lines.hear(now_ns as f64, &bytes[..count]),
@@ -172,30 +171,27 @@ impl Socket {
         }
     }
 
-    fn forget_client(&self, cable: &mut Cable, pty: &Pty) {
+    fn forget_client(&self, cable: &mut Cable, line: &dyn Line) {
         cable.waiting.clear();
         cable.mismatch = None;
         // One that was killed may have left it locked: nobody is there to miss the old one.
-        if pty.forget_client().is_err() && self.renew(cable).is_err() {
+        if line.forget_client().is_err() && self.renew(cable).is_err() {
             self.folder.unlink(self.name);
-            cable.pty = None;
+            cable.line = None;
         }
     }
 
     /// Whether a client has yet to read what it was sent; waits up to `limit` for room.
     pub fn is_behind(&self, limit: Duration) -> bool {
-        let pty = {
+        let line = {
             let cable = self.lock();
             if cable.waiting.is_empty() {
                 return false;
             }
-            cable.pty.clone()
+            cable.line.clone()
         };
-        let Some(pty) = pty else { return false };
-        let limit = Timespec::try_from(limit).unwrap_or_default();
-        let mut room = [PollFd::new(&*pty, PollFlags::OUT)];
-        // What it says is found out by trying.
-        let _ = poll(&mut room, Some(&limit));
+        let Some(line) = line else { return false };
+        line.wait_for_room(limit);
         true
     }
 }
