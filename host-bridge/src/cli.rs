@@ -1,5 +1,6 @@
 //! The command line.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, channel};
@@ -11,8 +12,11 @@ use crate::place::Place;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use protocol::Role;
 
+pub use desk::Desk;
+
 mod bringup;
 mod completions;
+mod desk;
 mod doctor;
 mod export;
 mod flash;
@@ -181,6 +185,22 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// Does what these words of a command line ask for at `desk`: the exit status. For `doctor` and `bringup`, which go by
+/// nothing else.
+///
+/// # Errors
+/// If it can't be done, or is another command.
+pub fn run_at(
+    desk: &mut Desk,
+    words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> anyhow::Result<u8> {
+    match Arguments::try_parse_from(words)?.command {
+        Command::Doctor(doctor) => doctor.execute(desk),
+        Command::Bringup(bringup) => bringup.execute(desk),
+        _ => anyhow::bail!("it goes by this computer's own clock and ports"),
+    }
+}
+
 /// An error and its causes, each said once: many errors name their cause themselves.
 fn words(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
@@ -204,8 +224,8 @@ impl Arguments {
             Command::Export(export) => export.execute(),
             Command::Relay(relay) => relay.execute(),
             Command::Stop(stop) => stop.execute(),
-            Command::Doctor(doctor) => doctor.execute(),
-            Command::Bringup(bringup) => bringup.execute(),
+            Command::Doctor(doctor) => Ok(doctor.execute(&mut Desk::own()?)?.into()),
+            Command::Bringup(bringup) => Ok(bringup.execute(&mut Desk::own()?)?.into()),
             Command::Completions(completions) => completions.execute(),
             Command::Man(man) => man.execute(),
         }

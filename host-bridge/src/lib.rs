@@ -6,7 +6,7 @@
 //!
 //! Nothing is estimated here: what the boards say is shown, kept and carried.
 
-pub use cli::run;
+pub use cli::{Desk, run, run_at};
 
 const PROGRAM: &str = concat!("host-bridge ", env!("CARGO_PKG_VERSION"));
 

@@ -2,11 +2,8 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, BufRead, IsTerminal, Write as _};
+use std::io::{self, IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::bench::Bench;
 use crate::bringup::progress::{Outcome, Progress};
@@ -15,12 +12,10 @@ use crate::bringup::sight::{Sight, Wanted};
 use crate::bringup::step::{Figure, Limit, Measure, Step, Witness};
 use crate::bringup::{report, step};
 use crate::doctor::{findings, json};
-use crate::system::System;
 use anyhow::Context;
 use clap::ValueHint;
 
-use super::output;
-use super::signals::{self, Again};
+use super::desk::Desk;
 
 pub const ABOUT: &str = "\
 Brings a bench up, one step at a time: says what to wire, measures, compares, and says what to try. It begins \
@@ -71,12 +66,12 @@ fn named(name: &str) -> Result<&'static Step, String> {
 }
 
 impl Bringup {
-    /// Does it.
-    pub fn execute(self) -> anyhow::Result<ExitCode> {
+    /// Does it at `desk`: the exit status.
+    pub fn execute(self, desk: &mut Desk) -> anyhow::Result<u8> {
         let progress = Progress::read(&self.state)?;
         if self.list {
-            output::print(&list(&progress))?;
-            return Ok(ExitCode::SUCCESS);
+            desk.print(&list(&progress))?;
+            return Ok(0);
         }
         let bench = self.boards.find()?;
         anyhow::ensure!(
@@ -85,14 +80,14 @@ impl Bringup {
         );
         let due = self.due(&progress);
         if due.is_empty() {
-            output::print("every step is done; --from STEP does it and those after it again")?;
-            return Ok(ExitCode::SUCCESS);
+            desk.print("every step is done; --from STEP does it and those after it again")?;
+            return Ok(0);
         }
         let mut session = Session {
             bench,
             progress,
             path: self.state,
-            ended: signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?,
+            desk,
             is_named: self.only.is_some(),
         };
         let is_done = if self.yes {
@@ -105,12 +100,12 @@ impl Bringup {
             let record = session.progress.record(&step.name);
             record.is_some_and(|record| record.outcome.is_done())
         });
-        output::print(&format!(
+        session.desk.print(&format!(
             "\n{}\n{}",
             session.path.display(),
             report_path(&session.path).display()
         ))?;
-        Ok(ExitCode::from(u8::from(!(passed && is_done))))
+        Ok(u8::from(!(passed && is_done)))
     }
 
     /// The steps to be done.
@@ -146,11 +141,11 @@ fn list(progress: &Progress) -> String {
 }
 
 /// A bench that is being brought up.
-struct Session {
+struct Session<'a> {
+    desk: &'a mut Desk,
     bench: Bench,
     progress: Progress,
     path: PathBuf,
-    ended: Arc<AtomicBool>,
     /// Whether the step was asked for by its name: then it is tried whoever it needs.
     is_named: bool,
 }
@@ -162,12 +157,12 @@ enum Answer {
     Quit,
 }
 
-impl Session {
+impl Session<'_> {
     /// Measures every step of `due` in one look; true if it was not interrupted.
     fn measure_all(&mut self, due: &[&'static Step]) -> anyhow::Result<bool> {
         let sets_amplitude = due.iter().any(|step| step.name == "amplitude");
         let sight = self.look(sets_amplitude);
-        if self.ended.load(Ordering::Acquire) {
+        if self.desk.is_ended() {
             return Ok(false);
         }
         for step in due {
@@ -197,12 +192,12 @@ impl Session {
                 self.leave(step, Outcome::Blocked, format!("by {need}"))?;
                 continue;
             }
-            output::print(&format!(
+            self.desk.print(&format!(
                 "\n{} - {} (section {})\n{}",
                 step.name, step.title, step.section, step.to_do
             ))?;
             loop {
-                match ask_what_to_do()? {
+                match self.ask_what_to_do()? {
                     Answer::Quit => return Ok(false),
                     Answer::Skip => {
                         let failed = self
@@ -216,10 +211,11 @@ impl Session {
                     }
                     Answer::Measure => {
                         let sight = self.look(step.name == "amplitude");
-                        if self.ended.load(Ordering::Acquire) {
+                        if self.desk.is_ended() {
                             return Ok(false);
                         }
-                        let figures = step.judge(&sight, |measure| ask_for(measure).ok().flatten());
+                        let figures =
+                            step.judge(&sight, |measure| self.ask_for(measure).ok().flatten());
                         if self.keep(step, figures, &sight)? {
                             break;
                         }
@@ -238,7 +234,7 @@ impl Session {
             span_s: SPAN_S,
             amplitude_mv: sets_amplitude.then_some(step::FIRST_AMPLITUDE_MV),
         };
-        Sight::of(&System::default(), &self.bench, wanted, &self.ended)
+        Sight::of(&self.desk.system, &self.bench, wanted, &self.desk.ended)
     }
 
     /// Why nothing is to be seen of a step on this bench, if so.
@@ -250,7 +246,8 @@ impl Session {
     }
 
     fn leave(&mut self, step: &Step, outcome: Outcome, note: String) -> anyhow::Result<()> {
-        output::print(&format!("{:<18}{}: {note}", step.name, outcome.name()))?;
+        self.desk
+            .print(&format!("{:<18}{}: {note}", step.name, outcome.name()))?;
         self.progress
             .put(step, outcome, Some(note), Vec::new(), 0.0);
         self.save()
@@ -271,7 +268,7 @@ impl Session {
                 let _ = writeln!(out, "    -> {advice}");
             }
         }
-        output::print(&out)?;
+        self.desk.print(&out)?;
         let document = json::write(&sight.examination, &findings::of(&sight.examination));
         self.progress.doctor = serde_json::from_str(&document).unwrap_or_default();
         self.progress
@@ -286,50 +283,54 @@ impl Session {
         fs::write(&path, report::html(&self.progress))
             .with_context(|| format!("{}: can't be written: give another --state", path.display()))
     }
-}
 
-/// A line of standard input; none at its end.
-fn line(prompt: &str) -> anyhow::Result<Option<String>> {
-    eprint!("{prompt} ");
-    io::stderr().flush()?;
-    let mut line = String::new();
-    let count = io::stdin()
-        .lock()
-        .read_line(&mut line)
-        .context("standard input can't be read")?;
-    Ok((count > 0).then(|| line.trim().to_owned()))
-}
+    /// A line of standard input; none at its end.
+    fn line(&mut self, prompt: &str) -> anyhow::Result<Option<String>> {
+        eprint!("{prompt} ");
+        io::stderr().flush()?;
+        let mut line = String::new();
+        let count = self
+            .desk
+            .input
+            .read_line(&mut line)
+            .context("standard input can't be read")?;
+        Ok((count > 0).then(|| line.trim().to_owned()))
+    }
 
-fn ask_what_to_do() -> anyhow::Result<Answer> {
-    loop {
-        match line("[Enter: measure, s: leave it, q: stop here]")?.as_deref() {
-            None | Some("q") => return Ok(Answer::Quit),
-            Some("s") => return Ok(Answer::Skip),
-            Some("") => return Ok(Answer::Measure),
-            Some(_) => {}
+    fn ask_what_to_do(&mut self) -> anyhow::Result<Answer> {
+        loop {
+            match self
+                .line("[Enter: measure, s: leave it, q: stop here]")?
+                .as_deref()
+            {
+                None | Some("q") => return Ok(Answer::Quit),
+                Some("s") => return Ok(Answer::Skip),
+                Some("") => return Ok(Answer::Measure),
+                Some(_) => {}
+            }
         }
     }
-}
 
-fn ask_for(measure: &Measure) -> anyhow::Result<Option<Value>> {
-    loop {
-        let unit = if measure.unit.is_empty() {
-            String::new()
-        } else {
-            format!(" in {}", measure.unit)
-        };
-        let Some(answer) = line(&format!("{}{unit}?", measure.what))? else {
-            return Ok(None);
-        };
-        match &measure.limit {
-            Limit::Word(_) if !answer.is_empty() => {
-                return Ok(Some(Value::Word(answer.to_lowercase())));
+    fn ask_for(&mut self, measure: &Measure) -> anyhow::Result<Option<Value>> {
+        loop {
+            let unit = if measure.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" in {}", measure.unit)
+            };
+            let Some(answer) = self.line(&format!("{}{unit}?", measure.what))? else {
+                return Ok(None);
+            };
+            match &measure.limit {
+                Limit::Word(_) if !answer.is_empty() => {
+                    return Ok(Some(Value::Word(answer.to_lowercase())));
+                }
+                Limit::Word(_) => {}
+                _ => match answer.replace(',', ".").parse::<f64>() {
+                    Ok(number) if number.is_finite() => return Ok(Some(Value::Number(number))),
+                    _ => eprintln!("give a number"),
+                },
             }
-            Limit::Word(_) => {}
-            _ => match answer.replace(',', ".").parse::<f64>() {
-                Ok(number) if number.is_finite() => return Ok(Some(Value::Number(number))),
-                _ => eprintln!("give a number"),
-            },
         }
     }
 }

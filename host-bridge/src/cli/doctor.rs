@@ -1,14 +1,11 @@
 //! `host-bridge doctor`.
 
 use std::io::{self, IsTerminal};
-use std::process::ExitCode;
 use std::time::Duration;
 
-use super::output;
-use super::signals::{self, Again};
+use super::desk::Desk;
 use crate::doctor::report::Style;
 use crate::doctor::{findings, json, look, report};
-use crate::system::System;
 
 /// What `doctor` is asked for.
 #[derive(Debug, clap::Args)]
@@ -36,14 +33,13 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 impl Doctor {
-    /// Does it.
-    pub fn execute(self) -> anyhow::Result<ExitCode> {
+    /// Does it at `desk`: the exit status.
+    pub fn execute(self, desk: &mut Desk) -> anyhow::Result<u8> {
         let bench = self.boards.find()?;
         if io::stderr().is_terminal() {
             eprintln!("looking for {:.1} s …", self.span.as_secs_f64());
         }
-        let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
-        let examination = look::look(&System::default(), &bench, self.span, &ended);
+        let examination = look::look(&desk.system, &bench, self.span, &desk.ended);
         let findings = findings::of(&examination);
         let text = if self.json {
             json::write(&examination, &findings) + "\n"
@@ -57,7 +53,7 @@ impl Doctor {
             report::write(&examination, &findings, style)
         };
         // Whoever has read enough has not found the bench ill by that.
-        output::print(&text)?;
-        Ok(ExitCode::from(u8::from(!findings.is_empty())))
+        desk.print(&text)?;
+        Ok(u8::from(!findings.is_empty()))
     }
 }

@@ -18,7 +18,11 @@ pub fn say(text: &str) {
 /// The same as [`print`], for who goes on printing: false if the reader has gone away. Fails if it can't be written
 /// for another reason.
 pub fn print_on(text: &str) -> anyhow::Result<bool> {
-    let mut out = io::stdout().lock();
+    write_on(&mut io::stdout().lock(), text)
+}
+
+/// The same on `out`.
+pub fn write_on(out: &mut dyn Write, text: &str) -> anyhow::Result<bool> {
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(false),
