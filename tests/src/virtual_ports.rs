@@ -1,9 +1,10 @@
 //! Serial ports in memory, which go by virtual time: a bench without a system beneath it.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
+use std::fs;
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use host_bridge::clock::{Clock, Notify};
@@ -18,6 +19,8 @@ use crate::virtual_clock::VirtualClock;
 const READ_US: u64 = 20_000;
 /// How long a board waits for them, in µs.
 const BOARD_READ_US: u64 = 1_000;
+/// The boards' rate, which a host sets when it opens a port.
+const BAUD: u32 = 921_600;
 /// What a line holds that nobody reads.
 const LINE_BYTES: usize = 4_096;
 
@@ -48,6 +51,8 @@ impl VirtualBench {
             to_host: Pipe::new(&self.clock),
             to_board: Pipe::new(&self.clock),
             is_pulled: AtomicBool::new(false),
+            is_open: AtomicBool::new(false),
+            baud: AtomicU32::new(BAUD),
         });
         self.ports.plug(&path, &cable);
         let clock: Arc<dyn Clock> = Arc::new(self.clock.clone());
@@ -59,7 +64,6 @@ impl VirtualBench {
 #[derive(Default)]
 pub struct VirtualPorts {
     cables: Mutex<BTreeMap<PathBuf, Arc<Cable>>>,
-    open: Arc<Mutex<BTreeSet<PathBuf>>>,
     named: AtomicU64,
     reads: Arc<AtomicU64>,
     looks: AtomicU64,
@@ -93,9 +97,21 @@ impl VirtualPorts {
         self.looks.load(Ordering::Relaxed)
     }
 
+    /// Sets the rate of the port called `path`, as a program beside its client may do.
+    ///
+    /// # Panics
+    /// If there is no such port.
+    pub fn set_baud(&self, path: &Path, baud: u32) {
+        let cable = self.cable(path).expect("the port is there");
+        cable.baud.store(baud, Ordering::Relaxed);
+    }
+
+    /// The cable at `path`, or at what a link in a bench's folder leads to.
     fn cable(&self, path: &Path) -> Option<Arc<Cable>> {
+        let link = fs::read_link(path).ok();
         let cables = locked(&self.cables);
-        cables.get(path).filter(|cable| !cable.is_pulled()).cloned()
+        let cable = cables.get(link.as_deref().unwrap_or(path));
+        cable.filter(|cable| !cable.is_pulled()).cloned()
     }
 }
 
@@ -112,28 +128,25 @@ impl Ports for VirtualPorts {
     }
 
     fn is_open(&self, port: &Path) -> bool {
-        locked(&self.open).contains(port)
+        let cable = self.cable(port);
+        cable.is_some_and(|cable| cable.is_open.load(Ordering::Acquire))
     }
 
     fn open(&self, port: &Path) -> Result<Opened, State> {
         let cable = self
             .cable(port)
             .ok_or_else(|| State::Absent(port.display().to_string()))?;
-        if !locked(&self.open).insert(port.to_owned()) {
-            let port = port.to_owned();
-            return Err(State::Busy(port));
+        if cable.is_open.swap(true, Ordering::AcqRel) {
+            return Err(State::Busy(port.to_owned()));
         }
+        cable.baud.store(BAUD, Ordering::Relaxed);
         let _ = cable.to_board.write(&[0]);
         Ok(Opened {
             input: Box::new(HostInput {
                 cable: Arc::clone(&cable),
                 reads: Arc::clone(&self.reads),
             }),
-            output: Box::new(HostOutput {
-                cable,
-                path: port.to_owned(),
-                open: Arc::clone(&self.open),
-            }),
+            output: Box::new(HostOutput { cable }),
         })
     }
 }
@@ -142,6 +155,10 @@ struct Cable {
     to_host: Pipe,
     to_board: Pipe,
     is_pulled: AtomicBool,
+    /// Whether a program has the port open.
+    is_open: AtomicBool,
+    /// The rate that it has set.
+    baud: AtomicU32,
 }
 
 impl Cable {
@@ -182,24 +199,26 @@ impl Pipe {
         Ok(count)
     }
 
+    /// What has come, as far as it fits: how many bytes.
+    fn take(&self, bytes: &mut [u8]) -> usize {
+        let mut held = locked(&self.bytes);
+        let count = held.len().min(bytes.len());
+        for (place, byte) in bytes.iter_mut().zip(held.drain(..count)) {
+            *place = byte;
+        }
+        count
+    }
+
     fn read(
         &self,
         bytes: &mut [u8],
         wait_us: u64,
         is_gone: impl Fn() -> bool,
     ) -> io::Result<usize> {
-        let take = |bytes: &mut [u8]| -> usize {
-            let mut held = locked(&self.bytes);
-            let count = held.len().min(bytes.len());
-            for (place, byte) in bytes.iter_mut().zip(held.drain(..count)) {
-                *place = byte;
-            }
-            count
-        };
-        let mut count = take(bytes);
+        let mut count = self.take(bytes);
         if count == 0 && !is_gone() {
             self.came.wait_until(self.clock.now_us() + wait_us);
-            count = take(bytes);
+            count = self.take(bytes);
         }
         match count {
             0 if is_gone() => Err(ErrorKind::BrokenPipe.into()),
@@ -230,8 +249,6 @@ impl Input for HostInput {
 
 struct HostOutput {
     cable: Arc<Cable>,
-    path: PathBuf,
-    open: Arc<Mutex<BTreeSet<PathBuf>>>,
 }
 
 impl Write for HostOutput {
@@ -249,7 +266,7 @@ impl Write for HostOutput {
 
 impl Drop for HostOutput {
     fn drop(&mut self) {
-        locked(&self.open).remove(&self.path);
+        self.cable.is_open.store(false, Ordering::Release);
     }
 }
 
@@ -261,6 +278,31 @@ pub struct BoardEnd {
 }
 
 impl BoardEnd {
+    /// Whether a program has the port open.
+    pub fn has_client(&self) -> bool {
+        self.cable.is_open.load(Ordering::Acquire)
+    }
+
+    /// The rate that it has set.
+    pub fn baud(&self) -> u32 {
+        self.cable.baud.load(Ordering::Relaxed)
+    }
+
+    /// What has come by now, as far as it fits: how many bytes.
+    pub fn take(&self, bytes: &mut [u8]) -> usize {
+        self.cable.to_board.take(bytes)
+    }
+
+    /// Hands on what there is room for now: how many bytes.
+    pub fn put(&self, bytes: &[u8]) -> usize {
+        self.cable.to_host.write(bytes).unwrap_or(0)
+    }
+
+    /// Forgets what nobody has read.
+    pub fn forget_unread(&self) {
+        self.cable.to_host.clear();
+    }
+
     /// Pulls the cable when it is dropped.
     pub fn plug(&self) -> Plug {
         Plug(Arc::clone(&self.cable))

@@ -80,12 +80,7 @@ fn the_dashboard_stops_a_board_and_streams_its_gauges() {
         "{}",
         terminal.last_shown()
     );
-    terminal.type_keys("g");
-    assert!(
-        terminal.shows(LIMIT, "the gauges are streamed from now on"),
-        "{}",
-        terminal.last_shown()
-    );
+    terminal.types_until(LIMIT, "g", "the gauges are streamed from now on");
     assert!(
         terminal.shows(LIMIT, "LSB high"),
         "{}",
