@@ -11,7 +11,7 @@ use crate::SAMPLE_RATE_HZ;
 use crate::amplitude::MAX_WINDOW_MS;
 use crate::counting::CountedGauge;
 use crate::estimator::{Estimator, Finding, Touch};
-use crate::root::sqrt;
+use crate::float::sqrt;
 use crate::stroke::Stroke;
 use crate::travel::Travel;
 

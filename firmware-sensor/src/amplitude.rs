@@ -1,6 +1,6 @@
 //! How strong the band-passed signal was over the window.
 
-use crate::root::sqrt;
+use crate::float::sqrt;
 
 /// The longest window that a configuration can ask for, in ms.
 pub const MAX_WINDOW_MS: usize = 200;

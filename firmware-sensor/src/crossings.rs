@@ -20,9 +20,9 @@ use core::f32::consts::PI;
 use protocol::{GAUGES, SensorConfiguration};
 
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
+use crate::float::sqrt;
 use crate::hum::Pickup;
 use crate::landmarks::{LONGEST, Landmarks, MARKS};
-use crate::root::sqrt;
 use crate::travel::Travel;
 use crate::travel::{MIN_SPEED_MM_S, PLACES_PER_MM, Place};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};

@@ -16,6 +16,7 @@
 use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
+use crate::float::{larger, smaller};
 
 /// Samples that a difference spans.
 const SPAN: usize = 7;
@@ -93,9 +94,10 @@ impl Noise {
             return;
         }
         self.followed = (self.followed + 1.0).min(FOLLOWED_LOOKS);
+        let follow = 1.0 / self.followed;
         for (variance, looks) in self.variances.iter_mut().zip(&self.looks) {
-            let now = second_least(looks) / (IN_LOOK as f32 * DIFFERENCE_GAIN * SECOND_OF_MEAN);
-            *variance += (now - *variance) / self.followed;
+            const SCALE: f32 = 1.0 / (IN_LOOK as f32 * DIFFERENCE_GAIN * SECOND_OF_MEAN);
+            *variance += follow * (SCALE * second_least(looks) - *variance);
         }
     }
 
@@ -108,8 +110,8 @@ impl Noise {
 fn second_least(looks: &[f32; LOOKS]) -> f32 {
     let (mut least, mut second) = (f32::INFINITY, f32::INFINITY);
     for &look in looks {
-        second = second.min(look.max(least));
-        least = least.min(look);
+        second = smaller(second, larger(look, least));
+        least = smaller(least, look);
     }
     second
 }

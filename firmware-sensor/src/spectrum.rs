@@ -23,7 +23,7 @@ use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
-use crate::root::sqrt;
+use crate::float::sqrt;
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Travel};
 
 use evidence::{LineEvidence, WaveEvidence};
@@ -73,6 +73,9 @@ const SPEED_KEPT: f32 = 0.967;
 const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
 /// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
 const STRONG: f32 = 0.8;
+/// Estimates in a row that must find a weak wave that is not known yet before it is stood by: chance makes such a wave, and
+/// seldom twice the same.
+const TIMES: u8 = 5;
 /// A supposition that moves by more than this share is another one.
 const SAME: f32 = 0.1;
 /// The line's memory in wavelengths, as the periodogram's.
@@ -125,6 +128,9 @@ pub struct Spectrum {
     /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
     known_mm: f32,
     known_share: f32,
+    /// The last λ̂ that was probable enough, in mm, and how many times in a row it was: up to [`TIMES`].
+    sure_mm: f32,
+    sure_times: u8,
     /// How λ of the line changes along the way.
     trend: Trend,
 }
@@ -180,6 +186,8 @@ impl Spectrum {
             weighed: Weighed::default(),
             known_mm: 0.0,
             known_share: 0.0,
+            sure_mm: 0.0,
+            sure_times: 0,
             trend: Trend::default(),
         }
     }
@@ -236,7 +244,15 @@ impl Spectrum {
             (true, true) => WHERE_JERKY * said.probability,
             (false, _) => 0.0,
         };
-        let valid = confidence >= self.level;
+        let is_sure = confidence >= self.level;
+        if !is_sure || off(said.wavelength_mm, self.sure_mm) >= SAME {
+            self.sure_times = 0;
+        }
+        self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
+        self.sure_mm = said.wavelength_mm;
+        let at_once =
+            said.new || fitted.share() > STRONG || off(said.wavelength_mm, self.known_mm) < SAME;
+        let valid = is_sure && (at_once || self.sure_times == TIMES);
         if valid {
             self.known_mm = said.wavelength_mm;
             self.known_share += 0.1 * (fitted.share() - self.known_share);
@@ -301,8 +317,14 @@ impl Estimator for Spectrum {
             self.rested = self.rested.saturating_add(1);
         } else {
             self.rested = 0;
-            let completed = self.knots.push(touch.place, travel.abs(), &touch.gauges);
-            self.periodogram.push(&completed);
+            let periodogram = &mut self.periodogram;
+            self.knots
+                .push(touch.place, travel.abs(), &touch.gauges, |spacing, knot| {
+                    // The coarsest are for fits alone.
+                    if spacing < 2 {
+                        periodogram.push(spacing, knot);
+                    }
+                });
             let mm = travel.abs() as f32 * (1.0 / PLACES_PER_MM as f32);
             self.fresh_mm += mm;
             self.travelled_mm += mm;

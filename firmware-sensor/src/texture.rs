@@ -27,7 +27,7 @@ use protocol::{GAUGES, Texture};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Finding, MIN_AMPLITUDE_LSB, Touch};
-use crate::root::sqrt;
+use crate::float::sqrt;
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Place};
 use averages::Averages;
 use block::Block;

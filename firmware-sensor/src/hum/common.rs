@@ -2,7 +2,7 @@
 
 use protocol::GAUGES;
 
-use crate::root::sqrt;
+use crate::float::sqrt;
 
 /// A complex amplitude in ADC steps.
 pub(super) type Amplitude = [f32; 2];

@@ -19,8 +19,8 @@ use protocol::GAUGES;
 use super::common::{Amplitudes, conjugate_product, is_common, power, square, sum, unit};
 use super::own::Own;
 use super::steady::Steady;
+use crate::float::sqrt;
 use crate::phasor::phasor;
-use crate::root::sqrt;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
 /// Samples that a difference is taken over, half a cycle of 50 Hz: offset, drift and the even harmonics of

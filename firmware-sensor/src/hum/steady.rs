@@ -5,6 +5,7 @@
 
 use super::common::{Amplitude, Amplitudes, is_common, square, sum};
 use crate::ESTIMATE_RATE_HZ;
+use crate::float::{larger, smaller};
 
 /// Memory of the two followers and of the fast one's power, in estimates. They hear 3 Hz and 0.6 Hz on
 /// either side.
@@ -57,16 +58,16 @@ impl Steady {
     ) -> bool {
         self.heard = self.heard.saturating_add(1);
         let heard = f32::from(self.heard);
-        follow(&mut self.fast, sum(now, usable), heard.min(FAST));
+        follow(&mut self.fast, sum(now, usable), smaller(heard, FAST));
         for (slow, now) in self.slow.iter_mut().zip(now) {
-            follow(slow, *now, heard.min(SLOW));
+            follow(slow, *now, smaller(heard, SLOW));
         }
         // Not of what was there before the fast one had settled.
         let memory = (heard - FAST).clamp(1.0, REMEMBERED);
         self.fast_power += (square(self.fast) - self.fast_power) / memory;
         let steady = likely
             && self.heard >= TOLD
-            && square(sum(&self.slow, usable)) > (STEADY * self.fast_power).max(least_power)
+            && square(sum(&self.slow, usable)) > larger(STEADY * self.fast_power, least_power)
             && is_common(&self.slow, usable);
         if !steady {
             self.steady = 0;
@@ -78,8 +79,8 @@ impl Steady {
             self.fastest_mm_s = speed_mm_s;
         }
         self.steady = self.steady.saturating_add(1);
-        self.slowest_mm_s = self.slowest_mm_s.min(speed_mm_s);
-        self.fastest_mm_s = self.fastest_mm_s.max(speed_mm_s);
+        self.slowest_mm_s = smaller(self.slowest_mm_s, speed_mm_s);
+        self.fastest_mm_s = larger(self.fastest_mm_s, speed_mm_s);
         let differ_mm_s = self.fastest_mm_s - self.slowest_mm_s;
         let same = differ_mm_s < SAME * self.fastest_mm_s + SAME_MM_S;
         let other = differ_mm_s > OTHER * self.fastest_mm_s + SAME_MM_S;
@@ -116,6 +117,7 @@ impl Steady {
 
 /// Lets a mean over `memory` estimates follow.
 fn follow(mean: &mut Amplitude, now: Amplitude, memory: f32) {
-    mean[0] += (now[0] - mean[0]) / memory;
-    mean[1] += (now[1] - mean[1]) / memory;
+    let share = 1.0 / memory;
+    mean[0] += share * (now[0] - mean[0]);
+    mean[1] += share * (now[1] - mean[1]);
 }

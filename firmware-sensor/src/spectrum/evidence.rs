@@ -7,6 +7,7 @@
 
 use super::fit::{Fitted, LENGTH_COUNT, LENGTHS};
 use super::off;
+use crate::float::{larger, smaller};
 
 /// Evidence for a line of the averaged spectrum.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,12 +60,12 @@ pub const LINE_CLUES: usize = 30;
 pub const WAVE_CLUES: usize = 11;
 
 const LINE: [f32; LINE_CLUES + 1] = [
-    -11.595, -4.179, 0.353, 3.486, -1.658, 0.248, -0.675, 0.706, 0.314, -0.851, 0.004, 0.629,
-    7.312, 0.404, -1.133, 0.137, -0.811, 3.697, 1.050, -1.061, -0.229, 0.021, -0.249, -3.002,
-    -0.011, -0.335, 2.976, 0.327, 2.254, 0.178, 0.137,
+    -11.331, -2.152, -0.100, 3.119, -1.403, 0.243, -0.084, 0.713, 0.499, 0.305, -0.061, 0.785,
+    4.870, 0.625, -1.399, 0.177, -1.273, 3.809, 0.728, 0.806, 0.403, 0.020, -0.169, -2.307, -0.022,
+    -0.441, 1.063, 0.231, 0.327, 0.148, 0.067,
 ];
 const WAVE: [f32; WAVE_CLUES + 1] = [
-    -5.000, 0.885, 1.168, -0.940, 2.537, -0.016, -2.685, -0.658, -0.372, 0.811, 0.125, 0.548,
+    -3.947, 0.978, 1.202, -1.005, 1.946, -0.186, -2.918, -0.461, -0.359, 0.706, 0.152, 0.551,
 ];
 
 /// The logarithm of the share that is left unexplained, with its sign turned: 0 to 4.
@@ -75,15 +76,15 @@ fn odds(share: f32) -> f32 {
 impl LineEvidence {
     /// On scales on which the regression is nearly linear, with squares and products for what is not.
     pub fn clues(&self) -> [f32; LINE_CLUES] {
-        let travelled = libm::logf(1.0 + self.travelled_waves.min(30.0));
-        let held = libm::logf(1.0 + self.held_waves.min(30.0));
+        let travelled = libm::logf(1.0 + smaller(self.travelled_waves, 30.0));
+        let held = libm::logf(1.0 + smaller(self.held_waves, 30.0));
         let strength = odds(self.shares[0]);
         let long_strength = odds(self.shares[2]);
         let steadiness = -libm::logf(self.wander[1] + 0.005);
         let sharp = libm::logf(self.sharpness.clamp(0.6, 20.0));
         let firm = -libm::logf(self.spread + 0.003);
         let agreement = self.agreement;
-        let close = -libm::logf(self.distance.min(0.3) + 0.003);
+        let close = -libm::logf(smaller(self.distance, 0.3) + 0.003);
         [
             self.maturity,
             travelled,
@@ -120,7 +121,7 @@ impl LineEvidence {
 
     /// How much less the wave explains now than it used to: a wave that was strong and is gone.
     fn drop(&self) -> f32 {
-        (self.kept_shares[0] - self.shares[0]).max(0.0)
+        larger(self.kept_shares[0] - self.shares[0], 0.0)
     }
 
     /// Probability that λ̂ is within 5 %.
@@ -161,8 +162,8 @@ impl WaveEvidence {
     /// See [`LineEvidence::clues`].
     pub fn clues(&self) -> [f32; WAVE_CLUES] {
         let strength = odds(self.share);
-        let held = libm::logf(1.0 + self.held_waves.min(10.0));
-        let firm = -libm::logf(self.distance.min(0.3) + 0.003);
+        let held = libm::logf(1.0 + smaller(self.held_waves, 10.0));
+        let firm = -libm::logf(smaller(self.distance, 0.3) + 0.003);
         let sharp = -libm::logf(self.sigma.clamp(1e-5, 1.0));
         [
             strength,

@@ -13,9 +13,9 @@ use core::ops::Range;
 use protocol::GAUGES;
 
 use super::knots::{Backwards, Knot, Knots, spacing_for};
+use crate::float::{larger, smaller, sqrt};
 use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
 use crate::phasor::phasor;
-use crate::root::sqrt;
 use crate::travel::{PLACES_PER_MM, Place};
 
 /// The lengths that a pass is solved at, in waves.
@@ -27,6 +27,10 @@ pub(super) const LENGTH_COUNT: usize = 5;
 const LEAST_KNOTS: u16 = 8;
 /// Pivot below which the unknowns are not told apart: the path covers too little of a wave.
 const LEAST_PIVOT: f32 = 1e-4;
+
+/// Rest that no gauge is better than, relative to its energy. A gauge counts by the inverse of its rest: by its noise, as
+/// least squares want it, whatever its gain.
+const LEAST_REST: f32 = 0.1;
 
 /// What a solution costs, in knots.
 const SOLVING: usize = 4;
@@ -122,11 +126,18 @@ impl Pass {
         if work == 0 {
             return 0;
         }
-        let reader = self
-            .reader
-            .get_or_insert_with(|| path.backwards(spacing_for(self.wavelength_mm)));
-        let mut reader = *reader;
         let mut left = work;
+        let mut reader = match self.reader {
+            Some(reader) => reader,
+            None => {
+                let (partial, reader) = path.backwards(spacing_for(self.wavelength_mm));
+                if let Some(knot) = partial {
+                    left -= 1;
+                    self.take(&knot);
+                }
+                reader
+            }
+        };
         while !self.done && left > 0 {
             let solved = self.next;
             match path.next(&mut reader) {
@@ -194,12 +205,16 @@ impl Sums {
         let pivots: [f32; LINEAR] = eliminate(&mut a, |_| LEAST_PIVOT)?;
         let mut fitted = Fitted::default();
         let (mut along, mut curvature, mut rest, mut count) = (0.0, 0.0, 0.0, 0_u16);
+        let mut weighed_total = 0.0;
         for gauge in 0..GAUGES {
             let mut y = self.normal.right[gauge].map(|sum| sum * scale);
             eliminate_right(&a, &mut y, LINEAR);
             let energy = |j: usize| y[j] * y[j] * pivots[j];
-            let total = (self.normal.square[gauge] * scale - energy(0) - energy(1)).max(0.0);
-            let explained = (energy(2) + energy(3)).min(total);
+            let total = larger(
+                self.normal.square[gauge] * scale - energy(0) - energy(1),
+                0.0,
+            );
+            let explained = smaller(energy(2) + energy(3), total);
             fitted.totals[gauge] = total;
             fitted.explaineds[gauge] = explained;
             if usable >> gauge & 1 == 0 {
@@ -208,12 +223,16 @@ impl Sums {
             let sine = y[3] * pivots[3];
             let cosine = y[2] * pivots[2] - a[3][2] * sine;
             // d/d ln k of a cos θ + b sin θ is θ (b cos θ − a sin θ).
-            along += sine * y[4] - cosine * y[5];
-            curvature +=
-                sine * sine * a[4][4] - 2.0 * cosine * sine * a[5][4] + cosine * cosine * a[5][5];
+            let left = total - explained;
+            let weight = 1.0 / larger(left + LEAST_REST * total, f32::MIN_POSITIVE);
+            along += weight * (sine * y[4] - cosine * y[5]);
+            curvature += weight
+                * (sine * sine * a[4][4] - 2.0 * cosine * sine * a[5][4]
+                    + cosine * cosine * a[5][5]);
             fitted.total += total;
             fitted.explained += explained;
-            rest += total - explained;
+            rest += weight * left;
+            weighed_total += weight * total;
             count += 1;
         }
         if curvature.is_nan() || curvature <= 0.0 {
@@ -221,7 +240,7 @@ impl Sums {
         }
         let most = 0.5 / waves;
         let step = (along / curvature).clamp(-most, most);
-        let rest = (rest - along * along / curvature).max(1e-9 * fitted.total);
+        let rest = larger(rest - along * along / curvature, 1e-9 * weighed_total);
         let free = self.knots * count;
         let unknowns = LINEAR as u16 * count + 2;
         fitted.sigma = sqrt(rest / curvature / f32::from(free.saturating_sub(unknowns).max(1)));

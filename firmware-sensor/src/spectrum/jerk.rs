@@ -4,8 +4,8 @@ use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::Touch;
+use crate::float::{larger, smaller, sqrt};
 use crate::phasor::phasor;
-use crate::root::sqrt;
 use crate::travel::PLACES_PER_UM;
 
 /// Gain in power of the first and of the second difference for white noise behind the anti-aliasing filter.
@@ -61,11 +61,13 @@ impl Jerk {
     pub(super) fn push(&mut self, touch: &Touch, travel: i32) {
         let [before, older] = self.before;
         let (mut first, mut power) = (0.0, 0.0);
-        for gauge in gauges_of(touch.usable) {
-            let step = touch.gauges[gauge] - before[gauge];
-            let second = step - (before[gauge] - older[gauge]);
-            first += step * step;
-            power += second * second;
+        for gauge in 0..GAUGES {
+            if touch.usable >> gauge & 1 == 1 {
+                let step = touch.gauges[gauge] - before[gauge];
+                let second = step - (before[gauge] - older[gauge]);
+                first += step * step;
+                power += second * second;
+            }
         }
         self.before = [touch.gauges, before];
         self.speed += (travel.abs() as f32 - self.speed) * (1.0 / SPEED_SAMPLES);
@@ -78,7 +80,7 @@ impl Jerk {
             return;
         };
         let samples = samples as f32;
-        let share = 1.0 / samples.min(JERK_SAMPLES);
+        let share = 1.0 / smaller(samples, JERK_SAMPLES);
         let by_speed = power / self.speed;
         self.power += (power - self.power) * share;
         self.by_speed += (by_speed - self.by_speed) * share;
@@ -88,13 +90,13 @@ impl Jerk {
             self.quiet = by_speed;
         }
         // A quantile in steps of its own size: so many up as down once a share of the powers is below.
-        let step = (1.0 / samples).max(QUIET_STEP);
+        let step = larger(1.0 / samples, QUIET_STEP);
         self.quiet *= if by_speed > self.quiet {
             1.0 + step * QUIET_SHARE
         } else {
             1.0 - step * (1.0 - QUIET_SHARE)
         };
-        self.quiet = self.quiet.max(self.by_speed * QUIET_LEAST);
+        self.quiet = larger(self.quiet, self.by_speed * QUIET_LEAST);
     }
 
     /// Begins anew on another surface, where it is as quiet as before in between.
@@ -168,9 +170,4 @@ fn second_difference_gain(frequency_hz: f32) -> f32 {
     let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
     let square = 4.0 * sin * sin;
     square * square
-}
-
-/// The gauges whose bit is set.
-fn gauges_of(mask: u8) -> impl Iterator<Item = usize> {
-    (0..GAUGES).filter(move |gauge| mask >> gauge & 1 == 1)
 }

@@ -31,11 +31,8 @@ const ALL_KEPT: usize = KEPT[0] + KEPT[1] + KEPT[2];
 const SPARE: usize = 8;
 
 /// The spacing that serves a wavelength.
-pub(super) fn spacing_for(wavelength_mm: f32) -> usize {
-    COARSER_FROM_MM
-        .iter()
-        .filter(|&&from_mm| wavelength_mm >= from_mm)
-        .count()
+pub(super) const fn spacing_for(wavelength_mm: f32) -> usize {
+    (wavelength_mm >= COARSER_FROM_MM[0]) as usize + (wavelength_mm >= COARSER_FROM_MM[1]) as usize
 }
 
 /// A piece of travel.
@@ -100,9 +97,6 @@ pub(super) struct Knots {
     knots: [Knot; ALL_KEPT],
 }
 
-/// Knots that a millisecond completed, by spacing.
-pub(super) type Completed = [Option<Knot>; SPACINGS];
-
 impl Knots {
     /// No path yet.
     pub fn new() -> Self {
@@ -112,21 +106,30 @@ impl Knots {
         }
     }
 
-    /// Takes a millisecond that travelled, `places` above 0 in quarters of a µm.
-    pub fn push(&mut self, place: Place, places: i32, gauges: &[f32; GAUGES]) -> Completed {
+    /// Takes a millisecond that travelled, `places` above 0 in quarters of a µm. `tell` hears each knot that it
+    /// completes, and at which spacing.
+    #[inline]
+    pub fn push(
+        &mut self,
+        place: Place,
+        places: i32,
+        gauges: &[f32; GAUGES],
+        mut tell: impl FnMut(usize, &Knot),
+    ) {
         let piece = Knot {
             place,
             travel_mm: places as f32 * (1.0 / PLACES_PER_MM as f32),
             gauges: *gauges,
         };
-        let mut completed = [None; SPACINGS];
-        completed[0] = self.gather(0, &piece);
-        if let Some(fine) = completed[0] {
-            for (spacing, completed) in completed.iter_mut().enumerate().skip(1) {
-                *completed = self.gather(spacing, &fine);
+        let Some(fine) = self.gather(0, &piece) else {
+            return;
+        };
+        tell(0, &fine);
+        for spacing in 1..SPACINGS {
+            if let Some(knot) = self.gather(spacing, &fine) {
+                tell(spacing, &knot);
             }
         }
-        completed
     }
 
     /// The knot that `piece` completes, if it does.
@@ -140,37 +143,34 @@ impl Knots {
         let knot = ring.gathering.knot()?;
         ring.gathering = Gathering::default();
         self.knots[FIRST[spacing] + ring.next] = knot;
-        ring.next = (ring.next + 1) % KEPT[spacing];
+        ring.next = if ring.next + 1 < KEPT[spacing] {
+            ring.next + 1
+        } else {
+            0
+        };
         ring.count = (ring.count + 1).min(KEPT[spacing]);
         Some(knot)
     }
 
-    /// A reader of the path as it is now, from its end backwards. Good for as long as no more than [`SPARE`]
-    /// knots have come.
-    pub fn backwards(&self, spacing: usize) -> Backwards {
+    /// The path as it is now, from its end backwards: what is not a whole knot yet, if it is half of one, and a reader of
+    /// the knots before it. Good for as long as no more than [`SPARE`] knots have come.
+    pub fn backwards(&self, spacing: usize) -> (Option<Knot>, Backwards) {
         let ring = &self.rings[spacing];
-        Backwards {
+        let partial = ring
+            .gathering
+            .knot()
+            .filter(|knot| knot.travel_mm > 0.5 * SPACINGS_MM[spacing]);
+        let reader = Backwards {
             spacing,
-            // Half a knot counts as one.
-            partial: ring
-                .gathering
-                .knot()
-                .filter(|knot| knot.travel_mm > 0.5 * SPACINGS_MM[spacing]),
-            newest: true,
             place: ring.next,
             left: ring.count.min(KEPT[spacing] - SPARE),
-        }
+        };
+        (partial, reader)
     }
 
     /// The next knot back of a reader.
     #[inline]
-    pub fn next<'a>(&'a self, reader: &'a mut Backwards) -> Option<&'a Knot> {
-        if reader.newest {
-            reader.newest = false;
-            if let Some(partial) = &reader.partial {
-                return Some(partial);
-            }
-        }
+    pub fn next(&self, reader: &mut Backwards) -> Option<&Knot> {
         reader.left = reader.left.checked_sub(1)?;
         let place = reader.place.checked_sub(1);
         reader.place = place.unwrap_or(KEPT[reader.spacing] - 1);
@@ -182,9 +182,6 @@ impl Knots {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Backwards {
     spacing: usize,
-    /// What is not a whole knot yet, which comes first.
-    partial: Option<Knot>,
-    newest: bool,
     /// In the ring, of the knot that was last.
     place: usize,
     left: usize,

@@ -2,7 +2,7 @@
 
 use protocol::GAUGES;
 
-use crate::root::sqrt;
+use crate::float::{larger, smaller, sqrt};
 
 use super::evidence::LineEvidence;
 use super::fit::{Fitted, LENGTH_COUNT};
@@ -20,6 +20,10 @@ const GONE: f32 = 0.5;
 const FORGOTTEN: f32 = 0.01;
 /// A short fit this close to the trend, in ln λ, is about the line.
 const ON_THE_TREND: f32 = 0.15;
+/// A fit this close to the line, relative to it, is about it; and one this close to the mean of what there is, is finer.
+const NEAR: f32 = 0.06;
+/// See [`NEAR`].
+const CLOSE: f32 = 0.01;
 /// Estimates for which a period that a fit has refused is not looked for again.
 const REFUSED_ESTIMATES: u8 = 20;
 
@@ -87,26 +91,19 @@ impl Spectrum {
         }
         let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
         let share = near(1, 0.2).map_or(0.0, share_over);
-        let strong = (share > STRONG).then(|| longest_that_agrees(&found));
-        let chosen = strong
+        let chosen = (share > STRONG)
+            .then(|| longest_that_agrees(&found))
             .flatten()
-            .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, 0.06)));
+            .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, NEAR)));
         let fitted = chosen.and_then(|n| found[n]);
-        // A weak line's fit wanders: the trend knows better.
-        let wavelength_mm = match (fitted, self.trend.course()) {
-            (Some(fitted), Some(course)) => {
-                let trust = ((fitted.share() - 0.3) / 0.5).clamp(0.0, 1.0);
-                let fit = libm::logf(fitted.wavelength_mm);
-                libm::expf(course.here + trust * (fit - course.here))
-            }
-            (Some(fitted), None) => fitted.wavelength_mm,
-            (None, Some(course)) => libm::expf(course.here),
-            (None, None) => here_mm,
-        };
+        let wavelength_mm = self.weighed_mm(&found, here_mm, share > STRONG);
         self.line.fitted_mm = chosen.map_or(0.0, |n| middles[n]);
         self.line.share = if fitted.is_some() { share } else { 0.0 };
-        let wander =
-            |n: usize| found[n].map_or(0.15, |fitted| off(fitted.wavelength_mm, here_mm).min(0.15));
+        let wander = |n: usize| {
+            found[n].map_or(0.15, |fitted| {
+                smaller(off(fitted.wavelength_mm, here_mm), 0.15)
+            })
+        };
         let seen = Seen {
             fresh_mm: self.survey.fresh_mm,
             ln_here: libm::logf(here_mm),
@@ -158,6 +155,44 @@ impl Spectrum {
         })
     }
 
+    /// λ here, of the average's peak there and of fits carried to here. Each may be off: a peak where two lines meet, a
+    /// fit where little is explained, the trend where the surface changes. So their mean in ln λ first; then, of what is
+    /// finest, all that is close to it.
+    fn weighed_mm(
+        &self,
+        found: &[Option<Fitted>; LENGTH_COUNT],
+        here_mm: f32,
+        strong: bool,
+    ) -> f32 {
+        let fits = found.map(|fitted| fitted.map(|fitted| fitted.wavelength_mm));
+        let course = self.trend.course().map(|course| libm::expf(course.here));
+        let within = |mm: Option<f32>, base_mm: f32, most: f32| {
+            mm.filter(|&mm| off(mm, base_mm) < most)
+                .map(|mm| libm::logf(mm / base_mm))
+        };
+        let sum: f32 = [course, fits[2], fits[3]]
+            .into_iter()
+            .filter_map(|mm| within(mm, here_mm, NEAR))
+            .sum();
+        let mean_mm = here_mm * libm::expf(0.25 * sum);
+        if strong && let Some(fit_mm) = longest_that_agrees(found).and_then(|n| fits[n]) {
+            let held = self.line.held_waves > MEMORY_WAVES;
+            if !held || off(fit_mm, mean_mm) < 0.05 {
+                return fit_mm;
+            }
+        }
+        let longest = fits.into_iter().skip(1).rev().flatten().next();
+        let (mut sum, mut count) = (0.0, 0_u8);
+        for close in [longest, course]
+            .into_iter()
+            .filter_map(|mm| within(mm, mean_mm, CLOSE))
+        {
+            sum += close;
+            count += 1;
+        }
+        mean_mm * libm::expf(sum / f32::from(count.max(1)))
+    }
+
     /// Goes on with the trend, and takes what a short fit says into it. λ of the line here, in mm, and how
     /// much ln λ has changed on the way here.
     fn follow_trend(&mut self, found: &[Option<Fitted>; LENGTH_COUNT], line_mm: f32) -> (f32, f32) {
@@ -170,7 +205,7 @@ impl Spectrum {
         let expected = self.trend.course();
         let plausible = |fitted: &Fitted| {
             let fit_mm = self.trend.of_fit(fitted.wavelength_mm, fitted.centre);
-            off(fit_mm, here_mm) < 0.06
+            off(fit_mm, here_mm) < NEAR
                 || expected
                     .is_some_and(|course| (libm::logf(fit_mm) - course.here).abs() < ON_THE_TREND)
         };
@@ -237,7 +272,7 @@ impl Line {
         for (kept, now) in self.shares.iter_mut().zip(seen.shares) {
             *kept += share * (now - *kept);
         }
-        self.usual = self.shares[0].max(self.usual - FORGOTTEN * waves);
+        self.usual = larger(self.shares[0], self.usual - FORGOTTEN * waves);
     }
 }
 
@@ -249,9 +284,9 @@ fn longest_that_agrees(found: &[Option<Fitted>; LENGTH_COUNT]) -> Option<usize> 
     let mut longest = None;
     let all = found.iter().enumerate().skip(1);
     for (n, fitted) in all.map_while(|(n, fitted)| Some((n, (*fitted)?))) {
-        let interval = (4.0 * fitted.sigma).max(0.003);
-        low = low.max(fitted.wavelength_mm * (1.0 - interval));
-        high = high.min(fitted.wavelength_mm * (1.0 + interval));
+        let interval = larger(4.0 * fitted.sigma, 0.003);
+        low = larger(low, fitted.wavelength_mm * (1.0 - interval));
+        high = smaller(high, fitted.wavelength_mm * (1.0 + interval));
         if low > high || fitted.share() < STRONG * shortest.share() {
             break;
         }

@@ -6,24 +6,30 @@
 
 use protocol::GAUGES;
 
-use super::knots::{Completed, Knot, SPACINGS, spacing_for};
+use super::knots::{Knot, spacing_for};
 use crate::estimator::MIN_AMPLITUDE_LSB;
+use crate::float::{larger, sqrt};
 use crate::phasor::phasor;
-use crate::root::sqrt;
 use crate::travel::PLACES_PER_MM;
 
 /// Candidates: six an octave, so that a ratio of 2 lies on the grid, and one beyond either end.
 pub(super) const CANDIDATES: usize = 26;
+/// Those that the finest knots serve; the next coarser ones serve the others.
+const FINE: usize = 11;
 /// The shortest candidate, in mm.
 const SHORTEST_MM: f32 = 0.5;
 /// Candidates in an octave.
 pub(super) const PER_OCTAVE: usize = 6;
 /// Travel constant of each of the two poles, in wavelengths.
-const POLE_WAVES: f32 = 0.7;
+const POLE_WAVES: f32 = 0.85;
 /// Travel that the energies lag behind by, in wavelengths: both poles'.
 pub(super) const KERNEL_WAVES: f32 = 2.0 * POLE_WAVES;
-/// Travel constant of the high-pass in front, in mm: drift and slopes are not to leak into long waves.
+/// Travel constant of the two high-passes in front, in mm: drift, slopes and the form of a surface are not to leak into
+/// long waves. The first takes off the level, the second what a slope leaves of it.
 const HIGH_PASS_MM: f32 = 3.0;
+/// How nearly gauges count alike, whatever their gains: one that feels nothing but its noise is not to count as the
+/// others do. 0 would be alike, and much above 1 by their energies.
+const EQUAL: f32 = 0.1;
 /// Travel constant of the average, in wavelengths.
 pub(super) const AVERAGE_WAVES: f32 = 14.0;
 /// Energy over all candidates, in ADC steps², of the least wave that is listened to. Below it the gauges are silent, and
@@ -35,10 +41,10 @@ const LEAST_WEIGHT: f32 = 1e-3;
 /// A candidate wavelength.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    wavelength_mm: f32,
     /// Phase of a place in 2⁻³² cycles.
     increment: u32,
-    spacing: usize,
+    /// Travel constants of its poles in a mm.
+    poles_per_mm: f32,
     /// Re and Im of each gauge behind the first pole, and behind both.
     first: [[f32; 2]; GAUGES],
     second: [[f32; 2]; GAUGES],
@@ -56,21 +62,25 @@ pub(super) type Spectrum = [f32; CANDIDATES];
 #[derive(Clone, Debug)]
 pub(super) struct Periodogram {
     candidates: [Candidate; CANDIDATES],
-    /// The high-pass' level of each gauge at each spacing; none before the first knot.
-    level: [Option<[f32; GAUGES]>; SPACINGS],
+    /// The high-passes' level of each gauge at each spacing, none before the first knot, and what a slope leaves of it.
+    level: [Option<[f32; GAUGES]>; 2],
+    slope: [[f32; GAUGES]; 2],
 }
 
 impl Periodogram {
     /// Nothing felt yet.
     pub fn new() -> Self {
+        const {
+            assert!(spacing_for(wavelength_mm(FINE - 1)) == 0);
+            assert!(spacing_for(wavelength_mm(FINE)) == 1);
+        }
         Self {
             candidates: core::array::from_fn(|i| {
                 let wavelength_mm = wavelength_mm(i);
                 Candidate {
-                    wavelength_mm,
                     increment: (4_294_967_296.0 / f64::from(wavelength_mm * PLACES_PER_MM as f32))
                         as u32,
-                    spacing: spacing_for(wavelength_mm).min(1),
+                    poles_per_mm: 1.0 / (POLE_WAVES * wavelength_mm),
                     first: [[0.0; 2]; GAUGES],
                     second: [[0.0; 2]; GAUGES],
                     first_weight: 0.0,
@@ -79,7 +89,8 @@ impl Periodogram {
                     mean_weight: 0.0,
                 }
             }),
-            level: [None; SPACINGS],
+            level: [None; 2],
+            slope: [[0.0; GAUGES]; 2],
         }
     }
 
@@ -88,35 +99,48 @@ impl Periodogram {
         self.level[0].unwrap_or_default()
     }
 
-    /// Takes the knots that a millisecond completed.
-    pub fn push(&mut self, completed: &Completed) {
-        for (spacing, knot) in completed.iter().enumerate().take(2) {
-            let Some(knot) = knot else { continue };
-            let level = self.level[spacing].get_or_insert(knot.gauges);
-            let z = knot.travel_mm * (1.0 / HIGH_PASS_MM);
-            let follow = z / (1.0 + z);
-            let mut felt = [0.0; GAUGES];
-            for gauge in 0..GAUGES {
-                level[gauge] += follow * (knot.gauges[gauge] - level[gauge]);
-                felt[gauge] = knot.gauges[gauge] - level[gauge];
-            }
-            for candidate in &mut self.candidates {
-                if candidate.spacing == spacing {
-                    candidate.take(knot, &felt);
-                }
-            }
+    /// Takes a knot of the finest spacing, 0, or of the next, 1.
+    pub fn push(&mut self, spacing: usize, knot: &Knot) {
+        let level = self.level[spacing].get_or_insert(knot.gauges);
+        let slope = &mut self.slope[spacing];
+        let z = knot.travel_mm * (1.0 / HIGH_PASS_MM);
+        let follow = z / (1.0 + z);
+        let mut felt = [0.0; GAUGES];
+        for gauge in 0..GAUGES {
+            level[gauge] += follow * (knot.gauges[gauge] - level[gauge]);
+            let above = knot.gauges[gauge] - level[gauge];
+            slope[gauge] += follow * (above - slope[gauge]);
+            felt[gauge] = above - slope[gauge];
+        }
+        let (fine, coarse) = self.candidates.split_at_mut(FINE);
+        for candidate in if spacing == 0 { fine } else { coarse } {
+            candidate.take(knot, &felt);
         }
     }
 
-    /// Energy in the usable gauges over the latest waves: behind one pole, and behind both.
+    /// Energy in the usable gauges over the latest waves: behind one pole, and behind both. The gauges count nearly
+    /// alike: see [`EQUAL`].
     pub fn energies(&self, usable: u8) -> (Spectrum, Spectrum) {
-        let usable = &core::array::from_fn(|gauge| f32::from(usable >> gauge & 1));
-        let (mut short, mut long) = ([0.0; CANDIDATES], [0.0; CANDIDATES]);
-        for (i, candidate) in self.candidates.iter().enumerate() {
-            short[i] = energy(&candidate.first, candidate.first_weight, usable);
-            long[i] = energy(&candidate.second, candidate.second_weight, usable);
+        let mut weights: [f32; GAUGES] =
+            core::array::from_fn(|gauge| f32::from(usable >> gauge & 1));
+        let powers: [[f32; GAUGES]; CANDIDATES] = core::array::from_fn(|i| {
+            let candidate = &self.candidates[i];
+            powers(&candidate.second, candidate.second_weight)
+        });
+        let totals: [f32; GAUGES] =
+            core::array::from_fn(|gauge| powers.iter().map(|powers| powers[gauge]).sum());
+        let mean = weighed(&totals, &weights) / larger(weights.iter().sum(), 1.0);
+        for (weight, total) in weights.iter_mut().zip(totals) {
+            *weight *= mean / larger(total + EQUAL * mean, f32::MIN_POSITIVE);
         }
-        (short, long)
+        let short = core::array::from_fn(|i| {
+            let candidate = &self.candidates[i];
+            weighed(
+                &self::powers(&candidate.first, candidate.first_weight),
+                &weights,
+            )
+        });
+        (short, powers.map(|powers| weighed(&powers, &weights)))
     }
 
     /// Takes the energies into the average, `travel_mm` after the last time.
@@ -127,7 +151,7 @@ impl Periodogram {
         }
         let scale = 1.0 / total;
         for (candidate, energy) in self.candidates.iter_mut().zip(energies) {
-            let z = travel_mm / (AVERAGE_WAVES * candidate.wavelength_mm);
+            let z = travel_mm * (POLE_WAVES / AVERAGE_WAVES) * candidate.poles_per_mm;
             // A kernel that is not full yet says little.
             let full = candidate.second_weight * candidate.second_weight;
             let follow = z / (1.0 + z) * full * full;
@@ -138,7 +162,7 @@ impl Periodogram {
 
     /// Starts the average over with the energies of now, of that weight.
     pub fn restart(&mut self, energies: &Spectrum, weight: f32) {
-        let total: f32 = energies.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+        let total: f32 = larger(energies.iter().sum(), f32::MIN_POSITIVE);
         for (candidate, energy) in self.candidates.iter_mut().zip(energies) {
             candidate.mean = weight * energy / total;
             candidate.mean_weight = weight;
@@ -166,7 +190,7 @@ impl Periodogram {
 impl Candidate {
     #[inline]
     fn take(&mut self, knot: &Knot, felt: &[f32; GAUGES]) {
-        let z = knot.travel_mm / (POLE_WAVES * self.wavelength_mm);
+        let z = knot.travel_mm * self.poles_per_mm;
         // e^(−z) to within z³/6.
         let keep = 1.0 / (1.0 + z * (1.0 + 0.5 * z));
         let take = 1.0 - keep;
@@ -183,16 +207,21 @@ impl Candidate {
     }
 }
 
-fn energy(sums: &[[f32; 2]; GAUGES], weight: f32, usable: &[f32; GAUGES]) -> f32 {
+/// Each gauge's energy in a candidate.
+fn powers(sums: &[[f32; 2]; GAUGES], weight: f32) -> [f32; GAUGES] {
     if weight < LEAST_WEIGHT {
-        return 0.0;
+        return [0.0; GAUGES];
     }
-    let sum: f32 = sums
+    let scale = 2.0 / (weight * weight);
+    sums.map(|[re, im]| scale * (re * re + im * im))
+}
+
+fn weighed(powers: &[f32; GAUGES], weights: &[f32; GAUGES]) -> f32 {
+    powers
         .iter()
-        .zip(usable)
-        .map(|([re, im], usable)| usable * (re * re + im * im))
-        .sum();
-    2.0 * sum / (weight * weight)
+        .zip(weights)
+        .map(|(power, weight)| power * weight)
+        .sum()
 }
 
 /// A candidate's wavelength in mm, from the steps of an octave: 2^(n/6).
@@ -219,9 +248,28 @@ pub(super) fn is_peak(spectrum: &Spectrum, number: usize) -> bool {
 
 /// The highest peak.
 pub(super) fn highest_peak(spectrum: &Spectrum) -> Option<usize> {
+    highest_by(spectrum, |number| spectrum[number])
+}
+
+/// The peak that stands highest above the mean of its flanks: what is random lies higher at long waves, and a line
+/// beside it need not be the highest.
+pub(super) fn clearest_peak(spectrum: &Spectrum) -> Option<usize> {
+    highest_by(spectrum, |number| {
+        spectrum[number] - 0.5 * flanks(spectrum, number)
+    })
+}
+
+fn highest_by(spectrum: &Spectrum, height: impl Fn(usize) -> f32) -> Option<usize> {
     (1..CANDIDATES - 1)
         .filter(|&number| is_peak(spectrum, number))
-        .max_by(|&one, &other| spectrum[one].total_cmp(&spectrum[other]))
+        .map(|number| (number, height(number)))
+        .max_by(|(_, one), (_, other)| one.total_cmp(other))
+        .map(|(number, _)| number)
+}
+
+/// The sum of a peak's flanks, a third of an octave to either side.
+fn flanks(spectrum: &Spectrum, number: usize) -> f32 {
+    spectrum[number.saturating_sub(2)] + spectrum[(number + 2).min(CANDIDATES - 1)]
 }
 
 /// The wavelength of a peak in mm. Two poles leave of a wave k the energy P₀/(1 + (2πq)²(kλ − 1)²)² at the
@@ -234,7 +282,7 @@ pub(super) fn vertex_mm(spectrum: &Spectrum, number: usize, both_poles: bool) ->
     let (x0, x2) = (wavelength_mm(number - 1), wavelength_mm(number + 1));
     let least = 1e-9 * spectrum[number];
     let [y0, y1, y2] = [number - 1, number, number + 1].map(|i| {
-        let power = spectrum[i].max(least).max(f32::MIN_POSITIVE);
+        let power = larger(larger(spectrum[i], least), f32::MIN_POSITIVE);
         if both_poles {
             1.0 / sqrt(power)
         } else {
@@ -253,7 +301,9 @@ pub(super) fn vertex_mm(spectrum: &Spectrum, number: usize, both_poles: bool) ->
 /// How far a peak stands above its flanks, a third of an octave to either side: a line has a kernel's
 /// width, a band its own.
 pub(super) fn sharpness(spectrum: &Spectrum, number: usize) -> f32 {
-    let below = spectrum[number.saturating_sub(2)];
-    let above = spectrum[(number + 2).min(CANDIDATES - 1)];
-    2.0 * spectrum[number] / (below + above).max(0.1 * spectrum[number] + f32::MIN_POSITIVE)
+    2.0 * spectrum[number]
+        / larger(
+            flanks(spectrum, number),
+            0.1 * spectrum[number] + f32::MIN_POSITIVE,
+        )
 }

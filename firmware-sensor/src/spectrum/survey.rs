@@ -2,13 +2,16 @@
 
 use super::fit::Pass;
 use super::periodogram::{
-    CANDIDATES, PER_OCTAVE, Spectrum as Energies, highest_peak, is_peak, sharpness, vertex_mm,
-    wavelength_mm,
+    CANDIDATES, PER_OCTAVE, Spectrum as Energies, clearest_peak, highest_peak, is_peak, sharpness,
+    vertex_mm, wavelength_mm,
 };
 use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off};
 
 /// One estimate of so many fits the line over the longer lengths, too; those after it take its fits over.
-const LONGER_EVERY: u8 = 3;
+const LONGER_EVERY: u8 = 5;
+/// How much higher than the peak an end of the spectrum is where the wave lies beyond it. A random part alone lifts the
+/// long end.
+const BEYOND: f32 = 1.5;
 
 /// The spectra's peaks, and what fits are under way.
 #[derive(Clone, Debug, Default)]
@@ -20,9 +23,9 @@ pub(super) struct Survey {
     pub(super) maturity: f32,
     pub(super) presence: f32,
     pub(super) sharpness: f32,
-    /// The moment's highest peak is the line's.
+    /// The moment's clearest peak is the line's.
     pub(super) agree: bool,
-    /// The line is twice or three times as long as the highest peak.
+    /// The line is twice or three times as long as the clearest peak.
     pub(super) longer: bool,
     pub(super) line_pass: Option<Pass>,
     pub(super) wave_pass: Option<Pass>,
@@ -40,16 +43,17 @@ impl Spectrum {
         let survey = &mut self.survey;
         (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
-        let (Some(highest), Some(momentary)) = (highest_peak(&averaged), highest_peak(&energies))
+        let (Some(clearest), Some(momentary)) =
+            (clearest_peak(&averaged), clearest_peak(&energies))
         else {
             return;
         };
         // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
         // shorter one in knots that are too long for it.
-        if averaged[highest] < averaged[0].max(averaged[CANDIDATES - 1]) {
+        if BEYOND * averaged[clearest] < averaged[0].max(averaged[CANDIDATES - 1]) {
             return;
         }
-        let kept = self.kept_peak(&averaged, highest);
+        let kept = self.kept_peak(&averaged, clearest);
         let (number, line_mm) = self
             .longer_period(&averaged, &energies, kept)
             .unwrap_or((kept, vertex_mm(&averaged, kept, true)));
@@ -102,15 +106,15 @@ impl Spectrum {
         });
     }
 
-    /// The peak where the line was, as long as there is one that is not much lower than the highest.
-    fn kept_peak(&self, averaged: &Energies, highest: usize) -> usize {
+    /// The peak where the line was, as long as there is one that is not much lower than the clearest.
+    fn kept_peak(&self, averaged: &Energies, clearest: usize) -> usize {
         let was_mm = self.line.mm;
         (1..CANDIDATES - 1)
-            .filter(|&i| is_peak(averaged, i) && averaged[i] > 0.4 * averaged[highest])
+            .filter(|&i| is_peak(averaged, i) && averaged[i] > 0.4 * averaged[clearest])
             .find(|&i| {
                 was_mm > 0.0 && self.line.held_waves > 3.0 && off(wavelength_mm(i), was_mm) < 0.11
             })
-            .unwrap_or(highest)
+            .unwrap_or(clearest)
     }
 
     /// A period of which the peak is the second or third harmonic, and its candidate.
@@ -141,7 +145,7 @@ impl Spectrum {
     }
 }
 
-/// The moment's highest peak, or the line's where that peak is its second or third harmonic.
+/// The moment's clearest peak, or the line's where that peak is its second or third harmonic.
 fn fundamental_of(energies: &Energies, peak: usize, line: usize, line_mm: f32) -> usize {
     let ratio = line_mm / wavelength_mm(peak);
     if (ratio - 2.0).abs() < 0.2 || (ratio - 3.0).abs() < 0.3 {

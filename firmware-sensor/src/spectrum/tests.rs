@@ -9,7 +9,9 @@ use protocol::GAUGES;
 
 use super::fit::{LENGTH_COUNT, LENGTHS, Pass};
 use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
-use super::periodogram::{Periodogram, highest_peak, sharpness, vertex_mm, wavelength_mm};
+use super::periodogram::{
+    CANDIDATES, Periodogram, clearest_peak, highest_peak, sharpness, vertex_mm, wavelength_mm,
+};
 use super::trend::Trend;
 use crate::travel::PLACES_PER_MM;
 
@@ -45,7 +47,11 @@ fn path(
         };
         let mm = place as f32 / PLACES_PER_MM as f32;
         let gauges = core::array::from_fn(|gauge| felt(mm, gauge));
-        periodogram.push(&knots.push(place, places, &gauges));
+        knots.push(place, places, &gauges, |spacing, knot| {
+            if spacing < 2 {
+                periodogram.push(spacing, knot);
+            }
+        });
     }
     (knots, periodogram)
 }
@@ -67,8 +73,8 @@ fn knots_are_as_long_as_their_spacing_says_and_come_newest_first() {
     for mm_per_ms in [0.013, 0.037, 0.071] {
         let (knots, _) = path(4_000, mm_per_ms, 1_000_000, |mm, _| mm);
         for (spacing, nominal_mm) in SPACINGS_MM.into_iter().enumerate() {
-            let mut reader = knots.backwards(spacing);
-            let mut all: Vec<Knot> = Vec::new();
+            let (partial, mut reader) = knots.backwards(spacing);
+            let mut all: Vec<Knot> = partial.into_iter().collect();
             while let Some(knot) = knots.next(&mut reader) {
                 all.push(*knot);
             }
@@ -93,7 +99,7 @@ fn knots_are_as_long_as_their_spacing_says_and_come_newest_first() {
 
 #[test]
 fn a_spacing_leaves_enough_knots_a_wave() {
-    for number in 0..super::periodogram::CANDIDATES {
+    for number in 0..CANDIDATES {
         let mm = wavelength_mm(number);
         let knots = mm / SPACINGS_MM[spacing_for(mm)];
         assert!((5.0..=18.0).contains(&knots), "{knots} at {mm} mm");
@@ -179,8 +185,48 @@ fn gauges_that_are_left_out_have_no_energy() {
     let (_, periodogram) = path(4_000, 0.04, 1_000_000, only_two);
     let total = |usable| periodogram.energies(usable).1.iter().sum::<f32>();
     assert!(total(0b0_0011) > 1e3);
-    assert!((total(ALL) / total(0b0_0011) - 1.0).abs() < 1e-6);
     assert_eq!(total(0b1_1100), 0.0);
+    // Those that feel nothing hardly change what the others count for.
+    let share = |usable, number: usize| periodogram.energies(usable).1[number] / total(usable);
+    for number in 0..CANDIDATES {
+        assert!((share(ALL, number) - share(0b0_0011, number)).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn a_gauge_with_ten_times_the_gain_does_not_outvote_the_others() {
+    let felt = |mm: f32, gauge: usize| match gauge {
+        0 => 10.0 * wave(mm, gauge, 2.0),
+        _ => wave(mm, gauge, 3.2),
+    };
+    let (_, periodogram) = path(8_000, 0.04, 1_000_000, felt);
+    let (_, energies) = periodogram.energies(ALL);
+    let peak = highest_peak(&energies).expect("there are waves");
+    assert!((wavelength_mm(peak) / 3.2 - 1.0).abs() < 0.06, "{peak}");
+}
+
+#[test]
+fn the_clearest_peak_is_a_line_beside_what_is_random_and_higher() {
+    let mut spectrum = [0.0; CANDIDATES];
+    for (number, energy) in spectrum.iter_mut().enumerate() {
+        // A broad hump around 22.
+        *energy = 10.0 - 0.08 * (number as f32 - 22.0).powi(2);
+    }
+    spectrum[9] += 4.0;
+    assert_eq!(highest_peak(&spectrum), Some(22));
+    assert_eq!(clearest_peak(&spectrum), Some(9));
+    assert_eq!(clearest_peak(&[0.0; CANDIDATES]), None);
+}
+
+#[test]
+fn a_slope_lifts_no_long_wave() {
+    let sloping = |mm: f32, gauge: usize| wave(mm, gauge, 1.2) + 400.0 * mm;
+    let (_, periodogram) = path(8_000, 0.04, 1_000_000, sloping);
+    let (_, energies) = periodogram.energies(ALL);
+    let peak = highest_peak(&energies).expect("there is a wave");
+    assert!((wavelength_mm(peak) / 1.2 - 1.0).abs() < 0.07, "{peak}");
+    let long: f32 = energies[18..].iter().sum();
+    assert!(long < 0.02 * energies[peak], "{long} {}", energies[peak]);
 }
 
 /// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind.

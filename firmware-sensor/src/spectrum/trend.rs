@@ -5,6 +5,7 @@
 //! about, tells what λ is here. Places, not travel: after a turn the fits come by the same places again.
 
 use super::periodogram::{AVERAGE_WAVES, KERNEL_WAVES};
+use crate::float::larger;
 use crate::travel::{PLACES_PER_MM, Place};
 
 /// Travel for which a fit is remembered, in wavelengths.
@@ -123,13 +124,13 @@ impl Trend {
         }
         let scale = 1.0 / self.weight;
         let (x, y) = (self.x * scale, self.y * scale);
-        let spread = (self.xx * scale - x * x).max(1e-6);
+        let spread = larger(self.xx * scale - x * x, 1e-6);
         let common = self.xy * scale - x * y;
         let slope = (common / spread).clamp(-STEEPEST, STEEPEST);
-        let rest = (self.yy * scale - y * y - common * common / spread).max(0.0);
+        let rest = larger(self.yy * scale - y * y - common * common / spread, 0.0);
         let young = MEMORY_WAVES * scale;
         let chance = DOUBT * young * (rest + LEAST_VARIANCE) / spread;
-        let slope = slope * (1.0 - chance / (slope * slope).max(f32::MIN_POSITIVE)).max(0.0);
+        let slope = slope * larger(1.0 - chance / larger(slope * slope, f32::MIN_POSITIVE), 0.0);
         Some(Course {
             here: y - slope * x,
             slope,

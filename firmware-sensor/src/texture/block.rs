@@ -5,9 +5,9 @@ use protocol::texture::PARTIALS;
 
 use super::partial::PartialSum;
 use super::{Complex, times};
+use crate::float::sqrt;
 use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
 use crate::phasor::phasor;
-use crate::root::sqrt;
 
 /// Knots in a block.
 pub(super) const KNOTS: usize = 48;

@@ -2,7 +2,7 @@
 
 use protocol::Friction;
 
-use crate::root::sqrt;
+use crate::float::sqrt;
 
 /// Travel over which friction is averaged, in mm, and for which it does not count after a turn.
 const FRICTION_MM: f32 = 20.0;

@@ -4,7 +4,7 @@ use protocol::Partial;
 use protocol::texture::{LARGEST_RATIO, UNITY};
 
 use super::Complex;
-use crate::root::sqrt;
+use crate::float::sqrt;
 
 /// Blocks over which is averaged.
 pub(super) const MEMORY_BLOCKS: f32 = 8.0;

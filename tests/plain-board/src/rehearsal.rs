@@ -13,7 +13,9 @@ use core::fmt::{self, Debug, Display as Text, Formatter, Write};
 use firmware_display::{
     Display, MICROMETRES_PER_COUNT, Readback, Senses, Settings, TICK_RATE_HZ, Transfer,
 };
-use firmware_sensor::{Drive, MID_RAIL_CODE, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan, Sensor, root};
+use firmware_sensor::{
+    Drive, MID_RAIL_CODE, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan, Sensor, float,
+};
 use protocol::{
     CHANNELS, Configuration, Configure, DisplayConfiguration, DisplayState, GAUGES, Hello,
     MAX_FRAME, Message, Method, Mode, Port, PortCounters, Role, SensorConfiguration, StopReason,
@@ -245,7 +247,7 @@ impl Rehearsal {
             hand = hand.wrapping_add(9_000);
         }
         // Any number but a negative one: the instruction, where there is one, against its software.
-        let root = root::sqrt(f32::from_bits(self.draw() >> 1));
+        let root = float::sqrt(f32::from_bits(self.draw() >> 1));
         if !root.is_nan() {
             self.hashes.sensor.bytes(&root.to_bits().to_le_bytes());
         }

@@ -45,9 +45,16 @@ pub struct Texture {
     pub share: f64,
     /// Share of its power that all gauges meet at the same place; the rest is each one's own.
     pub common: f64,
-    /// Wavelength above which it is white and below which it falls by 6 dB an octave, in mm.
+    /// Wavelength above which it is white and below which it falls by 6 dB an octave and pole, in mm.
     pub corner_mm: f64,
+    /// See `corner_mm`: up to [`POLES`].
+    pub poles: usize,
+    /// Above this it falls again, in mm.
+    pub longest_mm: f64,
 }
+
+/// Most poles of a random part.
+pub const POLES: usize = 4;
 
 /// A track that bends: the ridges are crossed at an angle, λ is longer by 1/cos.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +76,8 @@ pub struct Ground {
     pub second: Option<Second>,
     /// Its random part.
     pub texture: Option<Texture>,
+    /// What it is bent or warped by: long waves.
+    pub form: Option<Texture>,
     /// How the track bends.
     pub bend: Option<Bend>,
     /// The fingertip's contact is a Gaussian of this full width at half maximum, in mm.
@@ -87,15 +96,17 @@ pub struct Profile {
 
 impl Texture {
     fn lay(&self, points: usize, dice: &mut Dice) -> Vec<f32> {
-        /// Above this it falls again, in mm: what is longer is not texture but form.
-        const FORM_MM: f64 = 30.0;
         let keep = libm::exp(-TAU * GRID_MM / self.corner_mm);
-        let slow = libm::exp(-TAU * GRID_MM / FORM_MM);
-        let (mut fine, mut form) = (0.0, 0.0);
-        run_in(points, FORM_MM, || {
-            fine = keep * fine + (1.0 - keep) * dice.gaussian();
-            form = slow * form + (1.0 - slow) * fine;
-            fine - form
+        let slow = libm::exp(-TAU * GRID_MM / self.longest_mm);
+        let (mut stages, mut level) = ([0.0; POLES], 0.0);
+        run_in(points, self.longest_mm, || {
+            let mut fine = dice.gaussian();
+            for stage in &mut stages[..self.poles] {
+                *stage = keep * *stage + (1.0 - keep) * fine;
+                fine = *stage;
+            }
+            level = slow * level + (1.0 - slow) * fine;
+            fine - level
         })
     }
 }
@@ -148,26 +159,25 @@ impl Ground {
         for (wave, cosine) in waves.iter_mut().zip(cosines) {
             *wave /= cosine;
         }
-        let heights = match &self.texture {
-            None => vec![signal],
-            Some(texture) => {
-                let mut layer = |rms: f64| {
-                    let mut heights = texture.lay(points, dice);
-                    blur(&mut heights, sigma_mm);
-                    normalise(&mut heights, rms);
-                    heights
-                };
-                let common = layer(texture.share * libm::sqrt(texture.common));
-                (0..gauges)
-                    .map(|_| {
-                        let own = layer(texture.share * libm::sqrt(1.0 - texture.common));
-                        (signal.iter().zip(&common).zip(own))
-                            .map(|((signal, common), own)| signal + common + own)
-                            .collect()
-                    })
-                    .collect()
-            }
-        };
+        let mut heights = vec![signal];
+        for texture in [&self.texture, &self.form].into_iter().flatten() {
+            let mut layer = |rms: f64| {
+                let mut heights = texture.lay(points, dice);
+                blur(&mut heights, sigma_mm);
+                normalise(&mut heights, rms);
+                heights
+            };
+            let common = layer(texture.share * libm::sqrt(texture.common));
+            heights = (0..gauges)
+                .map(|gauge| {
+                    let own = layer(texture.share * libm::sqrt(1.0 - texture.common));
+                    let below = &heights[gauge.min(heights.len() - 1)];
+                    (below.iter().zip(&common).zip(own))
+                        .map(|((below, common), own)| below + common + own)
+                        .collect()
+                })
+                .collect();
+        }
         Profile {
             from_mm,
             heights,

@@ -28,7 +28,8 @@
 //!
 //! | of all | how often | range |
 //! | --- | --- | --- |
-//! | random part | 0.5 | RMS 0–1 of the signal; falls below 0.2–4 mm; 0–1 of it common to the gauges |
+//! | random part | 0.5 | RMS 0–1.5 of the signal; falls below 0.2–4 mm; 0–1 of it common to the gauges |
+//! | form | 0.3 | RMS 0–3 of the signal; falls steeply below 12–40 mm; 0.7–1 of it common to the gauges |
 //! | contact | always | a Gaussian 0.1–0.3 mm wide at half height |
 //!
 //! | without a period | what |
@@ -41,13 +42,15 @@
 //! | steps | at random, 2–15 mm apart as a mean |
 //! | hum only | flat, hum of 0.3–2 of the level |
 //!
+//! Flat surfaces have neither random part nor form.
+//!
 //! The hand's distributions are [`Hand`]'s, the gauges' are [`Pickup`]'s.
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Scan};
 
 use super::dice::Dice;
 use super::ground::{
-    Bend, Ground, Plain, Ridges, Second, Specimen, Texture, Waveform, greatest_angle,
+    Bend, Ground, POLES, Plain, Ridges, Second, Specimen, Texture, Waveform, greatest_angle,
 };
 use super::hand::{Hand, Path, Stroke};
 use super::pickup::{GAUGES, Pickup};
@@ -60,6 +63,7 @@ const STREAM_OF_DRAWS: u64 = 1;
 const STREAM_OF_MOTION: u64 = 2;
 const STREAM_OF_GROUND: u64 = 3;
 const STREAM_OF_GAUGES: u64 = 4;
+const STREAM_OF_FORM: u64 = 5;
 
 /// What kind of surface a trial has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -188,6 +192,7 @@ impl Trial {
             first,
             second,
             texture,
+            form: form(class, &mut Dice::new(seed, STREAM_OF_FORM)),
             bend: None,
             contact_mm,
         };
@@ -293,7 +298,9 @@ impl Trial {
             (self.ground.second.is_some(), "two specimens"),
             (self.ground.bend.is_some(), "curved track"),
             (random > 0.0 && random <= 0.5, "random part to 0.5"),
-            (random > 0.5, "random part above 0.5"),
+            (random > 0.5 && random <= 1.0, "random part 0.5–1"),
+            (random > 1.0, "random part above 1"),
+            (self.ground.form.is_some(), "form"),
             (self.pickup.noise_corner_hz > 0.0, "noise with a corner"),
             (self.pickup.pink > 0.0, "1/f noise"),
             (self.pickup.hum > 0.0, "hum"),
@@ -404,7 +411,7 @@ fn second(first: &Specimen, dice: &mut Dice) -> Option<Second> {
 }
 
 fn texture(class: Class, dice: &mut Dice) -> Option<Texture> {
-    let share = dice.sometimes(0.5, 0.0, 1.0);
+    let share = dice.sometimes(0.5, 0.0, 1.5);
     let woven = dice.between(0.2, 0.8);
     let share = match class {
         Class::Weave => woven,
@@ -416,8 +423,22 @@ fn texture(class: Class, dice: &mut Dice) -> Option<Texture> {
         share,
         common: dice.uniform(),
         corner_mm: dice.log_between(0.2, 4.0),
+        poles: 1,
+        longest_mm: 30.0,
     };
     (share > 0.0).then_some(texture)
+}
+
+fn form(class: Class, dice: &mut Dice) -> Option<Texture> {
+    let form = Texture {
+        share: dice.sometimes(0.3, 0.0, 3.0),
+        common: dice.between(0.7, 1.0),
+        corner_mm: dice.log_between(12.0, 40.0),
+        poles: POLES,
+        longest_mm: 200.0,
+    };
+    let flat = matches!(class, Class::Flat | Class::HumOnly);
+    (form.share > 0.0 && !flat).then_some(form)
 }
 
 fn bend(ground: &Ground, dice: &mut Dice) -> Option<Bend> {

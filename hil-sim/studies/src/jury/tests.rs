@@ -6,7 +6,8 @@ use firmware_display::Settings;
 use protocol::SensorConfiguration;
 
 use super::counts::Counts;
-use super::ground::{Bend, Ground, Plain, Ridges, Second, Specimen, Texture, Waveform};
+use super::dice::Dice;
+use super::ground::{Bend, Ground, POLES, Plain, Ridges, Second, Specimen, Texture, Waveform};
 use super::hand::{Encoder, Hand, SCANS_PER_S, Stroke};
 use super::pickup::{Gauge, Pickup};
 use super::play::play;
@@ -25,6 +26,7 @@ fn clean(class: Class, first: Specimen) -> Trial {
             first,
             second: None,
             texture: None,
+            form: None,
             bend: None,
             contact_mm: 0.1,
         },
@@ -218,6 +220,37 @@ fn the_period_of_every_waveform_is_the_truth() {
 }
 
 #[test]
+fn a_form_has_no_short_waves() {
+    const MM: f64 = 2_000.0;
+    let ground = Ground {
+        first: Specimen::Plain(Plain::Flat),
+        second: None,
+        texture: None,
+        form: Some(Texture {
+            share: 2.0,
+            common: 1.0,
+            corner_mm: 12.0,
+            poles: POLES,
+            longest_mm: 200.0,
+        }),
+        bend: None,
+        contact_mm: 0.2,
+    };
+    let profile = ground.lay(0.0, MM, 1, &mut Dice::new(3, 1));
+    let at = |point: usize| f64::from(profile.height(0, 0.1 * point as f64));
+    // Against the middle of its neighbours 1 mm away, a wave of 4 mm would keep all its power.
+    let points = 10..(10.0 * MM) as usize - 10;
+    let (mut all, mut short) = (0.0, 0.0);
+    for point in points.clone() {
+        all += at(point).powi(2);
+        short += (at(point) - 0.5 * (at(point - 10) + at(point + 10))).powi(2);
+    }
+    let rms = (all / points.len() as f64).sqrt();
+    assert!((rms - 2.0).abs() < 0.05, "{rms}");
+    assert!((short / all).sqrt() < 0.03, "{}", (short / all).sqrt());
+}
+
+#[test]
 fn of_two_waves_the_truth_is_the_stronger_and_the_weaker_has_its_share() {
     for ratio in [0.6, 1.7] {
         let waveform = Waveform::TwoWaves {
@@ -391,6 +424,8 @@ fn a_random_part_is_common_to_the_gauges_or_their_own() {
             share: 1.0,
             common,
             corner_mm: 0.5,
+            poles: 1,
+            longest_mm: 30.0,
         });
         for gauge in &mut trial.pickup.gauges {
             gauge.place_mm = 0.0;

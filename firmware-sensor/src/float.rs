@@ -1,4 +1,4 @@
-//! The square root, by the processor's own instruction where it has one.
+//! What the processor has instructions for, but core on it has not, or only as calls.
 
 /// √x, rounded to nearest as IEEE 754 has it: the same bits everywhere. NaN for a negative x.
 ///
@@ -28,4 +28,18 @@ pub fn sqrt(x: f32) -> f32 {
     }
     #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
     libm::sqrtf(x)
+}
+
+/// The larger of two; `other` where one of them is no number.
+///
+/// `f32::max` is a call on the boards, for what it promises of numbers that are none.
+#[inline(always)]
+pub fn larger(one: f32, other: f32) -> f32 {
+    if one > other { one } else { other }
+}
+
+/// The smaller of two; `other` where one of them is no number. See [`larger`].
+#[inline(always)]
+pub fn smaller(one: f32, other: f32) -> f32 {
+    if one < other { one } else { other }
 }
