@@ -483,7 +483,7 @@ fn encoders_count_five_micrometres_and_lose_what_they_say() {
     };
     let arm_mm: Vec<f64> = (0..40_000).map(|scan| 0.01 * f64::from(scan)).collect();
     let travelled = |encoder: &Encoder| {
-        let counts = encoder.counts(&arm_mm, &mut super::dice::Dice::new(3, 1));
+        let counts = encoder.counts(&arm_mm, &mut Dice::new(3, 1));
         assert_eq!(counts.len(), 10_000);
         let steps = counts.windows(2);
         steps
