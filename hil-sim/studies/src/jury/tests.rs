@@ -166,8 +166,8 @@ fn a_seed_means_the_same_trial_on_every_machine() {
             })
     });
     let expected = [
-        0xc425_62c5_84c2_d662,
-        0x8a3d_e83a_002a_970a,
+        0x9e3a_d0a5_77a8_c397,
+        0x96bc_f3b5_164d_101a,
         0x4186_ca82_75bb_6afe,
     ];
     assert_eq!(hashes, expected, "{hashes:#x?}");
@@ -238,7 +238,7 @@ fn a_form_has_no_short_waves() {
     };
     let profile = ground.lay(0.0, MM, 1, &mut Dice::new(3, 1));
     let at = |point: usize| f64::from(profile.height(0, 0.1 * point as f64));
-    // Against the middle of its neighbours 1 mm away, a wave of 4 mm would keep all its power.
+    // Against the middle of its neighbours 1 mm away, a wave of 4 mm keeps all its height, one of 12 mm 0.13 of it.
     let points = 10..(10.0 * MM) as usize - 10;
     let (mut all, mut short) = (0.0, 0.0);
     for point in points.clone() {
@@ -247,7 +247,7 @@ fn a_form_has_no_short_waves() {
     }
     let rms = (all / points.len() as f64).sqrt();
     assert!((rms - 2.0).abs() < 0.05, "{rms}");
-    assert!((short / all).sqrt() < 0.03, "{}", (short / all).sqrt());
+    assert!((short / all).sqrt() < 0.1, "{}", (short / all).sqrt());
 }
 
 #[test]
