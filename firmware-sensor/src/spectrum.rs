@@ -9,8 +9,8 @@
 //! Position, not time, is the independent variable, so a change of speed or direction changes nothing. On
 //! a real surface the wave explains a quarter of what the gauges say, and chance explains nearly as much:
 //! what tells them apart is whether a line stays where it is over fresh ground. So each estimate has two
-//! suppositions. The *line* is the highest peak of the averaged spectrum; the *wave* is the highest peak of
-//! the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
+//! suppositions. The *line* is the clearest peak of the averaged spectrum, the one that stands highest above
+//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
 //! waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
 //! λ̂ is the period: a line at 2 λ or 3 λ that is at least 0.4 times as high as one at λ is taken for the
@@ -29,7 +29,7 @@ use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Travel};
 use evidence::{LineEvidence, WaveEvidence};
 use fit::{Fitted, LENGTH_COUNT, LENGTHS};
 use jerk::Jerk;
-use knots::Knots;
+use knots::{Knot, Knots};
 use line::Line;
 use periodogram::Periodogram;
 use play::Play;
@@ -128,7 +128,7 @@ pub struct Spectrum {
     /// The last estimate that was stood by, in mm, and the share over two waves since; 0 before.
     known_mm: f32,
     known_share: f32,
-    /// The last λ̂ that was probable enough, in mm, and how many times in a row it was: up to [`TIMES`].
+    /// The last λ̂ in mm, and how many times in a row it was probable enough: up to [`TIMES`].
     sure_mm: f32,
     sure_times: u8,
     /// How λ of the line changes along the way.
@@ -318,13 +318,9 @@ impl Estimator for Spectrum {
         } else {
             self.rested = 0;
             let periodogram = &mut self.periodogram;
+            let tell = |spacing, knot: &Knot| periodogram.push(spacing, knot);
             self.knots
-                .push(touch.place, travel.abs(), &touch.gauges, |spacing, knot| {
-                    // The coarsest are for fits alone.
-                    if spacing < 2 {
-                        periodogram.push(spacing, knot);
-                    }
-                });
+                .push(touch.place, travel.abs(), &touch.gauges, tell);
             let mm = travel.abs() as f32 * (1.0 / PLACES_PER_MM as f32);
             self.fresh_mm += mm;
             self.travelled_mm += mm;
@@ -352,10 +348,7 @@ impl Estimator for Spectrum {
         self.weighed = Weighed::default();
         let line = self.weigh_line();
         let wave = self.weigh_wave().filter(|_| !self.line_goes_on());
-        if let Some(wave) = &wave
-            && wave.probability > CONVINCING
-            && self.wave.held_waves > 1.0
-        {
+        if wave.is_some() && self.wave.is_surface {
             self.begin_anew();
         }
         let likelier = |one: Supposition, other: Supposition| {

@@ -345,12 +345,12 @@ fn rounding_bound() -> f64 {
 
 #[test]
 fn a_recording_makes_a_scene_that_gives_its_estimates_again() {
-    let toml = format!("{STROKES}[estimator]\nwaves = 6\nvalid_percent = 70\n");
+    let toml = format!("{STROKES}[estimator]\nwaves = 6\nvalid_percent = 80\n");
     let round = round("clean", &toml, 0.0, None);
     assert!(round.outcome.unmet.is_empty(), "{:?}", round.outcome.unmet);
     assert!((round.made.wavelength_mm / 2.0 - 1.0).abs() < 0.005);
     assert_eq!(round.outcome.scene.estimator.waves, 6);
-    assert_eq!(round.outcome.scene.estimator.valid_percent, 70);
+    assert_eq!(round.outcome.scene.estimator.valid_percent, 80);
     assert_eq!(round.outcome.scene.notes, []);
     let (alike, worst) = round.agreement(KNOWN_S);
     assert!(alike == 1.0 && worst < rounding_bound(), "{alike}, {worst}");

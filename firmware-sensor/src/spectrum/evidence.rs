@@ -18,7 +18,8 @@ pub struct LineEvidence {
     pub travelled_waves: f32,
     /// Travel for which the line has been where it is, in wavelengths.
     pub held_waves: f32,
-    /// Share of the energy that the wave explains over the latest two, three and eight waves.
+    /// Share of the energy that the wave explains over the latest two, three and eight waves, or as many of these as are
+    /// configured: so for all that is said of eight.
     pub shares: [f32; 3],
     /// How far the fits over three and eight waves are from the line, RMS over the average's memory.
     pub wander: [f32; 2],

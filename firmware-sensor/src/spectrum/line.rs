@@ -59,7 +59,7 @@ struct Seen {
     drift: f32,
     /// See [`Survey::agree`].
     agrees: bool,
-    /// Of the fits over three and eight waves: how far from the line, and shares.
+    /// Of the fits over three waves and over the longest length: how far from the line, and shares.
     wander: [f32; 2],
     shares: [f32; 2],
 }
@@ -91,12 +91,12 @@ impl Spectrum {
         }
         let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
         let share = near(1, 0.2).map_or(0.0, share_over);
-        let chosen = (share > STRONG)
+        let of_strong = (share > STRONG)
             .then(|| longest_that_agrees(&found))
-            .flatten()
-            .or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, NEAR)));
+            .flatten();
+        let chosen = of_strong.or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, NEAR)));
         let fitted = chosen.and_then(|n| found[n]);
-        let wavelength_mm = self.weighed_mm(&found, here_mm, share > STRONG);
+        let wavelength_mm = self.weighed_mm(&found, here_mm, of_strong);
         self.line.fitted_mm = chosen.map_or(0.0, |n| middles[n]);
         self.line.share = if fitted.is_some() { share } else { 0.0 };
         let wander = |n: usize| {
@@ -104,13 +104,16 @@ impl Spectrum {
                 smaller(off(fitted.wavelength_mm, here_mm), 0.15)
             })
         };
+        // The longest that is configured says what the longest of all would.
+        let longest = self.lengths.saturating_sub(1);
+        let three = longest.min(2);
         let seen = Seen {
             fresh_mm: self.survey.fresh_mm,
             ln_here: libm::logf(here_mm),
             drift,
             agrees: self.survey.agree,
-            wander: [wander(2), wander(4)],
-            shares: [share_over(2), share_over(4)],
+            wander: [wander(three), wander(longest)],
+            shares: [share_over(three), share_over(longest)],
         };
         self.line.follow(line_mm, &seen);
         // A strong wave that explains much less than it used to is going, whatever its past says.
@@ -124,7 +127,7 @@ impl Spectrum {
             maturity: self.survey.maturity,
             travelled_waves: self.travelled_mm / line_mm,
             held_waves: self.line.held_waves,
-            shares: [share_over(1), share_over(2), share_over(4)],
+            shares: [share_over(1), share_over(three), share_over(longest)],
             wander: self.line.squares.map(sqrt),
             agreement: self.line.agreement,
             distance: off(wavelength_mm, here_mm),
@@ -162,7 +165,7 @@ impl Spectrum {
         &self,
         found: &[Option<Fitted>; LENGTH_COUNT],
         here_mm: f32,
-        strong: bool,
+        of_strong: Option<usize>,
     ) -> f32 {
         let fits = found.map(|fitted| fitted.map(|fitted| fitted.wavelength_mm));
         let course = self.trend.course().map(|course| libm::expf(course.here));
@@ -170,12 +173,18 @@ impl Spectrum {
             mm.filter(|&mm| off(mm, base_mm) < most)
                 .map(|mm| libm::logf(mm / base_mm))
         };
-        let sum: f32 = [course, fits[2], fits[3]]
+        let (mut sum, mut count) = (0.0, 0.0);
+        for away in [course, fits[2], fits[3]]
             .into_iter()
             .filter_map(|mm| within(mm, here_mm, NEAR))
-            .sum();
-        let mean_mm = here_mm * libm::expf(0.25 * sum);
-        if strong && let Some(fit_mm) = longest_that_agrees(found).and_then(|n| fits[n]) {
+        {
+            sum += away;
+            count += 1.0;
+        }
+        // The peak of an average that is not full yet is still what it was begun with.
+        let peak = self.survey.maturity * (4.0 - count);
+        let mean_mm = here_mm * libm::expf(sum / larger(count + peak, 1.0));
+        if let Some(fit_mm) = of_strong.and_then(|n| fits[n]) {
             let held = self.line.held_waves > MEMORY_WAVES;
             if !held || off(fit_mm, mean_mm) < 0.05 {
                 return fit_mm;

@@ -8,7 +8,7 @@ use protocol::GAUGES;
 
 use super::knots::{Knot, spacing_for};
 use crate::estimator::MIN_AMPLITUDE_LSB;
-use crate::float::{larger, sqrt};
+use crate::float::{larger, smaller, sqrt};
 use crate::phasor::phasor;
 use crate::travel::PLACES_PER_MM;
 
@@ -37,6 +37,10 @@ pub(super) const AVERAGE_WAVES: f32 = 14.0;
 const LEAST_ENERGY: f32 = 10.0 * MIN_AMPLITUDE_LSB * MIN_AMPLITUDE_LSB;
 /// Weight of a pole below which it is not looked at.
 const LEAST_WEIGHT: f32 = 1e-3;
+
+/// Weight of an average below which nothing is known of a candidate: its kernel is not full yet, and the little that it
+/// holds looks like much.
+const LEAST_MATURITY: f32 = 1e-3;
 
 /// A candidate wavelength.
 #[derive(Clone, Copy, Debug)]
@@ -99,9 +103,12 @@ impl Periodogram {
         self.level[0].unwrap_or_default()
     }
 
-    /// Takes a knot of the finest spacing, 0, or of the next, 1.
+    /// Takes a knot of any spacing. Those of the coarsest are for fits alone.
     pub fn push(&mut self, spacing: usize, knot: &Knot) {
-        let level = self.level[spacing].get_or_insert(knot.gauges);
+        let Some(level) = self.level.get_mut(spacing) else {
+            return;
+        };
+        let level = level.get_or_insert(knot.gauges);
         let slope = &mut self.slope[spacing];
         let z = knot.travel_mm * (1.0 / HIGH_PASS_MM);
         let follow = z / (1.0 + z);
@@ -123,24 +130,26 @@ impl Periodogram {
     pub fn energies(&self, usable: u8) -> (Spectrum, Spectrum) {
         let mut weights: [f32; GAUGES] =
             core::array::from_fn(|gauge| f32::from(usable >> gauge & 1));
-        let powers: [[f32; GAUGES]; CANDIDATES] = core::array::from_fn(|i| {
+        let long: [[f32; GAUGES]; CANDIDATES] = core::array::from_fn(|i| {
             let candidate = &self.candidates[i];
             powers(&candidate.second, candidate.second_weight)
         });
         let totals: [f32; GAUGES] =
-            core::array::from_fn(|gauge| powers.iter().map(|powers| powers[gauge]).sum());
-        let mean = weighed(&totals, &weights) / larger(weights.iter().sum(), 1.0);
+            core::array::from_fn(|gauge| long.iter().map(|powers| powers[gauge]).sum());
+        let total = weighed(&totals, &weights);
+        let equal = EQUAL * total / larger(weights.iter().sum(), 1.0);
         for (weight, total) in weights.iter_mut().zip(totals) {
-            *weight *= mean / larger(total + EQUAL * mean, f32::MIN_POSITIVE);
+            *weight /= larger(total + equal, f32::MIN_POSITIVE);
         }
+        // Together they hold as much as before.
+        let scale = total / larger(weighed(&totals, &weights), f32::MIN_POSITIVE);
+        let weights = weights.map(|weight| scale * weight);
         let short = core::array::from_fn(|i| {
             let candidate = &self.candidates[i];
-            weighed(
-                &self::powers(&candidate.first, candidate.first_weight),
-                &weights,
-            )
+            let powers = powers(&candidate.first, candidate.first_weight);
+            weighed(&powers, &weights)
         });
-        (short, powers.map(|powers| weighed(&powers, &weights)))
+        (short, long.map(|powers| weighed(&powers, &weights)))
     }
 
     /// Takes the energies into the average, `travel_mm` after the last time.
@@ -169,11 +178,11 @@ impl Periodogram {
         }
     }
 
-    /// The average: shares of the energy.
+    /// The average: shares of the energy, 0 where nothing is known yet.
     pub fn averaged(&self) -> Spectrum {
         core::array::from_fn(|i| {
             let candidate = &self.candidates[i];
-            if candidate.mean_weight > 1e-6 {
+            if candidate.mean_weight > LEAST_MATURITY {
                 candidate.mean / candidate.mean_weight
             } else {
                 0.0
@@ -237,11 +246,11 @@ pub(super) const fn wavelength_mm(number: usize) -> f32 {
     SHORTEST_MM * (1_u32 << (number / PER_OCTAVE)) as f32 * STEPS[number % PER_OCTAVE]
 }
 
-/// Whether there is a peak at candidate `number`: the ends have none.
+/// Whether there is a peak at candidate `number`: the ends have none, nor has one beside what is not known yet.
 pub(super) fn is_peak(spectrum: &Spectrum, number: usize) -> bool {
     number >= 1
         && number + 1 < CANDIDATES
-        && spectrum[number] > 0.0
+        && smaller(spectrum[number - 1], spectrum[number + 1]) > 0.0
         && spectrum[number] >= spectrum[number - 1]
         && spectrum[number] >= spectrum[number + 1]
 }

@@ -53,7 +53,11 @@ impl Spectrum {
         if BEYOND * averaged[clearest] < averaged[0].max(averaged[CANDIDATES - 1]) {
             return;
         }
-        let kept = self.kept_peak(&averaged, clearest);
+        let kept = if self.line.held_waves > 3.0 {
+            peak_at(&averaged, self.line.mm, clearest).unwrap_or(clearest)
+        } else {
+            clearest
+        };
         let (number, line_mm) = self
             .longer_period(&averaged, &energies, kept)
             .unwrap_or((kept, vertex_mm(&averaged, kept, true)));
@@ -88,14 +92,22 @@ impl Spectrum {
             SHORTER_LENGTHS.min(self.lengths)
         };
         survey.line_pass = Some(Pass::new(start_mm, 1..lengths, usable, base));
-        // The short kernel sees a new surface first.
-        let newest = highest_peak(&short)
+        // The short kernel sees a new surface first. What takes a line's place goes on as long as it has a peak.
+        let highest = highest_peak(&short);
+        let goes_on = (self.line.there < 0.5)
+            .then_some(highest)
+            .flatten()
+            .and_then(|highest| peak_at(&short, self.wave.mm, highest))
+            .map(|_| self.wave.mm);
+        let newest = highest
             .map(|number| vertex_mm(&short, number, false))
             .filter(|&mm| {
                 let known = self.known_mm > 0.0 && off(mm, self.known_mm) > 0.25;
                 off(mm, here_mm) > 0.12 && (known || off(mm, self.wave.mm) < SAME)
             });
-        let wave_mm = newest.or((!survey.agree).then_some(momentary_mm));
+        let wave_mm = goes_on
+            .or(newest)
+            .or((!survey.agree).then_some(momentary_mm));
         survey.wave_pass = wave_mm.map(|mm| {
             let start_mm = if off(self.wave.mm, mm) < 0.06 {
                 self.wave.mm
@@ -104,17 +116,6 @@ impl Spectrum {
             };
             Pass::new(start_mm, 0..3.min(self.lengths), usable, base)
         });
-    }
-
-    /// The peak where the line was, as long as there is one that is not much lower than the clearest.
-    fn kept_peak(&self, averaged: &Energies, clearest: usize) -> usize {
-        let was_mm = self.line.mm;
-        (1..CANDIDATES - 1)
-            .filter(|&i| is_peak(averaged, i) && averaged[i] > 0.4 * averaged[clearest])
-            .find(|&i| {
-                was_mm > 0.0 && self.line.held_waves > 3.0 && off(wavelength_mm(i), was_mm) < 0.11
-            })
-            .unwrap_or(clearest)
     }
 
     /// A period of which the peak is the second or third harmonic, and its candidate.
@@ -143,6 +144,13 @@ impl Spectrum {
         }
         None
     }
+}
+
+/// The peak at `mm`, if there is one that is not much lower than peak `number`.
+fn peak_at(energies: &Energies, mm: f32, number: usize) -> Option<usize> {
+    (1..CANDIDATES - 1)
+        .filter(|&i| is_peak(energies, i) && energies[i] > 0.4 * energies[number])
+        .find(|&i| mm > 0.0 && off(wavelength_mm(i), mm) < 0.11)
 }
 
 /// The moment's clearest peak, or the line's where that peak is its second or third harmonic.

@@ -48,9 +48,7 @@ fn path(
         let mm = place as f32 / PLACES_PER_MM as f32;
         let gauges = core::array::from_fn(|gauge| felt(mm, gauge));
         knots.push(place, places, &gauges, |spacing, knot| {
-            if spacing < 2 {
-                periodogram.push(spacing, knot);
-            }
+            periodogram.push(spacing, knot);
         });
     }
     (knots, periodogram)
@@ -185,6 +183,7 @@ fn gauges_that_are_left_out_have_no_energy() {
     let (_, periodogram) = path(4_000, 0.04, 1_000_000, only_two);
     let total = |usable| periodogram.energies(usable).1.iter().sum::<f32>();
     assert!(total(0b0_0011) > 1e3);
+    assert!((total(ALL) / total(0b0_0011) - 1.0).abs() < 1e-6);
     assert_eq!(total(0b1_1100), 0.0);
     // Those that feel nothing hardly change what the others count for.
     let share = |usable, number: usize| periodogram.energies(usable).1[number] / total(usable);
@@ -210,12 +209,15 @@ fn the_clearest_peak_is_a_line_beside_what_is_random_and_higher() {
     let mut spectrum = [0.0; CANDIDATES];
     for (number, energy) in spectrum.iter_mut().enumerate() {
         // A broad hump around 22.
-        *energy = 10.0 - 0.08 * (number as f32 - 22.0).powi(2);
+        *energy = (10.0 - 0.08 * (number as f32 - 22.0).powi(2)).max(0.1);
     }
     spectrum[9] += 4.0;
     assert_eq!(highest_peak(&spectrum), Some(22));
     assert_eq!(clearest_peak(&spectrum), Some(9));
     assert_eq!(clearest_peak(&[0.0; CANDIDATES]), None);
+    // Nothing is known of what is next to it.
+    spectrum[10] = 0.0;
+    assert_eq!(clearest_peak(&spectrum), Some(22));
 }
 
 #[test]

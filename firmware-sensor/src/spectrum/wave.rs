@@ -1,13 +1,16 @@
 //! The wave of the moment, where it is not the line: a new surface, or chance.
 
 use super::evidence::{WaveEvidence, best_of};
-use super::{SAME, Spectrum, Supposition, is_common, off};
+use super::{CONVINCING, SAME, Spectrum, Supposition, is_common, off};
+use crate::float::larger;
 
 /// The wave of the moment, from one estimate to the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Wave {
     pub(super) mm: f32,
     pub(super) held_waves: f32,
+    /// It is the surface: convincing by its evidence alone, and there for a wavelength.
+    pub(super) is_surface: bool,
 }
 
 impl Spectrum {
@@ -26,8 +29,11 @@ impl Spectrum {
         }
         self.wave.mm = best.wavelength_mm;
         let evidence = WaveEvidence::of(&found, self.wave.held_waves, self.known_share)?;
+        let probability = evidence.probability();
         self.weighed.wave = Some((best.wavelength_mm, evidence));
-        if !is_common(&best, self.touch.usable) {
+        let is_common = is_common(&best, self.touch.usable);
+        self.wave.is_surface = is_common && probability > CONVINCING && self.wave.held_waves > 1.0;
+        if !is_common {
             return None;
         }
         // Where a strong line has gone, something has taken its place.
@@ -35,7 +41,7 @@ impl Spectrum {
         let least = if follows { best.share() } else { 0.0 };
         Some(Supposition {
             wavelength_mm: best.wavelength_mm,
-            probability: evidence.probability().max(least),
+            probability: larger(probability, least),
             fitted: Some(best),
             new: follows,
         })

@@ -81,30 +81,6 @@ fn off(texture: &Texture, shape: Shape) -> (f64, f64) {
     })
 }
 
-/// The level of each band and the share that repeats, told last on other pieces of `ground`: RMS and mean. One piece of a
-/// random surface has few waves of the lowest band: of 24 pieces, some were told 1 to 3 dB too high.
-fn typical(ground: Ground, snr_db: f64, speed_mm_s: f64, ms: u64) -> ([f64; BANDS], f64) {
-    const PIECES: usize = 9;
-    let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
-    let told: Vec<Texture> = (0..PIECES)
-        .map(|piece| {
-            let from_mm = 37.3 * piece as f64;
-            let mut bench = Bench::new(SensorConfiguration::DEFAULT);
-            bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
-            bench.rub(
-                ms,
-                |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
-                |gauge, x_mm, _| ground.felt(gauge, x_mm + from_mm),
-            );
-            last_valid(&bench)
-        })
-        .collect();
-    let mean = |of: &dyn Fn(&Texture) -> f64| told.iter().map(of).sum::<f64>() / PIECES as f64;
-    let levels =
-        std::array::from_fn(|band| mean(&|told| f64::from(told.bands[band]).powi(2)).sqrt());
-    (levels, mean(&|told| told.repeating_percent.into()))
-}
-
 fn last_valid(bench: &Bench) -> Texture {
     let valid = bench.textures.iter().rev().find(|told| told.valid);
     *valid.unwrap_or_else(|| panic!("none is valid: {:?}", bench.textures))
@@ -150,7 +126,7 @@ fn partials_are_within_a_db_and_five_degrees_at_20_db_and_three_db_at_0_db() {
 
 #[test]
 fn what_does_not_repeat_is_told_in_its_band_whatever_the_speed() {
-    let told_db = |told: f64| 20.0 * (told.max(1.0) / 300.0).log10();
+    let told_db = |told: u16| 20.0 * (f64::from(told).max(1.0) / 300.0).log10();
     for (wavelength_mm, speed_mm_s) in [(1.0, 40.0), (2.0, 20.0), (2.0, 70.0), (4.0, 70.0)] {
         for band in 0..BANDS {
             let ground = Ground {
@@ -158,7 +134,7 @@ fn what_does_not_repeat_is_told_in_its_band_whatever_the_speed() {
                 shape: PLAIN,
                 random: Some((band, 0.3)),
             };
-            let (told, repeating) = typical(ground, 20.0, speed_mm_s, 6_000);
+            let told = last_valid(&rubbed(ground, 20.0, speed_mm_s, 6_000));
             let what = format!("{wavelength_mm} mm, {speed_mm_s} mm/s, band {band}: {told:?}");
             // Of the lowest band, a block of 12 mm has one line, of which the fitted slope takes its share.
             let least_db = if (band, wavelength_mm) == (0, 4.0) {
@@ -166,15 +142,15 @@ fn what_does_not_repeat_is_told_in_its_band_whatever_the_speed() {
             } else {
                 -6.5
             };
-            let own_db = told_db(told[band]);
+            let own_db = told_db(told.bands[band]);
             assert!((least_db..1.0).contains(&own_db), "{own_db} dB: {what}");
-            for (other, &level) in told.iter().enumerate() {
+            for (other, &level) in told.bands.iter().enumerate() {
                 assert!(
                     other == band || told_db(level) < own_db - 2.5,
                     "band {other}: {what}"
                 );
             }
-            assert!((75.0..=97.0).contains(&repeating), "{repeating} %: {what}");
+            assert!((75..=97).contains(&told.repeating_percent), "{what}");
         }
     }
 }
@@ -187,15 +163,14 @@ fn noise_is_no_texture() {
         random: None,
     };
     for (wavelength_mm, speed_mm_s) in RUBS {
-        for (snr_db, most, least_percent) in [(20.0, 30.0, 99.0), (0.0, 150.0, 94.0)] {
-            let (told, repeating) = typical(plain(wavelength_mm), snr_db, speed_mm_s, 4_000);
-            let what = format!("{wavelength_mm} mm, {speed_mm_s} mm/s, {snr_db} dB: {told:?}");
-            assert!(told.iter().all(|&band| band <= most), "{what}");
-            assert!(repeating >= least_percent, "{repeating} %: {what}");
+        for (snr_db, most, least_percent) in [(20.0, 30, 99), (0.0, 150, 94)] {
             let bench = rubbed(plain(wavelength_mm), snr_db, speed_mm_s, 4_000);
-            let ratios = last_valid(&bench).partials.map(|partial| partial.ratio);
-            let small = |&ratio: &u16| f64::from(ratio) <= most / 3.0;
-            assert!(ratios.iter().all(small), "{ratios:?}: {what}");
+            let told = last_valid(&bench);
+            let what = format!("{wavelength_mm} mm, {speed_mm_s} mm/s, {snr_db} dB: {told:?}");
+            assert!(told.bands.iter().all(|&band| band <= most), "{what}");
+            let ratios = told.partials.map(|partial| partial.ratio);
+            assert!(ratios.iter().all(|&ratio| ratio <= most / 3), "{what}");
+            assert!(told.repeating_percent >= least_percent, "{what}");
         }
     }
 }

@@ -90,10 +90,9 @@ fn the_finger_feels_the_same_on_both_engines() {
         let native = Judgement::of(&run.scene, false).unwrap_or_else(|error| panic!("{error}"));
         let (ours, theirs) = (native.verdict.summary, run.verdict.summary);
         // The boards scan between the native engine's scans, so an estimate may be stood by one sooner or
-        // later, 10 ms, and be in force two ticks later: at the start, and at each boundary. A weak new wave is to be
-        // found five times in a row: one doubt at the level on one engine alone is 50 ms more.
+        // later, 10 ms, and be in force two ticks later: at the start, and at each boundary.
         let surfaces = run.scene.surface.specimens.len() as f64;
-        let bound = surfaces * 0.061 / run.scene.duration_s;
+        let bound = surfaces * 0.011 / run.scene.duration_s;
         for (ours, theirs) in [
             (ours.felt_right_share, theirs.felt_right_share),
             (ours.felt_wrong_share, theirs.felt_wrong_share),
