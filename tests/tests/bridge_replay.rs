@@ -395,7 +395,7 @@ fn a_force_channel_is_recorded_and_played_too() {
 #[test]
 fn a_piece_of_a_recording_makes_a_scene() {
     // The longer fits are made by every fifth estimate: beginning here, the scene is in step with the board.
-    let round = round("piece", STROKES, 1.335, Some(3.14));
+    let round = round("piece", STROKES, 1.335, Some(3.15));
     assert!(
         (1.7..=1.8).contains(&round.made.duration_s),
         "{:?}",
