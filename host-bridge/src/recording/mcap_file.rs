@@ -208,6 +208,7 @@ mod tests {
 
     use super::super::row_builder::{Note, RowBuilder};
     use super::*;
+    use crate::clock::unix_ns;
     use crate::link::Event;
 
     const MINUTE_US: u64 = 60_000_000;
@@ -294,8 +295,12 @@ mod tests {
         let once = file.safe_bytes();
         let mut rows = RowBuilder::default();
         let mut noise = Noise(1);
+        // A round moment of the calendar, so that how its bytes change, and so how they pack, is every day the same.
+        let moment_ns = unix_ns(0).next_multiple_of(1 << 40);
+        let start_us = (moment_ns - unix_ns(0)) / 1_000;
         for at_us in (0..MINUTE_US).step_by(1_000) {
             for (role, message) in said(at_us, &mut noise) {
+                let at_us = start_us + at_us;
                 let note = Note::Event(Event::Heard { at_us, message });
                 for entry in rows.enter(role, at_us, &note) {
                     file.write(&entry).unwrap_or_else(|error| panic!("{error}"));
