@@ -7,6 +7,7 @@
 
 use protocol::{GAUGES, GaugeHealth};
 
+use crate::float::larger;
 use crate::{SCANS_PER_SAMPLE, Scan};
 
 /// Codes so near the converter's ends are at an end: amplifiers do not reach the rails.
@@ -243,7 +244,7 @@ impl History {
         self.mean += follow * (mean - self.mean);
         // About the mean of the last 0.3 s: a slow texture's swing over 10 ms counts too.
         let power = square - 2.0 * mean * self.mean + self.mean * self.mean;
-        self.power += follow * (power.max(0.0) - self.power);
+        self.power += follow * (larger(power, 0.0) - self.power);
         self.now = square - mean * mean;
     }
 }

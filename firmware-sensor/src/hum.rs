@@ -21,6 +21,7 @@
 
 use protocol::GAUGES;
 
+use crate::float::larger;
 use crate::travel::MIN_SPEED_MM_S;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 use common::{Amplitudes, power};
@@ -174,7 +175,7 @@ impl Hum {
     pub fn own_powers(&self, usable: u8) -> [f32; GAUGES] {
         let [low, high] =
             [0, 1].map(|n| self.followers[n].own_powers(usable, self.resting >= RESTED_ESTIMATES));
-        core::array::from_fn(|gauge| low[gauge].max(high[gauge]))
+        core::array::from_fn(|gauge| larger(low[gauge], high[gauge]))
     }
 }
 

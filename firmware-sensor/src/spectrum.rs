@@ -330,11 +330,8 @@ impl Estimator for Spectrum {
             slot if slot > SURVEY_SLOT => {
                 let work = WORK[usize::from(slot - SURVEY_SLOT - 1)];
                 let survey = &mut self.survey;
-                let passes = [&mut survey.line_pass, &mut survey.wave_pass];
-                passes
-                    .into_iter()
-                    .flatten()
-                    .fold(work, |left, pass| pass.run(&self.knots, left));
+                let left = survey.line_pass.run(&self.knots, work);
+                survey.wave_pass.run(&self.knots, left);
             }
             _ => {}
         }

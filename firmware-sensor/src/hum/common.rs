@@ -2,7 +2,7 @@
 
 use protocol::GAUGES;
 
-use crate::float::sqrt;
+use crate::float::{larger, sqrt};
 
 /// A complex amplitude in ADC steps.
 pub(super) type Amplitude = [f32; 2];
@@ -49,7 +49,7 @@ pub(super) fn is_common(amplitudes: &Amplitudes, usable: u8) -> bool {
 
 /// A phase: z / |z|.
 pub(super) fn unit(z: Amplitude) -> Amplitude {
-    let magnitude = sqrt(square(z)).max(f32::MIN_POSITIVE);
+    let magnitude = larger(sqrt(square(z)), f32::MIN_POSITIVE);
     z.map(|part| part / magnitude)
 }
 

@@ -19,7 +19,7 @@ use protocol::GAUGES;
 use super::common::{Amplitudes, conjugate_product, is_common, power, square, sum, unit};
 use super::own::Own;
 use super::steady::Steady;
-use crate::float::sqrt;
+use crate::float::{larger, smaller, sqrt};
 use crate::phasor::phasor;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 
@@ -257,7 +257,7 @@ impl Follower {
         let mut away_hz = f32::MAX;
         for n in 1..=HARMONICS {
             let n = f32::from(n);
-            away_hz = away_hz.min(n * (n * texture_hz - self.frequency_hz()).abs());
+            away_hz = smaller(away_hz, n * (n * texture_hz - self.frequency_hz()).abs());
         }
         away_hz
     }
@@ -324,7 +324,7 @@ impl Follower {
             let unit_now = unit(sum(&self.found, usable));
             let before = unit(sum(self.steady.slow(), usable));
             self.known = self.steady.slow().map(|z| {
-                let along = conjugate_product(z, before)[0].max(0.0);
+                let along = larger(conjugate_product(z, before)[0], 0.0);
                 unit_now.map(|part| along * part)
             });
             self.scale = Some(1.0);
@@ -440,8 +440,8 @@ impl Follower {
 
     /// Whether what is found stands out of what chance would leave.
     fn is_significant(&self, usable: u8) -> bool {
-        let chance = SIGNIFICANT * 4.0 / self.blocks.max(1.0) * self.scatter;
-        power(&self.found, usable) > chance.max(least_power(usable))
+        let chance = SIGNIFICANT * 4.0 / larger(self.blocks, 1.0) * self.scatter;
+        power(&self.found, usable) > larger(chance, least_power(usable))
     }
 }
 

@@ -4,6 +4,7 @@ use protocol::GAUGES;
 
 use super::common::{Amplitudes, conjugate_product, square, sum};
 use crate::ESTIMATE_RATE_HZ;
+use crate::float::larger;
 
 /// Estimates in a row without a texture that is known to be at the frequency, before what a gauge holds
 /// there may be blamed on it: three of the followers' time constants of 0.25 s.
@@ -79,7 +80,7 @@ fn not_common(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
         } else {
             most * (2.0 * along - most * square(others))
         };
-        0.5 * (square(z) - common).max(0.0)
+        0.5 * larger(square(z) - common, 0.0)
     })
 }
 

@@ -70,7 +70,7 @@ impl Fitted {
 }
 
 /// A pass through the latest waves, in portions.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Pass {
     wavelength_mm: f32,
     lengths: usize,
@@ -86,7 +86,8 @@ pub(super) struct Pass {
     sums: Sums,
     /// What was found at each length.
     pub found: [Option<Fitted>; LENGTH_COUNT],
-    done: bool,
+    /// There are lengths to come.
+    under_way: bool,
 }
 
 /// The normal equations so far.
@@ -101,30 +102,40 @@ struct Sums {
 }
 
 impl Pass {
-    /// A pass from the knot back that is the newest when it begins, for those `lengths` of [`LENGTHS`], starting at
+    /// Begins from the knot back that is then the newest, for those `lengths` of [`LENGTHS`], starting at
     /// `wavelength_mm` above 0. `base` is taken off the gauges: anything near their mean.
-    pub fn new(wavelength_mm: f32, lengths: Range<usize>, usable: u8, base: [f32; GAUGES]) -> Self {
+    pub fn begin(
+        &mut self,
+        wavelength_mm: f32,
+        lengths: Range<usize>,
+        usable: u8,
+        base: [f32; GAUGES],
+    ) {
         let places = wavelength_mm * PLACES_PER_MM as f32;
-        Self {
-            wavelength_mm,
-            lengths: lengths.end.min(LENGTH_COUNT),
-            next: lengths.start,
-            usable,
-            reader: None,
-            origin: None,
-            increment: (4_294_967_296.0 / f64::from(places)) as u32,
-            radians_per_place: 2.0 * core::f32::consts::PI / places,
-            base,
-            sums: Sums::default(),
-            found: [None; LENGTH_COUNT],
-            done: false,
-        }
+        self.wavelength_mm = wavelength_mm;
+        self.lengths = lengths.end.min(LENGTH_COUNT);
+        self.next = lengths.start;
+        self.usable = usable;
+        self.reader = None;
+        self.origin = None;
+        self.increment = (4_294_967_296.0 / places) as u32;
+        self.radians_per_place = 2.0 * core::f32::consts::PI / places;
+        self.base = base;
+        self.sums = Sums::default();
+        self.found = [None; LENGTH_COUNT];
+        self.under_way = true;
+    }
+
+    /// Forgets what it has found.
+    pub fn end(&mut self) {
+        self.found = [None; LENGTH_COUNT];
+        self.under_way = false;
     }
 
     /// Goes on for that much work: one for each knot, [`SOLVING`] for each solution. What is left of it.
     pub fn run(&mut self, path: &Knots, work: usize) -> usize {
-        if work == 0 {
-            return 0;
+        if work == 0 || !self.under_way {
+            return work;
         }
         let mut left = work;
         let mut reader = match self.reader {
@@ -138,11 +149,11 @@ impl Pass {
                 reader
             }
         };
-        while !self.done && left > 0 {
+        while self.under_way && left > 0 {
             let solved = self.next;
             match path.next(&mut reader) {
                 Some(knot) => self.take(knot),
-                None => self.done = true,
+                None => self.under_way = false,
             }
             left = left.saturating_sub(1 + SOLVING * (self.next - solved));
         }
@@ -171,7 +182,7 @@ impl Pass {
                 });
             self.next += 1;
         }
-        self.done = self.next == self.lengths;
+        self.under_way = self.next < self.lengths;
     }
 }
 

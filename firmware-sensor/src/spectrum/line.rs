@@ -23,7 +23,7 @@ const ON_THE_TREND: f32 = 0.15;
 /// A fit this close to the line, relative to it, is about it; and one this close to the mean of what there is, is finer.
 const NEAR: f32 = 0.06;
 /// See [`NEAR`].
-const CLOSE: f32 = 0.01;
+const CLOSE: f32 = 0.007;
 /// Estimates for which a period that a fit has refused is not looked for again.
 const REFUSED_ESTIMATES: u8 = 20;
 
@@ -68,7 +68,7 @@ impl Spectrum {
     /// What is to be said of the line, where there is one.
     pub(super) fn weigh_line(&mut self) -> Option<Supposition> {
         let line_mm = self.survey.line_mm?;
-        let mut found = self.survey.line_pass.as_ref()?.found;
+        let mut found = self.survey.line_pass.found;
         let longer = &mut found[SHORTER_LENGTHS..];
         if self.shorter_so_far == 0 {
             self.longer_fits.copy_from_slice(longer);
@@ -159,47 +159,47 @@ impl Spectrum {
     }
 
     /// λ here, of the average's peak there and of fits carried to here. Each may be off: a peak where two lines meet, a
-    /// fit where little is explained, the trend where the surface changes. So their mean in ln λ first; then, of what is
-    /// finest, all that is close to it.
+    /// fit where little is explained, the trend where the surface changes. So the mean of those that agree first; then, of
+    /// what is finest, all that is close to it.
     fn weighed_mm(
         &self,
         found: &[Option<Fitted>; LENGTH_COUNT],
         here_mm: f32,
         of_strong: Option<usize>,
     ) -> f32 {
-        let fits = found.map(|fitted| fitted.map(|fitted| fitted.wavelength_mm));
-        let course = self.trend.course().map(|course| libm::expf(course.here));
-        let within = |mm: Option<f32>, base_mm: f32, most: f32| {
-            mm.filter(|&mm| off(mm, base_mm) < most)
-                .map(|mm| libm::logf(mm / base_mm))
-        };
-        let (mut sum, mut count) = (0.0, 0.0);
-        for away in [course, fits[2], fits[3]]
-            .into_iter()
-            .filter_map(|mm| within(mm, here_mm, NEAR))
-        {
-            sum += away;
-            count += 1.0;
+        let strong_mm = of_strong
+            .and_then(|n| found[n])
+            .map(|fitted| fitted.wavelength_mm);
+        if let Some(fit_mm) = strong_mm.filter(|_| self.line.held_waves <= MEMORY_WAVES) {
+            return fit_mm;
         }
+        let ln = |n: usize| found[n].map(|fitted| libm::logf(fitted.wavelength_mm));
+        let (three, five) = (ln(2), ln(3));
+        let course = self.trend.course().map(|course| course.here);
         // The peak of an average that is not full yet is still what it was begun with.
-        let peak = self.survey.maturity * (4.0 - count);
-        let mean_mm = here_mm * libm::expf(sum / larger(count + peak, 1.0));
-        if let Some(fit_mm) = of_strong.and_then(|n| fits[n]) {
-            let held = self.line.held_waves > MEMORY_WAVES;
-            if !held || off(fit_mm, mean_mm) < 0.05 {
-                return fit_mm;
-            }
+        let agreed = agreed(&[
+            (Some(libm::logf(here_mm)), self.survey.maturity),
+            (course, 1.0),
+            (three, 1.0),
+            (five, 1.0),
+        ]);
+        let agreed_mm = libm::expf(agreed);
+        if let Some(fit_mm) = strong_mm.filter(|&mm| off(mm, agreed_mm) < 0.05) {
+            return fit_mm;
         }
-        let longest = fits.into_iter().skip(1).rev().flatten().next();
+        let longest = ln(4).or(five).or(three).or_else(|| ln(1));
         let (mut sum, mut count) = (0.0, 0_u8);
         for close in [longest, course]
             .into_iter()
-            .filter_map(|mm| within(mm, mean_mm, CLOSE))
+            .flatten()
+            .map(|ln| ln - agreed)
         {
-            sum += close;
-            count += 1;
+            if close.abs() < CLOSE {
+                sum += close;
+                count += 1;
+            }
         }
-        mean_mm * libm::expf(sum / f32::from(count.max(1)))
+        agreed_mm * libm::expf(sum / f32::from(count.max(1)))
     }
 
     /// Goes on with the trend, and takes what a short fit says into it. λ of the line here, in mm, and how
@@ -209,7 +209,7 @@ impl Spectrum {
             self.trend = Trend::default();
         }
         let waves = self.survey.fresh_mm / line_mm;
-        let moved_mm = self.trend.advance(self.touch.place, waves);
+        let moved_mm = self.trend.advance(self.touch.place, waves, line_mm);
         let here_mm = self.trend.of_average(line_mm);
         let expected = self.trend.course();
         let plausible = |fitted: &Fitted| {
@@ -231,8 +231,7 @@ impl Spectrum {
 
     /// Whether most gauges feel a strong line as they did: what else there is has befallen the others.
     pub(super) fn line_goes_on(&self) -> bool {
-        let pass = self.survey.line_pass.as_ref();
-        let Some(fitted) = pass.and_then(|pass| pass.found[2]) else {
+        let Some(fitted) = self.survey.line_pass.found[2] else {
             return false;
         };
         let usable = self.touch.usable;
@@ -283,6 +282,23 @@ impl Line {
         }
         self.usual = larger(self.shares[0], self.usual - FORGOTTEN * waves);
     }
+}
+
+/// The mean of what is near the median: each an ln λ, and what it counts for. The first must be there.
+fn agreed(said: &[(Option<f32>, f32); 4]) -> f32 {
+    let mut sorted = said.map(|(ln, _)| ln.unwrap_or(f32::INFINITY));
+    sorted.sort_unstable_by(f32::total_cmp);
+    let known = sorted.iter().filter(|ln| ln.is_finite()).count().max(1);
+    let median = 0.5 * (sorted[(known - 1) / 2] + sorted[known / 2]);
+    let (mut sum, mut total) = (0.0, f32::MIN_POSITIVE);
+    for &(ln, weight) in said {
+        let away = ln.unwrap_or(f32::INFINITY) - median;
+        if away.abs() < NEAR {
+            sum += weight * away;
+            total += weight;
+        }
+    }
+    median + sum / total
 }
 
 /// Which is the longest fit whose λ̂ all shorter ones contain in their intervals, from two waves on; none if the one over

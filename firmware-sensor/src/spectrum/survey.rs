@@ -6,6 +6,7 @@ use super::periodogram::{
     vertex_mm, wavelength_mm,
 };
 use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off};
+use crate::float::larger;
 
 /// One estimate of so many fits the line over the longer lengths, too; those after it take its fits over.
 const LONGER_EVERY: u8 = 5;
@@ -27,8 +28,8 @@ pub(super) struct Survey {
     pub(super) agree: bool,
     /// The line is twice or three times as long as the clearest peak.
     pub(super) longer: bool,
-    pub(super) line_pass: Option<Pass>,
-    pub(super) wave_pass: Option<Pass>,
+    pub(super) line_pass: Pass,
+    pub(super) wave_pass: Pass,
 }
 
 impl Spectrum {
@@ -39,9 +40,10 @@ impl Spectrum {
         let (short, energies) = self.periodogram.energies(usable);
         self.periodogram.average(&energies, fresh_mm);
         let averaged = self.periodogram.averaged();
-        // In place: the passes are large.
         let survey = &mut self.survey;
-        (survey.line_mm, survey.line_pass, survey.wave_pass) = (None, None, None);
+        survey.line_mm = None;
+        survey.line_pass.end();
+        survey.wave_pass.end();
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
         let (Some(clearest), Some(momentary)) =
             (clearest_peak(&averaged), clearest_peak(&energies))
@@ -50,7 +52,7 @@ impl Spectrum {
         };
         // What is highest at an end lies beyond it: a peak is then a harmonic of a longer wave, or the image of a
         // shorter one in knots that are too long for it.
-        if BEYOND * averaged[clearest] < averaged[0].max(averaged[CANDIDATES - 1]) {
+        if BEYOND * averaged[clearest] < larger(averaged[0], averaged[CANDIDATES - 1]) {
             return;
         }
         let kept = if self.line.held_waves > 3.0 {
@@ -69,7 +71,7 @@ impl Spectrum {
         survey.sharpness = sharpness(&averaged, number);
         survey.maturity = self.periodogram.maturity(number);
         let total: f32 = energies.iter().sum();
-        survey.presence = energies[number] / (total * averaged[number]).max(f32::MIN_POSITIVE);
+        survey.presence = energies[number] / larger(total * averaged[number], f32::MIN_POSITIVE);
         let here_mm = self.trend.of_average(line_mm);
         survey.agree = off(momentary_mm, here_mm) < 0.12;
 
@@ -91,7 +93,7 @@ impl Spectrum {
         } else {
             SHORTER_LENGTHS.min(self.lengths)
         };
-        survey.line_pass = Some(Pass::new(start_mm, 1..lengths, usable, base));
+        survey.line_pass.begin(start_mm, 1..lengths, usable, base);
         // The short kernel sees a new surface first. What takes a line's place goes on as long as it has a peak.
         let highest = highest_peak(&short);
         let goes_on = (self.line.there < 0.5)
@@ -108,14 +110,15 @@ impl Spectrum {
         let wave_mm = goes_on
             .or(newest)
             .or((!survey.agree).then_some(momentary_mm));
-        survey.wave_pass = wave_mm.map(|mm| {
+        if let Some(mm) = wave_mm {
             let start_mm = if off(self.wave.mm, mm) < 0.06 {
                 self.wave.mm
             } else {
                 mm
             };
-            Pass::new(start_mm, 0..3.min(self.lengths), usable, base)
-        });
+            let lengths = 0..3.min(self.lengths);
+            survey.wave_pass.begin(start_mm, lengths, usable, base);
+        }
     }
 
     /// A period of which the peak is the second or third harmonic, and its candidate.

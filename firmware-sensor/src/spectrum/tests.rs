@@ -60,7 +60,8 @@ fn wave(mm: f32, gauge: usize, wavelength_mm: f32) -> f32 {
 }
 
 fn run(knots: &Knots, start_mm: f32) -> Pass {
-    let mut pass = Pass::new(start_mm, 0..LENGTH_COUNT, ALL, NO_BASE);
+    let mut pass = Pass::default();
+    pass.begin(start_mm, 0..LENGTH_COUNT, ALL, NO_BASE);
     while pass.run(knots, 7) == 0 {}
     pass
 }

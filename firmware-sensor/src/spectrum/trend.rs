@@ -10,11 +10,13 @@ use crate::travel::{PLACES_PER_MM, Place};
 
 /// Travel for which a fit is remembered, in wavelengths.
 const MEMORY_WAVES: f32 = 5.0;
-/// How much of a slope is not believed, in its own variances: on a surface that has none, 84 % of the time
+/// How much of a slope is not believed, in its own variances: on a surface that has none, 68 % of the time
 /// none is said.
-const DOUBT: f32 = 2.0;
+const DOUBT: f32 = 1.0;
 /// Variance of ln λ that no fit is better than, (0.3 %)²: what turns and uneven ridges do to it.
 const LEAST_VARIANCE: f32 = 1e-5;
+/// What the average's peak counts for among the fits, in waves of them: it lies far back, and so tells most of a slope.
+const PEAK_WEIGHT: f32 = 1.0;
 /// Steepest slope of ln λ that a surface has, per mm.
 const STEEPEST: f32 = 0.015;
 
@@ -36,6 +38,8 @@ pub(super) struct Trend {
     /// Place that the spectrum of the moment is about, and the averaged one's peak, in mm from here.
     moment_mm: f32,
     average_mm: f32,
+    /// ln λ of that peak.
+    peak: f32,
     course: Option<Course>,
 }
 
@@ -49,8 +53,9 @@ pub(super) struct Course {
 }
 
 impl Trend {
-    /// Goes on to `here`, `waves` later. The way there, in mm.
-    pub fn advance(&mut self, here: Place, waves: f32) -> f32 {
+    /// Goes on to `here`, `waves` later, where the averaged spectrum's peak is `peak_mm`. The way there, in mm.
+    pub fn advance(&mut self, here: Place, waves: f32, peak_mm: f32) -> f32 {
+        self.peak = libm::logf(peak_mm);
         let moved_mm = self.away_mm(here);
         self.here = here;
         self.xx += moved_mm * (moved_mm * self.weight - 2.0 * self.x);
@@ -122,12 +127,19 @@ impl Trend {
         if self.weight <= 0.0 {
             return None;
         }
-        let scale = 1.0 / self.weight;
-        let (x, y) = (self.x * scale, self.y * scale);
-        let spread = larger(self.xx * scale - x * x, 1e-6);
-        let common = self.xy * scale - x * y;
+        let (peak_x, peak_y) = (self.average_mm, self.peak);
+        // As full as the memory of the fits.
+        let peak = PEAK_WEIGHT / MEMORY_WAVES * self.weight;
+        let scale = 1.0 / (self.weight + peak);
+        let mean = |sum: f32, of_peak: f32| (sum + peak * of_peak) * scale;
+        let (x, y) = (mean(self.x, peak_x), mean(self.y, peak_y));
+        let spread = larger(mean(self.xx, peak_x * peak_x) - x * x, 1e-6);
+        let common = mean(self.xy, peak_x * peak_y) - x * y;
         let slope = (common / spread).clamp(-STEEPEST, STEEPEST);
-        let rest = larger(self.yy * scale - y * y - common * common / spread, 0.0);
+        let rest = larger(
+            mean(self.yy, peak_y * peak_y) - y * y - common * common / spread,
+            0.0,
+        );
         let young = MEMORY_WAVES * scale;
         let chance = DOUBT * young * (rest + LEAST_VARIANCE) / spread;
         let slope = slope * larger(1.0 - chance / larger(slope * slope, f32::MIN_POSITIVE), 0.0);

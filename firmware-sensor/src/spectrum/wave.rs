@@ -16,9 +16,8 @@ pub(super) struct Wave {
 impl Spectrum {
     /// What is to be said of a wave that the line is not.
     pub(super) fn weigh_wave(&mut self) -> Option<Supposition> {
-        let found = self.survey.wave_pass.as_ref().map(|pass| pass.found);
-        let best = found.as_ref().and_then(|found| best_of(&found[..3]));
-        let (Some(found), Some((best, _))) = (found, best) else {
+        let found = &self.survey.wave_pass.found;
+        let Some((best, _)) = best_of(&found[..3]) else {
             self.wave = Wave::default();
             return None;
         };
@@ -28,7 +27,7 @@ impl Spectrum {
             self.wave.held_waves = 0.0;
         }
         self.wave.mm = best.wavelength_mm;
-        let evidence = WaveEvidence::of(&found, self.wave.held_waves, self.known_share)?;
+        let evidence = WaveEvidence::of(found, self.wave.held_waves, self.known_share)?;
         let probability = evidence.probability();
         self.weighed.wave = Some((best.wavelength_mm, evidence));
         let is_common = is_common(&best, self.touch.usable);
