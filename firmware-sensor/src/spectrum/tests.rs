@@ -232,23 +232,26 @@ fn a_slope_lifts_no_long_wave() {
     assert!(long < 0.02 * energies[peak], "{long} {}", energies[peak]);
 }
 
-/// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind.
-fn trend(mut ln_mm: impl FnMut(f32) -> f32) -> (Trend, f32) {
+/// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind and off by `noise`, and of an average that
+/// is not.
+fn trend(ln_mm: impl Fn(f32) -> f32, mut noise: impl FnMut() -> f32) -> (Trend, f32) {
     let (mut trend, mut mm) = (Trend::default(), 0.0);
     for step in 0..300 {
         let forth = step / 40 % 2 == 0;
         mm += if forth { 0.5 } else { -0.5 };
         let behind_mm = if forth { mm - 5.0 } else { mm + 5.0 };
         let place = |mm: f32| (mm * PLACES_PER_MM as f32) as i32;
-        trend.advance(place(mm), 0.2);
-        trend.take(place(behind_mm), libm::expf(ln_mm(behind_mm)), 0.2);
+        let peak_mm = libm::expf(ln_mm(mm + trend.average_mm()));
+        trend.advance(place(mm), 0.2, peak_mm);
+        let fit_mm = libm::expf(ln_mm(behind_mm) + noise());
+        trend.take(place(behind_mm), fit_mm, 0.2);
     }
     (trend, mm)
 }
 
 #[test]
 fn the_trend_tells_the_wavelength_here() {
-    let (trend, mm) = trend(|mm| 1.0 + 0.008 * mm);
+    let (trend, mm) = trend(|mm| 1.0 + 0.008 * mm, || 0.0);
     let course = trend.course().unwrap();
     assert!(
         (course.here - (1.0 + 0.008 * mm)).abs() < 1e-3,
@@ -260,7 +263,7 @@ fn the_trend_tells_the_wavelength_here() {
 #[test]
 fn the_trend_finds_no_slope_in_chance() {
     let mut noise = Noise(7);
-    let (trend, _) = trend(|_| 1.0 + 0.03 * noise.even());
+    let (trend, _) = trend(|_| 1.0, || 0.03 * noise.even());
     let course = trend.course().unwrap();
     assert!((course.here - 1.0).abs() < 0.01, "{course:?}");
     assert!(course.slope.abs() < 0.001, "{course:?}");

@@ -80,6 +80,12 @@ impl Trend {
         moved_mm
     }
 
+    /// How far from here the place is that the averaged spectrum's peak is about, in mm.
+    #[cfg(test)]
+    pub fn average_mm(&self) -> f32 {
+        self.average_mm
+    }
+
     /// λ here, by what it is as the averaged spectrum's peak.
     pub fn of_average(&self, wavelength_mm: f32) -> f32 {
         self.carried(wavelength_mm, self.average_mm)
