@@ -1,7 +1,5 @@
 //! How good each method is on synthetic rubs, per instant: the error of every valid estimate, from the
 //! first one on, and how many there are.
-//!
-//! `cargo test -p firmware-sensor --test methods -- --ignored --nocapture` prints a table of them all.
 
 use crate::rubbing::{CODES_PER_UNIT, GAINS, Judgement, Motion, Rub, with};
 use protocol::Method;
@@ -78,34 +76,6 @@ fn largest(judgements: &[Judgement], of: impl Fn(&Judgement) -> f64) -> f64 {
 
 fn smallest(judgements: &[Judgement], of: impl Fn(&Judgement) -> f64) -> f64 {
     -largest(judgements, |judgement| -of(judgement))
-}
-
-#[test]
-#[ignore = "prints a table, for people"]
-fn survey() {
-    println!("λ's RMS error in %: mean and largest of a family's rubs; largest single error;");
-    println!("least valid share in motion; largest valid-but-wrong share; amplitudes in ADC steps");
-    for method in [
-        Method::Counting,
-        Method::AdaptedCounting,
-        Method::Crossings,
-        Method::Spectrum,
-    ] {
-        println!("\n{method:?}");
-        for (name, rubs) in families() {
-            let all = judge(method, &rubs);
-            println!(
-                "{name:24} {:6.2} {:6.2} {:7.2}   valid {:.3} wrong {:.4}   {:4.0} to {:4.0}",
-                all.iter().map(|j| j.rms_percent).sum::<f64>() / all.len() as f64,
-                largest(&all, |j| j.rms_percent),
-                largest(&all, |j| j.worst_percent),
-                smallest(&all, |j| j.valid_share),
-                largest(&all, |j| j.wrong_share),
-                smallest(&all, |j| j.amplitude_lsb),
-                largest(&all, |j| j.amplitude_lsb),
-            );
-        }
-    }
 }
 
 /// What noise alone makes of λ over four half waves, in %, for a gauge of gain 1: see below.
