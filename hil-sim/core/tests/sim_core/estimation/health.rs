@@ -180,6 +180,12 @@ fn a_noisy_gauge_is_found_and_forgiven() {
 }
 
 #[test]
+#[ignore = "nothing is valid until a noisy gauge is found, and its second costs more than a fifth of the time"]
+fn the_others_go_on_while_a_gauge_is_noisy() {
+    goes_on("noisy", 0.8);
+}
+
+#[test]
 fn a_humming_gauge_is_found_and_forgiven() {
     // Measured: 0.13 and 0.88 s, and 0.95 valid.
     is_found_and_forgiven("humming", &[GaugeHealth::Hum], 0.2, 1.0);
