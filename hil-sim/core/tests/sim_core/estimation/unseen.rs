@@ -282,7 +282,7 @@ fn strong_stick_slip_without_the_force_channel_is_wrong_in_three_percent_at_most
 }
 
 #[test]
-#[ignore = "short textures in strong stick-slip excite the ringing sensor: 4 to 5 %, half of it valid"]
+#[ignore = "short textures in strong stick-slip excite the ringing sensor: 2.5 % off"]
 fn so_is_strong_stick_slip_over_a_short_texture_by_hand() {
     let goal = Goal {
         rms_percent: Some(2.0),
@@ -299,7 +299,7 @@ fn so_is_strong_stick_slip_over_a_short_texture_by_hand() {
 }
 
 #[test]
-#[ignore = "mild stick-slip by hand slips through: up to 1.5 % of the estimates"]
+#[ignore = "mild stick-slip by hand slips through: up to 1.1 % of the estimates"]
 fn mild_stick_slip_without_the_force_channel_is_never_wrong() {
     let recordings = [
         ("blind-mild-1.1mm-hand", blind(MILD, 1.1, hand)),
