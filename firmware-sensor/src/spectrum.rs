@@ -10,8 +10,8 @@
 //! a real surface the wave explains a quarter of what the gauges say, and chance explains nearly as much:
 //! what tells them apart is whether a line stays where it is over fresh ground. So each estimate has two
 //! suppositions. The *line* is the clearest peak of the averaged spectrum, the one that stands highest above
-//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is
-//! refined by least squares over the last waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
+//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
+//! waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
 //! λ̂ is the period: a line at 2 λ or 3 λ that is at least 0.4 times as high as one at λ is taken for the
 //! fundamental, if a fit over three waves finds it there. Of waves that have no common period the
@@ -119,9 +119,6 @@ pub struct Spectrum {
     survey: Survey,
     line: Line,
     wave: Wave,
-    /// The direction of travel, and whether it has changed since the last estimate's work began.
-    forth: bool,
-    turned: bool,
     /// Estimates since the line was last fitted over the longer lengths, and what was found there.
     shorter_so_far: u8,
     longer_fits: [Option<Fitted>; LENGTH_COUNT - SHORTER_LENGTHS],
@@ -183,8 +180,6 @@ impl Spectrum {
             survey: Survey::default(),
             line: Line::default(),
             wave: Wave::default(),
-            forth: true,
-            turned: false,
             shorter_so_far: 0,
             longer_fits: [None; LENGTH_COUNT - SHORTER_LENGTHS],
             refused: 0,
@@ -322,9 +317,6 @@ impl Estimator for Spectrum {
             self.rested = self.rested.saturating_add(1);
         } else {
             self.rested = 0;
-            let forth = travel > 0;
-            self.turned |= forth != self.forth;
-            self.forth = forth;
             let periodogram = &mut self.periodogram;
             let tell = |spacing, knot: &Knot| periodogram.push(spacing, knot);
             self.knots

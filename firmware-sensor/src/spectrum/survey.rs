@@ -87,12 +87,7 @@ impl Spectrum {
         } else {
             here_mm
         };
-        // A turn is where it is, whenever the line was first found: who feels the same strokes says the same of them.
-        self.shorter_so_far = if core::mem::take(&mut self.turned) {
-            0
-        } else {
-            (self.shorter_so_far + 1) % LONGER_EVERY
-        };
+        self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
         let lengths = if self.shorter_so_far == 0 {
             self.lengths
         } else {
