@@ -6,7 +6,7 @@
 
 use protocol::GAUGES;
 
-use super::knots::{Knot, SPACINGS, spacing_for};
+use super::knots::{Knot, spacing_for};
 use crate::estimator::MIN_AMPLITUDE_LSB;
 use crate::float::{larger, smaller, sqrt};
 use crate::phasor::phasor;
@@ -14,8 +14,8 @@ use crate::travel::PLACES_PER_MM;
 
 /// Candidates: six an octave, so that a ratio of 2 lies on the grid, and one beyond either end.
 pub(super) const CANDIDATES: usize = 26;
-/// The first one that the knots of each spacing serve, and the end.
-const SERVED_FROM: [usize; SPACINGS + 1] = [0, 11, 17, CANDIDATES];
+/// Those that the finest knots serve; the next coarser ones serve the others.
+const FINE: usize = 11;
 /// The shortest candidate, in mm.
 const SHORTEST_MM: f32 = 0.5;
 /// Candidates in an octave.
@@ -67,21 +67,16 @@ pub(super) type Spectrum = [f32; CANDIDATES];
 pub(super) struct Periodogram {
     candidates: [Candidate; CANDIDATES],
     /// The high-passes' level of each gauge at each spacing, none before the first knot, and what a slope leaves of it.
-    level: [Option<[f32; GAUGES]>; SPACINGS],
-    slope: [[f32; GAUGES]; SPACINGS],
+    level: [Option<[f32; GAUGES]>; 2],
+    slope: [[f32; GAUGES]; 2],
 }
 
 impl Periodogram {
     /// Nothing felt yet.
     pub fn new() -> Self {
         const {
-            let mut spacing = 0;
-            while spacing < SPACINGS {
-                let (first, end) = (SERVED_FROM[spacing], SERVED_FROM[spacing + 1]);
-                assert!(spacing_for(wavelength_mm(first)) == spacing);
-                assert!(spacing_for(wavelength_mm(end - 1)) == spacing);
-                spacing += 1;
-            }
+            assert!(spacing_for(wavelength_mm(FINE - 1)) == 0);
+            assert!(spacing_for(wavelength_mm(FINE)) == 1);
         }
         Self {
             candidates: core::array::from_fn(|i| {
@@ -98,8 +93,8 @@ impl Periodogram {
                     mean_weight: 0.0,
                 }
             }),
-            level: [None; SPACINGS],
-            slope: [[0.0; GAUGES]; SPACINGS],
+            level: [None; 2],
+            slope: [[0.0; GAUGES]; 2],
         }
     }
 
@@ -108,9 +103,12 @@ impl Periodogram {
         self.level[0].unwrap_or_default()
     }
 
-    /// Takes a knot of that spacing.
+    /// Takes a knot of any spacing. Those of the coarsest are for fits alone.
     pub fn push(&mut self, spacing: usize, knot: &Knot) {
-        let level = self.level[spacing].get_or_insert(knot.gauges);
+        let Some(level) = self.level.get_mut(spacing) else {
+            return;
+        };
+        let level = level.get_or_insert(knot.gauges);
         let slope = &mut self.slope[spacing];
         let z = knot.travel_mm * (1.0 / HIGH_PASS_MM);
         let follow = z / (1.0 + z);
@@ -121,7 +119,8 @@ impl Periodogram {
             slope[gauge] += follow * (above - slope[gauge]);
             felt[gauge] = above - slope[gauge];
         }
-        for candidate in &mut self.candidates[SERVED_FROM[spacing]..SERVED_FROM[spacing + 1]] {
+        let (fine, coarse) = self.candidates.split_at_mut(FINE);
+        for candidate in if spacing == 0 { fine } else { coarse } {
             candidate.take(knot, &felt);
         }
     }

@@ -16,7 +16,7 @@ const DOUBT: f32 = 1.0;
 /// Variance of ln λ that no fit is better than, (0.3 %)²: what turns and uneven ridges do to it.
 const LEAST_VARIANCE: f32 = 1e-5;
 /// What the average's peak counts for among the fits, in waves of them: it lies far back, and so tells most of a slope.
-const PEAK_WEIGHT: f32 = 1.0;
+const PEAK_WEIGHT: f32 = 0.5;
 /// Steepest slope of ln λ that a surface has, per mm.
 const STEEPEST: f32 = 0.015;
 
