@@ -1,5 +1,7 @@
 //! Replays what a display board did with its own library, word for word.
 
+use std::collections::HashSet;
+
 use firmware_display::{Display, Senses, Settings};
 use hil_sim_core::link::impairments::BYTE_NS;
 use hil_sim_core::run::recording::{ACTUATORS, EstimateRecord, Recording};
@@ -20,6 +22,8 @@ const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
 /// Histories followed at a time. Estimates that hardly differ while the hand hardly moves, about a
 /// turning point, can be taken in any of ten ticks each, and no word tells.
 const MOST_HISTORIES: usize = 100;
+/// The same if the link has delays and losses, so that more than one estimate in a hundred is held up.
+const MOST_HISTORIES_OF_WEATHER: usize = 1_000;
 
 /// How a display board came to its words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +55,22 @@ struct History {
 /// # Errors
 /// The first word that no history explains.
 pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, String> {
+    replay_by(recording, settings, MOST_HISTORIES)
+}
+
+/// [`replay`] of a link with delays and losses, which takes longer.
+///
+/// # Errors
+/// The same.
+pub fn replay_of_weather(recording: &Recording, settings: &Settings) -> Result<Replay, String> {
+    replay_by(recording, settings, MOST_HISTORIES_OF_WEATHER)
+}
+
+fn replay_by(
+    recording: &Recording,
+    settings: &Settings,
+    most_histories: usize,
+) -> Result<Replay, String> {
     let arrived = arrived(recording);
     let mut display = Display::new(settings, None);
     display.started(Ok(()));
@@ -102,7 +122,7 @@ pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, Stri
                 differences.join("; or, with another history: ")
             ));
         }
-        merge(&mut next);
+        merge(&mut next, most_histories);
         histories = next;
         compared += usize::from(output.is_some());
     }
@@ -153,23 +173,18 @@ fn difference(due: Option<&[u16; ACTUATORS]>, seen: Option<&[u16; ACTUATORS]>) -
 }
 
 /// Of those histories that have become equal, keeps the one with the fewest held up; of the others the
-/// [`MOST_HISTORIES`] with the fewest.
-fn merge(histories: &mut Vec<History>) {
+/// `most` with the fewest.
+fn merge(histories: &mut Vec<History>, most: usize) {
     if histories.len() < 2 {
         return;
     }
     histories.sort_by_key(|history| history.held_up);
-    let mut seen = Vec::new();
+    let mut seen = HashSet::new();
     histories.retain(|history| {
-        let state = format!(
+        seen.insert(format!(
             "{} {} {:?}",
             history.taken, history.waiting, history.display
-        );
-        let news = !seen.contains(&state);
-        if news {
-            seen.push(state);
-        }
-        news
+        ))
     });
-    histories.truncate(MOST_HISTORIES);
+    histories.truncate(most);
 }

@@ -21,6 +21,7 @@ mod recorder;
 mod rtt;
 pub mod semihosted;
 mod sensor;
+pub mod sensor_alone;
 pub mod soak;
 mod terminal;
 mod traps;
@@ -154,32 +155,49 @@ pub fn run_at(
         display_told: display.witness.told("display")?,
     };
     let pace = recorder::pace(started, sensor.witness.warm, ended);
-    Ok((record(scene, sensor, display, pace), facts))
+    Ok((record(scene, sensor, Some(display), pace), facts))
 }
 
+/// What the boards leave behind; without a display's, what the sensor does.
 fn record(
     scene: &Scene,
     sensor: Finished<Vec<ScanRecord>, Recorder>,
-    display: Finished<DisplayRecords, Recorder>,
+    display: Option<Finished<DisplayRecords, Recorder>>,
     (warm_up_s, wall_s): (f64, f64),
 ) -> Recording {
     let mut digest = Digest::default();
     digest.link(&sensor.witness.sent);
-    digest.link(&display.witness.sent);
-    digest.outputs(&display.records.outputs);
 
     // What the sensor said, and what of it reached the display.
     let mut said = MessageDecoder::default();
     said.hear(&sensor.witness.sent);
     let mut heard = MessageDecoder::default();
-    heard.hear(&display.witness.heard);
     let mut display_said = MessageDecoder::default();
-    display_said.hear(&display.witness.sent);
+    let mut log: Vec<(u64, &'static str, String)> = Vec::new();
+    let mut log_of = |board, witness: &Recorder| {
+        let lines = witness.log_lines().into_iter();
+        log.extend(lines.map(|(at_ns, line)| (at_ns, board, line)));
+    };
+    log_of("sensor", &sensor.witness);
+    let mut resets = sensor.resets;
+    // A sensor that has started again, or goes by a clock of its own, says nothing of the scene's.
+    let keeps_time = sensor.clock.is_true() && resets.is_empty();
+    let mut records = DisplayRecords::default();
+    if let Some(display) = display {
+        let witness = &display.witness;
+        digest.link(&witness.sent);
+        digest.outputs(&display.records.outputs);
+        heard.hear(&witness.heard);
+        display_said.hear(&witness.sent);
+        log_of("display", witness);
+        resets.extend(display.resets);
+        records = display.records;
+    }
+    log.sort_by_key(|&(at_ns, ..)| at_ns);
+    resets.sort_by_key(|reset| reset.at_ns);
 
     let clock_offset_ns = clock_offset_ns(&said, &sensor.records);
     let mut estimates: Vec<EstimateRecord> = Vec::new();
-    // A sensor that has started again, or goes by a clock of its own, says nothing of the scene's.
-    let keeps_time = sensor.clock.is_true() && sensor.resets.is_empty();
     for TimedMessage { at_ns, message } in said.messages() {
         if let Message::Estimate(estimate) = message {
             let made_ns = (estimate.instant_us * 1_000).saturating_add_signed(-clock_offset_ns);
@@ -197,21 +215,8 @@ fn record(
         }),
         _ => None,
     });
-    let mut log: Vec<(u64, &'static str, String)> = Vec::new();
-    for (board, witness) in [("sensor", &sensor.witness), ("display", &display.witness)] {
-        log.extend(
-            witness
-                .log_lines()
-                .into_iter()
-                .map(|(at_ns, line)| (at_ns, board, line)),
-        );
-    }
-    log.sort_by_key(|&(at_ns, ..)| at_ns);
     let sensor_status = last_status(&said);
     let display_status = last_status(&display_said);
-    let mut resets = sensor.resets;
-    resets.extend(display.resets);
-    resets.sort_by_key(|reset| reset.at_ns);
     let mut recording = Recording {
         engine: Engine::Elf,
         duration_s: scene.duration_s,
@@ -219,10 +224,10 @@ fn record(
         wall_s,
         hash: digest.finish(),
         scans: sensor.records,
-        ticks: display.records.ticks,
+        ticks: records.ticks,
         estimates,
         arrived: arrived.collect(),
-        outputs: display.records.outputs,
+        outputs: records.outputs,
         sensor_status,
         display_status,
         log,
@@ -230,7 +235,7 @@ fn record(
             display: display_said.into_messages(),
             sensor: said.into_messages(),
             resets,
-            clears_ns: display.records.clears_ns,
+            clears_ns: records.clears_ns,
         },
     };
     recording.match_arrivals();

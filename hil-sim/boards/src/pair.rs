@@ -12,7 +12,6 @@ use super::nucleo::{Nucleo, Pins};
 use super::sensor::SensorPins;
 use super::traps::Traps;
 use super::{ElfError, Firmware, Firmwares};
-use hil_sim_core::plant::arm::Arm;
 use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::plant::fault::hand::HandFault;
 use hil_sim_core::plant::world::World;
@@ -54,8 +53,7 @@ where
     S: BoardHook<SensorPins>,
     D: BoardHook<DisplayPins>,
 {
-    let (sensor_world, display_world) = (World::new(scene)?, World::new(scene)?);
-    let arm = Arm::new(&scene.arm, &scene.motion);
+    let (sensor_pins, display_world) = (SensorPins::of_scene(scene)?, World::new(scene)?);
     let (to_display, from_sensor) = sync_channel(PORTIONS_READY);
     let (to_sensor, from_display) = sync_channel(PORTIONS_READY);
     let sensor_cable = Cable {
@@ -69,11 +67,9 @@ where
     let (sensor, display) = thread::scope(|scope| {
         let sensor = scope.spawn(|| {
             let firmware = &firmwares.sensor;
-            let configuration = scene.sensor_configuration();
-            let pins = SensorPins::new(sensor_world, arm, configuration, &scene.faults);
             drive(
                 Role::Sensor,
-                Nucleo::new(pins, SensorPins::fit),
+                Nucleo::new(sensor_pins, SensorPins::fit),
                 firmware,
                 Lockstep::new(scene, Role::Sensor, &firmware.elf, sensor_cable, sensor),
                 scene.duration_s,

@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rigless::emulator::{
-    CoreBus, CoreSpec, DataModel, Error, Exit, Processor, ProcessorConstructor, Queued,
+    CoreBus, CoreSpec, DataModel, Error, Exit, HostCall, Processor, ProcessorConstructor, Queued,
 };
 use rigless::image::Image;
 use rigless::soc::{Endian, Width};
@@ -55,6 +55,8 @@ fn idle(program: u64) -> Option<PooledProcessor> {
     let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
     let at = idle.iter().position(|kept| kept.program == program)?;
     let mut kept = idle.swap_remove(at);
+    // A program that ended itself still waits for the answer to that, which is no part of the state that is saved.
+    kept.processor.answer_host_call(Some(0));
     kept.processor.load(&kept.at_power_up).ok()?;
     Some(kept)
 }
@@ -292,6 +294,10 @@ impl Processor for Lease {
 
     fn own_ranges(&self) -> Vec<Range<u64>> {
         self.processor().own_ranges()
+    }
+
+    fn host_call(&self, read: &mut dyn FnMut(u64, Width) -> Option<u64>) -> Option<HostCall> {
+        self.processor().host_call(read)
     }
 
     fn answer_host_call(&mut self, answer: Option<u64>) {

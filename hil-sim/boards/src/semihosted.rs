@@ -105,6 +105,7 @@ fn run_on<P: Pins>(
     start.semihosting = true;
     let finished = Nucleo::new(pins, fit)
         .map_err(ElfError::board(BOARD))?
+        .running(&image, None)
         .run(&start, first, listener)
         .map_err(ElfError::board(BOARD))?;
     let listener = finished.driver;

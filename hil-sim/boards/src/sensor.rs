@@ -1,7 +1,7 @@
 //! What is on the sensor board's pins: five gauges and the force channel on ADC3, the arm's encoder,
 //! and the arm's servo drive.
 
-use protocol::{CHANNELS, SensorConfiguration};
+use protocol::CHANNELS;
 use rigless::device::Level;
 use rigless::mcu::Operate;
 use rigless::soc::Width;
@@ -19,7 +19,7 @@ use hil_sim_core::plant::fault::clock::Clock;
 use hil_sim_core::plant::fault::gauges::GaugeFaults;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::recording::ScanRecord;
-use hil_sim_core::scene::fault::Fault;
+use hil_sim_core::scene::{Scene, SceneError};
 
 /// ADC3's channels on A0–A5: PA3 PC0 PC3 PF3 PF5 PF10.
 const ADC_CHANNELS: [u8; CHANNELS] = [3, 10, 13, 9, 15, 8];
@@ -59,27 +59,24 @@ pub struct SensorPins {
 }
 
 impl SensorPins {
-    /// The surroundings that `world` and `arm` describe; the servo drive is scaled as the board is told.
-    /// `faults` are the scene's.
-    pub fn new(
-        world: World,
-        arm: Arm,
-        configuration: SensorConfiguration,
-        faults: &[Fault],
-    ) -> Self {
-        let arm_full_scale_mm_s = f64::from(configuration.arm_full_scale_um_s) * 1e-3;
-        Self {
-            world,
-            arm,
-            arm_full_scale_mm_s,
+    /// The surroundings that `scene` describes; the servo drive is scaled as the board is told.
+    ///
+    /// # Errors
+    /// If the scene's world can't be built.
+    pub fn of_scene(scene: &Scene) -> Result<Self, SceneError> {
+        let configuration = scene.sensor_configuration();
+        Ok(Self {
+            world: World::new(scene)?,
+            arm: Arm::new(&scene.arm, &scene.motion),
+            arm_full_scale_mm_s: f64::from(configuration.arm_full_scale_um_s) * 1e-3,
             position_mm: 0.0,
-            gauges: GaugeFaults::new(faults),
-            clock: Clock::new(faults),
+            gauges: GaugeFaults::new(&scene.faults),
+            clock: Clock::new(&scene.faults),
             encoder: EncoderWires::Sound,
             held: None,
             drive_sign: 1.0,
             scans: Vec::new(),
-        }
+        })
     }
 
     /// The true wavelength under the fingertip at the last scan, in mm.

@@ -1,5 +1,7 @@
 //! The programs of tests for a board, on an emulated one with their jumper wires.
 
+use std::sync::LazyLock;
+
 use hil_sim_boards::jig::Jumper;
 use hil_sim_boards::semihosted::{self, Said};
 use tests::elves;
@@ -56,8 +58,10 @@ fn begun(said: &Said) -> Vec<String> {
         .collect()
 }
 
-fn every_test_passes((program, tests): (&str, &[&str])) {
-    let said = run(program, &Jumper::ALL);
+/// What the tests of restarts say.
+static RESTARTED: LazyLock<Said> = LazyLock::new(|| run(RESTARTS.0, &Jumper::ALL));
+
+fn every_test_passes(tests: &[&str], said: &Said) {
     assert!(said.is_done, "{said:#?}");
     assert_eq!(begun(&said), tests, "{said:#?}");
     let passed = said.log.iter().filter(|line| *line == "all tests passed!");
@@ -66,29 +70,32 @@ fn every_test_passes((program, tests): (&str, &[&str])) {
 
 #[test]
 fn the_sensor_boards_tests_pass_on_the_emulated_board() {
-    every_test_passes(SENSOR);
+    every_test_passes(SENSOR.1, &run(SENSOR.0, &Jumper::ALL));
 }
 
 #[test]
 fn the_display_boards_tests_pass_on_the_emulated_board() {
-    every_test_passes(DISPLAY);
+    every_test_passes(DISPLAY.1, &run(DISPLAY.0, &Jumper::ALL));
 }
 
 #[test]
 fn the_tests_of_restarts_pass_on_the_emulated_board() {
-    every_test_passes(RESTARTS);
+    every_test_passes(RESTARTS.1, &RESTARTED);
 }
 
 #[test]
 fn below_its_ram_the_emulated_board_does_not_fault_as_a_chip_should() {
-    let said = run(RESTARTS.0, &Jumper::ALL);
-    let stack = said
+    let stack = RESTARTED
         .log
         .iter()
         .find_map(|line| line.split_once("fault, CFSR ")?.1.split_once(", stack 0x"))
         .and_then(|(_, stack)| u32::from_str_radix(stack, 16).ok());
     // If this fails, the emulator is another one: the page on these tests has to say so.
-    assert!(stack.is_some_and(|stack| stack < 0x1FFF_0000), "{said:#?}");
+    assert!(
+        stack.is_some_and(|stack| stack < 0x1FFF_0000),
+        "{:#?}",
+        *RESTARTED
+    );
 }
 
 #[test]

@@ -1,16 +1,17 @@
 //! Both engines make the same of a recording, wherever their scans fall between its rows: the native engine's
-//! fall where the scene's clock says, the emulated board's when its firmware has started. Needs the two ELFs,
-//! as ./test builds them.
+//! fall where the scene's clock says, the emulated board's when its firmware has started. Needs the sensor's
+//! ELF, as ./test builds it.
 
+use std::convert::Infallible;
 use std::env;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use hil_sim_boards::{Firmware, Firmwares};
+use hil_sim_boards::{Firmware, sensor_alone};
 use hil_sim_core::judge::Verdict;
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
-use hil_sim_core::run::recording::Recording;
+use hil_sim_core::run::batch;
 use hil_sim_core::scene::{Gauges, Scene};
 use protocol::Role;
 use stranger::{RECORDED_HZ, Stranger};
@@ -102,13 +103,13 @@ fn committed(folder: &Path, scenes: &mut Vec<(String, Vec<Scene>)>) {
     }
 }
 
-fn firmware(role: Role) -> Firmware {
+fn sensor_firmware() -> Firmware {
     let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/thumbv7em-none-eabihf/release"),
         PathBuf::from,
     );
-    let path = folder.join(format!("firmware-{}", role.name()));
-    Firmware::read(&path, role).unwrap_or_else(|error| panic!("{error}"))
+    let path = folder.join("firmware-sensor");
+    Firmware::read(&path, Role::Sensor).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The mean valid share of some runs, and their valid estimates' RMS error in %, if there are any.
@@ -152,27 +153,26 @@ fn agree(native: &Made, elf: &Made) -> bool {
 
 #[test]
 fn both_engines_make_the_same_of_every_recording() {
-    let firmwares = Firmwares {
-        sensor: firmware(Role::Sensor),
-        display: firmware(Role::Display),
-    };
+    let firmware = sensor_firmware();
     let mut scenes = recordings();
     committed(
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes"),
         &mut scenes,
     );
+    let each: Vec<&Scene> = scenes.iter().flat_map(|(_, scenes)| scenes).collect();
+    let judged = |scene: &Scene, recording| Outcome::new(scene.clone(), recording).verdict;
+    let Ok(verdicts) = batch::on_all_cores(&each, |scene| {
+        let native = native::run(scene).unwrap();
+        let elf = sensor_alone::run(scene, &firmware).unwrap();
+        Ok::<_, Infallible>((judged(scene, native), judged(scene, elf)))
+    });
+    let (native, elf): (Vec<Verdict>, Vec<Verdict>) = verdicts.into_iter().unzip();
+    let (mut native, mut elf) = (&native[..], &elf[..]);
     let mut disagreements = Vec::new();
     println!("{:40} valid: native, elf; rms %: native, elf", "");
-    for (name, scenes) in scenes {
-        let made = |run: &dyn Fn(&Scene) -> Recording| {
-            let verdicts: Vec<Verdict> = scenes
-                .iter()
-                .map(|scene| Outcome::new(scene.clone(), run(scene)).verdict)
-                .collect();
-            Made::of(&verdicts)
-        };
-        let native = made(&|scene| native::run(scene).unwrap());
-        let elf = made(&|scene| hil_sim_boards::run(scene, &firmwares).unwrap().0);
+    for (name, scenes) in &scenes {
+        let made = |of: &mut &[Verdict]| Made::of(of.split_off(..scenes.len()).unwrap());
+        let (native, elf) = (made(&mut native), made(&mut elf));
         let line = format!(
             "{name:40} {:.3} {:.3}  {:.3} {:.3}",
             native.valid_share,
