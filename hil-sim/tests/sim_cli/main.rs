@@ -9,3 +9,4 @@ mod map;
 mod paper;
 mod people;
 mod run;
+mod serve;

@@ -9,8 +9,8 @@ use host_bridge::flash::programmer::{Programmer, Progress, Stage};
 use probe_rs::integration::FakeProbe;
 use protocol::Role;
 
-use crate::chip::{Chip, DEVICE_ID, Deed, FLASH_SIZE, OPTIONS, OPTIONS_1, probe};
-use crate::elf::{Elf, FLASH, program};
+use super::chip::{Chip, DEVICE_ID, Deed, FLASH_SIZE, OPTIONS, OPTIONS_1, probe};
+use super::elf::{Elf, FLASH, program};
 
 /// A plan that takes sectors 0, 1 and 4, and the chip for it.
 fn bench(name: &str) -> (Plan, Arc<Mutex<Chip>>) {

@@ -3,8 +3,8 @@
 use protocol::{PortCounters, ResetCause, RoleCounters, Status};
 use tests::{elves, stack};
 
-use crate::PLAIN;
-use crate::bit_for_bit::RUBBED;
+use super::PLAIN;
+use super::bit_for_bit::RUBBED;
 
 /// Time after the clock's start by which a board has set up its peripherals, in s.
 const START_UP_S: f64 = 0.1;

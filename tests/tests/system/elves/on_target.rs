@@ -63,7 +63,7 @@ static RESTARTED: LazyLock<Said> = LazyLock::new(|| run(RESTARTS.0, &Jumper::ALL
 
 fn every_test_passes(tests: &[&str], said: &Said) {
     assert!(said.is_done, "{said:#?}");
-    assert_eq!(begun(&said), tests, "{said:#?}");
+    assert_eq!(begun(said), tests, "{said:#?}");
     let passed = said.log.iter().filter(|line| *line == "all tests passed!");
     assert_eq!(passed.count(), 1, "{said:#?}");
 }

@@ -5,7 +5,7 @@ use host_bridge::doctor::permission::Permission;
 use host_bridge::state::State;
 use protocol::Role;
 
-use crate::bench::{hello, one, sensor_spoiled, spoiled};
+use super::bench::{hello, one, sensor_spoiled, spoiled};
 
 #[test]
 fn a_probe_that_is_not_for_this_user_comes_with_its_rule() {

@@ -7,7 +7,7 @@ use host_bridge::doctor::report::Style;
 use host_bridge::state::State;
 use serde_json::Value;
 
-use crate::bench::bench;
+use super::bench::bench;
 
 #[test]
 fn a_bench_that_is_well_has_no_findings() {

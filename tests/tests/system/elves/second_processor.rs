@@ -9,7 +9,7 @@ use hil_sim_core::scene::fault::{Fault, Kind};
 use tests::run::scene;
 use tests::{elves, other_processor};
 
-#[path = "../../plain-board/src/rehearsal.rs"]
+#[path = "../../../plain-board/src/rehearsal.rs"]
 mod rehearsal;
 
 use rehearsal::{Met, Rehearsal, SECONDS};

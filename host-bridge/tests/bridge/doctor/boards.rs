@@ -6,7 +6,7 @@ use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::state::State;
 use protocol::{DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, Trip};
 
-use crate::bench::{
+use super::bench::{
     display_counters, display_spoiled, hello, one, peer, sensor_counters, sensor_spoiled, spoiled,
 };
 

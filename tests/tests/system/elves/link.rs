@@ -6,7 +6,7 @@ use protocol::{MAX_FRAME, PortCounters, RoleCounters, Status};
 use tests::history;
 use tests::run::{Run, scene};
 
-use crate::PLAIN;
+use super::PLAIN;
 
 /// Frames a second: a hundred estimates and a status; 500 motions and a status.
 const SENSOR_FRAMES_PER_S: f64 = 101.0;

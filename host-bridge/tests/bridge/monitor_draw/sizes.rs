@@ -11,7 +11,7 @@ use protocol::{
     PortCounters, Range, Refusal, Role, SensorConfiguration, Setting, Trip,
 };
 
-use crate::{NOW_US, assert_has, busy, estimate, heard, picture, view};
+use super::{NOW_US, assert_has, busy, estimate, heard, picture, view};
 
 /// The usual terminal, and a large one.
 const SIZES: [(u16, u16); 2] = [(80, 24), (120, 40)];

@@ -18,6 +18,8 @@ use tests::virtual_ports::VirtualBench;
 use tests::virtual_relay::{VirtualPair, VirtualSite, name};
 use tests::weather::Sky;
 
+mod stop;
+
 /// Far more of virtual time than anything here takes.
 const LIMIT: Duration = Duration::from_secs(60);
 /// What the command line has by default.
@@ -434,37 +436,6 @@ fn a_relay_on_loopback_adds_no_millisecond() {
 }
 
 #[test]
-fn a_board_that_another_program_stopped_stops_the_other_site() {
-    let Sites {
-        sensor,
-        display,
-        pair,
-    } = Sites::new(MAX_AGE);
-    listen(&sensor, LIMIT, at_least(10));
-    display.say(Message::Stopped(Stopped::by(Trip::EmergencyStop)));
-    listen(&sensor, LIMIT, |heard| {
-        heard
-            .iter()
-            .any(|message| matches!(message, Message::Stop(_)))
-    });
-    pair.display
-        .says("the board at the sensor's site has stopped", LIMIT);
-    // And that is all: nobody says it back.
-    pass(&pair.bench, Duration::from_secs(1));
-    sensor.take_heard();
-    display.take_heard();
-    pass(&pair.bench, Duration::from_secs(1));
-    for board in [&sensor, &display] {
-        let heard = board.take_heard();
-        assert!(
-            !heard
-                .iter()
-                .any(|message| matches!(message, Message::Stop(_)))
-        );
-    }
-}
-
-#[test]
 fn a_board_whose_cable_is_pulled_and_put_back_goes_on_also_if_it_starts_anew() {
     let bench = VirtualBench::default();
     let sensor = talking_board_on(&bench, Role::Sensor);
@@ -512,98 +483,6 @@ fn a_board_that_takes_no_bytes_gets_the_newest_when_it_does_again() {
     sensor.deafen(false);
     motions.extend(listen(&sensor, LIMIT, at_least(300)));
     assert_rising(&motions);
-}
-
-#[test]
-fn stop_reaches_both_boards_from_either_site_also_when_the_network_was_away() {
-    const DELAY: Duration = Duration::from_millis(30);
-    let Sites {
-        sensor,
-        display,
-        pair,
-    } = Sites::new(MAX_AGE);
-    pair.network.delay(DELAY, Duration::ZERO);
-    listen(&sensor, LIMIT, at_least(10));
-
-    pair.sensor.site.stop(STOP);
-    // One way over the network, and until the board looks.
-    let soon = DELAY + Duration::from_millis(2);
-    listen(&display, soon, |heard| heard.iter().any(is_stop));
-    listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
-    pair.sensor.says(
-        "Stop: the board at the display's site has stopped: by the operator",
-        LIMIT,
-    );
-    pair.display.says("Stop, said by the sensor's site", LIMIT);
-    pair.display
-        .says("Stop: the board here has stopped: by the operator", LIMIT);
-
-    pair.display.site.stop(STOP);
-    pair.display.says(
-        "Stop: the board at the sensor's site has stopped: by the operator",
-        LIMIT,
-    );
-
-    // Said while the network is away, it comes when it is back.
-    pair.network.cut(true);
-    pair.display.says("the sensor's site: silent", LIMIT);
-    display.take_heard();
-    pair.sensor.site.stop(STOP);
-    pass(&pair.bench, Duration::from_secs(5));
-    assert!(!display.take_heard().iter().any(is_stop));
-    pair.network.cut(false);
-    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
-}
-
-#[test]
-fn an_operators_stop_is_done_only_when_the_display_itself_says_that_it_has_stopped() {
-    let Sites {
-        sensor,
-        display,
-        pair,
-    } = Sites::new(MAX_AGE);
-    listen(&sensor, LIMIT, at_least(10));
-    let clock: Arc<dyn Clock> = Arc::new(pair.bench.clock.clone());
-    let stop = |name: Name, within| -> Stopping {
-        operator::stop(&pair.network, &clock, &name, STOP, within)
-            .unwrap_or_else(|error| panic!("{error}"))
-    };
-    const SHORT: Duration = Duration::from_secs(1);
-
-    // Its bridge has written it, and yet the display goes on.
-    display.disobey(true);
-    assert_eq!(stop(name(), SHORT).progress, Progress::Told);
-    let told = display.take_heard().into_iter().filter(is_stop).count();
-    assert!(
-        told > 1,
-        "a line may garble what is said: told {told} times"
-    );
-
-    // It is told until it obeys.
-    let result = Arc::new(Mutex::new(None));
-    let (theirs, network, own) = (
-        Arc::clone(&result),
-        pair.network.clone(),
-        Arc::clone(&clock),
-    );
-    let stopping = clock.spawn(Box::new(move || {
-        let stopping = operator::stop(&network, &own, &name(), STOP, LIMIT);
-        *locked(&theirs) = stopping.ok();
-    }));
-    listen(&display, LIMIT, |heard| heard.iter().any(is_stop));
-    display.disobey(false);
-    clock.join(stopping);
-    let wanted = Stopping {
-        progress: Progress::Stopped,
-        trip: Some(Trip::Operator),
-    };
-    assert_eq!(*locked(&result), Some(wanted));
-
-    let other = "other".parse().expect("a name");
-    assert_eq!(stop(other, SHORT).progress, Progress::Unheard);
-    drop(display);
-    pair.display.says("not there", LIMIT);
-    assert_eq!(stop(name(), SHORT).progress, Progress::Heard);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use protocol::{Hello, PROTOCOL_VERSION, Role, SCHEMA_HASH};
 
-use crate::elf::{Elf, FLASH, file, folder, program};
+use super::elf::{Elf, FLASH, file, folder, program};
 
 /// The flash's size in bytes.
 const FLASH_BYTES: usize = 2 * 1024 * 1024;

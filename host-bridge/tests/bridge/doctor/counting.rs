@@ -4,7 +4,7 @@ use host_bridge::doctor::counters;
 use host_bridge::link::Missed;
 use protocol::{DisplayCounters, DisplayState, PortCounters, RoleCounters, SensorCounters};
 
-use crate::bench::{display_counters, display_spoiled, one, sensor_counters, sensor_spoiled};
+use super::bench::{display_counters, display_spoiled, one, sensor_counters, sensor_spoiled};
 
 #[test]
 fn a_count_says_whether_it_grows() {

@@ -12,7 +12,7 @@ use tests::bridge::{self, Running};
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::utterance::Speaker;
 
-use crate::{LIMIT, Pair, entries, folder, messages, signal, succeeded};
+use super::{LIMIT, Pair, entries, folder, messages, signal, succeeded};
 
 /// Waits until a board has been asked for its configuration: it is known.
 fn asked(board: &FakeBoard) -> bool {

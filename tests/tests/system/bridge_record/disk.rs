@@ -13,7 +13,7 @@ use tests::bridge;
 use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
-use crate::{LIMIT, Pair, entries, folder, signal};
+use super::{LIMIT, Pair, entries, folder, signal};
 
 /// Samples that fill no disk of these tests.
 const SOME: u32 = 800;

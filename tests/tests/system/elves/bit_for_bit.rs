@@ -8,7 +8,7 @@ use tests::history;
 use tests::run::{Run, scene};
 use tests::sensing::{replay, share_explained};
 
-use crate::configuration::assert_taken;
+use super::configuration::assert_taken;
 
 /// To and fro over a boundary, with noise; for a second one gauge is dead and one saturates.
 fn rubbing(method: &str, duration_s: f64) -> Scene {

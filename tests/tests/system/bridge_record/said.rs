@@ -11,7 +11,7 @@ use tests::bridge;
 use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
-use crate::{LIMIT, Pair, entries, folder, messages, of, signal, succeeded};
+use super::{LIMIT, Pair, entries, folder, messages, of, signal, succeeded};
 
 /// Says the same to both, for `turns`, without what the program answers by itself.
 fn talk(pair: &Pair, turns: u32) -> Vec<(Role, Message)> {
