@@ -21,9 +21,8 @@ use ros2msg::Definition;
 use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
-mod spoiled;
-
 mod readers;
+mod spoiled;
 
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(120);

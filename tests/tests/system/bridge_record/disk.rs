@@ -1,6 +1,6 @@
 //! What was said to be safe is, whatever happens to the program, the disk and the file.
 
-use std::fs;
+use std::fs::{self, File};
 use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -20,20 +20,22 @@ const SOME: u32 = 800;
 
 #[test]
 fn a_program_that_is_killed_leaves_what_it_said_is_safe() {
-    let path = folder("killed").join("killed.mcap");
+    let folder = folder("killed");
+    let (path, told) = (folder.join("killed.mcap"), folder.join("told"));
     let pair = Pair::new();
     let running = pair.record(
-        &mut bridge::command(),
+        bridge::command().stderr(File::create(&told).expect("a file can be made")),
         &[path.to_str().expect("UTF-8"), "--no-gauges"],
     );
     pair.wait_for_questions();
-    // Until some seconds of it are safe: the file grows with each.
+    // Until some seconds of it are safe, the file grows with each, and it has said so.
     let end = Instant::now() + LIMIT;
     let (mut sizes, mut last) = (0, 0);
     let mut speaker = Speaker::new(8);
     let mut said = Vec::new();
-    while sizes < 3 {
-        assert!(Instant::now() < end, "the file does not grow");
+    let text = || fs::read_to_string(&told).unwrap_or_default();
+    while sizes < 3 || !text().contains("messages") {
+        assert!(Instant::now() < end, "the file does not grow: {}", text());
         let motion = speaker.motion();
         pair.display.say(motion.clone());
         said.push(motion);
@@ -45,7 +47,7 @@ fn a_program_that_is_killed_leaves_what_it_said_is_safe() {
     signal(&running, "-KILL");
     let ended = running.wait(LIMIT);
     assert_eq!(ended.status.code(), None);
-    let safe = number_before(&ended.stderr, "messages");
+    let safe = number_before(&text(), "messages");
     let (read, is_cut) = entries(&path);
     assert!(is_cut);
     let motions: Vec<Message> = read

@@ -1,0 +1,162 @@
+//! What cannot be read.
+
+use super::*;
+
+#[test]
+fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
+    let folder = Folder::new("refused");
+    let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"f\"\n";
+    let tone = || wav(8_000, (0..20_000).map(|_| 0.0));
+    let stereo = {
+        let spec = WavSpec {
+            channels: 2,
+            sample_rate: 8_000,
+            bits_per_sample: 16,
+            sample_format: SampleFormat::Int,
+        };
+        let mut bytes = Cursor::new(Vec::new());
+        WavWriter::new(&mut bytes, spec)
+            .unwrap()
+            .finalize()
+            .unwrap();
+        bytes.into_inner()
+    };
+    let loud = wav(
+        8_000,
+        (0..20_000).map(|row| if row == 77 { 9.0 } else { 0.0 }),
+    );
+    let own = mcap(
+        "/imu",
+        (0..9).map(|n| (n, "{\"ax\":1,\"b\":{\"c\":2}}".to_owned())),
+    );
+    let slow: String = (0..300)
+        .map(|row| format!("{},1,1,1,1,1\n", f64::from(row) / 100.0))
+        .collect();
+    let gap: String = (0..1_500)
+        .map(|row| {
+            format!(
+                "{},1,1,1,1,1\n",
+                f64::from(row + u32::from(row > 700)) / 500.0
+            )
+        })
+        .collect();
+    let header = "t_s,g0,g1,g2,g3,g4\n";
+    for (keys, bytes, want) in [
+        (
+            "",
+            stereo.clone(),
+            "x.toml:4: gauges.channels: is missing: the file has 2 channels",
+        ),
+        (
+            "channels = [0, 1, 2, 0, 0]",
+            stereo.clone(),
+            "x.toml:7: gauges.channels: 2 is no channel of the WAV file: give numbers from 0 to 1",
+        ),
+        (
+            "channels = [0, 1]",
+            stereo.clone(),
+            "x.toml:7: gauges.channels: names 2 channels",
+        ),
+        (
+            "channels = [0, 1, 0, 1, -1]",
+            stereo.clone(),
+            "x.toml:7: gauges.channels[4]: -1 is no column",
+        ),
+        (
+            "channels = [0, 0, 0, 0, 0]",
+            stereo,
+            "f: 0 row(s) of numbers",
+        ),
+        ("", tone()[..tone().len() - 6].to_vec(), "f: sample 19998"),
+        ("", tone()[..20].to_vec(), "f: cannot be read as WAV"),
+        (
+            "rate_hz = 8000",
+            tone(),
+            "x.toml:7: gauges.rate_hz: a WAV file has none but its own",
+        ),
+        (
+            "topic = \"/x\"",
+            tone(),
+            "x.toml:7: gauges.topic: the file is no MCAP",
+        ),
+        (
+            "start_s = 2",
+            tone(),
+            "x.toml:6: gauges.file: lasts from -2 to 0.49",
+        ),
+        (
+            "volts_per_unit = 0",
+            tone(),
+            "x.toml:7: gauges.volts_per_unit: 0 is not a scale",
+        ),
+        (
+            "",
+            loud,
+            "f: sample 77 (0.009625 s), channel 0: 9 makes 10.650 V, which no ADC pin bears",
+        ),
+        (
+            "",
+            own.clone(),
+            "f: has no messages on /sensor/gauges: give topic as one of /imu, /other",
+        ),
+        (
+            "topic = \"/imu\"",
+            own.clone(),
+            "x.toml:4: gauges.channels: is missing: name the messages' fields",
+        ),
+        (
+            "topic = \"/imu\"\nchannels = [\"ay\", \"ay\", \"ay\", \"ay\", \"ay\"]",
+            own.clone(),
+            "f: message 0 of /imu, field ay: is no number there: there are ax, b.c",
+        ),
+        (
+            "topic = \"/imu\"\nchannels = [1, 1, 1, 1, 1]",
+            own.clone(),
+            "x.toml:8: gauges.channels: 1 is a number: name",
+        ),
+        ("", own[..30].to_vec(), "f: "),
+        (
+            "time_s_per_unit = 1",
+            format!("{header}0,1,1,1,1,1\n").into_bytes(),
+            "x.toml:7: gauges.time_s_per_unit: is no column's",
+        ),
+        (
+            "channels = [\"v\", \"v\", \"v\", \"v\", \"v\"]\nrate_hz = 1000",
+            b"t,w\n0,1\n".to_vec(),
+            "x.toml:7: gauges.channels: \"v\" is no column: there are t, w",
+        ),
+        (
+            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]",
+            b"t,w\n0,1\n".to_vec(),
+            "x.toml:4: gauges.time: is missing",
+        ),
+        (
+            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\nrate_hz = 1000",
+            b"t,w\n0,1\n0,x\n".to_vec(),
+            "f:3: column 2 (w): \"x\" is no number",
+        ),
+        (
+            "channels = [1, 1, 1, 1, 7]\nrate_hz = 1000",
+            b"0,1\n0,1\n".to_vec(),
+            "x.toml:7: gauges.channels: 7 is no column: the file's first line holds numbers, so give numbers from 0 to 1",
+        ),
+        (
+            "channels = [1, 1, 1, 1, 1]\nrate_hz = 1000",
+            b"0,1\n0,99\n".to_vec(),
+            "f:2: column 2: \"99\" makes 100.650 V",
+        ),
+        (
+            "",
+            format!("{header}{slow}").into_bytes(),
+            "f:3: column 1 (t_s): \"0.01\" comes more than 5 ms after the row before: give 200 Hz or more",
+        ),
+        (
+            "",
+            format!("{header}{gap}").into_bytes(),
+            "f:703: column 1 (t_s): \"1.404\" comes 4.000 ms after the row before",
+        ),
+    ] {
+        let refusal = folder.refusal(&format!("{gauges}{keys}\n"), "f", &bytes);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+}
