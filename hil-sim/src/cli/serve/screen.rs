@@ -2,7 +2,7 @@
 
 use std::io::{IsTerminal, Write};
 
-use ratatui::crossterm::terminal::size;
+use crossterm::terminal::size;
 
 /// Where the status is shown. That nobody may be looking is no reason to stop.
 pub struct Screen {
