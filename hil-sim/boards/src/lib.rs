@@ -158,7 +158,7 @@ pub fn run_at(
     Ok((record(scene, sensor, Some(display), pace), facts))
 }
 
-/// What the boards leave behind; without a display's, what the sensor does.
+/// What both boards leave behind, or the sensor board if it ran alone.
 fn record(
     scene: &Scene,
     sensor: Finished<Vec<ScanRecord>, Recorder>,

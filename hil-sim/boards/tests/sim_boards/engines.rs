@@ -1,19 +1,20 @@
 //! Both engines make the same of a recording, wherever their scans fall between its rows: the native engine's
-//! fall where the scene's clock says, the emulated board's when its firmware has started. Needs the sensor's
-//! ELF, as ./test builds it.
+//! fall where the scene's clock says, the emulated board's when its firmware has started. Needs the two ELFs,
+//! as ./test builds them.
 
 use std::convert::Infallible;
 use std::env;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use hil_sim_boards::{Firmware, sensor_alone};
+use hil_sim_boards::{Firmware, Firmwares, sensor_alone};
 use hil_sim_core::judge::Verdict;
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
 use hil_sim_core::run::batch;
+use hil_sim_core::run::recording::Recording;
 use hil_sim_core::scene::{Gauges, Scene};
-use protocol::Role;
+use protocol::{Estimate, Role};
 use stranger::{RECORDED_HZ, Stranger};
 
 #[path = "../../../core/tests/sim_core/estimation/stranger.rs"]
@@ -103,13 +104,13 @@ fn committed(folder: &Path, scenes: &mut Vec<(String, Vec<Scene>)>) {
     }
 }
 
-fn sensor_firmware() -> Firmware {
+fn firmware(role: Role) -> Firmware {
     let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/thumbv7em-none-eabihf/release"),
         PathBuf::from,
     );
-    let path = folder.join("firmware-sensor");
-    Firmware::read(&path, Role::Sensor).unwrap_or_else(|error| panic!("{error}"))
+    let path = folder.join(format!("firmware-{}", role.name()));
+    Firmware::read(&path, role).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The mean valid share of some runs, and their valid estimates' RMS error in %, if there are any.
@@ -153,7 +154,7 @@ fn agree(native: &Made, elf: &Made) -> bool {
 
 #[test]
 fn both_engines_make_the_same_of_every_recording() {
-    let firmware = sensor_firmware();
+    let firmware = firmware(Role::Sensor);
     let mut scenes = recordings();
     committed(
         &Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes"),
@@ -186,4 +187,38 @@ fn both_engines_make_the_same_of_every_recording() {
         }
     }
     assert!(disagreements.is_empty(), "{disagreements:#?}");
+}
+
+#[test]
+fn a_sensor_alone_says_of_a_recording_what_it_says_beside_a_display() {
+    let scene = Stranger {
+        surface: vec![(WAVELENGTH_MM, 0.0)],
+        arm_mm: at_47,
+        snr_db: 3.0,
+        duration_s: 2.0,
+        ..Stranger::default()
+    }
+    .scene("alone");
+    let firmwares = Firmwares {
+        sensor: firmware(Role::Sensor),
+        display: firmware(Role::Display),
+    };
+    let alone = sensor_alone::run(&scene, &firmwares.sensor).unwrap();
+    let (both, _) = hil_sim_boards::run(&scene, &firmwares).unwrap();
+    assert_eq!(alone.scans, both.scans);
+    assert!(alone.ticks.is_empty() && alone.outputs.is_empty());
+    let said = |recording: &Recording| {
+        let records = recording.estimates.iter();
+        records.map(|record| record.estimate).collect::<Vec<_>>()
+    };
+    let (alone, both) = (said(&alone), said(&both));
+    // Which one comes first hangs on when the other end has said Hello.
+    let first = alone[0].sequence.max(both[0].sequence);
+    let known = |said: Vec<Estimate>| {
+        let known = said.into_iter().filter(|one| one.sequence >= first);
+        known.collect::<Vec<_>>()
+    };
+    let (alone, both) = (known(alone), known(both));
+    assert!(alone.len() > 150, "{}", alone.len());
+    assert_eq!(alone, both);
 }
