@@ -23,7 +23,7 @@ const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
 /// turning point, can be taken in any of ten ticks each, and no word tells.
 const MOST_HISTORIES: usize = 100;
 /// The same if the link has delays and losses, so that more than one estimate in a hundred is held up.
-const MOST_HISTORIES_OF_WEATHER: usize = 1_000;
+const MOST_HISTORIES_OF_BAD_LINK: usize = 1_000;
 
 /// How a display board came to its words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,8 +62,8 @@ pub fn replay(recording: &Recording, settings: &Settings) -> Result<Replay, Stri
 ///
 /// # Errors
 /// The same.
-pub fn replay_of_weather(recording: &Recording, settings: &Settings) -> Result<Replay, String> {
-    replay_by(recording, settings, MOST_HISTORIES_OF_WEATHER)
+pub fn replay_of_bad_link(recording: &Recording, settings: &Settings) -> Result<Replay, String> {
+    replay_by(recording, settings, MOST_HISTORIES_OF_BAD_LINK)
 }
 
 fn replay_by(

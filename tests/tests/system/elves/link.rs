@@ -165,7 +165,7 @@ fn no_estimate_is_used_that_is_older_than_one_used_before() {
     assert!(display.peer.late > 0, "nothing came out of order");
     // The replay uses none that is older than one before it, and explains every word.
     let settings = WEATHER.scene.display_settings().unwrap();
-    let replay = history::replay_of_weather(recording, &settings).unwrap();
+    let replay = history::replay_of_bad_link(recording, &settings).unwrap();
     assert_eq!(replay.outputs, recording.outputs.len());
     // The hand rests at no time, the stimulus until the first valid estimate.
     assert!(replay.outputs > recording.ticks.len() / 2, "{replay:?}");
