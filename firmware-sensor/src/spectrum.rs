@@ -10,8 +10,8 @@
 //! a real surface the wave explains a quarter of what the gauges say, and chance explains nearly as much:
 //! what tells them apart is whether a line stays where it is over fresh ground. So each estimate has two
 //! suppositions. The *line* is the clearest peak of the averaged spectrum, the one that stands highest above
-//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is refined by least squares over the last
-//! waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
+//! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is
+//! refined by least squares over the last waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
 //! λ̂ is the period: a line at 2 λ or 3 λ that is at least 0.4 times as high as one at λ is taken for the
 //! fundamental, if a fit over three waves finds it there. Of waves that have no common period the

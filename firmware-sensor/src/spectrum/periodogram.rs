@@ -16,6 +16,8 @@ use crate::travel::PLACES_PER_MM;
 pub(super) const CANDIDATES: usize = 26;
 /// Those that the finest knots serve; the next coarser ones serve the others.
 const FINE: usize = 11;
+/// Spacings of knots that serve candidates: the coarsest is for fits alone.
+const SERVING: usize = 2;
 /// The shortest candidate, in mm.
 const SHORTEST_MM: f32 = 0.5;
 /// Candidates in an octave.
@@ -67,8 +69,8 @@ pub(super) type Spectrum = [f32; CANDIDATES];
 pub(super) struct Periodogram {
     candidates: [Candidate; CANDIDATES],
     /// The high-passes' level of each gauge at each spacing, none before the first knot, and what a slope leaves of it.
-    level: [Option<[f32; GAUGES]>; 2],
-    slope: [[f32; GAUGES]; 2],
+    level: [Option<[f32; GAUGES]>; SERVING],
+    slope: [[f32; GAUGES]; SERVING],
 }
 
 impl Periodogram {
@@ -93,8 +95,8 @@ impl Periodogram {
                     mean_weight: 0.0,
                 }
             }),
-            level: [None; 2],
-            slope: [[0.0; GAUGES]; 2],
+            level: [None; SERVING],
+            slope: [[0.0; GAUGES]; SERVING],
         }
     }
 
@@ -103,7 +105,7 @@ impl Periodogram {
         self.level[0].unwrap_or_default()
     }
 
-    /// Takes a knot of any spacing. Those of the coarsest are for fits alone.
+    /// Takes a knot of any spacing.
     pub fn push(&mut self, spacing: usize, knot: &Knot) {
         let Some(level) = self.level.get_mut(spacing) else {
             return;
