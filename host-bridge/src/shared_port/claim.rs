@@ -15,7 +15,18 @@ pub struct Device {
 }
 
 /// Ownership of a port. Dropping the last copy of it gives it up.
-pub struct Claim(Arc<File>);
+pub struct Claim(Arc<Lock>);
+
+/// A file that is locked. Closing it would leave it so for as long as a program that is just being started has it, too:
+/// a child has all files of its parent until its own program is loaded.
+struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Closing it does the same, a little later.
+        let _ = self.0.unlock();
+    }
+}
 
 impl Claim {
     pub fn again(&self) -> Self {
@@ -24,8 +35,9 @@ impl Claim {
 
     /// Has `words` stand where its holder is told. Fails if they can't be written.
     pub fn tell(&self, words: &str) -> io::Result<()> {
-        self.0.write_all_at(words.as_bytes(), 0)?;
-        self.0.set_len(words.len() as u64)
+        let Lock(file) = &*self.0;
+        file.write_all_at(words.as_bytes(), 0)?;
+        file.set_len(words.len() as u64)
     }
 }
 
@@ -66,7 +78,7 @@ impl Device {
             .open(self.file("lock")?)?;
         match file.try_lock() {
             Ok(()) => {
-                let claim = Claim(Arc::new(file));
+                let claim = Claim(Arc::new(Lock(file)));
                 // For people and messages: who it is.
                 claim.tell(&own_name())?;
                 Ok(Some(claim))
@@ -120,6 +132,7 @@ pub fn held(prefix: &str) -> Vec<String> {
         let mut file = File::open(path).ok()?;
         // Shared, so that two who look at once don't take each other for its holder.
         if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+            drop(Lock(file));
             return None;
         }
         let mut words = String::new();
@@ -162,5 +175,24 @@ fn folder() -> io::Result<PathBuf> {
             folder.display()
         );
         Err(io::Error::new(ErrorKind::PermissionDenied, words))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_given_up_is_free_while_a_program_just_started_still_has_the_file() {
+        let port = Device::named(&format!("claim-test-{}", std::process::id()));
+        let claim = port.claim().expect("a folder").expect("nobody else");
+        // As a child has it from its birth until its own program is loaded.
+        let inherited = claim.0.0.try_clone().expect("another handle");
+        let again = claim.again();
+        drop(claim);
+        assert!(port.claim().expect("a folder").is_none(), "a copy is left");
+        drop(again);
+        assert!(port.claim().expect("a folder").is_some());
+        drop(inherited);
     }
 }

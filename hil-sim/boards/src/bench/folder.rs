@@ -19,7 +19,7 @@ const BENCH: &str = "bench.toml";
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    _lock: File,
+    lock: File,
 }
 
 #[derive(Serialize)]
@@ -51,7 +51,7 @@ impl Folder {
             .open(path.join(LOCK))
             .map_err(&refuse)?;
         match lock.try_lock() {
-            Ok(()) => Ok(Self { path, _lock: lock }),
+            Ok(()) => Ok(Self { path, lock }),
             Err(TryLockError::WouldBlock) => Err(ServeError::Taken { path }),
             Err(TryLockError::Error(source)) => Err(refuse(source)),
         }
@@ -128,5 +128,25 @@ impl Drop for Folder {
             self.unlink(name);
         }
         let _ = fs::remove_file(self.bench_file());
+        // Closing it alone leaves it to a program that is just being started, and so has all files of this one.
+        let _ = self.lock.unlock();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_free_again_while_a_program_just_started_still_has_its_lock() {
+        let path = std::env::temp_dir().join(format!("bench-folder-{}", std::process::id()));
+        let folder = Folder::take(&path).unwrap();
+        let inherited = folder.lock.try_clone().unwrap();
+        assert!(matches!(Folder::take(&path), Err(ServeError::Taken { .. })));
+        drop(folder);
+        let again = Folder::take(&path);
+        assert!(again.is_ok(), "{again:?}");
+        drop(inherited);
+        fs::remove_dir_all(&path).unwrap();
     }
 }

@@ -22,7 +22,7 @@ pub struct Journal<'a> {
     path: PathBuf,
     file: File,
     /// Held until the journal is dropped.
-    _lock: File,
+    _lock: Lock,
 }
 
 impl<'a> Journal<'a> {
@@ -67,9 +67,19 @@ impl<'a> Journal<'a> {
     }
 }
 
+/// The right to write a CSV file. Dropping it gives it up.
+pub struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // Closing it alone leaves it to a program that is just being started, and so has all files of this one.
+        let _ = self.0.unlock();
+    }
+}
+
 /// Takes the right to write a CSV file: a lock on a file beside it, since the CSV itself is replaced.
 /// The right ends with the process, however it ends.
-pub fn lock(path: &Path) -> Result<File, MapError> {
+pub fn lock(path: &Path) -> Result<Lock, MapError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let lock_path = path.with_file_name(format!(".{name}.lock"));
     let mut options = OpenOptions::new();
@@ -81,7 +91,7 @@ pub fn lock(path: &Path) -> Result<File, MapError> {
     let file = file.map_err(MapError::file(&lock_path, NOT_WRITTEN))?;
     let no_locks = "cannot be locked: give an --out on a file system with locks";
     match file.try_lock() {
-        Ok(()) => Ok(file),
+        Ok(()) => Ok(Lock(file)),
         Err(TryLockError::WouldBlock) => Err(MapError::Busy(path.to_owned())),
         Err(TryLockError::Error(source)) => Err(MapError::File(lock_path, no_locks, source)),
     }
