@@ -45,7 +45,7 @@ impl<const TERMS: usize> Default for NormalEquations<TERMS> {
 }
 
 impl<const TERMS: usize> NormalEquations<TERMS> {
-    /// Takes a row: its terms, and what the gauges felt, in ADC steps.
+    /// Takes a row: its terms, of which the first is a constant 1, and what the gauges felt, in ADC steps.
     #[inline(always)]
     pub fn add(&mut self, terms: [f32; TERMS], felt: [f32; GAUGES]) {
         self.rows[self.filled] = Row { terms, felt };
@@ -68,21 +68,23 @@ impl<const TERMS: usize> NormalEquations<TERMS> {
     #[inline(never)]
     fn sum(&mut self) {
         let [one, two, three, four] = &self.rows;
+        // A term times the constant, which costs nothing once the loops are unrolled.
+        let by = |i: usize, term: f32, other: f32| if i == 0 { other } else { term * other };
         for i in 0..TERMS {
             for j in 0..=i {
-                self.products[i][j] += one.terms[i] * one.terms[j]
-                    + two.terms[i] * two.terms[j]
-                    + three.terms[i] * three.terms[j]
-                    + four.terms[i] * four.terms[j];
+                self.products[i][j] += by(j, one.terms[j], one.terms[i])
+                    + by(j, two.terms[j], two.terms[i])
+                    + by(j, three.terms[j], three.terms[i])
+                    + by(j, four.terms[j], four.terms[i]);
             }
         }
         for gauge in 0..GAUGES {
             let felt = [one, two, three, four].map(|row| row.felt[gauge]);
             for i in 0..TERMS {
-                self.right[gauge][i] += one.terms[i] * felt[0]
-                    + two.terms[i] * felt[1]
-                    + three.terms[i] * felt[2]
-                    + four.terms[i] * felt[3];
+                self.right[gauge][i] += by(i, one.terms[i], felt[0])
+                    + by(i, two.terms[i], felt[1])
+                    + by(i, three.terms[i], felt[2])
+                    + by(i, four.terms[i], felt[3]);
             }
             self.square[gauge] += felt.iter().map(|x| x * x).sum::<f32>();
         }

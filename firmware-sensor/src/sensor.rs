@@ -262,22 +262,26 @@ impl Sensor {
             self.surface
                 .say(sequence, instant_us, contact == Contact::Slip)
         });
-        let gauges = if self.streaming > 0 {
-            self.streaming -= 1;
-            self.block.push(started.place(number, instant_us), &sample)
-        } else {
-            self.block.clear();
-            None
-        };
         let drive = self
             .arm
             .step(arm_um, self.configuration.arm_full_scale_um_s);
-        Output {
+        let mut output = Output {
             estimate,
             texture,
-            gauges,
+            gauges: None,
             drive,
+        };
+        if self.streaming > 0 {
+            self.streaming -= 1;
+            let full = self.block.push(started.place(number, instant_us), &sample);
+            // A block is long, and seldom full: it is not copied while it is not there.
+            if full.is_some() {
+                output.gauges = full;
+            }
+        } else {
+            self.block.clear();
         }
+        output
     }
 }
 

@@ -8,7 +8,7 @@ use protocol::GAUGES;
 
 use super::knots::{Knot, spacing_for};
 use crate::estimator::MIN_AMPLITUDE_LSB;
-use crate::float::{larger, smaller, sqrt};
+use crate::float::{larger, sqrt};
 use crate::phasor::phasor;
 use crate::travel::PLACES_PER_MM;
 
@@ -250,11 +250,11 @@ pub(super) const fn wavelength_mm(number: usize) -> f32 {
 
 /// Whether there is a peak at candidate `number`: the ends have none, nor has one beside what is not known yet.
 pub(super) fn is_peak(spectrum: &Spectrum, number: usize) -> bool {
-    number >= 1
-        && number + 1 < CANDIDATES
-        && smaller(spectrum[number - 1], spectrum[number + 1]) > 0.0
-        && spectrum[number] >= spectrum[number - 1]
-        && spectrum[number] >= spectrum[number + 1]
+    if number < 1 || number + 1 >= CANDIDATES {
+        return false;
+    }
+    let [before, height, after] = [number - 1, number, number + 1].map(|i| spectrum[i]);
+    height >= before && height >= after && before > 0.0 && after > 0.0
 }
 
 /// The highest peak.
