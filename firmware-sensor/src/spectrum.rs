@@ -50,16 +50,17 @@ mod tests;
 mod trend;
 mod wave;
 
-/// The shortest and the longest wavelength that are stood by, in mm.
+/// The shortest and the longest wavelength that are stood by, in mm; an estimate of them may be [`MARGIN`] off.
 pub const SHORTEST_MM: f32 = 0.6;
 /// See [`SHORTEST_MM`].
 pub const LONGEST_MM: f32 = 8.0;
-/// The lowest and the highest frequency v/λ̂ that are stood by, in Hz, 2.5 and 150 with 4 % for what v and λ̂
-/// may be off: below, drift is not told from texture; above, the sensor's resonance and the anti-aliasing
-/// filter are.
+/// The lowest and the highest frequency v/λ̂ that are stood by, in Hz: below, drift is not told from texture; above, the
+/// sensor's resonance and the anti-aliasing filter are. Both are [`MARGIN`] from the 2.5 and 150 Hz that are promised.
 pub const LOWEST_HZ: f32 = 2.4;
 /// See [`LOWEST_HZ`].
 pub const HIGHEST_HZ: f32 = 156.0;
+/// What v and λ̂ may be off at the ends of a range without leaving it.
+pub const MARGIN: f32 = 1.04;
 
 /// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
 /// the encoder, so that one that dithers between counts is no travel. The force channel's noise, some
@@ -234,7 +235,7 @@ impl Spectrum {
                 noise,
                 usable.count_ones(),
             );
-        let in_range = (SHORTEST_MM..=LONGEST_MM).contains(&said.wavelength_mm)
+        let in_range = (SHORTEST_MM / MARGIN..=LONGEST_MM * MARGIN).contains(&said.wavelength_mm)
             && (LOWEST_HZ..=HIGHEST_HZ).contains(&hz)
             && amplitude_lsb >= MIN_AMPLITUDE_LSB
             && self.rested < REST_SAMPLES;

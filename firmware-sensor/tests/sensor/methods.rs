@@ -266,3 +266,16 @@ fn an_adapted_window_is_better_than_80_ms_in_the_papers_range() {
         assert!(adapted < 0.8 * fixed, "{adapted} beside {fixed}");
     }
 }
+
+#[test]
+fn a_wave_at_either_end_of_the_range_is_stood_by() {
+    for (wavelength_mm, speed_mm_s) in [(0.6, 20.0), (0.6, 70.0), (8.0, 30.0), (8.0, 100.0)] {
+        let rub = Rub::new(Motion::Constant(speed_mm_s), wavelength_mm);
+        for estimate in &rub.estimates(with(Method::Spectrum))[200..] {
+            assert!(
+                estimate.valid,
+                "{wavelength_mm} mm at {speed_mm_s} mm/s: {estimate:?}"
+            );
+        }
+    }
+}
