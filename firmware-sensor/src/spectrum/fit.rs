@@ -67,6 +67,19 @@ impl Fitted {
             0.0
         }
     }
+
+    /// The mean of the `usable` gauges' own shares, 0 to 1: one that the wave has left counts as much as the others,
+    /// also if there is little in it now.
+    pub fn gauges_share(&self, usable: u8) -> f32 {
+        let (mut sum, mut count) = (0.0, 0_u8);
+        for gauge in 0..GAUGES {
+            if usable >> gauge & 1 == 1 && self.totals[gauge] > 0.0 {
+                sum += self.explaineds[gauge] / self.totals[gauge];
+                count += 1;
+            }
+        }
+        sum / f32::from(count.max(1))
+    }
 }
 
 /// A pass through the latest waves, in portions.

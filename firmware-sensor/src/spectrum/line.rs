@@ -41,7 +41,9 @@ pub(super) struct Line {
     pub(super) agreement: f32,
     pub(super) squares: [f32; 2],
     pub(super) shares: [f32; 2],
-    /// The share over three waves that it has had lately, falling slowly.
+    /// Average over that memory of the share that each gauge has over three waves, and what it has been lately, falling
+    /// slowly.
+    pub(super) gauges_share: f32,
     pub(super) usual: f32,
     /// 1 as long as a strong line is still there, falling to 0 as it goes.
     pub(super) there: f32,
@@ -62,6 +64,8 @@ struct Seen {
     /// Of the fits over three waves and over the longest length: how far from the line, and shares.
     wander: [f32; 2],
     shares: [f32; 2],
+    /// See [`Fitted::gauges_share`].
+    gauges_share: f32,
 }
 
 impl Spectrum {
@@ -114,11 +118,13 @@ impl Spectrum {
             agrees: self.survey.agree,
             wander: [wander(three), wander(longest)],
             shares: [share_over(three), share_over(longest)],
+            gauges_share: found[three].map_or(0.0, |fitted| fitted.gauges_share(self.touch.usable)),
         };
         self.line.follow(line_mm, &seen);
         // A strong wave that explains much less than it used to is going, whatever its past says.
         self.line.there = if self.line.usual > KNOWN {
-            let share = share_over(2) / self.line.usual;
+            let gauges = found[2].map_or(0.0, |fitted| fitted.gauges_share(self.touch.usable));
+            let share = gauges / self.line.usual;
             ((share - GONE) / (STAYS - GONE)).clamp(0.0, 1.0)
         } else {
             1.0
@@ -280,7 +286,8 @@ impl Line {
         for (kept, now) in self.shares.iter_mut().zip(seen.shares) {
             *kept += share * (now - *kept);
         }
-        self.usual = larger(self.shares[0], self.usual - FORGOTTEN * waves);
+        self.gauges_share += share * (seen.gauges_share - self.gauges_share);
+        self.usual = larger(self.gauges_share, self.usual - FORGOTTEN * waves);
     }
 }
 
