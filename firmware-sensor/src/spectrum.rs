@@ -50,17 +50,18 @@ mod tests;
 mod trend;
 mod wave;
 
-/// The shortest and the longest wavelength that are stood by, in mm; an estimate of them may be [`MARGIN`] off.
+/// The shortest and the longest wavelength that are stood by, in mm, to within 1 % ([`MARGIN`]): an estimate of one of
+/// them scatters to both sides of it.
 pub const SHORTEST_MM: f32 = 0.6;
 /// See [`SHORTEST_MM`].
 pub const LONGEST_MM: f32 = 8.0;
 /// The lowest and the highest frequency v/λ̂ that are stood by, in Hz: below, drift is not told from texture; above, the
-/// sensor's resonance and the anti-aliasing filter are. Both are [`MARGIN`] from the 2.5 and 150 Hz that are promised.
+/// sensor's resonance and the anti-aliasing filter are. 2.5 and 150 Hz are promised; v and λ̂ may be 4 % off.
 pub const LOWEST_HZ: f32 = 2.4;
 /// See [`LOWEST_HZ`].
 pub const HIGHEST_HZ: f32 = 156.0;
-/// What v and λ̂ may be off at the ends of a range without leaving it.
-pub const MARGIN: f32 = 1.04;
+/// See [`SHORTEST_MM`].
+pub const MARGIN: f32 = 1.01;
 
 /// Half the width, in µm, of the play that a movement must overcome to count as travel: two counts of
 /// the encoder, so that one that dithers between counts is no travel. The force channel's noise, some
@@ -132,6 +133,8 @@ pub struct Spectrum {
     /// The last λ̂ in mm, and how many times in a row it was probable enough: up to [`TIMES`].
     sure_mm: f32,
     sure_times: u8,
+    /// How many times in a row there was no hint at stick and slip: up to [`TIMES`].
+    smooth_times: u8,
     /// How λ of the line changes along the way.
     trend: Trend,
 }
@@ -189,6 +192,7 @@ impl Spectrum {
             known_share: 0.0,
             sure_mm: 0.0,
             sure_times: 0,
+            smooth_times: TIMES,
             trend: Trend::default(),
         }
     }
@@ -251,8 +255,15 @@ impl Spectrum {
         }
         self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
         self.sure_mm = said.wavelength_mm;
-        let at_once =
-            said.new || fitted.share() > STRONG || off(said.wavelength_mm, self.known_mm) < SAME;
+        // A fingertip that sticks and slips is smooth for a moment.
+        self.smooth_times = if jerky {
+            0
+        } else {
+            (self.smooth_times + 1).min(TIMES)
+        };
+        let at_once = said.new
+            || fitted.share() > STRONG && self.smooth_times == TIMES
+            || off(said.wavelength_mm, self.known_mm) < SAME;
         let valid = is_sure && (at_once || self.sure_times == TIMES);
         if valid {
             self.known_mm = said.wavelength_mm;
