@@ -133,8 +133,6 @@ pub struct Spectrum {
     /// The last λ̂ in mm, and how many times in a row it was probable enough: up to [`TIMES`].
     sure_mm: f32,
     sure_times: u8,
-    /// How many times in a row there was no hint at stick and slip: up to [`TIMES`].
-    smooth_times: u8,
     /// How λ of the line changes along the way.
     trend: Trend,
 }
@@ -192,7 +190,6 @@ impl Spectrum {
             known_share: 0.0,
             sure_mm: 0.0,
             sure_times: 0,
-            smooth_times: TIMES,
             trend: Trend::default(),
         }
     }
@@ -255,15 +252,8 @@ impl Spectrum {
         }
         self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
         self.sure_mm = said.wavelength_mm;
-        // A fingertip that sticks and slips is smooth for a moment.
-        self.smooth_times = if jerky {
-            0
-        } else {
-            (self.smooth_times + 1).min(TIMES)
-        };
-        let at_once = said.new
-            || fitted.share() > STRONG && self.smooth_times == TIMES
-            || off(said.wavelength_mm, self.known_mm) < SAME;
+        let at_once =
+            said.new || fitted.share() > STRONG || off(said.wavelength_mm, self.known_mm) < SAME;
         let valid = is_sure && (at_once || self.sure_times == TIMES);
         if valid {
             self.known_mm = said.wavelength_mm;
