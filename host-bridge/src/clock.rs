@@ -204,7 +204,8 @@ impl<C: Clocks> Epoch<C> {
     fn begin(clocks: C) -> Self {
         Self {
             started: clocks.since_boot(),
-            unix_ns: u64::try_from(clocks.calendar().as_nanos()).unwrap_or(u64::MAX),
+            // In whole µs, as all moments are.
+            unix_ns: u64::try_from(clocks.calendar().as_micros() * 1_000).unwrap_or(u64::MAX),
             clocks,
         }
     }

@@ -295,8 +295,9 @@ mod tests {
         let once = file.safe_bytes();
         let mut rows = RowBuilder::default();
         let mut noise = Noise(1);
-        // A round moment of the calendar, so that how its bytes change, and so how they pack, is every day the same.
-        let moment_ns = unix_ns(0).next_multiple_of(1 << 40);
+        // How a minute packs depends on the bytes of its times, by some 2 %: so always the same moment after one whose
+        // lower 40 bits are 0, which is a whole number of µs as well.
+        let moment_ns = unix_ns(0).next_multiple_of(125 << 40) + 345_678_000;
         let start_us = (moment_ns - unix_ns(0)) / 1_000;
         for at_us in (0..MINUTE_US).step_by(1_000) {
             for (role, message) in said(at_us, &mut noise) {
