@@ -123,7 +123,7 @@ impl Spectrum {
         self.line.follow(line_mm, &seen);
         // A strong wave that explains much less than it used to is going, whatever its past says.
         self.line.there = if self.line.usual > KNOWN {
-            let gauges = found[2].map_or(0.0, |fitted| fitted.gauges_share(self.touch.usable));
+            let gauges = found[three].map_or(0.0, |fitted| fitted.gauges_share(self.touch.usable));
             let share = gauges / self.line.usual;
             ((share - GONE) / (STAYS - GONE)).clamp(0.0, 1.0)
         } else {

@@ -2,7 +2,7 @@
 //! first one on, and how many there are.
 
 use crate::rubbing::{CODES_PER_UNIT, GAINS, Judgement, Motion, Rub, with};
-use protocol::Method;
+use protocol::{Method, SensorConfiguration};
 
 const WAVELENGTHS_MM: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
 /// The paper's Fig. 7.
@@ -276,6 +276,20 @@ fn a_wave_at_either_end_of_the_range_is_stood_by() {
                 estimate.valid,
                 "{wavelength_mm} mm at {speed_mm_s} mm/s: {estimate:?}"
             );
+        }
+    }
+}
+
+#[test]
+fn however_few_waves_are_fitted_a_clean_one_is_stood_by() {
+    for waves in [2, 3, 5] {
+        let configuration = SensorConfiguration {
+            waves,
+            ..with(Method::Spectrum)
+        };
+        let estimates = Rub::new(Motion::Constant(50.0), 2.0).estimates(configuration);
+        for estimate in &estimates[100..] {
+            assert!(estimate.valid, "{waves} waves: {estimate:?}");
         }
     }
 }
