@@ -41,9 +41,9 @@ pub(super) struct Line {
     pub(super) agreement: f32,
     pub(super) squares: [f32; 2],
     pub(super) shares: [f32; 2],
-    /// Average over that memory of the share that each gauge has over three waves, and what it has been lately, falling
-    /// slowly.
+    /// Average over that memory of [`Fitted::gauges_share`] over three waves.
     pub(super) gauges_share: f32,
+    /// What that has been lately, falling slowly.
     pub(super) usual: f32,
     /// 1 as long as a strong line is still there, falling to 0 as it goes.
     pub(super) there: f32,
@@ -123,8 +123,7 @@ impl Spectrum {
         self.line.follow(line_mm, &seen);
         // A strong wave that explains much less than it used to is going, whatever its past says.
         self.line.there = if self.line.usual > KNOWN {
-            let gauges = found[three].map_or(0.0, |fitted| fitted.gauges_share(self.touch.usable));
-            let share = gauges / self.line.usual;
+            let share = seen.gauges_share / self.line.usual;
             ((share - GONE) / (STAYS - GONE)).clamp(0.0, 1.0)
         } else {
             1.0

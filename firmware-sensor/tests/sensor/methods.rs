@@ -181,7 +181,7 @@ fn crossings_need_gauges_that_agree() {
 fn crossings_of_the_gauges_that_are_allowed_are_enough() {
     for gauges in [0b00001, 0b10100, 0b01011] {
         let rub = &table_1(unchanged)[6];
-        let configuration = protocol::SensorConfiguration {
+        let configuration = SensorConfiguration {
             gauges,
             ..with(Method::Crossings)
         };

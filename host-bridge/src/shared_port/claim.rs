@@ -23,7 +23,7 @@ struct Lock(File);
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // Closing it does the same, a little later.
+        // If it can't be given up, it goes with the file, a little later.
         let _ = self.0.unlock();
     }
 }
@@ -132,7 +132,7 @@ pub fn held(prefix: &str) -> Vec<String> {
         let mut file = File::open(path).ok()?;
         // Shared, so that two who look at once don't take each other for its holder.
         if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
-            drop(Lock(file));
+            let _ = file.unlock();
             return None;
         }
         let mut words = String::new();
