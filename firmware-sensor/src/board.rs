@@ -29,6 +29,7 @@ use embassy_stm32::triggers::TIM3_TRGO;
 use embassy_stm32::{bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
+use embassy_time::Duration;
 use firmware_sensor::{Drive, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 use nucleo::encoder::Encoder;
 use nucleo::serial::{self, Serial};
@@ -62,6 +63,8 @@ const RING: usize = 2 * BLOCK;
 /// 28 + 12 ADC clocks at 21 MHz: 1.9 µs a channel, 11.4 µs a scan.
 const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
 const ARM_PWM: Hertz = Hertz(20_000);
+/// In which a command that the pins were given takes effect.
+pub const ARM_PWM_PERIOD: Duration = Duration::from_hz(ARM_PWM.0 as u64);
 
 /// Bytes of each port's ring. On a line without a gap half of it passes before anyone is told, 2.8 ms:
 /// with that a Stop is obeyed within 5 ms.
@@ -119,7 +122,7 @@ impl Board {
         // The converters' common registers, which hold their prescaler, may hang on ADC1's clock; the manual does not say.
         // If they do, and it is off, ADC3 runs at 42 MHz, of 36 MHz at most.
         pac::RCC.apb2enr().modify(|w| w.set_adc1en(true));
-        let adc = Adc::<ADC3>::new(p.ADC3).into_ring_buffered(
+        let mut adc = Adc::<ADC3>::new(p.ADC3).into_ring_buffered(
             p.DMA2_CH0,
             ADC_RING.init([0; RING]),
             Irqs,
@@ -127,6 +130,8 @@ impl Board {
             TIM3_TRGO,
             Exten::RISING_EDGE,
         );
+        // Also after scans were lost: DMA tells of each block's end, and the encoder is read then.
+        adc.set_alignment(BLOCK);
         let trigger = Timer::new(p.TIM3);
         trigger.set_frequency(Hertz(SCAN_RATE_HZ), RoundTo::Slower);
         trigger.set_master_mode(Mms::UPDATE);
@@ -211,7 +216,7 @@ impl Sampler {
         });
     }
 
-    /// The next sample's scans, and the encoder's position at the last of them.
+    /// The next sample's scans, and the encoder's position at the last of them. Nothing is lost if this is dropped.
     pub async fn next(&mut self) -> Result<([Scan; SCANS_PER_SAMPLE], u16), ScansLost> {
         let mut words = [0; BLOCK];
         match select(self.adc.read(&mut words), OVERRUN.wait()).await {

@@ -3,11 +3,12 @@
 use core::cell::Cell;
 
 use embassy_executor::Spawner;
+use embassy_futures::select::{Either, select};
 use embassy_stm32::usart::RingBufferedUartRx;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Instant};
+use embassy_time::{Duration, Instant, Timer};
 use firmware_sensor::capabilities::CAPABILITIES;
 use firmware_sensor::{Drive, Sensor, Settings, line};
 use nucleo::answer::answer;
@@ -23,7 +24,7 @@ use protocol::{
 };
 use static_cell::StaticCell;
 
-use crate::board::{ArmDrive, Board, Sampler, ScansLost};
+use crate::board::{ARM_PWM_PERIOD, ArmDrive, Board, Sampler, ScansLost};
 
 /// Time between two samples: the sampling task's deadline.
 const SAMPLE_PERIOD: Duration = Duration::from_hz(firmware_sensor::SAMPLE_RATE_HZ as u64);
@@ -78,8 +79,7 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
 
 /// Samples, estimates, drives the arm. Deadline: one sample period, 1 ms. Missed, DMA goes on for
 /// one more period and nothing is lost; missed twice, scans are lost and counted, and the filters
-/// run on with what comes next. A Stop takes the drive off before anything is computed, and also if there are
-/// no scans.
+/// run on with what comes next. A Stop takes the drive off when it is heard, whether scans come or not.
 #[embassy_executor::task]
 async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>) {
     let mut sensor = Sensor::new(SensorConfiguration::default());
@@ -91,12 +91,23 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>
     arm.enable();
     sampler.start();
     loop {
-        let sampled = sampler.next().await;
+        let sampled = match select(STOP.wait(), sampler.next()).await {
+            // Said again, it changes nothing.
+            Either::First(_) if sensor.arm().trip().is_some() => continue,
+            Either::First(stop) => {
+                let trip = stop.reason.trip();
+                sensor.stop(trip);
+                arm.set(Drive::default());
+                nucleo::trip::latch(trip);
+                Timer::after(ARM_PWM_PERIOD).await;
+                announced.tell(sensor.arm());
+                counters.stopped = Some(trip);
+                COUNTERS.lock(|shared| shared.set(counters));
+                continue;
+            }
+            Either::Second(sampled) => sampled,
+        };
         announced.tell(sensor.arm());
-        if let Some(stop) = STOP.try_take() {
-            sensor.stop(stop.reason.trip());
-            arm.set(Drive::default());
-        }
         let (scans, encoder) = match sampled {
             Ok(sample) => sample,
             Err(lost) => {
@@ -145,24 +156,18 @@ async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>
 /// What was said of the arm.
 #[derive(Default)]
 struct Announced {
-    kept: Option<Trip>,
     told: ArmState,
     is_off: bool,
 }
 
 impl Announced {
-    /// A sample after the last commands went to the pins: keeps why the arm was stopped where a reset does not
-    /// reach, says that its drive is off, and tells of each change as soon as there is room for the message.
+    /// A period of the PWM, or more, after the last commands went to the pins: says that a stopped arm's drive is
+    /// off, and tells of each change as soon as there is room for the message.
     fn tell(&mut self, state: ArmState) {
-        if let Some(trip) = state.trip() {
-            if self.kept.is_none() {
-                self.kept = Some(trip);
-                nucleo::trip::latch(trip);
-            }
-            // A whole period of the PWM at rest has gone by.
-            if !core::mem::replace(&mut self.is_off, true) {
-                stop::OFF.signal(trip);
-            }
+        if let Some(trip) = state.trip()
+            && !core::mem::replace(&mut self.is_off, true)
+        {
+            stop::OFF.signal(trip);
         }
         if state != self.told {
             let instant_us = Instant::now().as_micros();

@@ -39,7 +39,7 @@ mod tests {
     use embassy_futures::select::{Either, select};
     use embassy_stm32::pac;
     use embassy_time::Instant;
-    use firmware_sensor::{Drive, SAMPLE_RATE_HZ, SCAN_RATE_HZ};
+    use firmware_sensor::{Drive, SAMPLE_RATE_HZ, SCAN_RATE_HZ, SCANS_PER_SAMPLE};
     use nucleo::serial::{BAUD, Serial};
     use nucleo::stack::StackWatch;
     use protocol::CHANNELS;
@@ -155,6 +155,23 @@ mod tests {
         );
         assert!(mean.abs_diff(period) <= JITTER_CYCLES / SAMPLES + 1);
         assert!(longest - shortest <= JITTER_CYCLES);
+    }
+
+    #[test]
+    fn after_scans_were_lost_a_sample_ends_where_dma_tells_of_it(bench: &mut Bench) {
+        const WORDS: u32 = SCANS_PER_SAMPLE as u32 * CHANNELS as u32;
+        // Longer than the ring holds, and by four different parts of a sample.
+        for held_us in [3_050, 3_300, 3_550, 3_800] {
+            bench.position();
+            wait_us(held_us);
+            assert!(block_on(bench.sampler.next()).is_err());
+            for _ in 0..20 {
+                feed();
+                assert!(block_on(bench.sampler.next()).is_ok());
+                let left = u32::from(pac::DMA2.st(0).ndtr().read().ndt());
+                assert_eq!(left % WORDS, 0);
+            }
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ const SENSOR: (&str, &[&str]) = (
         "the_clock_tree_is_what_it_is_set_to",
         "processor_and_timers_agree_on_a_microsecond",
         "a_sample_comes_every_millisecond_of_the_cycle_counter",
+        "after_scans_were_lost_a_sample_ends_where_dma_tells_of_it",
         "a_scan_is_in_memory_twelve_microseconds_after_its_trigger",
         "the_encoder_counts_every_edge_both_ways",
         "the_trigger_latches_the_position_that_there_was",
@@ -101,10 +102,10 @@ fn below_its_ram_the_emulated_board_does_not_fault_as_a_chip_should() {
 #[test]
 fn a_jumper_that_is_left_out_fails_the_test_that_needs_it() {
     for (jumper, program, test) in [
-        (Jumper::EncoderA, SENSOR.0, SENSOR.1[4]),
-        (Jumper::EncoderB, SENSOR.0, SENSOR.1[4]),
-        (Jumper::Pulse, SENSOR.0, SENSOR.1[6]),
-        (Jumper::Serial, SENSOR.0, SENSOR.1[7]),
+        (Jumper::EncoderA, SENSOR.0, SENSOR.1[5]),
+        (Jumper::EncoderB, SENSOR.0, SENSOR.1[5]),
+        (Jumper::Pulse, SENSOR.0, SENSOR.1[7]),
+        (Jumper::Serial, SENSOR.0, SENSOR.1[8]),
         (Jumper::Spi, DISPLAY.0, DISPLAY.1[1]),
         (Jumper::Pulse, DISPLAY.0, DISPLAY.1[2]),
         (Jumper::Load, DISPLAY.0, DISPLAY.1[5]),

@@ -386,3 +386,56 @@ fn an_arm_that_was_stopped_stays_so_when_the_watchdog_restarts_its_board() {
         );
     }
 }
+
+#[test]
+fn the_arm_is_stopped_also_while_no_scans_come_and_stays_so_after_the_restart() {
+    const STOPPED_NS: u64 = 1_150 * MS;
+    let adc = "[[fault]]\nat_s = 1.15\nkind = \"adc-stopped\"";
+    for (speech, told) in [
+        (Speech::StopAlone, Role::Sensor),
+        (Speech::Key, Role::Sensor),
+        (Speech::StopAlone, Role::Display),
+    ] {
+        let what = (speech, told);
+        let run = Stopped::amid(speech, told, 3.0, adc);
+        let [reset] = run.recording.signs.resets[..] else {
+            panic!("{what:?}: one reset, not {:?}", run.recording.signs.resets);
+        };
+        assert!(
+            reset.at_ns > run.stop_ns + run.limit_ns(Role::Sensor),
+            "{what:?}: the Stop is heard before the watchdog acts, {reset:?}"
+        );
+        // Where the arm goes while nothing is sampled shows in where it is afterwards.
+        let scans = &run.recording.scans;
+        let last = scans.iter().rfind(|scan| scan.at_ns < STOPPED_NS).unwrap();
+        let driven_ns = run.stop_ns + run.limit_ns(Role::Sensor) - last.at_ns;
+        let most_mm = 1.2 * SPEED_MM_S * (driven_ns as f64 * 1e-9 + LAG_S);
+        let gone_mm = run.position_mm(u64::MAX) - last.position_mm;
+        assert!(
+            (0.0..=most_mm).contains(&gone_mm),
+            "{what:?}: {gone_mm} mm, bound {most_mm} mm"
+        );
+        let status = run.recording.sensor_status.expect("it says how it is");
+        assert_eq!(status.reset, ResetCause::Watchdog, "{what:?}");
+        assert!(
+            matches!(status.role, RoleCounters::Sensor(sensor) if sensor.stopped == Some(Trip::Operator)),
+            "{what:?}: {:?}",
+            status.role
+        );
+        // Whoever says a Stop is told at once, not by the restarted board.
+        let mut stopped = run.heard.iter().filter_map(|(at_ns, message)| {
+            matches!(message, Message::Stopped(_)).then_some(*at_ns)
+        });
+        match speech {
+            Speech::Key => assert_eq!(stopped.next(), None, "{what:?}: told in words"),
+            _ => {
+                let at_ns = stopped.next().expect("an answer");
+                let since_ns = at_ns - run.stop_ns;
+                assert!(
+                    since_ns <= run.limit_ns(told) + 5 * MS,
+                    "{what:?}: {since_ns}"
+                );
+            }
+        }
+    }
+}
