@@ -11,7 +11,7 @@ use hil_sim_studies::display::rendering_of_word;
 
 use protocol::Rendering;
 
-use super::files::Results;
+use super::files::{Format, Results};
 use super::say::say;
 use super::{Elves, number, status, threads, under_bar};
 
@@ -51,8 +51,8 @@ impl Campaign {
             rendering: self.rendering,
         };
         let firmwares = self.elves.read()?;
-        let json = Results::wanted(self.json.as_deref())?;
-        let csv = Results::wanted(self.csv.as_deref())?;
+        let json = Results::wanted(self.json.as_deref(), Format::JsonList)?;
+        let csv = Results::wanted(self.csv.as_deref(), Format::Csv("kind"))?;
 
         let shifts = plan.shifts();
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();

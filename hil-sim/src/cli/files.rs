@@ -1,8 +1,8 @@
 //! Files that commands write.
 
-use std::fs::{self, File};
-use std::io::Write;
-use std::path::Path;
+use std::fs::{self, File, TryLockError};
+use std::io::{BufWriter, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
@@ -17,41 +17,154 @@ pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
     })
 }
 
+/// What results are written as, and what a file of it begins with.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Format {
+    JsonList,
+    JsonObject,
+    Html,
+    Xml,
+    /// With these words before the first comma.
+    Csv(&'static str),
+}
+
+impl Format {
+    /// Whether a file that begins so may hold results from before: nothing else is written over.
+    fn is_of(self, head: &str) -> bool {
+        // A scene may begin with a bracket as well.
+        let two: String = head
+            .split_whitespace()
+            .collect::<String>()
+            .chars()
+            .take(2)
+            .collect();
+        match self {
+            Self::JsonList => matches!(two.as_str(), "[{" | "[]"),
+            Self::JsonObject => two == "{\"",
+            Self::Html => head.starts_with("<!doctype html"),
+            Self::Xml => head.starts_with("<?xml"),
+            Self::Csv(first) => head.split(',').next() == Some(first),
+        }
+    }
+}
+
 /// A file for results, opened before there are any: an hour is not to be lost for a folder that is not there.
+///
+/// What is written goes to a draft beside it, named `FILE.part`, which takes the file's place at the end: until
+/// then an earlier result is there. A device or a pipe is written to at once.
 pub(super) struct Results<'a> {
     pub path: &'a Path,
-    pub file: File,
+    file: BufWriter<File>,
+    /// And the place that it takes.
+    draft: Option<[PathBuf; 2]>,
 }
 
 impl<'a> Results<'a> {
-    /// Makes a file where the user wants it: never over a scene, which `--json *.toml` would take for it.
-    pub fn create(path: &'a Path) -> anyhow::Result<Self> {
+    /// Makes a file where the user wants it: over results from before, but never over anything else, which
+    /// `--json *.toml` would take for it.
+    pub fn create(path: &'a Path, format: Format) -> anyhow::Result<Self> {
+        let here = path.display();
         anyhow::ensure!(
             path.extension().is_none_or(|ending| ending != "toml"),
-            "{}: is a scene's name, and would be written over: give results a name of their own before the scenes",
-            path.display()
+            "{here}: is a scene's name, and would be written over: give results a name of their own before the scenes"
         );
-        let file = File::create(path).with_context(|| {
-            format!(
-                "{}: cannot be written: give a file in a folder that exists",
-                path.display()
-            )
-        })?;
-        Ok(Self { path, file })
+        let wrong = || format!("{here}: cannot be written: give a file in a folder that exists");
+        let there = match fs::metadata(path) {
+            Ok(there) => Some(there),
+            Err(error) if error.kind() == ErrorKind::NotFound => None,
+            Err(error) => return Err(error).with_context(wrong),
+        };
+        if there.as_ref().is_some_and(|there| !there.is_file()) {
+            let file = File::options().write(true).open(path).with_context(wrong)?;
+            let file = BufWriter::new(file);
+            return Ok(Self {
+                path,
+                file,
+                draft: None,
+            });
+        }
+        // What a link leads to, not the link.
+        let place = match there {
+            Some(_) => fs::canonicalize(path).with_context(wrong)?,
+            None => path.to_owned(),
+        };
+        if there.is_some() {
+            let mut head = Vec::new();
+            let file = File::options()
+                .read(true)
+                .write(true)
+                .open(&place)
+                .with_context(wrong)?;
+            file.take(256).read_to_end(&mut head).with_context(wrong)?;
+            anyhow::ensure!(
+                head.is_empty() || format.is_of(&String::from_utf8_lossy(&head)),
+                "{here}: is there, and no result from before: nothing was written; give another file, or take it away"
+            );
+        }
+        let mut draft = place.clone().into_os_string();
+        draft.push(".part");
+        let draft = PathBuf::from(draft);
+        let file = File::options()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&draft)
+            .with_context(wrong)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => anyhow::bail!(
+                "{here}: is being written already: give each result a file of its own"
+            ),
+            Err(TryLockError::Error(error)) => return Err(error).with_context(wrong),
+        }
+        file.set_len(0).with_context(wrong)?;
+        Ok(Self {
+            path,
+            file: BufWriter::new(file),
+            draft: Some([draft, place]),
+        })
     }
 
     /// The same where one is wanted.
-    pub fn wanted(path: Option<&'a Path>) -> anyhow::Result<Option<Self>> {
-        path.map(Self::create).transpose()
+    pub fn wanted(path: Option<&'a Path>, format: Format) -> anyhow::Result<Option<Self>> {
+        path.map(|path| Self::create(path, format)).transpose()
     }
 
+    /// All of it.
     pub fn write(mut self, text: &str) -> anyhow::Result<()> {
         let written = self.file.write_all(text.as_bytes());
-        written.with_context(|| self.path.display().to_string())
+        written.with_context(|| self.path.display().to_string())?;
+        self.end()
     }
 
     pub fn write_json(self, content: &impl serde::Serialize) -> anyhow::Result<()> {
         self.write(&(serde_json::to_string_pretty(content)? + "\n"))
+    }
+
+    /// Where parts of it are written.
+    pub fn file(&mut self) -> &mut impl Write {
+        &mut self.file
+    }
+
+    /// Nothing more is to come: it takes its place.
+    pub fn end(mut self) -> anyhow::Result<()> {
+        let placed = self.file.flush().and_then(|()| match self.draft.take() {
+            Some([draft, place]) => fs::rename(draft, place),
+            None => Ok(()),
+        });
+        placed.with_context(|| self.path.display().to_string())
+    }
+}
+
+impl Drop for Results<'_> {
+    /// A draft stays if there is anything in it.
+    fn drop(&mut self) {
+        if let Some([draft, _]) = &self.draft
+            && self.file.flush().is_ok()
+            && fs::metadata(draft).is_ok_and(|draft| draft.len() == 0)
+        {
+            let _ = fs::remove_file(draft);
+        }
     }
 }
 

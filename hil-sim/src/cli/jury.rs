@@ -22,7 +22,7 @@ use hil_sim_studies::jury::table::{Row, Weighed};
 use protocol::{DisplayConfiguration, Method, SensorConfiguration};
 use serde::Serialize;
 
-use super::files::Results;
+use super::files::{Format, Results};
 use super::run_options;
 use super::say::say;
 use super::{Elves, EngineName, threads, under_bar};
@@ -153,7 +153,7 @@ struct Felt {
 
 impl Jury {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let json = Results::wanted(self.json.as_deref())?;
+        let json = Results::wanted(self.json.as_deref(), Format::JsonObject)?;
         if self.weights {
             self.find_weights()?;
             return Ok(ExitCode::SUCCESS);

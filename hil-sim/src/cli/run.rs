@@ -1,7 +1,7 @@
 //! `hil-sim run`.
 
 use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -18,7 +18,7 @@ use hil_sim_studies::output::json::{JsonList, SceneResult};
 use hil_sim_studies::output::junit::{Fate, TestCase, case, xml};
 use hil_sim_studies::output::report::{Chapter, html};
 
-use super::files::Results;
+use super::files::{Format, Results};
 use super::run_options::{Loaded, RunOptions};
 use super::say::say;
 use super::scene_files::scene_files;
@@ -65,7 +65,7 @@ impl Run {
         let files = scene_files(&self.scenes, self.shard)?;
         let loaded = self.way.load(&files);
         if loaded.iter().any(Result::is_err)
-            && let Some(junit) = Results::wanted(self.junit.as_deref())?
+            && let Some(junit) = Results::wanted(self.junit.as_deref(), Format::Xml)?
         {
             junit.write(&xml(
                 self.way.engine(),
@@ -76,15 +76,15 @@ impl Run {
         let ready = self.way.ready()?;
         let golden = self.golden.as_deref().map(Golden::read).transpose()?;
         // Opened first: a run is not to be lost for a folder that is not there.
-        let json = Results::wanted(self.json.as_deref())?;
-        let report = Results::wanted(self.report.as_deref())?;
-        let junit = Results::wanted(self.junit.as_deref())?;
+        let json = Results::wanted(self.json.as_deref(), Format::JsonList)?;
+        let report = Results::wanted(self.report.as_deref(), Format::Html)?;
+        let junit = Results::wanted(self.junit.as_deref(), Format::Xml)?;
 
         say!("{HEADER}");
         let mut books = Books {
             way: &self.way,
             golden,
-            json: json.map(|json| (BufWriter::new(json.file), json.path, JsonList::default())),
+            json: json.map(|json| (json, JsonList::default())),
             cases: Vec::with_capacity(scenes.len()),
             outcomes: Vec::new(),
             met: true,
@@ -116,12 +116,13 @@ impl Run {
                 books.cases.into_iter().chain(rest),
             )?)?;
         }
-        ran?;
-        if let Some((mut file, path, list)) = books.json {
-            file.write_all(list.end().as_bytes())
-                .and_then(|()| file.flush())
-                .with_context(|| path.display().to_string())?;
+        // Of those that have run, if one could not.
+        if let Some((mut json, list)) = books.json {
+            let written = json.file().write_all(list.end().as_bytes());
+            written.with_context(|| json.path.display().to_string())?;
+            json.end()?;
         }
+        ran?;
         if let Some(report) = report {
             let chapters: Vec<_> = books.outcomes.iter().map(Chapter::of).collect();
             let path = report.path;
@@ -136,7 +137,7 @@ impl Run {
 struct Books<'a> {
     way: &'a RunOptions,
     golden: Option<Golden>,
-    json: Option<(BufWriter<fs::File>, &'a Path, JsonList)>,
+    json: Option<(Results<'a>, JsonList)>,
     cases: Vec<TestCase>,
     outcomes: Vec<Outcome>,
     /// Whether all was as expected so far.
@@ -182,9 +183,9 @@ impl Books<'_> {
             self.way.annotate(file, at, &title, line);
         }
         self.met &= is_met;
-        if let Some((file, path, list)) = &mut self.json {
-            let written = list.write(&SceneResult::of(&judgement, scene), file);
-            written.with_context(|| path.display().to_string())?;
+        if let Some((json, list)) = &mut self.json {
+            let written = list.write(&SceneResult::of(&judgement, scene), json.file());
+            written.with_context(|| json.path.display().to_string())?;
         }
         self.outcomes.extend(outcome);
         let (row, unmet) = (&row, &unmet);

@@ -1,6 +1,7 @@
 //! `hil-sim run` as a person or a script meets it.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -68,6 +69,101 @@ fn a_scene_is_never_written_over_with_results() {
         );
         assert_eq!(fs::read_to_string(folder.join("a.toml")).unwrap(), SOUND);
     }
+}
+
+/// A scene whose motion is a file's.
+const RECORDED: &str = "duration_s = 0.5
+[surface]
+specimens = [{ wavelength_mm = 2.0 }]
+[motion]
+kind = \"recorded\"
+file = \"m.csv\"
+";
+
+#[test]
+fn nothing_but_results_is_written_over_with_results() {
+    let folder = folder("over-an-input");
+    let motion = "t_s,x_mm\n0,0\n2,100\n";
+    fs::write(folder.join("m.csv"), motion).unwrap();
+    fs::write(folder.join("s.toml"), RECORDED).unwrap();
+    // A scene may have any name, and begin with a bracket as JSON does.
+    let other = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    fs::write(folder.join("scene"), other).unwrap();
+    std::os::unix::fs::symlink("s.toml", folder.join("link.json")).unwrap();
+    for option in ["--json", "--junit", "--report"] {
+        for (scene, file) in [
+            ("s.toml", "m.csv"),
+            ("scene", "scene"),
+            ("s.toml", "link.json"),
+        ] {
+            let output = hil_sim(&folder, &["run", scene, option, file]);
+            assert_eq!(output.status.code(), Some(2), "{option} {file}");
+            let complaint = errors(&output);
+            let is_told = complaint.contains(&format!("{file}: is there, and no result"));
+            assert!(is_told, "{complaint}");
+        }
+        // One from before is.
+        for _ in 0..2 {
+            let output = hil_sim(&folder, &["run", "s.toml", option, "o"]);
+            assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+        }
+        fs::remove_file(folder.join("o")).unwrap();
+    }
+    let output = hil_sim(
+        &folder,
+        &["run", "s.toml", "--json", "both", "--report", "both"],
+    );
+    assert_eq!(output.status.code(), Some(2));
+    assert!(errors(&output).contains("both: is being written already"));
+    for (file, text) in [("m.csv", motion), ("s.toml", RECORDED), ("scene", other)] {
+        assert_eq!(fs::read_to_string(folder.join(file)).unwrap(), text);
+    }
+    let mut left: Vec<String> = fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["link.json", "m.csv", "s.toml", "scene"]);
+}
+
+#[test]
+fn results_from_before_stay_until_there_are_new_ones() {
+    let folder = folder("killed");
+    let before = "[{ \"name\": \"before\" }]\n";
+    fs::write(folder.join("o.json"), before).unwrap();
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    let long = SOUND.replace("0.5", "600.0");
+    fs::write(folder.join("long.toml"), long).unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args(["run", "a.toml", "long.toml", "--json", "o.json"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Until the first scene's line, the second one of all, is there.
+    let lines = BufReader::new(run.stdout.take().unwrap()).lines();
+    assert_eq!(lines.take(2).map_while(Result::ok).count(), 2);
+    run.kill().unwrap();
+    run.wait().unwrap();
+    let text = fs::read_to_string(folder.join("o.json")).unwrap();
+    assert_eq!(text, before);
+}
+
+#[test]
+fn a_device_takes_results_as_a_file_does() {
+    let folder = folder("device");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "/dev/stdout"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(
+        String::from_utf8(output.stdout)
+            .unwrap()
+            .contains("\"name\": \"a\"")
+    );
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "/dev/full"]);
+    assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+    assert!(errors(&output).contains("/dev/full"));
+    assert!(!Path::new("/dev/full.part").exists());
 }
 
 #[test]
