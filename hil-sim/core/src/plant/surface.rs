@@ -208,8 +208,14 @@ impl Recorded {
     }
 
     fn new(profile: &Series, blur_mm: f64) -> Self {
-        let raw = on_grid(profile);
+        let mut raw = on_grid(profile);
         let points = raw.len();
+        // By a power of two, which costs no bit: squares of very small heights would be 0.
+        let highest = raw.iter().copied().map(f64::abs).fold(0.0, f64::max);
+        let (_, exponent) = libm::frexp(highest);
+        for height in &mut raw {
+            *height = libm::scalbn(*height, -exponent);
+        }
         let mean = raw.iter().sum::<f64>() / points as f64;
 
         let reach = (4.0 * blur_mm / GRID_MM).ceil() as i64;

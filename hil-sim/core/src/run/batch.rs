@@ -23,10 +23,11 @@ pub fn in_order<I: Sync, O: Send, E>(
     work: impl Fn(&I) -> O + Sync,
     mut finished: impl FnMut(usize, O) -> Result<(), E>,
 ) -> Result<(), E> {
+    let threads = threads.get().min(inputs.len());
     // One for each input that may be begun.
     let (permit, permits) = mpsc::channel();
     let allow = |permit: &mpsc::Sender<()>| permit.send(()).unwrap_or_default();
-    (0..2 * threads.get()).for_each(|_| allow(&permit));
+    (0..2 * threads).for_each(|_| allow(&permit));
     let (permits, next) = (Mutex::new(permits), AtomicUsize::new(0));
     let (sender, results) = mpsc::channel();
     let is_permitted = || {
@@ -36,7 +37,7 @@ pub fn in_order<I: Sync, O: Send, E>(
     thread::scope(|scope| {
         // Dropped at the end or at an error, whoever waits for one is done.
         let permit = permit;
-        for _ in 0..threads.get().min(inputs.len()) {
+        for _ in 0..threads {
             let (sender, next, work, is_permitted) = (sender.clone(), &next, &work, &is_permitted);
             scope.spawn(move || {
                 while is_permitted() {
@@ -108,7 +109,7 @@ mod tests {
             (0..turns).fold(*n, |n, _| n.wrapping_mul(6_364_136_223_846_793_005))
         };
         let inputs: Vec<u64> = (0..100).collect();
-        for count in [1, 2, 7] {
+        for count in [1, 2, 7, usize::MAX] {
             let mut seen = Vec::new();
             let all: Result<(), ()> = in_order(&inputs, threads(count), work, |index, result| {
                 assert_eq!(result, work(&inputs[index]));

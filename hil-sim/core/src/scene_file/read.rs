@@ -1,5 +1,6 @@
 //! From TOML to a checked [`Scene`], section by section.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -78,20 +79,33 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     })
 }
 
+/// Of a scene's name, in letters.
+const LONGEST_NAME: usize = 64;
+
 fn name(root: &mut Table<'_>, path: &Path) -> Result<String, SceneError> {
-    let from_file = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = root.text("name")?.unwrap_or(&from_file);
-    let usable = (1..=64).contains(&name.len())
+    let fits = |letter: char| letter.is_ascii_alphanumeric() || "._-".contains(letter);
+    let Some(name) = root.text("name")? else {
+        // A file may be called otherwise.
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let stem = stem.trim_start_matches('.').chars().take(LONGEST_NAME);
+        let name: String = stem
+            .map(|letter| if fits(letter) { letter } else { '_' })
+            .collect();
+        return Ok(if name.is_empty() {
+            "_".to_owned()
+        } else {
+            name
+        });
+    };
+    let is_usable = (1..=LONGEST_NAME).contains(&name.len())
         && !name.starts_with('.')
-        && name
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte));
-    if usable {
+        && name.chars().all(fits);
+    if is_usable {
         Ok(name.to_owned())
     } else {
         Err(root.refuse(
             "name",
-            format!("{name:?} cannot name a file everywhere: give 1 to 64 of A–Z a–z 0–9 . _ - without a dot in front"),
+            format!("{name:?} cannot name a file everywhere: give 1 to {LONGEST_NAME} of A–Z a–z 0–9 . _ - without a dot in front"),
         ))
     }
 }
@@ -224,6 +238,15 @@ fn motion(mut table: Table<'_>, duration_s: f64) -> Result<Motion, SceneError> {
         's' => {
             let amplitude_mm_s = table.needed_number("amplitude_mm_s")?;
             let frequency_hz = table.needed_number("frequency_hz")?;
+            let swing_mm = amplitude_mm_s / (TAU * frequency_hz);
+            let place = Bounds::of("start_mm");
+            if !place.allow(swing_mm) {
+                let message = format!(
+                    "at this amplitude a stroke is out of reach: give more, so that amplitude_mm_s / (2π · frequency_hz) is {}",
+                    place.give
+                );
+                return Err(table.refuse("frequency_hz", message));
+            }
             table.finish(" with kind = \"sinusoid\"")?;
             Ok(Motion::Sinusoid {
                 amplitude_mm_s,

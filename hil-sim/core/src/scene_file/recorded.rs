@@ -21,6 +21,7 @@ use std::sync::Arc;
 
 use protocol::GAUGES;
 
+use super::bounds::Bounds;
 use super::table::{Column, Table};
 use crate::plant::gauges::{MID_RAIL_VOLTS, SCAN_RATE_HZ};
 use crate::plant::surface::GRID_MM;
@@ -234,6 +235,26 @@ pub(super) fn motion(
     laid(table, rows, adc).map(Arc::new)
 }
 
+/// Of a surface: as fine as a profile is blurred, a million points.
+const LONGEST_PROFILE_MM: f64 = 20_000.0;
+/// Beyond any height in any unit, and far from what a number of 32 bits can't hold.
+const HIGHEST: f64 = 1e12;
+
+/// Whether a row of a profile can be of a surface.
+fn check_height(_: Option<&[f64]>, row: &[f64]) -> Result<(), (usize, String)> {
+    let place = Bounds::of("start_mm");
+    if !place.allow(row[0]) {
+        Err((0, format!("is out of reach: give {}", place.give)))
+    } else if row[1].abs() > HIGHEST {
+        Err((
+            1,
+            format!("is no height: give a number from -{HIGHEST:e} to {HIGHEST:e}"),
+        ))
+    } else {
+        Ok(())
+    }
+}
+
 /// The heights of `[surface]`, one column; or with `felt_per_unit` what is felt there.
 pub(super) fn profile(table: &mut Table<'_>) -> Result<Profile, SceneError> {
     let source = Source::of(table, &LENGTH, &["x_mm,height"])?;
@@ -250,9 +271,17 @@ pub(super) fn profile(table: &mut Table<'_>) -> Result<Profile, SceneError> {
         scale: felt_per_unit.unwrap_or(1.0),
         offset: 0.0,
     };
-    let nothing_else: Check<'_> = &|_, _| Ok(());
     let own = ("", ("", 1.0));
-    let (rows, _) = source.read(table, columns, own, EVERYWHERE, conversion, nothing_else)?;
+    let (rows, _) = source.read(table, columns, own, EVERYWHERE, conversion, &check_height)?;
+    let (first, last) = rows.extent();
+    if last - first > LONGEST_PROFILE_MM {
+        let message = format!(
+            "reaches over {:.3} m, a profile over at most {:.0}: give places in mm, or a part of it",
+            (last - first) * 1e-3,
+            LONGEST_PROFILE_MM * 1e-3
+        );
+        return Err(table.refuse("file", message));
+    }
     // Coarser heights are points of a surface, not samples of a wave: straight lines make no ripples of an edge.
     if lines == Some(true) || !is_denser(&rows, GRID_MM.recip()) {
         return Ok(profile(Arc::new(rows)));

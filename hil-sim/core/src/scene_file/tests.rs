@@ -449,3 +449,18 @@ fn whole_numbers_do_where_numbers_are_asked_for() {
         (2.0, 2.0)
     );
 }
+
+#[test]
+fn a_scene_without_a_name_has_its_files_whatever_that_is_called() {
+    let long = "a".repeat(300);
+    for (file, name) in [
+        ("my scene.toml", "my_scene"),
+        ("ü.toml", "_"),
+        (".hidden.toml", "hidden"),
+        ("3 mm, 70 mm_s.toml", "3_mm__70_mm_s"),
+        (&*long, &long[..64]),
+    ] {
+        let scene = Scene::parse(Path::new(file), SURFACE).unwrap();
+        assert_eq!(scene.name, name, "{file}");
+    }
+}

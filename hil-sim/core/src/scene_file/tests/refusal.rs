@@ -59,6 +59,10 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:6: motion.frequency_hz: 0 is not a frequency",
         ),
         (
+            "[motion]\nkind = \"sinusoid\"\namplitude_mm_s = 1000\nfrequency_hz = 1e-3",
+            "x.toml:6: motion.frequency_hz: at this amplitude a stroke is out of reach",
+        ),
+        (
             "[arm]\nfollows = \"link\"\nlag_ms = -0.1",
             "x.toml:5: arm.lag_ms: -0.1 is not a lag",
         ),

@@ -160,3 +160,60 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
 }
+
+#[test]
+fn a_profile_is_no_longer_and_no_higher_than_a_surface_and_its_scale_does_not_matter() {
+    let folder = Folder::new("profile-bounds");
+    let profile = "profile = \"recorded\"\nfile = \"p.csv\"\n";
+    let channels = format!("{profile}place = \"a\"\nchannels = [\"b\"]\nplace_mm_per_unit = 1e9\n");
+    for (section, csv, want) in [
+        (
+            profile,
+            "x_mm,height\n-100,0\n1e8,1\n",
+            "p.csv:3: column 1 (x_mm): \"1e8\" is out of reach",
+        ),
+        (
+            profile,
+            "x_mm,height\n-1e308,0\n1e308,1\n",
+            "p.csv:2: column 1 (x_mm): \"-1e308\" is out of reach",
+        ),
+        (
+            profile,
+            "x_mm,height\n0,0\n20001,1\n",
+            "x.toml:5: surface.file: reaches over 20.001 m",
+        ),
+        (
+            &channels,
+            "a,b\n0,0\n1,1\n",
+            "p.csv:3: column 1 (a): \"1\" is out of reach",
+        ),
+        (
+            profile,
+            "x_mm,height\n0,0\n40,1e307\n",
+            "p.csv:3: column 2 (height): \"1e307\" is no height",
+        ),
+    ] {
+        let refusal = folder.refusal(section, "p.csv", csv.as_bytes());
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+    let codes = |scale: f64| {
+        let rows = (0..2_400).map(|row| {
+            let x_mm = f64::from(row) * 0.05 - 10.0;
+            format!(
+                "{x_mm},{:e}\n",
+                scale * libm::sin(std::f64::consts::PI * x_mm)
+            )
+        });
+        let csv = format!("x_mm,height\n{}", rows.collect::<String>());
+        let scene = folder.load(profile, "p.csv", csv.as_bytes()).unwrap();
+        let mut world = World::new(&scene).unwrap();
+        let scans =
+            (0..4_000).map(|scan| world.codes(f64::from(scan) / 4_000.0, f64::from(scan) / 160.0));
+        scans.collect::<Vec<_>>()
+    };
+    let one = codes(1.0);
+    assert!(one.iter().any(|scan| scan[2] != one[0][2]));
+    for scale in [2f64.powi(36), 2f64.powi(-600)] {
+        assert!(codes(scale) == one, "{scale}");
+    }
+}
