@@ -3,14 +3,14 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use crate::bench::{Bench, BenchError, Seat};
 use crate::link::{Event, Link};
 use crate::place::Place;
 use clap::{Args, Parser, Subcommand, ValueHint};
-use protocol::Role;
+use crossbeam_channel::{Receiver, Sender, unbounded};
+use protocol::{Message, Role};
 
 pub use desk::Desk;
 
@@ -150,17 +150,36 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "give a number of seconds above 0, and at most a hundred years".to_owned())
 }
 
+/// Some ten seconds of all that two boards say.
+const WAITING: usize = 10_000;
+
 /// What happens to links, as it comes.
 type Told = Receiver<(Role, Event)>;
 
 /// The same, and what happens.
 fn told_links(bench: &Bench) -> (Vec<(Role, Link)>, Told) {
-    let (events, told) = channel();
-    let links = links(bench, move |role, event| {
+    let (events, told) = unbounded();
+    let links = links(bench, move |role, event| tell(&events, role, event));
+    (links, told)
+}
+
+/// Tells what happens. While whoever is told stands still, as a terminal may for hours, what is said hundreds of times
+/// a second goes once there are [`WAITING`]: the next one says as much.
+fn tell(events: &Sender<(Role, Event)>, role: Role, event: Event) {
+    let is_often = matches!(
+        &event,
+        Event::Heard {
+            message: Message::Motion(_)
+                | Message::Estimate(_)
+                | Message::Gauges(_)
+                | Message::Texture(_),
+            ..
+        }
+    );
+    if !(is_often && events.len() >= WAITING) {
         // Nobody listens any more at the end.
         let _ = events.send((role, event));
-    });
-    (links, told)
+    }
 }
 
 fn put(seat: &mut Seat, place: Option<&Place>) {
@@ -229,5 +248,41 @@ impl Arguments {
             Command::Completions(completions) => completions.execute(),
             Command::Man(man) => man.execute(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{Motion, Ping};
+
+    use super::*;
+
+    #[test]
+    fn whoever_stands_still_is_told_no_more_than_fits_and_all_that_is_rare() {
+        let (events, told) = unbounded();
+        let heard = |message| Event::Heard { at_us: 0, message };
+        let motion = Motion {
+            sequence: 0,
+            instant_us: 0,
+            position_um: 0,
+            velocity_um_s: 0,
+        };
+        for _ in 0..WAITING + 1_000 {
+            tell(&events, Role::Display, heard(Message::Motion(motion)));
+        }
+        let ping = Message::Ping(Ping { sent_us: 1 });
+        tell(&events, Role::Display, heard(ping));
+        assert_eq!(told.len(), WAITING + 1);
+        let last = told.try_iter().last();
+        assert!(matches!(
+            last,
+            Some((
+                _,
+                Event::Heard {
+                    message: Message::Ping(_),
+                    ..
+                }
+            ))
+        ));
     }
 }

@@ -137,7 +137,7 @@ fn write_texture(
     texture: texture::Made,
 ) -> Result<Vec<Exported>, ExportError> {
     let path = settings.to.clone();
-    refuse_taken(&path, settings.force)?;
+    refuse_taken(&path, settings.force, &settings.from)?;
     let text = texture
         .experience
         .text()
@@ -158,7 +158,7 @@ fn write_groups(settings: &Settings, groups: Vec<Group>) -> Result<Vec<Exported>
         settings.to.with_file_name(name)
     };
     for group in &groups {
-        refuse_taken(&path(group), settings.force)?;
+        refuse_taken(&path(group), settings.force, &settings.from)?;
     }
     let mut exported = Vec::with_capacity(groups.len());
     for group in groups {

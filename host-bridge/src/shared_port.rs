@@ -144,7 +144,8 @@ impl Seat {
         let part = match self.device.claim() {
             Ok(Some(claim)) => Part::Owner(self.own(claim)?),
             Ok(None) => Part::Guest(self.join()?),
-            Err(error) => return Err(self.failed(format!("can't be shared: {error}"))),
+            // Nobody can be told of it: better alone than not at all, for there may be a Stop to be said.
+            Err(_) => return (self.open)(),
         };
         let way = Arc::new(Mutex::new(part.way()));
         let path = self.path.clone();
@@ -452,5 +453,37 @@ impl Drop for SharedOutput {
                 open.remove(&self.path);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Silent;
+
+    impl Input for Silent {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(ErrorKind::TimedOut.into())
+        }
+
+        fn close(self: Box<Self>, _: bool) {}
+    }
+
+    #[test]
+    fn a_port_that_cannot_be_shared_is_had_alone() {
+        let seat = Seat {
+            path: PathBuf::from("port"),
+            device: Device::without_folder(),
+            open: Box::new(|| {
+                let (input, output) = (Box::new(Silent), Box::new(io::sink()));
+                Ok(Opened { input, output })
+            }),
+        };
+        let opened = seat.take();
+        let Ok(Opened { mut output, .. }) = opened else {
+            panic!("it is not opened");
+        };
+        output.write_all(b"!").expect("it takes a Stop");
     }
 }

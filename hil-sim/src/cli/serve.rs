@@ -50,7 +50,8 @@ Exit status 0 then, 1 if a board stopped by itself, 2 if the bench can't be set 
 #[command(after_long_help = COMMANDS)]
 pub(super) struct Serve {
     /// What is rubbed, and how: a scene's motion goes on for as long as the bench stands, a recorded one to
-    /// and fro. By default a hand swings at 0.83 Hz and up to 70 mm/s over specimens of 2 and 3 mm
+    /// and fro, a swinging one with a rest of half a second after five minutes. By default a hand swings at 0.83 Hz
+    /// and up to 70 mm/s over specimens of 2 and 3 mm
     scene: Option<PathBuf>,
     /// Where the ports are to be found
     #[arg(long, value_name = "DIR", default_value = hil_sim_boards::bench::DEFAULT_DIR)]

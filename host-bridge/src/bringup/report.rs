@@ -12,10 +12,12 @@ const STYLE: &str = "body{font:16px/1.4 sans-serif;max-width:60em;margin:2em aut
 table{border-collapse:collapse;width:100%}td,th{border:1px solid #999;padding:.2em .5em;text-align:left}\
 .passed{color:#060}.failed{color:#b00;font-weight:bold}.soft{color:#666}";
 
+/// What every report begins with.
+pub const BEGINNING: &str = "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n<title>Ridgelink: a bench brought up</title>\n";
+
 pub fn html(progress: &Progress) -> String {
     let mut page = format!(
-        "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n<title>Ridgelink: a bench brought up</title>\n\
-         <style>{STYLE}</style>\n<h1>A bench brought up</h1>\n\
+        "{BEGINNING}<style>{STYLE}</style>\n<h1>A bench brought up</h1>\n\
          <p>{}, protocol {}, schema {}</p>\n",
         escape(&progress.program),
         progress.protocol,

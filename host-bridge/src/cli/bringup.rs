@@ -69,6 +69,14 @@ impl Bringup {
     /// Does it at `desk`: the exit status.
     pub fn execute(self, desk: &mut Desk) -> anyhow::Result<u8> {
         let progress = Progress::read(&self.state)?;
+        let report = report_path(&self.state);
+        let is_report = |text: String| text.starts_with(report::BEGINNING);
+        anyhow::ensure!(
+            report != self.state
+                && (!report.exists() || fs::read_to_string(&report).is_ok_and(is_report)),
+            "{}: is where the report goes, and no report: give another --state, such as bringup.json",
+            report.display()
+        );
         if self.list {
             desk.print(&list(&progress))?;
             return Ok(0);

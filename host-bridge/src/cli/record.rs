@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::bench::Bench;
@@ -50,6 +51,10 @@ there; 2 nothing could be recorded, or not to the end: what was said to be safe 
 const LOOK: Duration = Duration::from_millis(50);
 /// How often the progress is told.
 const TOLD: Duration = Duration::from_secs(1);
+/// Lines that wait for a terminal that stands still.
+const WAITING_LINES: usize = 64;
+/// How long the last ones may take.
+const LINGER: Duration = Duration::from_secs(1);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
@@ -91,6 +96,10 @@ impl Record {
         let part = Duration::try_from_secs_f64(self.split * 60.0);
         let part = part.map_err(|_| anyhow::anyhow!("--split: give minutes, 0 or more"))?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
+        let roles = bench.roles();
+        let (logs, lines) = Logs::new();
+        // Before there is a file: an old one is not to go for a log that can't be read.
+        follow(&bench, &roles, &logs)?;
         let recorder = Arc::new(Recorder::start(Settings {
             mcap: self.file.clone(),
             csv: self.csv.clone(),
@@ -99,7 +108,6 @@ impl Record {
         })?);
         let started = Instant::now();
         let (events, told) = channel();
-        let roles = bench.roles();
         let recording = Arc::clone(&recorder);
         let links = super::links(&bench, move |role, event| {
             recording.on_event(role, &event);
@@ -108,8 +116,6 @@ impl Record {
                 let _ = events.send((role, event));
             }
         });
-        let (logs, lines) = Logs::new();
-        follow(&bench, &roles, &logs)?;
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
         let absent = Session {
             recorder: &recorder,
@@ -117,7 +123,7 @@ impl Record {
             told,
             lines,
             stream: GaugeStream::new(!self.no_gauges),
-            absent: BOARDS.into(),
+            absent: roles.clone(),
             screen: Screen::new(self.quiet),
             started,
         }
@@ -326,20 +332,43 @@ impl Session<'_> {
     }
 }
 
-/// Standard error: a progress line that is written over in a terminal, and lines of their own.
+/// Standard error: a progress line that is written over in a terminal, and lines of their own. A thread of its own
+/// writes them: who stops the terminal stops no recording, and misses what does not fit.
 struct Screen {
     quiet: bool,
     terminal: bool,
     /// Whether a progress line stands there.
     dirty: bool,
+    /// None once it is to end.
+    lines: Option<SyncSender<String>>,
+    /// Closed when all has been written.
+    written: Receiver<()>,
 }
 
 impl Screen {
     fn new(quiet: bool) -> Self {
+        let (lines, due) = sync_channel::<String>(WAITING_LINES);
+        let (writing, written) = channel::<()>();
+        thread::spawn(move || {
+            let _writing = writing;
+            for text in due {
+                let mut out = io::stderr();
+                // Nobody may be there to read it.
+                let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+            }
+        });
         Self {
             quiet,
             terminal: io::stderr().is_terminal(),
             dirty: false,
+            lines: Some(lines),
+            written,
+        }
+    }
+
+    fn write(&self, text: String) {
+        if let Some(lines) = &self.lines {
+            let _ = lines.try_send(text);
         }
     }
 
@@ -347,8 +376,7 @@ impl Screen {
     fn tell(&mut self, line: &str) {
         let clear = if self.dirty { "\r\x1b[K" } else { "" };
         self.dirty = false;
-        // Nobody may be there to read it.
-        let _ = writeln!(io::stderr(), "{clear}{line}");
+        self.write(format!("{clear}{line}\n"));
     }
 
     /// How far it has come.
@@ -356,20 +384,21 @@ impl Screen {
         if self.quiet {
             return;
         }
-        let mut out = io::stderr();
-        let _ = if self.terminal {
-            self.dirty = true;
-            write!(out, "\r\x1b[K{line}").and_then(|()| out.flush())
+        self.dirty = self.terminal;
+        self.write(if self.terminal {
+            format!("\r\x1b[K{line}")
         } else {
-            writeln!(out, "{line}")
-        };
+            format!("{line}\n")
+        });
     }
 }
 
 impl Drop for Screen {
     fn drop(&mut self) {
         if self.dirty {
-            let _ = writeln!(io::stderr());
+            self.write("\n".to_owned());
         }
+        self.lines = None;
+        let _ = self.written.recv_timeout(LINGER);
     }
 }

@@ -163,7 +163,7 @@ impl Replay {
     fn watch(&self, recording: Reader) -> anyhow::Result<ExitCode> {
         let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let pace = self.pace();
-        let (events, told) = channel();
+        let (events, told) = crossbeam_channel::unbounded();
         let their_end = Arc::clone(&ended);
         let player = thread::spawn(move || {
             play(

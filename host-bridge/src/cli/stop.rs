@@ -1,10 +1,10 @@
 //! `host-bridge stop`.
 
 use std::process::ExitCode;
-use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use crate::link::{Event, stop_all};
+use crossbeam_channel::RecvTimeoutError;
 use protocol::{Message, Trip};
 
 use super::output::say;

@@ -6,7 +6,7 @@ use std::path::Path;
 use hound::{SampleFormat, WavSpec, WavWriter};
 
 use super::name;
-use crate::output_file::OutputFileError;
+use crate::output_file::{self, OutputFileError};
 
 /// What samples follow each other along.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,12 +114,11 @@ impl Group {
 
 /// Writes a group's file. Fails if it can't be written.
 pub fn write(path: &Path, group: &Group) -> Result<(), OutputFileError> {
-    write_samples(path, group).map_err(|error| {
-        let source = match error {
+    output_file::made_by(path, |path| {
+        write_samples(path, group).map_err(|error| match error {
             hound::Error::IoError(source) => source,
             other => io::Error::other(other),
-        };
-        OutputFileError::not_written(path, source)
+        })
     })
 }
 

@@ -1,10 +1,11 @@
 //! A dashboard that is watched: where events come from, and where orders go to.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use crossbeam_channel::{Receiver, RecvTimeoutError, TryRecvError};
 use protocol::Role;
 
 use super::dashboard::Dashboard;
@@ -25,7 +26,7 @@ pub struct Source {
     /// The ways to the boards; none where a recording is watched.
     pub links: Vec<(Role, Link)>,
     /// The boards' logs, if they are read.
-    pub logs: Option<Receiver<(Role, LogEvent)>>,
+    pub logs: Option<mpsc::Receiver<(Role, LogEvent)>>,
 }
 
 pub struct Session {

@@ -54,20 +54,19 @@ pub fn part_path(path: &Path, part: u32) -> PathBuf {
 /// taken for this one's.
 fn later_parts(path: &Path) -> Option<Vec<PathBuf>> {
     let folder = path.parent().filter(|folder| folder.as_os_str() != "");
-    let stem = path.file_stem()?.to_str()?;
+    let stem = path.file_stem()?.as_encoded_bytes();
+    let is_later = |found: &Path| {
+        let number = found.file_stem()?.as_encoded_bytes();
+        let number = number.strip_prefix(stem)?.strip_prefix(b"-")?;
+        let number = str::from_utf8(number).ok()?.parse().ok()?;
+        // Not 1, and no number that is written otherwise.
+        (number > 1 && part_path(path, number).file_name() == found.file_name()).then_some(())
+    };
     let parts = fs::read_dir(folder.unwrap_or(Path::new(".")))
         .ok()?
         .flatten()
         .map(|entry| entry.path())
-        .filter(|found| {
-            found.extension() == path.extension()
-                && found
-                    .file_stem()
-                    .and_then(|found| found.to_str()?.strip_prefix(stem)?.strip_prefix('-'))
-                    .and_then(|number| number.parse().ok())
-                    // Not 1, and no number that is written otherwise.
-                    .is_some_and(|number| number > 1 && part_path(path, number) == *found)
-        });
+        .filter(|found| is_later(found).is_some());
     Some(parts.collect())
 }
 

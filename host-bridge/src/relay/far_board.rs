@@ -98,8 +98,9 @@ impl FarBoard {
         {
             self.say(&Message::Hello(hello.asking(false)));
         }
-        let since_us = self.clock.now_us() - self.said_us.load(Ordering::Relaxed);
-        if since_us >= BEAT_US {
+        let said_us = self.said_us.load(Ordering::Relaxed);
+        // Another thread may say something in between.
+        if self.clock.now_us().saturating_sub(said_us) >= BEAT_US {
             self.put(&[]);
         }
     }
@@ -113,4 +114,42 @@ impl FarBoard {
 /// What programs call the board of `role` of the bench called `name`.
 pub fn port(name: &Name, role: Role) -> String {
     format!("{FAR}{name}.{}", role.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread::JoinHandle;
+
+    use super::*;
+    use crate::clock::{Notify, SystemClock};
+
+    /// A clock that each time was read just before another thread read it.
+    struct Behind(AtomicU64);
+
+    impl Clock for Behind {
+        fn now_us(&self) -> u64 {
+            self.0.fetch_sub(1, Ordering::Relaxed)
+        }
+
+        fn notify(&self) -> Arc<dyn Notify> {
+            SystemClock.notify()
+        }
+
+        fn spawn(&self, work: Box<dyn FnOnce() + Send>) -> JoinHandle<()> {
+            SystemClock.spawn(work)
+        }
+
+        fn join(&self, thread: JoinHandle<()>) {
+            SystemClock.join(thread);
+        }
+    }
+
+    #[test]
+    fn what_another_thread_says_meanwhile_ends_no_relay() {
+        let name: Name = format!("far-{}", std::process::id()).parse().unwrap();
+        let clock = Arc::new(Behind(AtomicU64::new(1_000_000)));
+        let board = FarBoard::open(&name, Role::Sensor, clock, |_| {}).unwrap();
+        board.put(&[]);
+        board.elapse();
+    }
 }

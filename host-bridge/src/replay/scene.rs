@@ -102,7 +102,7 @@ pub struct Made {
 /// Writes the scene of a recording. Fails if none can be made of it, or a file can't be written.
 pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError> {
     let path = settings.path.clone();
-    output_file::refuse_taken(&path, settings.force)?;
+    output_file::refuse_taken(&path, settings.force, recording.path())?;
     let recording_path = recording.path().to_owned();
     let to_s = settings.to_s.unwrap_or(f64::INFINITY);
     let excerpt = Excerpt::take(recording, settings.from_s, to_s)?;

@@ -42,6 +42,15 @@ impl Claim {
 }
 
 impl Device {
+    /// One that no folder can be found for.
+    #[cfg(test)]
+    pub fn without_folder() -> Self {
+        Self {
+            folder: Err(ErrorKind::PermissionDenied.into()),
+            name: String::new(),
+        }
+    }
+
     /// The port at `path`; none if there is nothing, or no character device.
     pub fn of(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
@@ -79,8 +88,8 @@ impl Device {
         match file.try_lock() {
             Ok(()) => {
                 let claim = Claim(Arc::new(Lock(file)));
-                // For people and messages: who it is.
-                claim.tell(&own_name())?;
+                // For people and messages: who it is. A full disk is no reason not to have the port.
+                let _ = claim.tell(&own_name());
                 Ok(Some(claim))
             }
             Err(TryLockError::WouldBlock) => Ok(None),
@@ -155,25 +164,44 @@ fn own_name() -> String {
     )
 }
 
-/// The user's folder for what lives no longer than his programs.
+/// The user's folder for what lives no longer than his programs: where the system has one for that, or else where
+/// temporary files go.
 fn folder() -> io::Result<PathBuf> {
-    let user = getuid().as_raw();
-    let folder = match std::env::var_os("XDG_RUNTIME_DIR") {
-        Some(folder) if Path::new(&folder).is_dir() => Path::new(&folder).join("ridgelink"),
-        _ => std::env::temp_dir().join(format!("ridgelink-{user}")),
-    };
-    match DirBuilder::new().mode(0o700).create(&folder) {
+    let temporary = format!("ridgelink-{}", getuid().as_raw());
+    let of_session = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty());
+    let of_session = of_session.map(|folder| Path::new(&folder).join("ridgelink"));
+    let others = [std::env::temp_dir(), PathBuf::from("/tmp")];
+    let others = others.map(|folder| folder.join(&temporary));
+    first_usable(of_session.into_iter().chain(others))
+}
+
+/// The first of these folders that is there, or can be made, and is this user's alone. Fails with what is wrong with
+/// the last one.
+fn first_usable(folders: impl IntoIterator<Item = PathBuf>) -> io::Result<PathBuf> {
+    let mut wrong = io::Error::from(ErrorKind::NotFound);
+    for folder in folders {
+        match own(&folder) {
+            Ok(()) => return Ok(folder),
+            Err(error) => {
+                let words = format!("{}: {error}", folder.display());
+                wrong = io::Error::new(error.kind(), words);
+            }
+        }
+    }
+    Err(wrong)
+}
+
+/// Makes a folder if there is none, and fails unless it is this user's alone.
+fn own(folder: &Path) -> io::Result<()> {
+    match DirBuilder::new().mode(0o700).create(folder) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
         _ => {}
     }
-    let metadata = fs::symlink_metadata(&folder)?;
-    if metadata.is_dir() && metadata.uid() == user && metadata.mode() & 0o077 == 0 {
-        Ok(folder)
+    let metadata = fs::symlink_metadata(folder)?;
+    if metadata.is_dir() && metadata.uid() == getuid().as_raw() && metadata.mode() & 0o077 == 0 {
+        Ok(())
     } else {
-        let words = format!(
-            "{} must be a folder of this user's that nobody else may enter",
-            folder.display()
-        );
+        let words = "must be a folder of this user's that nobody else may enter";
         Err(io::Error::new(ErrorKind::PermissionDenied, words))
     }
 }
@@ -181,6 +209,23 @@ fn folder() -> io::Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_cannot_be_used_is_passed_over() {
+        let good = std::env::temp_dir().join(format!("claim-folder-{}", std::process::id()));
+        let bad = [
+            "/proc/ridgelink",
+            "/nonexistent/ridgelink",
+            "/dev/null",
+            "/",
+        ]
+        .map(PathBuf::from);
+        let folders = bad.clone().into_iter().chain([good.clone()]);
+        assert_eq!(first_usable(folders).expect("the last one"), good);
+        fs::remove_dir(good).expect("it was made");
+        let words = first_usable(bad).expect_err("none can be used").to_string();
+        assert!(words.starts_with("/: must be a folder"), "{words}");
+    }
 
     #[test]
     fn what_was_given_up_is_free_while_a_program_just_started_still_has_the_file() {

@@ -12,8 +12,14 @@ const KEPT: usize = 64;
 /// How fast a hand changes its speed, in mm/s².
 const ACCELERATION_MM_S2: f64 = 400.0;
 
+/// A hand that swings rests at the end of a stroke after so long, in s, as a person's does: one that never does is
+/// played nothing after the display's `full_drive_s`.
+const REST_EVERY_S: f64 = 300.0;
+/// For so long, in s: a display takes a quarter of a second for a rest.
+const REST_S: f64 = 0.5;
+
 /// A hand that goes on for as long as it is asked where it is. It makes its scene's motion, a recorded one
-/// to and fro, until it is told a speed; from then on it keeps to that. Whoever asks about one instant gets
+/// to and fro, a swinging one with a rest now and then, until it is told a speed; from then on it keeps to that. Whoever asks about one instant gets
 /// one answer, whenever they ask.
 #[derive(Debug)]
 pub struct DrivenHand {
@@ -91,6 +97,15 @@ impl DrivenHand {
 
     /// Where in what is recorded an instant is, in s, and whether it is played backwards there.
     fn played(&self, t_s: f64) -> (f64, bool) {
+        if let Motion::Sinusoid { frequency_hz, .. } = self.motion {
+            let strokes_s = (REST_EVERY_S * frequency_hz).ceil() / frequency_hz;
+            let round_s = strokes_s + REST_S;
+            let rounds = (t_s / round_s).floor();
+            return (
+                rounds * strokes_s + t_s.rem_euclid(round_s).min(strokes_s),
+                false,
+            );
+        }
         let Some((first_s, last_s)) = self.recorded_s else {
             return (t_s, false);
         };
@@ -172,6 +187,38 @@ mod tests {
 
     use super::*;
     use hil_sim_core::scene::Series;
+
+    #[test]
+    fn a_hand_that_swings_rests_before_the_display_asks_it_to() {
+        let motion = Motion::Sinusoid {
+            amplitude_mm_s: 70.0,
+            frequency_hz: 0.83,
+        };
+        let hand = DrivenHand::new(motion.clone(), None);
+        let (mut rested_s, mut busy_s, mut busiest_s) = (0.0, 0.0_f64, 0.0_f64);
+        let mut before_mm = 0.0;
+        for millisecond in 1..2_000_000 {
+            let t_s = f64::from(millisecond) * 1e-3;
+            let at_mm = hand.position_mm(t_s);
+            assert!(
+                (at_mm - before_mm).abs() < 0.071,
+                "{t_s} s: {before_mm} {at_mm}"
+            );
+            if t_s < REST_EVERY_S {
+                assert_eq!(at_mm, motion.position_mm(t_s));
+            }
+            // Slower than any display hears.
+            if hand.velocity_mm_s(t_s).abs() < 0.1 {
+                rested_s += 1e-3;
+            } else {
+                rested_s = 0.0;
+            }
+            busy_s = if rested_s > 0.25 { 0.0 } else { busy_s + 1e-3 };
+            busiest_s = busiest_s.max(busy_s);
+            before_mm = at_mm;
+        }
+        assert!(busiest_s < 310.0, "{busiest_s} s without a rest");
+    }
 
     #[test]
     fn it_makes_its_motion_until_it_is_told_a_speed_and_comes_to_that_smoothly() {

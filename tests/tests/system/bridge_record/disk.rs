@@ -1,6 +1,7 @@
 //! What was said to be safe is, whatever happens to the program, the disk and the file.
 
 use std::fs::{self, File};
+use std::io::Write;
 use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,7 +10,7 @@ use host_bridge::recording::row::Row;
 use protocol::{GAUGE_BLOCK, Message, Role};
 use rustix::fs::{CWD, FileType, Mode, OFlags, mknodat, open};
 use rustix::io::ioctl_fionread;
-use tests::bridge;
+use tests::bridge::{self, Running};
 use tests::fake_board::wait_until;
 use tests::utterance::Speaker;
 
@@ -241,6 +242,79 @@ fn places_that_take_no_file_are_named_with_the_reason() {
         assert!(ended.stderr.contains(want), "{words:?}: {}", ended.stderr);
     }
     assert_eq!(fs::read(&file).expect("still there"), b"");
+}
+
+#[test]
+fn a_log_that_cannot_be_read_costs_no_old_recording() {
+    let folder = folder("log");
+    let (old, new, bench) = ("old.mcap", "new.mcap", "bench.toml");
+    fs::write(folder.join(old), "kept").expect("the file can be written");
+    let seat = "[display]\nport = \"/dev/null/d\"\nrtt = \"tcp:nonsense\"\nelf = \"/bin/true\"\n";
+    fs::write(folder.join(bench), seat).expect("the file can be written");
+    for words in [vec![old, "--force"], vec![new]] {
+        let mut command = bridge::command();
+        command.current_dir(&folder).arg("record").args(&words);
+        let running = Running::start(command.args(["--bench", bench, "--for", "0.1"]));
+        let ended = running.wait(LIMIT);
+        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains("/bin/true"), "{}", ended.stderr);
+    }
+    assert_eq!(fs::read(folder.join(old)).expect("still there"), b"kept");
+    assert!(!folder.join(new).exists());
+}
+
+#[test]
+fn later_parts_that_are_in_the_way_are_named_wherever_the_recording_lies() {
+    let folder = folder("parts");
+    let boards = ["--sensor", "/dev/null/s", "--display", "/dev/null/d"];
+    let record = |words: &[&str]| {
+        let mut command = bridge::command();
+        command.current_dir(&folder).arg("record").args(words);
+        Running::start(command.args(boards).args(["--for", "0.1"])).wait(LIMIT)
+    };
+    for path in ["y.mcap", "./y.mcap", "../parts/y.mcap"] {
+        fs::write(folder.join("y-2.mcap"), "old").expect("the file can be written");
+        let ended = record(&[path]);
+        assert_eq!(ended.status.code(), Some(2), "{path}: {}", ended.stderr);
+        let is_told = ended.stderr.contains("y-2.mcap: is there already");
+        assert!(is_told, "{path}: {}", ended.stderr);
+        // Nobody is there to be recorded.
+        let ended = record(&[path, "--force"]);
+        assert_eq!(ended.status.code(), Some(1), "{path}: {}", ended.stderr);
+        assert!(!folder.join("y-2.mcap").exists(), "{path}");
+        fs::remove_file(folder.join("y.mcap")).expect("it was made");
+    }
+}
+
+#[test]
+fn a_terminal_that_stands_still_holds_up_no_recording() {
+    let path = folder("terminal").join("a.mcap");
+    let pair = Pair::new();
+    let (reader, mut writer) = std::io::pipe().expect("a pipe");
+    // As much as it takes while nobody reads.
+    writer.write_all(&[b' '; 1 << 16]).expect("it fits");
+    let mut command = bridge::command();
+    command.arg("record").arg(&path).args(["--for", "4"]);
+    command.arg("--sensor").arg(pair.sensor.path());
+    command.arg("--display").arg(pair.display.path());
+    let mut child = command.stderr(writer).spawn().expect("the program starts");
+    // A lease of gauges lasts 1.5 s: it is asked for again, and again.
+    let mut asked = 0;
+    let is_asked = || {
+        let heard = pair.sensor.take_heard();
+        let asks = |message: &&Message| matches!(message, Message::StreamGauges(_));
+        asked += heard.iter().filter(asks).count();
+        asked >= 3
+    };
+    assert!(wait_until(LIMIT, is_asked), "{asked} times");
+    let mut status = None;
+    let has_ended = || {
+        status = child.try_wait().expect("it can be asked");
+        status.is_some()
+    };
+    assert!(wait_until(LIMIT, has_ended), "it does not end");
+    assert_eq!(status.and_then(|status| status.code()), Some(0));
+    drop(reader);
 }
 
 #[test]
