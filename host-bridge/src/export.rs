@@ -91,9 +91,25 @@ pub struct Exported {
     pub section: Option<String>,
 }
 
+/// What was exported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exports {
+    /// The files.
+    pub files: Vec<Exported>,
+    /// Whether the recording was cut off: there may have been more of it.
+    pub is_cut: bool,
+}
+
+impl Exports {
+    const fn whole(files: Vec<Exported>) -> Self {
+        let is_cut = false;
+        Self { files, is_cut }
+    }
+}
+
 /// Writes the files. Fails if there is nothing to export, or a file can't be written; files that were written
 /// before stay.
-pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
+pub fn write(settings: &Settings) -> Result<Exports, ExportError> {
     let ending = |path: &Path| {
         let ending = path.extension()?.to_str()?;
         Some(ending.to_ascii_lowercase())
@@ -112,9 +128,9 @@ pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
         let scene = Scene::load(&settings.from)?;
         if is_texture {
             let texture = of_scene::texture(&scene, settings)?;
-            return write_texture(settings, texture);
+            return write_texture(settings, texture).map(Exports::whole);
         }
-        return write_groups(settings, of_scene::groups(&scene)?);
+        return write_groups(settings, of_scene::groups(&scene)?).map(Exports::whole);
     }
     let recording = Reader::open(&settings.from)?;
     let to_s = settings.to_s.unwrap_or(f64::INFINITY);
@@ -125,11 +141,14 @@ pub fn write(settings: &Settings) -> Result<Vec<Exported>, ExportError> {
             count: excerpt.samples.len(),
         }));
     }
-    if is_texture {
+    let files = if is_texture {
         let texture = of_recording::texture(&excerpt, settings)?;
-        return write_texture(settings, texture);
-    }
-    write_groups(settings, of_recording::groups(&excerpt)?)
+        write_texture(settings, texture)?
+    } else {
+        write_groups(settings, of_recording::groups(&excerpt)?)?
+    };
+    let is_cut = excerpt.cut;
+    Ok(Exports { files, is_cut })
 }
 
 fn write_texture(

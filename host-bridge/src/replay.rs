@@ -63,7 +63,7 @@ pub struct Played {
 /// Tells the events of a recording, each at its time by `clock`, until its end or until `ended`.
 ///
 /// What was known before `pace.from_s` of the links and the configurations is told first. Fails if the recording
-/// can't be read to the end; what was read before has been told.
+/// can't be read to the end, or ends before `pace.from_s`; what was read before has been told.
 pub fn play(
     clock: &dyn Clock,
     recording: Reader,
@@ -89,6 +89,13 @@ pub fn play(
         played.recorded_s = (at_s - start_s).max(played.recorded_s);
         played.events += 1;
         tell(role, event);
+    }
+    if !events.begun && pace.from_s > events.last_s {
+        return Err(ReadError::Ended {
+            path: events.recording.path().to_owned(),
+            last_s: events.last_s,
+            from_s: pace.from_s,
+        });
     }
     played.cut = events.recording.is_cut();
     played.passed_over = events.recording.passed_over();
@@ -117,6 +124,8 @@ struct Events {
     known: Vec<(Role, Kind, Event)>,
     due: VecDeque<(f64, Role, Event)>,
     begun: bool,
+    /// The time of the last row that was read, in s since the recording's start.
+    last_s: f64,
 }
 
 impl Events {
@@ -126,6 +135,7 @@ impl Events {
             known: Vec::new(),
             due: VecDeque::new(),
             begun: false,
+            last_s: 0.0,
         }
     }
 
@@ -144,6 +154,7 @@ impl Events {
                 return Ok(None);
             };
             let at_s = self.recording.since_start_s(entry.log_ns);
+            self.last_s = self.last_s.max(at_s);
             if at_s < from_s {
                 self.keep(entry.role, entry.row);
                 continue;

@@ -67,13 +67,17 @@ impl Export {
             date,
             force: self.force,
         })?;
-        let told: Vec<String> = exported
+        let mut told: Vec<String> = exported
+            .files
             .iter()
             .map(|file| {
                 let section = file.section.as_deref().map(indented).unwrap_or_default();
                 format!("{}: {}{section}", file.path.display(), file.holds)
             })
             .collect();
+        if exported.is_cut {
+            told.push("the recording was cut off: this is what there is of it".to_owned());
+        }
         output::print(&told.join("\n"))?;
         Ok(ExitCode::SUCCESS)
     }

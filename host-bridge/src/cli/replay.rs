@@ -43,7 +43,8 @@ Examples:
   host-bridge replay rubbing.mcap --to sensor-board --sensor /dev/ttyACM0
   host-bridge replay rubbing.mcap --to rubbing.toml --expect && hil-sim run rubbing.toml
 
-Exit status: 0 played or made; 1 some of it could not be said to the board; 2 not played, or not to the end.";
+Exit status: 0 played or made; 1 some of it could not be said to the board, or a signal ended it before; \
+2 not played, or damaged before its end.";
 
 /// How long a board is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -187,11 +188,12 @@ impl Replay {
             logs: None,
         };
         let watched = monitor::run(source, &Options::default(), &ended);
-        ended.store(true, Ordering::Relaxed);
+        // Not by a key, but by a signal.
+        let is_interrupted = ended.swap(true, Ordering::Relaxed);
         let played = player.join();
         watched?;
         played.map_err(|_| anyhow::anyhow!("the player died"))??;
-        Ok(ExitCode::SUCCESS)
+        Ok(ExitCode::from(u8::from(is_interrupted)))
     }
 
     const fn pace(&self) -> Pace {

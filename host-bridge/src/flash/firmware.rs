@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -95,6 +96,9 @@ pub struct Firmware {
     pub segments: Vec<Segment>,
 }
 
+/// A board's ELF with all that a debugger wants is a tenth of that; a device may never end.
+const LONGEST_ELF: u64 = 1 << 27;
+
 /// Where the build leaves the firmware of `role`.
 pub fn built(role: Role) -> PathBuf {
     Path::new(BUILT).join(format!("firmware-{}", role.name()))
@@ -104,11 +108,14 @@ impl Firmware {
     /// Reads the ELF at `path`, which is to be the firmware of `role`. Fails if it can't be read, is no whole ELF
     /// of this protocol, or is another board's.
     pub fn read(path: &Path, role: Role) -> Result<Self, FirmwareError> {
-        let elf = fs::read(path).map_err(|source| FirmwareError::Unreadable {
-            path: path.to_owned(),
-            role: role.name(),
-            source,
-        })?;
+        let mut elf = Vec::new();
+        fs::File::open(path)
+            .and_then(|file| file.take(LONGEST_ELF).read_to_end(&mut elf))
+            .map_err(|source| FirmwareError::Unreadable {
+                path: path.to_owned(),
+                role: role.name(),
+                source,
+            })?;
         let elf = Elf::open(path, &elf)?;
         let hello = elf.identity()?;
         let found = Role::from_byte(hello.role);

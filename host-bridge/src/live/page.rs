@@ -66,7 +66,12 @@ pub fn serve(listener: TcpListener, newest: Arc<Newest>, stop: Box<dyn Fn() + Se
         connections: AtomicUsize::new(0),
     });
     thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
+        for stream in listener.incoming() {
+            let Ok(stream) = stream else {
+                // No more handles, most likely: one is given back when a browser goes.
+                thread::park_timeout(PAUSE);
+                continue;
+            };
             let shared = Arc::clone(&shared);
             thread::spawn(move || {
                 let before = shared.connections.fetch_add(1, Ordering::Relaxed);
@@ -120,6 +125,8 @@ impl Shared {
 
 /// The longest head of a request, in bytes.
 const LONGEST: u64 = 16_384;
+/// Until another browser is let in after one could not be.
+const PAUSE: Duration = Duration::from_millis(100);
 /// How long a browser may take to say what it wants, or to take what it gets.
 const PATIENCE: Duration = Duration::from_secs(5);
 

@@ -40,11 +40,20 @@ pub enum ReadError {
     Foreign(PathBuf, String),
     #[error("{0}: its format is {1}, this program reads {FORMAT}: take the program that made it")]
     Newer(PathBuf, String),
-    #[error("{path}: damaged after {after}: {source}")]
+    #[error("{path}: damaged after {after}: {reason}")]
     Damaged {
         path: PathBuf,
         after: String,
-        source: McapError,
+        reason: String,
+    },
+    #[error(
+        "{path}: ends at {last_s:.3} s, and is to be read from {from_s} s on: give an earlier moment"
+    )]
+    Ended {
+        path: PathBuf,
+        /// In s since the recording's start.
+        last_s: f64,
+        from_s: f64,
     },
     #[error("{path}: the schema of {topic}: {source}")]
     Schema {
@@ -303,7 +312,7 @@ impl Reader {
                         || "its beginning".to_owned(),
                         |(topic, at_s)| format!("{topic} at {at_s:.3} s"),
                     ),
-                    source: error,
+                    reason: words(error),
                 });
             }
         }
@@ -374,5 +383,12 @@ impl Channel {
         let value = decode(definition, data)?;
         let json = ros2::inward(self.kind.shape(), value);
         Ok(Read::Row(self.kind.row(json)?))
+    }
+}
+/// What is wrong, without the trace that the parser adds for its authors.
+fn words(error: McapError) -> String {
+    match error {
+        McapError::Parse(error) => error.root_cause().to_string(),
+        error => error.to_string(),
     }
 }

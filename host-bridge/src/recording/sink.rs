@@ -2,10 +2,12 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
 use crate::recording::RecordingError;
 
@@ -48,8 +50,14 @@ impl Sink {
             (Some(_), Some(_)) => options.create(true).truncate(true),
             (Some(_), None) => &mut options,
         };
+        // A pipe that nobody reads is refused, and not waited for.
         let file = options
+            .custom_flags(libc::O_NONBLOCK)
             .open(made)
+            .and_then(|file| {
+                fcntl(&file, FcntlArg::F_SETFL(OFlag::empty()))?;
+                Ok(file)
+            })
             .map_err(|source| RecordingError::not_made(path, source))?;
         let sink = Self {
             path: path.to_owned(),

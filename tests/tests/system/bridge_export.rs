@@ -1,6 +1,7 @@
 //! `host-bridge export`: what goes out in `.hjif` and WAV is what was there, and comes back into a scene.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -45,7 +46,8 @@ fn settings(from: &Path, to: &Path) -> Settings {
 }
 
 fn export(from: &Path, to: &Path) -> Vec<Exported> {
-    write(&settings(from, to)).unwrap_or_else(|error| panic!("{error}"))
+    let exports = write(&settings(from, to)).unwrap_or_else(|error| panic!("{error}"));
+    exports.files
 }
 
 /// The keys of a section that is told beside a file.
@@ -433,5 +435,24 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
         "  felt_per_unit = 1.0",
     ] {
         assert!(ended.stdout.contains(want), "{}", ended.stdout);
+    }
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_said_to_be() {
+    let folder = folder("cut");
+    let (whole, cut) = (folder.join("whole.mcap"), folder.join("cut.mcap"));
+    let scene = scene_of("duration_s = 6.0\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
+    let recording = native::run(&scene).unwrap_or_else(|error| panic!("{error}"));
+    record(&whole, said_of(&recording.scans, scene.sensor_configuration()));
+    let bytes = fs::read(&whole).expect("a recording");
+    fs::write(&cut, &bytes[..bytes.len() * 3 / 4]).expect("the file can be written");
+    for (path, is_told) in [(whole, false), (cut, true)] {
+        let to = path.with_extension("wav");
+        let words = [OsStr::new("export"), path.as_os_str(), to.as_os_str()];
+        let ended = bridge::run(words, LIMIT);
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let told = ended.stdout.contains("the recording was cut off");
+        assert_eq!(told, is_told, "{}", ended.stdout);
     }
 }

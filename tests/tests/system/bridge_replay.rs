@@ -218,6 +218,10 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
         ),
         (vec![none, "--to", toml], "none.mcap: is no MCAP file"),
         (
+            vec![file, "--to", "monitor", "--from", "500"],
+            "and is to be read from 500 s on: give an earlier moment",
+        ),
+        (
             vec![file, "--to", toml],
             "half.mcap: 0 samples of the gauges there: record without --no-gauges",
         ),

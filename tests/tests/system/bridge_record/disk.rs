@@ -209,6 +209,9 @@ fn places_that_take_no_file_are_named_with_the_reason() {
     fs::write(&file, "").expect("the file can be written");
     let within = file.join("x.mcap");
     let absent = folder.join("absent").join("x.mcap");
+    // Nobody reads it.
+    let pipe = folder.join("pipe");
+    mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("a pipe can be made");
     let boards = ["--sensor", "/dev/null/s", "--display", "/dev/null/d"];
     for (words, want) in [
         (vec!["/proc/x.mcap"], "/proc/x.mcap: can't be made: "),
@@ -226,6 +229,10 @@ fn places_that_take_no_file_are_named_with_the_reason() {
             "file: is there already: give another name, or --force",
         ),
         (vec!["--csv", "/proc/x"], "/proc/x: can't be made: "),
+        (
+            vec![pipe.to_str().expect("UTF-8"), "--force"],
+            "pipe: can't be made: No such device or address",
+        ),
         (
             vec!["/dev/full", "--force"],
             "/dev/full: can't be written any further: No space left",

@@ -111,6 +111,20 @@ fn damage_is_named_with_file_channel_and_time() {
     assert!(count > 1_000, "{count}");
     let start = format!("{}: damaged after /sensor/gauges at ", path.display());
     assert!(error.starts_with(&start), "{error}");
+    // In one line, without what the parser traces for its authors.
+    let bytes = fs::read(&path).expect("the file can be read");
+    let mut told = 0;
+    for at in (8..bytes.len().min(2_000)).step_by(7) {
+        let (before, after) = bytes.split_at(at);
+        fs::write(&path, [before, &after[3..]].concat()).expect("the file can be written");
+        if let Err(error) = entries(&path) {
+            let error = error.to_string();
+            assert_eq!(error.lines().count(), 1, "at {at}: {error}");
+            assert!(!error.contains('\u{1b}'), "at {at}: {error:?}");
+            told += 1;
+        }
+    }
+    assert!(told > 100, "{told}");
 }
 
 #[test]
