@@ -34,7 +34,7 @@ use firmware_sensor::{Drive, SCAN_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 use nucleo::encoder::Encoder;
 use nucleo::serial::{self, Serial};
 use nucleo::supervision::Vitals;
-use protocol::{CHANNELS, Trip};
+use protocol::{CHANNELS, Configuration, Trip};
 use static_cell::StaticCell;
 
 bind_interrupts!(struct Irqs {
@@ -93,6 +93,8 @@ pub struct Board {
     pub arm: ArmDrive,
     /// Why the arm is to stay stopped, if a reset found it so.
     pub trip: Option<Trip>,
+    /// What was in force before the watchdog restarted the board.
+    pub configuration: Option<Configuration>,
     /// The port to the other board.
     pub peer: Serial,
     /// The console port.
@@ -107,6 +109,7 @@ impl Board {
         static ADC_RING: StaticCell<[u16; RING]> = StaticCell::new();
         let started = nucleo::reset::cause();
         let trip = nucleo::trip::kept_after(started.0);
+        let configuration = nucleo::kept_configuration::after(started.0);
         let p = nucleo::clock::start();
         let vitals = Vitals::new(p.IWDG, p.PB0, started);
 
@@ -167,6 +170,7 @@ impl Board {
             },
             arm,
             trip,
+            configuration,
             peer,
             console,
             vitals,

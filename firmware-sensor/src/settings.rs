@@ -16,6 +16,15 @@ impl Settings {
         configuration: SensorConfiguration::DEFAULT,
     };
 
+    /// What a board starts with that was restarted: what was in force before, if that is known and a sensor's.
+    pub fn restarted(before: Option<Configuration>) -> Self {
+        let mut settings = Self::DEFAULT;
+        if let Some(configuration) = before {
+            settings.on_configure(&Configure::anyway(configuration));
+        }
+        settings
+    }
+
     /// The configuration in force.
     pub const fn configuration(&self) -> &SensorConfiguration {
         &self.configuration
@@ -83,6 +92,16 @@ mod tests {
             let report = settings.on_configure(&Configure::anyway(asked));
             assert_eq!(report.refused.map(|refusal| refusal.setting), Some(setting));
             assert_eq!(settings, Settings::DEFAULT);
+        }
+    }
+
+    #[test]
+    fn a_restarted_board_goes_on_as_it_was_set() {
+        let kept = Settings::restarted(Some(asking(5)));
+        assert_eq!(kept.configuration().waves, 5);
+        let other = Configuration::Display(DisplayConfiguration::DEFAULT);
+        for before in [None, Some(asking(9)), Some(other)] {
+            assert_eq!(Settings::restarted(before), Settings::DEFAULT);
         }
     }
 

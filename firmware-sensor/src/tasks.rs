@@ -51,13 +51,16 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
         sampler,
         arm,
         trip,
+        configuration,
         peer,
         console,
         vitals,
     } = board;
+    let settings = Settings::restarted(configuration);
+    SETTINGS.lock(|shared| shared.set(settings));
     let [major, minor, patch] = hello.version;
     defmt::info!("sensor {}.{}.{} started", major, minor, patch);
-    sampling.spawn(once(sample(sampler, arm, trip)));
+    sampling.spawn(once(sample(sampler, arm, *settings.configuration(), trip)));
     for (side, serial) in [(Side::Peer, peer), (Side::Console, console)] {
         spawner.spawn(once(listen(ports, side, serial.receiver)));
         spawner.spawn(once(speak(ports, side, serial.transmitter)));
@@ -81,8 +84,13 @@ pub fn start(spawner: Spawner, board: Board, hello: Hello) {
 /// one more period and nothing is lost; missed twice, scans are lost and counted, and the filters
 /// run on with what comes next. A Stop takes the drive off when it is heard, whether scans come or not.
 #[embassy_executor::task]
-async fn sample(mut sampler: Sampler, mut arm: ArmDrive, persisted: Option<Trip>) {
-    let mut sensor = Sensor::new(SensorConfiguration::default());
+async fn sample(
+    mut sampler: Sampler,
+    mut arm: ArmDrive,
+    configuration: SensorConfiguration,
+    persisted: Option<Trip>,
+) {
+    let mut sensor = Sensor::new(configuration);
     let mut counters = SensorCounters::default();
     let mut announced = Announced::default();
     if let Some(trip) = persisted {
@@ -197,6 +205,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'sta
                     (answer, settings)
                 });
                 if answer.refused.is_none() {
+                    nucleo::kept_configuration::keep(&answer);
                     CONFIGURE.signal(*settings.configuration());
                 }
                 // Full only if the thread is held up: the host asks again.

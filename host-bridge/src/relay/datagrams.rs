@@ -164,18 +164,22 @@ impl Shared {
 }
 
 impl End {
-    /// Looks up where it connects, whose address may have changed; forgets who is gone.
+    /// Looks up where it connects if nothing comes from there, since its address may have changed; forgets who is gone.
     fn look(&self, at_us: u64) {
         let mut peers = locked(&self.peers);
+        let is_gone = |heard_us: u64| at_us.saturating_sub(heard_us) >= SILENCE_US;
         if let Some(towards) = &self.towards {
+            if peers.iter().any(|&(_, heard_us)| !is_gone(heard_us)) {
+                return;
+            }
             drop(peers);
-            // A name look-up may take its time.
+            // A name look-up may take its time, in which nothing is heard.
             let Some(address) = towards.resolve().ok().and_then(|all| all.first().copied()) else {
                 return;
             };
             *locked(&self.peers) = vec![(address, at_us)];
         } else {
-            peers.retain(|(_, heard_us)| at_us.saturating_sub(*heard_us) < SILENCE_US);
+            peers.retain(|&(_, heard_us)| !is_gone(heard_us));
         }
     }
 
@@ -201,4 +205,32 @@ fn any_port(address: Option<SocketAddr>) -> SocketAddr {
         _ => Ipv4Addr::UNSPECIFIED.into(),
     };
     (any, 0).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_looked_up_while_nobody_answers_and_not_otherwise() {
+        let towards: Endpoint = "udp/127.0.0.1:7".parse().expect("an endpoint");
+        let end = End {
+            socket: UdpSocket::bind("127.0.0.1:0").expect("a socket"),
+            towards: Some(towards),
+            peers: Mutex::default(),
+        };
+        let addresses =
+            || -> Vec<SocketAddr> { locked(&end.peers).iter().map(|peer| peer.0).collect() };
+        let looked_up = ["127.0.0.1:7".parse().expect("an address")];
+        let answering: SocketAddr = "127.0.0.1:8".parse().expect("an address");
+        end.look(SILENCE_US);
+        assert_eq!(addresses(), looked_up);
+        // The name means another address by now, which the one that answers does not care for.
+        *locked(&end.peers) = vec![(answering, 0)];
+        assert!(end.meet(answering, 10 * SILENCE_US));
+        end.look(11 * SILENCE_US - 1);
+        assert_eq!(addresses(), [answering]);
+        end.look(11 * SILENCE_US);
+        assert_eq!(addresses(), looked_up);
+    }
 }

@@ -8,6 +8,7 @@ pub mod clock;
 pub mod console;
 pub mod encoder;
 pub mod identity;
+pub mod kept_configuration;
 pub mod ports;
 pub mod reset;
 pub mod serial;

@@ -444,7 +444,10 @@ fn a_recording_that_was_cut_off_is_said_to_be() {
     let (whole, cut) = (folder.join("whole.mcap"), folder.join("cut.mcap"));
     let scene = scene_of("duration_s = 6.0\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n");
     let recording = native::run(&scene).unwrap_or_else(|error| panic!("{error}"));
-    record(&whole, said_of(&recording.scans, scene.sensor_configuration()));
+    record(
+        &whole,
+        said_of(&recording.scans, scene.sensor_configuration()),
+    );
     let bytes = fs::read(&whole).expect("a recording");
     fs::write(&cut, &bytes[..bytes.len() * 3 / 4]).expect("the file can be written");
     for (path, is_told) in [(whole, false), (cut, true)] {

@@ -220,3 +220,44 @@ fn every_estimate_comes_once_and_in_its_turn_on_the_console() {
     assert!(off_ns.abs() <= 5 * MS as i64, "{off_ns}");
     assert!(estimates.len() >= 190, "{}", estimates.len());
 }
+
+#[test]
+fn a_configuration_outlives_a_crash_and_not_the_power() {
+    let wanted = Configuration::Sensor(SensorConfiguration {
+        waves: 5,
+        arm_full_scale_um_s: 1_000_000,
+        ..SensorConfiguration::DEFAULT
+    });
+    let script = [
+        (300 * MS, Message::Configure(Configure::anyway(wanted))),
+        (2_600 * MS, Message::Question(Question::Configuration)),
+    ];
+    for (fault, in_force) in [
+        ("kind = \"sensor-panic\"", wanted),
+        ("kind = \"sensor-hang\"", wanted),
+        ("kind = \"sensor-brown-out\"", SENSOR),
+    ] {
+        let (sensor, heard) = Host::following(&script);
+        let terminals = Terminals {
+            sensor: Some(sensor),
+            ..Terminals::default()
+        };
+        let surface = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]";
+        let scene = scene(&format!(
+            "duration_s = 3.0\n{surface}\n[[fault]]\nat_s = 0.6\n{fault}\n"
+        ));
+        let (recording, _) = hil_sim_boards::run_at(&scene, elves::both(), terminals)
+            .unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(recording.signs.resets.len(), 1, "{fault}");
+        let reports = reports(&heard.lock().unwrap());
+        let [asked, .., told] = reports[..] else {
+            panic!("{fault}: {reports:?}");
+        };
+        assert_eq!(
+            (asked.configuration, asked.refused),
+            (wanted, None),
+            "{fault}"
+        );
+        assert_eq!(told.configuration, in_force, "{fault}");
+    }
+}
