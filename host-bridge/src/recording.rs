@@ -216,6 +216,10 @@ fn all_safe(tally: Tally, safe_bytes: u64) -> Progress {
 pub enum RecordingError {
     #[error("{0}: is there already: give another name, or --force to write over it")]
     Exists(PathBuf),
+    #[error(
+        "{0}: would be in the way of this recording's parts, and is none of an earlier one: give another name"
+    )]
+    NoPart(PathBuf),
     #[error("{0}: can't be made: {1}")]
     NotMade(PathBuf, #[source] io::Error),
     #[error("{path}: can't be written any further: {source}; {safe_bytes} bytes of it are safe")]

@@ -9,14 +9,12 @@ use protocol::{PROTOCOL_VERSION, SCHEMA_HASH};
 
 use super::Settings;
 use super::csv_folder::CsvFolder;
-use super::mcap_file::{FORMAT, McapFile};
+use super::mcap_file::{CONFIGURATION, FORMAT, McapFile};
+use super::reader::Reader;
 use super::row::{HelloRow, LinkEvent, Row};
 use super::row_builder::Entry;
 use crate::clock::{now_us, unix_ns};
 use crate::recording::RecordingError;
-
-/// The key of a board's configuration, as JSON, in what a later part tells of it.
-pub const CONFIGURATION: &str = "configuration";
 
 pub struct RecordingFiles {
     settings: Settings,
@@ -50,24 +48,45 @@ pub fn part_path(path: &Path, part: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// The later parts of an earlier recording of this name, which would be in the way hours from now, or be
-/// taken for this one's.
-fn later_parts(path: &Path) -> Option<Vec<PathBuf>> {
+/// Files of the names that later parts of this recording would have, and their numbers.
+fn named_as_parts(path: &Path) -> Vec<(PathBuf, u32)> {
     let folder = path.parent().filter(|folder| folder.as_os_str() != "");
-    let stem = path.file_stem()?.as_encoded_bytes();
-    let is_later = |found: &Path| {
+    let stem = path.file_stem().unwrap_or_default().as_encoded_bytes();
+    let number = |found: &Path| {
         let number = found.file_stem()?.as_encoded_bytes();
         let number = number.strip_prefix(stem)?.strip_prefix(b"-")?;
         let number = str::from_utf8(number).ok()?.parse().ok()?;
         // Not 1, and no number that is written otherwise.
-        (number > 1 && part_path(path, number).file_name() == found.file_name()).then_some(())
+        (number > 1 && part_path(path, number).file_name() == found.file_name()).then_some(number)
     };
-    let parts = fs::read_dir(folder.unwrap_or(Path::new(".")))
-        .ok()?
+    fs::read_dir(folder.unwrap_or(Path::new(".")))
+        .into_iter()
+        .flatten()
         .flatten()
         .map(|entry| entry.path())
-        .filter(|found| is_later(found).is_some());
-    Some(parts.collect())
+        .filter_map(|found| number(&found).map(|number| (found, number)))
+        .collect()
+}
+
+/// The later parts of an earlier recording of this name, which would be taken for this one's. Fails if there is a file
+/// that would be in a part's way hours from now.
+fn later_parts(settings: &Settings) -> Result<Vec<PathBuf>, RecordingError> {
+    let mut parts = Vec::new();
+    for (path, number) in settings
+        .mcap
+        .as_deref()
+        .map_or_else(Vec::new, named_as_parts)
+    {
+        let is_part = Reader::open(&path).is_ok_and(|file| file.part() == number);
+        let is_in_the_way = settings.part.is_some();
+        match (settings.force, is_part) {
+            (false, _) if is_in_the_way => return Err(RecordingError::Exists(path)),
+            (true, true) => parts.push(path),
+            (true, false) if is_in_the_way => return Err(RecordingError::NoPart(path)),
+            _ => {}
+        }
+    }
+    Ok(parts)
 }
 
 fn about(part: u32) -> BTreeMap<String, String> {
@@ -114,17 +133,7 @@ impl RecordingFiles {
         if settings.mcap.is_none() && settings.csv.is_none() {
             return Err(RecordingError::Nowhere);
         }
-        let old_parts = settings
-            .mcap
-            .as_deref()
-            .and_then(later_parts)
-            .unwrap_or_default();
-        if let Some(path) = old_parts.first()
-            && settings.part.is_some()
-            && !settings.force
-        {
-            return Err(RecordingError::Exists(path.clone()));
-        }
+        let old_parts = later_parts(&settings)?;
         let force = settings.force;
         let mcap = settings
             .mcap
@@ -150,10 +159,8 @@ impl RecordingFiles {
         if let Some(mcap) = &mut files.mcap {
             mcap.keep()?;
         }
-        if files.settings.force {
-            for path in old_parts {
-                fs::remove_file(&path).map_err(|source| RecordingError::NotMade(path, source))?;
-            }
+        for path in old_parts {
+            fs::remove_file(&path).map_err(|source| RecordingError::NotMade(path, source))?;
         }
         Ok(files)
     }

@@ -24,6 +24,8 @@ pub const PROFILE: &str = "ros2";
 pub const LIBRARY: &str = "host-bridge ";
 /// The metadata record that tells of the recording as a whole.
 pub const ABOUT: &str = "ridgelink";
+/// The key of a board's configuration, as JSON, in what a later part tells of it.
+pub const CONFIGURATION: &str = "configuration";
 /// The version of the rows: raised when one changes so that older programs can't read it.
 pub const FORMAT: &str = "2";
 /// Before it is compressed: more than a second of everything, so that what closes a chunk is the time.

@@ -17,8 +17,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use protocol::{GAUGE_BLOCK, PROTOCOL_VERSION, Role};
 use ros2msg::{DecodeError, Definition, DefinitionError, decode};
 
-use super::files::CONFIGURATION;
-use super::mcap_file::{ABOUT, FORMAT, LIBRARY, PROFILE};
+use super::mcap_file::{ABOUT, CONFIGURATION, FORMAT, LIBRARY, PROFILE};
 use super::ros2;
 use super::row::{CHANNELS, GaugeRow, Kind, Row, block, topic};
 use super::row_builder::Entry;
@@ -90,6 +89,7 @@ pub struct Reader {
     channels: BTreeMap<u16, Channel>,
     /// The protocol's version that the boards were to speak.
     protocol: u16,
+    part: u32,
     passed_over: u64,
     /// Samples of format 1 that are no whole block yet, and the first one's time.
     samples: (u64, Vec<GaugeRow>),
@@ -133,6 +133,7 @@ impl Reader {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             protocol: 0,
+            part: 1,
             passed_over: 0,
             samples: (0, Vec::with_capacity(GAUGE_BLOCK)),
             first_ns: None,
@@ -176,6 +177,7 @@ impl Reader {
                         return Err(ReadError::Newer(path, told_format));
                     }
                     self.protocol = told("protocol").parse().unwrap_or(0);
+                    self.part = told("part").parse().unwrap_or(1);
                     return Ok(());
                 }
                 Some(_) => {}
@@ -186,6 +188,11 @@ impl Reader {
     /// The file's name.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Which part of its recording the file is, from 1 on.
+    pub fn part(&self) -> u32 {
+        self.part
     }
 
     /// Whether the end was reached, and is not the end that a recording has: it was cut off.

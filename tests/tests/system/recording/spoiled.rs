@@ -215,10 +215,32 @@ fn what_is_there_already_is_left_alone_unless_forced() {
         "{error}"
     );
 
-    // They go with the file that they were parts of, and nothing else does.
+    // And is no part, whatever it is called.
+    fs::write(&path, "kept").expect("the file can be written");
+    let error = Recorder::start(settings(true))
+        .map(drop)
+        .expect_err("there is another file");
+    let words = error.to_string();
+    assert!(
+        words.contains("kept-2.mcap: would be in the way"),
+        "{words}"
+    );
+    for kept in [&path, &part_path(&path, 2)] {
+        assert_eq!(fs::read(kept).expect("still there"), b"kept");
+        fs::remove_file(kept).expect("it can be removed");
+    }
+
+    // Parts go with the file that they were parts of, and nothing else does.
+    let recorder = Recorder::start(Settings {
+        part: Some(Duration::from_millis(1)),
+        ..settings(false)
+    });
+    let recorder = recorder.expect("nothing is in the way");
+    let has_begun = || part_path(&path, 2).exists();
+    assert!(wait_until(LIMIT, has_begun), "there is no second part");
+    recorder.stop().expect("a whole file");
     let other = folder.join("kept-x.mcap");
     fs::write(&other, "kept").expect("the file can be written");
-    fs::write(&path, "kept").expect("the file can be written");
     let recorder = Recorder::start(settings(true)).expect("it may be written over");
     recorder.stop().expect("a whole file");
     assert!(!part_path(&path, 2).exists() && other.exists());
