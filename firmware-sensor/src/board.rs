@@ -14,19 +14,17 @@ use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::adc::vals::Exten;
 use embassy_stm32::adc::{Adc, AdcChannel, RingBufferedAdc, SampleTime};
-use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
+use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::pac;
-use embassy_stm32::pac::timer::vals::Mms;
-use embassy_stm32::peripherals::{ADC3, DMA2_CH0, TIM1, TIM3};
+use embassy_stm32::pac::timer::vals::{Mms, Ocm, Ossi};
+use embassy_stm32::peripherals::{ADC3, DMA2_CH0, PE9, TIM1, TIM3};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::timer::Ch1;
 use embassy_stm32::timer::low_level::{RoundTo, Timer};
-use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_stm32::triggers::TIM3_TRGO;
-use embassy_stm32::{bind_interrupts, dma};
+use embassy_stm32::{Peri, bind_interrupts, dma};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::Duration;
@@ -63,6 +61,8 @@ const RING: usize = 2 * BLOCK;
 /// 28 + 12 ADC clocks at 21 MHz: 1.9 µs a channel, 11.4 µs a scan.
 const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
 const ARM_PWM: Hertz = Hertz(20_000);
+/// As many as there can be.
+const PULSES: u16 = 256;
 /// In which a command that the pins were given takes effect.
 pub const ARM_PWM_PERIOD: Duration = Duration::from_hz(ARM_PWM.0 as u64);
 
@@ -139,20 +139,8 @@ impl Board {
         trigger.set_frequency(Hertz(SCAN_RATE_HZ), RoundTo::Slower);
         trigger.set_master_mode(Mms::UPDATE);
 
-        let pwm = PwmPin::<TIM1, Ch1>::new(p.PE9, OutputType::PushPull);
-        let pwm = SimplePwm::new(
-            p.TIM1,
-            Some(pwm),
-            None,
-            None,
-            None,
-            ARM_PWM,
-            Default::default(),
-        );
-        let arm = ArmDrive {
-            pwm,
-            forward: Output::new(p.PF13, Level::Low, Speed::Low),
-        };
+        let forward = Output::new(p.PF13, Level::Low, Speed::Low);
+        let arm = ArmDrive::new(Timer::new(p.TIM1), p.PE9, forward);
 
         static PEER: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
         static CONSOLE: StaticCell<[u8; RING_BYTES]> = StaticCell::new();
@@ -242,26 +230,58 @@ impl Sampler {
 }
 
 /// The arm's servo drive: speed as PWM duty, direction on a pin.
+///
+/// TIM1 repeats its pulse [`PULSES`] times after each command, and stops at its beginning, where the pin is low (RM0090,
+/// 17.3.3 and 17.3.10): whatever keeps the next command from coming, the drive is off 12.8 ms after the last one.
 pub struct ArmDrive {
-    pwm: SimplePwm<'static, TIM1>,
+    _timer: Timer<'static, TIM1>,
+    _pin: Flex<'static>,
     forward: Output<'static>,
+    /// Counts of a period.
+    period: u16,
 }
 
 impl ArmDrive {
-    /// Lets the drive follow commands; 0 until the first.
-    pub fn enable(&mut self) {
-        self.pwm.ch1().enable();
+    fn new(timer: Timer<'static, TIM1>, pin: Peri<'static, PE9>, forward: Output<'static>) -> Self {
+        let period = (timer.get_clock_frequency().0 / ARM_PWM.0) as u16;
+        let r = pac::TIM1;
+        r.arr().modify(|w| w.set_arr(period - 1));
+        r.rcr().modify(|w| w.set_rep(PULSES - 1));
+        // Low first, and high for the rest of a period.
+        r.ccr(0).modify(|w| w.set_ccr(period));
+        r.ccmr_output(0).modify(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+        r.ccer().modify(|w| w.set_cce(0, true));
+        r.cr1().modify(|w| w.set_opm(true));
+        r.bdtr().modify(|w| w.set_ossi(Ossi::IDLE_LEVEL));
+        let mut pin = Flex::new(pin);
+        pin.set_as_af_unchecked(1, AfType::output(OutputType::PushPull, Speed::Low));
+        Self {
+            _timer: timer,
+            _pin: pin,
+            forward,
+            period,
+        }
     }
 
-    /// Puts a command on the pins.
+    /// Lets the drive follow commands; 0 until the first.
+    pub fn enable(&mut self) {
+        pac::TIM1.bdtr().modify(|w| w.set_moe(true));
+    }
+
+    /// Puts a command on the pins, for [`PULSES`] periods from now.
     pub fn set(&mut self, drive: Drive) {
         self.forward.set_level(if drive.forward {
             Level::High
         } else {
             Level::Low
         });
-        self.pwm
-            .ch1()
-            .set_duty_cycle_fraction(drive.duty.into(), Drive::FULL.into());
+        let high = u32::from(self.period) * u32::from(drive.duty) / u32::from(Drive::FULL);
+        let r = pac::TIM1;
+        // Never all of it: the counter stops at 0, where the pin has to be low.
+        let low = (u32::from(self.period) - high).max(1) as u16;
+        r.ccr(0).modify(|w| w.set_ccr(low));
+        // Begins a period and counts anew; it stops the counter as well.
+        r.egr().write(|w| w.set_ug(true));
+        r.cr1().modify(|w| w.set_cen(drive.duty > 0));
     }
 }

@@ -117,3 +117,63 @@ fn the_surface_is_felt_under_the_arm_that_follows() {
     assert!(summary.rms_percent.unwrap() <= 1.0, "{summary:?}");
     assert!(summary.wrong_share.unwrap() <= 0.001, "{summary:?}");
 }
+
+/// From the last command to the end of the PWM that nobody renews: 256 periods of 50 µs.
+const RENEWED_WITHIN_S: f64 = 0.0128;
+
+#[test]
+fn an_arm_that_is_told_nothing_more_stands_still_long_before_the_watchdog() {
+    const STRUCK_S: f64 = 1.2;
+    const SHORT_LAG_S: f64 = 0.010;
+    for kind in ["adc-stopped", "sensor-hang", "sensor-panic"] {
+        let run = Run::of(scene(&format!(
+            r#"
+            duration_s = 2.4
+
+            [surface]
+            specimens = [{{ wavelength_mm = 2.0 }}]
+
+            [motion]
+            speed_mm_s = {SPEED_MM_S}
+
+            [arm]
+            follows = "link"
+            lag_ms = {}
+
+            [[fault]]
+            at_s = {STRUCK_S}
+            kind = "{kind}"
+            "#,
+            SHORT_LAG_S * 1e3
+        )));
+        let scans = &run.recording.scans;
+        let at = |at_s: f64| {
+            let scan = scans.iter().find(|scan| scan.at_ns as f64 * 1e-9 >= at_s);
+            scan.unwrap_or_else(|| panic!("{kind}: no scan from {at_s} s on"))
+        };
+        let (before, struck) = (at(STRUCK_S - 0.05), at(STRUCK_S - 0.001));
+        let way_mm = struck.position_mm - before.position_mm;
+        assert!(way_mm > 0.8 * SPEED_MM_S * 0.049, "{kind}: it moves before");
+        let [reset] = run.recording.signs.resets[..] else {
+            panic!("{kind}: one reset, not {:?}", run.recording.signs.resets);
+        };
+        let reset_s = reset.at_ns as f64 * 1e-9;
+        assert!(
+            reset_s > STRUCK_S + 0.2,
+            "{kind}: the watchdog takes its time"
+        );
+        // What the sample that was under way and the arm's own lag add; where it is shows when it is sampled again.
+        let most_mm = 1.2 * SPEED_MM_S * (0.001 + 0.001 + RENEWED_WITHIN_S + SHORT_LAG_S);
+        let gone_mm = at(reset_s).position_mm - struck.position_mm;
+        assert!(
+            (0.0..=most_mm).contains(&gone_mm),
+            "{kind}: {gone_mm} mm, bound {most_mm} mm"
+        );
+        // And follows again.
+        let end_mm = scans.last().map_or(0.0, |scan| scan.position_mm);
+        assert!(
+            end_mm > at(reset_s).position_mm + 10.0,
+            "{kind}: {end_mm} mm"
+        );
+    }
+}
