@@ -157,12 +157,12 @@ impl Plausibility {
         core::mem::replace(&mut self.unconfirmed, 0)
     }
 
-    /// Nothing is known of the surface any more.
     /// Whether the sensor has started again since this was asked last.
     pub fn take_beginning(&mut self) -> bool {
         core::mem::take(&mut self.began_anew)
     }
 
+    /// Nothing is known of the surface any more.
     fn forget(&mut self) {
         self.held = None;
         self.dismiss_surprise();
