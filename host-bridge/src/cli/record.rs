@@ -123,7 +123,7 @@ impl Record {
             told,
             lines,
             stream: GaugeStream::new(!self.no_gauges),
-            absent: roles.clone(),
+            absent: BOARDS.into(),
             screen: Screen::new(self.quiet),
             started,
         }
