@@ -1,5 +1,7 @@
 //! `hil-sim`: runs scenes on the firmware, on a host or on emulated boards.
 
+use std::io;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -10,7 +12,8 @@ fn main() -> ExitCode {
     match cli::Arguments::parse().execute() {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("{error:#}");
+            // Where nobody can be told, the exit status says it.
+            let _ = writeln!(io::stderr(), "{error:#}");
             ExitCode::from(2)
         }
     }

@@ -68,6 +68,10 @@ impl<'a> Results<'a> {
             path.extension().is_none_or(|ending| ending != "toml"),
             "{here}: is a scene's name, and would be written over: give results a name of their own before the scenes"
         );
+        anyhow::ensure!(
+            path != Path::new("-"),
+            "-: is no file's name here: give /dev/stdout for standard output, or ./- for a file"
+        );
         let wrong = || format!("{here}: cannot be written: give a file in a folder that exists");
         let there = match fs::metadata(path) {
             Ok(there) => Some(there),

@@ -58,7 +58,7 @@ pub(super) struct Jury {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits"])]
     folder: Option<PathBuf>,
     /// What runs a folder's scenes
-    #[arg(long, value_enum, default_value_t = EngineName::Native, requires = "folder")]
+    #[arg(long, value_enum, default_value_t = EngineName::Native)]
     engine: EngineName,
     /// How λ is estimated [default: as configured on a board; in a folder, as each scene says]
     #[arg(long, value_enum)]
@@ -153,6 +153,10 @@ struct Felt {
 
 impl Jury {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
+        anyhow::ensure!(
+            self.folder.is_some() || matches!(self.engine, EngineName::Native),
+            "--engine elf: runs the scenes of a folder, and there is none: give --folder too, or take it out"
+        );
         let json = Results::wanted(self.json.as_deref(), Format::JsonObject)?;
         if self.weights {
             self.find_weights()?;

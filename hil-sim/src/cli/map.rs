@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use super::run_options::tell_notes;
-use super::say::{self, say};
+use super::say::{self, say, tell};
 use super::{progress, threads};
 use hil_sim_studies::map::{Axis, METHODS, Made, Map, Plan, Shard, Survey, catalogue, find};
 use hil_sim_studies::study::{Record, Table, short};
@@ -111,7 +111,7 @@ fn make(map: &Map, plan: &Plan, merge: bool) -> anyhow::Result<Made> {
     bar.finish_and_clear();
     let made = survey.finish()?;
     for file in &made.files {
-        eprintln!("{}", file.display());
+        tell!("{}", file.display());
     }
     Ok(made)
 }

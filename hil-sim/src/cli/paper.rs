@@ -10,7 +10,7 @@ use hil_sim_studies::paper::{jobs, report};
 use hil_sim_studies::psychophysics::{Job, Plan, run};
 
 use super::files::write_all;
-use super::say::say;
+use super::say::{say, tell};
 use super::{Elves, EngineName, status};
 
 #[derive(Debug, clap::Args)]
@@ -49,7 +49,7 @@ impl Paper {
                 Job::Display(_) => "the display alone, wavelengths given",
             };
             let took_s = started.elapsed().as_secs_f64();
-            eprintln!("{done:>3} of {} after {took_s:>4.0} s: {what}", jobs.len());
+            tell!("{done:>3} of {} after {took_s:>4.0} s: {what}", jobs.len());
         })?;
 
         let report = report(plan, &recordings, &name)?;

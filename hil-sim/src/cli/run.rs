@@ -182,6 +182,12 @@ impl Books<'_> {
             let title = format!("{} is not as expected", scene.name);
             self.way.annotate(file, at, &title, line);
         }
+        for (number, finding) in judgement.findings.iter().enumerate() {
+            let kind = finding.fault.kind.name();
+            for line in &finding.unjudged {
+                say!("  not judged: fault[{number}] {kind}: {line}");
+            }
+        }
         self.met &= is_met;
         if let Some((json, list)) = &mut self.json {
             let written = list.write(&SceneResult::of(&judgement, scene), json.file());

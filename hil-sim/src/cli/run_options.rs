@@ -14,7 +14,7 @@ use hil_sim_studies::bench::Bench;
 use hil_sim_studies::jury::folder::{self, Entry};
 use hil_sim_studies::output::annotation::annotation;
 
-use super::say::say;
+use super::say::{say, tell};
 use super::{Elves, EngineName, threads};
 
 /// How scenes are run, and how it is told.
@@ -108,7 +108,7 @@ impl RunOptions {
 /// Tells on standard error what a scene's author should know.
 pub(super) fn tell_notes(scene: &Scene) {
     for note in &scene.notes {
-        eprintln!("{note}");
+        tell!("{note}");
     }
 }
 

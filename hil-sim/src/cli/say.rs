@@ -1,4 +1,4 @@
-//! Results on standard output.
+//! Results on standard output, and what else there is to tell on standard error.
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
@@ -13,6 +13,18 @@ macro_rules! say {
 }
 pub(super) use say;
 
+/// Prints a line on standard error, if that can be written.
+macro_rules! tell {
+    ($($text:tt)*) => {
+        // Results count, and the exit status.
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("{}\n", format_args!($($text)*)),
+        );
+    };
+}
+pub(super) use tell;
+
 /// Prints `text` as it is. If it can't be written, for another reason than that nobody reads it, the
 /// program ends with a complaint and exit status 2.
 pub(super) fn text(text: Arguments<'_>) {
@@ -20,7 +32,7 @@ pub(super) fn text(text: Arguments<'_>) {
     if let Err(error) = out.write_fmt(text).and_then(|()| out.flush())
         && error.kind() != io::ErrorKind::BrokenPipe
     {
-        eprintln!("standard output can't be written: {error}");
+        tell!("standard output can't be written: {error}");
         process::exit(2);
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use hil_sim_studies::map::Shard;
 
-/// The files, in the order in which they are named, those of a folder in the order of their names; only those
+/// The files, those of a folder with all folders in it that are no links, in the order in which they are named, those of a folder in the order of their names; only those
 /// of a shard, if one is given.
 pub(super) fn scene_files(named: &[PathBuf], shard: Option<Shard>) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
@@ -42,7 +42,10 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> anyhow::Result<()> {
     entries.sort();
     for path in entries {
         if path.is_dir() {
-            collect(&path, files)?;
+            // A link may lead back here.
+            if !path.is_symlink() {
+                collect(&path, files)?;
+            }
         } else if path.extension().is_some_and(|ending| ending == "toml") && !is_golden(&path) {
             files.push(path);
         }

@@ -13,6 +13,7 @@ use hil_sim_boards::bench::{Bench, BenchStatus, Command, Hand, Options, Pace, Po
 use hil_sim_core::scene::{Motion, Scene};
 
 use super::run_options::tell_notes;
+use super::say::tell;
 use super::{Elves, number};
 use input::{Input, Keys};
 use screen::Screen;
@@ -86,7 +87,7 @@ fn pace(text: &str) -> Result<Pace, String> {
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(seconds) if seconds > 0.0 && seconds <= 1e9 => Ok(seconds),
-        _ => Err("give a time above 0 s".to_owned()),
+        _ => Err("give a time above 0 s, 1 000 000 000 at most".to_owned()),
     }
 }
 
@@ -178,7 +179,7 @@ impl Serve {
         match bench.stop() {
             Ok(()) => Ok(ExitCode::SUCCESS),
             Err(error) => {
-                eprintln!("{error}");
+                tell!("{error}");
                 Ok(ExitCode::from(1))
             }
         }

@@ -343,3 +343,29 @@ fn the_committed_golden_hashes_hold() {
         hil_sim(&scenes, &["golden", "check", "--file", "golden.toml", "."]);
     assert_eq!(status, Some(0), "{output}{errors}");
 }
+
+#[test]
+fn a_file_that_holds_no_hashes_is_made_anew_as_its_refusal_says() {
+    let folder = folder("golden-garbage");
+    scenes(&folder, &["a"]);
+    let renew = ["golden", "renew", "--file", "g.toml", "a.toml"];
+    for garbage in ["garbage [", "[\"a.toml\"]\nnative = \"7\"\n"] {
+        fs::write(folder.join("g.toml"), garbage).unwrap();
+        let (status, _, errors) = hil_sim(&folder, &renew);
+        assert_eq!(status, Some(2), "{errors}");
+        let advice = "take it away and make it anew with hil-sim golden renew --file g.toml";
+        assert!(errors.contains(advice), "{errors}");
+        fs::remove_file(folder.join("g.toml")).unwrap();
+        assert_eq!(hil_sim(&folder, &renew).0, Some(0));
+    }
+    // Each cause is told once.
+    let missing = ["golden", "check", "--file", "nowhere/g.toml", "a.toml"];
+    for arguments in [
+        missing,
+        ["golden", "renew", "--file", "nowhere/g.toml", "a.toml"],
+    ] {
+        let (status, _, errors) = hil_sim(&folder, &arguments);
+        assert_eq!(status, Some(2), "{errors}");
+        assert!(errors.matches("No such file").count() <= 1, "{errors}");
+    }
+}

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use hil_sim_core::judge::fault::judge;
-use hil_sim_core::judge::outcome::Outcome;
+use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::native;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::catalogue::{Class, Needs};
@@ -176,4 +176,66 @@ fn a_campaign_of_an_unknown_kind_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     let errors = String::from_utf8(output.stderr).unwrap();
     assert!(errors.contains("gremlin: no such kind"), "{errors}");
+}
+
+/// What is not as expected of a scene in which nothing is at fault but what the scene breaks, and what is not judged.
+fn judged(text: &str) -> (Vec<String>, Vec<String>) {
+    let surface = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    let scene = Scene::parse(Path::new("x.toml"), &format!("{text}{surface}")).unwrap();
+    let judgement = Judgement::of(&scene, false).unwrap();
+    let unjudged = judgement.findings.into_iter().flat_map(|f| f.unjudged);
+    (judgement.unmet, unjudged.collect())
+}
+
+#[test]
+fn a_board_that_is_not_at_fault_is_not_blamed() {
+    let mut blamed = Vec::new();
+    let mut check = |text: String| {
+        let (unmet, _) = judged(&text);
+        if !unmet.is_empty() {
+            blamed.push(format!("{text}{unmet:?}"));
+        }
+    };
+    for kind in Kind::all().filter(|kind| kind.row().needs == Needs::Nothing) {
+        let name = kind.name();
+        let fault = |at_s: f64| format!("[[fault]]\nat_s = {at_s}\nkind = {name:?}\n");
+        // At the end.
+        for at_s in [0.6, 1.4, 1.499_999_9] {
+            check(format!("duration_s = 1.5\n{}", fault(at_s)));
+        }
+        // At the start, where there is nothing to replay yet.
+        for at_s in [0.0, 0.0004, 0.1, 0.2, 0.3] {
+            check(format!("duration_s = 4.0\n{}", fault(at_s)));
+        }
+        // Nothing is ever driven.
+        let silent = "[display]\namplitude_mv = 0\n";
+        check(format!("duration_s = 4.0\n{}{silent}", fault(1.0)));
+        // The arm stands still with the hand.
+        let follows = "[arm]\nfollows = \"link\"\nlag_ms = 50\n";
+        check(format!("duration_s = 6.0\n{}{follows}", fault(2.0)));
+    }
+    // There is nothing so old to replay.
+    let replay = "[[fault]]\nat_s = 0.6\nkind = \"link-replay\"\nback_ms = 1000\n";
+    check(format!("duration_s = 4.0\n{replay}"));
+    // The hand is slow.
+    for kind in ["hand-encoder-dead", "adc-stuck"] {
+        let fault = format!("[[fault]]\nat_s = 2.0\nkind = {kind:?}\n");
+        let slow = "[motion]\nspeed_mm_s = 5.0\n";
+        check(format!("duration_s = 6.0\n{fault}{slow}"));
+    }
+    assert!(blamed.is_empty(), "{blamed:#?}");
+}
+
+#[test]
+fn what_the_scenes_end_leaves_no_time_for_is_said_on_the_terminal() {
+    let path = std::env::temp_dir().join(format!("hil-sim-unjudged-{}.toml", std::process::id()));
+    let scene = "duration_s = 1.5\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n\
+        [[fault]]\nat_s = 0.6\nkind = \"hand-encoder-dead\"\n";
+    std::fs::write(&path, scene).unwrap();
+    let output = hil_sim(&["run", path.to_str().unwrap()]);
+    std::fs::remove_file(&path).unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let line = "  not judged: fault[0] hand-encoder-dead: whether it shows within 3500 ms: the scene ends before\n";
+    assert!(said.contains(line), "{said}");
+    assert_eq!(output.status.code(), Some(0), "{said}");
 }

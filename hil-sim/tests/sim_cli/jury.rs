@@ -227,4 +227,15 @@ fn arguments_that_cannot_be_used_are_refused() {
     // One or the other.
     refuses(&folder, &["--folder", ".", "--seed", "3"], &["--folder"]);
     refuses(&folder, &["--engine", "elf"], &["--folder"]);
+    refuses(
+        &folder,
+        &["--engine", "elf", "--surfaces", "1"],
+        &["--engine elf", "give --folder too"],
+    );
+    let largest = u64::MAX.to_string();
+    refuses(
+        &folder,
+        &["--surfaces", "2", "--seed", &largest],
+        &["beyond the largest, 18446744073709551615", "--seed"],
+    );
 }

@@ -1,6 +1,6 @@
 //! `hil-sim run` as a person or a script meets it.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -287,4 +287,62 @@ fn a_reader_that_goes_away_changes_neither_files_nor_exit_status() {
     let json: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
     assert_eq!(json[0]["name"], "a");
+}
+
+#[test]
+fn a_device_without_an_end_is_no_scene_and_holds_no_hashes() {
+    let folder = folder("endless");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    for (arguments, file) in [
+        (&["run", "/dev/zero"][..], "/dev/zero"),
+        (
+            &["golden", "renew", "a.toml", "--file", "/dev/full"],
+            "/dev/full",
+        ),
+    ] {
+        let output = hil_sim(&folder, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let want = format!("{file}: cannot be read: is no file, and does not end within 64 MB");
+        assert!(errors(&output).starts_with(&want), "{}", errors(&output));
+    }
+}
+
+#[test]
+fn where_nobody_can_be_told_the_exit_status_says_it() {
+    let folder = folder("untold");
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let status = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args(["run", "nosuch"])
+        .stderr(full)
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(2));
+}
+
+#[test]
+fn a_folder_that_leads_back_to_itself_is_looked_through_once() {
+    let folder = folder("loop");
+    fs::create_dir(folder.join("in")).unwrap();
+    fs::write(folder.join("in/a.toml"), SOUND).unwrap();
+    std::os::unix::fs::symlink("..", folder.join("in/back")).unwrap();
+    std::os::unix::fs::symlink("in", folder.join("named")).unwrap();
+    for named in [".", "named"] {
+        let output = hil_sim(&folder, &["run", named]);
+        assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+        // The head and the scene.
+        assert_eq!(String::from_utf8_lossy(&output.stdout).lines().count(), 2);
+    }
+}
+
+#[test]
+fn a_dash_is_no_file_for_results() {
+    let folder = folder("dash");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    for option in ["--json", "--report", "--junit"] {
+        let output = hil_sim(&folder, &["run", "a.toml", option, "-"]);
+        assert_eq!(output.status.code(), Some(2), "{option}");
+        assert!(errors(&output).contains("give /dev/stdout"), "{option}");
+    }
+    assert!(!folder.join("-").exists());
 }

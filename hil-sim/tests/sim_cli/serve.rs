@@ -234,6 +234,7 @@ fn what_it_cannot_do_is_refused_with_what_to_do() {
         (&["--pace", "0"][..], "give 0.01 to 100, or max"),
         (&["--pace", "fast"], "give 0.01 to 100, or max"),
         (&["--for", "0"], "give a time above 0 s"),
+        (&["--for", "1e308"], "1 000 000 000 at most"),
         (&["--hand", "keyboard"], "needs a terminal"),
         (
             &["--hand", "nobody.csv"],

@@ -3,7 +3,7 @@
 //!
 //! A fault is judged by itself until the next one of the scene begins; whether the display stays stopped, until its
 //! power goes. One that is shorter than its kind's default, or too small to be told from a sound board, need not be
-//! seen; it must do no harm.
+//! seen; it must do no harm. Nor is judged what the scene's end leaves no time for: [`Finding::unjudged`] says so.
 
 mod conduct;
 mod finding;

@@ -150,14 +150,14 @@ impl Texture for Patch {
         let at_mm = fingertip_mm + PLACES_MM[gauge];
         let advance = advance(gauge);
         if self.is_periodic {
-            for section in &self.sections {
-                if section.from_mm <= at_mm - REACH_MM && at_mm + REACH_MM <= section.to_mm {
-                    return feel(
-                        &section.periods[gauge],
-                        (at_mm - section.start_mm) * section.cycles_per_mm,
-                        advance,
-                    );
-                }
+            let begun = |section: &Section| section.from_mm <= at_mm - REACH_MM;
+            let section = &self.sections[self.sections[1..].partition_point(begun)];
+            if at_mm + REACH_MM <= section.to_mm {
+                return feel(
+                    &section.periods[gauge],
+                    (at_mm - section.start_mm) * section.cycles_per_mm,
+                    advance,
+                );
             }
         }
         self.gauges[gauge]

@@ -140,10 +140,7 @@ impl Surface {
     /// The number of the specimen at a place.
     #[inline]
     fn specimen(&self, x_mm: f64) -> usize {
-        self.patches[1..]
-            .iter()
-            .take_while(|patch| patch.start_mm <= x_mm)
-            .count()
+        self.patches[1..].partition_point(|patch| patch.start_mm <= x_mm)
     }
 }
 

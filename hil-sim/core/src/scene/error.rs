@@ -2,7 +2,13 @@
 
 /// What is wrong with a scene or with a file it names: `file:line: key: what is wrong: what to do`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{}: {}{message}", file, line.map(|line| format!(":{line}")).unwrap_or_default(), if key.is_empty() { String::new() } else { format!("{key}: ") })]
+#[error(
+    "{}{}: {}{}",
+    shown(file),
+    line.map(|line| format!(":{line}")).unwrap_or_default(),
+    if key.is_empty() { String::new() } else { format!("{}: ", shown(key)) },
+    shown(message)
+)]
 pub struct SceneError {
     /// The file at fault, as it was named.
     pub file: String,
@@ -13,6 +19,19 @@ pub struct SceneError {
     pub key: String,
     /// What is wrong and what to do.
     pub message: String,
+}
+
+/// A text with its control characters escaped: what a scene holds must not rule a terminal.
+fn shown(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if letter.is_control() {
+            shown.extend(letter.escape_debug());
+        } else {
+            shown.push(letter);
+        }
+    }
+    shown
 }
 
 impl SceneError {

@@ -144,6 +144,6 @@ fn solver(
 /// A step in µs, rounded down to three digits: what is said to be borne is.
 fn microseconds(step_s: f64) -> String {
     let us = step_s * 1e6;
-    let unit = 10f64.powi(us.log10().floor() as i32 - 2);
-    format!("{} µs", (us / unit).floor() * unit)
+    let scale = 10f64.powi(2 - us.log10().floor() as i32);
+    format!("{} µs", (us * scale).floor() / scale)
 }

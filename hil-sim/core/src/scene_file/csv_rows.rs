@@ -75,7 +75,11 @@ impl<'f> CsvRows<'f> {
         let mut row = vec![0.0; columns.len()];
         let mut skip = !bare;
         loop {
-            match self.reader.read_record(&mut record) {
+            let read = self.reader.read_record(&mut record);
+            if !skip && is_row(&read) && self.is_blank(&record) {
+                continue;
+            }
+            match read {
                 Ok(true) if skip => skip = false,
                 Ok(true) => {
                     for (number, &column) in row.iter_mut().zip(columns) {
@@ -115,14 +119,33 @@ impl<'f> CsvRows<'f> {
         }
     }
 
+    /// Whether a row's line holds nothing but blanks.
+    fn is_blank(&self, record: &csv::StringRecord) -> bool {
+        let starts_blank = record
+            .iter()
+            .next()
+            .is_none_or(|cell| cell.trim().is_empty());
+        starts_blank && {
+            let line = self.start(record.position()).map(|start| {
+                let rest = &self.bytes[start..];
+                rest.split(|&byte| byte == b'\n').next().unwrap_or(rest)
+            });
+            line.is_some_and(|line| line.trim_ascii().is_empty())
+        }
+    }
+
     /// The reader's own count stands before the empty lines that it passes over.
-    fn line_at(&self, position: Option<&csv::Position>) -> Option<usize> {
+    fn start(&self, position: Option<&csv::Position>) -> Option<usize> {
         let start = (position?.byte() as usize).min(self.bytes.len());
         let empty = self.bytes[start..]
             .iter()
             .take_while(|byte| b"\r\n".contains(byte))
             .count();
-        let before = &self.bytes[..start + empty];
+        Some(start + empty)
+    }
+
+    fn line_at(&self, position: Option<&csv::Position>) -> Option<usize> {
+        let before = &self.bytes[..self.start(position)?];
         Some(1 + before.iter().filter(|&&byte| byte == b'\n').count())
     }
 
@@ -137,5 +160,13 @@ impl<'f> CsvRows<'f> {
             _ => format!("cannot be read: {error}"),
         };
         self.refuse(self.line_at(error.position()), message)
+    }
+}
+
+/// Whether a row was read, of however many cells.
+fn is_row(read: &csv::Result<bool>) -> bool {
+    match read {
+        Ok(is_there) => *is_there,
+        Err(error) => matches!(error.kind(), csv::ErrorKind::UnequalLengths { .. }),
     }
 }

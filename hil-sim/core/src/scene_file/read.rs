@@ -11,7 +11,7 @@ use super::contact;
 use super::contact::Scenery;
 use super::display;
 use super::table::{Source, Table};
-use super::{fault, recorded};
+use super::{fault, read_bytes, recorded};
 use crate::plant::gauges::PLACES_MM;
 use crate::scene::Series;
 use crate::scene::{
@@ -212,7 +212,7 @@ impl Motion {
     /// # Errors
     /// If it can't be read, or is no hand's.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = read_bytes(path).map_err(|error| {
             let message = "give a CSV file with the columns t_s,x_mm";
             SceneError::of(
                 path.display(),
@@ -298,7 +298,7 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
             .unwrap_or(defaults.stiffness_n_per_m),
     };
     if kind == 'k' {
-        return Ok((Gauges::Kinematic(kinematic(table)?), force));
+        return Ok((Gauges::Kinematic(kinematic(table, duration_s)?), force));
     }
     let volts = recorded::gauges(&mut table, duration_s, tangential)?;
     if tangential == Some(true) && volts.width() == 5 {
@@ -312,7 +312,7 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
     Ok((Gauges::Recorded(volts), Force { present, ..force }))
 }
 
-fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
+fn kinematic(mut table: Table<'_>, duration_s: f64) -> Result<Kinematic, SceneError> {
     let resonance_hz = table.number("resonance_hz")?;
     let damping = table.number("resonance_damping")?;
     if damping.is_some() && resonance_hz.is_none() {
@@ -375,6 +375,10 @@ fn kinematic(mut table: Table<'_>) -> Result<Kinematic, SceneError> {
                 "there is no trouble: name gauges in dead, saturated, stuck, noisy or humming",
             ));
         }
+    }
+    if kinematic.trouble_from_s >= duration_s {
+        let message = format!("comes after the scene's end at {duration_s} s: give less");
+        return Err(table.refuse("trouble_from_s", message));
     }
     table.finish(" with kind = \"kinematic\"")?;
     Ok(kinematic)

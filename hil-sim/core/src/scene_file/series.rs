@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::csv_rows::CsvRows;
+use super::read_bytes;
 use super::recorded::EVERYWHERE;
 use super::recorded::tape::{Check, Conversion, Tape, plain, too_few};
 use super::table::Table;
@@ -40,6 +41,6 @@ pub(super) fn series(
         return Err(table.refuse("file", message));
     };
     let path = table.source().beside(name);
-    let bytes = std::fs::read(&path).map_err(|error| table.unreadable(&path, &error))?;
+    let bytes = read_bytes(&path).map_err(|error| table.unreadable(&path, &error))?;
     Series::read(&path, &bytes, headers, check)
 }

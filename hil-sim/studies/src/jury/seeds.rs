@@ -33,6 +33,17 @@ pub enum SeedsError {
     /// There are none.
     #[error("--surfaces 0: give 1 or more")]
     None,
+    /// So many do not follow on the first.
+    #[error(
+        "{count} seeds from {first} on go beyond the largest, {}: give a smaller --seed or fewer --surfaces",
+        u64::MAX
+    )]
+    Beyond {
+        /// The first of them.
+        first: u64,
+        /// How many.
+        count: u64,
+    },
     /// They go over the end of a range that is set aside.
     #[error(
         "seeds {first} to {last} are of more than one kind: {}–{} are for tuning, {}–{} for reporting; \
@@ -53,9 +64,11 @@ impl Seeds {
     /// # Errors
     /// If there are none, or if they are for different things.
     pub fn purpose(&self) -> Result<Purpose, SeedsError> {
-        let first = self.first;
-        let more = self.count.checked_sub(1).ok_or(SeedsError::None)?;
-        let last = first.saturating_add(more);
+        let Self { first, count } = *self;
+        let more = count.checked_sub(1).ok_or(SeedsError::None)?;
+        let last = first
+            .checked_add(more)
+            .ok_or(SeedsError::Beyond { first, count })?;
         if kind(first) != kind(last) || (kind(first) == Purpose::Free && spans_a_range(first, last))
         {
             return Err(SeedsError::Mixed { first, last });
@@ -65,7 +78,7 @@ impl Seeds {
 
     /// Each of them.
     pub fn all(&self) -> Vec<u64> {
-        (self.first..self.first.saturating_add(self.count)).collect()
+        (0..self.count).map(|more| self.first + more).collect()
     }
 }
 
@@ -109,6 +122,20 @@ mod tests {
         assert_eq!(purpose(20_000, 5), Ok(Purpose::Free));
         assert_eq!(purpose(0, 1), Ok(Purpose::Free));
         assert_eq!(purpose(7, 0), Err(SeedsError::None));
+    }
+
+    #[test]
+    fn seeds_beyond_the_largest_are_refused() {
+        for (first, count) in [(u64::MAX, 2), (u64::MAX - 1, 3), (7, u64::MAX)] {
+            let beyond = SeedsError::Beyond { first, count };
+            assert_eq!(purpose(first, count), Err(beyond));
+            assert!(beyond.to_string().contains("18446744073709551615"));
+        }
+        for count in [1, 2] {
+            let first = u64::MAX - (count - 1);
+            assert_eq!(purpose(first, count), Ok(Purpose::Free));
+            assert_eq!(Seeds { first, count }.all().len() as u64, count);
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use std::{fs, io};
 
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene_file::line::line_of;
+use hil_sim_core::scene_file::read_text;
 
 /// The file's first lines.
 const HEADER: &str = "\
@@ -24,21 +25,27 @@ const HEADER: &str = "\
 /// Why golden hashes cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum GoldenError {
-    /// The file cannot be read.
+    /// There is no such file.
     #[error(
-        "{path}: cannot be read: {}: make it with hil-sim golden renew --file {path} SCENES...",
-        .1, path = .0.display()
+        "{path}: cannot be read: there is no such file: make it with hil-sim golden renew --file {path} SCENES...",
+        path = .0.display()
     )]
-    Unreadable(PathBuf, #[source] io::Error),
+    Missing(PathBuf),
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {}: give a file of golden hashes", .0.display(), .1)]
+    Unreadable(PathBuf, io::Error),
     /// The file holds something else, at this line.
-    #[error("{}:{}: {}: mend it, or make it anew with hil-sim golden renew", .0.display(), .1, .2)]
+    #[error(
+        "{path}:{}: {}: mend it, or take it away and make it anew with hil-sim golden renew --file {path} SCENES...",
+        .1, .2, path = .0.display()
+    )]
     Foreign(PathBuf, usize, String),
     /// The file cannot be written.
     #[error("{}: cannot be written: {}: give a file in a folder that exists", .0.display(), .1)]
-    NotWritten(PathBuf, #[source] io::Error),
+    NotWritten(PathBuf, io::Error),
     /// A scene's file is nowhere.
     #[error("{}: cannot be found: {}: give the name of a scene", .0.display(), .1)]
-    NoScene(PathBuf, #[source] io::Error),
+    NoScene(PathBuf, io::Error),
 }
 
 type Hashes = BTreeMap<String, BTreeMap<String, String>>;
@@ -67,8 +74,10 @@ pub struct Golden {
 impl Golden {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<Self, GoldenError> {
-        let unreadable = |source| GoldenError::Unreadable(path.to_owned(), source);
-        let text = fs::read_to_string(path).map_err(unreadable)?;
+        let text = read_text(path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => GoldenError::Missing(path.to_owned()),
+            _ => GoldenError::Unreadable(path.to_owned(), error),
+        })?;
         let foreign = |line, what| GoldenError::Foreign(path.to_owned(), line, what);
         let hashes: Hashes = toml::from_str(&text).map_err(|error| {
             let before = &text.as_bytes()[..error.span().map_or(0, |at| at.start.min(text.len()))];
@@ -94,9 +103,7 @@ impl Golden {
     /// Reads a file, or begins one if there is none.
     pub fn open(path: &Path) -> Result<Self, GoldenError> {
         match Self::read(path) {
-            Err(GoldenError::Unreadable(_, source)) if source.kind() == io::ErrorKind::NotFound => {
-                Self::with(path, String::new(), Hashes::new())
-            }
+            Err(GoldenError::Missing(_)) => Self::with(path, String::new(), Hashes::new()),
             read => read,
         }
     }
@@ -258,6 +265,7 @@ mod tests {
             fs::write(&path, text).unwrap();
             let refusal = Golden::read(&path).unwrap_err().to_string();
             assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+            assert!(refusal.contains("take it away and make it anew"));
         }
         let missing = Golden::read(&folder.join("none.toml"))
             .unwrap_err()

@@ -93,6 +93,8 @@ pub struct Fault {
     pub safe_ms: Option<f64>,
     /// What is not as the table of kinds has it.
     pub unmet: Vec<String>,
+    /// What was not judged, and why.
+    pub unjudged: Vec<String>,
 }
 
 impl From<&Finding> for Fault {
@@ -103,6 +105,7 @@ impl From<&Finding> for Fault {
             detected_ms: finding.detected_ms(),
             safe_ms: finding.safe_ms(),
             unmet: finding.unmet(),
+            unjudged: finding.unjudged.clone(),
         }
     }
 }

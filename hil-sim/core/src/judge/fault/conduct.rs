@@ -221,14 +221,13 @@ impl Conduct {
         self.seen
     }
 
-    /// Until when the display has to drive again, if that is to be judged: it can be seen, and the hand moves for
-    /// half of the time.
+    /// Until when the display has to drive again, if it has to.
     pub fn due_again_ns(&self) -> Option<u64> {
-        let length_ns = self.again_ns.end - self.again_ns.start;
-        (length_ns > 0
-            && self.must_drive
-            && self.again_ns.end <= self.judged_ns.end
-            && 2 * self.seen.moved_ns >= length_ns)
-            .then_some(self.again_ns.end)
+        (!self.again_ns.is_empty() && self.must_drive).then_some(self.again_ns.end)
+    }
+
+    /// Whether that can be seen: the hand moves for half of the time.
+    pub fn shows_again(&self) -> bool {
+        2 * self.seen.moved_ns >= self.again_ns.end - self.again_ns.start
     }
 }

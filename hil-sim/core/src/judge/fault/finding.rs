@@ -1,6 +1,6 @@
 //! What became of a fault, beside its row of the table.
 
-use crate::scene::fault::Fault;
+use crate::scene::fault::{Fault, nanoseconds};
 
 /// What became of one fault.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,8 +23,14 @@ pub struct Finding {
     pub again_ns: Option<u64>,
     /// Resets of the display board that came of it.
     pub resets: usize,
+    /// What is not judged, each with the reason.
+    pub unjudged: Vec<String>,
     /// Whether it is one that has to be seen and answered: long enough, and great enough.
     pub(super) must_show: bool,
+    /// Why it need not be seen in time all the same.
+    pub(super) unseen: Option<&'static str>,
+    /// From its beginning until nobody looks on any more, in ns.
+    pub(super) left_ns: u64,
     /// What else is not as the table of kinds has it.
     pub(super) otherwise: Vec<String>,
 }
@@ -37,7 +43,9 @@ impl Finding {
         }
         let row = self.fault.kind.row();
         let mut unmet = Vec::new();
-        if let Some(within_ms) = row.seen_within_ms {
+        if let Some(within_ms) = row.seen_within_ms
+            && self.unseen.is_none()
+        {
             match self.detected_ms() {
                 None => unmet.push("no sign of it".to_owned()),
                 Some(ms) if ms > within_ms => {
@@ -48,6 +56,7 @@ impl Finding {
         }
         if let Some(within_ms) = row.safe_within_ms {
             match self.safe_ms() {
+                None if self.left_ns < nanoseconds(within_ms * 1e-3) => {}
                 None => unmet.push("outputs not at 0 V".to_owned()),
                 Some(ms) if ms > within_ms => {
                     unmet.push(format!("0 V after {ms:.2} ms of {within_ms}"));

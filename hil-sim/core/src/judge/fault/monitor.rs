@@ -13,7 +13,7 @@ use crate::judge::truth::Truth;
 use crate::plant::motion::MM_PER_COUNT;
 use crate::run::decoder::TimedMessage;
 use crate::run::observer::{RunEvent, RunObserver};
-use crate::scene::fault::{Class, Fault, Kind, Sign};
+use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
 use crate::scene::{Follows, Scene};
 
 /// From a reason to hold until the display says so, in ns: its next tick, and the message's way.
@@ -29,6 +29,8 @@ const MOTIONS_NS: u64 = 20_000_000;
 const NAMED_MS: f64 = 50.0;
 /// No hand is faster (docs' safety page).
 const FASTEST_HAND_MM_S: f64 = 2_000.0;
+/// At slower hands an encoder or a converter that stands still is told later than the table has it, or never.
+const TOLD_MM_S: f64 = 12.0;
 /// Share of the bytes from which on a corrupt frame is certain: one in ten frames.
 const CORRUPT_SHARE: f64 = 1e-3;
 
@@ -44,6 +46,12 @@ pub(super) struct FaultMonitor {
     of_others: Vec<Sign>,
     has_stopped: bool,
     must_show: bool,
+    /// When nobody looks on any more.
+    until_ns: u64,
+    /// Whether the display had a tick before the fault.
+    has_looked: bool,
+    /// Whether the hand is too slow for it to show in time.
+    is_slow: bool,
     outputs: Outputs,
     conduct: Conduct,
     /// If it is to keep in step.
@@ -114,6 +122,16 @@ fn must_show(fault: &Fault, scene: &Scene) -> bool {
         }
 }
 
+/// Whether the hand's mean speed is too low for an encoder or a converter that stands still to show in time.
+fn is_slow(fault: &Fault, scene: &Scene) -> bool {
+    const PARTS: u32 = 100;
+    let within_s = fault.kind.row().seen_within_ms.unwrap_or(0.0) * 1e-3;
+    let at_s = |part: u32| fault.at_s + within_s * f64::from(part) / f64::from(PARTS);
+    let speeds = (0..PARTS).map(|part| scene.motion.velocity_mm_s(at_s(part)).abs());
+    matches!(fault.kind, Kind::HandEncoderDead | Kind::AdcStuck)
+        && speeds.sum::<f64>() < TOLD_MM_S * f64::from(PARTS)
+}
+
 impl FaultMonitor {
     /// Before a run of `scene`, for one of its faults until `until_ns`.
     pub fn new(scene: &Scene, number: usize, until_ns: u64) -> Self {
@@ -146,12 +164,16 @@ impl FaultMonitor {
             let over_ns = other.ends_ns().unwrap_or(other.begins_ns());
             stops(other) || (over_ns + LINGERS_NS > from_ns && other.begins_ns() < alone_ns.end)
         };
-        let of_others = others()
+        let mut of_others: Vec<Sign> = others()
             .filter(|other| shows(other))
             .flat_map(|other| [other.kind.row().signs, other.kind.row().also])
             .flatten()
             .copied()
             .collect();
+        if fault.kind == Kind::HandEncoderDead && scene.arm.follows == Follows::Link {
+            // The arm stands still too, and nothing is sensed.
+            of_others.push(Sign::Fading(Hold::Stale));
+        }
         let configuration = scene.display_configuration();
         // Of a flood, which estimates find room is chance.
         let tires = f64::from(configuration.full_drive_s) < scene.duration_s;
@@ -175,6 +197,9 @@ impl FaultMonitor {
             of_others,
             has_stopped,
             must_show: must_show(&fault, scene),
+            until_ns,
+            has_looked: false,
+            is_slow: is_slow(&fault, scene),
             resets: 0,
             display: Voice::new(Role::Display),
             sensor: Voice::new(Role::Sensor),
@@ -184,14 +209,50 @@ impl FaultMonitor {
         }
     }
 
+    /// Why it need not show in that time.
+    fn unseen(&self) -> Option<&'static str> {
+        let kind = self.fault.kind;
+        let has_stopped = self.has_stopped && !self.outputs.was_driving;
+        if kind.row().class == Class::Stops && has_stopped {
+            return Some("the display has stopped before");
+        }
+        let back_ns = || nanoseconds(self.fault.values[0] * 1e-3);
+        if kind == Kind::LinkReplay && self.due_ns.start < back_ns() {
+            return Some("there is nothing so old to replay");
+        }
+        let within_ms = kind.row().seen_within_ms.unwrap_or(0.0);
+        if self.left_ns() < nanoseconds(within_ms * 1e-3) {
+            return Some(self.ends());
+        }
+        self.is_slow
+            .then_some("the hand moves at less than 12 mm/s")
+    }
+
+    /// From its beginning until nobody looks on any more, in ns.
+    fn left_ns(&self) -> u64 {
+        self.due_ns.end.saturating_sub(self.due_ns.start)
+    }
+
+    /// What ends that.
+    fn ends(&self) -> &'static str {
+        if self.due_ns.end < self.until_ns {
+            "the power goes before"
+        } else {
+            "the scene ends before"
+        }
+    }
+
     /// What became of it.
     pub fn finish(self) -> Finding {
+        let (unseen, ends, left_ns) = (self.unseen(), self.ends(), self.left_ns());
         let Self {
             fault,
             alone_ns,
             of_others,
             has_stopped,
             must_show,
+            has_looked,
+            until_ns,
             seen,
             ..
         } = self;
@@ -204,33 +265,58 @@ impl FaultMonitor {
             .min_by_key(|&(_, at_ns, words)| (at_ns, words));
         let outputs = self.outputs.finish();
         // At rest there is nothing that a gauge or an encoder could be missed by.
-        let must_show = must_show && (row.class == Class::Stops || outputs.was_driving);
+        let must_show = must_show
+            && (row.class == Class::Stops || outputs.was_driving)
+            // A count from which nobody has counted yet is no jump.
+            && (fault.kind != Kind::HandEncoderJump || has_looked);
         let due_again_ns = self.conduct.due_again_ns();
+        let shows_again = self.conduct.shows_again();
         let conduct = self.conduct.finish();
+        let leaves_ms = |ms: f64| left_ns >= nanoseconds(ms * 1e-3);
         let mut otherwise = Vec::new();
+        let mut unjudged = Vec::new();
 
+        if let Some(within_ms) = row.seen_within_ms
+            && let Some(why) = unseen
+            && must_show
+            && first.is_none_or(|&(_, at_ns, _)| ms(at_ns) > within_ms)
+        {
+            unjudged.push(format!("whether it shows within {within_ms} ms: {why}"));
+        }
+        if let Some(within_ms) = row.safe_within_ms
+            && must_show
+            && outputs.safe_ns.is_none()
+            && !leaves_ms(within_ms)
+        {
+            unjudged.push(format!(
+                "whether all outputs are at 0 V within {within_ms} ms: {ends}"
+            ));
+        }
         if row.class == Class::Stops && must_show && !has_stopped {
             let named = |(sign, ..): &&(Sign, u64, String)| matches!(sign, Sign::Stopped(trip) if row.trips.contains(trip));
-            let due_ms = |within_ms: f64| within_ms + NAMED_MS;
+            // A board that is silenced, or has to start again first, says it when it can.
+            let is_prompt = row.resets == 0 && !row.silences.contains(&Role::Display);
+            let within_ms = row.seen_within_ms.into_iter().chain(row.safe_within_ms);
+            let due_ms = match within_ms.reduce(f64::max) {
+                Some(within_ms) if is_prompt => within_ms + NAMED_MS,
+                _ => row.watch_s * 1e3,
+            };
             match seen
                 .iter()
                 .filter(named)
                 .map(|&(_, at_ns, _)| ms(at_ns))
                 .reduce(f64::min)
             {
+                None if !leaves_ms(due_ms) => {
+                    unjudged.push(format!("whether it says that it has stopped: {ends}"));
+                }
                 None => {
                     otherwise.push(format!("does not say that it has stopped: {:?}", row.trips))
                 }
-                // A board that is silenced, or has to start again first, says it when it can.
-                Some(named_ms) if row.resets == 0 && !row.silences.contains(&Role::Display) => {
-                    let within_ms = row.seen_within_ms.into_iter().chain(row.safe_within_ms);
-                    if let Some(due_ms) = within_ms.reduce(f64::max).map(due_ms)
-                        && named_ms > due_ms
-                    {
-                        otherwise.push(format!(
-                            "says that it has stopped after {named_ms:.2} ms of {due_ms}"
-                        ));
-                    }
+                Some(named_ms) if is_prompt && named_ms > due_ms => {
+                    otherwise.push(format!(
+                        "says that it has stopped after {named_ms:.2} ms of {due_ms}"
+                    ));
                 }
                 Some(_) => {}
             }
@@ -282,9 +368,18 @@ impl FaultMonitor {
             && conduct.again_ns.is_none_or(|again_ns| again_ns > due_ns)
         {
             let within_ms = (due_ns - over_ns) as f64 * 1e-6;
-            otherwise.push(format!(
-                "does not drive again within {within_ms:.0} ms of its end"
-            ));
+            let within = format!("again within {within_ms:.0} ms of its end");
+            if !outputs.drove {
+                unjudged.push(format!("whether it drives {within}: it never drove before"));
+            } else if due_ns > alone_ns.end {
+                let ends = match alone_ns.end < until_ns {
+                    true => "the next fault begins before",
+                    false => ends,
+                };
+                unjudged.push(format!("whether it drives {within}: {ends}"));
+            } else if shows_again {
+                otherwise.push(format!("does not drive {within}"));
+            }
         }
         for (role, beat, what) in [
             (Role::Sensor, self.estimates, "estimates"),
@@ -317,7 +412,10 @@ impl FaultMonitor {
             drives_again: outputs.drives_again,
             again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
             resets: self.resets,
+            unjudged,
             must_show,
+            unseen,
+            left_ns,
             otherwise,
         }
     }
@@ -359,7 +457,10 @@ impl RunObserver for FaultMonitor {
     fn see(&mut self, event: RunEvent<'_>) {
         self.step.see(event);
         match event {
-            RunEvent::Tick(tick) => self.conduct.tick(tick),
+            RunEvent::Tick(tick) => {
+                self.has_looked |= tick.at_ns < self.due_ns.start;
+                self.conduct.tick(tick);
+            }
             RunEvent::Output(output) => {
                 self.outputs.add(output);
                 self.conduct.output(output);

@@ -29,6 +29,8 @@ pub(super) struct Outputs {
     late_ns: Option<u64>,
     /// Whether the stimulus was on when the fault began.
     pub was_driving: bool,
+    /// Whether it had been on at any time before.
+    pub drove: bool,
     /// From when on all stayed at 0 V for the rest of the fault, in ns since the scene's start.
     pub safe_ns: Option<u64>,
     /// What they hold; none before the first change.
@@ -97,6 +99,7 @@ impl Outputs {
             until_ns,
             late_ns: (is_dangerous && late_ns < rest_ns).then_some(late_ns),
             was_driving: false,
+            drove: false,
             safe_ns: Some(from_ns),
             words: None,
             since_ns: [from_ns; ACTUATORS],
@@ -119,6 +122,7 @@ impl Outputs {
             return;
         }
         if at_ns < self.from_ns {
+            self.drove |= !is_silent;
             let is_held = at_ns <= self.from_ns.saturating_sub(DRIVEN_NS);
             self.was_driving = !is_silent || (self.was_driving && !is_held);
         }

@@ -345,3 +345,100 @@ fn what_is_too_short_or_too_small_need_not_be_seen() {
     alarm.for_s = Some(0.001);
     assert_eq!(judged(alarm), [""; 0]);
 }
+
+/// The last tick of a scene of 2 s.
+const LAST_S: f64 = 1.999_9;
+
+/// A recording of a display that hears of no fault, judged.
+fn unheard(faults: Vec<Fault>, speed_mm_s: f64) -> Vec<Finding> {
+    let scene = Scene {
+        duration_s: 2.0,
+        faults,
+        ..Scene::constant(2.0, speed_mm_s)
+    };
+    let recording = Run::steady(speed_mm_s, 2.0).record();
+    judge(&scene, &recording)
+}
+
+#[test]
+fn what_the_end_leaves_no_time_for_is_not_judged_and_said() {
+    for kind in Kind::all() {
+        let finding = unheard(vec![Fault::new(kind, LAST_S)], 50.0).remove(0);
+        assert_eq!(finding.unmet(), [""; 0], "{kind:?}");
+        let row = kind.row();
+        if row.seen_within_ms.is_some() || row.again_within_ms.is_some() {
+            assert!(!finding.unjudged.is_empty(), "{kind:?}");
+        }
+        let says = |line: &String| line.ends_with(": the scene ends before");
+        assert!(finding.unjudged.iter().all(says), "{:?}", finding.unjudged);
+    }
+    // With the time, it is.
+    let finding = unheard(vec![Fault::new(Kind::GaugeOpen, 1.7)], 50.0).remove(0);
+    assert_eq!(finding.unmet(), ["no sign of it"]);
+    let finding = unheard(vec![Fault::new(Kind::GaugeOpen, 1.700_001)], 50.0).remove(0);
+    assert_eq!(finding.unmet(), [""; 0]);
+    assert_eq!(
+        finding.unjudged,
+        ["whether it shows within 300 ms: the scene ends before"]
+    );
+    let finding = unheard(vec![Fault::new(Kind::DacAlarm, 1.95)], 50.0).remove(0);
+    assert_eq!(
+        finding.unmet(),
+        ["no sign of it", "outputs not at 0 V", "50 outputs stuck"]
+    );
+    assert_eq!(
+        finding.unjudged,
+        ["whether it says that it has stopped: the scene ends before"]
+    );
+}
+
+#[test]
+fn a_stop_after_a_stop_need_not_show_and_outputs_have_to_stay_at_zero() {
+    let faults = vec![
+        Fault::new(Kind::StopFromPeer, 0.5),
+        Fault::new(Kind::StopFromPeer, 1.0),
+    ];
+    let scene = Scene {
+        duration_s: 2.0,
+        faults,
+        ..Scene::constant(2.0, 50.0)
+    };
+    let mut recording = Run::steady(50.0, 2.0).record();
+    let mut silence = |to_ms: u64| {
+        for output in &mut recording.outputs {
+            if (500 * MS..to_ms * MS).contains(&output.at_ns) {
+                output.words = [ZERO_VOLT; ACTUATORS];
+            }
+        }
+        recording.outputs.dedup_by_key(|output| output.words);
+        judge(&scene, &recording).remove(1)
+    };
+    // It has not stopped.
+    assert_eq!(
+        silence(0).unmet(),
+        ["no sign of it", "outputs not at 0 V", "50 outputs stuck"]
+    );
+    assert_eq!(
+        silence(1_500).unmet(),
+        [
+            "outputs not at 0 V",
+            "restarted against the table: 0 resets, drives again"
+        ]
+    );
+    let finding = silence(2_000);
+    assert_eq!(finding.unmet(), [""; 0]);
+    assert_eq!(
+        finding.unjudged,
+        ["whether it shows within 5 ms: the display has stopped before"]
+    );
+}
+
+#[test]
+fn at_slow_hands_a_converter_that_stands_still_may_show_late() {
+    let unmet = |speed_mm_s| {
+        let finding = unheard(vec![Fault::new(Kind::AdcStuck, 0.5)], speed_mm_s).remove(0);
+        finding.unmet().contains(&"no sign of it".to_owned())
+    };
+    assert!(unmet(13.0));
+    assert!(!unmet(11.0));
+}

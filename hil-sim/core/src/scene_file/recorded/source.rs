@@ -5,6 +5,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::super::csv_rows::CsvRows;
+use super::super::read_bytes;
 use super::super::table::{Column, Table};
 use super::tape::{Check, Conversion, Tape, plain, too_few};
 use super::topic;
@@ -292,6 +293,14 @@ impl<'t> Source<'t> {
             return Err(table.refuse("channels", message));
         }
         let find = |key: &'static str, column: Column<'_>| {
+            if let Column::Named(name) = column {
+                let alike = rows.first().iter().filter(|cell| *cell == name).count();
+                if alike > 1 {
+                    let message =
+                        format!("{column} is the name of {alike} columns: give numbers, from 0 on");
+                    return Err(table.refuse(key, message));
+                }
+            }
             let found = match column {
                 Column::Numbered(number) => (number < rows.first().len()).then_some(number),
                 Column::Named(name) => rows.first().iter().position(|cell| cell == name),
@@ -362,7 +371,7 @@ fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
     } else if first.starts_with(b"\x89MCAP") {
         Ok(Format::Mcap)
     } else {
-        let text = fs::read(path).map_err(refuse_file)?;
+        let text = read_bytes(path).map_err(refuse_file)?;
         if is_json(&text) {
             let file = Experience::parse(&text).map_err(|error| refuse(path, error))?;
             return Ok(Format::Hjif(file));

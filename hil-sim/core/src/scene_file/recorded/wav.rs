@@ -20,6 +20,11 @@ impl Wav {
     pub fn open(path: &Path) -> Result<Self, SceneError> {
         let path_text = path.display().to_string();
         match WavReader::open(path) {
+            Ok(reader) if reader.spec().sample_rate == 0 => Err(SceneError::of(
+                path_text,
+                "",
+                "its head says 0 samples a second: give a file that says its rate",
+            )),
             Ok(reader) => Ok(Self {
                 path: path_text,
                 reader,

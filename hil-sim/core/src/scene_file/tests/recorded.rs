@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::SURFACE;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Motion, Scene, SceneError};
 
 /// A folder of its own for a test's CSV files, removed at the end.
 pub(super) struct Folder(PathBuf);
@@ -194,4 +194,29 @@ fn a_recorded_profile_must_cover_the_travel() {
         refusal.contains("the gauges come from -3.000 to 153.000 mm"),
         "{refusal}"
     );
+}
+
+#[test]
+fn lines_of_blanks_in_a_csv_file_are_passed_over_as_empty_ones_are() {
+    let folder = Folder::new("blank-lines");
+    let motion = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    for csv in [
+        "t_s,x_mm\n0,0\n\n3,10\n",
+        "t_s,x_mm\n0,0\n3,10\n  ",
+        "t_s,x_mm\n0,0\n \t\n3,10\n \r\n",
+        "t_s\tx_mm\n0\t0\n\t\n3\t10\n\t",
+    ] {
+        let Ok(scene) = folder.load(motion, csv) else {
+            panic!("{}", folder.refusal(motion, csv));
+        };
+        let Motion::Recorded(rows) = scene.motion else {
+            panic!("{csv:?}");
+        };
+        assert_eq!(rows.at, [0.0, 3.0], "{csv:?}");
+    }
+    let refusal = folder.refusal(motion, "t_s,x_mm\n0,0\n \n3,x\n");
+    assert!(refusal.starts_with("data.csv:4: "), "{refusal}");
+    // A cell in quotes is one, though there is nothing in it.
+    let refusal = folder.refusal(motion, "t_s,x_mm\n0,0\n\"\"\n3,10\n");
+    assert!(refusal.starts_with("data.csv:3: 1 cells"), "{refusal}");
 }

@@ -143,6 +143,10 @@ fn impossible_values_are_refused_at_their_line_and_key() {
             "x.toml:5: gauges.trouble_from_s: -1 is not an instant",
         ),
         (
+            "[gauges]\ndead = [1]\ntrouble_from_s = 3",
+            "x.toml:5: gauges.trouble_from_s: comes after the scene's end at 3 s: give less",
+        ),
+        (
             "[gauges]\nresonance_damping = 0.1",
             "x.toml:4: gauges.resonance_damping: has nothing to damp",
         ),
@@ -393,6 +397,10 @@ fn a_contact_that_cannot_be_solved_so_is_refused_with_what_can() {
             ],
         ),
         (
+            "friction = \"mild\"\nintegrator = \"euler\"\nstep_us = 100",
+            &["it bears 29.7 µs: give less"],
+        ),
+        (
             "friction = \"strong\"\nintegrator = \"rk4\"\nstep_us = 1000",
             &["contact.step_us", "250 (a scan)"],
         ),
@@ -439,4 +447,15 @@ fn a_missing_file_is_refused() {
     assert!(
         refusal_of("[motion]\nkind = \"recorded\"").contains("x.toml:3: motion.file: is missing")
     );
+}
+
+#[test]
+fn control_characters_of_a_scene_do_not_reach_the_terminal() {
+    let text = "\"a\\u001b[31m\\nb\" = 1\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    let told = refusal(text);
+    let want = "scenes/x.toml:1: a\\u{1b}[31m\\nb: no such key here";
+    assert!(told.starts_with(want), "{told}");
+    let word = "[surface]\nprofile = \"\\u0007\"\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    let told = refusal(word);
+    assert!(told.contains("\"\\u{7}\" is unknown"), "{told}");
 }

@@ -270,10 +270,13 @@ pub fn faults(findings: &[Finding]) -> String {
     let line = |finding: &Finding| {
         let of_kind = finding.fault.kind.row();
         let unmet = finding.unmet().join("; ");
-        let unmet = match &*unmet {
+        let mut unmet = match &*unmet {
             "" => unmet,
             _ => format!("<span class=unmet>{}</span>", escape(&unmet)),
         };
+        for line in &finding.unjudged {
+            unmet += &format!(" not judged {}", escape(line));
+        }
         let again = if finding.drives_again { "yes" } else { "no" };
         row(
             of_kind.name,

@@ -40,6 +40,9 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
             )
         })
         .collect();
+    // Rate and bytes a second.
+    let mut unpaced = tone();
+    unpaced[24..32].fill(0);
     let header = "t_s,g0,g1,g2,g3,g4\n";
     for (keys, bytes, want) in [
         (
@@ -115,6 +118,21 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
             "x.toml:8: gauges.channels: 1 is a number: name",
         ),
         ("", own[..30].to_vec(), "f: "),
+        (
+            "",
+            unpaced,
+            "f: its head says 0 samples a second: give a file that says its rate",
+        ),
+        (
+            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\nrate_hz = 1000",
+            b"w,t,w\n0,1,2\n".to_vec(),
+            "x.toml:7: gauges.channels: \"w\" is the name of 2 columns: give numbers, from 0 on",
+        ),
+        (
+            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\ntime = \"t\"",
+            b"t,t,w\n0,1,2\n".to_vec(),
+            "x.toml:8: gauges.time: \"t\" is the name of 2 columns",
+        ),
         (
             "time_s_per_unit = 1",
             format!("{header}0,1,1,1,1,1\n").into_bytes(),
