@@ -43,14 +43,38 @@ struct History {
     /// One that arrived is not taken although it could be.
     waiting: bool,
     held_up: usize,
+    /// Of those that came just before one is taken: the latest that was taken then, and the earliest that was not,
+    /// in ns behind that instant.
+    latest_taken_ns: i64,
+    earliest_left_ns: i64,
+    /// How many were taken or left against these: each takes about as long as the others.
+    odd: usize,
+}
+
+impl History {
+    /// An estimate came `behind_ns` after the instant at which one is taken, and may just have been.
+    fn came_close(&mut self, behind_ns: i64, is_taken: bool) {
+        if is_taken {
+            self.odd += usize::from(behind_ns > self.earliest_left_ns);
+            self.latest_taken_ns = self.latest_taken_ns.max(behind_ns);
+        } else {
+            self.odd += usize::from(behind_ns < self.latest_taken_ns);
+            self.earliest_left_ns = self.earliest_left_ns.min(behind_ns);
+        }
+    }
+
+    /// How unlikely it is.
+    fn oddness(&self) -> usize {
+        self.held_up + self.odd
+    }
 }
 
 /// Replays a display board from its encoder readings and the estimates that reached it, and compares
 /// every word of every output.
 ///
 /// An estimate that arrives just before one is taken may be taken then or a tick later: all
-/// histories are followed up until the words tell, and of those that do, the one with the fewest
-/// held up counts. Estimates older than one that has arrived before are never taken.
+/// histories are followed up until the words tell, and of those that do, the likeliest counts: the one with the
+/// fewest held up, in which those that came close took about as long as each other. Estimates older than one that has arrived before are never taken.
 ///
 /// # Errors
 /// The first word that no history explains.
@@ -79,6 +103,9 @@ fn replay_by(
         taken: 0,
         waiting: false,
         held_up: 0,
+        latest_taken_ns: i64::MIN,
+        earliest_left_ns: i64::MAX,
+        odd: 0,
     }];
     let mut outputs = recording.outputs.iter().peekable();
     let mut compared = 0;
@@ -98,6 +125,10 @@ fn replay_by(
                 let mut history = history.clone();
                 for (_, record) in &arrived[history.taken..taken] {
                     history.display.on_estimate(&record.estimate);
+                }
+                for (index, &(at_ns, _)) in arrived.iter().enumerate().take(may).skip(usual) {
+                    let behind_ns = at_ns as i64 - taken_ns as i64;
+                    history.came_close(behind_ns, index < taken);
                 }
                 history.taken = taken;
                 if history.waiting != (usual > taken) {
@@ -172,13 +203,12 @@ fn difference(due: Option<&[u16; ACTUATORS]>, seen: Option<&[u16; ACTUATORS]>) -
     }
 }
 
-/// Of those histories that have become equal, keeps the one with the fewest held up; of the others the
-/// `most` with the fewest.
+/// Of those histories that have become equal, keeps the likeliest; of the others the `most` that are.
 fn merge(histories: &mut Vec<History>, most: usize) {
     if histories.len() < 2 {
         return;
     }
-    histories.sort_by_key(|history| history.held_up);
+    histories.sort_by_key(History::oddness);
     let mut seen = HashSet::new();
     histories.retain(|history| {
         seen.insert(format!(
