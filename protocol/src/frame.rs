@@ -207,3 +207,29 @@ const fn all(items: &[&NamedType]) -> usize {
 const fn varint(bits: usize) -> usize {
     bits.div_ceil(7)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Schema)]
+    struct Wrapped(#[expect(dead_code, reason = "its type counts")] u32);
+
+    #[test]
+    fn the_longest_postcard_of_each_sort_of_type_is_known() {
+        for (named, longest) in [
+            (bool::SCHEMA, 1),
+            (u16::SCHEMA, 3),
+            (i32::SCHEMA, 5),
+            (u64::SCHEMA, 10),
+            (f32::SCHEMA, 4),
+            (f64::SCHEMA, 8),
+            (<()>::SCHEMA, 0),
+            (<Option<u16>>::SCHEMA, 4),
+            (<(u8, u16, f64)>::SCHEMA, 12),
+            (Wrapped::SCHEMA, 5),
+        ] {
+            assert_eq!(max_encoded(named), longest, "{}", named.name);
+        }
+    }
+}

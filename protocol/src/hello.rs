@@ -131,3 +131,20 @@ impl Hello {
         core::str::from_utf8(&self.chip[..end]).unwrap_or("?")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_role_comes_back_from_its_byte() {
+        for (role, byte) in [
+            (Role::Sensor, b's'),
+            (Role::Display, b'd'),
+            (Role::Host, b'h'),
+        ] {
+            assert_eq!((role.byte(), Role::from_byte(byte)), (byte, Some(role)));
+        }
+        assert_eq!(Role::from_byte(b'S'), None);
+    }
+}

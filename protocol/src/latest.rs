@@ -58,3 +58,58 @@ impl Latest {
             .map(|(at_us, _)| now_us.saturating_sub(at_us) / 1_000)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Contact, GaugeHealth, Range};
+
+    fn estimate(instant_us: u64) -> Estimate {
+        Estimate {
+            sequence: 1,
+            instant_us,
+            wavelength_mm: Some(2.0),
+            confidence: 0.9,
+            valid: true,
+            range: Range::T1,
+            contact: Contact::Slip,
+            counted_mm: None,
+            amplitude_lsb: 90.0,
+            velocity_um_s: 50_000,
+            lag_um: None,
+            gauges_used: 0b1_1111,
+            health: [GaugeHealth::Good; 5],
+        }
+    }
+
+    fn motion(instant_us: u64) -> Motion {
+        Motion {
+            sequence: 1,
+            instant_us,
+            position_um: 0,
+            velocity_um_s: 0,
+        }
+    }
+
+    #[test]
+    fn what_is_said_ages_from_its_instant_and_what_is_heard_from_when_it_came() {
+        let mut latest = Latest::new();
+        assert_eq!((latest.estimate(), latest.motion()), (None, None));
+        assert_eq!(latest.estimate_age_ms(5_000_000), None);
+        assert_eq!(latest.motion_age_ms(5_000_000), None);
+        latest.said(&Message::Estimate(estimate(1_000_000)));
+        latest.said(&Message::Motion(motion(2_000_000)));
+        assert_eq!(latest.estimate(), Some(&estimate(1_000_000)));
+        assert_eq!(latest.motion(), Some(&motion(2_000_000)));
+        assert_eq!(latest.estimate_age_ms(5_001_999), Some(4_001));
+        assert_eq!(latest.motion_age_ms(5_001_999), Some(3_001));
+        latest.heard(3_000_000, &Message::Estimate(estimate(7)));
+        latest.heard(4_000_000, &Message::Motion(motion(8)));
+        assert_eq!(latest.estimate(), Some(&estimate(7)));
+        assert_eq!(latest.motion(), Some(&motion(8)));
+        assert_eq!(latest.estimate_age_ms(5_002_000), Some(2_002));
+        assert_eq!(latest.motion_age_ms(5_002_000), Some(1_002));
+        // A clock that was read before is no age below none.
+        assert_eq!(latest.motion_age_ms(0), Some(0));
+    }
+}

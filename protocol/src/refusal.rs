@@ -117,3 +117,48 @@ pub enum Setting {
     /// of actuators at more different places and phases than are worked out in time.
     Rendering,
 }
+
+#[cfg(test)]
+mod tests {
+    use core::fmt::Write;
+
+    use super::*;
+
+    fn words(setting: Setting) -> heapless::String<256> {
+        let refusal = Refusal {
+            setting,
+            index: 20,
+            low: 3,
+            high: 50,
+        };
+        let mut words = heapless::String::new();
+        write!(words, "{refusal}").unwrap();
+        words
+    }
+
+    #[test]
+    fn a_refusal_says_what_and_what_to_give() {
+        for (setting, said) in [
+            (Setting::Role, "the configuration is for the other board"),
+            (
+                Setting::Replaces,
+                "the configuration in force is not the one that was to be replaced, but 0x00000003",
+            ),
+            (
+                Setting::Actuators,
+                "Actuators names neither the description in force nor the one that was sent, 0x00000003",
+            ),
+            (
+                Setting::ActuatorsFirst,
+                "no block of actuators begins at 20: give a multiple of ten up to 50",
+            ),
+            (
+                Setting::ActuatorGain,
+                "ActuatorGain of actuator 20 is out of range: give 3 to 50",
+            ),
+            (Setting::WindowMs, "WindowMs is out of range: give 3 to 50"),
+        ] {
+            assert_eq!(words(setting), said);
+        }
+    }
+}

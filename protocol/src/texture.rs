@@ -65,3 +65,38 @@ impl Texture {
             && self.repeating_percent <= 100
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_texture_is_sound_up_to_the_ends_of_its_ranges() {
+        let most = Partial {
+            ratio: 10_000,
+            phase: u16::MAX,
+        };
+        let ends = Texture {
+            partials: [most; PARTIALS],
+            repeating_percent: 100,
+            bands: [10_000; BANDS],
+            ..Texture::default()
+        };
+        assert!(Texture::default().is_sound() && ends.is_sound());
+        for place in 0..PARTIALS {
+            let mut beyond = ends;
+            beyond.partials[place].ratio += 1;
+            assert!(!beyond.is_sound());
+        }
+        for band in 0..BANDS {
+            let mut beyond = ends;
+            beyond.bands[band] += 1;
+            assert!(!beyond.is_sound());
+        }
+        let beyond = Texture {
+            repeating_percent: 101,
+            ..ends
+        };
+        assert!(!beyond.is_sound());
+    }
+}
