@@ -230,3 +230,24 @@ fn an_import_upwards_and_a_circle_are_seen() {
     );
     assert_eq!(circles(&graph), ["plant", "scene"]);
 }
+
+#[test]
+fn each_deliberate_defect_finds_its_place_in_the_code() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |file: &str| {
+        fs::read_to_string(root.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
+    };
+    let table: toml::Table = read("tests/defects.toml").parse().expect("TOML");
+    let rows = table["defect"].as_array().expect("a list");
+    assert!(rows.len() > 40, "{}", rows.len());
+    for row in rows {
+        let [name, file, from, to] =
+            ["name", "file", "from", "to"].map(|key| row[key].as_str().unwrap_or_default());
+        assert_eq!(
+            read(file).matches(from).count(),
+            1,
+            "{name}: {from:?} in {file}"
+        );
+        assert_ne!(from, to, "{name}");
+    }
+}
