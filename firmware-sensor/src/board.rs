@@ -61,9 +61,9 @@ const RING: usize = 2 * BLOCK;
 /// 28 + 12 ADC clocks at 21 MHz: 1.9 µs a channel, 11.4 µs a scan.
 const SAMPLE_TIME: SampleTime = SampleTime::CYCLES28;
 const ARM_PWM: Hertz = Hertz(20_000);
-/// As many as there can be.
+/// Of a command: as many as the timer can count.
 const PULSES: u16 = 256;
-/// In which a command that the pins were given takes effect.
+/// Waited for before a drive that was commanded off is said to be.
 pub const ARM_PWM_PERIOD: Duration = Duration::from_hz(ARM_PWM.0 as u64);
 
 /// Bytes of each port's ring. On a line without a gap half of it passes before anyone is told, 2.8 ms:

@@ -42,19 +42,22 @@ pub fn made_by(
     path: &Path,
     make: impl FnOnce(&Path) -> io::Result<()>,
 ) -> Result<(), OutputFileError> {
-    let wrong = |source| OutputFileError::not_written(path, source);
+    replaced_by(path, make).map_err(|source| OutputFileError::not_written(path, source))
+}
+
+/// The same for those who have words of their own for what fails: fails with the system's reason.
+pub fn replaced_by(path: &Path, make: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
     // A device or a pipe.
     if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
-        return make(path).map_err(wrong);
+        return make(path);
     }
     // What a link leads to, not the link.
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let mut draft = place.clone().into_os_string();
     draft.push(".new");
     let made = make(Path::new(&draft)).and_then(|()| fs::rename(&draft, &place));
-    made.map_err(|source| {
+    made.inspect_err(|_| {
         let _ = fs::remove_file(&draft);
-        wrong(source)
     })
 }
 

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use hil_sim_studies::map::Shard;
 
-/// The files, those of a folder with all folders in it that are no links, in the order in which they are named, those of a folder in the order of their names; only those
-/// of a shard, if one is given.
+/// The files, in the order in which they are named; those of a folder in the order of their names, with those of the
+/// folders in it that are no links. Only those of a shard, if one is given.
 pub(super) fn scene_files(named: &[PathBuf], shard: Option<Shard>) -> anyhow::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in named {

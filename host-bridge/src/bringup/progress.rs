@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::step;
 use super::step::{Figure, Step};
+use crate::output_file;
 
 const FORMAT: u32 = 1;
 
@@ -123,9 +124,7 @@ impl Progress {
     pub fn write(&self, path: &Path) -> Result<(), ProgressError> {
         // Nothing in it can fail to be written: every key is a string.
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        let beside = path.with_extension("new");
-        fs::write(&beside, text)
-            .and_then(|()| fs::rename(&beside, path))
+        output_file::replaced_by(path, |path| fs::write(path, text))
             .map_err(|source| ProgressError::File(path.to_owned(), source))
     }
 

@@ -12,6 +12,7 @@ use crate::bringup::sight::{Sight, Wanted};
 use crate::bringup::step::{Figure, Limit, Measure, Step, Witness};
 use crate::bringup::{report, step};
 use crate::doctor::{findings, json};
+use crate::output_file;
 use anyhow::Context;
 use clap::ValueHint;
 
@@ -288,7 +289,8 @@ impl Session<'_> {
     fn save(&self) -> anyhow::Result<()> {
         self.progress.write(&self.path)?;
         let path = report_path(&self.path);
-        fs::write(&path, report::html(&self.progress))
+        let text = report::html(&self.progress);
+        output_file::replaced_by(&path, |path| fs::write(path, text))
             .with_context(|| format!("{}: can't be written: give another --state", path.display()))
     }
 

@@ -77,13 +77,15 @@ fn later_parts(settings: &Settings) -> Result<Vec<PathBuf>, RecordingError> {
         .as_deref()
         .map_or_else(Vec::new, named_as_parts)
     {
-        let is_part = Reader::open(&path).is_ok_and(|file| file.part() == number);
         let is_in_the_way = settings.part.is_some();
-        match (settings.force, is_part) {
-            (false, _) if is_in_the_way => return Err(RecordingError::Exists(path)),
-            (true, true) => parts.push(path),
-            (true, false) if is_in_the_way => return Err(RecordingError::NoPart(path)),
-            _ => {}
+        if !settings.force {
+            if is_in_the_way {
+                return Err(RecordingError::Exists(path));
+            }
+        } else if Reader::open(&path).is_ok_and(|file| file.part() == number) {
+            parts.push(path);
+        } else if is_in_the_way {
+            return Err(RecordingError::NoPart(path));
         }
     }
     Ok(parts)

@@ -392,6 +392,7 @@ impl Channel {
         Ok(Read::Row(self.kind.row(json)?))
     }
 }
+
 /// What is wrong, without the trace that the parser adds for its authors.
 fn words(error: McapError) -> String {
     match error {

@@ -301,7 +301,7 @@ fn a_terminal_that_stands_still_holds_up_no_recording() {
     // As much as it takes while nobody reads.
     writer.write_all(&[b' '; 1 << 16]).expect("it fits");
     let mut command = bridge::command();
-    command.arg("record").arg(&path).args(["--for", "4"]);
+    command.arg("record").arg(&path);
     command.arg("--sensor").arg(pair.sensor.path());
     command.arg("--display").arg(pair.display.path());
     let mut child = command.stderr(writer).spawn().expect("the program starts");
@@ -311,9 +311,13 @@ fn a_terminal_that_stands_still_holds_up_no_recording() {
         let heard = pair.sensor.take_heard();
         let asks = |message: &&Message| matches!(message, Message::StreamGauges(_));
         asked += heard.iter().filter(asks).count();
-        asked >= 3
+        asked >= 6
     };
     assert!(wait_until(LIMIT, is_asked), "{asked} times");
+    let sent = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(sent.is_ok_and(|status| status.success()));
     let mut status = None;
     let has_ended = || {
         status = child.try_wait().expect("it can be asked");
