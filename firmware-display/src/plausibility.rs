@@ -6,7 +6,7 @@
 //! | late | its sequence is not after the last one's, and no new beginning | not used |
 //! | out of range | it is valid, and λ is missing, not finite or not a [`Wavelength`] | not used; counts as distrust |
 //! | implausible | it contradicts itself, see [`contradicts_itself`] | not used; counts as distrust |
-//! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held |
+//! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held, see [`Plausibility::is_fresh`] |
 //! | surprising | λ differs from the one held by more than a factor of 2.1 | kept until the next valid one: if that is within a tenth of it, that one is trusted; if not, the surprise counts as distrust |
 //! | trusted | none of these | λ is followed |
 //!
@@ -41,6 +41,11 @@ const REVERSAL_QUARTERS: u32 = quarters(500);
 /// What the sensor said last counts for so long.
 const HEARD_QUARTERS: u32 = quarters(250);
 
+/// A λ is held for so many times as long as it was trusted: the first one may have been chance.
+const HELD_TIMES: u32 = 5;
+/// It is held for so long at least: a link of 50 ms of jitter that loses every fifth is no reason to stop.
+const LEAST_HELD_QUARTERS: u32 = quarters(150);
+
 /// What is to be done with an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
@@ -70,6 +75,8 @@ pub struct Plausibility {
     unconfirmed: u32,
     /// Time since the last trusted estimate, in quarters of a millisecond.
     age: u32,
+    /// Time from the first trusted estimate of this surface to the last, in quarters of a millisecond.
+    known: u32,
     flood: Flood,
     distrust: Distrust,
     contradiction: Contradiction,
@@ -85,6 +92,7 @@ impl Plausibility {
             surprise: None,
             unconfirmed: 0,
             age: u32::MAX,
+            known: 0,
             flood: Flood::OF_ESTIMATES,
             distrust: Distrust::NONE,
             contradiction: Contradiction::NONE,
@@ -118,7 +126,7 @@ impl Plausibility {
             self.distrust.count();
             return Verdict::OutOfRange;
         };
-        if !self.is_fresh(max_age_ms) {
+        if self.age > quarters(max_age_ms.into()) {
             self.forget();
         }
         self.weigh(wavelength)
@@ -132,9 +140,14 @@ impl Plausibility {
         self.contradiction.elapse(quarters, hand_rests);
     }
 
-    /// Whether the last trusted λ is no older than this.
-    pub const fn is_fresh(&self, max_age_ms: u16) -> bool {
-        self.age <= quarters(max_age_ms as u32)
+    /// Whether the last trusted λ is no older than this, nor older than five times as long as this surface has been
+    /// known, or 150 ms if that is longer.
+    pub fn is_fresh(&self, max_age_ms: u16) -> bool {
+        let earned = self
+            .known
+            .saturating_mul(HELD_TIMES)
+            .max(LEAST_HELD_QUARTERS);
+        self.age <= quarters(max_age_ms.into()).min(earned)
     }
 
     /// Whether there are more estimates than a sensor sends.
@@ -169,10 +182,10 @@ impl Plausibility {
     }
 
     fn weigh(&mut self, wavelength: Wavelength) -> Verdict {
-        if self
+        let is_known = self
             .held
-            .is_some_and(|held| is_another_surface(held, wavelength))
-        {
+            .is_some_and(|held| !is_another_surface(held, wavelength));
+        if self.held.is_some() && !is_known {
             let confirmed = self
                 .surprise
                 .is_some_and(|surprise| are_within(wavelength, surprise, CONFIRMATION));
@@ -184,6 +197,11 @@ impl Plausibility {
             self.surprise = None;
         }
         self.dismiss_surprise();
+        self.known = if is_known {
+            self.known.saturating_add(self.age)
+        } else {
+            0
+        };
         self.held = Some(wavelength);
         self.age = 0;
         Verdict::Trusted(wavelength)

@@ -210,10 +210,26 @@ impl Spectrum {
             young_waves: MEMORY_WAVES,
             ..Line::default()
         };
+        self.forget_fits();
+        self.jerk.restart();
+    }
+
+    /// The surface begins here. What was felt before was none; the step of a landing would go on in all long waves.
+    fn land(&mut self) {
+        self.periodogram = Periodogram::new();
+        self.knots.restart();
+        self.travelled_mm = 0.0;
+        self.line = Line::default();
+        self.wave = Wave::default();
+        self.forget_fits();
+        self.jerk = Jerk::default();
+    }
+
+    /// What was fitted on another surface says nothing of this one.
+    fn forget_fits(&mut self) {
         self.refused = 0;
         self.longer_fits = Default::default();
         self.trend = Trend::default();
-        self.jerk.restart();
     }
 
     /// What is said of the likelier supposition.

@@ -123,7 +123,7 @@ pub struct DisplayConfiguration {
     pub rendering: Rendering,
     /// How often they get new voltages.
     pub update_rate: UpdateRate,
-    /// Age of the last valid estimate, in ms, at which the stimulus fades out, 20 to 5 000.
+    /// Age of the last valid estimate, in ms, at which the stimulus fades out at the latest, 20 to 5 000.
     pub max_age_ms: u16,
     /// Time from 0 to full stimulus, in ms, 1 to 1 000.
     pub fade_in_ms: u16,

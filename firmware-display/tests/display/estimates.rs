@@ -343,3 +343,46 @@ fn every_estimate_that_is_not_used_is_counted_for_its_reason() {
     // The forty-first without a tick.
     tell(sound(40, 2.0), |c| c.flooded += 1);
 }
+
+/// For how long λ is held after estimates of these wavelengths, one every 10 ms, in ms.
+fn held_after_ms(wavelengths_mm: &[f32]) -> u32 {
+    let mut plausibility = Plausibility::new();
+    for (n, &mm) in (0..).zip(wavelengths_mm) {
+        plausibility.elapse(quarters(10), false);
+        plausibility.judge(&sound(n, mm), MAX_AGE_MS);
+    }
+    let mut held_ms = 0;
+    while plausibility.is_fresh(MAX_AGE_MS) {
+        plausibility.elapse(quarters(1), false);
+        held_ms += 1;
+    }
+    held_ms - 1
+}
+
+#[test]
+fn a_surface_that_was_met_just_now_is_held_for_less() {
+    // One estimate, which may be chance; 40 ms, 90 ms, and a second of one surface, which may change a little.
+    assert_eq!(held_after_ms(&[2.0]), 150);
+    assert_eq!(held_after_ms(&[2.0; 5]), 200);
+    assert_eq!(held_after_ms(&[2.0; 10]), 450);
+    assert_eq!(held_after_ms(&[2.0; 11]), 500);
+    let mut slowly = [2.0; 100];
+    slowly[50..].fill(3.9);
+    assert_eq!(held_after_ms(&slowly), 500);
+    // Another surface, which the second of its estimates confirms, is new.
+    slowly[97..].fill(9.0);
+    assert_eq!(held_after_ms(&slowly), 150);
+}
+
+#[test]
+fn what_one_estimate_began_is_at_zero_volt_two_hundred_milliseconds_later() {
+    for rate in RATES {
+        let configuration = at(rate);
+        let mut rig = Rig::new(&configuration);
+        // Not at a crossing.
+        rig.rub(3, 2.0);
+        rig.estimate(2.0);
+        let ticks = rig.stays_silent_after(1_000).unwrap();
+        assert_eq!(ticks, rig.ticks(150 + u32::from(configuration.fade_out_ms)));
+    }
+}

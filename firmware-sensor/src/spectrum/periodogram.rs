@@ -37,6 +37,13 @@ pub(super) const AVERAGE_WAVES: f32 = 14.0;
 /// Energy over all candidates, in ADC steps², of the least wave that is listened to. Below it the gauges are silent, and
 /// there is nothing to average.
 const LEAST_ENERGY: f32 = 10.0 * MIN_AMPLITUDE_LSB * MIN_AMPLITUDE_LSB;
+/// Travel constant of the mean energy, in mm.
+const LOUDNESS_MM: f32 = 20.0;
+/// How many times louder than that mean most gauges become where the fingertip comes down on its way: 15 dB. What was
+/// felt before was no surface.
+const LANDING: f32 = 30.0;
+/// Weight of the mean below which too little has been felt to tell.
+const LEAST_FELT: f32 = 0.2;
 /// Weight of a pole below which it is not looked at.
 const LEAST_WEIGHT: f32 = 1e-3;
 
@@ -64,6 +71,17 @@ struct Candidate {
 /// All candidates' energies, in one way or another.
 pub(super) type Spectrum = [f32; CANDIDATES];
 
+/// The energies of a moment, in ADC steps².
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    /// Of each candidate in the usable gauges over the latest waves: behind one pole, and behind both.
+    pub short: Spectrum,
+    /// See `short`.
+    pub long: Spectrum,
+    /// Of each gauge in all candidates, behind both poles.
+    pub totals: [f32; GAUGES],
+}
+
 /// The bank of candidates.
 #[derive(Clone, Debug)]
 pub(super) struct Periodogram {
@@ -71,6 +89,9 @@ pub(super) struct Periodogram {
     /// The high-passes' level of each gauge at each spacing, none before the first knot, and what a slope leaves of it.
     level: [Option<[f32; GAUGES]>; SERVING],
     slope: [[f32; GAUGES]; SERVING],
+    /// Mean of [`Moment::totals`] over the latest travel, and the weight that it has.
+    loudness: [f32; GAUGES],
+    loudness_weight: f32,
 }
 
 impl Periodogram {
@@ -97,6 +118,8 @@ impl Periodogram {
             }),
             level: [None; SERVING],
             slope: [[0.0; GAUGES]; SERVING],
+            loudness: [0.0; GAUGES],
+            loudness_weight: 0.0,
         }
     }
 
@@ -127,9 +150,8 @@ impl Periodogram {
         }
     }
 
-    /// Energy in the usable gauges over the latest waves: behind one pole, and behind both. The gauges count nearly
-    /// alike: see [`EQUAL`].
-    pub fn energies(&self, usable: u8) -> (Spectrum, Spectrum) {
+    /// The energies of now. The usable gauges count nearly alike: see [`EQUAL`].
+    pub fn energies(&self, usable: u8) -> Moment {
         let mut weights: [f32; GAUGES] =
             core::array::from_fn(|gauge| f32::from(usable >> gauge & 1));
         let long: [[f32; GAUGES]; CANDIDATES] = core::array::from_fn(|i| {
@@ -151,17 +173,40 @@ impl Periodogram {
             let powers = powers(&candidate.first, candidate.first_weight);
             weighed(&powers, &weights)
         });
-        (short, long.map(|powers| weighed(&powers, &weights)))
+        Moment {
+            short,
+            long: long.map(|powers| weighed(&powers, &weights)),
+            totals,
+        }
+    }
+
+    /// Whether the fingertip has just come down: most of the usable gauges are much louder than they have been.
+    pub fn lands(&self, now: &Moment, usable: u8) -> bool {
+        let louder = (0..GAUGES)
+            .filter(|&gauge| usable >> gauge & 1 == 1)
+            .filter(|&gauge| {
+                self.loudness_weight * now.totals[gauge] > LANDING * self.loudness[gauge]
+            })
+            .count();
+        self.loudness_weight > LEAST_FELT && 2 * louder > usable.count_ones() as usize
     }
 
     /// Takes the energies into the average, `travel_mm` after the last time.
-    pub fn average(&mut self, energies: &Spectrum, travel_mm: f32) {
-        let total: f32 = energies.iter().sum();
-        if total < LEAST_ENERGY || travel_mm <= 0.0 {
+    pub fn average(&mut self, now: &Moment, travel_mm: f32) {
+        if travel_mm <= 0.0 {
+            return;
+        }
+        let follow = travel_mm / (LOUDNESS_MM + travel_mm);
+        for (loudness, total) in self.loudness.iter_mut().zip(now.totals) {
+            *loudness += follow * (total - *loudness);
+        }
+        self.loudness_weight += follow * (1.0 - self.loudness_weight);
+        let total: f32 = now.long.iter().sum();
+        if total < LEAST_ENERGY {
             return;
         }
         let scale = 1.0 / total;
-        for (candidate, energy) in self.candidates.iter_mut().zip(energies) {
+        for (candidate, energy) in self.candidates.iter_mut().zip(now.long) {
             let z = travel_mm * (POLE_WAVES / AVERAGE_WAVES) * candidate.poles_per_mm;
             // A kernel that is not full yet says little.
             let full = candidate.second_weight * candidate.second_weight;

@@ -37,13 +37,19 @@ impl Spectrum {
     pub(super) fn survey(&mut self) {
         let usable = self.touch.usable;
         let fresh_mm = core::mem::take(&mut self.fresh_mm);
-        let (short, energies) = self.periodogram.energies(usable);
-        self.periodogram.average(&energies, fresh_mm);
-        let averaged = self.periodogram.averaged();
+        let now = self.periodogram.energies(usable);
+        let (short, energies) = (now.short, now.long);
         let survey = &mut self.survey;
         survey.line_mm = None;
         survey.line_pass.end();
         survey.wave_pass.end();
+        if self.periodogram.lands(&now, usable) {
+            self.land();
+            return;
+        }
+        self.periodogram.average(&now, fresh_mm);
+        let averaged = self.periodogram.averaged();
+        let survey = &mut self.survey;
         (survey.fresh_mm, survey.energies) = (fresh_mm, energies);
         let (Some(clearest), Some(momentary)) =
             (clearest_peak(&averaged), clearest_peak(&energies))

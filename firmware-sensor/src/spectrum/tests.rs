@@ -170,7 +170,7 @@ fn a_peak_lies_where_the_wave_is_between_candidates_and_is_sharp() {
         let (_, periodogram) = path(8_000, 0.04, 1_000_000, |mm, gauge| {
             wave(mm, gauge, truth_mm)
         });
-        let (_, energies) = periodogram.energies(ALL);
+        let energies = periodogram.energies(ALL).long;
         let peak = highest_peak(&energies).expect("there is a wave");
         let off = (vertex_mm(&energies, peak, true) / truth_mm - 1.0).abs();
         assert!(off < 0.02, "{off} of {truth_mm} mm");
@@ -182,12 +182,12 @@ fn a_peak_lies_where_the_wave_is_between_candidates_and_is_sharp() {
 fn gauges_that_are_left_out_have_no_energy() {
     let only_two = |mm: f32, gauge: usize| if gauge < 2 { wave(mm, gauge, 2.0) } else { 0.0 };
     let (_, periodogram) = path(4_000, 0.04, 1_000_000, only_two);
-    let total = |usable| periodogram.energies(usable).1.iter().sum::<f32>();
+    let total = |usable| periodogram.energies(usable).long.iter().sum::<f32>();
     assert!(total(0b0_0011) > 1e3);
     assert!((total(ALL) / total(0b0_0011) - 1.0).abs() < 1e-6);
     assert_eq!(total(0b1_1100), 0.0);
     // Those that feel nothing hardly change what the others count for.
-    let share = |usable, number: usize| periodogram.energies(usable).1[number] / total(usable);
+    let share = |usable, number: usize| periodogram.energies(usable).long[number] / total(usable);
     for number in 0..CANDIDATES {
         assert!((share(ALL, number) - share(0b0_0011, number)).abs() < 1e-3);
     }
@@ -200,7 +200,7 @@ fn a_gauge_with_ten_times_the_gain_does_not_outvote_the_others() {
         _ => wave(mm, gauge, 3.2),
     };
     let (_, periodogram) = path(8_000, 0.04, 1_000_000, felt);
-    let (_, energies) = periodogram.energies(ALL);
+    let energies = periodogram.energies(ALL).long;
     let peak = highest_peak(&energies).expect("there are waves");
     assert!((wavelength_mm(peak) / 3.2 - 1.0).abs() < 0.06, "{peak}");
 }
@@ -225,7 +225,7 @@ fn the_clearest_peak_is_a_line_beside_what_is_random_and_higher() {
 fn a_slope_lifts_no_long_wave() {
     let sloping = |mm: f32, gauge: usize| wave(mm, gauge, 1.2) + 400.0 * mm;
     let (_, periodogram) = path(8_000, 0.04, 1_000_000, sloping);
-    let (_, energies) = periodogram.energies(ALL);
+    let energies = periodogram.energies(ALL).long;
     let peak = highest_peak(&energies).expect("there is a wave");
     assert!((wavelength_mm(peak) / 1.2 - 1.0).abs() < 0.07, "{peak}");
     let long: f32 = energies[18..].iter().sum();

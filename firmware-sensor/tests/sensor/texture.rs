@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use protocol::texture::BANDS;
-use protocol::{SensorConfiguration, Texture};
+use protocol::{Estimate, SensorConfiguration, Texture};
 
 use crate::felt::{Bench, CODES, GAINS, NOISE_20_DB, PHASES_RAD, PLACES_MM};
 
@@ -253,5 +253,48 @@ fn the_force_is_told_by_its_mean_and_fluctuation_against_the_movement() {
     assert_eq!(
         last_valid(&rubbed(ground, 20.0, 60.0, 3_000)).friction,
         None
+    );
+}
+
+/// Travel on `ground` after which 3 λ of it in a row are stood by, within 5 %, in mm. The fingertip comes down on it after
+/// `air_mm`, in which there is noise alone.
+fn learned_after_mm(ground: Ground, air_mm: f64) -> f64 {
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.noise_lsb = 0.05 * CODES;
+    // It is the same ground, wherever the air ends.
+    let felt = |gauge: usize, x_mm: f64| match x_mm - air_mm {
+        on_mm if on_mm > 0.0 => ground.felt(gauge, on_mm) + 3.0 * CODES * GAINS[gauge],
+        _ => 0.0,
+    };
+    let speed_mm_s = 50.0;
+    let ms = ((air_mm + 150.0) / speed_mm_s * 1_000.0) as u64;
+    let estimates = bench.rub(ms, |_| speed_mm_s, |gauge, x_mm, _| felt(gauge, x_mm));
+    let row = (3.0 * ground.wavelength_mm / speed_mm_s * 100.0) as usize;
+    let is_right = |estimate: &Estimate| {
+        let mm = estimate.wavelength_mm.filter(|_| estimate.valid);
+        mm.is_some_and(|mm| (f64::from(mm) / ground.wavelength_mm - 1.0).abs() < 0.05)
+    };
+    let learned = estimates.windows(row).find(|row| row.iter().all(is_right));
+    let at_us = learned.expect("the ground is long enough")[0].instant_us;
+    at_us as f64 * 1e-6 * speed_mm_s - air_mm
+}
+
+#[test]
+fn a_fingertip_that_comes_down_on_its_way_learns_nearly_as_soon_as_one_that_starts_there() {
+    let (mut started_mm, mut landed_mm) = (0.0, 0.0);
+    for wavelength_mm in [1.6, 3.0, 6.0] {
+        for band in [1, 2] {
+            let ground = Ground {
+                wavelength_mm,
+                shape: PLAIN,
+                random: Some((band, 0.6)),
+            };
+            started_mm += learned_after_mm(ground, 0.0);
+            landed_mm += learned_after_mm(ground, 60.0);
+        }
+    }
+    assert!(
+        landed_mm <= 1.3 * started_mm,
+        "{landed_mm} mm after landing, {started_mm} from the start, on six grounds"
     );
 }

@@ -5,6 +5,11 @@ use std::collections::VecDeque;
 
 use protocol::{Estimate, GAUGES, Hold};
 
+/// A λ counts for so many times as long as it has been followed, and for so long at least.
+const EARNED: u64 = 5;
+const LEAST_AGE_NS: u64 = 150_000_000;
+/// For how long it has been followed, a board knows to a tick.
+const TICK_NS: u64 = 500_000;
 /// λ that can be played, in mm.
 const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
 /// A λ that differs by more than this factor from the one held has to be confirmed by the next one.
@@ -36,6 +41,8 @@ pub struct Trust {
     held_mm: Option<f32>,
     surprise_mm: Option<f32>,
     trusted_ns: Option<u64>,
+    /// When the first λ that was followed on this surface came.
+    since_ns: u64,
     /// Estimates that have come and have not run out, and when.
     bucket: (f64, u64),
     floods: bool,
@@ -45,7 +52,7 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Before the first estimate; an estimate counts for `max_age_ms`.
+    /// Before the first estimate; an estimate counts for `max_age_ms`, less where its λ is new.
     pub fn new(max_age_ms: u16) -> Self {
         Self {
             max_age_ns: u64::from(max_age_ms) * 1_000_000,
@@ -73,13 +80,13 @@ impl Trust {
             self.distrust(at_ns);
             return None;
         };
-        if self.is_stale(at_ns) {
+        if self.is_older(at_ns, self.max_age_ns) {
             self.forget(at_ns);
         }
-        if self
+        let is_new = self
             .held_mm
-            .is_some_and(|held_mm| differ(mm, held_mm, SURPRISE))
-        {
+            .is_none_or(|held_mm| differ(mm, held_mm, SURPRISE));
+        if is_new && self.held_mm.is_some() {
             let confirmed = self
                 .surprise_mm
                 .take_if(|surprise_mm| !differ(mm, *surprise_mm, CONFIRMATION));
@@ -90,6 +97,9 @@ impl Trust {
             }
         }
         self.dismiss(at_ns);
+        if is_new {
+            self.since_ns = at_ns;
+        }
         self.held_mm = Some(mm);
         self.trusted_ns = Some(at_ns);
         Some(f64::from(mm))
@@ -117,8 +127,14 @@ impl Trust {
     }
 
     fn is_stale(&self, at_ns: u64) -> bool {
+        let followed_ns = self.trusted_ns.unwrap_or(0).saturating_sub(self.since_ns);
+        let earned_ns = (EARNED * (followed_ns + TICK_NS)).max(LEAST_AGE_NS);
+        self.is_older(at_ns, self.max_age_ns.min(earned_ns))
+    }
+
+    fn is_older(&self, at_ns: u64, age_ns: u64) -> bool {
         self.trusted_ns
-            .is_none_or(|trusted_ns| at_ns > trusted_ns + self.max_age_ns)
+            .is_none_or(|trusted_ns| at_ns > trusted_ns + age_ns)
     }
 
     /// Whether it was sent after the last one. Of a sensor that has started again, everything is forgotten.
@@ -218,7 +234,7 @@ mod tests {
         assert_eq!(holds(&mut trust, 45), []);
         followed(&mut trust, 5, &[0.0]);
         assert_eq!(holds(&mut trust, 50), [Hold::Distrust]);
-        followed(&mut trust, 6, &[2.0]);
+        followed(&mut trust, 6, &[2.0; 20]);
         assert_eq!(holds(&mut trust, 550), [Hold::Distrust]);
         assert_eq!(holds(&mut trust, 551), []);
     }
@@ -227,18 +243,35 @@ mod tests {
     fn an_estimate_counts_for_its_time_and_an_old_one_for_nothing() {
         let mut trust = Trust::new(500);
         assert_eq!(holds(&mut trust, 0), [Hold::Stale]);
-        followed(&mut trust, 5, &[2.0]);
-        assert_eq!(holds(&mut trust, 550), []);
-        assert_eq!(holds(&mut trust, 551), [Hold::Stale]);
+        followed(&mut trust, 5, &[2.0; 20]);
+        assert_eq!(holds(&mut trust, 240 + 500), []);
+        assert_eq!(holds(&mut trust, 240 + 501), [Hold::Stale]);
         // What was sent before it, or is sent again, changes nothing; a sensor's first does.
         let mut late = Run::steady(50.0, 2.0).record().estimates[0].estimate;
-        late.sequence = 5;
-        assert_eq!(trust.hear(560 * MS, &late), None);
-        late.sequence = 4;
-        assert_eq!(trust.hear(560 * MS, &late), None);
+        late.sequence = 24;
+        assert_eq!(trust.hear(750 * MS, &late), None);
+        late.sequence = 23;
+        assert_eq!(trust.hear(750 * MS, &late), None);
         assert_eq!(followed(&mut trust, 100, &[2.0]), [Some(2.0)]);
         late.sequence = 0;
         assert_eq!(trust.hear(1_001 * MS, &late), Some(2.0));
+    }
+
+    #[test]
+    fn a_surface_that_was_met_just_now_counts_for_less() {
+        let mut trust = Trust::new(500);
+        followed(&mut trust, 5, &[2.0]);
+        assert_eq!(holds(&mut trust, 50 + 150), []);
+        assert_eq!(holds(&mut trust, 50 + 151), [Hold::Stale]);
+        // Known for 60 ms, or a tick longer.
+        followed(&mut trust, 100, &[2.0; 7]);
+        assert_eq!(holds(&mut trust, 1_060 + 302), []);
+        assert_eq!(holds(&mut trust, 1_060 + 303), [Hold::Stale]);
+        // Another one has to be known anew.
+        followed(&mut trust, 200, &[2.0; 20]);
+        followed(&mut trust, 220, &[5.0, 5.0]);
+        assert_eq!(holds(&mut trust, 2_210 + 150), []);
+        assert_eq!(holds(&mut trust, 2_210 + 151), [Hold::Stale]);
     }
 
     #[test]
