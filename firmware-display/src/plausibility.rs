@@ -41,10 +41,13 @@ const REVERSAL_QUARTERS: u32 = quarters(500);
 /// What the sensor said last counts for so long.
 const HEARD_QUARTERS: u32 = quarters(250);
 
-/// A λ is held for so many times as long as it was trusted: the first one may have been chance.
+/// A λ is held for so many times as long as it was known: the first one may have been chance.
 const HELD_TIMES: u32 = 5;
 /// It is held for so long at least: a link of 50 ms of jitter that loses every fifth is no reason to stop.
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
+
+/// Confidence from which on a doubtful estimate is more likely right than wrong.
+const LIKELY: f32 = 0.5;
 
 /// What is to be done with an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +78,9 @@ pub struct Plausibility {
     unconfirmed: u32,
     /// Time since the last trusted estimate, in quarters of a millisecond.
     age: u32,
-    /// Time from the first trusted estimate of this surface to the last, in quarters of a millisecond.
+    /// Time since the first trusted estimate of this surface, and from there to the last estimate that said about the
+    /// λ that is held, trusted or likely, in quarters of a millisecond.
+    since: u32,
     known: u32,
     flood: Flood,
     distrust: Distrust,
@@ -92,6 +97,7 @@ impl Plausibility {
             surprise: None,
             unconfirmed: 0,
             age: u32::MAX,
+            since: 0,
             known: 0,
             flood: Flood::OF_ESTIMATES,
             distrust: Distrust::NONE,
@@ -119,10 +125,16 @@ impl Plausibility {
             return Verdict::Implausible;
         }
         self.contradiction.hear(estimate.velocity_um_s);
+        let wavelength = estimate.wavelength_mm.and_then(Wavelength::new);
         if !estimate.valid {
+            let says_the_same = |(one, held)| are_within(one, held, CONFIRMATION);
+            if estimate.confidence >= LIKELY && wavelength.zip(self.held).is_some_and(says_the_same)
+            {
+                self.known = self.since;
+            }
             return Verdict::Idle;
         }
-        let Some(wavelength) = estimate.wavelength_mm.and_then(Wavelength::new) else {
+        let Some(wavelength) = wavelength else {
             self.distrust.count();
             return Verdict::OutOfRange;
         };
@@ -135,6 +147,7 @@ impl Plausibility {
     /// A tick of `quarters` of a millisecond has passed, with the hand at rest or not.
     pub fn elapse(&mut self, quarters: u32, hand_rests: bool) {
         self.age = self.age.saturating_add(quarters);
+        self.since = self.since.saturating_add(quarters);
         self.flood.elapse(quarters);
         self.distrust.elapse(quarters);
         self.contradiction.elapse(quarters, hand_rests);
@@ -197,11 +210,10 @@ impl Plausibility {
             self.surprise = None;
         }
         self.dismiss_surprise();
-        self.known = if is_known {
-            self.known.saturating_add(self.age)
-        } else {
-            0
-        };
+        if !is_known {
+            self.since = 0;
+        }
+        self.known = self.since;
         self.held = Some(wavelength);
         self.age = 0;
         Verdict::Trusted(wavelength)

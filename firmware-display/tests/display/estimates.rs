@@ -344,12 +344,17 @@ fn every_estimate_that_is_not_used_is_counted_for_its_reason() {
     tell(sound(40, 2.0), |c| c.flooded += 1);
 }
 
-/// For how long λ is held after estimates of these wavelengths, one every 10 ms, in ms.
+/// For how long λ is held after sound estimates of these wavelengths, one every 10 ms, in ms.
 fn held_after_ms(wavelengths_mm: &[f32]) -> u32 {
+    held_ms((0..).zip(wavelengths_mm).map(|(n, &mm)| sound(n, mm)))
+}
+
+/// For how long λ is held after estimates that come every 10 ms, in ms.
+fn held_ms(estimates: impl Iterator<Item = Estimate>) -> u32 {
     let mut plausibility = Plausibility::new();
-    for (n, &mm) in (0..).zip(wavelengths_mm) {
+    for estimate in estimates {
         plausibility.elapse(quarters(10), false);
-        plausibility.judge(&sound(n, mm), MAX_AGE_MS);
+        plausibility.judge(&estimate, MAX_AGE_MS);
     }
     let mut held_ms = 0;
     while plausibility.is_fresh(MAX_AGE_MS) {
@@ -372,6 +377,23 @@ fn a_surface_that_was_met_just_now_is_held_for_less() {
     // Another surface, which the second of its estimates confirms, is new.
     slowly[97..].fill(9.0);
     assert_eq!(held_after_ms(&slowly), 150);
+}
+
+#[test]
+fn doubtful_estimates_that_likely_say_the_same_make_a_surface_known() {
+    // One that is trusted, and nine that are not, of so many mm and that confidence: λ is held from the tenth on.
+    let after = |mm: f32, confidence: f32| {
+        let doubtful = (1..10).map(|n| Estimate {
+            valid: false,
+            confidence,
+            ..sound(n, mm)
+        });
+        held_ms([sound(0, 2.0)].into_iter().chain(doubtful))
+    };
+    // Known for 90 ms, so held until 450 ms after the first.
+    assert_eq!(after(2.1, 0.5), 450 - 90);
+    assert_eq!(after(2.1, 0.49), 150 - 90);
+    assert_eq!(after(2.3, 0.5), 150 - 90);
 }
 
 #[test]

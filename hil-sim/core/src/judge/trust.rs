@@ -5,10 +5,12 @@ use std::collections::VecDeque;
 
 use protocol::{Estimate, GAUGES, Hold};
 
-/// A λ counts for so many times as long as it has been followed, and for so long at least.
+/// A λ counts for so many times as long as estimates have said about the same, and for so long at least.
 const EARNED: u64 = 5;
+/// Confidence of one that says so without being stood by.
+const LIKELY: f32 = 0.5;
 const LEAST_AGE_NS: u64 = 150_000_000;
-/// For how long it has been followed, a board knows to a tick.
+/// For how long they have, a board knows to a tick.
 const TICK_NS: u64 = 500_000;
 /// λ that can be played, in mm.
 const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
@@ -43,6 +45,8 @@ pub struct Trust {
     trusted_ns: Option<u64>,
     /// When the first λ that was followed on this surface came.
     since_ns: u64,
+    /// When an estimate said about that λ last, whether it was to be followed or not.
+    said_ns: u64,
     /// Estimates that have come and have not run out, and when.
     bucket: (f64, u64),
     floods: bool,
@@ -73,10 +77,16 @@ impl Trust {
             self.distrust(at_ns);
             return None;
         }
+        let playable_mm = estimate.wavelength_mm.filter(|mm| PLAYABLE_MM.contains(mm));
         if !estimate.valid {
+            let says_the_same = |(mm, held_mm)| !differ(mm, held_mm, CONFIRMATION);
+            let is_likely = estimate.confidence >= LIKELY;
+            if is_likely && playable_mm.zip(self.held_mm).is_some_and(says_the_same) {
+                self.said_ns = at_ns;
+            }
             return None;
         }
-        let Some(mm) = estimate.wavelength_mm.filter(|mm| PLAYABLE_MM.contains(mm)) else {
+        let Some(mm) = playable_mm else {
             self.distrust(at_ns);
             return None;
         };
@@ -101,6 +111,7 @@ impl Trust {
             self.since_ns = at_ns;
         }
         self.held_mm = Some(mm);
+        self.said_ns = at_ns;
         self.trusted_ns = Some(at_ns);
         Some(f64::from(mm))
     }
@@ -127,8 +138,8 @@ impl Trust {
     }
 
     fn is_stale(&self, at_ns: u64) -> bool {
-        let followed_ns = self.trusted_ns.unwrap_or(0).saturating_sub(self.since_ns);
-        let earned_ns = (EARNED * (followed_ns + TICK_NS)).max(LEAST_AGE_NS);
+        let known_ns = self.said_ns.saturating_sub(self.since_ns);
+        let earned_ns = (EARNED * (known_ns + TICK_NS)).max(LEAST_AGE_NS);
         self.is_older(at_ns, self.max_age_ns.min(earned_ns))
     }
 
@@ -267,11 +278,26 @@ mod tests {
         followed(&mut trust, 100, &[2.0; 7]);
         assert_eq!(holds(&mut trust, 1_060 + 302), []);
         assert_eq!(holds(&mut trust, 1_060 + 303), [Hold::Stale]);
+        // What likely says the same makes it known, even if it is not to be followed.
+        followed(&mut trust, 150, &[2.0]);
+        let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        for (sequence, confidence, mm) in [(151, 0.5, 2.1), (152, 0.49, 2.0), (153, 0.9, 2.3)] {
+            let doubtful = Estimate {
+                sequence,
+                confidence,
+                valid: false,
+                wavelength_mm: Some(mm),
+                ..plain
+            };
+            assert_eq!(trust.hear(1_600 * MS, &doubtful), None);
+        }
+        assert_eq!(holds(&mut trust, 1_500 + 500), []);
+        assert_eq!(holds(&mut trust, 1_500 + 501), [Hold::Stale]);
         // Another one has to be known anew.
-        followed(&mut trust, 200, &[2.0; 20]);
-        followed(&mut trust, 220, &[5.0, 5.0]);
-        assert_eq!(holds(&mut trust, 2_210 + 150), []);
-        assert_eq!(holds(&mut trust, 2_210 + 151), [Hold::Stale]);
+        followed(&mut trust, 250, &[2.0; 20]);
+        followed(&mut trust, 270, &[5.0, 5.0]);
+        assert_eq!(holds(&mut trust, 2_710 + 150), []);
+        assert_eq!(holds(&mut trust, 2_710 + 151), [Hold::Stale]);
     }
 
     #[test]
