@@ -40,12 +40,10 @@ const CONTRADICTION_QUARTERS: u32 = quarters(3_000);
 const REVERSAL_QUARTERS: u32 = quarters(500);
 /// What the sensor said last counts for so long.
 const HEARD_QUARTERS: u32 = quarters(250);
-
 /// A λ is held for so many times as long as it was known: the first one may have been chance.
 const HELD_TIMES: u32 = 5;
 /// It is held for so long at least: a link of 50 ms of jitter that loses every fifth is no reason to stop.
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
-
 /// Confidence from which on a doubtful estimate is more likely right than wrong.
 const LIKELY: f32 = 0.5;
 

@@ -328,6 +328,10 @@ fn off(one: f32, other: f32) -> f32 {
 impl Estimator for Spectrum {
     /// Gathers knots, and works on the next estimate: the peaks five milliseconds before it, then the fits.
     fn push(&mut self, touch: &Touch) {
+        // A gauge that fails jumps, which is no sign of stick and slip.
+        if touch.usable != self.touch.usable {
+            self.jerk.restart();
+        }
         self.touch = *touch;
         let travel = self.play.follow(touch.place);
         self.jerk.push(touch, travel);

@@ -102,7 +102,7 @@ impl Jerk {
     /// Begins anew on another surface, where it is as quiet as before in between.
     pub(super) fn restart(&mut self) {
         *self = Self {
-            samples: 2,
+            samples: self.samples.min(2),
             power: 0.0,
             by_speed: 0.0,
             first: 0.0,

@@ -98,6 +98,21 @@ fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_g
 }
 
 #[test]
+fn a_gauge_that_breaks_off_is_not_taken_for_stick_and_slip() {
+    for speed_mm_s in [6.0, 20.0, 50.0] {
+        let mut bench = Bench::new(DEFAULT);
+        bench.rub(4_000, |_| speed_mm_s, texture(2.0));
+        let broken = but(1, 2.0, |_, _| -2_500.0);
+        let estimates = bench.rub(1_000, |_| speed_mm_s, broken);
+        let (valid, worst) = valid_and_worst(&estimates, 2.0);
+        assert!(
+            valid >= 0.9 && worst < 0.01,
+            "{speed_mm_s} mm/s: {valid}, {worst}"
+        );
+    }
+}
+
+#[test]
 fn one_two_three_or_four_dead_gauges_leave_the_others_as_they_are() {
     for dead in [0b00001, 0b00110, 0b11010, 0b11110, 0b01111_u8] {
         let mut bench = Bench::new(DEFAULT);

@@ -170,7 +170,8 @@ fn a_line_that_takes_no_bytes_holds_nobody_up() {
     board.say(motion(1));
     let heard = |event| matches!(event, Event::Heard { message, .. } if message == motion(1));
     assert!(wait_until(LIMIT, || told.try_iter().any(&heard)));
-    assert_eq!(link.post(&STOP), Err(NotSent::Stuck));
+    // A little may still go: the kernel moves bytes on when it comes to it.
+    assert!(wait_until(LIMIT, || link.post(&STOP) == Err(NotSent::Stuck)));
     assert!(link.counters().dropped > 0);
     // What is said when the line takes bytes again is understood: no frame was left half said.
     board.deafen(false);
