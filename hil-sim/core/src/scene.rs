@@ -357,7 +357,7 @@ pub struct Estimator {
     /// The longest fit, in wavelengths of travel, 2 to 8: the knob between accuracy and latency. Default 8.
     pub waves: u8,
     /// An estimate is stood by when its confidence, the probability that it is within 5 %, is at least
-    /// this many percent, 50 to 99. Default 90.
+    /// this many percent, 50 to 99. Default 60.
     pub valid_percent: u8,
     /// Where the fingertip's stiffness comes from. Default configured.
     pub stiffness: Stiffness,

@@ -102,6 +102,32 @@ impl Pair {
             );
         }
     }
+
+    /// Waits until two programs answer the same question: a guest may speak before it is heard of as one who listens.
+    fn wait_until_both_hear(&mut self) {
+        for role in [Role::Sensor, Role::Display] {
+            let board = self.board(role);
+            let first = self.pings + 1;
+            let mut answers = Vec::new();
+            let both = || {
+                answers.push(0);
+                let sent_us = first + answers.len() as u64;
+                board.say(Message::Ping(Ping { sent_us }));
+                for message in board.take_heard() {
+                    if let Message::Pong(pong) = message
+                        && let Some(number) = pong.sent_us.checked_sub(first + 1)
+                        && let Some(count) = answers.get_mut(number as usize)
+                    {
+                        *count += 1;
+                    }
+                }
+                answers.contains(&2)
+            };
+            let waited = wait_until(LIMIT, both);
+            self.pings = first + answers.len() as u64;
+            assert!(waited, "two do not answer the {}", role.name());
+        }
+    }
 }
 
 fn signal(running: &Running, name: &str) {

@@ -227,7 +227,7 @@ fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
     pair.wait_until_heard();
     let words = [path.to_str().expect("UTF-8"), "--json"];
     let running = pair.record(&mut bridge::command(), &words);
-    pair.wait_for_questions();
+    pair.wait_until_both_hear();
     let mut speakers = [
         (Role::Sensor, Speaker::new(1)),
         (Role::Display, Speaker::new(2)),
