@@ -99,7 +99,7 @@ impl Jerk {
         self.quiet = larger(self.quiet, self.by_speed * QUIET_LEAST);
     }
 
-    /// Begins anew on another surface, where it is as quiet as before in between.
+    /// Begins anew, on another surface or with other gauges: it is as quiet as before in between.
     pub(super) fn restart(&mut self) {
         *self = Self {
             samples: self.samples.min(2),

@@ -268,3 +268,36 @@ fn the_trend_finds_no_slope_in_chance() {
     assert!((course.here - 1.0).abs() < 0.01, "{course:?}");
     assert!(course.slope.abs() < 0.001, "{course:?}");
 }
+
+#[test]
+fn a_landing_is_felt_by_most_gauges_and_not_by_one_that_breaks() {
+    let lands = |air_mm: f32, louder: u8, usable: u8| {
+        // Noise of 10 steps, and a wave of 300 from there on.
+        let mut noise = Noise(7);
+        let (mut knots, mut periodogram) = (Knots::new(), Periodogram::new());
+        let mut landed = false;
+        let places = PLACES_PER_MM / 20;
+        for step in 1..=((air_mm + 4.0) * 20.0) as i32 {
+            let place = step * places;
+            let mm = place as f32 / PLACES_PER_MM as f32;
+            let gauges = core::array::from_fn(|gauge| {
+                let is_louder = mm > air_mm && louder >> gauge & 1 == 1;
+                let felt = if is_louder { wave(mm, gauge, 1.0) } else { 0.0 };
+                felt + 10.0 * noise.even()
+            });
+            knots.push(place, places, &gauges, |spacing, knot| {
+                periodogram.push(spacing, knot);
+            });
+            let now = periodogram.energies(usable);
+            landed |= periodogram.lands(&now, usable);
+            periodogram.average(&now, 0.05);
+        }
+        landed
+    };
+    assert!(lands(30.0, ALL, ALL) && lands(30.0, 0b0_0111, ALL));
+    assert!(!lands(30.0, 0b0_0011, ALL));
+    // Of those that can be used.
+    assert!(lands(30.0, 0b0_0011, 0b0_0111) && !lands(30.0, 0b0_0111, 0b1_1100));
+    // Where it starts there is nothing to compare with.
+    assert!(!lands(1.0, ALL, ALL) && !lands(30.0, 0, ALL));
+}
