@@ -40,7 +40,7 @@ const CONTRADICTION_QUARTERS: u32 = quarters(3_000);
 const REVERSAL_QUARTERS: u32 = quarters(500);
 /// What the sensor said last counts for so long.
 const HEARD_QUARTERS: u32 = quarters(250);
-/// A λ is held for so many times as long as it was known: the first one may have been chance.
+/// A λ is held for so many times as long as its surface was known: the first one may have been chance.
 const HELD_TIMES: u32 = 5;
 /// It is held for so long at least: a link of 50 ms of jitter that loses every fifth is no reason to stop.
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
@@ -76,9 +76,9 @@ pub struct Plausibility {
     unconfirmed: u32,
     /// Time since the last trusted estimate, in quarters of a millisecond.
     age: u32,
-    /// Time since the first trusted estimate of this surface, and from there to the last estimate that said about the
-    /// λ that is held, trusted or likely, in quarters of a millisecond.
+    /// Time since the first trusted estimate of this surface, in quarters of a millisecond.
     since: u32,
+    /// How much of that had passed at the last estimate that was trusted, or that is [`LIKELY`] and about the λ held.
     known: u32,
     flood: Flood,
     distrust: Distrust,
@@ -193,10 +193,10 @@ impl Plausibility {
     }
 
     fn weigh(&mut self, wavelength: Wavelength) -> Verdict {
-        let is_known = self
+        let is_new = self
             .held
-            .is_some_and(|held| !is_another_surface(held, wavelength));
-        if self.held.is_some() && !is_known {
+            .is_none_or(|held| is_another_surface(held, wavelength));
+        if is_new && self.held.is_some() {
             let confirmed = self
                 .surprise
                 .is_some_and(|surprise| are_within(wavelength, surprise, CONFIRMATION));
@@ -208,7 +208,7 @@ impl Plausibility {
             self.surprise = None;
         }
         self.dismiss_surprise();
-        if !is_known {
+        if is_new {
             self.since = 0;
         }
         self.known = self.since;
