@@ -1,6 +1,7 @@
 //! `host-bridge record`: everything that the boards say is in the file, and what was said to be safe stays
 //! so, whatever happens to the program, the disk and the boards.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -107,25 +108,28 @@ impl Pair {
     fn wait_until_both_hear(&mut self) {
         for role in [Role::Sensor, Role::Display] {
             let board = self.board(role);
-            let first = self.pings + 1;
-            let mut answers = Vec::new();
+            let before = self.pings;
+            let mut sent_us = before;
+            let mut answers = BTreeMap::new();
             let both = || {
-                answers.push(0);
-                let sent_us = first + answers.len() as u64;
+                sent_us += 1;
                 board.say(Message::Ping(Ping { sent_us }));
                 for message in board.take_heard() {
+                    // Earlier questions were asked more than once.
                     if let Message::Pong(pong) = message
-                        && let Some(number) = pong.sent_us.checked_sub(first + 1)
-                        && let Some(count) = answers.get_mut(number as usize)
+                        && pong.sent_us > before
                     {
-                        *count += 1;
+                        *answers.entry(pong.sent_us).or_insert(0) += 1;
                     }
                 }
-                answers.contains(&2)
+                answers.values().any(|&count| count == 2)
             };
-            let waited = wait_until(LIMIT, both);
-            self.pings = first + answers.len() as u64;
-            assert!(waited, "two do not answer the {}", role.name());
+            assert!(
+                wait_until(LIMIT, both),
+                "two do not answer the {}",
+                role.name()
+            );
+            self.pings = sent_us;
         }
     }
 }
