@@ -66,7 +66,7 @@ pub(super) struct Jury {
     /// Confidence from which on an estimate is valid, in percent, 50 to 99 [default: as above]
     #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(50..=99))]
     valid_percent: Option<u8>,
-    /// Age of the last valid estimate at which the display fades out, in ms, 20 to 5 000 [default: as above]
+    /// Age of the last valid estimate at which the display fades out at the latest, in ms, 20 to 5 000 [default: as above]
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(20..=5_000))]
     max_age_ms: Option<u16>,
     /// Print the table by what makes surfaces hard, too
