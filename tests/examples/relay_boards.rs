@@ -6,8 +6,8 @@
 //! came before, which must never be. Exit status 1 if it was.
 //!
 //! `cargo build --workspace --bins && cargo run --example relay_boards -- 60 udp 500 50 5` starts two bridges that meet by
-//! `udp/`, over 500 ms each way, up to 50 ms more, and 5 % loss; `tcp` in its place by a stream alone, which sends again
-//! what is lost. Ten seconds later the gaps of each board are counted, for 60 s, and told at the end.
+//! `udp/`, over 500 ms each way, up to 50 ms more, and 5 % loss; `quic` in its place with certificates as well, `tcp` and
+//! `tls` by a stream alone, which sends again what is lost. Ten seconds later the gaps of each board are counted, for 60 s, and told at the end.
 
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use host_bridge::relay::report::Histogram;
 use protocol::{Message, Role};
 use rustix::process::Signal;
+use tests::certificates::{Authority, Kind};
 use tests::relay::{Relay, free_port};
 use tests::swift_board::SwiftBoard;
 use tests::weather::datagrams::DatagramWeather;
@@ -114,10 +115,17 @@ impl Bridges {
         let stream = Weather::over(port);
         let through = stream.port();
         let datagrams = DatagramWeather::over(through, port);
-        let [listen, connect] = [port, through].map(|port| format!("{carrier}/127.0.0.1:{port}"));
-        // Whatever comes is passed on, so that gaps are the network's.
-        let start = |role, board: &SwiftBoard, end, at: &str| {
-            Relay::bridge(role, &board.path, &[end, at, "--max-age", "60000"])
+        let [listen, connect] = [port, through].map(|port| format!("{carrier}/localhost:{port}"));
+        let authority = matches!(carrier, "tls" | "quic")
+            .then(|| Authority::new(&std::env::temp_dir(), "relay_boards"));
+        let start = |role: Role, board: &SwiftBoard, end: &str, at: &str| {
+            let proofs = authority
+                .iter()
+                .flat_map(|ours| ours.proofs(role.name(), Kind::Good, ours));
+            // Whatever comes is passed on, so that gaps are the network's.
+            let ages = ["--max-age", "60000"].map(str::to_owned);
+            let more: Vec<String> = proofs.chain(ages).collect();
+            Relay::bridge_with(role, &board.path, [end, at], &more)
         };
         let listening = start(Role::Sensor, sensor, "--listen", &listen);
         listening.says("listening", LIMIT);

@@ -6,6 +6,7 @@
 pub mod bench;
 pub mod bridge;
 pub mod browser;
+pub mod certificates;
 pub mod elves;
 pub mod fake_bench;
 pub mod fake_board;

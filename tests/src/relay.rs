@@ -87,6 +87,12 @@ impl Relay {
         Self::start(arguments.into_iter().chain(more.iter().copied()))
     }
 
+    /// The same, with one end and the options for its certificate.
+    pub fn bridge_with(role: Role, port: &Path, end: [&str; 2], proofs: &[String]) -> Self {
+        let more = end.into_iter().chain(proofs.iter().map(String::as_str));
+        Self::bridge(role, port, &more.collect::<Vec<_>>())
+    }
+
     /// What it has said on standard error so far.
     pub fn words(&self) -> String {
         self.stderr.all().join("\n")

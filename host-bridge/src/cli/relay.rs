@@ -43,10 +43,10 @@ At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
 With a router in between, both connect to it:
                 host-bridge relay router --listen tcp/0.0.0.0:7447
 
-udp/ in place of tcp/ sends estimates and motions as datagrams, at the same port: on a network that loses, nothing \
-waits for what is lost.
+udp/ in place of tcp/, and quic/ in place of tls/, sends estimates and motions as datagrams, at the same port: on a \
+network that loses, nothing waits for what is lost.
 
-With tls/ in place of tcp/, all of them want --ca, --certificate and --key. Whoever has no certificate of that CA \
+With tls/ or quic/, all of them want --ca, --certificate and --key. Whoever has no certificate of that CA \
 is refused, and the certificate's common name decides for whom it may speak: NAME.sensor, NAME.display, \
 NAME.router, or NAME.operator for `relay stop`, where NAME is what --name says. Without TLS, listening beyond this \
 computer wants --insecure.

@@ -10,7 +10,8 @@ use rustls::crypto::{CryptoProvider, ring};
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
 use rustls::server::WebPkiClientVerifier;
-use rustls::{CertificateError, ClientConfig, Error, RootCertStore, version::TLS13};
+use rustls::server::danger::ClientCertVerifier;
+use rustls::{CertificateError, ClientConfig, Error, RootCertStore, ServerConfig, version::TLS13};
 
 /// Three PEM files. With them, both ends of every connection have to prove who they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,29 +50,72 @@ pub enum CredentialsError {
     Unusable(PathBuf, Error),
 }
 
+/// What is in the three files.
+struct Contents {
+    provider: Arc<CryptoProvider>,
+    roots: Arc<RootCertStore>,
+    chain: Vec<CertificateDer<'static>>,
+    key: PrivateKeyDer<'static>,
+}
+
 impl Credentials {
     /// Reads and checks all three: what a connection will be made with. Fails if one of them can't be read, is
     /// none, doesn't fit, or is not valid today.
     pub fn load(&self) -> Result<ClientConfig, CredentialsError> {
+        let contents = self.read()?;
+        ClientConfig::builder_with_provider(contents.provider)
+            .with_protocol_versions(&[&TLS13])
+            .map_err(|reason| self.refusal(reason))?
+            .with_root_certificates(contents.roots)
+            .with_client_auth_cert(contents.chain, contents.key)
+            .map_err(|reason| self.refusal(reason))
+    }
+
+    /// The same for connections that others make. Fails as [`Credentials::load`] does.
+    pub fn load_listener(&self) -> Result<ServerConfig, CredentialsError> {
+        let contents = self.read()?;
+        let verifier = self.verifier(&contents.roots, &contents.provider)?;
+        ServerConfig::builder_with_provider(contents.provider)
+            .with_protocol_versions(&[&TLS13])
+            .map_err(|reason| self.refusal(reason))?
+            .with_client_cert_verifier(verifier)
+            .with_single_cert(contents.chain, contents.key)
+            .map_err(|reason| self.refusal(reason))
+    }
+
+    fn read(&self) -> Result<Contents, CredentialsError> {
         let provider = Arc::new(ring::default_provider());
         let roots = Arc::new(roots(&self.ca)?);
         let chain = certificates(&self.certificate)?;
         self.check_validity(&roots, &chain, &provider)?;
         let key = PrivateKeyDer::from_pem_slice(&read(&self.key)?)
             .map_err(|_| CredentialsError::NoKey(self.key.clone()))?;
-        let unusable = |reason| CredentialsError::Unusable(self.key.clone(), reason);
-        ClientConfig::builder_with_provider(provider)
-            .with_protocol_versions(&[&TLS13])
-            .map_err(unusable)?
-            .with_root_certificates(roots)
-            .with_client_auth_cert(chain, key)
-            .map_err(|error| match error {
-                Error::InconsistentKeys(_) => CredentialsError::Mismatch {
-                    key: self.key.clone(),
-                    certificate: self.certificate.clone(),
-                },
-                reason => unusable(reason),
-            })
+        Ok(Contents {
+            provider,
+            roots,
+            chain,
+            key,
+        })
+    }
+
+    fn refusal(&self, reason: Error) -> CredentialsError {
+        match reason {
+            Error::InconsistentKeys(_) => CredentialsError::Mismatch {
+                key: self.key.clone(),
+                certificate: self.certificate.clone(),
+            },
+            reason => CredentialsError::Unusable(self.key.clone(), reason),
+        }
+    }
+
+    fn verifier(
+        &self,
+        roots: &Arc<RootCertStore>,
+        provider: &Arc<CryptoProvider>,
+    ) -> Result<Arc<dyn ClientCertVerifier>, CredentialsError> {
+        WebPkiClientVerifier::builder_with_provider(Arc::clone(roots), Arc::clone(provider))
+            .build()
+            .map_err(|_| CredentialsError::NoCertificate(self.ca.clone()))
     }
 
     /// Whether one's own certificate is valid today, whoever made it: the other site may believe in
@@ -85,10 +129,7 @@ impl Credentials {
         let Some((own, between)) = chain.split_first() else {
             return Err(CredentialsError::NoCertificate(self.certificate.clone()));
         };
-        let verifier =
-            WebPkiClientVerifier::builder_with_provider(Arc::clone(roots), Arc::clone(provider))
-                .build()
-                .map_err(|_| CredentialsError::NoCertificate(self.ca.clone()))?;
+        let verifier = self.verifier(roots, provider)?;
         let path = self.certificate.clone();
         match verifier.verify_client_cert(own, between, UnixTime::now()) {
             Ok(_) | Err(Error::InvalidCertificate(CertificateError::UnknownIssuer)) => Ok(()),

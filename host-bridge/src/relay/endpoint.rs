@@ -1,8 +1,10 @@
-//! Where a bridge listens or connects: `tcp/HOST:PORT`, `udp/HOST:PORT`, or with certificates `tls/HOST:PORT`; and why
-//! nobody is reached there: what the network's engine keeps to itself, found out by trying.
+//! Where a bridge listens or connects: `tcp/HOST:PORT`, `udp/HOST:PORT`, or with certificates `tls/HOST:PORT`,
+//! `quic/HOST:PORT`; and why nobody is reached there: what the network's engine keeps to itself, found out by trying.
 
 use std::io::Read;
-use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
+use std::net::{
+    IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs, UdpSocket,
+};
 use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,13 +20,15 @@ pub enum Carrier {
     Tcp,
     /// One stream, encrypted, with certificates on both ends.
     Tls,
-    /// The same, and beside it UDP datagrams at the same port for what only the newest of matters: what is lost holds
-    /// up nothing.
+    /// As [`Carrier::Tcp`], and beside it UDP datagrams at the same port for what only the newest of matters: what is
+    /// lost holds up nothing.
     Udp,
+    /// As [`Carrier::Tls`], and beside it QUIC's datagrams at the same port, with the same certificates.
+    Quic,
 }
 
 impl Carrier {
-    const ALL: [Self; 3] = [Self::Tcp, Self::Tls, Self::Udp];
+    const ALL: [Self; 4] = [Self::Tcp, Self::Tls, Self::Udp, Self::Quic];
 
     /// What endpoints of it begin with.
     pub const fn name(self) -> &'static str {
@@ -32,7 +36,25 @@ impl Carrier {
             Self::Tcp => "tcp",
             Self::Tls => "tls",
             Self::Udp => "udp",
+            Self::Quic => "quic",
         }
+    }
+
+    /// Whether both ends have to prove who they are.
+    pub const fn has_certificates(self) -> bool {
+        matches!(self, Self::Tls | Self::Quic)
+    }
+
+    /// The one that does the same with certificates.
+    pub const fn with_certificates(self) -> Self {
+        match self {
+            Self::Tcp | Self::Tls => Self::Tls,
+            Self::Udp | Self::Quic => Self::Quic,
+        }
+    }
+
+    const fn has_datagrams(self) -> bool {
+        matches!(self, Self::Udp | Self::Quic)
     }
 }
 
@@ -52,7 +74,7 @@ pub struct Endpoint {
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum EndpointError {
     #[error(
-        "say tcp/HOST:PORT or udp/HOST:PORT, or tls/HOST:PORT with certificates, e.g. tcp/192.168.1.20:7447"
+        "say tcp/HOST:PORT or udp/HOST:PORT, or with certificates tls/HOST:PORT or quic/HOST:PORT, e.g. tcp/192.168.1.20:7447"
     )]
     Transport,
     #[error("no port from 1 to 65535 behind the host, e.g. tcp/192.168.1.20:7447")]
@@ -79,7 +101,7 @@ impl FromStr for Endpoint {
             .strip_prefix('[')
             .and_then(|host| host.strip_suffix(']'));
         let is_host = match bracketed {
-            Some(address) => address.parse::<std::net::Ipv6Addr>().is_ok(),
+            Some(address) => address.parse::<Ipv6Addr>().is_ok(),
             None => {
                 let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"._-".contains(&byte);
                 !host.is_empty() && host.bytes().all(is_plain)
@@ -118,6 +140,7 @@ impl Endpoint {
     pub fn locator(&self) -> String {
         let stream = match self.carrier {
             Carrier::Udp => Carrier::Tcp,
+            Carrier::Quic => Carrier::Tls,
             stream => stream,
         };
         format!("{}/{}:{}", stream.name(), self.host, self.port)
@@ -129,10 +152,24 @@ impl Endpoint {
         Ok(found.collect())
     }
 
+    /// Where a socket for its datagrams is bound: there, or to any port that can reach it. Fails if the name can't be
+    /// resolved.
+    pub fn addresses_to_bind(&self, is_listening: bool) -> io::Result<Vec<SocketAddr>> {
+        let addresses = self.resolve()?;
+        if is_listening {
+            return Ok(addresses);
+        }
+        let any: IpAddr = match addresses.first() {
+            Some(SocketAddr::V6(_)) => Ipv6Addr::UNSPECIFIED.into(),
+            _ => Ipv4Addr::UNSPECIFIED.into(),
+        };
+        Ok(vec![(any, 0).into()])
+    }
+
     /// Tries whether one may listen here, so that who may not is told why in plain words. Fails with the system's reason.
     pub fn try_listening(&self) -> io::Result<()> {
         let addresses = &self.resolve()?[..];
-        if self.carrier == Carrier::Udp {
+        if self.carrier.has_datagrams() {
             UdpSocket::bind(addresses)?;
         }
         TcpListener::bind(addresses).map(drop)
@@ -270,6 +307,7 @@ mod tests {
             "tls/10.0.0.7:1",
             "tcp/[::1]:65535",
             "udp/localhost:7447",
+            "quic/localhost:7447",
         ] {
             let endpoint: Endpoint = good.parse().expect("an endpoint");
             assert_eq!(endpoint.to_string(), good);
@@ -294,8 +332,12 @@ mod tests {
     fn a_port_in_use_is_noticed_before_the_engine_is_started() {
         let tcp = TcpListener::bind("127.0.0.1:0").expect("a port");
         let udp = UdpSocket::bind("127.0.0.1:0").expect("a port");
-        for (name, taken) in [("tcp", tcp.local_addr()), ("udp", udp.local_addr())] {
-            let taken = taken.expect("an address");
+        for (name, taken) in [
+            ("tcp", &tcp.local_addr()),
+            ("udp", &udp.local_addr()),
+            ("quic", &udp.local_addr()),
+        ] {
+            let taken = taken.as_ref().expect("an address");
             let endpoint: Endpoint = format!("{name}/{taken}").parse().expect("one");
             let error = endpoint.try_listening().expect_err("it is taken");
             assert_eq!(error.kind(), io::ErrorKind::AddrInUse);

@@ -118,6 +118,22 @@ pub fn common_name(name: &Name, role: Role) -> String {
     format!("{name}.{role}")
 }
 
+/// The keys on which the owner of a certificate with this common name may send datagrams: what is fleeting of the board,
+/// or the operator, of one of the benches `names`. Empty if it is none of theirs.
+pub fn keys_of_datagrams(names: &[Name], common: &str) -> Vec<String> {
+    let of = |name: &Name| {
+        let roles = [Role::Sensor, Role::Display, Role::Host];
+        let role = roles
+            .into_iter()
+            .find(|&role| common_name(name, role) == common)?;
+        let fleeting = Channel::ALL
+            .into_iter()
+            .filter(|channel| channel.is_fleeting());
+        Some(fleeting.map(|channel| name.key(role, channel)).collect())
+    };
+    names.iter().find_map(of).unwrap_or_default()
+}
+
 /// The engine's rules for a program that takes part in the benches `names`, by connecting to another one or
 /// being connected to.
 pub fn rules(names: &[Name], is_connecting: bool) -> Value {
@@ -198,5 +214,21 @@ mod tests {
         let key = name.key(Role::Display, Channel::Board);
         assert_eq!(key, "ridgelink/bench/display/board");
         assert_eq!(name.keys(Role::Sensor), "ridgelink/bench/sensor/*");
+    }
+
+    #[test]
+    fn a_certificate_lets_datagrams_through_on_its_own_fleeting_keys_only() {
+        let names = ["left", "right"].map(|name| name.parse().expect("a name"));
+        let keys = |common| keys_of_datagrams(&names, common);
+        let of_right = [
+            "ridgelink/right/display/board",
+            "ridgelink/right/display/clock",
+        ];
+        assert_eq!(keys("right.display"), of_right);
+        let operators = ["ridgelink/left/host/board", "ridgelink/left/host/clock"];
+        assert_eq!(keys("left.operator"), operators);
+        for stranger in ["other.display", "right.router", "right.host", "right", ""] {
+            assert!(keys(stranger).is_empty(), "{stranger}");
+        }
     }
 }

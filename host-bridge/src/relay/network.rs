@@ -14,8 +14,8 @@ use zenoh::{Session, Wait};
 
 use crate::engine::Setup;
 use crate::relay::credentials::Credentials;
-use crate::relay::datagrams::Datagrams;
-use crate::relay::endpoint::{Carrier, Endpoint, Reach};
+use crate::relay::datagrams::{Datagrams, Identity};
+use crate::relay::endpoint::{Endpoint, Reach};
 use crate::relay::envelope::{Envelope, MAX_ENVELOPE};
 use crate::relay::name::{Channel, Name};
 pub use crate::relay::transport::NetworkError;
@@ -60,6 +60,8 @@ pub struct Network {
     ends: Ends,
     credentials: Option<Credentials>,
     tls: Option<Arc<ClientConfig>>,
+    /// The same for datagrams.
+    identity: Option<Identity>,
     /// The benches that it takes part in, as far as certificates decide it.
     names: Vec<Name>,
 }
@@ -71,8 +73,6 @@ impl Transport for Network {
         role: Role,
         subscriptions: Vec<Subscription>,
     ) -> Result<Box<dyn Connection>, NetworkError> {
-        let is_udp = |endpoint: &&Endpoint| endpoint.carrier == Carrier::Udp;
-        let by_datagrams: Vec<&Endpoint> = self.ends.endpoints().iter().filter(is_udp).collect();
         let is_listening = self.ends.is_listening();
         let subscriptions = Arc::new(subscriptions);
         let heard = Arc::clone(&subscriptions);
@@ -84,8 +84,14 @@ impl Transport for Network {
             }
         };
         let session = self.open()?;
-        let datagrams = Datagrams::open(&by_datagrams, is_listening, Box::new(on_datagram))
-            .map_err(|error| NetworkError::Engine(format!("datagrams: {error}")))?;
+        let identity = self.identity.as_ref();
+        let datagrams = Datagrams::open(
+            self.ends.endpoints(),
+            is_listening,
+            identity,
+            Box::new(on_datagram),
+        )
+        .map_err(|error| NetworkError::Engine(format!("datagrams: {error}")))?;
         let wire = Wire::new(session, datagrams, name, role, &subscriptions)?;
         Ok(Box::new(wire))
     }
@@ -117,7 +123,7 @@ impl Network {
         for endpoint in ends.endpoints() {
             let is_open = is_listening && !endpoint.is_loopback() && !is_insecure;
             let is_numbered = !is_listening && endpoint.host.starts_with('[');
-            let refusal = match (endpoint.carrier == Carrier::Tls, &credentials) {
+            let refusal = match (endpoint.carrier.has_certificates(), &credentials) {
                 (true, None) => NetworkError::WithoutCertificates,
                 (false, Some(_)) => NetworkError::Open,
                 (false, None) if is_open => NetworkError::Insecure,
@@ -127,6 +133,10 @@ impl Network {
             return Err(refusal(endpoint.clone()));
         }
         let tls = credentials.as_ref().map(Credentials::load).transpose()?;
+        let listener = credentials
+            .as_ref()
+            .map(Credentials::load_listener)
+            .transpose()?;
         for endpoint in ends.endpoints().iter().filter(|_| is_listening) {
             endpoint
                 .try_listening()
@@ -135,6 +145,10 @@ impl Network {
         Ok(Self {
             ends,
             credentials,
+            identity: tls
+                .clone()
+                .zip(listener)
+                .map(|(tls, listener)| Identity::new(tls, listener, names.clone())),
             tls: tls.map(Arc::new),
             names,
         })

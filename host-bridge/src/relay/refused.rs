@@ -1,5 +1,6 @@
 //! Whom the engine's access control refuses: it throws away what a certificate may not say, and only mentions it to
-//! those who follow its traces. This does, and keeps what a person should know of it: who, and what, once.
+//! those who follow its traces. This does, and keeps what a person should know of it: who, and what, once. So it does
+//! of datagrams.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -142,6 +143,13 @@ pub fn take() -> Vec<Refused> {
         .as_mut()
         .map(|ledger| std::mem::take(&mut ledger.untold))
         .unwrap_or_default()
+}
+
+/// A peer, by its certificate's name, has sent a datagram on a key that is not its own; no key if it has none at all.
+pub fn note(name: &str, key: Option<&str>) {
+    locked(&LEDGER)
+        .get_or_insert_default()
+        .note(clock::now_us(), name, key);
 }
 
 thread_local! {

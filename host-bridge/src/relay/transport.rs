@@ -18,10 +18,10 @@ pub enum NetworkError {
     Credentials(#[from] CredentialsError),
     #[error("{0} wants certificates on both ends: give --ca, --certificate and --key")]
     WithoutCertificates(Endpoint),
-    #[error("{0} would leave certificates unused and let anybody in: say tls/{host}:{port}, or leave out --ca, --certificate and --key", host = .0.host, port = .0.port)]
+    #[error("{0} would leave certificates unused and let anybody in: say {safe}/{host}:{port}, or leave out --ca, --certificate and --key", safe = .0.carrier.with_certificates().name(), host = .0.host, port = .0.port)]
     Open(Endpoint),
     #[error(
-        "{0} would let anybody who reaches it move the arm: say tls/{host}:{port} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", host = .0.host, port = .0.port
+        "{0} would let anybody who reaches it move the arm: say {safe}/{host}:{port} with --ca, --certificate and --key; or --insecure, where the network itself lets nobody in", safe = .0.carrier.with_certificates().name(), host = .0.host, port = .0.port
     )]
     Insecure(Endpoint),
     #[error("{0}: an IPv6 address can't be matched with a certificate: give the host's name")]

@@ -2,6 +2,7 @@
 //! limits are a hang's. What depends on time is in `bridge_relay`, by virtual time.
 
 use std::net::TcpListener;
+use std::path::Path;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
@@ -10,6 +11,7 @@ use host_bridge::place::Place;
 use protocol::{Message, Question, Role, Stop, StopReason};
 use rustix::process::Signal;
 use serde_json::Value;
+use tests::certificates::{Authority, Kind};
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::relay::{Relay, free_port, listen, sequences, talking_board};
 use tests::utterance::Speaker;
@@ -135,6 +137,20 @@ fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
 #[test]
 fn what_goes_by_datagrams_goes_on_while_the_stream_stands_still_and_what_is_lost_is_not_sent_again()
 {
+    assert_datagrams_go_on("udp", "127.0.0.1", [&[], &[]]);
+}
+
+#[test]
+fn so_it_does_with_certificates() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let authority = Authority::new(folder, "datagrams");
+    let proofs = ["sensor", "display"].map(|role| authority.proofs(role, Kind::Good, &authority));
+    assert_datagrams_go_on("quic", "localhost", [&proofs[0], &proofs[1]]);
+}
+
+/// That two bridges, the sensor's and the display's, which prove who they are with `proofs`, hear each other by the
+/// datagrams of `carrier` on a network that loses some, while the stream stands still.
+fn assert_datagrams_go_on(carrier: &str, host: &str, proofs: [&[String]; 2]) {
     let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
     let port = free_port();
     let stream = Weather::over(port);
@@ -143,9 +159,18 @@ fn what_goes_by_datagrams_goes_on_while_the_stream_stands_still_and_what_is_lost
         loss: 0.1,
         ..Sky::default()
     });
-    let [listening, connecting] = [port, stream.port()].map(|port| format!("udp/127.0.0.1:{port}"));
-    let listener = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &listening]);
-    let bridge = Relay::bridge(Role::Display, display.path(), &["--connect", &connecting]);
+    let [listening, connecting] =
+        [port, stream.port()].map(|port| format!("{carrier}/{host}:{port}"));
+    let start = |role, board: &FakeBoard, end: [&str; 2], proofs| {
+        Relay::bridge_with(role, board.path(), end, proofs)
+    };
+    let listener = start(Role::Sensor, &sensor, ["--listen", &listening], proofs[0]);
+    let bridge = start(
+        Role::Display,
+        &display,
+        ["--connect", &connecting],
+        proofs[1],
+    );
     // At first both carry everything; then only datagrams do, as soon as each end hears them.
     let lost = || {
         let lines = listener.lines();

@@ -14,11 +14,8 @@ use host_bridge::relay::network::{Ends, Network};
 use host_bridge::relay::site::bridge_hello;
 use host_bridge::relay::transport::{Connection, Transport};
 use protocol::{Hello, Ping, Role};
-use rcgen::{
-    BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa,
-    Issuer, KeyPair, date_time_ymd,
-};
 use tests::bridge;
+use tests::certificates::{Authority, Kind};
 use tests::fake_board::{FakeBoard, wait_until};
 use tests::relay::{Relay, free_port, listen, sequences, talking_board};
 
@@ -27,115 +24,37 @@ const FORGED_EVERY: Duration = Duration::from_millis(20);
 /// Only what hangs takes so long.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// A certificate authority that lasts for a test.
-struct Authority {
-    folder: PathBuf,
-    issuer: Issuer<'static, KeyPair>,
-}
-
-/// Which certificate is wanted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Good,
-    Expired,
-    OfAnotherHost,
-    ForServersOnly,
-    OfAnotherBench,
-}
-
-impl Authority {
-    fn new(test: &str) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-            .join("bridge_relay_refusals")
-            .join(test);
-        fs::create_dir_all(&folder).expect("a folder can be made");
-        let key = KeyPair::generate().expect("a key can be made");
-        let mut params = CertificateParams::default();
-        params.distinguished_name.push(DnType::CommonName, test);
-        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
-        let certificate = params.self_signed(&key).expect("it can be signed");
-        fs::write(folder.join("ca.pem"), certificate.pem()).expect("it can be written");
-        Self {
-            folder,
-            issuer: Issuer::new(params, key),
-        }
-    }
-
-    fn file(&self, name: &str) -> String {
-        self.folder.join(name).display().to_string()
-    }
-
-    /// The three options for a certificate of this authority's, which believes in `ca`.
-    fn proofs(&self, name: &str, kind: Kind, ca: &Self) -> Vec<String> {
-        let host = if kind == Kind::OfAnotherHost {
-            "elsewhere"
-        } else {
-            "localhost"
-        };
-        let mut params = CertificateParams::new([host.to_owned()]).expect("a name");
-        let role = name.rsplit('-').next().unwrap_or(name);
-        let bench = if kind == Kind::OfAnotherBench {
-            "other"
-        } else {
-            "bench"
-        };
-        params.distinguished_name = DistinguishedName::new();
-        params
-            .distinguished_name
-            .push(DnType::CommonName, format!("{bench}.{role}"));
-        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
-        if kind != Kind::ForServersOnly {
-            params
-                .extended_key_usages
-                .push(ExtendedKeyUsagePurpose::ClientAuth);
-        }
-        if kind == Kind::Expired {
-            params.not_before = date_time_ymd(2001, 1, 1);
-            params.not_after = date_time_ymd(2002, 1, 1);
-        }
-        let key = KeyPair::generate().expect("a key can be made");
-        let certificate = params
-            .signed_by(&key, &self.issuer)
-            .expect("it can be signed");
-        let (pem, key_pem) = (format!("{name}.pem"), format!("{name}.key"));
-        fs::write(self.folder.join(&pem), certificate.pem()).expect("it can be written");
-        fs::write(self.folder.join(&key_pem), key.serialize_pem()).expect("it can be written");
-        [
-            ("--ca", ca.file("ca.pem")),
-            ("--certificate", self.file(&pem)),
-            ("--key", self.file(&key_pem)),
-        ]
-        .into_iter()
-        .flat_map(|(option, file)| [option.to_owned(), file])
-        .collect()
-    }
+fn authority(test: &str) -> Authority {
+    Authority::new(Path::new(env!("CARGO_TARGET_TMPDIR")), test)
 }
 
 fn start(role: Role, board: &FakeBoard, end: [&str; 2], proofs: &[String]) -> Relay {
-    let more: Vec<&str> = end
-        .into_iter()
-        .chain(proofs.iter().map(String::as_str))
-        .collect();
-    Relay::bridge(role, board.path(), &more)
+    Relay::bridge_with(role, board.path(), end, proofs)
 }
 
 #[test]
 fn with_certificates_of_one_ca_two_sites_meet_and_nobody_else_gets_in() {
-    let (ours, theirs) = (Authority::new("ours"), Authority::new("theirs"));
+    let (ours, theirs) = (authority("ours"), authority("theirs"));
     let sensor = talking_board(Role::Sensor);
     let port = free_port();
-    let [tls, tcp, udp] =
-        ["tls", "tcp", "udp"].map(|carrier| format!("{carrier}/localhost:{port}"));
+    let [tls, quic, tcp, udp] =
+        ["tls", "quic", "tcp", "udp"].map(|carrier| format!("{carrier}/localhost:{port}"));
     let good = ours.proofs("sensor", Kind::Good, &ours);
-    let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &good);
+    let listening = start(Role::Sensor, &sensor, ["--listen", &quic], &good);
     listening.says("listening", LIMIT);
 
     // Strangers: a certificate of another CA, one that believes in another CA, and none at all.
     let stranger = theirs.proofs("display", Kind::Good, &ours);
     let distrustful = ours.proofs("distrustful-display", Kind::Good, &theirs);
     for (at, proofs, words) in [
-        (&tls, stranger, "our certificate is rejected there"),
-        (&tls, distrustful, "not made by the CA given with --ca"),
+        (&tls, stranger.clone(), "our certificate is rejected there"),
+        (&quic, stranger, "our certificate is rejected there"),
+        (
+            &tls,
+            distrustful.clone(),
+            "not made by the CA given with --ca",
+        ),
+        (&quic, distrustful, "not made by the CA given with --ca"),
         (&tcp, Vec::new(), "nobody there speaks to us"),
         (&udp, Vec::new(), "nobody there speaks to us"),
     ] {
@@ -179,9 +98,22 @@ fn network(ends: Ends, proofs: &[String]) -> Network {
 
 #[test]
 fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
-    let ours = Authority::new("roles");
+    // A stranger has no name but the engine's, one for each connection.
+    assert_forgers_are_refused("tls", "may not speak on any key", 5);
+}
+
+#[test]
+fn nor_does_it_by_datagrams() {
+    // A datagram has the certificate's name with it.
+    assert_forgers_are_refused("quic", "REFUSED: other.display may not speak on any key", 6);
+}
+
+/// That over `carrier` nobody is believed who speaks for another, and each is named: a stranger in `words`, in
+/// `refusals` lines all of them.
+fn assert_forgers_are_refused(carrier: &str, stranger: &str, refusals: usize) {
+    let ours = authority(&format!("roles-{carrier}"));
     let sensor = talking_board(Role::Sensor);
-    let tls = format!("tls/localhost:{}", free_port());
+    let tls = format!("{carrier}/localhost:{}", free_port());
     let good = ours.proofs("sensor", Kind::Good, &ours);
     let listening = start(Role::Sensor, &sensor, ["--listen", &tls], &good);
     listening.says("listening", LIMIT);
@@ -245,7 +177,7 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
     for words in [
         "REFUSED: bench.sensor may not speak on ridgelink/bench/display/clock",
         "REFUSED: bench.operator may not speak on ridgelink/bench/display/stop",
-        "may not speak on any key",
+        stranger,
     ] {
         assert!(
             wait_until(LIMIT, || {
@@ -258,11 +190,11 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
     }
     // On a slow machine a minute passes, and each is named again.
     let words = listening.words();
-    let refusals: BTreeSet<&str> = words
+    let told: BTreeSet<&str> = words
         .lines()
         .filter(|line| line.contains("REFUSED: ") && !line.contains("more of the last minute"))
         .collect();
-    assert_eq!(refusals.len(), 5, "{words}");
+    assert_eq!(told.len(), refusals, "{words}");
     // Only what the real one has said has come.
     let said = listening.words().matches("the display's site: ").count();
     assert_eq!(said, 1, "{}", listening.words());
@@ -274,12 +206,12 @@ fn listening_beyond_this_computer_without_tls_is_to_be_asked_for() {
     let path = sensor.path().to_string_lossy();
     let port = free_port();
     let [at, datagrams] = ["tcp", "udp"].map(|carrier| format!("{carrier}/0.0.0.0:{port}"));
-    for at in [&at, &datagrams] {
+    for (at, safe) in [(&at, "tls/0.0.0.0"), (&datagrams, "quic/0.0.0.0")] {
         assert_refused(
             &["sensor", "--sensor", &path, "--listen", at],
             &[
                 "would let anybody who reaches it move the arm",
-                "tls/0.0.0.0",
+                safe,
                 "--insecure",
             ],
         );
@@ -295,7 +227,7 @@ fn listening_beyond_this_computer_without_tls_is_to_be_asked_for() {
 
 #[test]
 fn a_router_refuses_strangers_as_well() {
-    let (ours, theirs) = (Authority::new("router"), Authority::new("router-theirs"));
+    let (ours, theirs) = (authority("router"), authority("router-theirs"));
     let tls = format!("tls/localhost:{}", free_port());
     let proofs = ours.proofs("router", Kind::Good, &ours);
     let mut arguments = vec!["router", "--listen", &tls];
@@ -316,7 +248,7 @@ fn a_router_refuses_strangers_as_well() {
 
 #[test]
 fn a_listener_of_another_name_or_without_tls_is_not_believed() {
-    let ours = Authority::new("names");
+    let ours = authority("names");
     let board = talking_board(Role::Display);
     let good = ours.proofs("display", Kind::Good, &ours);
     let tls = format!("tls/localhost:{}", free_port());
@@ -439,10 +371,12 @@ fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
         &["sensor", "--listen", "tcp/x:1", "--name", "a/b"],
         &["\"a/b\" is no name"],
     );
-    assert_refused(
-        &["sensor", "--listen", "tls/localhost:7447"],
-        &["wants certificates", "--ca"],
-    );
+    for secure in ["tls/localhost:7447", "quic/localhost:7447"] {
+        assert_refused(
+            &["sensor", "--listen", secure],
+            &["wants certificates", "--ca"],
+        );
+    }
     assert_refused(
         &[
             "router",
@@ -471,7 +405,7 @@ fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
 
 #[test]
 fn credentials_that_cannot_be_used_are_named() {
-    let ours = Authority::new("credentials");
+    let ours = authority("credentials");
     let tls = format!("tls/localhost:{}", free_port());
     let refused = |proofs: &[String], words: &[&str]| {
         let mut arguments = vec!["router", "--listen", &tls];
@@ -485,7 +419,7 @@ fn credentials_that_cannot_be_used_are_named() {
         proofs
     };
     ours.proofs("other", Kind::Good, &ours);
-    fs::write(ours.folder.join("text"), "no PEM\n").expect("it can be written");
+    fs::write(ours.file("text"), "no PEM\n").expect("it can be written");
 
     refused(&with(1, "no-such-file"), &["no-such-file", "can't be read"]);
     refused(&with(3, "no-such-file"), &["no-such-file", "can't be read"]);
@@ -502,9 +436,10 @@ fn credentials_that_cannot_be_used_are_named() {
     let servers = ours.proofs("servers", Kind::ForServersOnly, &ours);
     refused(&servers, &["servers.pem", "clientAuth"]);
 
-    for open in ["tcp/localhost:7447", "udp/localhost:7447"] {
-        let mut arguments = vec!["router", "--listen", open];
+    for (open, safe) in [("tcp", "tls"), ("udp", "quic")] {
+        let [open, safe] = [open, safe].map(|carrier| format!("{carrier}/localhost:7447"));
+        let mut arguments = vec!["router", "--listen", &open];
         arguments.extend(good.iter().map(String::as_str));
-        assert_refused(&arguments, &["let anybody in", "tls/localhost:7447"]);
+        assert_refused(&arguments, &["let anybody in", &safe]);
     }
 }
