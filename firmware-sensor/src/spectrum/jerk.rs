@@ -171,3 +171,178 @@ fn second_difference_gain(frequency_hz: f32) -> f32 {
     let square = 4.0 * sin * sin;
     square * square
 }
+
+#[cfg(test)]
+mod tests {
+    use core::f32::consts::TAU;
+    use core::ops::Range;
+
+    use super::*;
+
+    const WAVELENGTH_MM: f32 = 2.0;
+    const SPEED_MM_S: f32 = 30.0;
+    /// The wave's amplitude, and its power in all gauges.
+    const WAVE: f32 = 300.0;
+    const WAVES_POWER: f32 = 0.5 * WAVE * WAVE * GAUGES as f32;
+
+    fn feel(
+        jerk: &mut Jerk,
+        times_ms: Range<u32>,
+        mm_s: f32,
+        usable: u8,
+        felt: impl Fn(f32, usize) -> f32,
+    ) {
+        for ms in times_ms {
+            let touch = Touch {
+                gauges: core::array::from_fn(|gauge| felt(ms as f32, gauge)),
+                usable,
+                ..Touch::default()
+            };
+            jerk.push(&touch, (mm_s * PLACES_PER_UM as f32) as i32);
+        }
+    }
+
+    fn sine(ms: f32, hz: f32) -> f32 {
+        libm::sinf(TAU * libm::fmodf(ms * hz, 1_000.0) / 1_000.0)
+    }
+
+    /// A quarter of a turn from gauge to gauge: what four of them have of power is always the same.
+    fn even(amplitude: f32) -> impl Fn(f32, usize) -> f32 {
+        move |ms, gauge| match gauge {
+            4 => 1e4 * sine(ms, 170.0),
+            gauge => amplitude * sine(ms + 2.5 * gauge as f32, 100.0),
+        }
+    }
+
+    fn assert_near(got: f32, want: f32, share: f32) {
+        assert!(
+            (got - want).abs() <= share * want.abs(),
+            "{got}, not {want}"
+        );
+    }
+
+    #[test]
+    fn of_a_sine_the_powers_of_both_differences_are_known() {
+        let mut jerk = Jerk::default();
+        // Of the fifth gauge, which is not usable, nothing counts.
+        feel(&mut jerk, 0..2_000, 40.0, 0b0_1111, even(100.0));
+        let gain = {
+            let sin = libm::sinf(TAU * 0.05);
+            4.0 * sin * sin
+        };
+        assert_near(jerk.first, 4.0 * 5_000.0 * gain, 1e-3);
+        assert_near(jerk.power, 4.0 * 5_000.0 * gain * gain, 1e-3);
+        let places = 40.0 * PLACES_PER_UM as f32;
+        assert_near(jerk.mean_speed, places, 1e-3);
+        assert_near(jerk.by_speed, jerk.power / places, 1e-3);
+        assert_near(jerk.quiet, jerk.by_speed, 2.0 * QUIET_STEP);
+        // Where all moments are alike, all of the power may be a rough surface's.
+        assert_near(jerk.steady(1), STEADY_DOUBT * jerk.power, 1e-6);
+    }
+
+    #[test]
+    fn the_quiet_power_falls_nine_times_as_fast_as_it_rises() {
+        let mut jerk = Jerk::default();
+        feel(&mut jerk, 0..2_000, 40.0, 0b0_1111, even(100.0));
+        feel(&mut jerk, 2_000..2_010, 40.0, 0b0_1111, even(50.0));
+        let before = jerk.quiet;
+        feel(&mut jerk, 2_010..2_030, 40.0, 0b0_1111, even(50.0));
+        assert_near(jerk.quiet, before * libm::powf(0.982, 20.0), 1e-4);
+        feel(&mut jerk, 2_030..2_040, 40.0, 0b0_1111, even(200.0));
+        let before = jerk.quiet;
+        feel(&mut jerk, 2_040..2_060, 40.0, 0b0_1111, even(200.0));
+        assert_near(jerk.quiet, before * libm::powf(1.002, 20.0), 1e-4);
+        // However quiet it is, a thousandth of the mean is left.
+        feel(&mut jerk, 2_060..2_800, 40.0, 0b0_1111, even(0.0));
+        assert_near(jerk.quiet, 1e-3 * jerk.by_speed, 1e-3);
+    }
+
+    #[test]
+    fn an_arm_that_creeps_tells_nothing_and_a_restart_forgets_the_means_alone() {
+        let mut jerk = Jerk::default();
+        feel(&mut jerk, 0..1_000, 4.5, 0b0_1111, even(100.0));
+        assert_eq!((jerk.power, jerk.samples), (0.0, 0));
+        feel(&mut jerk, 1_000..2_000, 5.5, 0b0_1111, even(100.0));
+        assert!(jerk.power > 0.0);
+        let quiet = jerk.quiet;
+        jerk.restart();
+        assert_eq!(
+            [jerk.power, jerk.by_speed, jerk.first, jerk.mean_speed],
+            [0.0; 4]
+        );
+        assert_eq!((jerk.quiet, jerk.samples), (quiet, 2));
+        // The first sample afterwards is the mean.
+        feel(&mut jerk, 2_000..2_001, 5.5, 0b0_1111, even(100.0));
+        assert_near(jerk.mean_speed, jerk.speed, 1e-6);
+    }
+
+    /// What is said of a wave with `extra` on it, by the time in ms and the gauge.
+    fn is_slip(hz: f32, mm_s: f32, noise: f32, extra: impl Fn(f32, usize) -> f32) -> bool {
+        let mut jerk = Jerk::default();
+        feel(&mut jerk, 0..3_000, mm_s, 0b1_1111, |ms, gauge| {
+            WAVE * sine(ms, hz) + extra(ms, gauge)
+        });
+        jerk.is_slip(mm_s / hz, hz, WAVES_POWER, noise, GAUGES as u32)
+    }
+
+    /// For 8 of 50 ms the fingertip slips: so many Hz of that amplitude, the same in all gauges.
+    fn bursts(hz: f32, amplitude: f32) -> impl Fn(f32, usize) -> f32 {
+        move |ms, _| {
+            if libm::fmodf(ms, 50.0) < 8.0 {
+                amplitude * sine(ms, hz)
+            } else {
+                0.0
+            }
+        }
+    }
+
+    #[test]
+    fn moments_that_are_too_fast_for_the_contact_are_slip() {
+        let hz = SPEED_MM_S / WAVELENGTH_MM;
+        assert!(is_slip(hz, SPEED_MM_S, 0.0, bursts(150.0, 100.0)));
+        assert!(!is_slip(hz, SPEED_MM_S, 0.0, |_, _| 0.0));
+        // Too weak, and faster than any fingertip on its spring.
+        assert!(!is_slip(hz, SPEED_MM_S, 0.0, bursts(150.0, 50.0)));
+        assert!(!is_slip(hz, SPEED_MM_S, 0.0, bursts(420.0, 100.0)));
+        // At five times the speed 150 Hz are 1 mm, which a contact feels.
+        assert!(!is_slip(
+            5.0 * hz,
+            5.0 * SPEED_MM_S,
+            0.0,
+            bursts(150.0, 100.0)
+        ));
+        // Always there, it is a rough surface.
+        let rough = |ms: f32, gauge: usize| 100.0 * sine(ms + gauge as f32 / 0.6, 150.0);
+        assert!(!is_slip(hz, SPEED_MM_S, 0.0, rough));
+    }
+
+    #[test]
+    fn noise_that_is_known_is_not_held_against_the_surface() {
+        let hz = SPEED_MM_S / WAVELENGTH_MM;
+        // The bursts' mean power in the second difference is some 3 300 in all gauges.
+        let with = |noise| is_slip(hz, SPEED_MM_S, noise, bursts(150.0, 100.0));
+        assert!(with(100.0) && with(250.0));
+        assert!(!with(600.0) && !with(1_000.0));
+    }
+
+    #[test]
+    fn a_wave_that_passes_fast_is_jerky_by_itself() {
+        // 100 Hz of a wave of 0.6 mm, and its edges' third at 300 Hz.
+        let edge = |ms: f32, _| WAVE / 3.0 * 0.2 * sine(ms, 300.0);
+        assert!(!is_slip(100.0, 60.0, 0.0, |_, _| 0.0));
+        assert!(!is_slip(100.0, 60.0, 0.0, edge));
+    }
+
+    #[test]
+    fn gains_are_as_physics_has_them() {
+        assert_near(second_difference_gain(250.0), 4.0, 1e-4);
+        assert_near(second_difference_gain(500.0), 16.0, 1e-4);
+        assert_near(second_difference_gain(800.0), 16.0, 1e-4);
+        assert_near(
+            let_through(1.0 / (TAU * CONTACT_SIGMA_MM)),
+            libm::expf(-1.0),
+            1e-4,
+        );
+        assert_near(let_through(1e3), libm::expf(-40.0), 1e-4);
+    }
+}

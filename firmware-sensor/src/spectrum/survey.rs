@@ -174,3 +174,54 @@ fn fundamental_of(energies: &Energies, peak: usize, line: usize, line_mm: f32) -
     }
     peak
 }
+
+#[cfg(test)]
+mod tests {
+    use protocol::SensorConfiguration;
+
+    use super::*;
+
+    const PEAK: usize = 9;
+
+    /// A peak, and one that is a period of two or three of its waves, so high.
+    fn energies(up: usize, height: f32) -> Energies {
+        let mut energies = [0.001; CANDIDATES];
+        energies[PEAK] = 1.0;
+        energies[PEAK + up] = height;
+        energies
+    }
+
+    #[test]
+    fn a_peak_at_twice_or_three_times_the_wavelength_is_the_period() {
+        for (up, ratio) in [(PER_OCTAVE, 2.0), (10, 3.0)] {
+            let found = |averaged, now| {
+                Spectrum::new(&SensorConfiguration::DEFAULT).longer_period(
+                    &energies(up, averaged),
+                    &energies(up, now),
+                    PEAK,
+                )
+            };
+            let (number, mm) = found(0.41, 0.1).expect("a period");
+            assert_eq!(number, PEAK + up);
+            assert!(off(mm, ratio * wavelength_mm(PEAK)) < 0.02, "{mm} mm");
+            // Much lower on the average, or hardly there at the moment.
+            assert_eq!(found(0.39, 0.1), None);
+            assert_eq!(found(0.41, 0.08), None);
+        }
+        // Neither twice nor three times.
+        let askew = energies(PER_OCTAVE + 2, 0.9);
+        let mut spectrum = Spectrum::new(&SensorConfiguration::DEFAULT);
+        assert_eq!(spectrum.longer_period(&askew, &askew, PEAK), None);
+    }
+
+    #[test]
+    fn a_period_that_was_refused_is_not_asked_about_for_a_while() {
+        let twice = energies(PER_OCTAVE, 0.9);
+        let mut spectrum = Spectrum::new(&SensorConfiguration::DEFAULT);
+        spectrum.refused = 2;
+        for _ in 0..2 {
+            assert_eq!(spectrum.longer_period(&twice, &twice, PEAK), None);
+        }
+        assert!(spectrum.longer_period(&twice, &twice, PEAK).is_some());
+    }
+}

@@ -42,3 +42,42 @@ impl Rub {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn friction_is_the_force_against_the_movement_and_how_it_fluctuates() {
+        let mut rub = Rub::default();
+        // 2 N against the movement, half a newton more and less in turn; after each turn it does not count for 1 mm.
+        for stroke in 0..20 {
+            let forwards = stroke % 2 == 0;
+            rub.since_turn_mm = 0.0;
+            for step in 0..1_000 {
+                let against_n = match step {
+                    ..90 => 50.0,
+                    step if step % 2 == 0 => 2.5,
+                    _ => 1.5,
+                };
+                let force_n = if forwards { against_n } else { -against_n };
+                rub.push(force_n, forwards, 0.01);
+            }
+        }
+        let friction = rub.friction().expect("200 mm are enough");
+        assert!(friction.mean_mn.abs_diff(2_000) <= 1, "{friction:?}");
+        assert!(friction.fluctuation_mn.abs_diff(500) <= 1, "{friction:?}");
+    }
+
+    #[test]
+    fn nothing_is_known_after_a_few_mm() {
+        let mut rub = Rub::default();
+        let mut travelled_mm = 0.0;
+        while rub.friction().is_none() {
+            rub.push(1.0, true, 0.5);
+            travelled_mm += 0.5;
+        }
+        // 1 − e^(−x / 20) = 0.3, and the millimetre after the turn.
+        assert!((7.5..9.0).contains(&travelled_mm), "{travelled_mm} mm");
+    }
+}

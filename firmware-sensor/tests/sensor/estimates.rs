@@ -110,6 +110,25 @@ fn every_cell_of_table_1_is_where_quantisation_puts_it() {
 }
 
 #[test]
+fn every_estimate_has_the_arms_velocity_and_the_papers_count_beside_its_own() {
+    // There and back, 50 mm/s each way.
+    let there_and_back = |t_s: f64| 50.0 * (2.0 - (2.0 - t_s).abs());
+    let mut sensor = Sensor::new(SensorConfiguration::DEFAULT);
+    let estimates = estimates(&rub(&mut sensor, 4.0, 2.0, there_and_back));
+    for (turn_s, velocity_um_s) in [(1.0, 50_000), (3.0, -50_000)] {
+        let at = (turn_s * f64::from(ESTIMATE_RATE_HZ)) as usize;
+        for estimate in &estimates[at - 40..at + 60] {
+            assert_eq!(estimate.velocity_um_s, velocity_um_s);
+            // Four crossings a window of 4 mm, and five now and then.
+            let counted = estimate.counted_mm.expect("it counts");
+            assert!((1.59..2.01).contains(&counted), "{counted} mm");
+            let own = estimate.wavelength_mm.expect("a wavelength");
+            assert!((own - 2.0).abs() < 0.02, "{own} mm");
+        }
+    }
+}
+
+#[test]
 fn a_single_estimate_is_one_of_the_two_counts_that_fit() {
     // 30 mm/s on 3 mm: 1.6 crossings a window, so λe is 4.8 mm or 2.4 mm, and the speed 1 % off at most.
     let outputs = rub(&mut counting_sensor(), 2.5, 3.0, |t_s| 30.0 * t_s);
