@@ -224,4 +224,41 @@ mod tests {
         }
         assert!(spectrum.longer_period(&twice, &twice, PEAK).is_some());
     }
+
+    #[test]
+    fn the_line_takes_the_place_of_a_peak_that_is_its_second_or_third_harmonic() {
+        for (up, ratio) in [(PER_OCTAVE, 2.0), (10, 3.0)] {
+            let line = PEAK + up;
+            let at = |height, beside: usize, off_by: f32| {
+                let energies = energies(up + beside - 1, height);
+                let line_mm = (ratio + off_by) * wavelength_mm(PEAK);
+                fundamental_of(&energies, PEAK, line, line_mm)
+            };
+            for beside in 0..3 {
+                assert_eq!(at(0.1, beside, 0.0), line + beside - 1);
+                assert_eq!(at(0.08, beside, 0.0), PEAK);
+            }
+            for off_by in [0.19, -0.19] {
+                assert_eq!(at(0.1, 1, off_by), line);
+            }
+            for off_by in [0.31, -0.31] {
+                assert_eq!(at(0.1, 1, off_by), PEAK);
+            }
+        }
+        assert_eq!(
+            fundamental_of(&energies(PER_OCTAVE, 1.0), PEAK, PEAK, wavelength_mm(PEAK)),
+            PEAK
+        );
+    }
+
+    #[test]
+    fn a_peak_is_found_where_it_is_expected_unless_it_is_much_lower() {
+        let twice_mm = 2.0 * wavelength_mm(PEAK);
+        let found = |height, mm| peak_at(&energies(PER_OCTAVE, height), mm, PEAK);
+        assert_eq!(found(0.41, 1.1 * twice_mm), Some(PEAK + PER_OCTAVE));
+        assert_eq!(found(0.41, twice_mm / 1.1), Some(PEAK + PER_OCTAVE));
+        for (height, mm) in [(0.39, twice_mm), (0.9, 1.13 * twice_mm), (0.9, 0.0)] {
+            assert_eq!(found(height, mm), None);
+        }
+    }
 }

@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use protocol::GAUGES;
 
-use super::fit::{LENGTH_COUNT, LENGTHS, Pass};
+use super::fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};
 use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
 use super::periodogram::{
     CANDIDATES, Periodogram, clearest_peak, highest_peak, sharpness, vertex_mm, wavelength_mm,
@@ -300,4 +300,63 @@ fn a_landing_is_felt_by_most_gauges_and_not_by_one_that_breaks() {
     assert!(lands(30.0, 0b0_0011, 0b0_0111) && !lands(30.0, 0b0_0111, 0b1_1100));
     // Where it starts there is nothing to compare with.
     assert!(!lands(1.0, ALL, ALL) && !lands(30.0, 0, ALL));
+}
+
+#[test]
+fn the_wavelength_of_a_peak_is_that_of_the_line_that_made_it() {
+    // What one and two poles leave of a wave, at each candidate.
+    for both_poles in [false, true] {
+        for wanted_mm in [1.1_f32, 1.9, 2.05, 3.3] {
+            let spectrum = core::array::from_fn(|i| {
+                let off = 6.0 * (wavelength_mm(i) / wanted_mm - 1.0);
+                let one_pole = 100.0 / (1.0 + off * off);
+                if both_poles {
+                    one_pole * one_pole
+                } else {
+                    one_pole
+                }
+            });
+            let peak = highest_peak(&spectrum).expect("a peak");
+            let mm = vertex_mm(&spectrum, peak, both_poles);
+            assert!(
+                (mm / wanted_mm - 1.0).abs() < 1e-3,
+                "{mm} for {wanted_mm} mm"
+            );
+        }
+    }
+    // The ends have no neighbours, and a plain no vertex.
+    let flat = [1.0; CANDIDATES];
+    for number in [0, 5, CANDIDATES - 1] {
+        assert_eq!(vertex_mm(&flat, number, true), wavelength_mm(number));
+    }
+}
+
+#[test]
+fn the_highest_peak_is_at_neither_end() {
+    let mut spectrum = [1.0; CANDIDATES];
+    spectrum[0] = 9.0;
+    spectrum[CANDIDATES - 1] = 9.0;
+    spectrum[1] = 2.0;
+    spectrum[CANDIDATES - 3] = 3.0;
+    assert_eq!(highest_peak(&spectrum), Some(CANDIDATES - 3));
+    spectrum[CANDIDATES - 3] = 1.0;
+    spectrum[CANDIDATES - 2] = 10.0;
+    assert_eq!(highest_peak(&spectrum), Some(CANDIDATES - 2));
+}
+
+#[test]
+fn a_fits_shares_are_of_all_energy_and_of_each_usable_gauge_alike() {
+    let fitted = Fitted {
+        total: 200.0,
+        explained: 150.0,
+        totals: [100.0, 50.0, 0.0, 50.0, 80.0],
+        explaineds: [90.0, 10.0, 0.0, 20.0, 80.0],
+        ..Fitted::default()
+    };
+    assert_eq!(fitted.share(), 0.75);
+    assert_eq!(Fitted::default().share(), 0.0);
+    // The gauge without any energy has no share, and the last one is not usable.
+    let share = fitted.gauges_share(0b0_1111);
+    assert!((share - 0.5).abs() < 1e-6, "{share}");
+    assert_eq!(fitted.gauges_share(0b0_0100), 0.0);
 }
