@@ -103,3 +103,73 @@ fn outstanding(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
     let most = OUTSTANDING * sorted[count / 2];
     powers.map(|power| if power > most { power } else { 0.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: u8 = 0b1_1111;
+
+    fn powers(found: Amplitudes, usable: u8) -> [f32; GAUGES] {
+        let mut own = Own::default();
+        for _ in 0..FIRST_ESTIMATES {
+            own.learn(None, false);
+        }
+        own.powers(&found, usable, true)
+    }
+
+    fn assert_near(got: [f32; GAUGES], want: [f32; GAUGES]) {
+        for (got, want) in got.into_iter().zip(want) {
+            assert!(
+                (got - want).abs() < 1e-3 * want.abs() + 1e-3,
+                "{got}, not {want}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_all_gauges_have_in_common_is_nobodys_own() {
+        assert_near(powers([[10.0, 5.0]; GAUGES], ALL), [0.0; GAUGES]);
+        // Nor is what an amplifier makes more or less of.
+        let mut found = [[10.0, 5.0]; GAUGES];
+        found[3] = [40.0, 20.0];
+        assert_near(powers(found, ALL), [0.0; GAUGES]);
+    }
+
+    #[test]
+    fn what_lies_across_what_is_common_or_against_it_is_its_own() {
+        // Half of |z|² is the power. Without gauge 2 the others have 10 in common.
+        let mut found = [[10.0, 0.0]; GAUGES];
+        found[2] = [10.0, 8.0];
+        assert!((powers(found, ALL)[2] - 32.0).abs() < 0.1);
+        found[2] = [-8.0, 0.0];
+        assert!((powers(found, ALL)[2] - 32.0).abs() < 0.1);
+        // More than five times the others' mean is no amplifier's doing: of 80 some 30.
+        found[2] = [80.0, 0.0];
+        assert!((powers(found, ALL)[2] - 0.5 * 30.0 * 30.0).abs() < 0.1);
+        // Whether it is usable or not.
+        assert!((powers(found, 0b1_1011)[2] - 0.5 * 30.0 * 30.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn beside_a_texture_that_may_be_there_only_what_stands_out_is_its_own() {
+        let mut own = Own::default();
+        let mut found = [[4.0, 0.0]; GAUGES];
+        found[1] = [0.0, 17.0];
+        let at_once = |own: &Own, usable| own.powers(&found, usable, false);
+        assert_eq!(at_once(&own, ALL), [0.0; GAUGES], "too early");
+        for _ in 0..FIRST_ESTIMATES {
+            own.learn(Some(0.5), true);
+        }
+        // Sixteen times the median's power of 8 is 128.
+        assert_eq!(at_once(&own, ALL), [0.0, 144.5, 0.0, 0.0, 0.0]);
+        assert_eq!(at_once(&own, 0b0_0011), [0.0; GAUGES], "two know no median");
+        // Elsewhere for long enough, what is not common counts. A stroke that passes it begins anew.
+        for _ in 0..SURE_ESTIMATES {
+            own.learn(Some(5.0), false);
+        }
+        assert!(at_once(&own, ALL)[0] > 0.0);
+        own.learn(Some(-5.0), false);
+        assert_eq!(at_once(&own, ALL)[0], 0.0);
+    }
+}

@@ -183,11 +183,11 @@ mod tests {
 
     const PEAK: usize = 9;
 
-    /// A peak, and one that is a period of two or three of its waves, so high.
+    /// A peak, and one that is a period of two or three of its waves, so high by comparison.
     fn energies(up: usize, height: f32) -> Energies {
         let mut energies = [0.001; CANDIDATES];
-        energies[PEAK] = 1.0;
-        energies[PEAK + up] = height;
+        energies[PEAK] = 3.0;
+        energies[PEAK + up] = 3.0 * height;
         energies
     }
 
