@@ -345,6 +345,18 @@ fn the_highest_peak_is_at_neither_end() {
 }
 
 #[test]
+fn the_clearest_peak_is_not_the_highest_of_what_is_random() {
+    let mut spectrum = [1.0; CANDIDATES];
+    // A hill of low frequencies, and a line that stands on its own.
+    for (number, height) in [(14, 8.0), (15, 9.0), (16, 10.0), (17, 9.0), (18, 8.0)] {
+        spectrum[number] = height;
+    }
+    spectrum[6] = 6.0;
+    assert_eq!(highest_peak(&spectrum), Some(16));
+    assert_eq!(clearest_peak(&spectrum), Some(6));
+}
+
+#[test]
 fn a_fits_shares_are_of_all_energy_and_of_each_usable_gauge_alike() {
     let fitted = Fitted {
         total: 200.0,
