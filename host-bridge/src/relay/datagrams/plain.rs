@@ -18,12 +18,12 @@ const LOOK: Duration = Duration::from_millis(100);
 
 /// A port that is open.
 pub struct Plain {
-    end: Arc<End>,
+    port: Arc<Port>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// A socket, and who is told by it.
-struct End {
+struct Port {
     socket: UdpSocket,
     /// Where it connects; none if others come.
     towards: Option<Endpoint>,
@@ -36,15 +36,15 @@ impl Plain {
     pub fn open(endpoint: &Endpoint, is_listening: bool, shared: Arc<Shared>) -> io::Result<Self> {
         let socket = UdpSocket::bind(&endpoint.addresses_to_bind(is_listening)?[..])?;
         socket.set_read_timeout(Some(LOOK))?;
-        let end = Arc::new(End {
+        let port = Arc::new(Port {
             socket,
             towards: (!is_listening).then(|| endpoint.clone()),
             peers: Mutex::default(),
             is_ended: AtomicBool::new(false),
         });
-        let hearing = Arc::clone(&end);
+        let hearing = Arc::clone(&port);
         Ok(Self {
-            end,
+            port,
             thread: Some(thread::spawn(move || hearing.hear(&shared))),
         })
     }
@@ -52,9 +52,9 @@ impl Plain {
 
 impl datagrams::End for Plain {
     fn send(&self, datagram: &[u8]) -> bool {
-        for &(peer, _) in locked(&self.end.peers).iter() {
+        for &(peer, _) in locked(&self.port.peers).iter() {
             // Who is not there misses it.
-            let _ = self.end.socket.send_to(datagram, peer);
+            let _ = self.port.socket.send_to(datagram, peer);
         }
         true
     }
@@ -62,14 +62,14 @@ impl datagrams::End for Plain {
 
 impl Drop for Plain {
     fn drop(&mut self) {
-        self.end.is_ended.store(true, Ordering::Relaxed);
+        self.port.is_ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
     }
 }
 
-impl End {
+impl Port {
     fn hear(&self, shared: &Shared) {
         let mut bytes = [0; MAX_KEY + 1 + MAX_ENVELOPE];
         let mut looked_us = 0;
@@ -132,24 +132,24 @@ mod tests {
     #[test]
     fn a_name_is_looked_up_while_nobody_answers_and_not_otherwise() {
         let towards: Endpoint = "udp/127.0.0.1:7".parse().expect("an endpoint");
-        let end = End {
+        let port = Port {
             socket: UdpSocket::bind("127.0.0.1:0").expect("a socket"),
             towards: Some(towards),
             peers: Mutex::default(),
             is_ended: AtomicBool::new(false),
         };
         let addresses =
-            || -> Vec<SocketAddr> { locked(&end.peers).iter().map(|peer| peer.0).collect() };
+            || -> Vec<SocketAddr> { locked(&port.peers).iter().map(|peer| peer.0).collect() };
         let looked_up = ["127.0.0.1:7".parse().expect("an address")];
         let answering: SocketAddr = "127.0.0.1:8".parse().expect("an address");
-        end.look(SILENCE_US);
+        port.look(SILENCE_US);
         assert_eq!(addresses(), looked_up);
         // The name means another address by now, which the one that answers does not care for.
-        *locked(&end.peers) = vec![(answering, 0)];
-        assert!(end.meet(answering, 10 * SILENCE_US));
-        end.look(11 * SILENCE_US - 1);
+        *locked(&port.peers) = vec![(answering, 0)];
+        assert!(port.meet(answering, 10 * SILENCE_US));
+        port.look(11 * SILENCE_US - 1);
         assert_eq!(addresses(), [answering]);
-        end.look(11 * SILENCE_US);
+        port.look(11 * SILENCE_US);
         assert_eq!(addresses(), looked_up);
     }
 }
