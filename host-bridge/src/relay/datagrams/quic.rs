@@ -319,3 +319,176 @@ impl Controller for Steady {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+    use std::sync::mpsc::{Receiver, channel};
+
+    use rcgen::{
+        BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose,
+        IsCa, Issuer, KeyPair, date_time_ymd,
+    };
+    use rustls::RootCertStore;
+    use rustls::crypto::ring;
+    use rustls::pki_types::PrivateKeyDer;
+    use rustls::server::WebPkiClientVerifier;
+    use rustls::version::TLS13;
+
+    use super::*;
+    use crate::relay::datagrams::End;
+
+    const KEY: &str = "ridgelink/bench/display/board";
+    /// Only what hangs takes so long.
+    const LIMIT: Duration = Duration::from_secs(120);
+    const YEAR: Duration = Duration::from_secs(365 * 86_400);
+
+    struct Authority {
+        root: CertificateDer<'static>,
+        issuer: Issuer<'static, KeyPair>,
+    }
+
+    impl Authority {
+        fn new() -> Self {
+            let key = KeyPair::generate().expect("a key");
+            let mut params = CertificateParams::default();
+            params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+            let root = params.self_signed(&key).expect("it can be signed");
+            Self {
+                root: root.der().clone(),
+                issuer: Issuer::new(params, key),
+            }
+        }
+
+        /// Somebody's whose certificate of that common name is valid for so long still.
+        fn identity(&self, common_name: &str, valid: Duration) -> Identity {
+            let mut params = CertificateParams::new(["localhost".to_owned()]).expect("a name");
+            params.distinguished_name = DistinguishedName::new();
+            params
+                .distinguished_name
+                .push(DnType::CommonName, common_name);
+            params.extended_key_usages = vec![
+                ExtendedKeyUsagePurpose::ServerAuth,
+                ExtendedKeyUsagePurpose::ClientAuth,
+            ];
+            let now = SystemTime::now()
+                .duration_since(UNIX_EPOCH)
+                .expect("a date");
+            params.not_after = date_time_ymd(1970, 1, 1) + now + valid;
+            let key = KeyPair::generate().expect("a key");
+            let certificate = params.signed_by(&key, &self.issuer).expect("it is signed");
+            let chain = vec![certificate.der().clone()];
+            let key = || PrivateKeyDer::Pkcs8(key.serialize_der().into());
+            let mut roots = RootCertStore::empty();
+            roots.add(self.root.clone()).expect("a root");
+            let roots = Arc::new(roots);
+            let provider = Arc::new(ring::default_provider());
+            let verifier = WebPkiClientVerifier::builder_with_provider(
+                Arc::clone(&roots),
+                Arc::clone(&provider),
+            );
+            let connecting = rustls::ClientConfig::builder_with_provider(Arc::clone(&provider))
+                .with_protocol_versions(&[&TLS13])
+                .expect("a version")
+                .with_root_certificates(roots)
+                .with_client_auth_cert(chain.clone(), key())
+                .expect("they fit");
+            let listening = rustls::ServerConfig::builder_with_provider(provider)
+                .with_protocol_versions(&[&TLS13])
+                .expect("a version")
+                .with_client_cert_verifier(verifier.build().expect("it has a root"))
+                .with_single_cert(chain, key())
+                .expect("they fit");
+            let names = vec!["bench".parse().expect("a name")];
+            Identity::new(connecting, listening, names)
+        }
+    }
+
+    fn open(at: &Endpoint, is_listening: bool, identity: Identity) -> (Quic, Receiver<String>) {
+        let (heard, told) = channel();
+        let shared = Shared {
+            heard_us: AtomicU64::new(0),
+            on_datagram: Box::new(move |key, _| {
+                // Whoever asked may have gone.
+                let _ = heard.send(key.to_owned());
+            }),
+        };
+        let end = Quic::open(at, is_listening, identity, Arc::new(shared));
+        (end.expect("a port"), told)
+    }
+
+    fn free_port() -> Endpoint {
+        let socket = UdpSocket::bind("127.0.0.1:0").expect("the system has ports");
+        let port = socket.local_addr().expect("an address").port();
+        let endpoint = format!("quic/localhost:{port}");
+        endpoint.parse().expect("an endpoint")
+    }
+
+    /// Sends what the display says until `enough`.
+    fn speak_until(speaker: &Quic, mut enough: impl FnMut() -> bool) -> bool {
+        let datagram = [KEY.as_bytes(), &[0, 1, 2, 3]].concat();
+        let began = Instant::now();
+        while !enough() {
+            if began.elapsed() > LIMIT {
+                return false;
+            }
+            speaker.send(&datagram);
+            thread::sleep(Duration::from_millis(5));
+        }
+        true
+    }
+
+    #[test]
+    fn a_connection_ends_with_the_certificate_of_its_other_end() {
+        let ours = Authority::new();
+        let at = free_port();
+        let (listener, told) = open(&at, true, ours.identity("bench.sensor", YEAR));
+        let short = ours.identity("bench.display", Duration::from_secs(4));
+        let (display, _) = open(&at, false, short);
+        assert!(speak_until(&display, || told
+            .try_iter()
+            .any(|key| key == KEY)));
+        let peers = || locked(&listener.peers.connections).len();
+        assert!(speak_until(&display, || peers() == 0));
+        while told.try_recv().is_ok() {}
+        // It comes again and again, and in no more, while another one does.
+        let (good, _) = open(&at, false, ours.identity("bench.display", YEAR));
+        assert!(speak_until(&good, || told.try_iter().count() > 0));
+        drop(good);
+        assert!(speak_until(&display, || peers() == 0));
+    }
+
+    #[test]
+    fn who_is_of_another_authority_or_bench_is_not_heard_and_neither_is_another_boards_key() {
+        let (ours, theirs) = (Authority::new(), Authority::new());
+        let at = free_port();
+        let (listener, told) = open(&at, true, ours.identity("bench.sensor", YEAR));
+        let strangers = [
+            theirs.identity("bench.display", YEAR),
+            ours.identity("other.display", YEAR),
+            ours.identity("bench.router", YEAR),
+            // Let in, and not heard on the display's key.
+            ours.identity("bench.sensor", YEAR),
+        ]
+        .map(|identity| open(&at, false, identity).0);
+        let peers = || locked(&listener.peers.connections).len();
+        let speaks = |mut enough: Box<dyn FnMut() -> bool + '_>| {
+            speak_until(&strangers[3], || {
+                for stranger in &strangers[..3] {
+                    stranger.send(&[KEY.as_bytes(), &[0]].concat());
+                }
+                enough()
+            })
+        };
+        assert!(speaks(Box::new(|| peers() == 1)));
+        let (display, _) = open(&at, false, ours.identity("bench.display", YEAR));
+        let began = Instant::now();
+        assert!(speaks(Box::new(|| {
+            assert!(told.try_recv().is_err(), "somebody else was heard");
+            peers() == 2 && began.elapsed() > AGAIN
+        })));
+        assert!(speak_until(&display, || told
+            .try_iter()
+            .any(|key| key == KEY)));
+    }
+}
