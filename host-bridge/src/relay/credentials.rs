@@ -50,51 +50,39 @@ pub enum CredentialsError {
     Unusable(PathBuf, Error),
 }
 
-/// What is in the three files.
-struct Contents {
-    provider: Arc<CryptoProvider>,
-    roots: Arc<RootCertStore>,
-    chain: Vec<CertificateDer<'static>>,
-    key: PrivateKeyDer<'static>,
+/// What connections are made with.
+pub struct Loaded {
+    /// Those that one makes.
+    pub connecting: ClientConfig,
+    /// Those that others make.
+    pub listening: ServerConfig,
 }
 
 impl Credentials {
-    /// Reads and checks all three: what a connection will be made with. Fails if one of them can't be read, is
+    /// Reads and checks all three: what connections will be made with. Fails if one of them can't be read, is
     /// none, doesn't fit, or is not valid today.
-    pub fn load(&self) -> Result<ClientConfig, CredentialsError> {
-        let contents = self.read()?;
-        ClientConfig::builder_with_provider(contents.provider)
-            .with_protocol_versions(&[&TLS13])
-            .map_err(|reason| self.refusal(reason))?
-            .with_root_certificates(contents.roots)
-            .with_client_auth_cert(contents.chain, contents.key)
-            .map_err(|reason| self.refusal(reason))
-    }
-
-    /// The same for connections that others make. Fails as [`Credentials::load`] does.
-    pub fn load_listener(&self) -> Result<ServerConfig, CredentialsError> {
-        let contents = self.read()?;
-        let verifier = self.verifier(&contents.roots, &contents.provider)?;
-        ServerConfig::builder_with_provider(contents.provider)
-            .with_protocol_versions(&[&TLS13])
-            .map_err(|reason| self.refusal(reason))?
-            .with_client_cert_verifier(verifier)
-            .with_single_cert(contents.chain, contents.key)
-            .map_err(|reason| self.refusal(reason))
-    }
-
-    fn read(&self) -> Result<Contents, CredentialsError> {
+    pub fn load(&self) -> Result<Loaded, CredentialsError> {
         let provider = Arc::new(ring::default_provider());
         let roots = Arc::new(roots(&self.ca)?);
         let chain = certificates(&self.certificate)?;
-        self.check_validity(&roots, &chain, &provider)?;
+        let verifier = self.verifier(&roots, &provider)?;
+        self.check_validity(&verifier, &chain)?;
         let key = PrivateKeyDer::from_pem_slice(&read(&self.key)?)
             .map_err(|_| CredentialsError::NoKey(self.key.clone()))?;
-        Ok(Contents {
-            provider,
-            roots,
-            chain,
-            key,
+        let refused = |reason| self.refusal(reason);
+        Ok(Loaded {
+            connecting: ClientConfig::builder_with_provider(Arc::clone(&provider))
+                .with_protocol_versions(&[&TLS13])
+                .map_err(refused)?
+                .with_root_certificates(roots)
+                .with_client_auth_cert(chain.clone(), key.clone_key())
+                .map_err(refused)?,
+            listening: ServerConfig::builder_with_provider(provider)
+                .with_protocol_versions(&[&TLS13])
+                .map_err(refused)?
+                .with_client_cert_verifier(verifier)
+                .with_single_cert(chain, key)
+                .map_err(refused)?,
         })
     }
 
@@ -122,14 +110,12 @@ impl Credentials {
     /// another CA than this one.
     fn check_validity(
         &self,
-        roots: &Arc<RootCertStore>,
+        verifier: &Arc<dyn ClientCertVerifier>,
         chain: &[CertificateDer<'static>],
-        provider: &Arc<CryptoProvider>,
     ) -> Result<(), CredentialsError> {
         let Some((own, between)) = chain.split_first() else {
             return Err(CredentialsError::NoCertificate(self.certificate.clone()));
         };
-        let verifier = self.verifier(roots, provider)?;
         let path = self.certificate.clone();
         match verifier.verify_client_cert(own, between, UnixTime::now()) {
             Ok(_) | Err(Error::InvalidCertificate(CertificateError::UnknownIssuer)) => Ok(()),

@@ -132,11 +132,7 @@ impl Network {
             };
             return Err(refusal(endpoint.clone()));
         }
-        let tls = credentials.as_ref().map(Credentials::load).transpose()?;
-        let listener = credentials
-            .as_ref()
-            .map(Credentials::load_listener)
-            .transpose()?;
+        let loaded = credentials.as_ref().map(Credentials::load).transpose()?;
         for endpoint in ends.endpoints().iter().filter(|_| is_listening) {
             endpoint
                 .try_listening()
@@ -145,11 +141,10 @@ impl Network {
         Ok(Self {
             ends,
             credentials,
-            identity: tls
-                .clone()
-                .zip(listener)
-                .map(|(tls, listener)| Identity::new(tls, listener, names.clone())),
-            tls: tls.map(Arc::new),
+            tls: loaded
+                .as_ref()
+                .map(|loaded| Arc::new(loaded.connecting.clone())),
+            identity: loaded.map(|loaded| Identity::new(loaded, names.clone())),
             names,
         })
     }

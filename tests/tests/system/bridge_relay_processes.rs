@@ -141,7 +141,7 @@ fn what_goes_by_datagrams_goes_on_while_the_stream_stands_still_and_what_is_lost
 }
 
 #[test]
-fn so_it_does_with_certificates() {
+fn datagrams_with_certificates_go_on_while_the_stream_stands_still() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let authority = Authority::new(folder, "datagrams");
     let proofs = ["sensor", "display"].map(|role| authority.proofs(role, Kind::Good, &authority));

@@ -103,7 +103,7 @@ fn a_certificate_of_the_right_ca_speaks_for_nobody_but_whom_it_names() {
 }
 
 #[test]
-fn nor_does_it_by_datagrams() {
+fn a_certificate_of_the_right_ca_sends_datagrams_for_nobody_but_whom_it_names() {
     // A datagram has the certificate's name with it.
     assert_forgers_are_refused("quic", "REFUSED: other.display may not speak on any key", 6);
 }

@@ -24,6 +24,7 @@ use tokio::task::spawn_blocking;
 use tokio::time::{sleep, timeout};
 
 use crate::lock::locked;
+use crate::relay::credentials::Loaded;
 use crate::relay::datagrams::{self, PEERS, Shared};
 use crate::relay::endpoint::Endpoint;
 use crate::relay::name::{self, Name};
@@ -54,11 +55,11 @@ pub struct Identity {
 
 impl Identity {
     /// One that takes part in the benches `names`.
-    pub fn new(
-        mut connecting: rustls::ClientConfig,
-        mut listening: rustls::ServerConfig,
-        names: Vec<Name>,
-    ) -> Self {
+    pub fn new(loaded: Loaded, names: Vec<Name>) -> Self {
+        let Loaded {
+            mut connecting,
+            mut listening,
+        } = loaded;
         connecting.alpn_protocols = vec![PROTOCOL.to_vec()];
         listening.alpn_protocols = vec![PROTOCOL.to_vec()];
         Self {
@@ -125,13 +126,13 @@ impl Quic {
         Ok(Self {
             peers,
             end: Some(end),
-            thread: Some(thread::spawn(move || run(&runtime, work, ended))),
+            thread: Some(thread::spawn(move || run(runtime, work, ended))),
         })
     }
 }
 
-/// Does `work` until it `ended`. What it has begun ends with the runtime.
-fn run(runtime: &Runtime, work: impl Future<Output = ()>, ended: oneshot::Receiver<()>) {
+/// Does `work` until it `ended`. What it has begun ends with it; a name that is being looked up is not waited for.
+fn run(runtime: Runtime, work: impl Future<Output = ()>, ended: oneshot::Receiver<()>) {
     runtime.block_on(async {
         tokio::select! {
             () = work => {}
@@ -139,6 +140,7 @@ fn run(runtime: &Runtime, work: impl Future<Output = ()>, ended: oneshot::Receiv
             _ = ended => {}
         }
     });
+    runtime.shutdown_background();
 }
 
 impl datagrams::End for Quic {
@@ -175,8 +177,8 @@ fn transport() -> Arc<TransportConfig> {
         .max_idle_timeout(Some(idle.into()))
         .keep_alive_interval(Some(KEEP_ALIVE))
         .datagram_send_buffer_size(WAITING)
-        .congestion_controller_factory(Arc::new(Steady))
-        // There is the other stream for that.
+        .congestion_controller_factory(Arc::new(FixedWindow))
+        // The stream over TLS is for what has to come.
         .max_concurrent_bidi_streams(VarInt::default())
         .max_concurrent_uni_streams(VarInt::default());
     Arc::new(transport)
@@ -203,7 +205,7 @@ async fn listen(port: &quinn::Endpoint, peers: &Arc<Peers>) {
         } else if incoming.remote_address_validated() {
             tokio::spawn(welcome(incoming, Arc::clone(peers)));
         } else {
-            // Whoever is where he says gets in at the second try; only one that was tried is not tried again.
+            // Whoever forges his address does not get this answer. It can be given once, and was not.
             let _ = incoming.retry();
         }
     }
@@ -288,17 +290,17 @@ fn identify(connection: &Connection) -> Option<(String, Duration)> {
     Some((common_name.as_str().ok()?.to_owned(), valid))
 }
 
-/// Lets everything go that is to go.
+/// A congestion window that no loss narrows.
 #[derive(Clone)]
-struct Steady;
+struct FixedWindow;
 
-impl ControllerFactory for Steady {
+impl ControllerFactory for FixedWindow {
     fn build(self: Arc<Self>, _: Instant, _: u16) -> Box<dyn Controller> {
         Box::new(Self)
     }
 }
 
-impl Controller for Steady {
+impl Controller for FixedWindow {
     fn on_congestion_event(&mut self, _: Instant, _: Instant, _: bool, _: u64) {}
 
     fn on_mtu_update(&mut self, _: u16) {}
@@ -322,6 +324,8 @@ impl Controller for Steady {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::PathBuf;
     use std::sync::atomic::AtomicU64;
     use std::sync::mpsc::{Receiver, channel};
 
@@ -329,33 +333,35 @@ mod tests {
         BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose,
         IsCa, Issuer, KeyPair, date_time_ymd,
     };
-    use rustls::RootCertStore;
-    use rustls::crypto::ring;
-    use rustls::pki_types::PrivateKeyDer;
-    use rustls::server::WebPkiClientVerifier;
-    use rustls::version::TLS13;
 
     use super::*;
+    use crate::relay::credentials::Credentials;
     use crate::relay::datagrams::End;
+    use crate::relay::refused::Refused;
 
     const KEY: &str = "ridgelink/bench/display/board";
     /// Only what hangs takes so long.
     const LIMIT: Duration = Duration::from_secs(120);
+    /// When what was said is said again, unless it is heard.
+    const UNHEARD: Duration = Duration::from_millis(5);
     const YEAR: Duration = Duration::from_secs(365 * 86_400);
 
     struct Authority {
-        root: CertificateDer<'static>,
+        folder: PathBuf,
         issuer: Issuer<'static, KeyPair>,
     }
 
     impl Authority {
-        fn new() -> Self {
+        fn new(name: &str) -> Self {
+            let folder = std::env::temp_dir().join(format!("quic-{}-{name}", std::process::id()));
+            fs::create_dir_all(&folder).expect("a folder");
             let key = KeyPair::generate().expect("a key");
             let mut params = CertificateParams::default();
             params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
             let root = params.self_signed(&key).expect("it can be signed");
+            fs::write(folder.join("ca.pem"), root.pem()).expect("it can be written");
             Self {
-                root: root.der().clone(),
+                folder,
                 issuer: Issuer::new(params, key),
             }
         }
@@ -377,30 +383,25 @@ mod tests {
             params.not_after = date_time_ymd(1970, 1, 1) + now + valid;
             let key = KeyPair::generate().expect("a key");
             let certificate = params.signed_by(&key, &self.issuer).expect("it is signed");
-            let chain = vec![certificate.der().clone()];
-            let key = || PrivateKeyDer::Pkcs8(key.serialize_der().into());
-            let mut roots = RootCertStore::empty();
-            roots.add(self.root.clone()).expect("a root");
-            let roots = Arc::new(roots);
-            let provider = Arc::new(ring::default_provider());
-            let verifier = WebPkiClientVerifier::builder_with_provider(
-                Arc::clone(&roots),
-                Arc::clone(&provider),
-            );
-            let connecting = rustls::ClientConfig::builder_with_provider(Arc::clone(&provider))
-                .with_protocol_versions(&[&TLS13])
-                .expect("a version")
-                .with_root_certificates(roots)
-                .with_client_auth_cert(chain.clone(), key())
-                .expect("they fit");
-            let listening = rustls::ServerConfig::builder_with_provider(provider)
-                .with_protocol_versions(&[&TLS13])
-                .expect("a version")
-                .with_client_cert_verifier(verifier.build().expect("it has a root"))
-                .with_single_cert(chain, key())
-                .expect("they fit");
+            let write = |file: &str, pem: String| {
+                let path = self.folder.join(file);
+                fs::write(&path, pem).expect("it can be written");
+                path
+            };
+            let credentials = Credentials {
+                ca: self.folder.join("ca.pem"),
+                certificate: write("own.pem", certificate.pem()),
+                key: write("own.key", key.serialize_pem()),
+            };
             let names = vec!["bench".parse().expect("a name")];
-            Identity::new(connecting, listening, names)
+            Identity::new(credentials.load().expect("they fit"), names)
+        }
+    }
+
+    impl Drop for Authority {
+        fn drop(&mut self) {
+            // Left there, it is in nobody's way.
+            let _ = fs::remove_dir_all(&self.folder);
         }
     }
 
@@ -424,45 +425,46 @@ mod tests {
         endpoint.parse().expect("an endpoint")
     }
 
-    /// Sends what the display says until `enough`.
-    fn speak_until(speaker: &Quic, mut enough: impl FnMut() -> bool) -> bool {
+    /// All of them say what the display says, again whenever it is heard or was not for a while, until it is `enough`,
+    /// asked with what was heard.
+    fn speak_until(
+        speakers: &[&Quic],
+        told: &Receiver<String>,
+        mut enough: impl FnMut(Option<&str>) -> bool,
+    ) {
         let datagram = [KEY.as_bytes(), &[0, 1, 2, 3]].concat();
         let began = Instant::now();
-        while !enough() {
-            if began.elapsed() > LIMIT {
-                return false;
+        let mut heard = None;
+        while !enough(heard.as_deref()) {
+            assert!(began.elapsed() < LIMIT, "not enough after {LIMIT:?}");
+            for speaker in speakers {
+                speaker.send(&datagram);
             }
-            speaker.send(&datagram);
-            thread::sleep(Duration::from_millis(5));
+            heard = told.recv_timeout(UNHEARD).ok();
         }
-        true
     }
 
     #[test]
     fn a_connection_ends_with_the_certificate_of_its_other_end() {
-        let ours = Authority::new();
+        let ours = Authority::new("expiry");
         let at = free_port();
         let (listener, told) = open(&at, true, ours.identity("bench.sensor", YEAR));
         let short = ours.identity("bench.display", Duration::from_secs(4));
         let (display, _) = open(&at, false, short);
-        assert!(speak_until(&display, || told
-            .try_iter()
-            .any(|key| key == KEY)));
         let peers = || locked(&listener.peers.connections).len();
-        assert!(speak_until(&display, || peers() == 0));
+        speak_until(&[&display], &told, |heard| heard == Some(KEY));
+        speak_until(&[&display], &told, |_| peers() == 0);
+        // Another one gets in where it does not any more.
         while told.try_recv().is_ok() {}
-        // It comes again and again, and in no more, while another one does.
         let (good, _) = open(&at, false, ours.identity("bench.display", YEAR));
-        assert!(speak_until(&good, || told.try_iter().count() > 0));
-        drop(good);
-        assert!(speak_until(&display, || peers() == 0));
+        speak_until(&[&good], &told, |heard| heard == Some(KEY));
     }
 
     #[test]
     fn who_is_of_another_authority_or_bench_is_not_heard_and_neither_is_another_boards_key() {
-        let (ours, theirs) = (Authority::new(), Authority::new());
+        let (ours, theirs) = (Authority::new("ours"), Authority::new("theirs"));
         let at = free_port();
-        let (listener, told) = open(&at, true, ours.identity("bench.sensor", YEAR));
+        let (_listener, told) = open(&at, true, ours.identity("bench.sensor", YEAR));
         let strangers = [
             theirs.identity("bench.display", YEAR),
             ours.identity("other.display", YEAR),
@@ -471,24 +473,20 @@ mod tests {
             ours.identity("bench.sensor", YEAR),
         ]
         .map(|identity| open(&at, false, identity).0);
-        let peers = || locked(&listener.peers.connections).len();
-        let speaks = |mut enough: Box<dyn FnMut() -> bool + '_>| {
-            speak_until(&strangers[3], || {
-                for stranger in &strangers[..3] {
-                    stranger.send(&[KEY.as_bytes(), &[0]].concat());
-                }
-                enough()
+        let mut refused = Vec::new();
+        let mut is_named = |name: &str, on: Option<&str>| {
+            refused.extend(refused::take());
+            refused.iter().any(|one| {
+                matches!(one, Refused::Named { peer, key } if peer == name && key.as_deref() == on)
             })
         };
-        assert!(speaks(Box::new(|| peers() == 1)));
+        speak_until(&strangers.each_ref(), &told, |heard| {
+            assert_eq!(heard, None, "a stranger is heard");
+            is_named("other.display", None)
+                && is_named("bench.router", None)
+                && is_named("bench.sensor", Some(KEY))
+        });
         let (display, _) = open(&at, false, ours.identity("bench.display", YEAR));
-        let began = Instant::now();
-        assert!(speaks(Box::new(|| {
-            assert!(told.try_recv().is_err(), "somebody else was heard");
-            peers() == 2 && began.elapsed() > AGAIN
-        })));
-        assert!(speak_until(&display, || told
-            .try_iter()
-            .any(|key| key == KEY)));
+        speak_until(&[&display], &told, |heard| heard == Some(KEY));
     }
 }
