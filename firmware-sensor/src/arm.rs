@@ -3,13 +3,19 @@
 use protocol::{ArmState, Motion, Trip};
 
 /// Milliseconds without a [`Motion`] after which the arm stands still.
-const SILENCE_MS: u32 = 100;
+pub const SILENCE_MS: u32 = 100;
 /// kp: the velocity that an error of position adds, in µm/s per µm. The error decays with a time
 /// constant of 1/kp, 100 ms: slow beside the drive, so that no drive of this kind oscillates with it.
 const POSITION_GAIN_PER_S: i64 = 10;
 /// Errors of position are taken for no larger than this, in µm: any such error asks for full speed, and
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
+
+/// What a hand may be away from where its last motion has it by now, in µm a ms since then and in µm: it turns from no
+/// more than 2 m/s. What is further away is another hand, with a zero of its own.
+const MOST_TURN_UM_PER_MS: u64 = 2_000;
+/// See [`MOST_TURN_UM_PER_MS`].
+const LEAST_TURN_UM: u64 = 1_000;
 
 /// What the arm's servo drive gets: its velocity command as PWM and a direction pin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,17 +55,17 @@ impl Arm {
     /// Takes a motion that came while the arm was at `arm_um`. One with an older or the same sequence
     /// is refused, and false returned; so is any once it is stopped.
     ///
-    /// The first motion, also the first one after [a silence](Arm::step), fixes the offset between hand
-    /// and arm: the arm never jumps to where the hand went meanwhile, and a restarted display, which
-    /// counts from 0 again, is followed.
+    /// The first motion, also the first one after [a silence](Arm::step) and the first of another hand, fixes the
+    /// offset between hand and arm: the arm never jumps to where the hand went meanwhile, and a restarted
+    /// display, which counts from 0 again, is followed.
     pub fn on_motion(&mut self, motion: &Motion, arm_um: i64) -> bool {
         if self.stopped.is_some() {
             return false;
         }
         let offset_um = match &self.following {
-            None => motion.position_um.saturating_sub(arm_um),
-            Some(f) if motion.sequence.wrapping_sub(f.sequence).cast_signed() > 0 => f.offset_um,
-            Some(_) => return false,
+            Some(f) if motion.sequence.wrapping_sub(f.sequence).cast_signed() <= 0 => return false,
+            Some(f) if f.leads_to(motion) => f.offset_um,
+            _ => motion.position_um.saturating_sub(arm_um),
         };
         self.following = Some(Following {
             sequence: motion.sequence,
@@ -69,6 +75,11 @@ impl Arm {
             age_ms: 0,
         });
         true
+    }
+
+    /// Nothing was heard and driven for longer than [a silence](Arm::step): the next motion is a first one.
+    pub fn rest(&mut self) {
+        self.following = None;
     }
 
     /// The drive is off from now on, for good.
@@ -98,16 +109,30 @@ impl Arm {
             return Drive::default();
         }
         let velocity_um_s = i64::from(f.velocity_um_s);
-        let hand_um = f
-            .hand_um
-            .saturating_add(velocity_um_s * i64::from(f.age_ms) / 1_000);
-        let error_um = hand_um.saturating_sub(f.offset_um).saturating_sub(arm_um);
+        let error_um = f
+            .expected_um()
+            .saturating_sub(f.offset_um)
+            .saturating_sub(arm_um);
         let error_um = error_um.clamp(-MAX_ERROR_UM, MAX_ERROR_UM);
         f.age_ms += 1;
         drive(
             velocity_um_s + POSITION_GAIN_PER_S * error_um,
             full_scale_um_s,
         )
+    }
+}
+
+impl Following {
+    /// Where the hand is by now, if it goes on with its last velocity.
+    fn expected_um(&self) -> i64 {
+        let moved_um = i64::from(self.velocity_um_s) * i64::from(self.age_ms) / 1_000;
+        self.hand_um.saturating_add(moved_um)
+    }
+
+    /// Whether the same hand can be where `motion` has it.
+    fn leads_to(&self, motion: &Motion) -> bool {
+        let away_um = motion.position_um.saturating_sub(self.expected_um());
+        away_um.unsigned_abs() <= LEAST_TURN_UM + MOST_TURN_UM_PER_MS * u64::from(self.age_ms)
     }
 }
 
@@ -196,6 +221,35 @@ mod tests {
         assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
         assert!(arm.on_motion(&motion(0, 900_000, 0), 5_000));
         assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+    }
+
+    #[test]
+    fn another_hand_with_newer_numbers_is_followed_from_where_both_are() {
+        let mut arm = Arm::default();
+        assert!(arm.on_motion(&motion(10, 0, 0), 700));
+        for _ in 0..30 {
+            assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+        }
+        // Half a metre away: no hand gets there in 30 ms.
+        assert!(arm.on_motion(&motion(1_000, 500_000, 0), 700));
+        assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+        // The same hand may be 50 mm away after 30 ms that were lost, and is followed there.
+        for _ in 1..30 {
+            arm.step(700, FULL_SCALE_UM_S);
+        }
+        assert!(arm.on_motion(&motion(1_001, 550_000, 0), 700));
+        assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, Drive::FULL);
+    }
+
+    #[test]
+    fn after_a_rest_the_next_motion_is_a_first_one() {
+        let mut arm = Arm::default();
+        arm.on_motion(&motion(10, 0, 50_000), 0);
+        arm.step(0, FULL_SCALE_UM_S);
+        arm.rest();
+        assert_eq!(arm.step(0, FULL_SCALE_UM_S), Drive::default());
+        assert!(arm.on_motion(&motion(9, 900, 0), 0));
+        assert_eq!(arm.step(0, FULL_SCALE_UM_S).duty, 0);
     }
 
     #[test]

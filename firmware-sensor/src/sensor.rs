@@ -148,6 +148,11 @@ impl Sensor {
         self.arm.stop(trip);
     }
 
+    /// No sample was taken for longer than [`SILENCE_MS`](crate::arm::SILENCE_MS): the arm rests until the next motion.
+    pub fn pause(&mut self) {
+        self.arm.rest();
+    }
+
     /// What the arm does.
     pub fn arm(&self) -> ArmState {
         self.arm.state()

@@ -9,6 +9,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
+use firmware_sensor::arm::SILENCE_MS;
 use firmware_sensor::capabilities::CAPABILITIES;
 use firmware_sensor::{Drive, Sensor, Settings, line};
 use nucleo::answer::answer;
@@ -28,6 +29,8 @@ use crate::board::{ARM_PWM_PERIOD, ArmDrive, Board, Sampler, ScansLost};
 
 /// Time between two samples: the sampling task's deadline.
 const SAMPLE_PERIOD: Duration = Duration::from_hz(firmware_sensor::SAMPLE_RATE_HZ as u64);
+/// Time without a sample after which the arm rests, as after the same time without a motion.
+const SILENCE: Duration = Duration::from_millis(SILENCE_MS as u64);
 
 /// From the ports to the sampling task: the latest counts.
 static MOTION: Signal<CriticalSectionRawMutex, Motion> = Signal::new();
@@ -97,7 +100,11 @@ async fn sample(
         sensor.stop(trip);
     }
     arm.enable();
+    // One that was stopped before its restart says so, whether scans come or not.
+    Timer::after(ARM_PWM_PERIOD).await;
+    announced.tell(sensor.arm());
     sampler.start();
+    let mut served = Instant::now();
     loop {
         let sampled = match select(STOP.wait(), sampler.next()).await {
             // Said again, it changes nothing.
@@ -128,6 +135,12 @@ async fn sample(
             }
         };
         let begun = Instant::now();
+        if begun - served > SILENCE {
+            // What the hand did and said meanwhile is not to be caught up with.
+            MOTION.reset();
+            sensor.pause();
+        }
+        served = begun;
         if let Some(configuration) = CONFIGURE.try_take() {
             sensor.configure(configuration);
         }

@@ -4,22 +4,23 @@ use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::Touch;
-use crate::float::{larger, smaller, sqrt};
+use crate::float::{larger, sqrt};
 use crate::phasor::phasor;
 use crate::travel::PLACES_PER_UM;
 
-/// Gain in power of the first and of the second difference for white noise behind the anti-aliasing filter.
-const FIRST_DIFFERENCE_NOISE_GAIN: f32 = 1.83;
-/// See [`FIRST_DIFFERENCE_NOISE_GAIN`].
-const SECOND_DIFFERENCE_NOISE_GAIN: f32 = 4.85;
-/// What of the noise's variance is not known: a tenth of what it makes of the second difference.
-const NOISE_DOUBT: f32 = 0.5;
+/// Gains in power of the first and of the second difference for white noise behind the anti-aliasing filter.
+const NOISE_GAINS: [f32; 2] = [1.83, 4.85];
+/// Share of what noise makes of a difference that is not known.
+const NOISE_DOUBT: f32 = 0.1;
 /// What a contact dulls a texture by: a Gaussian of this σ in mm, 0.24 mm wide at half height.
 const CONTACT_SIGMA_MM: f32 = 0.1;
 /// Power at high frequencies, relative to the wave's, that is never held against a surface.
 const LEAST_JERK: f32 = 0.005;
 /// What is faster than this is noise: a fingertip on its spring slips for some ms. White noise is at 303 Hz.
 const SLIPS_BELOW_HZ: f32 = 350.0;
+/// Up to this speed in mm/s, what a contact of 0.24 mm lets through passes at 100 Hz at most. So the first difference tells
+/// slips from it, too, and noise makes less of it.
+const SLOW_MM_S: f32 = 25.0;
 /// How much more than from its quiet moments steady power may be, which is known to a fifth or so.
 const STEADY_DOUBT: f32 = 1.05;
 /// Speed from which on a millisecond counts, in places a millisecond: 5 mm/s.
@@ -39,34 +40,67 @@ const QUIET_OF_MEAN: [f32; GAUGES] = [0.0158, 0.1054, 0.1948, 0.2659, 0.3221];
 /// Time constant of the high-frequency power, in samples.
 const JERK_SAMPLES: f32 = 300.0;
 
-/// The power of the second difference in time, which high frequencies dominate.
+/// The power of a difference in time, over the milliseconds that moved.
+#[derive(Clone, Copy, Debug, Default)]
+struct Power {
+    /// Its mean, and the mean of it by speed in places a millisecond.
+    mean: f32,
+    by_speed: f32,
+    /// The power by speed that a tenth of them are below: roughness passes as fast as the arm is.
+    quiet: f32,
+}
+
+/// The power of the first and of the second difference in time. High frequencies dominate the second one: where the
+/// arm is slow, and slips are slower than the noise, the first shows more of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jerk {
     before: [[f32; GAUGES]; 2],
     /// Speed lately, in places a millisecond.
     speed: f32,
-    /// Means over the milliseconds that moved: the second difference's power, and that by speed.
-    power: f32,
-    by_speed: f32,
-    /// The same of the first difference's power, and of the speed in places a millisecond.
-    first: f32,
+    /// Of the first and of the second difference.
+    powers: [Power; 2],
     mean_speed: f32,
-    /// The power by speed that a tenth of them are below: roughness passes as fast as the arm is.
-    quiet: f32,
     samples: u32,
+}
+
+impl Power {
+    /// Takes a millisecond's, for that share of the mean; the quiet one follows in steps of that size.
+    fn take(&mut self, power: f32, per_speed: f32, share: f32, step: f32) {
+        let by_speed = power * per_speed;
+        self.mean += (power - self.mean) * share;
+        self.by_speed += (by_speed - self.by_speed) * share;
+        if self.quiet == 0.0 {
+            self.quiet = by_speed;
+        }
+        // A quantile in steps of its own size: so many up as down once a share of the powers is below.
+        self.quiet *= if by_speed > self.quiet {
+            1.0 + step * QUIET_SHARE
+        } else {
+            1.0 - step * (1.0 - QUIET_SHARE)
+        };
+        self.quiet = larger(self.quiet, self.by_speed * QUIET_LEAST);
+    }
+
+    /// What the mean power may be if it is always as in the quiet moments, speed for speed, with `gauges`
+    /// gauges: a fingertip that sticks and slips is quiet in between, noise and a rough surface are not.
+    fn steady(&self, gauges: u32) -> f32 {
+        let gauges = (gauges as usize).clamp(1, GAUGES);
+        let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * self.by_speed.max(f32::MIN_POSITIVE));
+        (STEADY_DOUBT * share * self.mean).min(STEADY_DOUBT * self.mean)
+    }
 }
 
 impl Jerk {
     /// Takes a millisecond's touch and its travel in places.
     pub(super) fn push(&mut self, touch: &Touch, travel: i32) {
         let [before, older] = self.before;
-        let (mut first, mut power) = (0.0, 0.0);
+        let (mut first, mut second) = (0.0, 0.0);
         for gauge in 0..GAUGES {
             if touch.usable >> gauge & 1 == 1 {
                 let step = touch.gauges[gauge] - before[gauge];
-                let second = step - (before[gauge] - older[gauge]);
+                let bend = step - (before[gauge] - older[gauge]);
                 first += step * step;
-                power += second * second;
+                second += bend * bend;
             }
         }
         self.before = [touch.gauges, before];
@@ -79,33 +113,23 @@ impl Jerk {
         let Some(samples) = self.samples.checked_sub(2).filter(|&samples| samples > 0) else {
             return;
         };
-        let samples = samples as f32;
-        let share = 1.0 / smaller(samples, JERK_SAMPLES);
-        let by_speed = power / self.speed;
-        self.power += (power - self.power) * share;
-        self.by_speed += (by_speed - self.by_speed) * share;
-        self.first += (first - self.first) * share;
+        let one = 1.0 / samples as f32;
+        let (share, step) = (larger(one, 1.0 / JERK_SAMPLES), larger(one, QUIET_STEP));
+        let per_speed = 1.0 / self.speed;
+        let [of_first, of_second] = &mut self.powers;
+        of_first.take(first, per_speed, share, step);
+        of_second.take(second, per_speed, share, step);
         self.mean_speed += (self.speed - self.mean_speed) * share;
-        if self.quiet == 0.0 {
-            self.quiet = by_speed;
-        }
-        // A quantile in steps of its own size: so many up as down once a share of the powers is below.
-        let step = larger(1.0 / samples, QUIET_STEP);
-        self.quiet *= if by_speed > self.quiet {
-            1.0 + step * QUIET_SHARE
-        } else {
-            1.0 - step * (1.0 - QUIET_SHARE)
-        };
-        self.quiet = larger(self.quiet, self.by_speed * QUIET_LEAST);
     }
 
     /// Begins anew, on another surface or with other gauges: it is as quiet as before in between.
     pub(super) fn restart(&mut self) {
         *self = Self {
             samples: self.samples.min(2),
-            power: 0.0,
-            by_speed: 0.0,
-            first: 0.0,
+            powers: self.powers.map(|power| Power {
+                quiet: power.quiet,
+                ..Power::default()
+            }),
             mean_speed: 0.0,
             ..*self
         };
@@ -123,21 +147,16 @@ impl Jerk {
         noise: f32,
         gauges: u32,
     ) -> bool {
-        let quiet = self
-            .steady(gauges)
-            .max(SECOND_DIFFERENCE_NOISE_GAIN * noise);
-        let left = self.power - quiet - NOISE_DOUBT * noise;
-        if left <= LEAST_JERK * explained {
-            return false;
-        }
         // What a wave with sharp edges makes, as far as the contact leaves them sharp.
-        let wave = |number: f32, share: f32| {
-            share * second_difference_gain(number * hz) * let_through(number / wavelength_mm)
+        let edges = |order: i32| {
+            let wave = |number: f32, share: f32| {
+                share * difference_gain(number * hz, order) * let_through(number / wavelength_mm)
+            };
+            (wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04))
+                / let_through(1.0 / wavelength_mm)
         };
-        let edges = wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04);
-        let left = left - explained * edges / let_through(1.0 / wavelength_mm);
-        let second = (self.power - SECOND_DIFFERENCE_NOISE_GAIN * noise).max(0.0);
-        let first = self.first - FIRST_DIFFERENCE_NOISE_GAIN * noise;
+        let beyond_noise = |n: usize| (self.powers[n].mean - NOISE_GAINS[n] * noise).max(0.0);
+        let (first, second) = (beyond_noise(0), beyond_noise(1));
         // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
         let sine = if second < 4.0 * first {
             0.5 * sqrt(second / first)
@@ -146,15 +165,15 @@ impl Jerk {
         };
         let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
         let per_mm = slip_hz * PLACES_PER_UM as f32 / self.mean_speed.max(f32::MIN_POSITIVE);
-        slip_hz < SLIPS_BELOW_HZ && left > explained * let_through(per_mm).max(LEAST_JERK)
-    }
-
-    /// What the mean power may be if it is always as in the quiet moments, speed for speed, with `gauges`
-    /// gauges: a fingertip that sticks and slips is quiet in between, noise and a rough surface are not.
-    fn steady(&self, gauges: u32) -> f32 {
-        let gauges = (gauges as usize).clamp(1, GAUGES);
-        let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * self.by_speed.max(f32::MIN_POSITIVE));
-        (STEADY_DOUBT * share * self.power).min(STEADY_DOUBT * self.power)
+        let least = explained * let_through(per_mm).max(LEAST_JERK);
+        let stands_out = |n: usize| {
+            let power = &self.powers[n];
+            let known = NOISE_GAINS[n] * noise;
+            let left = power.mean - power.steady(gauges).max(known) - NOISE_DOUBT * known;
+            left > least && left > explained * edges(n as i32 + 1) + least
+        };
+        let is_slow = self.mean_speed < SLOW_MM_S * PLACES_PER_UM as f32;
+        slip_hz < SLIPS_BELOW_HZ && (stands_out(1) || is_slow && stands_out(0))
     }
 }
 
@@ -164,12 +183,12 @@ fn let_through(per_mm: f32) -> f32 {
     libm::expf(-(radians * radians).min(40.0))
 }
 
-/// Power gain of the second difference at 1 kHz, (2 sin(πf/fs))⁴, up to half the sample rate.
-fn second_difference_gain(frequency_hz: f32) -> f32 {
+/// Power gain of the first or second difference at 1 kHz, (2 sin(πf/fs))² or its square, up to half the sample rate.
+fn difference_gain(frequency_hz: f32, order: i32) -> f32 {
     let half_turns = (frequency_hz / SAMPLE_RATE_HZ as f32).min(0.5);
     let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
     let square = 4.0 * sin * sin;
-    square * square
+    if order == 1 { square } else { square * square }
 }
 
 #[cfg(test)]
@@ -230,14 +249,22 @@ mod tests {
             let sin = libm::sinf(TAU * 0.05);
             4.0 * sin * sin
         };
-        assert_near(jerk.first, 4.0 * 5_000.0 * gain, 1e-3);
-        assert_near(jerk.power, 4.0 * 5_000.0 * gain * gain, 1e-3);
+        assert_near(jerk.powers[0].mean, 4.0 * 5_000.0 * gain, 1e-3);
+        assert_near(jerk.powers[1].mean, 4.0 * 5_000.0 * gain * gain, 1e-3);
         let places = 40.0 * PLACES_PER_UM as f32;
         assert_near(jerk.mean_speed, places, 1e-3);
-        assert_near(jerk.by_speed, jerk.power / places, 1e-3);
-        assert_near(jerk.quiet, jerk.by_speed, 2.0 * QUIET_STEP);
+        assert_near(jerk.powers[1].by_speed, jerk.powers[1].mean / places, 1e-3);
+        assert_near(
+            jerk.powers[1].quiet,
+            jerk.powers[1].by_speed,
+            2.0 * QUIET_STEP,
+        );
         // Where all moments are alike, all of the power may be a rough surface's.
-        assert_near(jerk.steady(1), STEADY_DOUBT * jerk.power, 1e-6);
+        assert_near(
+            jerk.powers[1].steady(1),
+            STEADY_DOUBT * jerk.powers[1].mean,
+            1e-6,
+        );
     }
 
     #[test]
@@ -245,32 +272,37 @@ mod tests {
         let mut jerk = Jerk::default();
         feel(&mut jerk, 0..2_000, 40.0, 0b0_1111, even(100.0));
         feel(&mut jerk, 2_000..2_010, 40.0, 0b0_1111, even(50.0));
-        let before = jerk.quiet;
+        let before = jerk.powers[1].quiet;
         feel(&mut jerk, 2_010..2_030, 40.0, 0b0_1111, even(50.0));
-        assert_near(jerk.quiet, before * libm::powf(0.982, 20.0), 1e-4);
+        assert_near(jerk.powers[1].quiet, before * libm::powf(0.982, 20.0), 1e-4);
         feel(&mut jerk, 2_030..2_040, 40.0, 0b0_1111, even(200.0));
-        let before = jerk.quiet;
+        let before = jerk.powers[1].quiet;
         feel(&mut jerk, 2_040..2_060, 40.0, 0b0_1111, even(200.0));
-        assert_near(jerk.quiet, before * libm::powf(1.002, 20.0), 1e-4);
+        assert_near(jerk.powers[1].quiet, before * libm::powf(1.002, 20.0), 1e-4);
         // However quiet it is, a thousandth of the mean is left.
         feel(&mut jerk, 2_060..2_800, 40.0, 0b0_1111, even(0.0));
-        assert_near(jerk.quiet, 1e-3 * jerk.by_speed, 1e-3);
+        assert_near(jerk.powers[1].quiet, 1e-3 * jerk.powers[1].by_speed, 1e-3);
     }
 
     #[test]
     fn an_arm_that_creeps_tells_nothing_and_a_restart_forgets_the_means_alone() {
         let mut jerk = Jerk::default();
         feel(&mut jerk, 0..1_000, 4.5, 0b0_1111, even(100.0));
-        assert_eq!((jerk.power, jerk.samples), (0.0, 0));
+        assert_eq!((jerk.powers[1].mean, jerk.samples), (0.0, 0));
         feel(&mut jerk, 1_000..2_000, 5.5, 0b0_1111, even(100.0));
-        assert!(jerk.power > 0.0);
-        let quiet = jerk.quiet;
+        assert!(jerk.powers[1].mean > 0.0);
+        let quiet = jerk.powers[1].quiet;
         jerk.restart();
         assert_eq!(
-            [jerk.power, jerk.by_speed, jerk.first, jerk.mean_speed],
+            [
+                jerk.powers[0].mean,
+                jerk.powers[1].mean,
+                jerk.powers[1].by_speed,
+                jerk.mean_speed
+            ],
             [0.0; 4]
         );
-        assert_eq!((jerk.quiet, jerk.samples), (quiet, 2));
+        assert_eq!((jerk.powers[1].quiet, jerk.samples), (quiet, 2));
         // The first sample afterwards is the mean.
         feel(&mut jerk, 2_000..2_001, 5.5, 0b0_1111, even(100.0));
         assert_near(jerk.mean_speed, jerk.speed, 1e-6);
@@ -326,6 +358,20 @@ mod tests {
     }
 
     #[test]
+    fn slips_of_a_slow_arm_stand_out_of_more_noise() {
+        // Bursts that swell and fade, at 110 Hz: twice as much of them is in the first difference as in the second.
+        let soft = |ms: f32, _| {
+            let envelope = larger(sine(ms, 20.0), 0.0);
+            110.0 * envelope * envelope * sine(ms, 110.0)
+        };
+        let slip = |mm_s: f32, noise| is_slip(3.0, mm_s, noise, soft);
+        assert!(slip(10.0, 100.0));
+        assert!(!slip(1.1 * SLOW_MM_S, 100.0));
+        // Noise that makes as much of the first difference hides them again.
+        assert!(!slip(10.0, 1_200.0));
+    }
+
+    #[test]
     fn a_wave_that_passes_fast_is_jerky_by_itself() {
         // 100 Hz of a wave of 0.6 mm, and its edges' third at 300 Hz.
         let edge = |ms: f32, _| WAVE / 3.0 * 0.2 * sine(ms, 300.0);
@@ -335,9 +381,10 @@ mod tests {
 
     #[test]
     fn gains_are_as_physics_has_them() {
-        assert_near(second_difference_gain(250.0), 4.0, 1e-4);
-        assert_near(second_difference_gain(500.0), 16.0, 1e-4);
-        assert_near(second_difference_gain(800.0), 16.0, 1e-4);
+        assert_near(difference_gain(250.0, 2), 4.0, 1e-4);
+        assert_near(difference_gain(500.0, 2), 16.0, 1e-4);
+        assert_near(difference_gain(800.0, 2), 16.0, 1e-4);
+        assert_near(difference_gain(250.0, 1), 2.0, 1e-4);
         assert_near(
             let_through(1.0 / (TAU * CONTACT_SIGMA_MM)),
             libm::expf(-1.0),
