@@ -57,7 +57,8 @@ impl ClearGuard {
     /// CLR high, for [`HOLD_OFF_US`] from now.
     ///
     /// The counter is started before it is set: should software end between the two, it runs out and
-    /// CLR falls. A counter that stood at 1 would keep CLR high.
+    /// CLR falls. A counter that stood at 1 would keep CLR high: if the pulse before ended between the two, it is set
+    /// back.
     pub fn hold_off(&mut self) {
         let r = pac::TIM1;
         let mut running = Cr1Gp16(0);
@@ -65,6 +66,9 @@ impl ClearGuard {
         running.set_cen(true);
         r.cr1().write_value(running);
         r.cnt().write(|w| w.set_cnt(1));
+        if !r.cr1().read().cen() {
+            r.cnt().write(|w| w.set_cnt(0));
+        }
     }
 }
 

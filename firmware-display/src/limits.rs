@@ -93,11 +93,15 @@ impl Limits {
     /// Takes another rate and amplitude, of which a lower one has 250 ms to be reached.
     pub const fn set(&mut self, rate: UpdateRate, amplitude_mv: u16) {
         self.quarters = per_tick(rate);
-        self.amplitude = steps(amplitude_mv);
+        let amplitude = steps(amplitude_mv);
+        // What is the same, said again, puts nothing off.
+        if amplitude < self.amplitude {
+            self.settling = SETTLING_QUARTERS;
+        }
+        self.amplitude = amplitude;
         if self.amplitude > self.allowed {
             self.allowed = self.amplitude;
         }
-        self.settling = SETTLING_QUARTERS;
     }
 
     /// Looks at the words of a tick.
@@ -295,6 +299,23 @@ mod tests {
             assert_eq!(limits.check(&high), Err(Breach::Voltage));
             limits.set(rate, 5_000);
             assert_eq!(limits.check(&high), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_lower_amplitude_that_is_said_again_and_again_is_due_all_the_same() {
+        for rate in RATES {
+            let mut limits = Limits::new(rate, 5_000);
+            let high = [word(5.0); ACTUATORS];
+            limits.before = high;
+            let (settling, often) = (250 * rate.hz() / 1_000, 100 * rate.hz() / 1_000);
+            for tick in 1..settling {
+                if tick % often == 1 {
+                    limits.set(rate, 1_000);
+                }
+                assert_eq!(limits.check(&high), Ok(()), "tick {tick}");
+            }
+            assert_eq!(limits.check(&high), Err(Breach::Voltage));
         }
     }
 
