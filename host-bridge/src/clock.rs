@@ -37,7 +37,7 @@ pub trait Notify: Send + Sync {
     fn wait_until(&self, until_us: u64);
 }
 
-/// The computer's own clock: [`host_clock::now_us`].
+/// The computer's own clock: [`now_us`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SystemClock;
 

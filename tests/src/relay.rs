@@ -205,7 +205,8 @@ pub fn talking_board_on(bench: &VirtualBench, role: Role) -> FakeBoard {
     FakeBoard::acting_on(bench, hello(role), script(role))
 }
 
-const fn hello(role: Role) -> Hello {
+/// What a board of `role` says of itself.
+pub const fn hello(role: Role) -> Hello {
     Hello::new(role, "stm32f429zi", [0, 1, 0])
 }
 

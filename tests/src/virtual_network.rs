@@ -41,6 +41,8 @@ struct State {
     tape: Option<Vec<(String, Vec<u8>)>>,
     is_still: bool,
     is_cut: bool,
+    /// Whose programs neither say nor hear anything.
+    cut_off: Option<Role>,
     /// What is on its way: when it comes, and in which order it went.
     flying: BTreeMap<(u64, u64), Flying>,
     sent: u64,
@@ -58,6 +60,7 @@ struct Flying {
 #[derive(Clone)]
 struct Listener {
     owner: u64,
+    role: Role,
     subscription: Arc<Subscription>,
 }
 
@@ -129,6 +132,11 @@ impl VirtualNetwork {
         state.flying.clear();
     }
 
+    /// Loses what programs of `role` say, and what they would hear, for as long as they are cut off.
+    pub fn cut_off(&self, role: Role, is_cut: bool) {
+        locked(&self.0.state).cut_off = is_cut.then_some(role);
+    }
+
     /// Ends it: nothing is delivered any more.
     pub fn end(&self) {
         self.0.is_ended.store(true, Ordering::Release);
@@ -160,8 +168,11 @@ impl Shared {
                 return (due, first.key().0);
             }
             let Flying { from, key, bytes } = first.remove();
-            let hears =
-                |listener: &&Listener| listener.owner != from && listener.subscription.hears(&key);
+            let hears = |listener: &&Listener| {
+                listener.owner != from
+                    && Some(listener.role) != state.cut_off
+                    && listener.subscription.hears(&key)
+            };
             due.extend(
                 state
                     .listeners
@@ -184,6 +195,7 @@ impl Transport for VirtualNetwork {
         let owner = self.0.connected.fetch_add(1, Ordering::Relaxed);
         let listeners = subscriptions.into_iter().map(|subscription| Listener {
             owner,
+            role,
             subscription: Arc::new(subscription),
         });
         locked(&self.0.state).listeners.extend(listeners);
@@ -216,7 +228,7 @@ impl Connection for Program {
     fn publish(&self, channel: Channel, envelope: &Envelope) -> bool {
         let now_us = self.shared.clock.now_us();
         let mut state = locked(&self.shared.state);
-        if !state.is_cut {
+        if !state.is_cut && state.cut_off != Some(self.role) {
             let sky = state.sky;
             let key = self.name.key(self.role, channel);
             let bytes = envelope.to_bytes();

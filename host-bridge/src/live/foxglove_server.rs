@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::io;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 
 use foxglove::{
@@ -19,10 +19,19 @@ use crate::recording::{CdrEncoder, Note, RowBuilder, SchemaError};
 pub enum LiveError {
     #[error("port {0} for Foxglove: {1}: give another one with --port")]
     Foxglove(u16, #[source] Box<FoxgloveError>),
-    #[error("port {0} for the page: {1}: give another one with --port")]
-    Page(u16, #[source] io::Error),
+    #[error("port at {0} for the page: {1}: {advice}", advice = advice(.1))]
+    Page(SocketAddr, #[source] io::Error),
     #[error(transparent)]
     Schema(#[from] SchemaError),
+}
+
+fn advice(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::AddrNotAvailable => {
+            "this computer has no such address: give one of its own with --listen"
+        }
+        _ => "give another one with --port",
+    }
 }
 
 /// A server that says everything to whoever asks, and hears nothing.

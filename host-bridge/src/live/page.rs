@@ -1,11 +1,11 @@
 //! The page of our own: what it is made of, what it is told, and its Stop; and as much of HTTP as it needs: one request a
 //! connection.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use std::{io, thread};
 
 use super::foxglove_server::LiveError;
@@ -14,7 +14,10 @@ use crate::lock::locked;
 const PAGE: &str = include_str!("page.html");
 /// What a page of ours says with its Stop: no other site's page may, for its browser asks here first.
 const STOP_HEADER: &str = "x-ridgelink-stop";
+/// Browsers that may look on at once; more are answered, and sent away.
 const MOST: usize = 32;
+/// Connections that are looked after at once. Another waits until one of them has said what it wants, or its time is over.
+const MOST_AT_ONCE: usize = 128;
 /// A browser that has gone is noticed at the next thing that is said to it.
 const LOOK: Duration = Duration::from_secs(1);
 
@@ -55,7 +58,7 @@ pub fn listen(address: IpAddr, port: u16) -> Result<(TcpListener, SocketAddr), L
     listener
         .and_then(|listener| Ok((listener.local_addr()?, listener)))
         .map(|(here, listener)| (listener, here))
-        .map_err(|source| LiveError::Page(port, source))
+        .map_err(|source| LiveError::Page((address, port).into(), source))
 }
 
 /// Serves the page for as long as the program runs; `stop` is called at each Stop.
@@ -66,26 +69,45 @@ pub fn serve(listener: TcpListener, newest: Arc<Newest>, stop: Box<dyn Fn() + Se
         connections: AtomicUsize::new(0),
     });
     thread::spawn(move || {
-        for stream in listener.incoming() {
-            let Ok(stream) = stream else {
+        loop {
+            if shared.connections.load(Ordering::Relaxed) >= MOST_AT_ONCE {
+                thread::park_timeout(PAUSE);
+                continue;
+            }
+            let Ok((stream, _)) = listener.accept() else {
                 // No more handles, most likely: one is given back when a browser goes.
                 thread::park_timeout(PAUSE);
                 continue;
             };
-            let shared = Arc::clone(&shared);
-            thread::spawn(move || {
-                let before = shared.connections.fetch_add(1, Ordering::Relaxed);
+            let connection = Connection::new(&shared);
+            // Without a thread for it, it is closed.
+            let _ = thread::Builder::new().spawn(move || {
                 // A browser that goes away in the middle is no error of ours.
-                let _ = shared.speak(&stream, before >= MOST);
-                shared.connections.fetch_sub(1, Ordering::Relaxed);
+                let _ = connection.0.speak(&stream);
             });
         }
     });
 }
 
+/// One that is looked after, until it is dropped.
+struct Connection(Arc<Shared>);
+
+impl Connection {
+    fn new(shared: &Arc<Shared>) -> Self {
+        shared.connections.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(shared))
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.0.connections.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 impl Shared {
-    /// Answers one request. A Stop is heard however many there are.
-    fn speak(&self, stream: &TcpStream, is_full: bool) -> io::Result<()> {
+    /// Answers one request. A Stop is heard however many look on.
+    fn speak(&self, stream: &TcpStream) -> io::Result<()> {
         const TEXT: &str = "text/plain; charset=utf-8";
         let Some(request) = Request::read(stream)? else {
             return answer(stream, "400 Bad Request", TEXT, b"no request\n");
@@ -102,7 +124,9 @@ impl Shared {
             ("POST", "/stop") => {
                 answer(stream, "403 Forbidden", TEXT, b"not from a page of ours\n")
             }
-            _ if is_full => answer(stream, "503 Service Unavailable", TEXT, b"too many\n"),
+            _ if self.connections.load(Ordering::Relaxed) > MOST => {
+                answer(stream, "503 Service Unavailable", TEXT, b"too many\n")
+            }
             ("GET", "/") => answer(
                 stream,
                 "200 OK",
@@ -127,8 +151,27 @@ impl Shared {
 const LONGEST: u64 = 16_384;
 /// Until another browser is let in after one could not be.
 const PAUSE: Duration = Duration::from_millis(100);
-/// How long a browser may take to say what it wants, or to take what it gets.
+/// How long a browser may take to say what it wants.
+const HEAD_WITHIN: Duration = Duration::from_secs(2);
+/// How long it may take to take what it gets.
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A stream that fails from an instant on, however little comes at a time.
+struct Within<'a> {
+    stream: &'a TcpStream,
+    end: Instant,
+}
+
+impl Read for Within<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let left = self.end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        self.stream.set_read_timeout(Some(left))?;
+        (&mut &*self.stream).read(bytes)
+    }
+}
 
 /// What a browser asks for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -142,9 +185,11 @@ pub struct Request {
 impl Request {
     /// Reads one; none if it is no request. Fails if the connection fails.
     pub fn read(stream: &TcpStream) -> io::Result<Option<Self>> {
-        stream.set_read_timeout(Some(PATIENCE))?;
         stream.set_write_timeout(Some(PATIENCE))?;
-        Self::parse(BufReader::new(stream))
+        Self::parse(BufReader::new(Within {
+            stream,
+            end: Instant::now() + HEAD_WITHIN,
+        }))
     }
 
     fn parse(reader: impl BufRead) -> io::Result<Option<Self>> {
@@ -223,6 +268,9 @@ pub fn event(mut stream: &TcpStream, line: &str) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::net::Ipv4Addr;
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
 
     fn request(text: &str) -> Option<Request> {
@@ -261,5 +309,42 @@ mod tests {
         }
         let without = request("GET / HTTP/1.1\r\n\r\n").expect("a request");
         assert!(!without.is_by_address());
+    }
+    /// A server of its own, and whether it has heard a Stop.
+    fn server() -> (SocketAddr, Arc<AtomicBool>) {
+        let (listener, address) = listen(Ipv4Addr::LOCALHOST.into(), 0).expect("a free port");
+        let heard = Arc::new(AtomicBool::new(false));
+        let hear = Arc::clone(&heard);
+        let stop = move || hear.store(true, Ordering::Release);
+        serve(listener, Arc::default(), Box::new(stop));
+        (address, heard)
+    }
+
+    #[test]
+    fn whoever_says_what_he_wants_byte_by_byte_is_sent_away() {
+        let (address, _) = server();
+        let mut slow = TcpStream::connect(address).expect("it listens");
+        // Ten times as long as it may take.
+        let refused = (0..200).find(|_| {
+            thread::park_timeout(HEAD_WITHIN / 20);
+            slow.write_all(b"G").is_err()
+        });
+        assert!(refused.is_some(), "still listened to");
+    }
+
+    #[test]
+    fn a_stop_is_heard_though_many_have_connected_and_say_nothing() {
+        let (address, heard) = server();
+        let silent: Vec<_> = (0..MOST_AT_ONCE + 100)
+            .map_while(|_| TcpStream::connect(address).ok())
+            .collect();
+        let mut page = TcpStream::connect(address).expect("it listens");
+        let request = format!("POST /stop HTTP/1.1\r\nHost: {address}\r\n{STOP_HEADER}: 1\r\n\r\n");
+        page.write_all(request.as_bytes()).expect("it takes it");
+        let mut said = String::new();
+        page.read_to_string(&mut said).expect("it answers");
+        assert!(said.starts_with("HTTP/1.1 200"), "{said}");
+        assert!(heard.load(Ordering::Acquire));
+        drop(silent);
     }
 }

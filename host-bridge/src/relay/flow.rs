@@ -28,6 +28,9 @@ const HALF_WINDOW_US: u64 = 30_000_000;
 const STANDING_US: u64 = 40_000;
 /// How long a queue is watched before it is judged, beyond a repair, in µs.
 const WATCH_US: u64 = 250_000;
+/// So many watches with messages at the longest intervals, and no shorter wait, tell a longer way from a queue. In the first
+/// of them what is on its way went at shorter intervals.
+const THIN_WATCHES: u32 = 3;
 /// Shortest and longest time that a standing queue puts between two messages, in µs.
 const SPACING_US: (u64, u64) = (LATE_SPACING_US, 50_000);
 
@@ -56,6 +59,8 @@ pub struct Flow {
     wait_before_us: u64,
     /// Between two messages, in µs.
     spacing_us: u64,
+    /// Watches that it has been the longest for.
+    thin_watches: u32,
     /// When the last message was let through, in µs.
     last_us: Option<u64>,
 }
@@ -147,19 +152,28 @@ impl Flow {
         let allowed_us = self
             .round_trips_us(REPAIR_ROUND_TRIPS)
             .saturating_add(STANDING_US);
-        let is_falling = wait_us < self.wait_before_us / 8 * 7;
+        // A long queue empties as slowly as the network carries.
+        let least_fall_us = (self.wait_before_us / 8).min(WATCH_US / 8);
+        let is_falling = wait_us + least_fall_us < self.wait_before_us;
         if wait_us <= allowed_us {
-            let spacing_us = self.spacing_us / 4 * 3;
+            // Quickly where nothing waits at all.
+            let kept = if wait_us <= allowed_us / 8 { 2 } else { 3 };
+            let spacing_us = self.spacing_us / 4 * kept;
             let is_needed = spacing_us >= shortest_us / 8;
             self.spacing_us = if is_needed { spacing_us } else { 0 };
         } else if is_falling {
             // That takes its time.
         } else if self.spacing_us < longest_us {
             self.spacing_us = (self.spacing_us * 2).clamp(shortest_us, longest_us);
-        } else {
+        } else if self.thin_watches >= THIN_WATCHES {
             self.there_us = Least::default();
             self.round_trip_us = Least::default();
         }
+        self.thin_watches = if self.spacing_us == longest_us {
+            self.thin_watches.saturating_add(1)
+        } else {
+            0
+        };
         self.wait_before_us = wait_us;
         self.wait_us = None;
     }

@@ -15,6 +15,10 @@ use crate::relay::gate::{Gate, Order};
 use crate::relay::remote::RemoteBridge;
 use crate::relay::report::{Histogram, Incoming, Notice, Percentiles};
 
+/// For so long after another bridge has got the bench, in µs, its board's messages are not passed: the board here is to
+/// notice that nobody speaks. An arm that is silent for 0.1 s stands still, and follows the next hand from where both are.
+const BETWEEN_HOLDERS_US: u64 = 150_000;
+
 /// What is to be done about an envelope.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(
@@ -58,6 +62,8 @@ pub struct Inward {
     max_age_us: u64,
     gate: Gate,
     ages: Ages,
+    /// Until when nothing is passed, in µs: see [`BETWEEN_HOLDERS_US`].
+    quiet_until_us: u64,
     remote: RemoteBridge,
     counts: Incoming,
     total: Histogram,
@@ -76,6 +82,7 @@ impl Inward {
             max_age_us: micros(max_age),
             gate: Gate::default(),
             ages: Ages::new(max_age),
+            quiet_until_us: 0,
             remote: RemoteBridge::default(),
             counts: Incoming::default(),
             total: Histogram::default(),
@@ -130,7 +137,7 @@ impl Inward {
             }
             Content::HandOver => {
                 if self.gate.hand_over(envelope.session, now_us) {
-                    self.ages.forget();
+                    self.begin(now_us);
                     tell(Notice::HandedOver(self.role));
                 }
                 Heard::Nothing
@@ -186,7 +193,7 @@ impl Inward {
 
     fn greet(&mut self, envelope: &Envelope, now_us: u64, tell: &mut impl FnMut(Notice)) {
         if self.gate.ask(envelope.session, now_us) {
-            self.ages.forget();
+            self.begin(now_us);
             self.told_rival = false;
         }
         if !self.gate.is_holder(envelope.session) {
@@ -197,6 +204,12 @@ impl Inward {
         } else if self.remote.hear(envelope.hello, envelope.session, now_us) {
             tell(Notice::Remote(self.role, self.remote.state().clone()));
         }
+    }
+
+    /// Another bridge has the bench.
+    const fn begin(&mut self, now_us: u64) {
+        self.ages.forget();
+        self.quiet_until_us = now_us.saturating_add(BETWEEN_HOLDERS_US);
     }
 
     fn on_pong(&mut self, pong: &Pong, now_us: u64) -> Option<Answer> {
@@ -220,6 +233,10 @@ impl Inward {
             .gate
             .judge(envelope.session, envelope.counter, sequence_number);
         if order != Order::Newer {
+            return Heard::Nothing;
+        }
+        if now_us < self.quiet_until_us {
+            self.counts.undated += 1;
             return Heard::Nothing;
         }
         match self.ages.judge(envelope.sent_us, now_us) {

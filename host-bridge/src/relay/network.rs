@@ -229,7 +229,10 @@ pub struct Wire {
 }
 
 fn engine(error: zenoh::Error) -> NetworkError {
-    NetworkError::Engine(error.to_string())
+    let words = error.to_string();
+    // After them it says where in its own source it was.
+    let words = words.split(" at /").next().unwrap_or(&words);
+    NetworkError::Engine(words.trim().to_owned())
 }
 
 impl Wire {

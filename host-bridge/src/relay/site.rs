@@ -317,7 +317,11 @@ impl Shared {
     }
 
     fn carry(&self, at_us: u64, message: Message) {
-        let obeyed = locked(&self.stops).obeyed(at_us, &message);
+        let obeyed = {
+            let mut stops = locked(&self.stops);
+            stops.on_state(&message);
+            stops.obeyed(at_us, &message)
+        };
         if let Some((trip, ids)) = obeyed {
             // By another program, or by the board itself: both stop.
             let (id, reason) = (random_number(), StopReason::Host);
@@ -434,6 +438,10 @@ impl Shared {
         let standing = locked(&self.stops).hear(id, stop);
         let content = match standing {
             Standing::New => {
+                // An operator may be gone before the other site can hear him.
+                if by == Role::Host {
+                    locked(&self.stops).pass_on(id, stop);
+                }
                 self.tell_board(id, stop);
                 self.tell(Notice::StopSaid(by));
                 return;
@@ -485,11 +493,12 @@ impl Shared {
     }
 
     fn stop(&self, stop: Stop) {
-        let id = random_number();
-        locked(&self.stops).say(id, stop);
+        let (id, is_new) = locked(&self.stops).say(random_number(), stop);
         self.tell_board(id, stop);
-        self.tell(Notice::StopSaid(self.settings.role));
-        self.say(Channel::Stop, Content::Stop { id, stop });
+        if is_new {
+            self.tell(Notice::StopSaid(self.settings.role));
+            self.say(Channel::Stop, Content::Stop { id, stop });
+        }
     }
 
     /// Says Stop to the board, whose link says it again until it is answered.

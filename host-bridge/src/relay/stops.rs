@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::{Message, Stop, Trip};
+use protocol::{DisplayState, Message, Stop, Trip};
 
 /// Stops that may wait for this site's board at once; each is the same to it.
 const PENDING: usize = 8;
@@ -41,10 +41,22 @@ pub struct Stops {
 }
 
 impl Stops {
-    /// Stop was said here: for both boards.
-    pub fn say(&mut self, id: u64, stop: Stop) {
+    /// Stop was said here, for both boards: its number, and whether it is a new one. As long as the other site has not
+    /// heard one for the same reason it is that one, not the one numbered `id`, however often it is said.
+    pub fn say(&mut self, id: u64, stop: Stop) -> (u64, bool) {
+        let said = self.pass_on(id, stop);
+        self.hear(said.0, stop);
+        said
+    }
+
+    /// The other site is to hear of a Stop: see [`Stops::say`].
+    pub fn pass_on(&mut self, id: u64, stop: Stop) -> (u64, bool) {
+        let known = self.unheard.iter().find(|(_, unheard)| *unheard == stop);
+        if let Some(&(known, _)) = known {
+            return (known, false);
+        }
         self.unheard.push((id, stop));
-        self.hear(id, stop);
+        (id, true)
     }
 
     /// Stop came, for the board here: how it stands.
@@ -110,6 +122,18 @@ impl Stops {
         self.is_halted = false;
     }
 
+    /// The board said something. If it is that it goes, and no Stop is on its way to it, it has started anew.
+    pub fn on_state(&mut self, message: &Message) {
+        let goes = match message {
+            Message::Safety(safety) => !matches!(safety.state, DisplayState::Stopped(_)),
+            Message::Arm(arm) => arm.state.trip().is_none(),
+            _ => false,
+        };
+        if goes && self.pending.is_empty() {
+            self.on_restart();
+        }
+    }
+
     /// What the other site says of a Stop: true if it was said here and nothing was known of it yet.
     pub fn on_outcome(&mut self, id: u64) -> bool {
         let before = self.unheard.len();
@@ -138,7 +162,7 @@ impl Stops {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::{DisplayState, Safety, StopReason, Stopped};
+    use protocol::{Safety, StopReason, Stopped};
 
     const STOP: Stop = Stop {
         reason: StopReason::Operator,
@@ -206,6 +230,45 @@ mod tests {
         let mut stops = Stops::default();
         stops.hear(4, STOP);
         assert!(!stops.spread(5, STOP));
+    }
+
+    #[test]
+    fn a_stop_that_is_said_again_is_the_same_as_long_as_the_other_site_has_not_heard_it() {
+        let mut stops = Stops::default();
+        assert_eq!(stops.say(1, STOP), (1, true));
+        for id in 2..1_000 {
+            assert_eq!(stops.say(id, STOP), (1, false));
+        }
+        assert_eq!(stops.unheard(), [(1, STOP)]);
+        // For another reason it is another.
+        let host = Stop {
+            reason: StopReason::Host,
+        };
+        assert_eq!(stops.say(1_000, host), (1_000, true));
+        assert_eq!(stops.unheard().len(), 2);
+        stops.on_outcome(1);
+        assert_eq!(stops.say(1_001, STOP), (1_001, true));
+    }
+
+    #[test]
+    fn a_board_that_says_that_it_goes_has_started_anew() {
+        let mut stops = Stops::default();
+        stops.hear(1, STOP);
+        let safety = |state| {
+            Message::Safety(Safety {
+                instant_us: 0,
+                state,
+            })
+        };
+        // Said before it heard the Stop.
+        stops.on_state(&safety(DisplayState::Driving));
+        assert!(!stops.spread(2, STOP));
+        stops.tell(1, 5);
+        stops.obeyed(6, &stopped());
+        stops.on_state(&safety(DisplayState::Stopped(Trip::Operator)));
+        assert!(!stops.spread(3, STOP));
+        stops.on_state(&safety(DisplayState::Ready));
+        assert!(stops.spread(4, STOP));
     }
 
     #[test]

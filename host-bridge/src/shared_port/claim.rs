@@ -61,14 +61,11 @@ impl Device {
         })
     }
 
-    /// What is called `name`, of which only letters, digits and `-` are told apart.
+    /// What is called `name`. All that a bench's name may have is told apart.
     pub fn named(name: &str) -> Self {
-        let plain = |letter: char| {
-            if letter.is_ascii_alphanumeric() {
-                letter
-            } else {
-                '-'
-            }
+        let plain = |letter: char| match letter {
+            'a'..='z' | 'A'..='Z' | '0'..='9' | '.' | '_' => letter,
+            _ => '-',
         };
         Self {
             folder: folder(),
@@ -117,7 +114,7 @@ impl Device {
 
     fn file(&self, extension: &str) -> io::Result<PathBuf> {
         match &self.folder {
-            Ok(folder) => Ok(folder.join(&self.name).with_extension(extension)),
+            Ok(folder) => Ok(folder.join(format!("{}.{extension}", self.name))),
             Err(error) => Err(io::Error::new(error.kind(), error.to_string())),
         }
     }
@@ -225,6 +222,23 @@ mod tests {
         fs::remove_dir(good).expect("it was made");
         let words = first_usable(bad).expect_err("none can be used").to_string();
         assert!(words.starts_with("/: must be a folder"), "{words}");
+    }
+
+    #[test]
+    fn benches_whose_names_differ_in_a_sign_share_no_port() {
+        let sockets = ["lab_1", "lab-1", "lab.1", "lab1"].map(|name| {
+            [
+                "relay:NAME.sensor",
+                "relay:NAME.display",
+                "hand NAME sensor",
+            ]
+            .map(|port| Device::named(&port.replace("NAME", name)).socket())
+        });
+        let mut sockets = sockets.concat();
+        sockets.sort();
+        let all = sockets.len();
+        sockets.dedup();
+        assert_eq!(sockets.len(), all, "{sockets:?}");
     }
 
     #[test]

@@ -10,9 +10,9 @@ use host_bridge::lock::locked;
 use host_bridge::relay::flow::LATE_SPACING_US;
 use host_bridge::relay::name::Name;
 use host_bridge::relay::operator::{self, Progress, Stopping};
-use protocol::{Message, Role, Stop, StopReason, Stopped, Trip};
+use protocol::{DisplayState, Message, Role, Safety, Stop, StopReason, Stopped, Trip};
 use tests::fake_board::{FakeBoard, wait_by};
-use tests::relay::{ESTIMATE_US, MOTION_US, listen, motion, sequences, talking_board_on};
+use tests::relay::{ESTIMATE_US, MOTION_US, hello, listen, motion, sequences, talking_board_on};
 use tests::virtual_network::VirtualNetwork;
 use tests::virtual_ports::VirtualBench;
 use tests::virtual_relay::{VirtualPair, VirtualSite, name};
@@ -331,6 +331,57 @@ fn the_bench_is_handed_over_by_who_holds_it_and_by_nobody_else() {
     let is_back = || hands() == ["held", "watched"];
     assert!(wait_by(&sensor, LIMIT, is_back), "{:?}", hands());
     listen(&sensor, LIMIT, at_least(100));
+}
+
+#[test]
+fn between_two_holders_the_board_hears_nothing_for_as_long_as_it_follows_the_first() {
+    // The arm stands still after 0.1 s of silence, and then follows another hand from where both are.
+    const SILENCE: Duration = Duration::from_millis(110);
+    for leaves in [false, true] {
+        let Sites {
+            sensor,
+            display: _display,
+            mut pair,
+        } = Sites::new(MAX_AGE);
+        listen(&sensor, LIMIT, at_least(100));
+        // Up for longer: its numbers are the newer ones.
+        let other_board = FakeBoard::acting_on(&pair.bench, hello(Role::Display), {
+            let mut said_us = 0;
+            Box::new(move |now_us| {
+                let is_due = now_us >= said_us + MOTION_US;
+                said_us = if is_due { now_us } else { said_us };
+                let number = 1_000_000 + (now_us / MOTION_US) as u32;
+                is_due.then(|| motion(number, now_us)).into_iter().collect()
+            })
+        });
+        let waiting = rival(&pair, &other_board);
+        waiting.says("another bridge of this site holds the bench", LIMIT);
+        pass(&pair.bench, Duration::from_secs(1));
+        sensor.take_heard();
+        let _kept = if leaves {
+            drop(std::mem::replace(&mut pair.display, waiting));
+            None
+        } else {
+            pair.display.site.hand_over();
+            Some(waiting)
+        };
+        let is_others = |message: &Message| matches!(message, Message::Motion(motion) if motion.sequence >= 1_000_000);
+        let (mut last_us, mut first_us) = (None, None);
+        let clock = &pair.bench.clock;
+        let changed = wait_by(&sensor, LIMIT, || {
+            for message in sensor.take_heard() {
+                match is_others(&message) {
+                    true => first_us = first_us.or(Some(clock.now_us())),
+                    false if is_motion(&message) => last_us = Some(clock.now_us()),
+                    false => {}
+                }
+            }
+            first_us.is_some()
+        });
+        assert!(changed, "nobody took the bench");
+        let silence = Duration::from_micros(first_us.unwrap() - last_us.unwrap());
+        assert!(silence > SILENCE, "{silence:?}, leaves: {leaves}");
+    }
 }
 
 #[test]

@@ -124,3 +124,59 @@ fn an_operators_stop_is_done_only_when_the_display_itself_says_that_it_has_stopp
     pair.display.says("not there", LIMIT);
     assert_eq!(stop(name(), SHORT).progress, Progress::Heard);
 }
+
+#[test]
+fn an_operators_stop_reaches_a_site_that_the_network_had_cut_off() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(10));
+    pair.network.cut_off(Role::Sensor, true);
+    let clock: Arc<dyn Clock> = Arc::new(pair.bench.clock.clone());
+    let stopping = operator::stop(&pair.network, &clock, &name(), STOP, LIMIT);
+    assert_eq!(
+        stopping.map(|stopping| stopping.progress).ok(),
+        Some(Progress::Stopped)
+    );
+    assert!(display.take_heard().iter().any(is_stop));
+    pass(&pair.bench, Duration::from_secs(5));
+    assert!(!sensor.take_heard().iter().any(is_stop));
+    // The operator has gone: the display's site says it on.
+    pair.network.cut_off(Role::Sensor, false);
+    listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
+    pair.display.says(
+        "Stop: the board at the sensor's site has stopped: by the operator",
+        LIMIT,
+    );
+}
+
+#[test]
+fn a_board_that_started_anew_unseen_is_known_to_go_again() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(10));
+    let is_told = |heard: &[Message]| {
+        heard
+            .iter()
+            .any(|message| matches!(message, Message::Stop(_)))
+    };
+    display.say(Message::Stopped(Stopped::by(Trip::EmergencyStop)));
+    listen(&sensor, LIMIT, is_told);
+    pair.display
+        .says("the board at the sensor's site has stopped", LIMIT);
+    sensor.take_heard();
+    // Its clock would have told of a start that was seen.
+    let state = DisplayState::Driving;
+    display.say(Message::Safety(Safety {
+        instant_us: 0,
+        state,
+    }));
+    pass(&pair.bench, Duration::from_secs(1));
+    display.say(Message::Stopped(Stopped::by(Trip::EmergencyStop)));
+    listen(&sensor, LIMIT, is_told);
+}
