@@ -212,6 +212,12 @@ fn threads(jobs: usize) -> NonZero<usize> {
         .unwrap_or(NonZero::<usize>::MIN)
 }
 
+/// How many of something, for an option that nothing can be done without.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|&count| count > 0);
+    count.ok_or_else(|| "give a whole number of 1 or more".to_owned())
+}
+
 /// What `work` makes of each of these, in their order, so many at a time and under a bar; or its first error.
 fn under_bar<I: Sync, O: Send, E: Send>(
     inputs: &[I],

@@ -50,8 +50,8 @@ A first session:
   host-bridge record                 the same, kept
   host-bridge replay                 and played again
 
-Results go to standard output, progress and complaints to standard error. Exit status 0 means done, 2 that \
-what was asked for can't be done; what 1 means, each command's own --help says."
+Results go to standard output; progress, complaints and what became of a Stop to standard error. Exit status 0 \
+means done, 2 that what was asked for can't be done; what 1 means, each command's own --help says."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -140,6 +140,14 @@ fn links(
 }
 
 /// A time above 0 s, and short enough to be waited for: a hundred years.
+/// A place in a recording, in s after its start.
+fn place_s(text: &str) -> Result<f64, String> {
+    let place_s = text.parse().ok();
+    place_s
+        .filter(|place_s| (0.0..f64::INFINITY).contains(place_s))
+        .ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
+}
+
 fn seconds(text: &str) -> Result<Duration, String> {
     const LONGEST_S: f64 = 100.0 * 365.0 * 86_400.0;
     text.parse::<f64>()

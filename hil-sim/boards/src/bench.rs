@@ -155,10 +155,10 @@ pub enum ServeError {
     #[error("{}: another bench stands here: stop it, or give another folder by --dir", path.display())]
     Taken { path: PathBuf },
     /// The folder can't be used.
-    #[error("{}: can't be used for a bench's ports: {source}: give another folder by --dir", path.display())]
+    #[error("{}: can't be used for a bench's ports: give another folder by --dir", path.display())]
     Folder { path: PathBuf, source: io::Error },
     /// There is no pseudo-terminal for a port.
-    #[error("{name}: no pseudo-terminal: {source}: is /dev/pts mounted, and are there any left?")]
+    #[error("{name}: no pseudo-terminal: is /dev/pts mounted, and are there any left?")]
     Terminal { name: PortName, source: io::Error },
     /// The port is not there.
     #[error("{name}: there is no such port while the boards are joined: set the bench up --apart")]

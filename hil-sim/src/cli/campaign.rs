@@ -13,15 +13,15 @@ use protocol::Rendering;
 
 use super::files::{Format, Results};
 use super::say::say;
-use super::{Elves, number, status, threads, under_bar};
+use super::{Elves, at_least_one, number, status, threads, under_bar};
 
 #[derive(Debug, clap::Args)]
 pub(super) struct Campaign {
     /// Kinds to try, as `hil-sim faults` names them [default: all]
     #[arg(long, value_name = "KIND", value_delimiter = ',', num_args = 1..)]
     kinds: Vec<String>,
-    /// How many times each
-    #[arg(long, default_value_t = 25)]
+    /// How many times each, 1 or more
+    #[arg(long, default_value_t = 25, value_parser = at_least_one)]
     instants: usize,
     /// Decides the instants, and what the kinds leave to chance
     #[arg(long, default_value_t = 1)]
@@ -29,8 +29,8 @@ pub(super) struct Campaign {
     /// How much of the surface the display plays: fundamental, shape or texture
     #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
     rendering: Rendering,
-    /// Runs at a time; each takes up to two processors
-    #[arg(long, value_name = "RUNS", default_value_t = threads(0).get())]
+    /// Runs at a time, each of which takes up to two processors; 0: one per core
+    #[arg(long, value_name = "RUNS", default_value_t = 0)]
     jobs: usize,
     /// Where to write the table as JSON
     #[arg(long, value_name = "FILE")]
@@ -58,7 +58,7 @@ impl Campaign {
         let virtual_s: f64 = shifts.iter().map(|shift| shift.scene.duration_s).sum();
         let started = Instant::now();
         let work = |shift: &Shift| shift.run(&firmwares);
-        let trials = under_bar(&shifts, threads(self.jobs.max(1)), "scenes", work)?.concat();
+        let trials = under_bar(&shifts, threads(self.jobs), "scenes", work)?.concat();
         let tallies = plan.kinds.iter().map(|&kind| Tally::of(kind, &trials));
         let tallies: Vec<Tally> = tallies.collect();
 

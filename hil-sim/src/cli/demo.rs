@@ -11,6 +11,7 @@ use hil_sim_core::scene::Scene;
 use hil_sim_studies::output::report::{Chapter, html};
 use hil_sim_studies::paper::{CELLS_MM, PAPER_MM, SPEEDS_MM_S};
 
+use super::files::{Format, Results};
 use super::say::say;
 use super::{Elves, number, status};
 
@@ -36,6 +37,9 @@ const FREQUENCY_TOLERANCE: f64 = 0.001;
 impl Demo {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let firmwares = self.elves.read()?;
+        let folder = self.report.parent().unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let report = Results::create(&self.report, Format::Html)?;
         say!(
             "Two emulated boards, a UART between them, {} and {}:\n",
             firmwares.sensor.path.display(),
@@ -55,10 +59,7 @@ impl Demo {
             }
         }
         let chapters: Vec<_> = outcomes.iter().map(Chapter::of).collect();
-        let folder = self.report.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        std::fs::write(&self.report, html(&chapters))
-            .with_context(|| self.report.display().to_string())?;
+        report.write(&html(&chapters))?;
         say!("\n{}", verdict(as_predicted));
         say!("Plots of every cell: {}", self.report.display());
         Ok(status(as_predicted))

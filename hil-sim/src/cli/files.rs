@@ -163,8 +163,9 @@ impl<'a> Results<'a> {
 impl Drop for Results<'_> {
     /// A draft stays if there is anything in it.
     fn drop(&mut self) {
+        // What is not written shows in what is there.
+        let _ = self.file.flush();
         if let Some([draft, _]) = &self.draft
-            && self.file.flush().is_ok()
             && fs::metadata(draft).is_ok_and(|draft| draft.len() == 0)
         {
             let _ = fs::remove_file(draft);

@@ -29,8 +29,11 @@ impl Init {
                     "{name}: cannot be made: give a file that is not there yet, in a folder that is"
                 )
             })?;
-        file.write_all(FIRST.as_bytes())
-            .with_context(|| format!("{name}"))?;
+        if let Err(error) = file.write_all(FIRST.as_bytes()) {
+            // So that it can be tried again.
+            let _ = std::fs::remove_file(&self.file);
+            return Err(error).with_context(|| format!("{name}: cannot be written"));
+        }
         say!("{name}: written; now: hil-sim run {name} --report report.html");
         Ok(ExitCode::SUCCESS)
     }

@@ -1,12 +1,11 @@
 //! `hil-sim map`.
 
-use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use super::run_options::tell_notes;
 use super::say::{self, say, tell};
-use super::{progress, threads};
+use super::{at_least_one, progress, threads};
 use hil_sim_studies::map::{Axis, METHODS, Made, Map, Plan, Shard, Survey, catalogue, find};
 use hil_sim_studies::study::{Record, Table, short};
 
@@ -24,9 +23,9 @@ pub(super) struct Maps {
     /// Run the i-th of n parts only, into a file of its own
     #[arg(long, value_name = "I/N")]
     shard: Option<String>,
-    /// Scenes to run at a time [default: one per core]
-    #[arg(long, value_name = "N")]
-    jobs: Option<NonZero<usize>>,
+    /// Scenes to run at a time, 1 or more [default: one per core]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    jobs: Option<usize>,
     /// Join shards' files and draw, but run nothing
     #[arg(long, conflicts_with = "shard")]
     merge: bool,
@@ -77,7 +76,7 @@ impl Maps {
             methods,
             folder: self.out,
             shard: self.shard.as_deref().map(str::parse::<Shard>).transpose()?,
-            threads: threads(self.jobs.map_or(0, NonZero::get)),
+            threads: threads(self.jobs.unwrap_or(0)),
             renew: self.renew,
         };
         // All of it first: a refusal is not to come after half an hour.

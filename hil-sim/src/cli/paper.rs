@@ -9,7 +9,7 @@ use anyhow::{Context, bail};
 use hil_sim_studies::paper::{jobs, report};
 use hil_sim_studies::psychophysics::{Job, Plan, run};
 
-use super::files::write_all;
+use super::files::{Format, Results, write_all};
 use super::say::{say, tell};
 use super::{Elves, EngineName, status};
 
@@ -35,6 +35,7 @@ impl Paper {
         let (folder, name) = folder(&self.out)?;
         // First: runs are not to be lost for a folder that cannot be.
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let page = Results::create(&self.out, Format::Html)?;
 
         let plan = Plan {
             seed: self.seed,
@@ -54,7 +55,7 @@ impl Paper {
 
         let report = report(plan, &recordings, &name)?;
         write_all(&folder, report.files)?;
-        std::fs::write(&self.out, &report.html).with_context(|| self.out.display().to_string())?;
+        page.write(&report.html)?;
         say!(
             "Tables I to IV and Figs 4 to 8, ours beside the paper's: {}\nTheir numbers as CSV: {}\n{:.0} s in all",
             self.out.display(),

@@ -80,8 +80,13 @@ impl Run {
         let report = Results::wanted(self.report.as_deref(), Format::Html)?;
         let junit = Results::wanted(self.junit.as_deref(), Format::Xml)?;
 
-        say!("{HEADER}");
+        let names = scenes
+            .iter()
+            .map(|loaded| loaded.scene.name.chars().count());
+        let width = names.max().unwrap_or(0).max(LEAST_WIDTH);
+        say!("{:<width$}{HEADER}", "scene");
         let mut books = Books {
+            width,
             way: &self.way,
             golden,
             json: json.map(|json| (json, JsonList::default())),
@@ -136,6 +141,8 @@ impl Run {
 /// What is written down of the runs, in their order.
 struct Books<'a> {
     way: &'a RunOptions,
+    /// Of the names.
+    width: usize,
     golden: Option<Golden>,
     json: Option<(Results<'a>, JsonList)>,
     cases: Vec<TestCase>,
@@ -159,7 +166,7 @@ impl Books<'_> {
             }
         };
         let (hash, wall_s) = (judgement.ran.hash, judgement.ran.wall_s);
-        let mut row = row(&scene.name, &judgement);
+        let mut row = row(&scene.name, self.width, &judgement);
         let mut unmet = judgement.unmet.clone();
         let text = fs::read_to_string(path).unwrap_or_default();
         // Each line with the file and the line of it that it is about.
@@ -217,15 +224,16 @@ fn unrun((path, loaded): (&PathBuf, &Result<Loaded, SceneError>)) -> TestCase {
     }
 }
 
-const HEADER: &str = "\
-scene                       λ mm     rms %  valid  felt right  felt wrong  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
+/// Least width of the names' column.
+const LEAST_WIDTH: usize = 24;
+const HEADER: &str = "    λ mm     rms %  valid  felt right  felt wrong  actuators Hz  of v/λ̂ Hz  phase rms  × real time";
 
 /// A scene's line, up to whether it is as expected.
-fn row(name: &str, judgement: &Judgement) -> String {
+fn row(name: &str, width: usize, judgement: &Judgement) -> String {
     let summary = &judgement.verdict.summary;
     let actuators = &judgement.verdict.actuators;
     format!(
-        "{name:<24} {:>8} {:>8}  {:>5}  {:>10}  {:>10}  {:>12}  {:>9}  {:>9}  {:>11}",
+        "{name:<width$} {:>8} {:>8}  {:>5}  {:>10}  {:>10}  {:>12}  {:>9}  {:>9}  {:>11}",
         number(summary.mean_mm, 3),
         number(summary.rms_percent, 2),
         number(summary.valid_share, 2),

@@ -178,6 +178,14 @@ fn a_campaign_of_an_unknown_kind_is_refused() {
     assert!(errors.contains("gremlin: no such kind"), "{errors}");
 }
 
+#[test]
+fn a_campaign_that_would_try_nothing_is_refused() {
+    let output = hil_sim(&["campaign", "--instants", "0"]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(errors.contains("a whole number of 1 or more"), "{errors}");
+}
+
 /// What is not as expected of a scene in which nothing is at fault but what the scene breaks, and what is not judged.
 fn judged(text: &str) -> (Vec<String>, Vec<String>) {
     let surface = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";

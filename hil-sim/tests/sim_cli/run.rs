@@ -71,6 +71,58 @@ fn a_scene_is_never_written_over_with_results() {
     }
 }
 
+#[test]
+fn a_demo_or_a_paper_is_never_written_over_anything_else() {
+    let folder = folder("over-a-note");
+    for (command, option) in [("demo", "--report"), ("paper", "--out")] {
+        for (name, says) in [
+            ("a.toml", "is a scene's name"),
+            ("note.html", "is there, and no result from before"),
+        ] {
+            fs::write(folder.join(name), SOUND).unwrap();
+            let elves = concat!(
+                env!("CARGO_MANIFEST_DIR"),
+                "/../target/thumbv7em-none-eabihf/release/firmware-"
+            );
+            let [sensor, display] = ["sensor", "display"].map(|board| format!("{elves}{board}"));
+            let output = hil_sim(
+                &folder,
+                &[
+                    command,
+                    option,
+                    name,
+                    "--sensor-elf",
+                    &sensor,
+                    "--display-elf",
+                    &display,
+                ],
+            );
+            assert_eq!(output.status.code(), Some(2), "{command} {name}");
+            let complaint = errors(&output);
+            assert!(complaint.contains(says), "{complaint}");
+            assert_eq!(fs::read_to_string(folder.join(name)).unwrap(), SOUND);
+        }
+    }
+}
+
+#[test]
+fn a_long_name_leaves_the_columns_where_they_are() {
+    let folder = folder("long-name");
+    let name = "a-name-that-is-longer-than-any-column-would-have-been";
+    fs::write(folder.join("a.toml"), format!("name = \"{name}\"\n{SOUND}")).unwrap();
+    fs::write(folder.join("b.toml"), format!("name = \"b\"\n{SOUND}")).unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "b.toml"]);
+    let text = String::from_utf8(output.stdout).unwrap();
+    // Where each number of the first column ends.
+    let ends: Vec<Option<usize>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.find(" 2.0").map(|at| at + " 2.000".len()))
+        .collect();
+    assert_eq!(ends.len(), 2, "{text}");
+    assert!(ends[0].is_some() && ends[0] == ends[1], "{text}");
+}
+
 /// A scene whose motion is a file's.
 const RECORDED: &str = "duration_s = 0.5
 [surface]

@@ -89,8 +89,12 @@ impl Standing {
     }
 
     fn say(&mut self, lines: &str) {
+        self.say_bytes(lines.as_bytes());
+    }
+
+    fn say_bytes(&mut self, bytes: &[u8]) {
         let stdin = self.child.stdin.as_mut().unwrap();
-        stdin.write_all(lines.as_bytes()).unwrap();
+        stdin.write_all(bytes).unwrap();
     }
 
     /// What it has complained about by its end, and its exit status.
@@ -132,6 +136,8 @@ fn lines_on_standard_input_move_cables_and_quit_takes_everything_away() {
             bench.greeting
         );
     }
+    // What is no text is a line like any other.
+    bench.say_bytes(b"caf\xe9\n");
     bench.say("hand 40\njump\npull sensor-link\nreset display\npull display-console\n");
     wait_for("a pulled cable", || {
         are_there(&folder) == [true, false, true, true]
@@ -143,6 +149,10 @@ fn lines_on_standard_input_move_cables_and_quit_takes_everything_away() {
     assert_eq!(status, Some(0), "{complaints}");
     assert!(
         complaints.contains("\"jump\": is no command: give pull"),
+        "{complaints}"
+    );
+    assert!(
+        complaints.contains("\"caf\u{fffd}\": is no command"),
         "{complaints}"
     );
     assert!(

@@ -39,10 +39,10 @@ pub struct Export {
     #[arg(value_name = "TO", value_hint = ValueHint::FilePath)]
     to: PathBuf,
     /// Of a recording: from so many seconds after its start on
-    #[arg(long = "from", value_name = "SECONDS")]
+    #[arg(long = "from", value_name = "SECONDS", value_parser = super::place_s, allow_negative_numbers = true)]
     from_s: Option<f64>,
     /// Of a recording: to so many seconds after its start
-    #[arg(long = "to-time", value_name = "SECONDS")]
+    #[arg(long = "to-time", value_name = "SECONDS", value_parser = super::place_s, allow_negative_numbers = true)]
     to_s: Option<f64>,
     /// Writes over files that are there already
     #[arg(long)]
@@ -54,7 +54,7 @@ impl Export {
     pub fn execute(self) -> anyhow::Result<ExitCode> {
         let from_s = self.from_s.unwrap_or(0.0);
         if let Some(to_s) = self.to_s
-            && (to_s.is_nan() || to_s <= from_s)
+            && to_s <= from_s
         {
             bail!("--to-time {to_s}: give a time after --from");
         }

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use crate::hand::Hand;
 use crate::link::OPERATOR_STOP;
 use crate::relay::credentials::Credentials;
-use crate::relay::endpoint::Endpoint;
+use crate::relay::endpoint::{Endpoint, Reach};
 use crate::relay::name::Name;
 use crate::relay::network::{Ends, Network};
 use crate::relay::operator::{self, Progress};
@@ -20,6 +20,7 @@ use crate::relay::refused;
 use crate::relay::remote::site;
 use crate::relay::report::{Notice, Report};
 use crate::relay::site::{Settings, Site, opposite};
+use crate::relay::transport::Transport;
 use crate::system::System;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueHint};
@@ -274,19 +275,17 @@ impl Stopping {
         let (outcomes, told) = channel();
         // All at once: one that is dead must not hold up the others.
         for endpoint in self.connect {
-            let ends = Ends::Connecting(vec![endpoint]);
+            let ends = Ends::Connecting(vec![endpoint.clone()]);
             let network = Network::new(ends, credentials.clone(), vec![name.clone()], false)?;
             let (outcomes, name) = (outcomes.clone(), name.clone());
             thread::spawn(move || {
                 let clock = System::default().clock;
                 // Nobody waits any more once one has come through.
-                let _ = outcomes.send(operator::stop(
-                    &network,
-                    &clock,
-                    &name,
-                    OPERATOR_STOP,
-                    within,
-                ));
+                let outcome = operator::stop(&network, &clock, &name, OPERATOR_STOP, within);
+                let _ = outcomes.send(outcome.map_err(|error| match network.reach(&endpoint) {
+                    Reach::Reached => format!("{endpoint}: {error}"),
+                    reach => format!("{endpoint}: {reach}"),
+                }));
             });
         }
         drop(outcomes);
@@ -318,7 +317,7 @@ impl Stopping {
             self.within
         ));
         for error in errors {
-            say(&error.to_string());
+            say(&error);
         }
         Ok(ExitCode::from(1))
     }

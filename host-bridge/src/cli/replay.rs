@@ -21,7 +21,7 @@ use anyhow::{Context, bail};
 use clap::ValueHint;
 use protocol::Role;
 
-use super::output;
+use super::output::{self, say};
 use super::signals::{self, Again};
 
 /// What the command does.
@@ -64,10 +64,10 @@ pub struct Replay {
     #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = speed)]
     speed: f64,
     /// From so many seconds after its start on
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = super::place_s, allow_negative_numbers = true)]
     from: f64,
     /// To so many seconds after its start
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = super::place_s, allow_negative_numbers = true)]
     to_time: Option<f64>,
     /// For a scene: the wavelength that was rubbed, in mm; without it, the median of the valid estimates
     #[arg(long, value_name = "MM")]
@@ -107,6 +107,9 @@ impl FromStr for Target {
     }
 }
 
+/// Share of estimates of another λ from which on a person is told.
+const MANY_OFF: f64 = 0.05;
+
 fn speed(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -121,6 +124,12 @@ impl Replay {
             bail!(
                 "--to-time {}: give a time after --from",
                 self.to_time.unwrap_or(0.0)
+            );
+        }
+        if self.speed != 1.0 && matches!(self.to, Target::Scene(_)) {
+            bail!(
+                "--speed {}: a scene has its own time: leave it out",
+                self.speed
             );
         }
         if let Some(wavelength_mm) = self.wavelength
@@ -157,6 +166,12 @@ impl Replay {
             cut(made.cut),
             passed_over(made.passed_over),
         ))?;
+        if made.off_share > MANY_OFF {
+            say(&format!(
+                "{:.0} % of the valid estimates are more than a tenth off that λ: if the surface changes on the way, give --from and --to-time of a part where it does not",
+                100.0 * made.off_share
+            ));
+        }
         Ok(ExitCode::SUCCESS)
     }
 

@@ -93,6 +93,8 @@ pub struct Made {
     pub begin_us: i64,
     /// Recorded estimates within it that are valid, and all.
     pub estimates: (usize, usize),
+    /// Share of the valid ones that are more than a tenth off that wavelength: a scene has but one.
+    pub off_share: f64,
     /// Whether the recording was cut off.
     pub cut: bool,
     /// Rows of an older protocol that say nothing in this version's.
@@ -125,6 +127,8 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         .wavelength_mm
         .or_else(|| median(&valid))
         .ok_or(SceneError::NoWavelength)?;
+    let is_off = |mm: &&f64| (**mm / wavelength_mm - 1.0).abs() > 0.1;
+    let off = valid.iter().filter(is_off).count();
     let expected = settings
         .expect
         .then(|| Expectation::of(&within, layout.duration_s))
@@ -145,6 +149,7 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         wavelength_mm,
         begin_us: layout.begin_us,
         estimates: (valid.len(), within.len()),
+        off_share: off as f64 / valid.len().max(1) as f64,
         cut: excerpt.cut,
         passed_over: excerpt.passed_over,
     })

@@ -237,6 +237,18 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
             vec![file, "--to", toml, "--from", "2", "--to-time", "1"],
             "give a time after --from",
         ),
+        (
+            vec![file, "--to", "monitor", "--from", "nan"],
+            "give a number of seconds, 0 or more",
+        ),
+        (
+            vec![file, "--to", "display-board", "--to-time", "-1"],
+            "give a number of seconds, 0 or more",
+        ),
+        (
+            vec![file, "--to", toml, "--speed", "2"],
+            "a scene has its own time",
+        ),
     ] {
         let ended = bridge::run(["replay"].into_iter().chain(words.iter().copied()), LIMIT);
         assert_eq!(ended.status.code(), Some(2), "{words:?}: {}", ended.stderr);

@@ -77,14 +77,30 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
         match measured {
             Some(measured) if wanted.contains(&measured) => {}
             Some(measured) => {
-                lines.push(format!(
-                    "{key}: {measured:.4} is not within {low:.4} and {high:.4}"
-                ));
+                let said = if key == "mean_mm" {
+                    format!("not within {low:.4} and {high:.4}")
+                } else if measured > *high {
+                    format!("more than {}", rounded(*high))
+                } else {
+                    format!("less than {}", rounded(*low))
+                };
+                lines.push(format!("{key}: {} is {said}", rounded(measured)));
             }
             None => lines.push(format!("{key}: nothing could be measured")),
         }
     }
     lines
+}
+
+/// A number to four digits.
+fn rounded(value: f64) -> String {
+    let whole = value.abs().max(1e-9).log10().floor();
+    let decimals = (3.0 - whole).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
+    }
 }
 
 /// The keys of a scene's file that a line is about, as [`crate::scene_file::line::line_of`] takes them: what stands
@@ -175,6 +191,32 @@ mod tests {
                 "felt_right_share_min",
                 "felt_wrong_share_max",
                 "frequency_percent"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_line_says_what_was_measured_and_which_bound_it_is_beyond() {
+        for (value, text) in [
+            (389.75, "389.8"),
+            (0.000_412_36, "0.0004124"),
+            (-1.5, "-1.5"),
+            (0.0, "0"),
+            (123_456.0, "123456"),
+        ] {
+            assert_eq!(rounded(value), text);
+        }
+        let unmet = expect(|e| {
+            e.wavelength_bias_percent = Some(1.4);
+            e.valid_share_min = Some(0.91);
+            e.wrong_share_max = Some(0.001);
+        });
+        assert_eq!(
+            unmet,
+            [
+                "wavelength_bias_percent: -1.5 is less than -1.4",
+                "valid_share_min: 0.9 is less than 0.91",
+                "wrong_share_max: 0.002 is more than 0.001"
             ]
         );
     }

@@ -435,6 +435,11 @@ fn estimator(
             return Err(table.refuse("gauges", "there are none: name one or more of 0 to 4"));
         }
     };
+    let is_count = matches!(method, Method::Counting | Method::AdaptedCounting);
+    if is_count && !gauges[usize::from(counted_gauge)] {
+        let what = format!("gauge {counted_gauge} is not among gauges: its count is never valid");
+        notes.push(table.refuse("counted_gauge", what));
+    }
     let waves = table.whole_or("waves", (2, 8), defaults.waves)?;
     let valid_percent = table.whole_or("valid_percent", (50, 99), defaults.valid_percent)?;
     for key in ["travel_wavelengths", "candidates"] {

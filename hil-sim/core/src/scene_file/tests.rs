@@ -279,6 +279,28 @@ fn a_scene_of_the_banks_runs_by_its_successor_and_is_told_so_where_it_says_it() 
 }
 
 #[test]
+fn a_count_of_a_gauge_that_is_left_out_is_told() {
+    let notes = |estimator: &str| {
+        let text = format!("{SURFACE}[estimator]\n{estimator}");
+        let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
+        scene.notes.iter().map(ToString::to_string).collect()
+    };
+    let told: Vec<String> = notes("method = \"counting\"\ngauges = [0, 1]\ncounted_gauge = 2\n");
+    assert_eq!(
+        told,
+        [
+            "x.toml:6: estimator.counted_gauge: gauge 2 is not among gauges: its count is never valid"
+        ]
+    );
+    for sound in [
+        "method = \"counting\"\ngauges = [0, 2]\n",
+        "gauges = [0, 1]\n",
+    ] {
+        assert_eq!(notes(sound), [] as [String; 0]);
+    }
+}
+
+#[test]
 fn old_words_are_not_offered_to_those_who_mistake_a_word() {
     let text = refusal_of("[estimator]\nmethod = \"bunk\"");
     assert!(

@@ -94,8 +94,15 @@ fn meaning(key: KeyEvent) -> Option<Input> {
 /// Hands on lines of standard input. Its end means nothing.
 pub fn on_lines(events: Sender<Input>) {
     thread::spawn(move || {
-        for line in io::stdin().lock().lines().map_while(Result::ok) {
-            if !line.trim().is_empty() && events.send(Input::Line(line)).is_err() {
+        let (mut input, mut bytes) = (io::stdin().lock(), Vec::new());
+        while input
+            .read_until(b'\n', &mut bytes)
+            .is_ok_and(|count| count > 0)
+        {
+            // One that is no text is no command, and is answered as such.
+            let line = String::from_utf8_lossy(&bytes).trim().to_owned();
+            bytes.clear();
+            if !line.is_empty() && events.send(Input::Line(line)).is_err() {
                 return;
             }
         }

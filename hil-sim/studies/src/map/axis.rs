@@ -147,13 +147,15 @@ impl Axis {
     }
 
     /// The number of the step nearest to a number on the axis, or with this name. None if the text is
-    /// neither.
+    /// neither, or a number beyond the axis' ends.
     pub fn nearest(&self, text: &str) -> Option<usize> {
         if self.scale == Scale::Named {
             return self.steps.iter().position(|step| self.place(step) == text);
         }
-        let at = self.along(text.parse().ok()?)?;
-        Some((at.round().max(0.0) as usize).min(self.steps.len() - 1))
+        let nearest = self.along(text.parse().ok()?)?.round();
+        (0.0..self.steps.len() as f64)
+            .contains(&nearest)
+            .then_some(nearest as usize)
     }
 
     /// Where a value is, counted in steps from the first: on the axis' scale between the two steps around
@@ -230,7 +232,10 @@ mod tests {
         // The middle between 1 and 10 is √10.
         assert_eq!(log.nearest("3.1"), Some(0));
         assert_eq!(log.nearest("3.2"), Some(1));
-        assert_eq!(log.nearest("1e9"), Some(2));
+        assert_eq!(log.nearest("300"), Some(2));
+        assert_eq!(log.nearest("400"), None);
+        assert_eq!(log.nearest("0.3"), None);
+        assert_eq!(log.nearest("nan"), None);
         assert_eq!(log.nearest("-1"), None);
         assert_eq!(log.nearest("fast"), None);
         let listed = Axis::listed("", Knob::ENCODER, &[5.0, 10.0, 15.0, 200.0]);

@@ -12,6 +12,7 @@ use super::Map;
 use super::error::{MapError, NOT_WRITTEN};
 use super::fingerprint::Fingerprints;
 use super::row::{Row, header, rank};
+use crate::output::replace;
 
 /// Rows by method and cell.
 pub type Rows = BTreeMap<(String, usize), Row>;
@@ -41,7 +42,7 @@ impl<'a> Journal<'a> {
             (Rows::new(), false)
         };
         if !is_sound {
-            replace(map, path, keys, &rows)?;
+            rewrite(map, path, keys, &rows)?;
         }
         let file = OpenOptions::new().append(true).open(path);
         let journal = Self {
@@ -63,7 +64,7 @@ impl<'a> Journal<'a> {
 
     /// Writes all rows anew, sorted. The file is replaced at once, not piece by piece.
     pub fn sort(&mut self, rows: &Rows, keys: &mut Fingerprints) -> Result<(), MapError> {
-        replace(self.map, &self.path, keys, rows)
+        rewrite(self.map, &self.path, keys, rows)
     }
 }
 
@@ -143,17 +144,14 @@ pub fn read(
 }
 
 /// Replaces a CSV file by one with these rows, sorted by method and cell.
-fn replace(map: &Map, path: &Path, keys: &mut Fingerprints, rows: &Rows) -> Result<(), MapError> {
+fn rewrite(map: &Map, path: &Path, keys: &mut Fingerprints, rows: &Rows) -> Result<(), MapError> {
     let mut sorted: Vec<&Row> = rows.values().collect();
     sorted.sort_by_key(|row| (rank(&row.method), row.cell));
     let mut text = header(map);
     for row in sorted {
         text += &line(map, row, keys)?;
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let new = path.with_file_name(format!(".{name}.new"));
-    let written = fs::write(&new, text).and_then(|()| fs::rename(&new, path));
-    written.map_err(MapError::file(path, NOT_WRITTEN))
+    replace(path, &text).map_err(MapError::file(path, NOT_WRITTEN))
 }
 
 fn line(map: &Map, row: &Row, keys: &mut Fingerprints) -> Result<String, MapError> {

@@ -8,12 +8,14 @@
 //! ```
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene_file::line::line_of;
 use hil_sim_core::scene_file::read_text;
+
+use super::replace;
 
 /// The file's first lines.
 const HEADER: &str = "\
@@ -41,7 +43,7 @@ pub enum GoldenError {
     )]
     Foreign(PathBuf, usize, String),
     /// The file cannot be written.
-    #[error("{}: cannot be written: {}: give a file in a folder that exists", .0.display(), .1)]
+    #[error("{}: cannot be written: {}: nothing was changed; give a file in a folder that exists and has room", .0.display(), .1)]
     NotWritten(PathBuf, io::Error),
     /// A scene's file is nowhere.
     #[error("{}: cannot be found: {}: give the name of a scene", .0.display(), .1)]
@@ -169,7 +171,7 @@ impl Golden {
             }
             text.push('\n');
         }
-        let written = fs::write(&self.path, text.trim_end().to_owned() + "\n");
+        let written = replace(&self.path, &(text.trim_end().to_owned() + "\n"));
         written.map_err(|source| GoldenError::NotWritten(self.path.clone(), source))
     }
 }
@@ -192,6 +194,8 @@ pub fn complaint(standing: &Comparison, hash: u64, golden: &Golden, name: &str) 
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn folder(test: &str) -> PathBuf {
