@@ -14,8 +14,9 @@ const NOISE_GAINS: [f32; 2] = [1.83, 4.85];
 const NOISE_DOUBT: f32 = 0.1;
 /// What a contact dulls a texture by: a Gaussian of this σ in mm, 0.24 mm wide at half height.
 const CONTACT_SIGMA_MM: f32 = 0.1;
-/// Power at high frequencies, relative to the wave's, that is never held against a surface.
-const LEAST_JERK: f32 = 0.005;
+/// Power of the first and of the second difference, relative to the wave's, that is never held against a surface: as noise
+/// makes, so the first has 2.65 times as much of it.
+const LEAST_JERKS: [f32; 2] = [0.013, 0.005];
 /// What is faster than this is noise: a fingertip on its spring slips for some ms. White noise is at 303 Hz.
 const SLIPS_BELOW_HZ: f32 = 350.0;
 /// Up to this speed in mm/s, what a contact of 0.24 mm lets through passes at 100 Hz at most. So the first difference tells
@@ -165,11 +166,11 @@ impl Jerk {
         };
         let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
         let per_mm = slip_hz * PLACES_PER_UM as f32 / self.mean_speed.max(f32::MIN_POSITIVE);
-        let least = explained * let_through(per_mm).max(LEAST_JERK);
         let stands_out = |n: usize| {
             let power = &self.powers[n];
             let known = NOISE_GAINS[n] * noise;
             let left = power.mean - power.steady(gauges).max(known) - NOISE_DOUBT * known;
+            let least = explained * let_through(per_mm).max(LEAST_JERKS[n]);
             left > least && left > explained * edges(n as i32 + 1) + least
         };
         let is_slow = self.mean_speed < SLOW_MM_S * PLACES_PER_UM as f32;
@@ -362,11 +363,11 @@ mod tests {
         // Bursts that swell and fade, at 110 Hz: twice as much of them is in the first difference as in the second.
         let soft = |ms: f32, _| {
             let envelope = larger(sine(ms, 20.0), 0.0);
-            110.0 * envelope * envelope * sine(ms, 110.0)
+            127.0 * envelope * envelope * sine(ms, 110.0)
         };
         let slip = |mm_s: f32, noise| is_slip(3.0, mm_s, noise, soft);
-        assert!(slip(10.0, 100.0));
-        assert!(!slip(1.1 * SLOW_MM_S, 100.0));
+        assert!(slip(10.0, 150.0));
+        assert!(!slip(1.1 * SLOW_MM_S, 150.0));
         // Noise that makes as much of the first difference hides them again.
         assert!(!slip(10.0, 1_200.0));
     }

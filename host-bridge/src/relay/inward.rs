@@ -15,8 +15,8 @@ use crate::relay::gate::{Gate, Order};
 use crate::relay::remote::RemoteBridge;
 use crate::relay::report::{Histogram, Incoming, Notice, Percentiles};
 
-/// For so long after another bridge has got the bench, in µs, its board's messages are not passed: the board here is to
-/// notice that nobody speaks. An arm that is silent for 0.1 s stands still, and follows the next hand from where both are.
+/// For so long after another bridge has got the bench, in µs, its board's messages wait: the board here is to notice that
+/// nobody speaks. An arm that hears nothing for 0.1 s stands still, and follows the next hand from where both are.
 const BETWEEN_HOLDERS_US: u64 = 150_000;
 
 /// What is to be done about an envelope.
@@ -62,7 +62,7 @@ pub struct Inward {
     max_age_us: u64,
     gate: Gate,
     ages: Ages,
-    /// Until when nothing is passed, in µs: see [`BETWEEN_HOLDERS_US`].
+    /// Until when messages wait, in µs: see [`BETWEEN_HOLDERS_US`].
     quiet_until_us: u64,
     remote: RemoteBridge,
     counts: Incoming,
@@ -209,7 +209,10 @@ impl Inward {
     /// Another bridge has the bench.
     const fn begin(&mut self, now_us: u64) {
         self.ages.forget();
-        self.quiet_until_us = now_us.saturating_add(BETWEEN_HOLDERS_US);
+        // The first one's board has nobody to be told from.
+        if self.counts.passed > 0 {
+            self.quiet_until_us = now_us.saturating_add(BETWEEN_HOLDERS_US);
+        }
     }
 
     fn on_pong(&mut self, pong: &Pong, now_us: u64) -> Option<Answer> {
@@ -235,13 +238,10 @@ impl Inward {
         if order != Order::Newer {
             return Heard::Nothing;
         }
-        if now_us < self.quiet_until_us {
-            self.counts.undated += 1;
-            return Heard::Nothing;
-        }
         match self.ages.judge(envelope.sent_us, now_us) {
             Age::Fresh(age_us) => Heard::Pass(Waiting {
                 message,
+                from_us: self.quiet_until_us,
                 until_us: now_us.saturating_add(self.max_age_us.saturating_sub(age_us)),
                 age_us,
                 came_us: now_us,
@@ -267,6 +267,8 @@ impl Inward {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Waiting {
     pub message: Message,
+    /// Until when it waits, in µs of the bridge's clock.
+    pub from_us: u64,
     /// When it is too old to be said, in µs of the bridge's clock.
     pub until_us: u64,
     /// How old it was when it came, in µs.
@@ -312,6 +314,11 @@ impl Outbox {
         let replaced = self.contents().newest.replace(waiting).is_some();
         self.changed.notify();
         replaced
+    }
+
+    /// Puts one back that was taken out, unless there is a newer one.
+    pub fn put_back(&self, waiting: Waiting) {
+        self.contents().newest.get_or_insert(waiting);
     }
 
     pub fn close(&self) {
@@ -361,6 +368,7 @@ mod tests {
                 position_um: 0,
                 velocity_um_s: 0,
             }),
+            from_us: 0,
             until_us: 0,
             age_us: 0,
             came_us: 0,
@@ -374,6 +382,17 @@ mod tests {
         assert!(outbox.put(waiting(2)));
         assert_eq!(outbox.take(0), Due::Message(waiting(2)));
         assert_eq!(outbox.take(0), Due::Nothing);
+    }
+
+    #[test]
+    fn what_is_put_back_makes_way_for_what_came_meanwhile() {
+        let outbox = outbox();
+        outbox.put_back(waiting(1));
+        outbox.put_back(waiting(2));
+        assert_eq!(outbox.take(0), Due::Message(waiting(1)));
+        outbox.put(waiting(3));
+        outbox.put_back(waiting(1));
+        assert_eq!(outbox.take(0), Due::Message(waiting(3)));
     }
 
     #[test]

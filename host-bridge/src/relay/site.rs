@@ -458,6 +458,11 @@ impl Shared {
             match self.outbox.take(self.now_us().saturating_add(micros(IDLE))) {
                 Due::Closed => return,
                 Due::Nothing => {}
+                Due::Message(waiting) if self.now_us() < waiting.from_us => {
+                    let left_us = waiting.from_us.saturating_sub(self.now_us());
+                    self.pause(Duration::from_micros(left_us));
+                    self.outbox.put_back(waiting);
+                }
                 Due::Message(waiting) if self.now_us() > waiting.until_us => {
                     locked(&self.inward).counts_mut().stale += 1;
                 }

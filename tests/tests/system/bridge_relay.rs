@@ -358,6 +358,8 @@ fn between_two_holders_the_board_hears_nothing_for_as_long_as_it_follows_the_fir
         waiting.says("another bridge of this site holds the bench", LIMIT);
         pass(&pair.bench, Duration::from_secs(1));
         sensor.take_heard();
+        let clock = pair.bench.clock.clone();
+        let (mut last_us, mut first_us) = (clock.now_us(), None);
         let _kept = if leaves {
             drop(std::mem::replace(&mut pair.display, waiting));
             None
@@ -366,20 +368,18 @@ fn between_two_holders_the_board_hears_nothing_for_as_long_as_it_follows_the_fir
             Some(waiting)
         };
         let is_others = |message: &Message| matches!(message, Message::Motion(motion) if motion.sequence >= 1_000_000);
-        let (mut last_us, mut first_us) = (None, None);
-        let clock = &pair.bench.clock;
         let changed = wait_by(&sensor, LIMIT, || {
             for message in sensor.take_heard() {
                 match is_others(&message) {
                     true => first_us = first_us.or(Some(clock.now_us())),
-                    false if is_motion(&message) => last_us = Some(clock.now_us()),
+                    false if is_motion(&message) => last_us = clock.now_us(),
                     false => {}
                 }
             }
             first_us.is_some()
         });
         assert!(changed, "nobody took the bench");
-        let silence = Duration::from_micros(first_us.unwrap() - last_us.unwrap());
+        let silence = Duration::from_micros(first_us.unwrap() - last_us);
         assert!(silence > SILENCE, "{silence:?}, leaves: {leaves}");
     }
 }
