@@ -22,6 +22,26 @@ pub enum Method {
     Crossings,
 }
 
+impl Method {
+    /// All of them, as they are listed for people.
+    pub const ALL: [Self; 4] = [
+        Self::Spectrum,
+        Self::Crossings,
+        Self::Counting,
+        Self::AdaptedCounting,
+    ];
+
+    /// Its name in scenes, tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Spectrum => "spectrum",
+            Self::Crossings => "crossings",
+            Self::Counting => "counting",
+            Self::AdaptedCounting => "counting-adapted",
+        }
+    }
+}
+
 /// The sensor board's settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct SensorConfiguration {
@@ -81,6 +101,19 @@ pub enum Mode {
     Travelling,
 }
 
+impl Mode {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Uniform, Self::Travelling];
+
+    /// Its name in scenes, tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Travelling => "travelling",
+        }
+    }
+}
+
 /// How much of the surface the actuators play.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Rendering {
@@ -91,6 +124,20 @@ pub enum Rendering {
     Shape,
     /// These, and a random part with the levels of [`crate::Texture::bands`] that is the same at the same place.
     Texture,
+}
+
+impl Rendering {
+    /// All of them, the simplest first.
+    pub const ALL: [Self; 3] = [Self::Fundamental, Self::Shape, Self::Texture];
+
+    /// Its name in scenes, tables and commands.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fundamental => "fundamental",
+            Self::Shape => "shape",
+            Self::Texture => "texture",
+        }
+    }
 }
 
 /// How often the actuators get new voltages.

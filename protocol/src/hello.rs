@@ -147,4 +147,15 @@ mod tests {
         }
         assert_eq!(Role::from_byte(b'S'), None);
     }
+
+    #[test]
+    fn people_are_told_who_it_is_and_on_which_chip() {
+        let names = [Role::Sensor, Role::Display, Role::Host].map(Role::name);
+        assert_eq!(names, ["sensor", "display", "host"]);
+        let hello = |chip| Hello::new(Role::Sensor, chip, [0, 1, 0]);
+        assert_eq!(hello("stm32f429zi").chip_name(), "stm32f429zi");
+        let mut unreadable = hello("stm32f429zi");
+        unreadable.chip[3] = 0xff;
+        assert_eq!(unreadable.chip_name(), "?");
+    }
 }

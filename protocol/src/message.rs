@@ -107,6 +107,16 @@ pub enum Range {
     T2,
 }
 
+impl Range {
+    /// The paper's name of it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::T1 => "T1",
+            Self::T2 => "T2",
+        }
+    }
+}
+
 /// What the fingertip does at the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Contact {
@@ -119,6 +129,18 @@ pub enum Contact {
     Stick,
     /// Stick and slip in turn, many times a second: see [`Estimate::lag_um`] for what can be known of it.
     StickSlip,
+}
+
+impl Contact {
+    /// It in a word, as used in messages to people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "unknown",
+            Self::Slip => "slip",
+            Self::Stick => "stick",
+            Self::StickSlip => "stick-slip",
+        }
+    }
 }
 
 /// What is wrong with a gauge.
@@ -278,5 +300,37 @@ impl Hello {
     /// Whether this build can read what the speaker says next.
     pub const fn is_compatible(&self) -> bool {
         self.protocol_version() == PROTOCOL_VERSION && self.schema_hash() == SCHEMA_HASH
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_are_told_of_contact_and_gauges_in_words() {
+        let contacts = [
+            Contact::Unknown,
+            Contact::Slip,
+            Contact::Stick,
+            Contact::StickSlip,
+        ];
+        assert_eq!(
+            contacts.map(Contact::name),
+            ["unknown", "slip", "stick", "stick-slip"]
+        );
+        let health = [
+            GaugeHealth::Good,
+            GaugeHealth::Dead,
+            GaugeHealth::Stuck,
+            GaugeHealth::Saturated,
+            GaugeHealth::Noisy,
+            GaugeHealth::Hum,
+        ];
+        assert_eq!(
+            health.map(GaugeHealth::name),
+            ["good", "dead", "stuck", "saturated", "noisy", "hum"]
+        );
+        assert_eq!([Range::T1, Range::T2].map(Range::name), ["T1", "T2"]);
     }
 }

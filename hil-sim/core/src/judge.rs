@@ -23,7 +23,7 @@ pub mod track;
 pub mod trust;
 pub mod truth;
 mod voltage;
-pub mod words;
+mod words;
 
 use crate::judge::truth::Truth;
 use crate::run::observer::{RunEvent, RunObserver, replay_to};

@@ -505,15 +505,3 @@ impl Default for Estimator {
         }
     }
 }
-
-impl Estimator {
-    /// The method's name in scenes and in the JSON.
-    pub const fn method_name(&self) -> &'static str {
-        match self.method {
-            Method::Spectrum => "spectrum",
-            Method::Counting => "counting",
-            Method::AdaptedCounting => "counting-adapted",
-            Method::Crossings => "crossings",
-        }
-    }
-}

@@ -7,7 +7,7 @@ use hil_sim_boards::cycles::CLOCK_HZ;
 use hil_sim_boards::display_alone::DisplayBench;
 use hil_sim_boards::instructions::{self, BUDGET, Counted, Cycles};
 use hil_sim_core::scene::Motion;
-use hil_sim_studies::display::{RICH_TEXTURE, rendering_of_word, word_of_mode, word_of_rendering};
+use hil_sim_studies::display::{RICH_TEXTURE, rendering_of_word};
 use hil_sim_studies::study::{Record, Table};
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
@@ -98,7 +98,7 @@ impl Budget {
         let firmware = self.measured.firmware()?;
         let is_rich = self.rendering != Rendering::Fundamental;
         let (wavelength_mm, goal, words) = if is_rich {
-            let word = word_of_rendering(self.rendering);
+            let word = self.rendering.name();
             (RICH_WAVELENGTH_MM, RICH_GOAL_PERCENT, format!(" {word}"))
         } else {
             (WAVELENGTH_MM, GOAL_PERCENT, String::new())
@@ -121,7 +121,7 @@ impl Budget {
                     ..DisplayBench::new(motion, wavelength_mm, SETTLING_S + COUNTED_S)
                 };
                 let counted = instructions::count(alone, &firmware, COUNTED_S)?;
-                let head = format!("{} Hz {}{words}:", update_rate.hz(), word_of_mode(mode));
+                let head = format!("{} Hz {}{words}:", update_rate.hz(), mode.name());
                 columns.push((head, counted));
             }
         }

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::ValueEnum;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
-use hil_sim_core::scene::{Estimator, Scene};
+use hil_sim_core::scene::Scene;
 use hil_sim_studies::bench::Bench;
 use hil_sim_studies::jury::counts::Counts;
 use hil_sim_studies::jury::evidence;
@@ -219,11 +219,7 @@ impl Jury {
         let settings =
             firmware_display::Settings::new(display, &protocol::actuators::DEFAULT_ACTUATORS)
                 .map_err(|refusal| anyhow::anyhow!("--max-age-ms: {refusal}"))?;
-        let method = Estimator {
-            method: sensor.method,
-            ..Estimator::default()
-        }
-        .method_name();
+        let method = sensor.method.name();
 
         let trials = self.of_surfaces(|&seed| {
             let trial = Trial::draw(seed);
@@ -336,7 +332,7 @@ fn judge_scene(bench: &Bench, entry: &Entry, scene: &Scene) -> anyhow::Result<Ju
     Ok(JudgedScene {
         name: entry.name.clone(),
         family: entry.family.clone(),
-        method: scene.estimator.method_name(),
+        method: scene.estimator.method.name(),
         said: entry.truth.judge(said),
         felt: verdict.summary.felt_wrong_share.map(|wrong| Felt {
             right: verdict.summary.felt_right_share.unwrap_or(0.0),

@@ -225,10 +225,7 @@ impl Shift {
                     Motion::Constant { .. } => "constant",
                     _ => "sinusoid",
                 },
-                mode: match self.scene.display.configuration.mode {
-                    Mode::Uniform => "uniform",
-                    Mode::Travelling => "travelling",
-                },
+                mode: self.scene.display.configuration.mode.name(),
                 scene: self.scene.name.clone(),
                 finding,
             })

@@ -12,28 +12,16 @@ use hil_sim_core::scene::{Link, Motion, Series};
 use protocol::texture::{BANDS, PARTIALS};
 use protocol::{DisplayConfiguration, Mode, Partial, Rendering, Texture, UpdateRate};
 
-/// Every rendering, the simplest first, by its name in tables, files and commands.
-pub const RENDERINGS: [(&str, Rendering); 3] = [
-    ("fundamental", Rendering::Fundamental),
-    ("shape", Rendering::Shape),
-    ("texture", Rendering::Texture),
-];
-
-/// The name of a rendering.
-pub fn word_of_rendering(rendering: Rendering) -> &'static str {
-    let found = RENDERINGS.iter().find(|(_, of)| *of == rendering);
-    found.map_or("", |(word, _)| word)
-}
-
 /// The rendering of a name.
 ///
 /// # Errors
 /// If it is none's, with those that there are.
 pub fn rendering_of_word(word: &str) -> Result<Rendering, String> {
-    let found = RENDERINGS.iter().find(|(name, _)| *name == word);
-    found.map(|(_, rendering)| *rendering).ok_or_else(|| {
-        format!("no rendering is called {word:?}: give fundamental, shape or texture")
-    })
+    let mut all = Rendering::ALL.into_iter();
+    all.find(|rendering| rendering.name() == word)
+        .ok_or_else(|| {
+            format!("no rendering is called {word:?}: give fundamental, shape or texture")
+        })
 }
 
 /// A surface that has everything: both partials, all that does not repeat.
@@ -57,14 +45,6 @@ const PLAIN_TEXTURE: Texture = Texture {
     bands: [0; BANDS],
     ..RICH_TEXTURE
 };
-
-/// The name of a mode in tables and files.
-pub const fn word_of_mode(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Uniform => "uniform",
-        Mode::Travelling => "travelling",
-    }
-}
 
 /// What the board starts with, but for this.
 fn configured(mode: Mode, update_rate: UpdateRate) -> DisplayConfiguration {

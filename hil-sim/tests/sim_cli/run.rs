@@ -43,7 +43,7 @@ fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
         serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
     assert_eq!(json[0]["name"], "a");
     assert_eq!(json[0]["engine"], "native");
-    assert_eq!(json[0]["method"], Estimator::default().method_name());
+    assert_eq!(json[0]["method"], Estimator::default().method.name());
     assert_eq!(json[0]["estimates"].as_array().unwrap().len(), 50);
     assert!(
         fs::read_to_string(folder.join("o.html"))

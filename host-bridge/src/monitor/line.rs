@@ -12,7 +12,6 @@ use super::board::Board;
 use super::dashboard::Dashboard;
 use super::log_entry::{LogEntry, LogEvent};
 use super::session::Session;
-use super::settings;
 use crate::clock::micros;
 use crate::clock::{now_us, unix_ns};
 use crate::state::State;
@@ -47,8 +46,8 @@ pub fn second(dashboard: &Dashboard) -> String {
         state_word(&dashboard.display),
         number(estimate.and_then(|estimate| estimate.wavelength_mm), 3),
         number(estimate.map(|estimate| estimate.confidence), 2),
-        estimate.map_or("-", |estimate| settings::range(estimate.range)),
-        estimate.map_or("-", |estimate| settings::contact(estimate.contact)),
+        estimate.map_or("-", |estimate| estimate.range.name()),
+        estimate.map_or("-", |estimate| estimate.contact.name()),
         number(estimate.and_then(|estimate| estimate.counted_mm), 2),
         mm_s(estimate.map(|estimate| estimate.velocity_um_s)),
         mm_s(dashboard.motion.map(|(_, motion)| motion.velocity_um_s)),
@@ -81,8 +80,8 @@ pub fn second_json(dashboard: &Dashboard) -> Value {
             "wavelength_mm": estimate.wavelength_mm,
             "confidence": estimate.confidence,
             "valid": estimate.valid,
-            "range": settings::range(estimate.range),
-            "contact": settings::contact(estimate.contact),
+            "range": estimate.range.name(),
+            "contact": estimate.contact.name(),
             "counted_mm": estimate.counted_mm,
             "amplitude_lsb": estimate.amplitude_lsb,
             "velocity_mm_s": mm_s(estimate.velocity_um_s),

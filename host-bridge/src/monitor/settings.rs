@@ -1,6 +1,6 @@
 //! The boards' settings by name, as a person changes them: fields of the configuration on the wire.
 
-use protocol::{Configuration, Contact, Range, Refusal, Role};
+use protocol::{Configuration, Refusal, Role};
 use serde_json::{Value, json};
 
 /// How a setting is given.
@@ -189,24 +189,6 @@ pub fn of(role: Role) -> &'static [Setting] {
         Role::Sensor => &SENSOR,
         Role::Display => &DISPLAY,
         Role::Host => &[],
-    }
-}
-
-/// The paper's range.
-pub const fn range(range: Range) -> &'static str {
-    match range {
-        Range::T1 => "T1",
-        Range::T2 => "T2",
-    }
-}
-
-/// What the fingertip does.
-pub const fn contact(contact: Contact) -> &'static str {
-    match contact {
-        Contact::Unknown => "unknown",
-        Contact::Slip => "slip",
-        Contact::Stick => "stick",
-        Contact::StickSlip => "stick-slip",
     }
 }
 

@@ -3,7 +3,7 @@
 use protocol::actuators::{self, grid};
 use protocol::{
     Configuration, Configure, DEFAULT_ACTUATORS, DisplayConfiguration, Refusal,
-    SensorConfiguration, Setting,
+    SensorConfiguration, Setting, UpdateRate,
 };
 
 /// The answer to the sensor's default configuration with one change.
@@ -102,6 +102,12 @@ fn each_of_the_displays_settings_is_taken_in_its_range_and_refused_beside_it() {
     assert_range(Setting::AmplitudeMv, 0, 5_000, |n| {
         display(|c| c.amplitude_mv = n as u16)
     });
+}
+
+#[test]
+fn a_rate_is_so_many_updates_a_second() {
+    let rates = [UpdateRate::Hz2000, UpdateRate::Hz4000].map(UpdateRate::hz);
+    assert_eq!(rates, [2_000, 4_000]);
 }
 
 #[test]

@@ -123,6 +123,6 @@ fn truth<'a>(scene: &'a Scene, wavelength_mm: &'a dyn Fn(f64) -> f64) -> Truth<'
         sensor: scene.sensor_configuration(),
         display: scene.display_configuration(),
         actuators: *scene.display.actuators,
-        ..Truth::new(&scene.name, scene.estimator.method_name(), wavelength_mm)
+        ..Truth::new(&scene.name, scene.estimator.method.name(), wavelength_mm)
     }
 }

@@ -28,18 +28,9 @@ const DAMPING: [f64; 2] = [
 
 pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
     let defaults = DisplayConfiguration::DEFAULT;
-    let mode = table.choice(
-        "mode",
-        &[("uniform", Mode::Uniform), ("travelling", Mode::Travelling)],
-    )?;
-    let rendering = table.choice(
-        "rendering",
-        &[
-            ("fundamental", Rendering::Fundamental),
-            ("shape", Rendering::Shape),
-            ("texture", Rendering::Texture),
-        ],
-    )?;
+    let mode = table.choice("mode", &Mode::ALL.map(|mode| (mode.name(), mode)))?;
+    let renderings = Rendering::ALL.map(|rendering| (rendering.name(), rendering));
+    let rendering = table.choice("rendering", &renderings)?;
     let update_rate = match table.whole("update_rate_hz", 2_000, 4_000)? {
         None | Some(2_000) => UpdateRate::Hz2000,
         Some(4_000) => UpdateRate::Hz4000,

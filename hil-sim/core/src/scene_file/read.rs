@@ -408,13 +408,8 @@ fn estimator(
     notes: &mut Vec<SceneError>,
 ) -> Result<Estimator, SceneError> {
     let defaults = Estimator::default();
-    let methods = [
-        ("default", defaults.method),
-        ("spectrum", Method::Spectrum),
-        ("crossings", Method::Crossings),
-        ("counting", Method::Counting),
-        ("counting-adapted", Method::AdaptedCounting),
-    ];
+    let mut methods = vec![("default", defaults.method)];
+    methods.extend(Method::ALL.map(|method| (method.name(), method)));
     let method = if table.text("method")? == Some("bank") {
         notes.push(table.refuse("method", BANK_IS_SPECTRUM));
         Method::Spectrum

@@ -251,7 +251,7 @@ fn every_method_has_its_word_and_the_default_is_the_boards() {
         let text = format!("{SURFACE}[estimator]\nmethod = \"{word}\"");
         let scene = Scene::parse(Path::new("x.toml"), &text).unwrap();
         assert_eq!(scene.sensor_configuration().method, method);
-        assert!(word == "default" || scene.estimator.method_name() == word);
+        assert!(word == "default" || scene.estimator.method.name() == word);
     }
 }
 

@@ -10,7 +10,7 @@ mod stretch;
 
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::{PLAIN_TEXTURE, configured, seconds, word_of_mode};
+use super::{PLAIN_TEXTURE, configured, seconds};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
@@ -310,7 +310,7 @@ impl Study for Vec<Row> {
         let rows = self.iter().map(|row| {
             Record::default()
                 .with("rate, Hz:", short(row.rate_hz))
-                .with("mode", word_of_mode(row.mode))
+                .with("mode", row.mode.name())
                 .with("hand", row.word_of_hand())
                 .with("mm/s:", number(row.speed_mm_s, 1))
                 .with("λ, mm:", number(row.wavelength_mm, 2))
@@ -329,7 +329,7 @@ impl Study for Vec<Row> {
         let of = |row: &Row| {
             Record::default()
                 .with("rate_hz", short(row.rate_hz))
-                .with("mode", word_of_mode(row.mode))
+                .with("mode", row.mode.name())
                 .with("hand", row.word_of_hand())
         };
         let rows = self.iter().map(|row| {

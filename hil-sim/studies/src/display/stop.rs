@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use protocol::{DisplayConfiguration, Mode, UpdateRate};
 
-use super::{configured, seconds, through, word_of_mode};
+use super::{configured, seconds, through};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use hil_sim_boards::display_alone::{self, DisplayBench};
 use hil_sim_boards::{ElfError, Firmware};
@@ -204,7 +204,7 @@ impl Study for Vec<Stop> {
         let rows = self.iter().map(|stop| {
             Record::default()
                 .with("rate, Hz:", short(stop.rate_hz))
-                .with("mode", word_of_mode(stop.mode))
+                .with("mode", stop.mode.name())
                 .with("crest, V:", number(stop.crest_v, 2))
                 .with("last count to 0 V, ms:", number(stop.watched_ms, 2))
                 .with("the last channel's, ms:", number(stop.all_ms, 2))
@@ -226,7 +226,7 @@ impl Study for Vec<Stop> {
             shown.map(|(what, (t_s, value))| {
                 Record::default()
                     .with("rate_hz", short(stop.rate_hz))
-                    .with("mode", word_of_mode(stop.mode))
+                    .with("mode", stop.mode.name())
                     .with("what", what)
                     .with("from_last_count_ms", fixed(t_s * 1e3, 4))
                     .with("value", fixed(*value, 5))

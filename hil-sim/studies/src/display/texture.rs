@@ -36,7 +36,7 @@ use hil_sim_core::run::recording::{Engine, volts};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
 
-use super::{RENDERINGS, seconds, through};
+use super::{seconds, through};
 use crate::bench::BenchError;
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 use likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
@@ -149,7 +149,7 @@ fn scenes(quick: bool) -> Vec<(Case, Rendering)> {
     };
     let cases = grounds.map(case);
     cases
-        .flat_map(|case| RENDERINGS.map(|(_, rendering)| (case.clone(), rendering)))
+        .flat_map(|case| Rendering::ALL.map(|rendering| (case.clone(), rendering)))
         .collect()
 }
 
@@ -220,7 +220,7 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
     };
     let mut rows = Vec::new();
     for &delay_ms in delays {
-        for (_, rendering) in RENDERINGS {
+        for rendering in Rendering::ALL {
             let hand_mm = |t_s| case.hand.position_mm(t_s);
             let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
             rows.push(row(case, Engine::Native, rendering, delay_ms, &played));
@@ -356,7 +356,7 @@ fn spread(
 /// nearly all of it, and where there is one the random part brings the spectrum no further away.
 fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bool {
     let of = |value: fn(&Row) -> f64| {
-        RENDERINGS.map(|(_, rendering)| spread(rows, engine, family, rendering, value))
+        Rendering::ALL.map(|rendering| spread(rows, engine, family, rendering, value))
     };
     let ([Some(fundamental), Some(shape), _], [_, Some(plain), Some(rough)]) =
         (of(|row| row.coherence), of(|row| row.distance_db))
@@ -385,7 +385,7 @@ impl Study for Measured {
         let mut add = |cells: [String; 6]| rows.push(Record::of(&HEADS, cells));
         for family in families(&self.rows) {
             for engine in [Engine::Native, Engine::Elf] {
-                for (word, rendering) in RENDERINGS {
+                for rendering in Rendering::ALL {
                     let of = |value: fn(&Row) -> f64| {
                         spread(&self.rows, engine, family, rendering, value)
                     };
@@ -394,20 +394,21 @@ impl Study for Measured {
                         continue;
                     };
                     let range = format!("{least:.2} to {most:.2}");
-                    let [family, engine, word] = [family, engine.name(), word].map(str::to_owned);
+                    let [family, engine, word] =
+                        [family, engine.name(), rendering.name()].map(str::to_owned);
                     let (mean, distance) = (number(mean, 2), number(distance, 1));
                     add([family, engine, word, mean, range, distance]);
                 }
             }
         }
         for pair in &self.pairs {
-            for ((word, _), answer) in RENDERINGS.iter().zip(&pair.answers) {
+            for (rendering, answer) in Rendering::ALL.iter().zip(&pair.answers) {
                 let [right, low, high] =
                     [answer.right, answer.interval.low, answer.interval.high].map(|x| 100.0 * x);
                 add([
                     format!("{} or {}", pair.one, pair.other),
                     Engine::Native.name().to_owned(),
-                    (*word).to_owned(),
+                    rendering.name().to_owned(),
                     format!("told apart {right:.0} %"),
                     format!("{low:.0} to {high:.0} %"),
                     "–".to_owned(),
@@ -427,7 +428,7 @@ impl Study for Measured {
                 .with("arm_mm_s", short(row.speeds_mm_s.0))
                 .with("hand_mm_s", short(row.speeds_mm_s.1))
                 .with("delay_ms", short(row.delay_ms))
-                .with("rendering", super::word_of_rendering(row.rendering))
+                .with("rendering", row.rendering.name())
                 .with("coherence", fixed(row.coherence, 3))
                 .with("distance_db", fixed(row.distance_db, 2))
         });
@@ -461,7 +462,7 @@ mod tests {
                     engine: Engine::Native,
                     speeds_mm_s: (60.0, 40.0),
                     delay_ms: 0.0,
-                    rendering: RENDERINGS[at].1,
+                    rendering: Rendering::ALL[at],
                     coherence: coherences[at],
                     distance_db: distances[at],
                 })

@@ -26,7 +26,7 @@ impl Measurement {
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
         let surface = Surface::new(&scene.surface, 0.0);
         let wavelength_mm = |x_mm| surface.wavelength_mm(x_mm);
-        let truth = Truth::new(&scene.name, scene.estimator.method_name(), &wavelength_mm);
+        let truth = Truth::new(&scene.name, scene.estimator.method.name(), &wavelength_mm);
         let mut judge = estimates::Judge::new(&truth);
         native::run_before(scene, &mut judge)?;
         let (judged, summary) = judge.finish();

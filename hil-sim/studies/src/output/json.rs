@@ -113,7 +113,7 @@ impl From<&Finding> for Fault {
 impl<'a> SceneResult<'a> {
     /// The object of a judged run; `scene` is the one that was run.
     pub fn of(judgement: &'a Judgement, scene: &'a Scene) -> Self {
-        let method = scene.estimator.method_name();
+        let method = scene.estimator.method.name();
         Self {
             contact: ContactResult::of(scene),
             events: judgement.events.clone(),

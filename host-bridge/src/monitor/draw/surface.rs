@@ -11,7 +11,6 @@ use super::plot::{Plot, Range, Series};
 use super::text;
 use super::text::cut_top;
 use crate::monitor::dashboard::Dashboard;
-use crate::monitor::settings;
 use crate::monitor::theme::Theme;
 use crate::monitor::view::View;
 
@@ -111,7 +110,7 @@ fn judgement(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
         ("unsure", theme.warning())
     };
     let bold = faded(style.add_modifier(Modifier::BOLD), is_old, theme);
-    let contact = settings::contact(estimate.contact).to_owned();
+    let contact = estimate.contact.name().to_owned();
     let plain = faded(Style::new(), is_old, theme);
     two(
         (" ", word.to_owned(), bold),
@@ -124,7 +123,7 @@ fn count(estimate: &Estimate, theme: Theme, is_old: bool) -> Line<'static> {
     let counted = estimate.counted_mm.map(|mm| format!("{mm:.2} mm"));
     let counted = counted.unwrap_or_else(|| "  -  ".to_owned());
     let style = faded(Style::new(), is_old, theme);
-    let range = settings::range(estimate.range).to_owned();
+    let range = estimate.range.name().to_owned();
     two(
         (" paper's count ", counted, style),
         ("   range ", range, style),

@@ -12,12 +12,13 @@
 //! tires nor learns. The same surface under other noise is among the pairs: so often is a guess right.
 
 use hil_sim_core::scene::SceneError;
+use protocol::Rendering;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::likeness::{THIRDS, thirds_where};
 use super::surfaces::{Ground, gratings, sine, weave};
-use super::{Case, LOOKS_S, RENDERINGS, SPEEDS, played, said, scene, ticks};
+use super::{Case, LOOKS_S, SPEEDS, played, said, scene, ticks};
 use crate::psychophysics::interval::{Interval, middle};
 use crate::psychophysics::normal::{PROBABLE_ERROR, cdf};
 use crate::study::{Progress, Record, csv, fixed};
@@ -36,7 +37,7 @@ const BRISK: f64 = 0.8;
 /// Resamplings of the bootstrap.
 const RESAMPLINGS: usize = 400;
 
-/// The names of two surfaces of one λ, and how each of [`RENDERINGS`] lets them be told apart.
+/// The names of two surfaces of one λ, and how each of [`Rendering::ALL`] lets them be told apart.
 #[derive(Clone, Debug)]
 pub struct Pair {
     pub one: String,
@@ -90,7 +91,7 @@ pub fn pairs(quick: bool, progress: &impl Progress) -> Result<Vec<Pair>, SceneEr
     });
     let felt = progress.each(&cases.collect::<Vec<_>>(), felt)?;
     let told = couples.iter().zip(felt.chunks(2 * seeds(quick) as usize));
-    let pair = |((one, other), felt): (&(Ground, Ground), &[[Levels; RENDERINGS.len()]])| {
+    let pair = |((one, other), felt): (&(Ground, Ground), &[[Levels; Rendering::ALL.len()]])| {
         let of = |which: usize, rendering: usize| -> Vec<Levels> {
             let own = felt.iter().skip(which).step_by(2);
             own.map(|levels| levels[rendering]).collect()
@@ -99,18 +100,18 @@ pub fn pairs(quick: bool, progress: &impl Progress) -> Result<Vec<Pair>, SceneEr
         Pair {
             one: one.name.clone(),
             other: other.name.clone(),
-            answers: (0..RENDERINGS.len()).map(answer).collect(),
+            answers: (0..Rendering::ALL.len()).map(answer).collect(),
         }
     };
     Ok(told.map(pair).collect())
 }
 
-fn felt(case: &Case) -> Result<[Levels; RENDERINGS.len()], SceneError> {
+fn felt(case: &Case) -> Result<[Levels; Rendering::ALL.len()], SceneError> {
     let said = said(&scene(case))?;
     let delay_ms = DELAY_MS * case.seed as f64;
     let hand_mm = |t_s| case.hand.position_mm(t_s);
     let is_brisk = |t_s| case.hand.relative_speed(LOOKS_S.0 + t_s) >= BRISK;
-    Ok(RENDERINGS.map(|(_, rendering)| {
+    Ok(Rendering::ALL.map(|rendering| {
         let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
         thirds_where(&played, is_brisk)
     }))
@@ -156,12 +157,12 @@ fn right(one: &Levels, other: &Levels) -> f64 {
 
 pub fn csv_of(pairs: &[Pair]) -> String {
     csv(pairs.iter().flat_map(|pair| {
-        let answers = RENDERINGS.iter().zip(&pair.answers);
-        answers.map(|((word, _), answer)| {
+        let answers = Rendering::ALL.iter().zip(&pair.answers);
+        answers.map(|(rendering, answer)| {
             Record::default()
                 .with("one", &*pair.one)
                 .with("other", &*pair.other)
-                .with("rendering", *word)
+                .with("rendering", rendering.name())
                 .with("right", fixed(answer.right, 3))
                 .with("low", fixed(answer.interval.low, 3))
                 .with("high", fixed(answer.interval.high, 3))

@@ -1,8 +1,9 @@
 //! The picture: coherence and spectral distance by family, and pairs of surfaces told apart, each rendering beside the
 //! others.
 
-use super::{Measured, RENDERINGS, Row, families, spread};
+use super::{Measured, Row, families, spread};
 use hil_sim_core::run::recording::Engine;
+use protocol::Rendering;
 
 use crate::output::plot::palette::{BLUE, GREEN, SOFT, VERMILION};
 use crate::output::plot::{Axis, Key, Mark, Page, Panel, Shape, Stroke, Symbol};
@@ -28,13 +29,13 @@ pub fn draw(measured: &Measured) -> String {
         "What the actuators play against the surface under the operator’s hand, 5–200 Hz; arm and hand at different \
          speeds. Symbols: means; lines: least to most. Firmware libraries; simulated observer."
     });
-    let keys = [0, 1, 2].map(|at| (Key::Symbol(SYMBOLS[at]), RENDERINGS[at].0));
+    let keys = [0, 1, 2].map(|at| (Key::Symbol(SYMBOLS[at]), Rendering::ALL[at].name()));
     page.legend(&keys);
     let families = families(rows);
     let by_family = places(families.iter().map(|&name| name.to_owned()));
     let of_family = |value: fn(&Row) -> f64| {
         marks(families.len(), |place, at| {
-            let rendering = RENDERINGS[at].1;
+            let rendering = Rendering::ALL[at];
             spread(rows, Engine::Native, families[place], rendering, value)
         })
     };
@@ -101,7 +102,7 @@ mod tests {
             .into_iter()
             .chain(surfaces::unseen())
             .flat_map(|ground| {
-                RENDERINGS.map(|(_, rendering)| Row {
+                Rendering::ALL.map(|rendering| Row {
                     surface: ground.name.clone(),
                     family: ground.family.to_owned(),
                     unseen: ground.unseen,

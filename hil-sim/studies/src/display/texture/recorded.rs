@@ -8,10 +8,10 @@ use std::ops::Range;
 
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::{Gauges, Motion, Scene, SceneError, Series, Waveform};
-use protocol::GAUGES;
+use protocol::{GAUGES, Rendering};
 
 use super::likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
-use super::{Measured, RENDERINGS, Row, SHIFTS, families, is_carried, played, said};
+use super::{Measured, Row, SHIFTS, families, is_carried, played, said};
 use crate::jury::folder::Entry;
 use crate::study::{Progress, Study, Table};
 
@@ -132,22 +132,22 @@ impl<'a> Take<'a> {
         let mut rows = Vec::new();
         for hand in self.hands() {
             let place_mm = |t_s: f64| self.place_mm(&hand, t_s);
-            let played = RENDERINGS
-                .map(|(_, rendering)| played(&said, place_mm, &hand.looked_at, rendering, 0.0));
-            let likeness = RENDERINGS.into_iter().zip(self.likeness(&hand, &played));
-            rows.extend(
-                likeness.map(|((_, rendering), (coherence, distance_db))| Row {
-                    surface: self.entry.name.clone(),
-                    family: self.entry.family.clone(),
-                    unseen: true,
-                    engine: Engine::Native,
-                    speeds_mm_s: (to_a_tenth(self.speed_mm_s()), to_a_tenth(hand.speed_mm_s)),
-                    delay_ms: 0.0,
-                    rendering,
-                    coherence,
-                    distance_db,
-                }),
-            );
+            let played = Rendering::ALL
+                .map(|rendering| played(&said, place_mm, &hand.looked_at, rendering, 0.0));
+            let likeness = Rendering::ALL
+                .into_iter()
+                .zip(self.likeness(&hand, &played));
+            rows.extend(likeness.map(|(rendering, (coherence, distance_db))| Row {
+                surface: self.entry.name.clone(),
+                family: self.entry.family.clone(),
+                unseen: true,
+                engine: Engine::Native,
+                speeds_mm_s: (to_a_tenth(self.speed_mm_s()), to_a_tenth(hand.speed_mm_s)),
+                delay_ms: 0.0,
+                rendering,
+                coherence,
+                distance_db,
+            }));
         }
         Ok(rows)
     }

@@ -6,9 +6,9 @@ use serde_json::Value;
 
 use crate::output::escape::escape;
 use crate::output::report::Chapter;
+use hil_sim_core::judge::JudgedEstimate;
 use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::judge::reaction::Reaction;
-use hil_sim_core::judge::{JudgedEstimate, words};
 
 /// Log lines shown, at most.
 const LOG_LINES: usize = 200;
@@ -146,7 +146,7 @@ pub fn summary(chapter: &Chapter) -> String {
 /// What the sensor says of the contact and of each gauge, as shares of the estimates.
 fn senses(estimates: &[JudgedEstimate]) -> Vec<(&'static str, String)> {
     const NAMES: [&str; GAUGES] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4"];
-    let contact = estimates.iter().map(|e| words::of_contact(e.contact));
+    let contact = estimates.iter().map(|e| e.contact.name());
     let mut lines = vec![("contact", shares(contact))];
     let lags = estimates.iter().filter_map(|e| e.lag_um);
     if let Some(most) = lags.map(i32::unsigned_abs).max() {
@@ -160,7 +160,7 @@ fn senses(estimates: &[JudgedEstimate]) -> Vec<(&'static str, String)> {
         let said = estimates.iter().map(|e| match e.health[gauge] {
             GaugeHealth::Good if e.gauges_used >> gauge & 1 == 1 => "takes part",
             GaugeHealth::Good => "sound but unused",
-            other => words::of_health(other),
+            other => other.name(),
         });
         lines.push((name, shares(said)));
     }
