@@ -11,11 +11,14 @@ const POSITION_GAIN_PER_S: i64 = 10;
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
 
-/// What a hand may be away from where its last motion has it by now, in µm a ms since then and in µm: it turns from no
+/// What a hand may be away from where its last motion would have it, in µm a ms since then and in µm: it turns from no
 /// more than 2 m/s. What is further away is another hand, with a zero of its own.
 const MOST_TURN_UM_PER_MS: u64 = 2_000;
 /// See [`MOST_TURN_UM_PER_MS`].
 const LEAST_TURN_UM: u64 = 1_000;
+/// Longest time between two motions of a hand that is followed, by its own clock, in µs: the silence, and what a network
+/// may hold up.
+const LONGEST_GAP_US: u64 = 500_000;
 
 /// What the arm's servo drive gets: its velocity command as PWM and a direction pin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,6 +46,8 @@ pub struct Arm {
 #[derive(Clone, Debug)]
 struct Following {
     sequence: u32,
+    /// Of the last motion, by the display's clock.
+    instant_us: u64,
     /// Hand minus arm when the first motion came.
     offset_um: i64,
     hand_um: i64,
@@ -69,6 +74,7 @@ impl Arm {
         };
         self.following = Some(Following {
             sequence: motion.sequence,
+            instant_us: motion.instant_us,
             offset_um,
             hand_um: motion.position_um,
             velocity_um_s: motion.velocity_um_s,
@@ -110,7 +116,7 @@ impl Arm {
         }
         let velocity_um_s = i64::from(f.velocity_um_s);
         let error_um = f
-            .expected_um()
+            .hand_after_um(u64::from(f.age_ms) * 1_000)
             .saturating_sub(f.offset_um)
             .saturating_sub(arm_um);
         let error_um = error_um.clamp(-MAX_ERROR_UM, MAX_ERROR_UM);
@@ -123,16 +129,21 @@ impl Arm {
 }
 
 impl Following {
-    /// Where the hand is by now, if it goes on with its last velocity.
-    fn expected_um(&self) -> i64 {
-        let moved_um = i64::from(self.velocity_um_s) * i64::from(self.age_ms) / 1_000;
+    /// Where the hand is so many µs after its last motion, up to a second, if it goes on with its velocity.
+    fn hand_after_um(&self, us: u64) -> i64 {
+        let moved_um = i64::from(self.velocity_um_s) * us.cast_signed() / 1_000_000;
         self.hand_um.saturating_add(moved_um)
     }
 
-    /// Whether the same hand can be where `motion` has it.
+    /// Whether `motion` can be the same hand's, by the clock of its board: what a network held up comes in one go.
     fn leads_to(&self, motion: &Motion) -> bool {
-        let away_um = motion.position_um.saturating_sub(self.expected_um());
-        away_um.unsigned_abs() <= LEAST_TURN_UM + MOST_TURN_UM_PER_MS * u64::from(self.age_ms)
+        let passed_us = motion.instant_us.checked_sub(self.instant_us);
+        passed_us
+            .filter(|&us| us <= LONGEST_GAP_US)
+            .is_some_and(|us| {
+                let away_um = motion.position_um.saturating_sub(self.hand_after_um(us));
+                away_um.unsigned_abs() <= LEAST_TURN_UM + MOST_TURN_UM_PER_MS * us / 1_000
+            })
     }
 }
 
@@ -225,19 +236,34 @@ mod tests {
 
     #[test]
     fn another_hand_with_newer_numbers_is_followed_from_where_both_are() {
-        let mut arm = Arm::default();
-        assert!(arm.on_motion(&motion(10, 0, 0), 700));
-        for _ in 0..30 {
+        // 30 ms later by their clocks, half a metre away: no hand gets there. And a hand nearby whose clock is another.
+        for (instant_us, position_um) in [(40_000, 500_000), (3_000_000, 20_000), (9_000, 20_000)] {
+            let mut arm = Arm::default();
+            let at = |sequence, instant_us, position_um| Motion {
+                instant_us,
+                ..motion(sequence, position_um, 0)
+            };
+            assert!(arm.on_motion(&at(10, 10_000, 0), 700));
             assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+            assert!(arm.on_motion(&at(1_000, instant_us, position_um), 700));
+            assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+            // From there on it is followed.
+            assert!(arm.on_motion(&at(1_001, instant_us + 2_000, position_um + 100), 700));
+            assert!(arm.step(700, FULL_SCALE_UM_S).duty > 0);
         }
-        // Half a metre away: no hand gets there in 30 ms.
-        assert!(arm.on_motion(&motion(1_000, 500_000, 0), 700));
-        assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
-        // The same hand may be 50 mm away after 30 ms that were lost, and is followed there.
-        for _ in 1..30 {
-            arm.step(700, FULL_SCALE_UM_S);
-        }
-        assert!(arm.on_motion(&motion(1_001, 550_000, 0), 700));
+    }
+
+    #[test]
+    fn the_same_hand_is_followed_also_where_motions_come_late_and_in_one_go() {
+        let mut arm = Arm::default();
+        let at = |sequence, instant_us, position_um| Motion {
+            instant_us,
+            ..motion(sequence, position_um, 0)
+        };
+        assert!(arm.on_motion(&at(10, 10_000, 0), 700));
+        arm.step(700, FULL_SCALE_UM_S);
+        // A tenth of a second later by its clock, and a millisecond later here.
+        assert!(arm.on_motion(&at(60, 110_000, 80_000), 700));
         assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, Drive::FULL);
     }
 

@@ -5,7 +5,7 @@
 //! what, and one that is not the computer's can go on as soon as everybody waits.
 
 use std::sync::mpsc::{self, TryIter, TryRecvError};
-use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, LazyLock, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -162,27 +162,9 @@ impl<T> Receiver<T> {
     }
 }
 
-/// A time of one of the system's clocks, since that clock's zero.
-trait Clocks {
-    /// Since the computer was started, what it slept included; never steps back.
-    fn since_boot(&self) -> Duration;
-
-    /// Since 1970.
-    fn calendar(&self) -> Duration;
-}
-
-/// The computer's own.
-struct System;
-
-impl Clocks for System {
-    fn since_boot(&self) -> Duration {
-        read(ClockId::CLOCK_BOOTTIME)
-    }
-
-    fn calendar(&self) -> Duration {
-        // A clock before 1970 is as good as one that stands at its beginning.
-        read(ClockId::CLOCK_REALTIME)
-    }
+/// Since the computer was started, what it slept included; never steps back.
+fn since_boot() -> Duration {
+    read(ClockId::CLOCK_BOOTTIME)
 }
 
 /// Every Linux since 2.6.39 has both.
@@ -193,25 +175,23 @@ fn read(clock: ClockId) -> Duration {
     })
 }
 
-/// The same moment on both clocks.
-struct Epoch<C> {
-    clocks: C,
+/// The same moment since the computer's start and since 1970.
+struct Epoch {
     started: Duration,
     unix_ns: u64,
 }
 
-impl<C: Clocks> Epoch<C> {
-    fn begin(clocks: C) -> Self {
+impl Epoch {
+    fn at(started: Duration, calendar: Duration) -> Self {
         Self {
-            started: clocks.since_boot(),
+            started,
             // In whole µs, as all moments are.
-            unix_ns: u64::try_from(clocks.calendar().as_micros() * 1_000).unwrap_or(u64::MAX),
-            clocks,
+            unix_ns: u64::try_from(calendar.as_micros() * 1_000).unwrap_or(u64::MAX),
         }
     }
 
-    fn now_us(&self) -> u64 {
-        let elapsed = self.clocks.since_boot().saturating_sub(self.started);
+    fn us(&self, since_boot: Duration) -> u64 {
+        let elapsed = since_boot.saturating_sub(self.started);
         u64::try_from(elapsed.as_micros()).unwrap_or(u64::MAX)
     }
 
@@ -220,20 +200,18 @@ impl<C: Clocks> Epoch<C> {
     }
 }
 
-static EPOCH: OnceLock<Epoch<System>> = OnceLock::new();
-
-fn epoch() -> &'static Epoch<System> {
-    EPOCH.get_or_init(|| Epoch::begin(System))
-}
+/// A calendar before 1970 is as good as one that stands at its beginning.
+static EPOCH: LazyLock<Epoch> =
+    LazyLock::new(|| Epoch::at(since_boot(), read(ClockId::CLOCK_REALTIME)));
 
 /// µs since this program first asked, what the computer slept included; never steps back.
 pub fn now_us() -> u64 {
-    epoch().now_us()
+    EPOCH.us(since_boot())
 }
 
 /// A moment of [`now_us`] in ns since 1970, by the calendar as it stood when this program first asked.
 pub fn unix_ns(at_us: u64) -> u64 {
-    epoch().unix_ns(at_us)
+    EPOCH.unix_ns(at_us)
 }
 
 #[cfg(test)]
@@ -268,7 +246,6 @@ mod tests {
 
 #[cfg(test)]
 mod host_clock_tests {
-    use std::cell::Cell;
     use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
     use super::*;
@@ -285,34 +262,18 @@ mod host_clock_tests {
         assert!(off_ns.abs() < 1_000_000_000, "{off_ns} ns off");
     }
 
-    /// A computer that is put to sleep.
-    struct Sleeper {
-        awake: Cell<Duration>,
-        asleep: Cell<Duration>,
-    }
-
-    impl Clocks for &Sleeper {
-        fn since_boot(&self) -> Duration {
-            self.awake.get() + self.asleep.get()
-        }
-
-        fn calendar(&self) -> Duration {
-            Duration::from_secs(1_000_000) + self.since_boot()
-        }
-    }
-
     #[test]
     fn what_is_heard_after_the_computer_slept_lies_right_on_the_calendar() {
-        let sleeper = Sleeper {
-            awake: Cell::new(Duration::from_secs(10)),
-            asleep: Cell::default(),
-        };
-        let epoch = Epoch::begin(&sleeper);
-        sleeper.awake.set(Duration::from_secs(13));
-        sleeper.asleep.set(Duration::from_secs(3_600));
-        assert_eq!(epoch.now_us(), 3_603_000_000);
-        let today_ns = (&sleeper).calendar().as_nanos();
-        assert_eq!(u128::from(epoch.unix_ns(epoch.now_us())), today_ns);
+        let (started, calendar) = (Duration::from_secs(10), Duration::from_secs(1_000_010));
+        let epoch = Epoch::at(started, calendar);
+        // Three seconds awake, and an hour asleep.
+        let later = Duration::from_secs(3_603);
+        assert_eq!(epoch.us(started + later), 3_603_000_000);
+        let today_ns = (calendar + later).as_nanos();
+        assert_eq!(
+            u128::from(epoch.unix_ns(epoch.us(started + later))),
+            today_ns
+        );
     }
 
     #[test]
@@ -324,7 +285,7 @@ mod host_clock_tests {
             first.parse().expect("a number")
         };
         let (before_s, began) = (uptime_s(), Instant::now());
-        let since_boot_s = System.since_boot().as_secs_f64();
+        let since_boot_s = since_boot().as_secs_f64();
         let took_s = began.elapsed().as_secs_f64();
         assert!(since_boot_s >= before_s, "{since_boot_s} before {before_s}");
         assert!(
