@@ -11,10 +11,10 @@ const POSITION_GAIN_PER_S: i64 = 10;
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
 
-/// What a hand may be away from where its last motion would have it, in µm a ms since then and in µm: it turns from no
+/// What a hand may be away from where its last motion would have it, in µm a µs since then and in µm: it turns from no
 /// more than 2 m/s. What is further away is another hand, with a zero of its own.
-const MOST_TURN_UM_PER_MS: u64 = 2_000;
-/// See [`MOST_TURN_UM_PER_MS`].
+const MOST_TURN_M_S: u64 = 2;
+/// See [`MOST_TURN_M_S`].
 const LEAST_TURN_UM: u64 = 1_000;
 /// Longest time between two motions of a hand that is followed, by its own clock, in µs: the silence, and what a network
 /// may hold up.
@@ -142,7 +142,7 @@ impl Following {
             .filter(|&us| us <= LONGEST_GAP_US)
             .is_some_and(|us| {
                 let away_um = motion.position_um.saturating_sub(self.hand_after_um(us));
-                away_um.unsigned_abs() <= LEAST_TURN_UM + MOST_TURN_UM_PER_MS * us / 1_000
+                away_um.unsigned_abs() <= LEAST_TURN_UM + MOST_TURN_M_S * us
             })
     }
 }

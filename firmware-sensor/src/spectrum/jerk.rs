@@ -19,9 +19,9 @@ const CONTACT_SIGMA_MM: f32 = 0.1;
 const LEAST_JERKS: [f32; 2] = [0.013, 0.005];
 /// What is faster than this is noise: a fingertip on its spring slips for some ms. White noise is at 303 Hz.
 const SLIPS_BELOW_HZ: f32 = 350.0;
-/// Up to this speed in mm/s, what a contact of 0.24 mm lets through passes at 100 Hz at most. So the first difference tells
-/// slips from it, too, and noise makes less of it.
-const SLOW_MM_S: f32 = 25.0;
+/// Up to this speed, 25 mm/s in places a millisecond, what a contact of 0.24 mm lets through passes at some 100 Hz at most. So
+/// the first difference tells slips from it, too, and noise makes less of it.
+const SLOW_PLACES: f32 = 25.0 * PLACES_PER_UM as f32;
 /// How much more than from its quiet moments steady power may be, which is known to a fifth or so.
 const STEADY_DOUBT: f32 = 1.05;
 /// Speed from which on a millisecond counts, in places a millisecond: 5 mm/s.
@@ -118,7 +118,12 @@ impl Jerk {
         let (share, step) = (larger(one, 1.0 / JERK_SAMPLES), larger(one, QUIET_STEP));
         let per_speed = 1.0 / self.speed;
         let [of_first, of_second] = &mut self.powers;
-        of_first.take(first, per_speed, share, step);
+        if self.speed < SLOW_PLACES {
+            of_first.take(first, per_speed, share, step);
+        } else {
+            // The rest of it is asked for below that speed alone.
+            of_first.mean += (first - of_first.mean) * share;
+        }
         of_second.take(second, per_speed, share, step);
         self.mean_speed += (self.speed - self.mean_speed) * share;
     }
@@ -173,7 +178,7 @@ impl Jerk {
             let least = explained * let_through(per_mm).max(LEAST_JERKS[n]);
             left > least && left > explained * edges(n as i32 + 1) + least
         };
-        let is_slow = self.mean_speed < SLOW_MM_S * PLACES_PER_UM as f32;
+        let is_slow = self.mean_speed < SLOW_PLACES;
         slip_hz < SLIPS_BELOW_HZ && (stands_out(1) || is_slow && stands_out(0))
     }
 }
@@ -367,7 +372,7 @@ mod tests {
         };
         let slip = |mm_s: f32, noise| is_slip(3.0, mm_s, noise, soft);
         assert!(slip(10.0, 150.0));
-        assert!(!slip(1.1 * SLOW_MM_S, 150.0));
+        assert!(!slip(27.5, 150.0));
         // Noise that makes as much of the first difference hides them again.
         assert!(!slip(10.0, 1_200.0));
     }
