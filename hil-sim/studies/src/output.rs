@@ -11,8 +11,10 @@ pub mod report;
 use std::path::Path;
 use std::{fs, io};
 
-/// Puts a file with this content in the place of the one that may be there, which stays if the new one can't be written.
+/// Puts a file with this content in the place of the one that may be there, which stays if the new one can't be written. Of
+/// a link, in the place that it leads to.
 pub(crate) fn replace(path: &Path, content: &str) -> io::Result<()> {
+    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let draft = path.with_file_name(format!(".{name}.new"));
     fs::write(&draft, content)
@@ -43,6 +45,19 @@ mod tests {
             1,
             "no draft is left"
         );
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_link_stays_one() {
+        let folder = std::env::temp_dir().join(format!("hil-sim-link-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (path, link) = (folder.join("a.toml"), folder.join("link.toml"));
+        fs::write(&path, "old").unwrap();
+        std::os::unix::fs::symlink("a.toml", &link).unwrap();
+        replace(&link, "new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         fs::remove_dir_all(&folder).unwrap();
     }
 }
