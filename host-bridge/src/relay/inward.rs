@@ -209,7 +209,7 @@ impl Inward {
     /// Another bridge has the bench.
     const fn begin(&mut self, now_us: u64) {
         self.ages.forget();
-        // The first one's board has nobody to be told from.
+        // The first one takes the bench from nobody.
         if self.counts.passed > 0 {
             self.quiet_until_us = now_us.saturating_add(BETWEEN_HOLDERS_US);
         }

@@ -77,6 +77,7 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
         match measured {
             Some(measured) if wanted.contains(&measured) => {}
             Some(measured) => {
+                // The one that is given by its middle is told by both ends.
                 let said = if key == "mean_mm" {
                     format!("not within {low:.4} and {high:.4}")
                 } else if measured > *high {
