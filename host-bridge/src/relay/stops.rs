@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::{DisplayState, Message, Stop, Trip};
+use protocol::{DisplayState, Message, RoleCounters, Stop, Trip};
 
 /// Stops that may wait for this site's board at once; each is the same to it.
 const PENDING: usize = 8;
@@ -127,6 +127,12 @@ impl Stops {
         let goes = match message {
             Message::Safety(safety) => !matches!(safety.state, DisplayState::Stopped(_)),
             Message::Arm(arm) => arm.state.trip().is_none(),
+            Message::Status(status) => match &status.role {
+                RoleCounters::Display(counters) => {
+                    !matches!(counters.state, DisplayState::Stopped(_))
+                }
+                RoleCounters::Sensor(counters) => counters.stopped.is_none(),
+            },
             _ => false,
         };
         if goes && self.pending.is_empty() {
@@ -162,7 +168,7 @@ impl Stops {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::{Safety, StopReason, Stopped};
+    use protocol::{PortCounters, ResetCause, Safety, SensorCounters, Status, StopReason, Stopped};
 
     const STOP: Stop = Stop {
         reason: StopReason::Operator,
@@ -269,6 +275,25 @@ mod tests {
         assert!(!stops.spread(3, STOP));
         stops.on_state(&safety(DisplayState::Ready));
         assert!(stops.spread(4, STOP));
+        // A status tells, too, of a board that does nothing but rest.
+        let status = |stopped| {
+            Message::Status(Status {
+                uptime_us: 0,
+                reset: ResetCause::Power,
+                watchdog_resets: 0,
+                peer: PortCounters::new(),
+                console: PortCounters::new(),
+                role: RoleCounters::Sensor(SensorCounters {
+                    stopped,
+                    ..SensorCounters::ZERO
+                }),
+                stack_free_bytes: 0,
+            })
+        };
+        stops.on_state(&status(Some(Trip::Operator)));
+        assert!(!stops.spread(5, STOP));
+        stops.on_state(&status(None));
+        assert!(stops.spread(6, STOP));
     }
 
     #[test]
