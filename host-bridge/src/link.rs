@@ -409,14 +409,18 @@ impl<F: FnMut(Event)> Reader<F> {
         match verdict {
             Verdict::Open => State::Opened(port),
             // Whether it asks in return does not make another board of it.
-            Verdict::Known(hello) if hello.role == self.shared.role.byte() => {
-                State::Known(port, hello.asking(false))
+            // A Hello's role stands where it stood in every version.
+            Verdict::Known(hello) | Verdict::Foreign(hello)
+                if hello.role != self.shared.role.byte() =>
+            {
+                State::Stranger {
+                    port,
+                    hello: hello.asking(false),
+                    wanted: self.shared.role,
+                }
             }
-            Verdict::Known(hello) => State::Stranger {
-                port,
-                hello: hello.asking(false),
-                wanted: self.shared.role,
-            },
+            // Whether it asks in return does not make another board of it.
+            Verdict::Known(hello) => State::Known(port, hello.asking(false)),
             Verdict::Foreign(hello) => State::Foreign(port, hello.asking(false)),
             Verdict::Silent => State::Silent(port),
             Verdict::Deaf => State::Deaf(port),

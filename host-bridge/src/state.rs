@@ -26,7 +26,7 @@ pub enum State {
     Garbage(PathBuf),
     /// A board of another protocol or schema.
     Foreign(PathBuf, Hello),
-    /// A board that is understood, but of another role than wanted.
+    /// A board of another role than wanted, of whatever protocol.
     Stranger {
         /// The port.
         port: PathBuf,

@@ -123,7 +123,8 @@ impl Flash {
         let console = console::place(&seat.place(), probe.serial(), &links)?;
         // Where any console will do, what is heard first need not be this board's.
         if !self.no_hello && console != Place::Anywhere {
-            self.check_console(console::look(&system, role, console.clone()), role)?;
+            let state = console::look(&system, role, console.clone());
+            self.check_console(state, role, is_attended())?;
         }
         let opened = probe.open()?;
         let mut programmer = Programmer::attach(opened, plan, || probe.open().ok())?;
@@ -225,10 +226,10 @@ impl Flash {
         Ok(several[number - 1].clone())
     }
 
-    /// Whether the console allows to go on.
-    fn check_console(&self, state: State, role: Role) -> anyhow::Result<()> {
+    /// Whether the console allows to go on; asks if that is somebody's to say and he is there.
+    fn check_console(&self, state: State, role: Role, is_attended: bool) -> anyhow::Result<()> {
         match state {
-            State::Stranger { ref hello, .. } if Role::from_byte(hello.role) != Some(role) => {
+            State::Stranger { ref hello, .. } => {
                 let is = Named(hello).to_string();
                 if self.change_role {
                     return Ok(());
@@ -238,7 +239,7 @@ impl Flash {
                      [y/N] ",
                     role.name()
                 );
-                if is_attended() && ask(&question, |answer| Some(answer == "y"))? {
+                if is_attended && ask(&question, |answer| Some(answer == "y"))? {
                     return Ok(());
                 }
                 anyhow::bail!(
@@ -326,5 +327,34 @@ impl Bar {
 
     fn end(&self) {
         self.0.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::{Arguments, Command};
+
+    #[test]
+    fn a_board_of_the_other_role_is_left_alone_unless_it_is_to_change() {
+        let flash = |more: &[&str]| {
+            let words = ["host-bridge", "flash", "sensor"].iter().chain(more);
+            match Arguments::parse_from(words).command {
+                Command::Flash(flash) => flash,
+                other => panic!("{other:?}"),
+            }
+        };
+        let state = || State::Stranger {
+            port: "/dev/ttyACM0".into(),
+            hello: Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
+            wanted: Role::Sensor,
+        };
+        let refused = flash(&[]).check_console(state(), Role::Sensor, false);
+        let words = refused.expect_err("it is the display").to_string();
+        assert!(words.contains("--change-role"), "{words}");
+        let allowed = flash(&["--change-role"]).check_console(state(), Role::Sensor, false);
+        allowed.expect("it is to change");
     }
 }

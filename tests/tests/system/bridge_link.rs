@@ -197,6 +197,30 @@ fn a_board_of_another_role_is_named_and_neither_heard_nor_spoken_to() {
     assert!(!board.take_heard().contains(&motion(9)));
 }
 
+#[test]
+fn a_board_of_another_role_is_named_by_it_whatever_its_version() {
+    let display = Hello::new(Role::Display, "stm32f429zi", [9, 8, 7]);
+    let other_protocol = Hello {
+        protocol: [0xff, 0x7f],
+        ..display
+    };
+    let other_schema = Hello {
+        schema: [1; 8],
+        ..display
+    };
+    for hello in [other_protocol, other_schema] {
+        let bench = VirtualBench::default();
+        let board = FakeBoard::acting_on(&bench, hello, Box::new(|_| Vec::new()));
+        let watched = Watched::at(&bench, Role::Sensor, &board);
+        let state = watched.turned(|state| !matches!(state, State::Opened { .. }));
+        let said = state.to_string();
+        assert_eq!(state.word(), "wrong-role", "{said}");
+        assert!(said.contains("display 9.8.7"), "{said}");
+        let advice = "exchange --sensor and --display, or flash the other firmware";
+        assert_eq!(state.advice(), Some(advice));
+    }
+}
+
 /// Stop is said, answered, and said no more.
 fn assert_stopped(bench: &VirtualBench, watched: &Watched, board: &FakeBoard) {
     watched.link.stop(OPERATOR).expect("there is a line");
