@@ -79,6 +79,7 @@ impl Bench {
     /// bench.
     pub fn find(given: Option<&Path>) -> Result<Self, BenchError> {
         let settings = std::env::var_os("XDG_CONFIG_HOME")
+            .filter(|folder| !folder.is_empty())
             .map(PathBuf::from)
             .or_else(|| std::env::var_os("HOME").map(|home| Path::new(&home).join(".config")));
         let usual = [

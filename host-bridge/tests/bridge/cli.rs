@@ -56,6 +56,24 @@ fn shells_get_their_completions() {
 }
 
 #[test]
+fn an_empty_name_of_the_folder_of_settings_is_none() {
+    let home = folder("settings");
+    let settings = home.join(".config/ridgelink");
+    fs::create_dir_all(&settings).expect("a folder can be made");
+    fs::write(settings.join("bench.toml"), "[sensor]\nprot = 1\n").expect("a file can be made");
+    let output = command(&["flash", "sensor", "--dry-run"])
+        .env("XDG_CONFIG_HOME", "")
+        .env("HOME", &home)
+        .output()
+        .expect("the program can be started");
+    let words = text(&output.stderr);
+    assert!(
+        words.contains("bench.toml") && words.contains("prot"),
+        "{words}"
+    );
+}
+
+#[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     let (reader, writer) = io::pipe().expect("the system has pipes");
     drop(reader);
