@@ -69,9 +69,8 @@ impl Bench {
     pub fn read(path: &Path) -> Result<Self, BenchError> {
         let text = fs::read_to_string(path)
             .map_err(|source| BenchError::Unreadable(path.to_owned(), source))?;
-        let bench: Self = toml::from_str(&text)
-            .map_err(|source| BenchError::Malformed(path.to_owned(), Box::new(source)))?;
-        bench.checked()
+        toml::from_str(&text)
+            .map_err(|source| BenchError::Malformed(path.to_owned(), Box::new(source)))
     }
 
     /// The bench file to be used: `given`, else [`FILE_NAME`] in the current folder, else `ridgelink/bench.toml` in
@@ -91,10 +90,10 @@ impl Bench {
         path.map_or_else(|| Ok(Self::default()), |path| Self::read(&path))
     }
 
-    /// The same, unless both boards are at one place. Fails if they are.
+    /// The same, unless both boards are at one place, by whatever names. Fails if they are.
     pub fn checked(self) -> Result<Self, BenchError> {
-        let place = self.sensor.place();
-        if place != Place::Anywhere && place == self.display.place() {
+        let [place, other] = [&self.sensor, &self.display].map(Seat::place);
+        if place != Place::Anywhere && place.leads_to() == other.leads_to() {
             return Err(BenchError::Twice(place.to_string()));
         }
         Ok(self)
@@ -164,6 +163,27 @@ mod tests {
         let bench: Bench = toml::from_str(text).expect("well-formed");
         let message = bench.checked().expect_err("one port twice").to_string();
         assert!(message.starts_with("/dev/a can't be both"), "{message}");
+    }
+
+    #[test]
+    fn two_names_of_one_port_for_two_boards_are_refused() {
+        let folder = std::env::temp_dir().join(format!("bench-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let [port, link] = ["port", "link"].map(|name| folder.join(name));
+        fs::write(&port, "").expect("a file");
+        std::os::unix::fs::symlink("port", &link).expect("a link");
+        let seat = |path: &PathBuf| Seat {
+            port: Some(path.clone()),
+            ..Seat::default()
+        };
+        let bench = Bench {
+            sensor: seat(&link),
+            display: seat(&port),
+        };
+        let message = bench.checked().expect_err("one port twice").to_string();
+        fs::remove_dir_all(&folder).expect("the folder");
+        let words = format!("{} can't be both", link.display());
+        assert!(message.starts_with(&words), "{message}");
     }
 
     #[test]

@@ -115,10 +115,15 @@ struct Where {
 impl Where {
     /// The bench, with what the command line says put over what the file says.
     fn find(&self) -> Result<Bench, BenchError> {
+        self.named()?.checked()
+    }
+
+    /// The same, even if both boards are at one place.
+    fn named(&self) -> Result<Bench, BenchError> {
         let mut bench = Bench::find(self.bench.as_deref())?;
         put(&mut bench.sensor, self.sensor.as_ref());
         put(&mut bench.display, self.display.as_ref());
-        bench.checked()
+        Ok(bench)
     }
 }
 

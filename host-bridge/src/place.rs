@@ -36,6 +36,14 @@ pub enum Place {
 }
 
 impl Place {
+    /// The same by the port's own name, where a link leads to it.
+    pub fn leads_to(&self) -> Self {
+        match self {
+            Self::Port(path) => Self::Port(path.canonicalize().unwrap_or_else(|_| path.clone())),
+            other => other.clone(),
+        }
+    }
+
     /// The ports to try, in order; empty if there is none at the moment.
     pub fn candidates(&self) -> Vec<PathBuf> {
         match self {

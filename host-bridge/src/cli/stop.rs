@@ -4,8 +4,9 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use crate::link::{Event, stop_all};
+use crate::state::State;
 use crossbeam_channel::RecvTimeoutError;
-use protocol::{Message, Trip};
+use protocol::{Message, Role, Stopped, Trip};
 
 use super::output::say;
 
@@ -15,8 +16,8 @@ A display's outputs go to 0 V, a sensor's arm drive goes off, and both stay so u
 power. Every version of the firmware understands it, and a board that has another program's attention as well. \
 With two sites, `relay stop` reaches them from anywhere.
 
-Exit status: 0 every board of the bench says that it has stopped; 1 one does not: then press the emergency stop, \
-or cut the power.";
+Exit status: 0 every board of the bench says that it has stopped; 1 one does not, or its port leads to another \
+board: then press the emergency stop, or cut the power.";
 
 /// What `stop` is asked for.
 #[derive(Debug, clap::Args)]
@@ -31,11 +32,14 @@ pub struct StopBoards {
 impl StopBoards {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
-        let bench = self.boards.find()?;
+        // A bench that can't be right is no reason not to say Stop.
+        let bench = self.boards.named()?;
         let (mut waiting, told) = super::told_links(&bench);
         let boards: Vec<_> = waiting.iter().map(|(_, link)| link.sender()).collect();
         stop_all(&boards);
         let end = Instant::now() + Duration::from_secs(self.within.into());
+        let mut answers: Vec<(Role, Stopped)> = Vec::new();
+        let mut is_missed = false;
         while !waiting.is_empty() {
             match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok((
@@ -44,29 +48,57 @@ impl StopBoards {
                         message: Message::Stopped(stopped),
                         ..
                     },
-                )) => {
-                    let before = waiting.len();
-                    waiting.retain(|(waits, _)| *waits != role);
-                    if waiting.len() == before {
-                        // It answers each time that it was told.
-                        continue;
-                    }
-                    let trip = stopped.trip().map(Trip::name);
-                    let trip = trip.unwrap_or("a reason that this program does not know");
-                    say(&format!("{} has stopped: {trip}", role.name()));
-                }
+                )) => answers.push((role, stopped)),
                 Ok(_) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
             }
+            waiting.retain(|(role, link)| {
+                let state = link.state();
+                // Who it is that answered may show in a moment.
+                let is_clear = !matches!(state, State::Opened { .. });
+                let answer = answers.iter().find(|(of, _)| of == role);
+                let Some((_, stopped)) = answer.filter(|_| is_clear) else {
+                    return true;
+                };
+                is_missed |= !say_answer(*role, &state, stopped);
+                false
+            });
         }
         for (role, link) in &waiting {
             let state = link.state();
+            if let Some((_, stopped)) = answers.iter().find(|(of, _)| of == role) {
+                is_missed |= !say_answer(*role, &state, stopped);
+                continue;
+            }
+            is_missed = true;
             let advice = state.advice().unwrap_or("it does not answer");
-            say(&format!(
-                "NOT STOPPED as far as is known: {}: {state} ({advice}): press the emergency stop, or cut its power",
-                role.name()
-            ));
+            not_stopped(*role, &format!("{state} ({advice})"));
         }
-        Ok(ExitCode::from(u8::from(!waiting.is_empty())))
+        Ok(ExitCode::from(u8::from(is_missed)))
     }
+}
+
+/// Says whose answer came on the way to the board of `role`; whether it is that board's.
+fn say_answer(role: Role, state: &State, stopped: &Stopped) -> bool {
+    let name = role.name();
+    if let State::Stranger { port, hello, .. } = state {
+        let is = Role::from_byte(hello.role).map_or("another board", Role::name);
+        let port = port.display();
+        not_stopped(
+            role,
+            &format!("{port} is the {is}, which has stopped; the {name} was not told"),
+        );
+        return false;
+    }
+    let trip = stopped.trip().map(Trip::name);
+    let trip = trip.unwrap_or("a reason that this program does not know");
+    say(&format!("{name} has stopped: {trip}"));
+    true
+}
+
+fn not_stopped(role: Role, why: &str) {
+    say(&format!(
+        "NOT STOPPED as far as is known: {}: {why}: press the emergency stop, or cut its power",
+        role.name()
+    ));
 }

@@ -436,6 +436,36 @@ fn stop_stops_both_boards_beside_a_monitor_that_has_their_ports() {
 }
 
 #[test]
+fn stop_says_so_where_both_names_lead_to_one_board() {
+    let running = bench();
+    let port = running.bench().display.path().clone();
+    let folder = std::env::temp_dir().join(format!("stop-twice-{}", std::process::id()));
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder");
+    let link = folder.join("sensor");
+    symlink(&port, &link).expect("a link");
+    for sensor in [&link, &port] {
+        let mut command = bridge::command();
+        command.args(["stop", "--within", "60"]);
+        command.arg("--sensor").arg(sensor);
+        command.arg("--display").arg(&port);
+        let done = bridge::Running::start(&mut command).wait(LIMIT);
+        assert_eq!(done.status.code(), Some(1), "{}", done.stderr);
+        for words in [
+            "display has stopped: by the operator".to_owned(),
+            format!(
+                "{} is the display, which has stopped; the sensor was not told",
+                sensor.display()
+            ),
+        ] {
+            assert!(done.stderr.contains(&words), "{}", done.stderr);
+        }
+        assert!(running.bench().stopped.take().is_some());
+    }
+    fs::remove_dir_all(&folder).expect("the folder");
+}
+
+#[test]
 fn a_key_streams_the_gauges_and_changes_no_setting() {
     let mut bench = FakeBench::new();
     bench.sensing.window_ms = 123;
