@@ -1,6 +1,6 @@
 //! A file that a command makes: never over one that is there, unless that is asked for.
 
-use std::fs;
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -24,13 +24,13 @@ impl OutputFileError {
 /// Refuses a file that is there already, unless it is written over by `force`; and `input`, which is read for it,
 /// even then. Fails with [`OutputFileError::Exists`] or [`OutputFileError::IsInput`].
 pub fn refuse_taken(path: &Path, force: bool, input: &Path) -> Result<(), OutputFileError> {
-    let Ok(place) = fs::canonicalize(path) else {
-        return Ok(());
-    };
-    if fs::canonicalize(input).is_ok_and(|input| input == place) {
+    if let (Ok(place), Ok(input)) = (fs::canonicalize(path), fs::canonicalize(input))
+        && place == input
+    {
         return Err(OutputFileError::IsInput(path.to_owned()));
     }
-    if !force {
+    // A link is there even if it leads to nothing.
+    if !force && fs::symlink_metadata(path).is_ok() {
         return Err(OutputFileError::Exists(path.to_owned()));
     }
     Ok(())
@@ -51,14 +51,44 @@ pub fn replaced_by(path: &Path, make: impl FnOnce(&Path) -> io::Result<()>) -> i
     if fs::metadata(path).is_ok_and(|there| !there.is_file()) {
         return make(path);
     }
-    // What a link leads to, not the link.
-    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut draft = place.clone().into_os_string();
-    draft.push(".new");
-    let made = make(Path::new(&draft)).and_then(|()| fs::rename(&draft, &place));
+    let place = leads_to(path);
+    let (draft, file) = draft(&place, OpenOptions::new().write(true))?;
+    drop(file);
+    let made = make(&draft).and_then(|()| fs::rename(&draft, &place));
     made.inspect_err(|_| {
         let _ = fs::remove_file(&draft);
     })
+}
+
+/// What a name stands for, through links, also where they lead to nothing: not a link is replaced, but what it leads
+/// to.
+pub fn leads_to(path: &Path) -> PathBuf {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut place = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = fs::read_link(&place) else {
+            break;
+        };
+        place = place.parent().unwrap_or(Path::new("")).join(next);
+    }
+    place
+}
+
+/// Makes a file that is to take the place of `place`, beside it and under a name that nobody has: also not an earlier
+/// program that was killed. Fails if it can't be made.
+pub fn draft(place: &Path, options: &mut OpenOptions) -> io::Result<(PathBuf, File)> {
+    options.create_new(true);
+    let mut number = 0_u32;
+    loop {
+        let mut name = place.file_name().unwrap_or_default().to_owned();
+        name.push(format!(".new-{}-{number}", std::process::id()));
+        let draft = place.with_file_name(name);
+        match options.open(&draft) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
+            made => return made.map(|file| (draft, file)),
+        }
+    }
 }
 
 /// Writes the whole file, as [`made_by`]. Fails with [`OutputFileError::NotWritten`].
@@ -101,6 +131,43 @@ mod tests {
         assert_eq!(fs::read_to_string(&old).unwrap(), "new");
         assert!(link.is_symlink());
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 2);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_draft_takes_no_name_that_somebody_has() {
+        let folder = std::env::temp_dir().join(format!("output-draft-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let out = folder.join("out");
+        let process = std::process::id();
+        let others = ["out.new".to_owned(), format!("out.new-{process}-0")];
+        let others = others.map(|name| folder.join(name));
+        for other in &others {
+            fs::write(other, "another's").unwrap();
+        }
+        write(&out, "text").unwrap();
+        assert_eq!(fs::read_to_string(&out).unwrap(), "text");
+        for other in &others {
+            assert_eq!(fs::read_to_string(other).unwrap(), "another's");
+        }
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 3);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_link_to_nothing_is_there_and_stays_a_link() {
+        let folder = std::env::temp_dir().join(format!("output-link-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let [link, out, input] = ["link", "out", "input"].map(|name| folder.join(name));
+        std::os::unix::fs::symlink("out", &link).unwrap();
+        assert!(matches!(
+            refuse_taken(&link, false, &input),
+            Err(OutputFileError::Exists(_))
+        ));
+        assert!(refuse_taken(&link, true, &input).is_ok());
+        write(&link, "text").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(&out).unwrap(), "text");
         fs::remove_dir_all(folder).unwrap();
     }
 }

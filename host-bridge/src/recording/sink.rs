@@ -9,14 +9,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
+use crate::output_file::{draft, leads_to};
 use crate::recording::RecordingError;
 
 /// A file that is being written.
 pub struct Sink {
-    /// Its name once it is kept.
+    /// Its name, as it was given.
     path: PathBuf,
-    /// What it is called as long as another file has its name.
-    beside: Option<PathBuf>,
+    /// Where that leads, and where it is once it is kept.
+    place: PathBuf,
+    /// What it is called as long as another file is there.
+    draft: Option<PathBuf>,
     /// It was made here, and nothing of it need stay.
     fresh: bool,
     file: File,
@@ -34,46 +37,49 @@ pub struct SinkWriter {
 }
 
 impl Sink {
-    /// Makes a file. With `force` it takes the place of one that is there at [`Sink::keep`], and writes to a device
-    /// or a pipe that is there at once. Dropping it before takes it away again. Fails if there is one already, or
-    /// it can't be made.
+    /// Makes a file. With `force` it takes the place of one that is there at [`Sink::keep`], of what a link leads to
+    /// and not of the link, and writes to a device or a pipe that is there at once. Dropping it before takes it away
+    /// again. Fails if there is one already, or it can't be made.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
-        let there = fs::metadata(path).ok().filter(|_| force);
-        let is_file = there.as_ref().is_some_and(fs::Metadata::is_file);
-        let beside = is_file.then(|| beside(path));
-        let made = beside.as_deref().unwrap_or(path);
-        let mut options = OpenOptions::new();
-        options.write(true);
-        match (&there, &beside) {
-            (None, _) => options.create_new(true),
-            // One of an attempt that was cut off is in nobody's way.
-            (Some(_), Some(_)) => options.create(true).truncate(true),
-            (Some(_), None) => &mut options,
+        let place = if force {
+            leads_to(path)
+        } else {
+            path.to_owned()
         };
+        let there = fs::metadata(&place).ok().filter(|_| force);
+        let is_file = there.as_ref().is_some_and(fs::Metadata::is_file);
         // A pipe that nobody reads is refused, and not waited for.
-        let file = options
-            .custom_flags(libc::O_NONBLOCK)
-            .open(made)
-            .and_then(|file| {
-                fcntl(&file, FcntlArg::F_SETFL(OFlag::empty()))?;
-                Ok(file)
-            })
-            .map_err(|source| RecordingError::not_made(path, source))?;
+        let mut options = OpenOptions::new();
+        options.write(true).custom_flags(libc::O_NONBLOCK);
+        let made = if is_file {
+            draft(&place, &mut options).map(|(draft, file)| (Some(draft), file))
+        } else {
+            options.create_new(there.is_none());
+            options.open(&place).map(|file| (None, file))
+        };
+        let not_made = |source| RecordingError::not_made(path, source);
+        let (draft, file) = made.map_err(not_made)?;
         let sink = Self {
             path: path.to_owned(),
-            fresh: there.is_none() || beside.is_some(),
-            beside,
+            place,
+            fresh: there.is_none() || is_file,
+            draft,
             file,
             safe_bytes: 0,
             full: Arc::new(AtomicBool::new(false)),
         };
+        fcntl(&sink.file, FcntlArg::F_SETFL(OFlag::empty()))
+            .map_err(|error| not_made(error.into()))?;
         sink.sync_folder();
         Ok(sink)
     }
 
     /// A name should outlast a loss of power as bytes do; not every file system can promise it.
     fn sync_folder(&self) {
-        let folder = self.path.parent().filter(|folder| folder.as_os_str() != "");
+        let folder = self
+            .place
+            .parent()
+            .filter(|folder| folder.as_os_str() != "");
         if let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) {
             let _ = folder.sync_all();
         }
@@ -81,10 +87,10 @@ impl Sink {
 
     /// The file stays, under its own name. Fails if it can't get that name.
     pub fn keep(&mut self) -> Result<(), RecordingError> {
-        if let Some(beside) = &self.beside {
-            fs::rename(beside, &self.path)
+        if let Some(draft) = &self.draft {
+            fs::rename(draft, &self.place)
                 .map_err(|source| RecordingError::not_made(&self.path, source))?;
-            self.beside = None;
+            self.draft = None;
             self.sync_folder();
         }
         self.fresh = false;
@@ -144,16 +150,9 @@ impl Sink {
 impl Drop for Sink {
     fn drop(&mut self) {
         if self.fresh {
-            let _ = fs::remove_file(self.beside.as_deref().unwrap_or(&self.path));
+            let _ = fs::remove_file(self.draft.as_deref().unwrap_or(&self.place));
         }
     }
-}
-
-/// The name of a file that is to take another's place.
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".new");
-    path.with_file_name(name)
 }
 
 impl Write for SinkWriter {
@@ -182,5 +181,44 @@ impl Seek for SinkWriter {
             SeekFrom::Current(0) => Ok(self.at),
             _ => Err(io::ErrorKind::Unsupported.into()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_takes_the_place_of_the_one_that_is_meant_and_of_no_other() {
+        let folder = std::env::temp_dir().join(format!("sink-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let [old, other, link, dangling, nothing] =
+            ["old", "old.new", "link", "dangling", "nothing"].map(|name| folder.join(name));
+        fs::write(&old, "old").unwrap();
+        fs::write(&other, "another's").unwrap();
+        std::os::unix::fs::symlink("old", &link).unwrap();
+        std::os::unix::fs::symlink("nothing", &dangling).unwrap();
+        let write = |path: &Path, text: &str| {
+            let mut sink = Sink::create(path, true).unwrap();
+            sink.writer().unwrap().write_all(text.as_bytes()).unwrap();
+            sink.keep().unwrap();
+        };
+        drop(Sink::create(&old, true).unwrap());
+        drop(Sink::create(&dangling, true).unwrap());
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 4);
+        assert_eq!(fs::read_to_string(&old).unwrap(), "old");
+        write(&old, "1");
+        assert_eq!(fs::read_to_string(&other).unwrap(), "another's");
+        write(&link, "2");
+        assert_eq!(fs::read_to_string(&old).unwrap(), "2");
+        for path in [&link, &dangling] {
+            let refused = Sink::create(path, false).map(drop);
+            assert!(matches!(refused, Err(RecordingError::Exists(_))));
+        }
+        write(&dangling, "3");
+        assert_eq!(fs::read_to_string(&nothing).unwrap(), "3");
+        assert!(link.is_symlink() && dangling.is_symlink());
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 5);
+        fs::remove_dir_all(folder).unwrap();
     }
 }
