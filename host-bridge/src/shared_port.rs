@@ -143,7 +143,7 @@ impl Seat {
     fn take(self) -> Result<Opened, State> {
         let part = match self.device.claim() {
             Ok(Some(claim)) => Part::Owner(self.own(claim)?),
-            Ok(None) => Part::Guest(self.join()?),
+            Ok(None) => self.join()?,
             // Nobody can be told of it: better alone than not at all, for there may be a Stop to be said.
             Err(_) => return (self.open)(),
         };
@@ -182,12 +182,15 @@ impl Seat {
         })
     }
 
-    /// Joins the owner, who may have begun just now.
-    fn join(&self) -> Result<Hearing, State> {
+    /// Joins the owner, who may have begun just now; or owns the port, if he lets go of it without having shared it.
+    fn join(&self) -> Result<Part, State> {
         let until = Instant::now() + GIVEN_UP;
         loop {
+            if let Ok(Some(claim)) = self.device.claim() {
+                return self.own(claim).map(Part::Owner);
+            }
             match Guest::open(&self.device.socket()) {
-                Ok(guest) => return Ok(Hearing::new(guest)),
+                Ok(guest) => return Ok(Part::Guest(Hearing::new(guest))),
                 Err(_) if Instant::now() >= until => {
                     let holder = self.device.holder();
                     return Err(self.failed(format!(
@@ -470,17 +473,28 @@ mod tests {
         fn close(self: Box<Self>, _: bool) {}
     }
 
-    #[test]
-    fn a_port_that_cannot_be_shared_is_had_alone() {
-        let seat = Seat {
+    fn seat(device: Device) -> Seat {
+        Seat {
             path: PathBuf::from("port"),
-            device: Device::without_folder(),
+            device,
             open: Box::new(|| {
                 let (input, output) = (Box::new(Silent), Box::new(io::sink()));
                 Ok(Opened { input, output })
             }),
-        };
-        let opened = seat.take();
+        }
+    }
+
+    #[test]
+    fn a_port_that_another_program_lets_go_of_unshared_is_had() {
+        // Another one had it a moment ago: that is why it is joined, and not claimed.
+        let seat = seat(Device::named(&format!("seat-test-{}", std::process::id())));
+        let part = seat.join();
+        assert!(matches!(part, Ok(Part::Owner(_))), "{:?}", part.err());
+    }
+
+    #[test]
+    fn a_port_that_cannot_be_shared_is_had_alone() {
+        let opened = seat(Device::without_folder()).take();
         let Ok(Opened { mut output, .. }) = opened else {
             panic!("it is not opened");
         };
