@@ -29,6 +29,8 @@ struct Channel {
     sink: Sink,
     writer: csv::Writer<SinkWriter>,
     cells: Vec<String>,
+    /// The time of the last line, in ns.
+    last_ns: u64,
     dirty: bool,
 }
 
@@ -130,6 +132,7 @@ impl Channel {
                 .buffer_capacity(BUFFER_BYTES)
                 .from_writer(writer),
             cells: Vec::new(),
+            last_ns: 0,
             dirty: true,
         };
         channel.cells = vec!["time_s".to_owned()];
@@ -145,7 +148,7 @@ impl Channel {
                 let value = serde_json::to_value(row);
                 let value = value.map_err(|error| self.failed(error.into()))?;
                 self.write_line(ns, GaugeRow::SCHEMA, &value)?;
-                ns += SAMPLE_US * NS_PER_US;
+                ns = ns.saturating_add(SAMPLE_US * NS_PER_US);
             }
             return Ok(());
         }
@@ -161,6 +164,9 @@ impl Channel {
         value: &Value,
     ) -> Result<(), RecordingError> {
         self.cells.clear();
+        // A block whose time is when it was heard may begin before the one before has ended.
+        self.last_ns = ns.max(self.last_ns);
+        let ns = self.last_ns;
         let time = format!("{}.{:09}", ns / NS_PER_S, ns % NS_PER_S);
         self.cells.push(time);
         cells(shape, Some(value), &mut self.cells);
@@ -246,5 +252,47 @@ pub fn cells(named: &'static NamedType, value: Option<&Value>, cells: &mut Vec<S
             Some(Value::String(text)) => text.clone(),
             Some(value) => value.to_string(),
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{CHANNELS, GAUGE_BLOCK, GaugeSample, Role};
+
+    use super::*;
+
+    #[test]
+    fn times_do_not_decrease_where_blocks_come_close_together() {
+        let path = std::env::temp_dir().join(format!("csv-folder-{}", std::process::id()));
+        let mut folder = CsvFolder::create(&path, true).unwrap();
+        // Of a board whose clock is not known yet: by when they were heard, not 8 ms apart.
+        for (first_sample, log_ns) in [(0, 50_000_000), (8, 51_000_000), (16, 70_000_000)] {
+            let gauges = Gauges {
+                first_sample,
+                instant_us: 1_000 * u64::from(first_sample),
+                position_um: 0,
+                samples: [GaugeSample {
+                    codes: [0; CHANNELS],
+                    travel_um: 0,
+                }; GAUGE_BLOCK],
+            };
+            let entry = Entry {
+                role: Role::Sensor,
+                row: Row::Gauges((&gauges).into()),
+                log_ns,
+            };
+            folder.write(&entry).unwrap();
+        }
+        folder.sync().unwrap();
+        let text = fs::read_to_string(path.join("sensor-gauges.csv")).unwrap();
+        fs::remove_dir_all(&path).unwrap();
+        let times: Vec<&str> = text
+            .lines()
+            .skip(1)
+            .filter_map(|line| line.split(',').next())
+            .collect();
+        assert_eq!(times.len(), 3 * GAUGE_BLOCK);
+        assert!(times.is_sorted(), "{times:?}");
+        assert_eq!(times[2 * GAUGE_BLOCK], "0.070000000");
     }
 }
