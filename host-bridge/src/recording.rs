@@ -121,14 +121,19 @@ impl Recorder {
 
     /// How it stands.
     pub fn progress(&self) -> Progress {
-        *locked(&self.progress)
+        let mut progress = *locked(&self.progress);
+        // It ends by itself only where it can't go on, and by a panic without another word.
+        let writer = locked(&self.writer);
+        progress.failed |= writer.as_ref().is_some_and(Writer::is_finished);
+        progress
     }
 
     /// Writes what still waits, ends the files as they should end, and says what is in them. The second call says
     /// nothing. Fails if they could not be written to the end. What was safe before is.
     pub fn stop(&self) -> Result<Progress, RecordingError> {
+        let writer = locked(&self.writer).take();
         self.notes.close();
-        match locked(&self.writer).take() {
+        match writer {
             None => Ok(self.progress()),
             Some(writer) => writer.join().map_err(|_| RecordingError::Died)?,
         }
@@ -293,6 +298,22 @@ mod tests {
         };
         assert_eq!(path, Path::new("/dev/full"));
         assert_eq!(source.kind(), io::ErrorKind::StorageFull, "{error}");
+    }
+
+    #[test]
+    fn a_writer_that_panicked_has_failed() {
+        let (notes, _waiting) = queue(PATIENCE);
+        let recorder = Recorder {
+            notes,
+            progress: Arc::default(),
+            writer: Mutex::new(Some(thread::spawn(|| panic!("as a test wants it")))),
+        };
+        let end = Instant::now() + LIMIT;
+        while !recorder.progress().failed && Instant::now() < end {
+            thread::park_timeout(Duration::from_millis(1));
+        }
+        assert!(recorder.progress().failed);
+        assert!(matches!(recorder.stop(), Err(RecordingError::Died)));
     }
 
     #[test]
