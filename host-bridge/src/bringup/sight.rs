@@ -99,7 +99,8 @@ impl Track {
     /// From the first place to the last, in mm.
     pub fn travel_mm(&self) -> Option<f64> {
         let (first, last) = self.ends()?;
-        Some((last.position_um - first.position_um) as f64 * 1e-3)
+        let way_um = last.position_um.saturating_sub(first.position_um);
+        Some(way_um as f64 * 1e-3)
     }
 
     /// The same in a second, in mm/s.
@@ -381,5 +382,18 @@ impl Watcher {
                 Some(refusal) => Err(refusal.to_string()),
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_that_no_number_holds_is_a_long_one() {
+        let mut track = Track::default();
+        track.go(1, 0, i64::MIN);
+        track.go(2, 1_000_000, i64::MAX);
+        assert!(track.travel_mm().is_some_and(|way_mm| way_mm > 1e15));
     }
 }

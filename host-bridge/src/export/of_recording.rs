@@ -85,11 +85,11 @@ pub fn texture(excerpt: &Excerpt, settings: &Settings) -> Result<Made, ExportErr
     });
     let begin_s = samples.first().map_or(0.0, |first| {
         let start = excerpt.samples.first().unwrap_or(first);
-        excerpt.first_s + (first.instant_us - start.instant_us) as f64 * 1e-6
+        excerpt.first_s + first.instant_us.saturating_sub(start.instant_us) as f64 * 1e-6
     });
     let description = format!(
         "gauges over the arm's way of {:.3} mm from {} mm on, {begin_s:.3} s after the recording's start, 1 is 1.65 V at the pin",
-        (high_um - low_um) as f64 * 1e-3,
+        high_um.abs_diff(low_um) as f64 * 1e-3,
         low_um as f64 * 1e-3,
     );
     let keys = format!(
@@ -111,11 +111,11 @@ fn longest_way(samples: &[GaugeRow]) -> Range<usize> {
     let mut way = longest.clone();
     let mut forwards = None;
     let length = |way: &Range<usize>| match &samples[way.clone()] {
-        [first, .., last] => (last.position_um - first.position_um).unsigned_abs(),
+        [first, .., last] => last.position_um.abs_diff(first.position_um),
         _ => 0,
     };
     for (at, pair) in samples.windows(2).enumerate() {
-        let travel_um = pair[1].position_um - pair[0].position_um;
+        let travel_um = pair[1].position_um.saturating_sub(pair[0].position_um);
         let turned = travel_um != 0 && forwards.is_some_and(|forwards| forwards != (travel_um > 0));
         if turned {
             way.start = at;
@@ -135,7 +135,7 @@ fn longest_way(samples: &[GaugeRow]) -> Range<usize> {
 fn over_place(samples: &[GaugeRow], low_um: i64, gauge: usize) -> Vec<(u64, f64)> {
     let mut points: Vec<(u64, f64, u32)> = Vec::with_capacity(samples.len());
     for sample in samples {
-        let place_um = (sample.position_um - low_um).unsigned_abs();
+        let place_um = sample.position_um.abs_diff(low_um);
         let felt = f64::from(i32::from(sample.codes()[gauge]) - MID_CODE) / f64::from(MID_CODE);
         match points.last_mut() {
             Some((at, sum, count)) if *at == place_um => {
@@ -187,6 +187,14 @@ mod tests {
         assert_eq!(longest_way(&rows), 2..7);
         assert_eq!(longest_way(&samples(&[0, 0, 0])), 0..1);
         assert_eq!(longest_way(&[]), 0..0);
+    }
+
+    #[test]
+    fn places_at_both_ends_of_their_numbers_are_no_trouble() {
+        let rows = samples(&[i64::MIN, i64::MAX, i64::MIN]);
+        assert_eq!(longest_way(&rows), 0..2);
+        let points = over_place(&rows[..2], i64::MIN, 0);
+        assert_eq!(points.last().map(|(at, _)| *at), Some(u64::MAX));
     }
 
     #[test]

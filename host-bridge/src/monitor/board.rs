@@ -47,7 +47,8 @@ impl Board {
     /// Time since its start, in µs, if it has said so and is still there.
     pub fn uptime_us(&self, now_us: u64) -> Option<u64> {
         let (at_us, status) = self.status.as_ref()?;
-        Some(status.uptime_us + now_us.saturating_sub(*at_us))
+        let since_us = now_us.saturating_sub(*at_us);
+        Some(status.uptime_us.saturating_add(since_us))
     }
 }
 
@@ -80,5 +81,30 @@ impl Rate {
     /// Of the last second, in Hz.
     pub const fn per_s(&self) -> u32 {
         self.per_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{ResetCause, RoleCounters, SensorCounters};
+
+    use super::*;
+
+    #[test]
+    fn a_clock_at_its_end_stands() {
+        let status = Status {
+            uptime_us: u64::MAX,
+            reset: ResetCause::Power,
+            watchdog_resets: 0,
+            stack_free_bytes: 0,
+            peer: PortCounters::new(),
+            console: PortCounters::new(),
+            role: RoleCounters::Sensor(SensorCounters::ZERO),
+        };
+        let board = Board {
+            status: Some((0, status)),
+            ..Board::default()
+        };
+        assert_eq!(board.uptime_us(7), Some(u64::MAX));
     }
 }

@@ -119,8 +119,10 @@ impl Fingertip {
         let ticks = (elapsed_us * u64::from(rate.hz()) / 1_000_000).cast_signed();
         let counts =
             motion.position_um.wrapping_sub(last.position_um) / i64::from(MICROMETRES_PER_COUNT);
+        // Wide: a board may say that it is anywhere.
+        let by = |tick: i64| i128::from(counts) * i128::from(tick) / i128::from(ticks);
         for tick in 0..ticks {
-            let travel = counts * (tick + 1) / ticks - counts * tick / ticks;
+            let travel = by(tick + 1) - by(tick);
             // No hand moves further in a tick.
             let travel = i16::try_from(travel).unwrap_or(0);
             self.plausibility
@@ -169,4 +171,23 @@ fn array(hash: u32) -> Option<[Actuator; ACTUATORS]> {
     std::iter::once(DEFAULT_ACTUATORS)
         .chain((0..=WIDEST_PITCH_UM).map(actuators::grid))
         .find(|actuators| actuators::hash(actuators) == hash)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_that_is_said_to_be_beyond_the_sky_is_not_followed() {
+        let mut fingertip = Fingertip::default();
+        for (sequence, position_um) in [(0, 1 << 62), (1, -(1 << 62)), (2, i64::MAX), (3, 0)] {
+            fingertip.follow(&Motion {
+                sequence,
+                instant_us: 50_000 * u64::from(sequence),
+                position_um,
+                velocity_um_s: 0,
+            });
+        }
+        assert!(fingertip.volts().iter().all(|volts| volts.abs() < 1e-6));
+    }
 }

@@ -190,7 +190,7 @@ struct Layout {
     /// The index among the samples of the one that lies at −¼ ms.
     first: usize,
     duration_s: f64,
-    /// The instant of the sensor's clock at the scene's start.
+    /// The instant of the sensor's clock at the scene's start. It wraps, as the clock may.
     begin_us: i64,
 }
 
@@ -209,13 +209,13 @@ impl Layout {
         (estimates > 0).then_some(Self {
             first,
             duration_s: estimates as f64 / 100.0,
-            begin_us: before.instant_us.cast_signed() + SCAN_US,
+            begin_us: before.instant_us.cast_signed().wrapping_add(SCAN_US),
         })
     }
 
     /// An instant of the sensor's clock in s since the scene's start.
     fn scene_s(&self, instant_us: u64) -> f64 {
-        (instant_us.cast_signed() - self.begin_us) as f64 * 1e-6
+        instant_us.cast_signed().wrapping_sub(self.begin_us) as f64 * 1e-6
     }
 
     /// Whether an instant of the sensor's clock lies within the scene.
@@ -226,6 +226,37 @@ impl Layout {
     /// When the scene starts, in s since the first of these samples, a ms apart.
     fn start_s(&self, samples: &[GaugeRow]) -> f64 {
         let first_us = samples.first().map_or(0, |first| first.instant_us);
-        (self.begin_us - first_us.cast_signed()) as f64 * 1e-6
+        self.begin_us.wrapping_sub(first_us.cast_signed()) as f64 * 1e-6
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_layout_holds_its_instants_wherever_the_clock_stands() {
+        for start_us in [0, i64::MAX.cast_unsigned() - 20_000, u64::MAX - 20_000] {
+            let rows: Vec<GaugeRow> = (0..40)
+                .map(|sample| GaugeRow {
+                    sample,
+                    block: 0,
+                    instant_us: start_us.wrapping_add(1_000 * u64::from(sample)),
+                    position_um: 0,
+                    travel_um: 0,
+                    g0_v: 0.0,
+                    g1_v: 0.0,
+                    g2_v: 0.0,
+                    g3_v: 0.0,
+                    g4_v: 0.0,
+                    tangential_v: 0.0,
+                })
+                .collect();
+            let layout = Layout::of(&rows).expect("enough of them");
+            let first_us = rows[layout.first].instant_us;
+            assert!(layout.holds(first_us.wrapping_add(1_000)), "{start_us}");
+            assert!(!layout.holds(first_us.wrapping_add(1 << 63)), "{start_us}");
+            assert!(layout.start_s(&rows).abs() < 0.1, "{start_us}");
+        }
     }
 }

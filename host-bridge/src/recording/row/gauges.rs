@@ -115,7 +115,9 @@ impl GaugeRow {
             Self {
                 sample: gauges.first_sample.wrapping_add(index),
                 block: gauges.first_sample,
-                instant_us: gauges.instant_us + u64::from(index) * SAMPLE_US,
+                instant_us: gauges
+                    .instant_us
+                    .saturating_add(u64::from(index) * SAMPLE_US),
                 position_um,
                 travel_um: sample.travel_um,
                 g0_v,
@@ -174,4 +176,23 @@ pub fn block(rows: &[GaugeRow]) -> Option<Gauges> {
         position_um: first.position_um,
         samples,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_of_a_clock_at_its_end_are_rows() {
+        let rows = GaugeRow::all(&Gauges {
+            first_sample: u32::MAX,
+            instant_us: u64::MAX,
+            position_um: i64::MAX,
+            samples: [GaugeSample {
+                codes: [0; CHANNELS],
+                travel_um: i16::MAX,
+            }; GAUGE_BLOCK],
+        });
+        assert!(rows.iter().all(|row| row.instant_us == u64::MAX));
+    }
 }
