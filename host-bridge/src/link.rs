@@ -163,10 +163,7 @@ impl Link {
 
     /// What this end of the line has counted since the line was opened last.
     pub fn counters(&self) -> PortCounters {
-        match &*locked(&self.shared.line) {
-            Some(line) => line.counters(),
-            None => *locked(&self.shared.counters),
-        }
+        self.shared.counters()
     }
 
     /// What of [`Link::counters`] was missed because the port changed hands between programs.
@@ -206,6 +203,11 @@ impl LinkSender {
         self.shared.post(message)
     }
 
+    /// What this end of the line has counted. See [`Link::counters`].
+    pub fn counters(&self) -> PortCounters {
+        self.shared.counters()
+    }
+
     /// Stops whatever board is there: says so now, and again until it answers that it has stopped; a board that
     /// comes later is told as soon as its port is open. Never waits. Fails if it could not be said yet.
     pub fn stop(&self, stop: Stop) -> Result<(), NotSent> {
@@ -222,6 +224,13 @@ pub fn stop_all(boards: &[LinkSender]) {
 }
 
 impl Shared {
+    fn counters(&self) -> PortCounters {
+        match &*locked(&self.line) {
+            Some(line) => line.counters(),
+            None => *locked(&self.counters),
+        }
+    }
+
     fn stop(&self, stop: Stop) -> Result<(), NotSent> {
         *locked(&self.stop) = Some((stop, self.now_us()));
         self.post(&Message::Stop(stop))

@@ -30,7 +30,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-pub use session::Source;
+pub use session::{RecordingFeed, Source};
 
 use crate::recording::RecordingError;
 use line::Format;

@@ -29,6 +29,7 @@ pub struct Terminal {
     /// What stands in the window.
     screen: Arc<Mutex<vt100::Parser>>,
     ended: Arc<AtomicBool>,
+    stands_still: Arc<AtomicBool>,
     window: JoinHandle<()>,
     /// Keeps the terminal alive while no program has it open.
     _kept: OwnedFd,
@@ -47,7 +48,9 @@ impl Terminal {
             Arc::<AtomicBool>::default(),
         );
         let screen = Arc::new(Mutex::new(vt100::Parser::new(ROWS, COLUMNS, 0)));
+        let stands_still = Arc::<AtomicBool>::default();
         let (theirs, their_end) = (Arc::clone(&shown), Arc::clone(&ended));
+        let takes_none = Arc::clone(&stands_still);
         let drawn = Arc::clone(&screen);
         let terminal = Self {
             path,
@@ -55,7 +58,10 @@ impl Terminal {
             shown,
             screen,
             ended,
-            window: thread::spawn(move || run(window, &typed, &theirs, &drawn, &their_end)),
+            stands_still,
+            window: thread::spawn(move || {
+                run(window, &typed, &theirs, &drawn, &takes_none, &their_end);
+            }),
             _kept: kept,
         };
         // As a shell leaves it: the pair was made for bytes, not for people.
@@ -149,6 +155,11 @@ impl Terminal {
         self.stty(&["-a"])
     }
 
+    /// Has the window take nothing for as long as it stands still: what is shown waits. It passes on keys.
+    pub fn stand_still(&self, stands_still: bool) {
+        self.stands_still.store(stands_still, Ordering::Release);
+    }
+
     /// Closes the terminal's window.
     pub fn hang_up(self) {
         self.ended.store(true, Ordering::Release);
@@ -178,11 +189,18 @@ fn run(
     typed: &Receiver<String>,
     shown: &Mutex<String>,
     screen: &Mutex<vt100::Parser>,
+    stands_still: &AtomicBool,
     ended: &AtomicBool,
 ) {
     let mut bytes = [0; 4_096];
     while !ended.load(Ordering::Acquire) {
-        match window.read(&mut bytes) {
+        let read = if stands_still.load(Ordering::Acquire) {
+            thread::park_timeout(LOOK);
+            Err(ErrorKind::TimedOut.into())
+        } else {
+            window.read(&mut bytes)
+        };
+        match read {
             Ok(count) => {
                 let mut screen = screen.lock().unwrap_or_else(PoisonError::into_inner);
                 screen.process(&bytes[..count]);

@@ -7,9 +7,10 @@ use std::time::Duration;
 use crate::bench::Bench;
 use crate::monitor::firmware_log::{Logs, Origin};
 use crate::monitor::line::Format;
-use crate::monitor::{self, Options, Source};
+use crate::monitor::{self, Options, RecordingFeed, Source};
 use anyhow::Context;
 use clap::ValueHint;
+use crossbeam_channel::unbounded;
 use protocol::Role;
 
 use super::signals::{self, Again};
@@ -84,13 +85,20 @@ impl Monitor {
             .context("can't listen to signals")?;
         let (logs, lines) = Logs::new();
         self.follow_logs(&bench, &logs)?;
-        let (links, events) = super::told_links(&bench);
+        let (happens, events) = unbounded();
+        let feed = RecordingFeed::default();
+        let feeds = feed.clone();
+        let links = super::links(&bench, move |role, event| {
+            feeds.on_event(role, &event);
+            super::tell(&happens, role, event);
+        });
         signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())
             .context("can't listen to signals")?;
         let source = Source {
             events,
             links,
             logs: Some(lines),
+            feed,
         };
         let format = Format {
             is_json: self.json,

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use crate::clock::SystemClock;
 use crate::clock::now_us;
 use crate::link::{Event, Link};
-use crate::monitor::{self, Options, Source};
+use crate::monitor::{self, Options, RecordingFeed, Source};
 use crate::recording::reader::Reader;
 use crate::replay::StandIn;
 use crate::replay::scene;
@@ -181,6 +181,8 @@ impl Replay {
         let pace = self.pace();
         let (events, told) = crossbeam_channel::unbounded();
         let their_end = Arc::clone(&ended);
+        let feed = RecordingFeed::default();
+        let feeds = feed.clone();
         let player = thread::spawn(move || {
             play(
                 &SystemClock,
@@ -192,6 +194,7 @@ impl Replay {
                     if let Event::Heard { at_us, .. } = &mut event {
                         *at_us = now_us();
                     }
+                    feeds.on_event(role, &event);
                     // A monitor that has ended listens no more.
                     let _ = events.send((role, event));
                 },
@@ -201,6 +204,7 @@ impl Replay {
             events: told,
             links: Vec::new(),
             logs: None,
+            feed,
         };
         let watched = monitor::run(source, &Options::default(), &ended);
         // Not by a key, but by a signal.

@@ -1,7 +1,7 @@
 //! A dashboard that is watched: where events come from, and where orders go to.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::{Arc, Mutex, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -13,11 +13,15 @@ use super::log_entry::LogEvent;
 use crate::clock::is_due;
 use crate::clock::now_us;
 use crate::link::{Event, Link, LinkSender};
+use crate::lock::locked;
 use crate::recording::gauge_stream::{GaugeStream, Lease};
 use crate::recording::{PART, Progress, Recorder, RecordingError, Settings, part_path};
+use crate::state::State;
 
 /// How often the links' own counters are looked at, in µs.
 const LINES_US: u64 = 200_000;
+/// How often is looked whether a recording has something to ask for.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// Where a monitor hears from.
 pub struct Source {
@@ -27,6 +31,83 @@ pub struct Source {
     pub links: Vec<(Role, Link)>,
     /// The boards' logs, if they are read.
     pub logs: Option<mpsc::Receiver<(Role, LogEvent)>>,
+    /// What whoever puts in the events feeds first.
+    pub feed: RecordingFeed,
+}
+
+/// Feeds the recording that a key has begun, if one goes on, from whoever hears the boards: who draws may have to wait
+/// for the terminal.
+#[derive(Clone, Default)]
+pub struct RecordingFeed(Arc<Mutex<Fed>>);
+
+#[derive(Default)]
+struct Fed {
+    /// How the ways to the boards stand.
+    states: Vec<(Role, State)>,
+    recorder: Option<Arc<Recorder>>,
+    /// Has the gauges stream for as long as a recording lasts.
+    stream: GaugeStream,
+}
+
+impl RecordingFeed {
+    /// Takes what the link to the board of `role` tells.
+    pub fn on_event(&self, role: Role, event: &Event) {
+        let mut fed = locked(&self.0);
+        if let Event::StateChanged(state) = event {
+            fed.states.retain(|(of, _)| *of != role);
+            fed.states.push((role, state.clone()));
+        }
+        fed.stream.on_event(role, event);
+        let recorder = fed.recorder.clone();
+        // A disk that stands still holds up one link only.
+        drop(fed);
+        if let Some(recorder) = recorder {
+            recorder.on_event(role, event);
+        }
+    }
+
+    /// Feeds `recorder` from now on.
+    fn begin(&self, recorder: &Arc<Recorder>) {
+        let mut fed = locked(&self.0);
+        fed.stream = GaugeStream::new(true);
+        // What came before it began is a part of it, so that it can be played back to a monitor.
+        for (role, state) in fed.states.clone() {
+            let event = Event::StateChanged(state);
+            recorder.on_event(role, &event);
+            fed.stream.on_event(role, &event);
+        }
+        fed.recorder = Some(Arc::clone(recorder));
+    }
+
+    fn end(&self) {
+        locked(&self.0).recorder = None;
+    }
+
+    /// Asks for what a recording needs, and records what the lines have counted, until `ended` is closed. What is not
+    /// answered is asked again.
+    fn ask(&self, recorder: &Recorder, boards: &[(Role, LinkSender)], ended: &mpsc::Receiver<()>) {
+        let mut lines_us = None;
+        loop {
+            let now_us = now_us();
+            loop {
+                // It is not held while something is said.
+                let due = locked(&self.0).stream.due(now_us);
+                let Some((role, message)) = due else { break };
+                if let Some((_, board)) = boards.iter().find(|(of, _)| *of == role) {
+                    let _ = board.post(&message);
+                }
+            }
+            if is_due(lines_us, LINES_US, now_us) {
+                lines_us = Some(now_us);
+                for (role, board) in boards {
+                    recorder.on_counters(*role, board.counters());
+                }
+            }
+            if ended.recv_timeout(LOOK) == Err(mpsc::RecvTimeoutError::Disconnected) {
+                return;
+            }
+        }
+    }
 }
 
 pub struct Session {
@@ -36,8 +117,6 @@ pub struct Session {
     recording: Option<LiveRecording>,
     /// A recording that is being ended, by a thread of its own: a disk may take its time.
     ending: Option<(String, JoinHandle<Result<Progress, RecordingError>>)>,
-    /// Has the gauges stream for as long as a recording lasts.
-    stream: GaugeStream,
     watch: Lease,
     lines_us: Option<u64>,
     is_over: bool,
@@ -57,7 +136,6 @@ impl Session {
             folder,
             recording: None,
             ending: None,
-            stream: GaugeStream::default(),
             watch: Lease::default(),
             lines_us: None,
             is_over: false,
@@ -97,9 +175,6 @@ impl Session {
             for (role, link) in &self.source.links {
                 let counters = link.counters();
                 self.dashboard.on_line(*role, counters, link.clocks());
-                if let Some(recording) = &self.recording {
-                    recording.recorder.on_counters(*role, counters);
-                }
             }
             let recording = self.recording.as_ref();
             if recording.is_some_and(|recording| recording.recorder.progress().failed) {
@@ -123,21 +198,13 @@ impl Session {
         links.map(|(_, link)| link.sender()).collect()
     }
 
-    /// Asks for what a recording needs, and who watches. What is not answered is asked again.
+    /// Asks for what who watches needs. What is not answered is asked again.
     fn ask(&mut self) {
         let wanted = self.dashboard.streams && self.dashboard.sensor.is_known();
         if let Some(message) = wanted.then(|| self.watch.due(now_us())).flatten()
             && let Some(link) = self.link(Role::Sensor)
         {
             let _ = link.post(&message);
-        }
-        if self.recording.is_none() {
-            return;
-        }
-        while let Some((role, message)) = self.stream.due(now_us()) {
-            if let Some(link) = self.link(role) {
-                let _ = link.post(&message);
-            }
         }
     }
 
@@ -179,19 +246,12 @@ impl Session {
             self.end_recording();
             return;
         }
-        match LiveRecording::begin(&self.folder, self.dashboard.now_us) {
+        let links = self.source.links.iter();
+        let boards = links.map(|(role, link)| (*role, link.sender())).collect();
+        let feed = self.source.feed.clone();
+        match LiveRecording::begin(&self.folder, self.dashboard.now_us, feed, boards) {
             Ok(recording) => {
-                // What came before it began is a part of it, so that it can be played back to a monitor.
-                self.stream = GaugeStream::new(true);
-                for role in [Role::Sensor, Role::Display] {
-                    if let Some(state) = &self.dashboard.board(role).state {
-                        let event = Event::StateChanged(state.clone());
-                        recording.recorder.on_event(role, &event);
-                        self.stream.on_event(role, &event);
-                    }
-                }
                 self.recording = Some(recording);
-                self.ask();
                 let gauges = if self.dashboard.sensor.is_known() {
                     "the sensor board is told to stream its gauges for as long as is recorded"
                 } else {
@@ -223,9 +283,10 @@ impl Session {
             return;
         };
         let path = recording.path.display().to_string();
+        self.source.feed.end();
         // One at a time: the one before has had all its time.
         let _ = self.finish_recording();
-        self.ending = Some((path, thread::spawn(move || recording.recorder.stop())));
+        self.ending = Some((path, thread::spawn(move || recording.end())));
     }
 
     /// Waits for the end of a recording, and tells what has come of it.
@@ -259,10 +320,6 @@ impl Session {
 
     fn on(&mut self, role: Role, event: Event) {
         self.has_met |= matches!(&event, Event::StateChanged(state) if state.is_known());
-        if let Some(recording) = &self.recording {
-            recording.recorder.on_event(role, &event);
-            self.stream.on_event(role, &event);
-        }
         self.dashboard.on(now_us(), role, event);
     }
 }
@@ -271,13 +328,21 @@ pub struct LiveRecording {
     pub path: PathBuf,
     /// Since when, in µs of [`crate::clock::now_us`].
     pub since_us: u64,
-    pub recorder: Recorder,
+    pub recorder: Arc<Recorder>,
+    /// Closed when it is to end.
+    going: mpsc::Sender<()>,
+    asking: JoinHandle<()>,
 }
 
 impl LiveRecording {
-    /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is free.
-    /// Fails if it can't be written there.
-    pub fn begin(folder: &Path, since_us: u64) -> Result<Self, RecordingError> {
+    /// Begins one in `folder`, under the first name of `monitor-1.mcap`, `monitor-2.mcap` and so on that is free, of
+    /// what comes through `feed`; `boards` are asked for what it needs. Fails if it can't be written there.
+    fn begin(
+        folder: &Path,
+        since_us: u64,
+        feed: RecordingFeed,
+        boards: Vec<(Role, LinkSender)>,
+    ) -> Result<Self, RecordingError> {
         let named = |number: u32| folder.join(format!("monitor-{number}.mcap"));
         let is_free = |path: &PathBuf| !path.exists() && !part_path(path, 2).exists();
         let path = (1..=u32::MAX)
@@ -290,10 +355,25 @@ impl LiveRecording {
             force: false,
             part: Some(PART),
         })?;
+        let recorder = Arc::new(recorder);
+        feed.begin(&recorder);
+        let (going, ended) = mpsc::channel();
+        let asked = Arc::clone(&recorder);
+        let asking = thread::spawn(move || feed.ask(&asked, &boards, &ended));
         Ok(Self {
             path,
             since_us,
             recorder,
+            going,
+            asking,
         })
+    }
+
+    /// Ends it when all that came is written. Fails if it can't be.
+    fn end(self) -> Result<Progress, RecordingError> {
+        drop(self.going);
+        // A thread that panicked has said so on standard error.
+        let _ = self.asking.join();
+        self.recorder.stop()
     }
 }

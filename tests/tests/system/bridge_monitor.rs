@@ -602,6 +602,43 @@ fn a_key_records_what_can_be_watched_again() {
 }
 
 #[test]
+fn a_recording_goes_on_though_the_terminal_takes_nothing() {
+    let folder = name_of_a_port("stuck").with_file_name("kept");
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    command.arg("--record-to").arg(&folder);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    terminal.type_keys("r");
+    assert!(terminal.shows(LIMIT, "recording"));
+    let file = folder.join("monitor-1.mcap");
+    let blocks = || {
+        let mut blocks = 0;
+        if let Ok(mut reader) = Reader::open(&file) {
+            while let Ok(Some(entry)) = reader.next_entry() {
+                blocks += usize::from(matches!(entry.row, Row::Gauges(_)));
+            }
+        }
+        blocks
+    };
+    terminal.stand_still(true);
+    // The one that draws waits for the terminal.
+    let stuck = format!("/proc/{}/task/{}/wchan", child.id(), child.id());
+    assert!(wait_until(LIMIT, || {
+        fs::read_to_string(&stuck).is_ok_and(|place| place.contains("wait_woken"))
+    }));
+    // Gauges of twice the time for which they are asked for at once.
+    let before = blocks();
+    assert!(wait_until(LIMIT, || blocks() > before + 375));
+    terminal.stand_still(false);
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+}
+
+#[test]
 fn a_folder_that_takes_no_recording_is_named() {
     let folder = name_of_a_port("no-recording").with_file_name("not-there");
     let running = bench();
