@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Seat};
 use crate::monitor::firmware_log::{Logs, Origin};
 use crate::monitor::line::Format;
 use crate::monitor::{self, Options, RecordingFeed, Source};
@@ -115,16 +115,25 @@ impl Monitor {
 
     /// Reads the logs of the boards whose ELF and whose bytes are known.
     fn follow_logs(&self, bench: &Bench, logs: &Logs) -> anyhow::Result<()> {
+        let origin = |seat: &Seat| match &seat.rtt {
+            Some(rtt) => Some(Origin::of(rtt)),
+            None if self.probe_log => Some(Origin::Probe(seat.usb.clone())),
+            None => None,
+        };
+        // One that is not named is whichever is plugged in, maybe the other board's.
+        if let [Some(Origin::Probe(one)), Some(Origin::Probe(other))] =
+            [&bench.sensor, &bench.display].map(origin)
+            && (one.is_none() || other.is_none() || one == other)
+        {
+            anyhow::bail!(
+                "each board's log needs a probe of its own: name both as `usb` in the bench file"
+            );
+        }
         for role in [Role::Sensor, Role::Display] {
             let Some(seat) = bench.seat(role) else {
                 continue;
             };
-            let origin = match &seat.rtt {
-                Some(rtt) => Some(Origin::of(rtt)),
-                None if self.probe_log => Some(Origin::Probe(seat.usb.clone())),
-                None => None,
-            };
-            match (&seat.elf, origin) {
+            match (&seat.elf, origin(seat)) {
                 (Some(elf), Some(origin)) => logs.follow(role, elf, origin)?,
                 (None, Some(_)) => anyhow::bail!(
                     "the {role}'s log can't be read without its firmware: give --{role}-elf",

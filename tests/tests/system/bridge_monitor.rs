@@ -540,6 +540,21 @@ fn a_log_without_its_firmware_or_from_none_is_refused() {
 }
 
 #[test]
+fn two_logs_are_not_read_by_one_probe() {
+    let folder = name_of_a_port("probes").with_file_name("bench.toml");
+    let two = "[sensor]\nelf = \"/bin/true\"\nUSB[display]\nelf = \"/bin/true\"\n";
+    for usb in ["", "usb = \"066C\"\n"] {
+        fs::write(&folder, two.replace("USB", usb)).expect("written");
+        let mut command = bridge::command();
+        command.args(["monitor", "--plain", "--probe-log", "--bench"]);
+        let ended = bridge::Running::start(command.arg(&folder)).wait(LIMIT);
+        assert_eq!(ended.status.code(), Some(2));
+        let words = "each board's log needs a probe of its own";
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+    }
+}
+
+#[test]
 fn a_key_records_what_can_be_watched_again() {
     let folder = name_of_a_port("recording").with_file_name("kept");
     fs::create_dir_all(&folder).expect("a folder can be made");
