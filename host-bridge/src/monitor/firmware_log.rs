@@ -1,9 +1,10 @@
 //! The firmwares' logs: the bytes of an RTT channel, from wherever they can be had, decoded by defmt's own
 //! decoder with the strings in the ELF.
 
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, IsTerminal, Read, Write};
 use std::net::TcpStream;
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,6 +13,7 @@ use std::thread;
 use std::time::Duration;
 
 use defmt_decoder::{DecodeError, Table};
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use probe_rs::probe::list::Lister;
 use probe_rs::rtt::{Rtt, ScanRegion, find_rtt_control_block_in_raw_file};
 use probe_rs::{Permissions, Session};
@@ -136,15 +138,27 @@ impl Log {
 
     fn read_file(&self, path: &Path) -> Result<(), String> {
         let failed = |error: io::Error| format!("{}: {error}", path.display());
-        let mut file = File::open(path).map_err(failed)?;
+        let mut file = open_at_once(path).map_err(failed)?;
         if file.is_terminal() {
             // Opened as a line, so that the system does not take the bytes for text.
             let opened = SharedPorts.open(path).map_err(|state| state.to_string())?;
             return self.listen(opened).map_err(failed);
         }
-        let grows = file.metadata().is_ok_and(|metadata| metadata.is_file());
-        self.decode(!grows, |bytes| file.read(bytes))
-            .map_err(failed)
+        fcntl(&file, FcntlArg::F_SETFL(OFlag::empty())).map_err(|error| failed(error.into()))?;
+        let kind = file.metadata().map_err(failed)?.file_type();
+        let mut has_come = false;
+        let read = |bytes: &mut [u8]| match file.read(bytes) {
+            // Nobody writes to the pipe yet.
+            Ok(0) if kind.is_fifo() && !has_come => {
+                thread::park_timeout(LOOK);
+                Err(ErrorKind::WouldBlock.into())
+            }
+            read => {
+                has_come |= read.is_ok();
+                read
+            }
+        };
+        self.decode(!kind.is_file(), read).map_err(failed)
     }
 
     fn read_tcp(&self, address: &str) -> Result<(), String> {
@@ -204,6 +218,15 @@ impl Log {
         }
         Ok(())
     }
+}
+
+/// Opens what may be a file, a pipe or a terminal: a pipe without a writer is not waited for, and a terminal does not
+/// become this program's own.
+fn open_at_once(path: &Path) -> io::Result<File> {
+    OpenOptions::new()
+        .read(true)
+        .custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY)
+        .open(path)
 }
 
 /// The chip of both boards, by probe-rs's name.

@@ -2,7 +2,8 @@
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -11,7 +12,9 @@ use protocol::{GAUGE_BLOCK, Message, Role};
 use rustix::fs::{CWD, FileType, Mode, OFlags, mknodat, open};
 use rustix::io::ioctl_fionread;
 use tests::bridge::{self, Running};
+use tests::elves;
 use tests::fake_board::wait_until;
+use tests::pty::Near;
 use tests::utterance::Speaker;
 
 use super::{LIMIT, Pair, entries, folder, signal};
@@ -83,9 +86,9 @@ fn a_disk_that_is_full_is_named_and_what_was_safe_stays_readable() {
         .env_remove("RIDGELINK_BENCH")
         .env_remove("HOME")
         .env_remove("XDG_CONFIG_HOME")
-        .stdin(std::process::Stdio::null())
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped());
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     let mut running = pair.record(
         &mut limited,
         &[path.to_str().expect("UTF-8"), "--no-gauges"],
@@ -268,6 +271,52 @@ fn a_log_that_cannot_be_read_costs_no_old_recording() {
     }
     assert_eq!(fs::read(folder.join(old)).expect("still there"), b"kept");
     assert!(!folder.join(new).exists());
+}
+
+#[test]
+fn a_log_becomes_no_controlling_terminal_and_a_pipe_without_a_writer_is_waited_for() {
+    let folder = folder("terminal");
+    let (_near, _kept, terminal) = Near::pair(Duration::from_millis(10)).expect("a terminal");
+    let pipe = folder.join("pipe");
+    mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("it can be made");
+    let seat = |role: Role, rtt: &Path| {
+        let (name, elf) = (role.name(), elves::path(role));
+        format!("[{name}]\nport = \"/dev/null/{name}\"\nelf = {elf:?}\nrtt = {rtt:?}\n")
+    };
+    let seats = seat(Role::Sensor, &terminal) + &seat(Role::Display, &pipe);
+    let bench = folder.join("bench.toml");
+    fs::write(&bench, seats).expect("the file can be written");
+    let program = bridge::command();
+    // The leader of a session has no terminal yet: whatever it opens may become it.
+    let mut command = Command::new("setsid");
+    command.arg(program.get_program()).arg("record");
+    command
+        .arg(folder.join("log.mcap"))
+        .arg("--bench")
+        .arg(&bench);
+    command.env_remove("RIDGELINK_BENCH");
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let running = Running::start(&mut command);
+    let process = PathBuf::from(format!("/proc/{}", running.child.id()));
+    let has_open = |path: &Path| {
+        let files = fs::read_dir(process.join("fd")).into_iter().flatten();
+        let mut targets = files
+            .flatten()
+            .filter_map(|file| fs::read_link(file.path()).ok());
+        targets.any(|target| target == path)
+    };
+    assert!(wait_until(LIMIT, || has_open(&terminal)));
+    let facts = fs::read_to_string(process.join("stat")).expect("it runs");
+    // Behind the name in brackets: state, parent, group, session, and the controlling terminal's number.
+    let (_, behind) = facts.rsplit_once(')').expect("a name");
+    assert_eq!(behind.split_whitespace().nth(4), Some("0"), "{facts}");
+    assert!(wait_until(LIMIT, || has_open(&pipe)));
+    signal(&running, "-INT");
+    let ended = running.wait(LIMIT);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
 }
 
 #[test]
