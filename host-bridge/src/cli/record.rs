@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use crate::bench::Bench;
 use crate::clock::now_us;
-use crate::link::{Event, Link};
+use crate::link::{Event, Link, stop_all};
 use crate::monitor::firmware_log::{LogError, Logs, Origin};
 use crate::monitor::log_entry::LogEvent;
 use crate::recording::gauge_stream::GaugeStream;
@@ -23,6 +23,7 @@ use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
+use super::stop::has_stopped;
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -55,6 +56,8 @@ const TOLD: Duration = Duration::from_secs(1);
 const WAITING_LINES: usize = 64;
 /// How long the last ones may take.
 const LINGER: Duration = Duration::from_secs(1);
+/// A board answers a Stop within milliseconds.
+const STOP_PATIENCE: Duration = Duration::from_millis(500);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
@@ -116,11 +119,19 @@ impl Record {
                 let _ = events.send((role, event));
             }
         });
-        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
+        let (said, stops) = channel();
+        let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
+        signals::on_stop(move || {
+            stop_all(&boards);
+            // Nobody listens any more when the recording ends.
+            let _ = said.send(());
+        })?;
         let absent = Session {
             recorder: &recorder,
             links: &links,
             told,
+            stops,
+            stopping: None,
             lines,
             stream: GaugeStream::new(!self.no_gauges),
             absent: BOARDS.into(),
@@ -180,11 +191,12 @@ fn follow(bench: &Bench, roles: &[Role], logs: &Logs) -> Result<(), LogError> {
     Ok(())
 }
 
-/// Whether an event changes what is to be said to a board.
+/// Whether an event changes what is to be said, to a board or of it.
 fn concerns(event: &Event) -> bool {
     !matches!(
         event,
-        Event::Heard { message, .. } if !matches!(message, Message::Configuration(_))
+        Event::Heard { message, .. }
+            if !matches!(message, Message::Configuration(_) | Message::Stopped(_))
     )
 }
 
@@ -219,6 +231,10 @@ struct Session<'a> {
     recorder: &'a Recorder,
     links: &'a [(Role, Link)],
     told: Receiver<(Role, Event)>,
+    /// That Stop was said.
+    stops: Receiver<()>,
+    /// Until when boards that were told to stop may take to answer.
+    stopping: Option<Instant>,
     /// The boards' logs.
     lines: Receiver<(Role, LogEvent)>,
     stream: GaugeStream,
@@ -268,8 +284,13 @@ impl Session<'_> {
         match self.told.recv_timeout(wait) {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                if let Event::StateChanged(state) = &event {
-                    self.on_state(role, state);
+                match &event {
+                    Event::StateChanged(state) => self.on_state(role, state),
+                    Event::Heard {
+                        message: Message::Stopped(stopped),
+                        ..
+                    } => self.screen.tell(&has_stopped(role, stopped)),
+                    _ => {}
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
@@ -280,9 +301,31 @@ impl Session<'_> {
                 other => self.screen.tell(&format!("{}: {other}", role.name())),
             }
         }
+        if self.stops.try_iter().count() > 0 {
+            self.stopping = Some(Instant::now() + STOP_PATIENCE);
+        }
+        if self
+            .stopping
+            .take_if(|end| Instant::now() >= *end)
+            .is_some()
+        {
+            self.tell_unstopped();
+        }
         while let Some((role, message)) = self.stream.due(now_us()) {
             // Asked again if it is not answered.
             self.post(role, &message);
+        }
+    }
+
+    /// Tells of boards that have not answered a Stop.
+    fn tell_unstopped(&mut self) {
+        let unstopped = self.links.iter().filter(|(_, link)| link.is_stopping());
+        let names: Vec<&str> = unstopped.map(|(role, _)| role.name()).collect();
+        if !names.is_empty() {
+            self.screen.tell(&format!(
+                "NOT STOPPED: {}: no answer, told again: use the emergency stop",
+                names.join(" and ")
+            ));
         }
     }
 

@@ -90,10 +90,15 @@ fn say_answer(role: Role, state: &State, stopped: &Stopped) -> bool {
         );
         return false;
     }
+    say(&has_stopped(role, stopped));
+    true
+}
+
+/// A board's answer to a Stop, in words.
+pub fn has_stopped(role: Role, stopped: &Stopped) -> String {
     let trip = stopped.trip().map(Trip::name);
     let trip = trip.unwrap_or("a reason that this program does not know");
-    say(&format!("{name} has stopped: {trip}"));
-    true
+    format!("{} has stopped: {trip}", role.name())
 }
 
 fn not_stopped(role: Role, why: &str) {

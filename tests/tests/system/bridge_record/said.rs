@@ -1,6 +1,6 @@
 //! Everything that is said is recorded, and nothing is changed.
 
-use std::fs;
+use std::fs::{self, File};
 
 use host_bridge::recording::row::Row;
 use protocol::{
@@ -131,4 +131,30 @@ fn gauges_are_asked_for_again_and_again_while_they_are_recorded_and_nothing_is_c
             .iter()
             .any(|entry| matches!(entry.row, Row::DisplayConfiguration(_)))
     );
+}
+
+#[test]
+fn what_became_of_a_stop_is_told() {
+    let folder = folder("stop");
+    let told = folder.join("told");
+    let pair = Pair::new();
+    pair.display.disobey(true);
+    let path = folder.join("stop.mcap");
+    let running = pair.record(
+        bridge::command().stderr(File::create(&told).expect("a file can be made")),
+        &[path.to_str().expect("UTF-8"), "--no-gauges", "--quiet"],
+    );
+    pair.wait_for_questions();
+    signal(&running, "-USR1");
+    let is_told = |words: &str| {
+        let text = || fs::read_to_string(&told).unwrap_or_default();
+        assert!(wait_until(LIMIT, || text().contains(words)), "{}", text());
+    };
+    is_told("sensor has stopped: by the operator\n");
+    is_told("NOT STOPPED: display: no answer, told again: use the emergency stop\n");
+    // It is told again until it answers.
+    pair.display.disobey(false);
+    is_told("display has stopped: by the operator\n");
+    signal(&running, "-INT");
+    assert_eq!(running.wait(LIMIT).status.code(), Some(0));
 }
