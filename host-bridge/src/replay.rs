@@ -236,6 +236,8 @@ pub struct StandIn {
 struct PeerClock {
     recorded_us: u64,
     own_us: u64,
+    /// The instant that was played last: as it was recorded, and as it was said.
+    last_recorded_us: u64,
     last_us: u64,
 }
 
@@ -285,20 +287,22 @@ impl StandIn {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
         let clock = match self.clock {
-            Some(clock) if recorded_us >= clock.recorded_us => clock,
+            Some(clock) if recorded_us >= clock.last_recorded_us => clock,
             // The first one, or the recorded board started anew.
             before => {
-                let own_us = before.map_or(now_us, |clock| clock.last_us + PAUSE_US);
+                let own_us = before.map_or(now_us, |clock| clock.last_us.saturating_add(PAUSE_US));
                 PeerClock {
                     recorded_us,
                     own_us,
+                    last_recorded_us: recorded_us,
                     last_us: own_us,
                 }
             }
         };
         let passed_us = (recorded_us - clock.recorded_us) as f64 / self.speed;
-        let instant_us = clock.own_us + passed_us.round() as u64;
+        let instant_us = clock.own_us.saturating_add(passed_us.round() as u64);
         self.clock = Some(PeerClock {
+            last_recorded_us: recorded_us,
             last_us: instant_us,
             ..clock
         });
@@ -344,6 +348,9 @@ mod tests {
         // Started anew.
         assert_eq!(say(&motion(0, 2_000, 0)), (2, 12_000, 0));
         assert_eq!(say(&motion(1, 4_000, 0)), (3, 13_000, 0));
+        // Once more, and heard only when its clock stood beyond the first one that was played.
+        assert_eq!(say(&motion(0, 3_000, 0)), (4, 23_000, 0));
+        assert_eq!(say(&motion(1, 5_000, 0)), (5, 24_000, 0));
     }
 
     #[test]
