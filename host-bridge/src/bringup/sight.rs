@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use protocol::{
     Configuration, ConfigurationReport, Configure, DisplayConfiguration, DisplayCounters, GAUGES,
-    Message, PortCounters, Question, Role, RoleCounters, SensorCounters, StreamGauges,
+    Message, PortCounters, Question, Role, RoleCounters, SensorCounters, Setting, StreamGauges,
 };
 
 use crate::bench::Bench;
@@ -203,6 +203,7 @@ impl Sight {
             asked: 0,
             heard: [0; 2],
             in_force: None,
+            has_ordered: false,
         };
         let examination = look_with(system, bench, PATIENCE, ended, &mut watcher);
         Self {
@@ -279,6 +280,8 @@ struct Watcher {
     heard: [u32; 2],
     /// What the display has in force, and its hash.
     in_force: Option<(u32, DisplayConfiguration)>,
+    /// Whether the display was told to take the amplitude.
+    has_ordered: bool,
 }
 
 /// Of the calls of [`Observer::say`], ten a second, the gauges are asked for anew at each such.
@@ -361,10 +364,11 @@ impl Watcher {
     }
 
     /// What is in force is asked for first: all but the amplitude is to stay as it is.
-    fn order(&self, amplitude_mv: u16) -> Message {
+    fn order(&mut self, amplitude_mv: u16) -> Message {
         let Some((hash, in_force)) = self.in_force else {
             return Message::Question(Question::Configuration);
         };
+        self.has_ordered = true;
         Message::Configure(Configure {
             replaces: Some(hash),
             configuration: Configuration::Display(DisplayConfiguration {
@@ -377,7 +381,12 @@ impl Watcher {
     fn configured(&mut self, report: &ConfigurationReport) {
         if let Configuration::Display(display) = report.configuration {
             self.in_force = Some((report.hash, display));
-            self.sight.amplitude = Some(match report.refused {
+            // All else stays as it is in force: no other refusal is an answer to this program. Where something else is
+            // in force by now, the change is made again of that.
+            let refused = report
+                .refused
+                .filter(|refusal| self.has_ordered && refusal.setting == Setting::AmplitudeMv);
+            self.sight.amplitude = Some(match refused {
                 None => Ok(display.amplitude_mv),
                 Some(refusal) => Err(refusal.to_string()),
             });
@@ -387,7 +396,63 @@ impl Watcher {
 
 #[cfg(test)]
 mod tests {
+    use protocol::Refusal;
+
     use super::*;
+
+    #[test]
+    fn a_refusal_that_answers_somebody_else_is_none() {
+        let mut watcher = Watcher {
+            sight: Sight::default(),
+            wanted: Wanted {
+                span_s: 1.0,
+                amplitude_mv: Some(700),
+            },
+            asked: 0,
+            heard: [0; 2],
+            in_force: None,
+            has_ordered: false,
+        };
+        let report = |configuration: DisplayConfiguration, setting: Option<Setting>| {
+            let refused = setting.map(|setting| Refusal {
+                setting,
+                index: 0,
+                low: 0,
+                high: 0,
+            });
+            ConfigurationReport::of(Configuration::Display(configuration), refused)
+        };
+        let orders = |watcher: &mut Watcher| -> Vec<Configure> {
+            let turns = (0..STREAM_EVERY)
+                .flat_map(|_| watcher.say())
+                .collect::<Vec<_>>();
+            let orders = turns.into_iter().filter_map(|(_, message)| match message {
+                Message::Configure(configure) => Some(configure),
+                _ => None,
+            });
+            orders.collect()
+        };
+        let before = DisplayConfiguration::DEFAULT;
+        let other = DisplayConfiguration {
+            fade_in_ms: 77,
+            ..before
+        };
+        assert_eq!(orders(&mut watcher), []);
+        // Another program asks for what can't be.
+        watcher.configured(&report(before, Some(Setting::AmplitudeMv)));
+        assert!(!watcher.is_configured());
+        let replaced = |orders: &[Configure]| orders.first().and_then(|order| order.replaces);
+        let of = |configuration| Configuration::Display(configuration).hash();
+        assert_eq!(replaced(&orders(&mut watcher)), Some(of(before)));
+        watcher.configured(&report(before, Some(Setting::Role)));
+        assert!(!watcher.is_configured());
+        // Another program has changed something in between: the change is made again of that.
+        watcher.configured(&report(other, Some(Setting::Replaces)));
+        assert!(!watcher.is_configured());
+        assert_eq!(replaced(&orders(&mut watcher)), Some(of(other)));
+        watcher.configured(&report(other, Some(Setting::AmplitudeMv)));
+        assert!(watcher.is_configured() && matches!(watcher.sight.amplitude, Some(Err(_))));
+    }
 
     #[test]
     fn a_way_that_no_number_holds_is_a_long_one() {
