@@ -144,7 +144,6 @@ fn links(
     bench.roles().into_iter().filter_map(open).collect()
 }
 
-/// A time above 0 s, and short enough to be waited for: a hundred years.
 /// A place in a recording, in s after its start.
 fn place_s(text: &str) -> Result<f64, String> {
     let place_s = text.parse().ok();
@@ -153,6 +152,7 @@ fn place_s(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "give a number of seconds, 0 or more".to_owned())
 }
 
+/// A time above 0 s, and short enough to be waited for: a hundred years.
 fn seconds(text: &str) -> Result<Duration, String> {
     const LONGEST_S: f64 = 100.0 * 365.0 * 86_400.0;
     text.parse::<f64>()

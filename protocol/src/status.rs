@@ -118,7 +118,7 @@ impl SensorCounters {
 /// What only a display board counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DisplayCounters {
-    /// Output ticks at 2 kHz since the start.
+    /// Output ticks since the start, at the update rate in force: 2 or 4 kHz.
     pub ticks: u32,
     /// Ticks whose words were sent to the DACs (a tick that changes nothing sends nothing).
     pub updates: u32,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 /// Every file with a type that a row is made of.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     include_str!("row/estimate.rs"),
     include_str!("row/gauges.rs"),
     include_str!("row/link.rs"),
@@ -19,6 +19,7 @@ const SOURCES: [&str; 14] = [
     include_str!("../../../protocol/src/refusal.rs"),
     include_str!("../../../protocol/src/safety.rs"),
     include_str!("../../../protocol/src/status.rs"),
+    include_str!("../../../protocol/src/stop.rs"),
     include_str!("../../../protocol/src/texture.rs"),
 ];
 /// How many descriptions may refer to each other in a row.
@@ -133,6 +134,19 @@ mod tests {
             twice.starts_with("The sender's clock when it sent this, in µs"),
             "{twice}"
         );
+    }
+
+    #[test]
+    fn variants_that_are_referred_to_are_described() {
+        let asked_for = field("Trip", "Operator");
+        assert_eq!(asked_for.as_deref(), Some("A person asked for it."));
+        for (name, of) in texts().keys() {
+            let words = field(name, of).unwrap_or_default();
+            let mut names = words.trim_end_matches('.').split('.').skip(1);
+            let is_path =
+                !words.contains(' ') && names.any(|name| name.starts_with(char::is_uppercase));
+            assert!(!is_path, "{name}.{of}: {words}");
+        }
     }
 
     #[test]
