@@ -99,16 +99,22 @@ impl Viewer {
             }
             if Instant::now() >= due {
                 due = Instant::now() + PICTURE;
-                self.dashboard.elapse(now_us());
                 if Instant::now() >= hands_due {
                     hands_due = Instant::now() + HANDS;
                     hands = hand::hands();
                 }
-                self.newest
-                    .put(picture(&self.dashboard, &hands).to_string());
+                self.show(&hands);
             }
         }
         self.foxglove.stop();
+    }
+
+    /// Draws another picture for the page.
+    fn show(&mut self, hands: &[String]) {
+        self.dashboard.elapse(now_us());
+        // Shown already, with the last ones.
+        self.dashboard.take_log_entries();
+        self.newest.put(picture(&self.dashboard, hands).to_string());
     }
 
     fn take(&mut self, role: Role, event: Event) {
@@ -202,7 +208,26 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
+    use crate::state::State;
+
+    #[test]
+    fn what_has_happened_is_kept_no_longer_than_it_is_shown() {
+        let settings = Settings {
+            address: IpAddr::from([127, 0, 0, 1]),
+            port: Some(0),
+            gauges: false,
+        };
+        let (_events, told) = crossbeam_channel::unbounded();
+        let mut viewer = Viewer::start(settings, Vec::new(), told).expect("any port will do");
+        let port = PathBuf::from("/dev/null/sensor");
+        viewer.take(Role::Sensor, Event::StateChanged(State::Silent(port)));
+        viewer.show(&[]);
+        assert_eq!(viewer.dashboard.take_log_entries(), []);
+        assert_eq!(viewer.dashboard.log_entries.len(), 1);
+    }
 
     #[test]
     fn a_second_program_takes_other_ports_unless_these_are_asked_for() {
