@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};
-use protocol::{DisplayState, Role};
+use protocol::{DisplayState, Role, Trip};
 use serde_json::{Value, json};
 
 use super::foxglove_server::{FoxgloveServer, LiveError};
@@ -60,11 +60,13 @@ impl Viewer {
         let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
         let stop = move || stop_all(&boards);
         page::serve(listener, Arc::clone(&newest), Box::new(stop));
+        let mut dashboard = Dashboard::default();
+        dashboard.linked = links.iter().map(|(role, _)| *role).collect();
         Ok(Self {
             foxglove,
             page,
             newest,
-            dashboard: Dashboard::default(),
+            dashboard,
             stream: GaugeStream::new(settings.gauges),
             links,
             told,
@@ -154,13 +156,22 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
     let now_us = dashboard.now_us;
     let is_fresh = |at_us: u64| now_us.saturating_sub(at_us) < FRESH_US;
     let mm_s = |um_s: i32| um_s as f32 / 1e3;
+    let safety = dashboard.safety.map(|(_, state)| state);
     let board = |role: Role| {
         let board = dashboard.board(role);
         let state = board.state.as_ref();
+        let stopped = match (role, safety) {
+            (Role::Sensor, _) => board.arm_stopped,
+            (_, Some(DisplayState::Stopped(trip))) => Some(trip),
+            _ => None,
+        };
         json!({
             "name": role.name(),
             "state": state.map_or_else(|| "not looked for".to_owned(), ToString::to_string),
             "known": board.is_known(),
+            // Whether this program may say anything to it.
+            "linked": dashboard.linked.contains(&role),
+            "stopped": stopped.map(Trip::name),
         })
     };
     let estimate = dashboard.estimate.filter(|(at_us, _)| is_fresh(*at_us));
@@ -171,7 +182,6 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
         let extent = trace.extent(now_us.saturating_sub(FRESH_US), now_us);
         extent.filter(|_| has_gauges).map(|extent| extent.last)
     });
-    let safety = dashboard.safety.map(|(_, state)| state);
     // Each one's place in mm, and its largest voltage of the last 50 to 100 ms.
     let fingertip = &dashboard.fingertip;
     let actuators = fingertip
@@ -210,8 +220,37 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
 mod tests {
     use std::path::PathBuf;
 
+    use protocol::{Arm, ArmState, Message};
+
     use super::*;
     use crate::state::State;
+
+    #[test]
+    fn the_picture_tells_which_boards_are_linked_and_stopped() {
+        let mut dashboard = Dashboard::default();
+        dashboard.linked = vec![Role::Sensor];
+        let stopped = |dashboard: &Dashboard| {
+            let boards = picture(dashboard, &[])["boards"].take();
+            let each = |at: usize| [boards[at]["linked"].clone(), boards[at]["stopped"].clone()];
+            [each(0), each(1)]
+        };
+        let none = [json!(false), json!(null)];
+        assert_eq!(
+            stopped(&dashboard),
+            [[json!(true), json!(null)], none.clone()]
+        );
+        let arm = Message::Arm(Arm {
+            instant_us: 1,
+            state: ArmState::Stopped(Trip::Operator),
+        });
+        let heard = Event::Heard {
+            at_us: 1,
+            message: arm,
+        };
+        dashboard.on(1, Role::Sensor, heard);
+        let by = json!("by the operator");
+        assert_eq!(stopped(&dashboard), [[json!(true), by], none]);
+    }
 
     #[test]
     fn what_has_happened_is_kept_no_longer_than_it_is_shown() {

@@ -8,7 +8,7 @@ use std::process::{Child, Command};
 use std::time::Duration;
 
 use hil_sim_boards::bench::Command as Order;
-use protocol::Role;
+use protocol::{Arm, ArmState, Message, Role, Trip};
 use serde_json::Value;
 use tests::bench::{ExclusiveBench, bench, until};
 use tests::bridge;
@@ -264,6 +264,38 @@ fn beyond_this_computer_it_listens_only_if_that_is_said() {
         "{}",
         refused.stderr
     );
+}
+
+#[test]
+fn the_page_of_one_board_tells_of_its_stop() {
+    let Some(browser) = Browser::start(1_024, 1_366, false) else {
+        eprintln!("skipped: needs Debian's chromium and chromium-driver");
+        return;
+    };
+    let board = FakeBoard::new(Role::Sensor);
+    let port = board.path().to_str().expect("UTF-8");
+    let live = Live::of(&["--port", "0", "--sensor", port]).expect("it says where");
+    browser.open(&format!("http://{}/", live.page));
+    until("the board", || {
+        browser
+            .text("boards")
+            .contains("sensor 0.1.0")
+            .then_some(())
+    });
+    browser.click("#stop");
+    until("word of it", || {
+        let words = "Stop was said to the sensor";
+        browser.text("said").contains(words).then_some(())
+    });
+    board.say(Message::Arm(Arm {
+        instant_us: 1,
+        state: ArmState::Stopped(Trip::Operator),
+    }));
+    until("its end", || {
+        let words = "The sensor has stopped: by the operator";
+        browser.text("said").contains(words).then_some(())
+    });
+    live.end();
 }
 
 #[test]
