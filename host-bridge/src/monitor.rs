@@ -7,6 +7,7 @@
 //! ```
 //!
 //! The [`dashboard`] knows neither boards nor terminals: it is fed events, and says what is to be said.
+//! A recording that a key has begun gets them from whoever hears the boards, by a [`RecordingFeed`].
 
 pub(crate) mod board;
 pub mod dashboard;

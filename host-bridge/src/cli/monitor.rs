@@ -97,7 +97,7 @@ impl Monitor {
         let source = Source {
             events,
             links,
-            logs: Some(lines),
+            logs: Some(feed.pass_on(lines)),
             feed,
         };
         let format = Format {

@@ -66,6 +66,31 @@ impl RecordingFeed {
         }
     }
 
+    /// Takes what logs say, and passes it on.
+    pub fn pass_on(
+        &self,
+        lines: mpsc::Receiver<(Role, LogEvent)>,
+    ) -> mpsc::Receiver<(Role, LogEvent)> {
+        let (passing, passed) = mpsc::channel();
+        let feed = self.clone();
+        thread::spawn(move || {
+            for (role, what) in lines {
+                feed.on_log(role, &what);
+                if passing.send((role, what)).is_err() {
+                    return;
+                }
+            }
+        });
+        passed
+    }
+
+    fn on_log(&self, role: Role, what: &LogEvent) {
+        let recorder = locked(&self.0).recorder.clone();
+        if let (Some(recorder), LogEvent::Log { level, text }) = (recorder, what) {
+            recorder.on_log(role, *level, text.clone());
+        }
+    }
+
     /// Feeds `recorder` from now on.
     fn begin(&self, recorder: &Arc<Recorder>) {
         let mut fed = locked(&self.0);
@@ -164,9 +189,6 @@ impl Session {
         if let Some(logs) = &self.source.logs {
             for (role, what) in logs.try_iter() {
                 came = true;
-                if let (Some(recording), LogEvent::Log { level, text }) = (&self.recording, &what) {
-                    recording.recorder.on_log(role, *level, text.clone());
-                }
                 self.dashboard.log(role, what);
             }
         }
@@ -375,5 +397,48 @@ impl LiveRecording {
         // A thread that panicked has said so on standard error.
         let _ = self.asking.join();
         self.recorder.stop()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::reader::Reader;
+    use crate::recording::row::Row;
+
+    #[test]
+    fn lines_of_a_log_are_recorded_while_nobody_draws() {
+        let folder = std::env::temp_dir().join(format!("session-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        let (_events, happens) = crossbeam_channel::unbounded();
+        let (lines, read) = mpsc::channel();
+        let feed = RecordingFeed::default();
+        let source = Source {
+            events: happens,
+            links: Vec::new(),
+            logs: Some(feed.pass_on(read)),
+            feed,
+        };
+        let mut session = Session::new(source, folder.clone());
+        session.toggle_recording();
+        let log = |text: &str| LogEvent::Log {
+            level: None,
+            text: text.to_owned(),
+        };
+        lines.send((Role::Sensor, log("a line"))).unwrap();
+        // It is passed on when it has been fed.
+        let passed = session.source.logs.as_ref().unwrap().recv();
+        assert_eq!(passed, Ok((Role::Sensor, log("a line"))));
+        session.close().unwrap();
+        let mut reader = Reader::open(&folder.join("monitor-1.mcap")).unwrap();
+        let mut texts = Vec::new();
+        while let Some(entry) = reader.next_entry().unwrap() {
+            if let Row::Log(row) = entry.row {
+                texts.push(row.msg.0);
+            }
+        }
+        assert_eq!(texts, ["a line"]);
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 }
