@@ -18,12 +18,12 @@ use crate::recording::gauge_stream::GaugeStream;
 use crate::recording::{PART, Progress, Recorder, Settings};
 use crate::state::{Advised, State};
 use clap::ValueHint;
-use protocol::{Message, Role};
+use protocol::{Message, Role, Stopped};
 use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
-use super::stop::has_stopped;
+use super::stop::{answering, has_stopped};
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -289,7 +289,7 @@ impl Session<'_> {
                     Event::Heard {
                         message: Message::Stopped(stopped),
                         ..
-                    } => self.screen.tell(&has_stopped(role, stopped)),
+                    } => self.on_stopped(role, stopped),
                     _ => {}
                 }
             }
@@ -314,6 +314,14 @@ impl Session<'_> {
         while let Some((role, message)) = self.stream.due(now_us()) {
             // Asked again if it is not answered.
             self.post(role, &message);
+        }
+    }
+
+    /// Tells of a board that has stopped, by its own name: behind a port may be the other one.
+    fn on_stopped(&mut self, role: Role, stopped: &Stopped) {
+        let state = self.link(role).map(Link::state);
+        if let Some(who) = state.and_then(|state| answering(role, &state)) {
+            self.screen.tell(&has_stopped(who, stopped));
         }
     }
 

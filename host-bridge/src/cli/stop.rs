@@ -39,7 +39,7 @@ impl StopBoards {
         stop_all(&boards);
         let end = Instant::now() + Duration::from_secs(self.within.into());
         let mut answers: Vec<(Role, Stopped)> = Vec::new();
-        let mut is_missed = false;
+        let mut heard = HeardAnswers::default();
         while !waiting.is_empty() {
             match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok((
@@ -60,38 +60,75 @@ impl StopBoards {
                 let Some((_, stopped)) = answer.filter(|_| is_clear) else {
                     return true;
                 };
-                is_missed |= !say_answer(*role, &state, stopped);
+                heard.take(*role, &state, stopped);
                 false
             });
         }
         for (role, link) in &waiting {
             let state = link.state();
-            if let Some((_, stopped)) = answers.iter().find(|(of, _)| of == role) {
-                is_missed |= !say_answer(*role, &state, stopped);
-                continue;
+            match answers.iter().find(|(of, _)| of == role) {
+                Some((_, stopped)) => heard.take(*role, &state, stopped),
+                None => {
+                    let advice = state.advice().unwrap_or("it does not answer");
+                    let why = format!("{state} ({advice})");
+                    heard.missed.push((*role, why));
+                }
             }
-            is_missed = true;
-            let advice = state.advice().unwrap_or("it does not answer");
-            not_stopped(*role, &format!("{state} ({advice})"));
         }
-        Ok(ExitCode::from(u8::from(is_missed)))
+        Ok(ExitCode::from(u8::from(heard.say_missed())))
     }
 }
 
-/// Says whose answer came on the way to the board of `role`; whether it is that board's.
-fn say_answer(role: Role, state: &State, stopped: &Stopped) -> bool {
-    let name = role.name();
-    if let State::Stranger { port, hello, .. } = state {
-        let is = Role::from_byte(hello.role).map_or("another board", Role::name);
-        let port = port.display();
-        not_stopped(
-            role,
-            &format!("{port} is the {is}, which has stopped; the {name} was not told"),
-        );
-        return false;
+/// Who has answered.
+#[derive(Default)]
+struct HeardAnswers {
+    /// The boards that have said of themselves that they have stopped.
+    stopped: Vec<Role>,
+    /// The boards of the bench that did not answer where they were to be, and why.
+    missed: Vec<(Role, String)>,
+}
+
+impl HeardAnswers {
+    /// Takes the answer that came on the way to the board of `role`, from whomever.
+    fn take(&mut self, role: Role, state: &State, stopped: &Stopped) {
+        let who = answering(role, state);
+        if who != Some(role)
+            && let Some(port) = state.port()
+        {
+            let is = who.map_or("another board", Role::name);
+            let (port, name) = (port.display(), role.name());
+            let why = format!("{port} is the {is}, which has stopped; the {name} was not told");
+            self.missed.push((role, why));
+        }
+        if let Some(who) = who.filter(|who| !self.stopped.contains(who)) {
+            self.stopped.push(who);
+            say(&has_stopped(who, stopped));
+        }
     }
-    say(&has_stopped(role, stopped));
-    true
+
+    /// Says which boards have not stopped as far as is known; whether there are any. One may have answered on the
+    /// other's way.
+    fn say_missed(&self) -> bool {
+        let mut is_missed = false;
+        for (role, why) in &self.missed {
+            if !self.stopped.contains(role) {
+                is_missed = true;
+                say(&format!(
+                    "NOT STOPPED as far as is known: {}: {why}: press the emergency stop, or cut its power",
+                    role.name()
+                ));
+            }
+        }
+        is_missed
+    }
+}
+
+/// Who it is that answers on the way to the board of `role`; none if it is neither board.
+pub fn answering(role: Role, state: &State) -> Option<Role> {
+    match state {
+        State::Stranger { hello, .. } => Role::from_byte(hello.role),
+        _ => Some(role),
+    }
 }
 
 /// A board's answer to a Stop, in words.
@@ -99,11 +136,4 @@ pub fn has_stopped(role: Role, stopped: &Stopped) -> String {
     let trip = stopped.trip().map(Trip::name);
     let trip = trip.unwrap_or("a reason that this program does not know");
     format!("{} has stopped: {trip}", role.name())
-}
-
-fn not_stopped(role: Role, why: &str) {
-    say(&format!(
-        "NOT STOPPED as far as is known: {}: {why}: press the emergency stop, or cut its power",
-        role.name()
-    ));
 }

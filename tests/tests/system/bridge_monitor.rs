@@ -466,6 +466,25 @@ fn stop_says_so_where_both_names_lead_to_one_board() {
 }
 
 #[test]
+fn stop_finds_both_boards_where_their_names_are_exchanged() {
+    let running = bench();
+    let [sensor, display] = {
+        let bench = running.bench();
+        [&bench.sensor, &bench.display].map(|board| board.path().clone())
+    };
+    let mut command = bridge::command();
+    command.args(["stop", "--within", "60"]);
+    command.arg("--sensor").arg(&display);
+    command.arg("--display").arg(&sensor);
+    let done = bridge::Running::start(&mut command).wait(LIMIT);
+    for board in ["sensor", "display"] {
+        let words = format!("{board} has stopped: by the operator");
+        assert!(done.stderr.contains(&words), "{}", done.stderr);
+    }
+    assert_eq!(done.status.code(), Some(0), "{}", done.stderr);
+}
+
+#[test]
 fn a_key_streams_the_gauges_and_changes_no_setting() {
     let mut bench = FakeBench::new();
     bench.sensing.window_ms = 123;
