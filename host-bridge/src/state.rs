@@ -54,6 +54,14 @@ impl State {
         }
     }
 
+    /// Which board it is that is heard on the way to that of the role `wanted`; none if it is neither.
+    pub fn who(&self, wanted: Role) -> Option<Role> {
+        match self {
+            Self::Stranger { hello, .. } => Role::from_byte(hello.role),
+            _ => Some(wanted),
+        }
+    }
+
     /// The port, if one is or was to be opened.
     pub const fn port(&self) -> Option<&PathBuf> {
         match self {

@@ -23,7 +23,7 @@ use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
-use super::stop::{answering, has_stopped};
+use super::stop::has_stopped;
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -319,8 +319,7 @@ impl Session<'_> {
 
     /// Tells of a board that has stopped, by its own name: behind a port may be the other one.
     fn on_stopped(&mut self, role: Role, stopped: &Stopped) {
-        let state = self.link(role).map(Link::state);
-        if let Some(who) = state.and_then(|state| answering(role, &state)) {
+        if let Some(who) = self.link(role).and_then(|link| link.state().who(role)) {
             self.screen.tell(&has_stopped(who, stopped));
         }
     }

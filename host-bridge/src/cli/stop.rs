@@ -91,7 +91,7 @@ struct HeardAnswers {
 impl HeardAnswers {
     /// Takes the answer that came on the way to the board of `role`, from whomever.
     fn take(&mut self, role: Role, state: &State, stopped: &Stopped) {
-        let who = answering(role, state);
+        let who = state.who(role);
         if who != Some(role)
             && let Some(port) = state.port()
         {
@@ -120,14 +120,6 @@ impl HeardAnswers {
             }
         }
         is_missed
-    }
-}
-
-/// Who it is that answers on the way to the board of `role`; none if it is neither board.
-pub fn answering(role: Role, state: &State) -> Option<Role> {
-    match state {
-        State::Stranger { hello, .. } => Role::from_byte(hello.role),
-        _ => Some(role),
     }
 }
 

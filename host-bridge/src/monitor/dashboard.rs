@@ -203,12 +203,17 @@ impl Dashboard {
         self.notify(false, "stop: sent, not confirmed yet".to_owned());
     }
 
-    /// The board of `role` says that it has stopped.
+    /// A board says that it has stopped, on the way to that of `role`.
     fn on_stopped(&mut self, role: Role) {
-        let Some((_, boards)) = &mut self.stopping else {
+        let state = self.board(role).state.as_ref();
+        let who = state.map_or(Some(role), |state| state.who(role));
+        let (Some((_, boards)), Some(who)) = (&mut self.stopping, who) else {
             return;
         };
-        boards.retain(|board| *board != role);
+        if !self.linked.contains(&who) {
+            return;
+        }
+        boards.retain(|board| *board != who);
         let waits = boards.clone();
         if waits.is_empty() {
             self.stopping = None;

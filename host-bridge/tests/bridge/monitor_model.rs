@@ -181,6 +181,26 @@ fn a_stop_is_over_when_every_board_has_answered_and_is_called_unanswered_until_t
 }
 
 #[test]
+fn a_stop_is_confirmed_by_whoever_answers_and_not_by_whose_port_it_was_to_be() {
+    let mut dashboard = connected();
+    dashboard.linked = vec![Role::Sensor, Role::Display];
+    let stranger = State::Stranger {
+        port: "/dev/tty".into(),
+        hello: Hello::new(Role::Display, "stm32f429zi", [0, 1, 0]),
+        wanted: Role::Sensor,
+    };
+    dashboard.on(1, Role::Sensor, Event::StateChanged(stranger));
+    dashboard.stop();
+    let message = Message::Stopped(Stopped::by(Trip::Operator));
+    dashboard.on(10, Role::Sensor, Event::Heard { at_us: 10, message });
+    let text = |dashboard: &Dashboard| dashboard.notice().expect("it is told").text.clone();
+    assert_eq!(text(&dashboard), "stop: confirmed by the display");
+    dashboard.elapse(600_000);
+    let words = text(&dashboard);
+    assert!(words.starts_with("NOT STOPPED: sensor: "), "{words}");
+}
+
+#[test]
 fn a_stop_that_has_no_way_to_any_board_is_called_so() {
     let mut dashboard = connected();
     dashboard.stop();
