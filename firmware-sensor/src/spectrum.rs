@@ -13,9 +13,9 @@
 //! its flanks; the *wave* is the clearest peak of the moment, where that is elsewhere: a new surface. Either is
 //! refined by least squares over the last waves of the path, and weighed by [`evidence`]; the more probable one is λ̂.
 //!
-//! λ̂ is the period: a line at 2 λ or 3 λ that is at least 0.4 times as high as one at λ is taken for the
-//! fundamental, if a fit over three waves finds it there. Of waves that have no common period the
-//! strongest is λ̂.
+//! λ̂ is the period: that of the clearest peak is taken for its half or third, if lines stand there that the peak's
+//! wavelength does not explain and that period does, its own among them, and a fit finds it there. Of waves that have no
+//! common period the strongest is λ̂.
 //!
 //! The work of an estimate is spread over the ten milliseconds before it: see [`Spectrum::push`].
 

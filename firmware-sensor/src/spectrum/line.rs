@@ -6,6 +6,7 @@ use crate::float::{larger, smaller, sqrt};
 
 use super::evidence::LineEvidence;
 use super::fit::{Fitted, LENGTH_COUNT};
+use super::survey::MATURE;
 use super::trend::Trend;
 use super::{MEMORY_WAVES, SAME, SHORTER_LENGTHS, STRONG, Spectrum, Supposition, is_common, off};
 
@@ -90,7 +91,7 @@ impl Spectrum {
                 .filter(|fitted| off(fitted.wavelength_mm, here_mm) < share)
                 .map(|_| n)
         };
-        if self.survey.longer && found[2].is_some() && near(2, 0.05).is_none() {
+        if self.survey.longer && self.is_refused(&found, here_mm) {
             self.refused = REFUSED_ESTIMATES;
         }
         let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
@@ -161,6 +162,15 @@ impl Spectrum {
             fitted: found[2].or(found[1]).or(fitted),
             new: false,
         })
+    }
+
+    /// Whether a fit is somewhere else than a period that the peaks tell. Beside its harmonics a weak one is off over three
+    /// waves more often than over five; those are not told every time, and a young one's are of what was there before.
+    fn is_refused(&self, found: &[Option<Fitted>; LENGTH_COUNT], here_mm: f32) -> bool {
+        let is_young = self.survey.maturity < MATURE || self.lengths < LENGTH_COUNT - 1;
+        let told = if is_young { 2 } else { 3 };
+        let is_new = is_young || self.shorter_so_far == 0;
+        is_new && found[told].is_some_and(|fitted| off(fitted.wavelength_mm, here_mm) >= 0.05)
     }
 
     /// λ here, of the average's peak there and of fits carried to here. Each may be off: a peak where two lines meet, a

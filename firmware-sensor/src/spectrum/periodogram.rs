@@ -310,9 +310,7 @@ pub(super) fn highest_peak(spectrum: &Spectrum) -> Option<usize> {
 /// The peak that stands highest above the mean of its flanks: what is random lies higher at long waves, and a line
 /// beside it need not be the highest.
 pub(super) fn clearest_peak(spectrum: &Spectrum) -> Option<usize> {
-    highest_by(spectrum, |number| {
-        spectrum[number] - 0.5 * flanks(spectrum, number)
-    })
+    highest_by(spectrum, |number| rise(spectrum, number))
 }
 
 fn highest_by(spectrum: &Spectrum, height: impl Fn(usize) -> f32) -> Option<usize> {
@@ -321,6 +319,11 @@ fn highest_by(spectrum: &Spectrum, height: impl Fn(usize) -> f32) -> Option<usiz
         .map(|number| (number, height(number)))
         .max_by(|(_, one), (_, other)| one.total_cmp(other))
         .map(|(number, _)| number)
+}
+
+/// How high a peak stands above the mean of its flanks.
+pub(super) fn rise(spectrum: &Spectrum, number: usize) -> f32 {
+    spectrum[number] - 0.5 * flanks(spectrum, number)
 }
 
 /// The sum of a peak's flanks, a third of an octave to either side.

@@ -2,17 +2,44 @@
 
 use super::fit::Pass;
 use super::periodogram::{
-    CANDIDATES, PER_OCTAVE, Spectrum as Energies, clearest_peak, highest_peak, is_peak, sharpness,
+    CANDIDATES, Spectrum as Energies, clearest_peak, highest_peak, is_peak, rise, sharpness,
     vertex_mm, wavelength_mm,
 };
 use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off};
-use crate::float::larger;
+use crate::float::{larger, smaller};
 
 /// One estimate of so many fits the line over the longer lengths, too; those after it take its fits over.
 const LONGER_EVERY: u8 = 5;
 /// How much higher than the peak an end of the spectrum is where the wave lies beyond it. A random part alone lifts the
 /// long end.
 const BEYOND: f32 = 1.5;
+
+/// A period of which a peak is the second or third harmonic.
+struct Comb {
+    /// Waves of the peak in a period, and how many candidates up that is.
+    waves: f32,
+    up: i8,
+    /// The period's other harmonics that are none of the peak's wavelength: of which order, and how many candidates up.
+    others: &'static [(f32, i8)],
+}
+const COMBS: [Comb; 2] = [
+    Comb {
+        waves: 2.0,
+        up: 6,
+        others: &[(3.0, -4), (5.0, -8)],
+    },
+    Comb {
+        waves: 3.0,
+        up: 10,
+        others: &[(2.0, 4), (4.0, -2), (5.0, -4)],
+    },
+];
+/// How high the period's lines stand together, relative to the peak, where the peak's wavelength is not the period. Two that
+/// fit are told from chance at half of that.
+const PERIOD: f32 = 0.4;
+/// Weight of the average from which on a line is told from the slope that it stands on: some four waves. Before, how high
+/// it is has to do: a strong wave is stood by sooner.
+pub(super) const MATURE: f32 = 0.25;
 
 /// The spectra's peaks, and what fits are under way.
 #[derive(Clone, Debug, Default)]
@@ -127,7 +154,8 @@ impl Spectrum {
         }
     }
 
-    /// A period of which the peak is the second or third harmonic, and its candidate.
+    /// A period of which the peak is the second or third harmonic, and its candidate. What tells it is the lines that it
+    /// explains and the peak's wavelength does not: of a weave they are high, though the period's own may be the least.
     fn longer_period(
         &mut self,
         averaged: &Energies,
@@ -139,20 +167,44 @@ impl Spectrum {
             return None;
         }
         let peak_mm = vertex_mm(averaged, peak, true);
-        for (ratio, up) in [(2.0, PER_OCTAVE), (3.0, 10)] {
-            for i in [peak + up, peak + up - 1, peak + up + 1] {
-                if i + 1 < CANDIDATES
-                    && is_peak(averaged, i)
-                    && averaged[i] > 0.4 * averaged[peak]
-                    && energies[i] > 0.09 * energies[peak]
-                    && off(vertex_mm(averaged, i, true), ratio * peak_mm) < 0.06
-                {
-                    return Some((i, ratio * peak_mm));
+        for comb in &COMBS {
+            let period_mm = comb.waves * peak_mm;
+            let Some(period) = line_at(averaged, peak, comb.up, period_mm) else {
+                continue;
+            };
+            let young = self.periodogram.maturity(period) < MATURE;
+            let is_high = young && averaged[period] > PERIOD * averaged[peak];
+            let own = rise(averaged, period);
+            if own <= 0.0 && !is_high {
+                continue;
+            }
+            let (mut sum, mut highest, mut second) = (own, own, 0.0);
+            let mut now = energies[period];
+            for &(order, up) in comb.others {
+                if let Some(number) = line_at(averaged, peak, up, period_mm / order) {
+                    let height = larger(rise(averaged, number), 0.0);
+                    sum += height;
+                    now += energies[number];
+                    second = larger(second, smaller(height, highest));
+                    highest = larger(highest, height);
                 }
+            }
+            let least = PERIOD * rise(averaged, peak);
+            let are_two = second > 0.25 * highest && sum > 0.5 * least;
+            let explains = own > 0.0 && (sum > least || are_two);
+            if now > 0.09 * energies[peak] && (explains || is_high) {
+                return Some((period, period_mm));
             }
         }
         None
     }
+}
+
+/// The peak `up` candidates from `peak`, or beside that, whose line is at `mm`.
+fn line_at(energies: &Energies, peak: usize, up: i8, mm: f32) -> Option<usize> {
+    let near = peak.checked_add_signed(isize::from(up))?;
+    (near.saturating_sub(1)..near + 2)
+        .find(|&i| is_peak(energies, i) && off(vertex_mm(energies, i, true), mm) < 0.06)
 }
 
 /// The peak at `mm`, if there is one that is not much lower than peak `number`.
@@ -179,6 +231,7 @@ fn fundamental_of(energies: &Energies, peak: usize, line: usize, line_mm: f32) -
 mod tests {
     use protocol::SensorConfiguration;
 
+    use super::super::periodogram::PER_OCTAVE;
     use super::*;
 
     const PEAK: usize = 9;
@@ -215,6 +268,44 @@ mod tests {
             let found = spectrum.longer_period(&askew, &askew, PEAK);
             let wanted = is_period.then_some(PEAK + up);
             assert_eq!(found.map(|found| found.0), wanted, "{up} candidates up");
+        }
+    }
+
+    #[test]
+    fn a_periods_other_lines_tell_it_together() {
+        let found = |period: f32, third: f32| {
+            let mut weave = [0.001; CANDIDATES];
+            for (number, height) in [(PEAK, 1.0), (PEAK + PER_OCTAVE, period), (PEAK - 4, third)] {
+                weave[number] = height;
+            }
+            let mut spectrum = Spectrum::new(&SensorConfiguration::DEFAULT);
+            spectrum
+                .longer_period(&weave, &weave, PEAK)
+                .map(|(number, _)| number)
+        };
+        let twice = Some(PEAK + PER_OCTAVE);
+        assert_eq!(found(0.05, 0.4), twice);
+        // Two that agree may be lower than one, and one that is much lower than the other does not agree.
+        assert_eq!(found(0.11, 0.11), twice);
+        assert_eq!(found(0.1, 0.28), twice);
+        assert_eq!(found(0.09, 0.09), None);
+        assert_eq!(found(0.05, 0.28), None);
+        // Without a line of its own there is no period.
+        assert_eq!(found(0.001, 0.9), None);
+    }
+
+    #[test]
+    fn what_is_high_and_flat_is_no_period_once_that_can_be_told() {
+        let mut slope = energies(PER_OCTAVE, 0.45);
+        for beside in [1, 2] {
+            slope[PEAK + PER_OCTAVE + beside] = 1.3;
+            slope[PEAK + PER_OCTAVE - beside] = 1.3;
+        }
+        for (weight, is_period) in [(0.24, true), (0.26, false)] {
+            let mut spectrum = Spectrum::new(&SensorConfiguration::DEFAULT);
+            spectrum.periodogram.restart(&slope, weight);
+            let found = spectrum.longer_period(&slope, &slope, PEAK);
+            assert_eq!(found.is_some(), is_period, "weight {weight}");
         }
     }
 

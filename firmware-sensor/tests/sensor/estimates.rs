@@ -1,7 +1,8 @@
 //! The whole [`Sensor`] on synthetic signals: ADC codes and encoder counts in, estimates out.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
+use crate::felt::{Bench, CODES, GAINS, PHASES_RAD, PLACES_MM, valid_and_worst};
 use firmware_sensor::counting::predicted_mean_mm;
 use firmware_sensor::texture::Surface;
 use firmware_sensor::{
@@ -448,4 +449,18 @@ fn on_a_gradient_the_wavelength_is_that_under_the_fingertip() {
             );
         }
     }
+}
+
+#[test]
+fn a_weaves_period_is_told_though_its_half_is_the_strongest() {
+    let weave = |gauge: usize, x_mm: f64, _: f64| {
+        let theta = TAU * (x_mm + PLACES_MM[gauge]) / 3.3 + PHASES_RAD[gauge];
+        let third = 0.7 * (3.0 * theta).sin();
+        CODES * GAINS[gauge] * (0.35 * theta.sin() + (2.0 * theta).sin() + third)
+    };
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    let begun = bench.rub(1_000, |_| 40.0, weave);
+    assert!(valid_and_worst(&begun, 3.3).0 > 0.0);
+    let (valid, worst) = valid_and_worst(&bench.rub(3_000, |_| 40.0, weave), 3.3);
+    assert!(valid > 0.95 && worst < 0.05, "{valid} valid, {worst} off");
 }
