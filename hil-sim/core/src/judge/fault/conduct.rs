@@ -37,7 +37,7 @@ pub(super) struct Misconduct {
     pub held: Option<(Hold, u64)>,
     /// They were driven for the first time after the fault was over.
     pub again_ns: Option<u64>,
-    /// Of the time in which they have to be, for how long the hand moved, in ns.
+    /// Of the time in which they have to be, for how long the hand moved and nothing held them, in ns.
     pub moved_ns: u64,
 }
 
@@ -69,12 +69,13 @@ pub(super) struct Conduct {
 }
 
 impl Conduct {
-    /// Judges until `until_ns`; a display that has stopped for good before need not drive.
+    /// Judges until `until_ns`; a display that has stopped for good before need not drive. Messages take up to `way_ns`.
     pub fn new(
         fault: &Fault,
         until_ns: u64,
         configuration: &DisplayConfiguration,
         has_stopped: bool,
+        way_ns: u64,
     ) -> Self {
         let row = fault.kind.row();
         let from_ns = fault.begins_ns();
@@ -86,11 +87,13 @@ impl Conduct {
             _ if row.safe_within_ms.is_some() => from_ns..over_ns,
             _ => from_ns..from_ns,
         };
-        let again_ms = row.again_within_ms.unwrap_or(0.0);
         Self {
             judged_ns: from_ns..until_ns,
             excused_ns,
-            again_ns: over_ns..over_ns + nanoseconds(again_ms * 1e-3),
+            again_ns: match row.again_within_ms {
+                Some(ms) => over_ns..over_ns + nanoseconds(ms * 1e-3) + way_ns,
+                None => over_ns..over_ns,
+            },
             forgets_ns: cuts_power.then_some(over_ns),
             must_drive: !has_stopped,
             max_age_ms: configuration.max_age_ms,
@@ -172,7 +175,7 @@ impl Conduct {
         let speed_mm_s = (tick.position_mm - before_mm).abs() / (step_ns as f64 * 1e-9);
         if speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
             self.moves_since_ns.get_or_insert(before_ns);
-            if self.again_ns.contains(&tick.at_ns) {
+            if self.again_ns.contains(&tick.at_ns) && self.held_since.is_none() {
                 self.seen.moved_ns += step_ns;
             }
         } else {
@@ -226,7 +229,7 @@ impl Conduct {
         (!self.again_ns.is_empty() && self.must_drive).then_some(self.again_ns.end)
     }
 
-    /// Whether that can be seen: the hand moves for half of the time.
+    /// Whether that can be seen: for half of the time the hand moves, over a surface of which something is known.
     pub fn shows_again(&self) -> bool {
         2 * self.seen.moved_ns >= self.again_ns.end - self.again_ns.start
     }

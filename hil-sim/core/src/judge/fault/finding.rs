@@ -1,6 +1,6 @@
 //! What became of a fault, beside its row of the table.
 
-use crate::scene::fault::{Fault, nanoseconds};
+use crate::scene::fault::{Fault, Row, nanoseconds};
 
 /// What became of one fault.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Finding {
     pub safe_ns: Option<u64>,
     /// Outputs that were not at 0 V when they had to be, or stood at another voltage.
     pub stuck: usize,
+    /// Of these, those that stood at another voltage.
+    pub standing: usize,
     /// Whether any output was driven after the fault had been answered by 0 V.
     pub drives_again: bool,
     /// From its end until the display drove again, in ns.
@@ -38,11 +40,37 @@ pub struct Finding {
 impl Finding {
     /// What is not as the table of kinds has it.
     pub fn unmet(&self) -> Vec<String> {
-        if !self.must_show {
-            return self.otherwise.clone();
-        }
         let row = self.fault.kind.row();
         let mut unmet = Vec::new();
+        if self.must_show {
+            self.must_be_answered(row, &mut unmet);
+        }
+        // What need not be seen must do no harm either.
+        let stuck = if self.must_show {
+            self.stuck
+        } else {
+            self.standing
+        };
+        if stuck > 0 {
+            unmet.push(format!("{stuck} outputs stuck"));
+        }
+        if self.is_restart_against_the_table() {
+            let again = if self.drives_again {
+                ", drives again"
+            } else {
+                ""
+            };
+            unmet.push(format!(
+                "restarted against the table: {} resets{again}",
+                self.resets
+            ));
+        }
+        unmet.extend_from_slice(&self.otherwise);
+        unmet
+    }
+
+    /// Whether it was seen, and the outputs were at 0 V, in time.
+    fn must_be_answered(&self, row: &Row, unmet: &mut Vec<String>) {
         if let Some(within_ms) = row.seen_within_ms
             && self.unseen.is_none()
         {
@@ -64,22 +92,6 @@ impl Finding {
                 Some(_) => {}
             }
         }
-        if self.stuck > 0 {
-            unmet.push(format!("{} outputs stuck", self.stuck));
-        }
-        if self.is_restart_against_the_table() {
-            unmet.push(format!(
-                "restarted against the table: {} resets{}",
-                self.resets,
-                if self.drives_again {
-                    ", drives again"
-                } else {
-                    ""
-                }
-            ));
-        }
-        unmet.extend_from_slice(&self.otherwise);
-        unmet
     }
 
     /// [`Finding::detected_ns`] in ms.

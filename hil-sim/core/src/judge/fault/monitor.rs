@@ -14,7 +14,7 @@ use crate::plant::motion::MM_PER_COUNT;
 use crate::run::decoder::TimedMessage;
 use crate::run::observer::{RunEvent, RunObserver};
 use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
-use crate::scene::{Follows, Scene};
+use crate::scene::{Follows, Link, Scene};
 
 /// From a reason to hold until the display says so, in ns: its next tick, and the message's way.
 const SAID_NS: u64 = 5_000_000;
@@ -44,6 +44,8 @@ pub(super) struct FaultMonitor {
     alone_ns: Range<u64>,
     /// What other faults may show meanwhile.
     of_others: Vec<Sign>,
+    /// What the scene's own link shows, with and without the fault: no sign of it.
+    weather: Vec<Sign>,
     has_stopped: bool,
     must_show: bool,
     /// When nobody looks on any more.
@@ -102,6 +104,18 @@ impl Beat {
     }
 }
 
+/// What the link of a scene makes boards count by itself.
+fn weather_signs(link: &Link) -> Vec<Sign> {
+    let corrupt = ["corrupt", "overlong", "malformed"];
+    let reordered = ["late", "implausible"];
+    let of_corrupt = corrupt.iter().filter(|_| link.corrupt > 0.0);
+    let of_reordered = reordered.iter().filter(|_| link.reorder > 0.0);
+    let counters = of_corrupt.chain(of_reordered);
+    counters
+        .flat_map(|&name| [Role::Sensor, Role::Display].map(|role| Sign::Counted(role, name)))
+        .collect()
+}
+
 /// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
 /// a sound board.
 fn must_show(fault: &Fault, scene: &Scene) -> bool {
@@ -122,14 +136,16 @@ fn must_show(fault: &Fault, scene: &Scene) -> bool {
         }
 }
 
-/// Whether the hand's mean speed is too low for an encoder or a converter that stands still to show in time.
+/// Whether the hand's mean speed is too low for an encoder, a converter or a gauge that stands still to show in time.
 fn is_slow(fault: &Fault, scene: &Scene) -> bool {
     const PARTS: u32 = 100;
     let within_s = fault.kind.row().seen_within_ms.unwrap_or(0.0) * 1e-3;
     let at_s = |part: u32| fault.at_s + within_s * f64::from(part) / f64::from(PARTS);
     let speeds = (0..PARTS).map(|part| scene.motion.velocity_mm_s(at_s(part)).abs());
-    matches!(fault.kind, Kind::HandEncoderDead | Kind::AdcStuck)
-        && speeds.sum::<f64>() < TOLD_MM_S * f64::from(PARTS)
+    matches!(
+        fault.kind,
+        Kind::HandEncoderDead | Kind::AdcStuck | Kind::GaugeOpen | Kind::GaugeShort
+    ) && speeds.sum::<f64>() < TOLD_MM_S * f64::from(PARTS)
 }
 
 impl FaultMonitor {
@@ -148,10 +164,10 @@ impl FaultMonitor {
             let later = others().filter(|other| is_next(other) && other.begins_ns() > from_ns);
             later.map(Fault::begins_ns).min().unwrap_or(u64::MAX)
         };
-        let due_ns = from_ns..until_ns.min(next_ns(|other| other.kind == Kind::PowerCycle));
+        let due_ns = from_ns..until_ns.min(next_ns(|other| other.cuts_power(Role::Display)));
         let alone_ns = from_ns..until_ns.min(next_ns(|_| true));
         let last_power_ns = others()
-            .filter(|other| other.kind == Kind::PowerCycle && other.begins_ns() <= from_ns)
+            .filter(|other| other.cuts_power(Role::Display) && other.begins_ns() <= from_ns)
             .map(Fault::begins_ns)
             .max();
         let stops = |other: &&Fault| {
@@ -174,6 +190,8 @@ impl FaultMonitor {
             // The arm stands still too, and nothing is sensed.
             of_others.push(Sign::Fading(Hold::Stale));
         }
+        let weather = weather_signs(&scene.link);
+        of_others.extend(&weather);
         let configuration = scene.display_configuration();
         // Of a flood, which estimates find room is chance.
         let tires = f64::from(configuration.full_drive_s) < scene.duration_s;
@@ -190,11 +208,18 @@ impl FaultMonitor {
             fault,
             outputs: Outputs::new(&fault, due_ns.end, &configuration),
             // When it has been driven for too long is not followed here.
-            conduct: Conduct::new(&fault, alone_ns.end, &configuration, has_stopped || tires),
+            conduct: Conduct::new(
+                &fault,
+                alone_ns.end,
+                &configuration,
+                has_stopped || tires,
+                nanoseconds((scene.link.delay_ms + scene.link.jitter_ms) * 1e-3),
+            ),
             step: keeps_step.then(|| Step::new(&truth, alone_ns.clone())),
             due_ns,
             alone_ns,
             of_others,
+            weather,
             has_stopped,
             must_show: must_show(&fault, scene),
             until_ns,
@@ -224,8 +249,11 @@ impl FaultMonitor {
         if self.left_ns() < nanoseconds(within_ms * 1e-3) {
             return Some(self.ends());
         }
-        self.is_slow
-            .then_some("the hand moves at less than 12 mm/s")
+        if self.is_slow {
+            return Some("the hand moves at less than 12 mm/s");
+        }
+        let hides = |sign: &Sign| self.weather.contains(sign);
+        (kind.row().signs.iter().any(hides)).then_some("the scene's link shows the same without it")
     }
 
     /// From its beginning until nobody looks on any more, in ns.
@@ -249,6 +277,7 @@ impl FaultMonitor {
             fault,
             alone_ns,
             of_others,
+            weather,
             has_stopped,
             must_show,
             has_looked,
@@ -261,7 +290,7 @@ impl FaultMonitor {
         let ms = |at_ns: u64| at_ns.saturating_sub(from_ns) as f64 * 1e-6;
         let first = seen
             .iter()
-            .filter(|(sign, ..)| row.signs.contains(sign))
+            .filter(|(sign, ..)| row.signs.contains(sign) && !weather.contains(sign))
             .min_by_key(|&(_, at_ns, words)| (at_ns, words));
         let outputs = self.outputs.finish();
         // At rest there is nothing that a gauge or an encoder could be missed by.
@@ -342,11 +371,16 @@ impl FaultMonitor {
                 ms(due_ns)
             ));
         }
+        // What is due is counted as well, at the next second.
+        let fades_are_due = seen
+            .iter()
+            .any(|&(sign, at_ns, _)| matches!(sign, Sign::Fading(hold) if is_due(hold, at_ns)));
         for (sign, at_ns, words) in &seen {
             let may = row.signs.contains(sign)
                 || row.also.contains(sign)
                 || of_others.contains(sign)
-                || matches!(sign, Sign::Fading(hold) if is_due(*hold, *at_ns));
+                || matches!(sign, Sign::Fading(hold) if is_due(*hold, *at_ns))
+                || fades_are_due && matches!(sign, Sign::Counted(_, "fades"));
             if alone_ns.contains(at_ns) && !may {
                 otherwise.push(format!(
                     "not to be expected: {words}, at {:.2} ms",
@@ -409,6 +443,7 @@ impl FaultMonitor {
             sign: first.map(|(.., words)| words.clone()).unwrap_or_default(),
             safe_ns: outputs.safe_ns.map(|at_ns| at_ns - from_ns),
             stuck: outputs.stuck(),
+            standing: outputs.standing(),
             drives_again: outputs.drives_again,
             again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
             resets: self.resets,

@@ -37,8 +37,10 @@ pub(super) struct Outputs {
     words: Option<[u16; ACTUATORS]>,
     /// Since when each is at one voltage, in ns.
     since_ns: [u64; ACTUATORS],
-    /// Which were not at 0 V when they had to be, or stood at another voltage.
-    stuck: [bool; ACTUATORS],
+    /// Which were not at 0 V when they had to be.
+    late: [bool; ACTUATORS],
+    /// Which stood at another voltage.
+    stands: [bool; ACTUATORS],
     /// Since when all are at 0 V, in ns.
     silent_ns: Option<u64>,
     /// Whether they were at 0 V for longer than a wave that passes it.
@@ -103,7 +105,8 @@ impl Outputs {
             safe_ns: Some(from_ns),
             words: None,
             since_ns: [from_ns; ACTUATORS],
-            stuck: [false; ACTUATORS],
+            late: [false; ACTUATORS],
+            stands: [false; ACTUATORS],
             silent_ns: None,
             answered: false,
             drives_again: false,
@@ -176,14 +179,14 @@ impl Outputs {
         let stood_ns = until_ns.saturating_sub(self.since_ns[actuator]);
         let is_cut = word.abs_diff(ZERO_VOLT) + 2 >= self.limits.words;
         let most_ns = if is_cut { CREST_NS } else { STANDING_NS };
-        self.stuck[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
+        self.stands[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
     }
 
     fn look_late(&mut self) {
         self.late_ns = None;
         if let Some(words) = &self.words {
-            for (stuck, &word) in self.stuck.iter_mut().zip(words) {
-                *stuck |= word != ZERO_VOLT;
+            for (late, &word) in self.late.iter_mut().zip(words) {
+                *late |= word != ZERO_VOLT;
             }
         }
     }
@@ -201,6 +204,12 @@ impl Outputs {
 
     /// How many were not at 0 V when they had to be, or stood at another voltage.
     pub fn stuck(&self) -> usize {
-        self.stuck.iter().filter(|&&stuck| stuck).count()
+        let both = self.late.iter().zip(&self.stands);
+        both.filter(|&(&late, &stands)| late || stands).count()
+    }
+
+    /// How many stood at another voltage than 0.
+    pub fn standing(&self) -> usize {
+        self.stands.iter().filter(|&&stands| stands).count()
     }
 }

@@ -1,6 +1,9 @@
 //! Recordings of displays that answer a fault well, or badly.
 
-use protocol::{DisplayState, Hold, Message, Rendering, Role, Safety, Trip};
+use protocol::{
+    DisplayCounters, DisplayState, Hold, Message, PortCounters, Rendering, ResetCause, Role,
+    RoleCounters, Safety, Status, Trip,
+};
 
 use super::*;
 use crate::judge::synthetic::{Run, word_of};
@@ -344,6 +347,91 @@ fn what_is_too_short_or_too_small_need_not_be_seen() {
     assert_eq!(judged(alarm)[0], "no sign of it");
     alarm.for_s = Some(0.001);
     assert_eq!(judged(alarm), [""; 0]);
+}
+
+#[test]
+fn what_need_not_be_seen_must_do_no_harm() {
+    let short = |outputs: Vec<OutputRecord>, signs: FaultEvidence| {
+        let mut alarm = Fault::new(Kind::DacAlarm, AT_MS as f64 * 1e-3);
+        alarm.for_s = Some(0.001);
+        let recording = Recording {
+            outputs,
+            signs,
+            ..Run::steady(50.0, 2.0).record()
+        };
+        let scene = Scene {
+            duration_s: END_MS as f64 * 1e-3,
+            faults: vec![alarm],
+            ..Scene::constant(2.0, 50.0)
+        };
+        finding(&scene, 0, END_MS * MS, &recording).unmet()
+    };
+    let mut again = driven(0, AT_MS + 2, ZERO_VOLT);
+    again.extend(driven(600, 700, ZERO_VOLT));
+    assert_eq!(
+        short(again, stopped()),
+        ["restarted against the table: 0 resets, drives again"]
+    );
+    let stands = short(driven(0, AT_MS + 2, 0x9000), FaultEvidence::default());
+    assert_eq!(stands, ["50 outputs stuck"]);
+}
+
+/// A hand that moves all the time over what `spoil` makes of a sound recording, with a fault at 0.5 s.
+fn spoiled(
+    fault: Kind,
+    scene: Scene,
+    spoil: impl FnOnce(&mut Recording),
+) -> (Vec<String>, Vec<String>) {
+    let mut recording = Run::steady(50.0, 2.0).record();
+    spoil(&mut recording);
+    let scene = Scene {
+        duration_s: 2.0,
+        faults: vec![Fault::new(fault, 0.5)],
+        ..scene
+    };
+    let finding = finding(&scene, 0, 2_000 * MS, &recording);
+    (finding.unmet(), finding.unjudged)
+}
+
+#[test]
+fn what_the_scenes_link_shows_by_itself_is_neither_a_sign_nor_a_false_alarm() {
+    let counted = |at_ms: u64, corrupt: u32, late: u32| {
+        let status = Status {
+            uptime_us: at_ms * 1_000,
+            reset: ResetCause::Power,
+            watchdog_resets: 0,
+            peer: PortCounters {
+                corrupt,
+                late,
+                ..PortCounters::default()
+            },
+            console: PortCounters::default(),
+            role: RoleCounters::Display(DisplayCounters::default()),
+            stack_free_bytes: 0,
+        };
+        TimedMessage {
+            at_ns: at_ms * MS,
+            message: Message::Status(status),
+        }
+    };
+    let judged = |kind: Kind, corrupt: f64, reorder: f64| {
+        let mut scene = Scene::constant(2.0, 50.0);
+        (scene.link.corrupt, scene.link.reorder) = (corrupt, reorder);
+        spoiled(kind, scene, |recording| {
+            recording.signs.display = vec![counted(400, 0, 0), counted(1_400, 3, 2)];
+        })
+    };
+    let alarms = judged(Kind::Nothing, 0.0, 0.0).0;
+    assert_eq!(alarms.len(), 2, "{alarms:?}");
+    assert_eq!(judged(Kind::Nothing, 1e-4, 0.01).0, [""; 0]);
+    let (unmet, unjudged) = judged(Kind::LinkCorrupt, 1e-4, 0.01);
+    assert!(!unmet.contains(&"no sign of it".to_owned()), "{unmet:?}");
+    assert!(
+        unjudged
+            .iter()
+            .any(|line| line.ends_with("the scene's link shows the same without it")),
+        "{unjudged:?}"
+    );
 }
 
 /// The last tick of a scene of 2 s.

@@ -110,6 +110,13 @@ fn recorded_gauges_are_played_and_refused_below_200_hz() {
         .unwrap();
     let mut world = crate::plant::world::World::new(&scene).unwrap();
     assert_eq!(world.codes(1.00025, 0.0), [0, 1024, 2048, 3072, 4095, 2048]);
+    // The last row goes on for as long as the others do.
+    let whole = rows.trim_end().rsplit_once('\n').expect("rows").0;
+    let load = |rows: &str| folder.load(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{rows}\n"));
+    assert!(whole.contains("\n2.999,") && !whole.contains("\n3,"));
+    load(whole).expect("3 s at 1 kHz are 3 000 rows");
+    let short = whole.rsplit_once('\n').expect("rows").0;
+    load(short).expect_err("2.999 s are no 3 s");
     for (csv, want) in [
         (
             "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.01,1,1,1,1,1\n",
