@@ -12,13 +12,11 @@ use crate::run::recording::{Arrival, TickRecord, ZERO_VOLT};
 
 /// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
 const TICKS_KEPT: usize = 8;
-/// Ticks at 0 V that are no wave's crossing.
-const CROSSING_TICKS: u32 = 3;
 
 /// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
 /// in which each estimate that is to be trusted ([`Trust`] says which) takes
 /// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
-/// heard. 0 until there is one.
+/// heard: what is on its way when silence falls is in force at once. 0 until there is one.
 ///
 /// An estimate is followed from the second tick after its arrival on, for the whole travel since the
 /// first: the board hears what has come once a tick's words are on their way.
@@ -37,8 +35,8 @@ pub struct DuePhase {
     last_tick_ns: Option<u64>,
     /// Whether the last output was other than 0 V.
     loud: bool,
-    /// Ticks since then. A wave crosses 0 V; silence stays there.
-    silent_ticks: u32,
+    /// Whether it was not, at the last tick. A wave crosses 0 V between ticks.
+    silent: bool,
 }
 
 /// The phase due at an instant.
@@ -68,7 +66,7 @@ impl DuePhase {
             arrived: VecDeque::new(),
             last_tick_ns: None,
             loud: false,
-            silent_ticks: CROSSING_TICKS,
+            silent: true,
         }
     }
 
@@ -110,10 +108,6 @@ impl DuePhase {
         self.followed.per_mm
     }
 
-    fn is_heard(&self) -> bool {
-        self.silent_ticks < CROSSING_TICKS
-    }
-
     /// The shortest λ̂ that has been in force, in mm.
     pub fn shortest_mm(&self) -> Option<f64> {
         self.shortest_mm
@@ -139,7 +133,7 @@ impl DuePhase {
             .last_tick_ns
             .is_some_and(|tick_ns| arrival.at_ns <= tick_ns)
         {
-            self.followed.hear(arrival, self.is_heard());
+            self.followed.hear(arrival, self.silent);
         } else {
             self.arrived.push_back(*arrival);
         }
@@ -148,6 +142,10 @@ impl DuePhase {
     fn tick(&mut self, tick: &TickRecord) {
         let travel_mm = tick.position_mm - self.before_mm.unwrap_or(tick.position_mm);
         self.before_mm = Some(tick.position_mm);
+        self.silent = !self.loud;
+        if self.silent {
+            self.followed.arrive();
+        }
         let per_mm = self.followed.tick();
         self.cycles += travel_mm * per_mm;
         self.travelled += travel_mm.abs() * per_mm;
@@ -166,17 +164,11 @@ impl DuePhase {
             self.ticks.pop_front();
         }
         self.last_tick_ns = Some(tick.at_ns);
-        self.silent_ticks = if self.loud {
-            0
-        } else {
-            self.silent_ticks.saturating_add(1)
-        };
         while let Some(arrival) = self
             .arrived
             .pop_front_if(|arrival| arrival.at_ns <= tick.at_ns)
         {
-            let heard = self.is_heard();
-            self.followed.hear(&arrival, heard);
+            self.followed.hear(&arrival, self.silent);
         }
     }
 }
@@ -203,8 +195,8 @@ impl Followed {
         }
     }
 
-    /// An estimate has come, while something was `heard` or nothing.
-    fn hear(&mut self, arrival: &Arrival, heard: bool) {
+    /// An estimate has come, while all was `silent` or not.
+    fn hear(&mut self, arrival: &Arrival, silent: bool) {
         let DisplayConfiguration {
             glide_ms,
             update_rate,
@@ -214,10 +206,16 @@ impl Followed {
             let target_per_mm = 1.0 / wavelength_mm;
             if target_per_mm != self.target_per_mm {
                 self.target_per_mm = target_per_mm;
-                let glide_ms = if heard { u32::from(glide_ms) } else { 0 };
+                let glide_ms = if silent { 0 } else { u32::from(glide_ms) };
                 self.ticks_left = glide_ms * (update_rate.hz() / 1_000);
             }
         }
+    }
+
+    /// Glides no further.
+    fn arrive(&mut self) {
+        self.per_mm = self.target_per_mm;
+        self.ticks_left = 0;
     }
 
     /// The wavenumber of a tick's travel.
@@ -234,7 +232,7 @@ mod tests {
     use super::*;
     use crate::judge::synthetic::Run;
     use crate::run::observer::replay_to;
-    use crate::run::recording::Recording;
+    use crate::run::recording::{ACTUATORS, Recording};
 
     /// Asks for the phase at an instant as soon as it can be told.
     struct Asking {
@@ -283,6 +281,25 @@ mod tests {
         let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
         assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
         assert!((shortest_mm - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn where_silence_falls_the_wavelength_glided_to_is_in_force_at_once() {
+        // As above, but silent for two ticks in the middle of the glide.
+        let mut recording = Run {
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
+            ..Run::steady(50.0, 2.0)
+        }
+        .record();
+        for output in &mut recording.outputs {
+            if (1.0112..1.0122).contains(&seconds(output.at_ns)) {
+                output.words = [ZERO_VOLT; ACTUATORS];
+            }
+        }
+        let due = due_at(1.9, &recording).0;
+        // From 25 cycles a second down to 22.5 in half a glide, then at once to 20.
+        let expected = (1.001 - 0.011) * 25.0 + 0.0102 * 23.75 + (1.9 - 1.0112) * 20.0;
+        assert!((due.cycles - expected).abs() < 0.003, "{due:?} {expected}");
     }
 
     #[test]
