@@ -414,6 +414,10 @@ impl End {
         let mut bytes = [0; 64];
         let mut length = 0;
         while let Some((due_ns, byte)) = wire.pop(now_ns) {
+            if wire.is_held_low(due_ns) {
+                self.port.on_line_error();
+                continue;
+            }
             bytes[length] = byte;
             length += 1;
             let more =

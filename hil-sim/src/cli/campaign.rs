@@ -111,7 +111,14 @@ impl Campaign {
             Some(kind) => Ok(kind),
             None => bail!("{name}: no such kind: give some of those in `hil-sim faults`"),
         };
-        self.kinds.iter().map(kind).collect()
+        let mut kinds = Vec::new();
+        for name in &self.kinds {
+            let kind = kind(name)?;
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        Ok(kinds)
     }
 }
 

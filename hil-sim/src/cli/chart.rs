@@ -8,7 +8,7 @@ use hil_sim_boards::Firmware;
 use hil_sim_studies::contact::{models, stability};
 use hil_sim_studies::display::{delay, purity, rendering_of_word, stop, texture, timing};
 use hil_sim_studies::estimators::{self, confidence, efficiency, family};
-use hil_sim_studies::jury::seeds::REPORTING;
+use hil_sim_studies::jury::seeds::{REPORTING, Seeds};
 use hil_sim_studies::study::{Progress, Study};
 use indicatif::ProgressBar;
 use protocol::Rendering;
@@ -156,8 +156,12 @@ impl Chart {
                 surfaces,
                 out,
             }) => {
-                let seeds: Vec<u64> = (seed..seed.saturating_add(surfaces)).collect();
-                out.draw("surfaces", |bar| Ok(confidence::measure(&seeds, bar)))
+                let seeds = Seeds {
+                    first: seed,
+                    count: surfaces,
+                };
+                seeds.purpose()?;
+                out.draw("surfaces", |bar| Ok(confidence::measure(&seeds.all(), bar)))
             }
             Self::Purity(Purity {
                 measured,

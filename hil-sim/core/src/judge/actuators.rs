@@ -73,8 +73,9 @@ pub struct Judge {
     /// In steps of the DAC; none before the first edge.
     max_step: Option<u16>,
     skew_ns: u64,
-    /// The hand's place at the last tick, and its longest travel in one, in mm.
-    hand_mm: Option<f64>,
+    /// The last tick in ns, the hand's place then, and its longest travel in one tick, in mm.
+    hand: Option<(u64, f64)>,
+    tick_ns: f64,
     longest_mm: Option<f64>,
 }
 
@@ -103,7 +104,8 @@ impl Judge {
             words: [0x8000; ACTUATORS],
             max_step: None,
             skew_ns: 0,
-            hand_mm: None,
+            hand: None,
+            tick_ns: 1e9 / f64::from(truth.display.update_rate.hz()),
             longest_mm: None,
         }
     }
@@ -194,8 +196,10 @@ impl RunObserver for Judge {
 
 impl Judge {
     fn tick(&mut self, tick: &TickRecord) {
-        if let Some(before_mm) = self.hand_mm.replace(tick.position_mm) {
-            let travel_mm = (tick.position_mm - before_mm).abs();
+        if let Some((before_ns, before_mm)) = self.hand.replace((tick.at_ns, tick.position_mm)) {
+            // A board that starts misses ticks.
+            let ticks = (tick.at_ns.saturating_sub(before_ns) as f64 / self.tick_ns).max(1.0);
+            let travel_mm = (tick.position_mm - before_mm).abs() / ticks;
             self.longest_mm = Some(self.longest_mm.unwrap_or(0.0).max(travel_mm));
         }
         self.reactions.tick(tick);
@@ -221,6 +225,7 @@ mod tests {
 
     use super::*;
     use crate::judge::synthetic::{Run, TICK_S};
+    use crate::run::recording::Recording;
 
     fn judged(run: &Run) -> Actuators {
         judge(&Truth::new("", "", &*run.surface_mm), &run.record())
@@ -234,6 +239,20 @@ mod tests {
             (actuators.frequency_hz.unwrap(), actuators.truth_hz.unwrap());
         assert!((truth_hz - 25.0).abs() < 25.0 * 1e-6, "{truth_hz}");
         assert!((frequency_hz - 25.0).abs() < 25.0 * 1e-4, "{frequency_hz}");
+    }
+
+    #[test]
+    fn the_natural_step_is_of_one_tick_also_where_some_are_missing() {
+        let run = Run::steady(50.0, 2.0);
+        let mut recording = run.record();
+        let step_v = |recording: &Recording| {
+            let judged = judge(&Truth::new("", "", &*run.surface_mm), recording);
+            judged.natural_step_v.expect("a hand moves")
+        };
+        let whole_v = step_v(&recording);
+        recording.ticks.drain(1..4);
+        let v = step_v(&recording);
+        assert!((v - whole_v).abs() < 1e-9, "{v} V for {whole_v} V");
     }
 
     #[test]

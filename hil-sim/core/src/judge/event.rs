@@ -226,17 +226,25 @@ impl Touches {
             return;
         };
         let (low_mm, high_mm) = (before_mm.min(here_mm), before_mm.max(here_mm));
-        for &border_mm in &self.borders_mm {
-            if low_mm < border_mm && border_mm <= high_mm {
-                let share = (border_mm - before_mm) / (here_mm - before_mm);
-                events.push(Event {
-                    t_s: before_s + share * (t_s - before_s),
-                    kind: Kind::Border {
-                        from_mm: self.surface.wavelength_mm(before_mm),
-                        to_mm: self.surface.wavelength_mm(here_mm),
-                    },
-                });
-            }
+        // Several in one scan have between them what is between them.
+        let crossed = |&border_mm: &f64| low_mm < border_mm && border_mm <= high_mm;
+        let mut crossed: Vec<f64> = self.borders_mm.iter().copied().filter(crossed).collect();
+        if here_mm < before_mm {
+            crossed.reverse();
+        }
+        let mut from_mm = self.surface.wavelength_mm(before_mm);
+        for (number, &border_mm) in crossed.iter().enumerate() {
+            let until_mm = match crossed.get(number + 1) {
+                Some(next_mm) => f64::midpoint(border_mm, *next_mm),
+                None => here_mm,
+            };
+            let to_mm = self.surface.wavelength_mm(until_mm);
+            let share = (border_mm - before_mm) / (here_mm - before_mm);
+            events.push(Event {
+                t_s: before_s + share * (t_s - before_s),
+                kind: Kind::Border { from_mm, to_mm },
+            });
+            from_mm = to_mm;
         }
     }
 }
@@ -305,6 +313,36 @@ mod tests {
                 to_mm: 4.0
             }
         );
+    }
+
+    #[test]
+    fn two_borders_in_one_scan_have_between_them_what_is_between_them() {
+        for speed_mm_s in [50.0, -50.0] {
+            let mut scene = two_specimens(Motion::Constant { speed_mm_s });
+            let place_mm = 7.3 * f64::signum(speed_mm_s);
+            scene.surface.start_mm += place_mm - 14.6;
+            scene.surface.specimens.insert(
+                1,
+                Specimen {
+                    wavelength_mm: 2.0,
+                    length_mm: 0.004,
+                },
+            );
+            scene.surface.specimens[0].length_mm = 14.6;
+            let events = found(&scene);
+            let borders: Vec<(f64, f64)> = events
+                .iter()
+                .filter_map(|event| match event.kind {
+                    Kind::Border { from_mm, to_mm } => Some((from_mm, to_mm)),
+                    _ => None,
+                })
+                .collect();
+            let due = match speed_mm_s > 0.0 {
+                true => [(1.0, 2.0), (2.0, 4.0)],
+                false => [(4.0, 2.0), (2.0, 1.0)],
+            };
+            assert_eq!(borders, due, "{speed_mm_s} mm/s");
+        }
     }
 
     #[test]

@@ -77,15 +77,19 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
         match measured {
             Some(measured) if wanted.contains(&measured) => {}
             Some(measured) => {
+                let (than, bound) = if measured > *high {
+                    ("more", *high)
+                } else {
+                    ("less", *low)
+                };
+                let [number, bound] = told_apart(measured, bound);
                 // The one that is given by its middle is told by both ends.
                 let said = if key == "mean_mm" {
                     format!("not within {low:.4} and {high:.4}")
-                } else if measured > *high {
-                    format!("more than {}", rounded(*high))
                 } else {
-                    format!("less than {}", rounded(*low))
+                    format!("{than} than {bound}")
                 };
-                lines.push(format!("{key}: {} is {said}", rounded(measured)));
+                lines.push(format!("{key}: {number} is {said}"));
             }
             None => lines.push(format!("{key}: nothing could be measured")),
         }
@@ -93,10 +97,18 @@ pub fn unmet(expect: &Expect, verdict: &Verdict) -> Vec<String> {
     lines
 }
 
-/// A number to four digits.
-fn rounded(value: f64) -> String {
+/// Two numbers to four digits, or to as many more as tell them apart.
+fn told_apart(one: f64, other: f64) -> [String; 2] {
+    (4..=17)
+        .map(|digits| [one, other].map(|value| rounded(value, digits)))
+        .find(|[one, other]| one != other)
+        .unwrap_or_else(|| [one, other].map(|value| value.to_string()))
+}
+
+/// A number to so many digits.
+fn rounded(value: f64, digits: i32) -> String {
     let whole = value.abs().max(1e-9).log10().floor();
-    let decimals = (3.0 - whole).max(0.0) as usize;
+    let decimals = (f64::from(digits) - 1.0 - whole).max(0.0) as usize;
     let text = format!("{value:.decimals$}");
     match text.split_once('.') {
         Some(_) => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
@@ -146,6 +158,15 @@ mod tests {
         };
         change(&mut expect);
         unmet(&expect, &verdict())
+    }
+
+    #[test]
+    fn a_number_just_beyond_its_bound_is_told_apart_from_it() {
+        assert_eq!(told_apart(0.950_119, 0.950_12), ["0.950119", "0.95012"]);
+        assert_eq!(told_apart(2.0, 1.0), ["2", "1"]);
+        let next = f64::from_bits(1.0_f64.to_bits() + 1);
+        let [one, other] = told_apart(1.0, next);
+        assert_ne!(one, other);
     }
 
     #[test]
@@ -205,7 +226,7 @@ mod tests {
             (0.0, "0"),
             (123_456.0, "123456"),
         ] {
-            assert_eq!(rounded(value), text);
+            assert_eq!(rounded(value, 4), text);
         }
         let unmet = expect(|e| {
             e.wavelength_bias_percent = Some(1.4);

@@ -228,16 +228,19 @@ impl LinkChannel {
         self.held.first_key_value().map(|(&(due_ns, _), _)| due_ns)
     }
 
-    /// When a fault says something by itself next.
-    fn next_talk(&self) -> Option<u64> {
-        let stop_ns = self
-            .faults
+    /// When the next Stop is said.
+    fn next_stop(&self) -> Option<u64> {
+        self.faults
             .iter()
             .filter(|fault| fault.kind == Kind::StopFromPeer)
             .nth(self.stops)
             .map(|fault| fault.begins_ns().max(self.free_ns))
             // Between two frames, not within one.
-            .filter(|_| self.frame.is_empty());
+            .filter(|_| self.frame.is_empty())
+    }
+
+    /// When a fault says something by itself next.
+    fn next_talk(&self) -> Option<u64> {
         let talks_ns = self
             .faults
             .iter()
@@ -246,22 +249,37 @@ impl LinkChannel {
             .filter(|&(at_ns, fault)| fault.is_on(at_ns))
             .map(|(at_ns, _)| at_ns)
             .min();
-        stop_ns.into_iter().chain(talks_ns).min()
+        self.next_stop().into_iter().chain(talks_ns).min()
     }
 
     fn talk(&mut self, at_ns: u64) {
         let talking = self.on(at_ns, talks).next().map(|fault| fault.kind);
-        let bytes = match talking {
-            Some(Kind::LinkGarbage) => vec![self.draws.next_u32().to_le_bytes()[0]],
-            Some(Kind::LinkFlood) => self.forger.repeat(),
-            Some(_) => vec![0],
-            None => {
-                self.stops += 1;
-                self.forger.stop()
+        // A Stop comes in between, unless the wire carries nothing.
+        let bytes = if self.next_stop().is_some_and(|stop_ns| stop_ns <= at_ns) {
+            self.stops += 1;
+            let carries_nothing = self.on(at_ns, Kind::cuts_wire).next().is_some();
+            if carries_nothing {
+                Vec::new()
+            } else {
+                // What was said before it is no part of its frame.
+                [vec![0], self.forger.stop()].concat()
+            }
+        } else {
+            match talking {
+                Some(Kind::LinkGarbage) => vec![self.draws.next_u32().to_le_bytes()[0]],
+                Some(Kind::LinkFlood) => self.forger.repeat(),
+                _ => vec![0],
             }
         };
         self.emit(at_ns, &bytes);
         self.talk_ns = at_ns + bytes.len() as u64 * BYTE_NS;
+    }
+
+    /// Whether what arrives at an instant is a line that is held low, and no byte that was said.
+    pub fn is_held_low(&self, at_ns: u64) -> bool {
+        self.on(at_ns, |kind| kind == Kind::WireStuckLow)
+            .next()
+            .is_some()
     }
 }
 

@@ -19,8 +19,17 @@ pub(super) struct Scenery<'a> {
     pub stiffness_n_per_m: f64,
 }
 
-/// The contact, and why if it was left open. With recorded gauges there is none, and the section must be
-/// absent.
+/// Whether a contact is asked for: by another word than those that stand for none.
+pub(super) fn is_given(mut table: Table<'_>) -> Result<bool, SceneError> {
+    let model = table.variant::<ContactModel>("model", "auto")?;
+    let friction = table.variant::<Friction>("friction", "none")?;
+    let integrator = table.variant::<Integrator>("integrator", "exact")?;
+    let has_step = table.number("step_us")?.is_some();
+    table.finish("")?;
+    Ok(model.is_some() || friction.is_some() || integrator.is_some() || has_step)
+}
+
+/// The contact, and why if it was left open. Of recorded gauges there is none.
 pub(super) fn read(
     mut table: Table<'_>,
     scenery: &Scenery<'_>,

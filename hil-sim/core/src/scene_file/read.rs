@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use protocol::{GAUGES, Method};
+use toml::de::DeValue;
 
 use super::bounds::Bounds;
 use super::contact;
@@ -41,13 +42,15 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
                 stiffness_n_per_m: force.stiffness_n_per_m,
             },
         )?,
-        Gauges::Recorded(_) if root.contains("contact") => {
-            return Err(root.refuse(
-                "contact",
-                "does not apply to recorded gauges: take [contact] out",
-            ));
+        Gauges::Recorded(_) => {
+            if contact::is_given(root.table("contact")?)? {
+                return Err(root.refuse(
+                    "contact",
+                    "does not apply to recorded gauges: take [contact] out",
+                ));
+            }
+            (Contact::KINEMATIC, None)
         }
-        Gauges::Recorded(_) => (Contact::KINEMATIC, None),
     };
     let link = link(root.table("link")?)?;
     let mut notes = Vec::new();
@@ -284,6 +287,23 @@ fn arm(mut table: Table<'_>) -> Result<ArmDrive, SceneError> {
     })
 }
 
+/// Keys of gauges that are not recorded, of which 0 or an empty list is nothing.
+const NOISE: [&str; 13] = [
+    "hum_50_hz",
+    "hum_60_hz",
+    "hum_off_hz",
+    "second_harmonic",
+    "dead",
+    "saturated",
+    "stuck",
+    "noisy",
+    "humming",
+    "pink",
+    "drift",
+    "offset",
+    "skew_us",
+];
+
 fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), SceneError> {
     let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')])?;
     let tangential = table.boolean("tangential")?;
@@ -307,6 +327,12 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
             "true, but the file has no column of that name: add it, name a sixth channel, or give false",
         ));
     }
+    table.let_pass(&NOISE, |value| match value {
+        DeValue::Array(list) => list.is_empty(),
+        DeValue::Integer(whole) => whole.as_str() == "0",
+        DeValue::Float(number) => number.as_str().parse() == Ok(0.0),
+        _ => false,
+    });
     table.finish(" with kind = \"recorded\"")?;
     let present = tangential.unwrap_or(volts.width() == 6);
     Ok((Gauges::Recorded(volts), Force { present, ..force }))

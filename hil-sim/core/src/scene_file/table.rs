@@ -113,6 +113,16 @@ impl<'t> Table<'t> {
         self.contains(key)
     }
 
+    /// Lets keys pass that say what is so without them.
+    pub fn let_pass(&mut self, keys: &[&'static str], is_nothing: impl Fn(&DeValue<'_>) -> bool) {
+        for &key in keys {
+            let value = self.entries.and_then(|entries| entries.get(key));
+            if value.is_some_and(|value| is_nothing(value.get_ref())) {
+                self.asked.push(key);
+            }
+        }
+    }
+
     pub fn contains(&self, key: &str) -> bool {
         self.entries
             .is_some_and(|entries| entries.contains_key(key))

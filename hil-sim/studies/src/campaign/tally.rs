@@ -84,8 +84,9 @@ impl Tally {
 
 fn middle_and_worst(mut numbers: Vec<f64>) -> Option<[f64; 2]> {
     numbers.sort_by(f64::total_cmp);
-    let middle = numbers.get(numbers.len() / 2)?;
-    Some([*middle, *numbers.last()?])
+    let worst = *numbers.last()?;
+    let middle = f64::midpoint(numbers[(numbers.len() - 1) / 2], numbers[numbers.len() / 2]);
+    Some([middle, worst])
 }
 
 /// The campaign's goals that are not met, one a line.

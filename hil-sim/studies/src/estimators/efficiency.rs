@@ -146,7 +146,7 @@ fn scene(profile: &Profile, wavelength_mm: f64, frequency_hz: f64) -> Scene {
         ..Kinematic::default()
     });
     scene.duration_s = (WINDOWS * window_s(&scene)).clamp(DURATION_S.0, DURATION_S.1);
-    // A seed of its own for each.
+    // A seed of its own for each place of the map; the two forms of wave there meet the same noise.
     scene.seed = (wavelength_mm * 10.0 + frequency_hz * 1_000.0) as u64;
     scene
 }

@@ -29,6 +29,8 @@ pub struct Finding {
     pub unjudged: Vec<String>,
     /// Whether it is one that has to be seen and answered: long enough, and great enough.
     pub(super) must_show: bool,
+    /// The display never hears of it: what it does has other reasons.
+    pub(super) is_unheard: bool,
     /// Why it need not be seen in time all the same.
     pub(super) unseen: Option<&'static str>,
     /// From its beginning until nobody looks on any more, in ns.
@@ -40,6 +42,9 @@ pub struct Finding {
 impl Finding {
     /// What is not as the table of kinds has it.
     pub fn unmet(&self) -> Vec<String> {
+        if self.is_unheard {
+            return self.otherwise.clone();
+        }
         let row = self.fault.kind.row();
         let mut unmet = Vec::new();
         if self.must_show {

@@ -46,6 +46,8 @@ pub(super) struct FaultMonitor {
     of_others: Vec<Sign>,
     /// What the scene's own link shows, with and without the fault: no sign of it.
     weather: Vec<Sign>,
+    /// It is said while nothing that is said arrives.
+    is_unheard: bool,
     has_stopped: bool,
     must_show: bool,
     /// When nobody looks on any more.
@@ -191,6 +193,8 @@ impl FaultMonitor {
             of_others.push(Sign::Fading(Hold::Stale));
         }
         let weather = weather_signs(&scene.link);
+        let is_unheard = fault.kind == Kind::StopFromPeer
+            && others().any(|other| other.kind.cuts_wire() && other.is_on(from_ns));
         of_others.extend(&weather);
         let configuration = scene.display_configuration();
         // Of a flood, which estimates find room is chance.
@@ -220,6 +224,7 @@ impl FaultMonitor {
             alone_ns,
             of_others,
             weather,
+            is_unheard,
             has_stopped,
             must_show: must_show(&fault, scene),
             until_ns,
@@ -278,6 +283,7 @@ impl FaultMonitor {
             alone_ns,
             of_others,
             weather,
+            is_unheard,
             has_stopped,
             must_show,
             has_looked,
@@ -295,6 +301,7 @@ impl FaultMonitor {
         let outputs = self.outputs.finish();
         // At rest there is nothing that a gauge or an encoder could be missed by.
         let must_show = must_show
+            && !is_unheard
             && (row.class == Class::Stops || outputs.was_driving)
             // A count from which nobody has counted yet is no jump.
             && (fault.kind != Kind::HandEncoderJump || has_looked);
@@ -304,7 +311,9 @@ impl FaultMonitor {
         let leaves_ms = |ms: f64| left_ns >= nanoseconds(ms * 1e-3);
         let mut otherwise = Vec::new();
         let mut unjudged = Vec::new();
-
+        if is_unheard {
+            unjudged.push("whether the display obeys: nothing arrives there then".to_owned());
+        }
         if let Some(within_ms) = row.seen_within_ms
             && let Some(why) = unseen
             && must_show
@@ -449,6 +458,7 @@ impl FaultMonitor {
             resets: self.resets,
             unjudged,
             must_show,
+            is_unheard,
             unseen,
             left_ns,
             otherwise,

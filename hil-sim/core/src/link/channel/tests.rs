@@ -17,8 +17,12 @@ struct Arrived {
 }
 
 fn arrive(fault: Fault) -> Arrived {
+    arrive_during(vec![fault])
+}
+
+fn arrive_during(faults: Vec<Fault>) -> Arrived {
     let mut scene = Scene::constant(2.0, 50.0);
-    scene.faults = vec![fault];
+    scene.faults = faults;
     let mut way = LinkChannel::new(&scene, Role::Display);
     let mut sender = Sender::new(Hello::new(Role::Sensor, "test", [0, 0, 0]));
     let hello = sender.hello_due(0).unwrap();
@@ -224,4 +228,28 @@ fn a_stop_comes_between_two_frames_and_none_is_lost() {
     let counters = arrived.receiver.counters();
     assert_eq!((counters.lost, counters.corrupt, counters.late), (0, 0, 0));
     assert_eq!(estimates(&arrived).len() as u64, FRAMES - 1);
+}
+
+/// A Stop at 150 ms, in the middle of a fault: when it has come, in ms.
+fn stop_during(kind: Kind) -> Option<u64> {
+    let stop = Fault::new(Kind::StopFromPeer, 0.15);
+    let messages = arrive_during(vec![fault(kind), stop]).messages;
+    let is_stop = |(_, message): &&(u64, Message)| matches!(message, Message::Stop(_));
+    messages
+        .iter()
+        .find(is_stop)
+        .map(|(at_ns, _)| at_ns / 1_000_000)
+}
+
+#[test]
+fn a_stop_is_heard_between_what_else_is_said_and_not_where_nothing_arrives() {
+    for kind in [Kind::LinkFlood, Kind::LinkGarbage] {
+        let stopped_ms = stop_during(kind).unwrap_or_else(|| panic!("{kind:?}"));
+        assert!(
+            (150..155).contains(&stopped_ms),
+            "{kind:?}: {stopped_ms} ms"
+        );
+    }
+    assert_eq!(stop_during(Kind::LinkDown), None);
+    assert_eq!(stop_during(Kind::WireStuckLow), None);
 }

@@ -63,6 +63,11 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether nothing that is said towards the display arrives while it lasts.
+    pub fn cuts_wire(self) -> bool {
+        matches!(self, Self::LinkDown | Self::WireStuckLow)
+    }
+
     /// All of them, in the order of the catalogue.
     pub fn all() -> impl Iterator<Item = Self> {
         catalogue::rows().iter().map(|row| row.kind)

@@ -177,6 +177,12 @@ fn a_recorded_force_is_played_unless_it_is_taken_out() {
         refusal.starts_with("x.toml:6: gauges.tangential: true, but the file has no column"),
         "{refusal}"
     );
+    // What says that there is none of it goes with recorded gauges.
+    let nothing =
+        "dead = []\nhum_50_hz = 0\npink = 0.0\n[contact]\nmodel = \"auto\"\nfriction = \"none\"\n";
+    folder.load(&format!("{GAUGES}{nothing}"), &with).unwrap();
+    let refusal = folder.refusal(&format!("{GAUGES}pink = 0.1\n"), &with);
+    assert!(refusal.contains("gauges.pink"), "{refusal}");
     let refusal = folder.refusal(&format!("{GAUGES}[contact]\nfriction = \"mild\""), &with);
     assert!(
         refusal.contains("does not apply to recorded gauges"),

@@ -103,6 +103,11 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
             "f: has no messages on /sensor/gauges: give topic as one of /imu, /other",
         ),
         (
+            "topic = \"/imu\"\nchannels = [\"ax\", \"ax\", \"ax\", \"ax\", \"ax\"]\nlogged_from_s = 100",
+            own.clone(),
+            "f: has messages on /imu from 0 to ",
+        ),
+        (
             "topic = \"/imu\"",
             own.clone(),
             "x.toml:4: gauges.channels: is missing: name the messages' fields",
