@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::ValueEnum;
-use hil_sim_core::judge::outcome::{Judgement, Outcome};
+use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::scene::Scene;
 use hil_sim_studies::bench::Bench;
 use hil_sim_studies::jury::counts::Counts;
@@ -317,25 +317,22 @@ impl From<MethodName> for Method {
 }
 
 fn judge_scene(bench: &Bench, entry: &Entry, scene: &Scene) -> anyhow::Result<JudgedScene> {
-    let context = || format!("{}", entry.scene.display());
-    let verdict = match bench {
-        Bench::Native => Judgement::of(scene, false).with_context(context)?.verdict,
-        Bench::Elf(_) => {
-            let recording = bench.run(scene).with_context(context)?;
-            Outcome::new(scene.clone(), recording).verdict
-        }
-    };
-    let said = verdict.estimates.iter().map(|estimate| {
+    let recording = bench
+        .run(scene)
+        .with_context(|| format!("{}", entry.scene.display()))?;
+    let outcome = Outcome::new(scene.clone(), recording);
+    let said = outcome.verdict.estimates.iter().map(|estimate| {
         let said_mm = estimate.wavelength_mm.filter(|_| estimate.valid);
         (estimate.t_s, said_mm)
     });
+    let felt = entry.truth.felt(&outcome.truth(), &outcome.recording);
     Ok(JudgedScene {
         name: entry.name.clone(),
         family: entry.family.clone(),
         method: scene.estimator.method.name(),
         said: entry.truth.judge(said),
-        felt: verdict.summary.felt_wrong_share.map(|wrong| Felt {
-            right: verdict.summary.felt_right_share.unwrap_or(0.0),
+        felt: felt.wrong_share.map(|wrong| Felt {
+            right: felt.right_share.unwrap_or(0.0),
             wrong,
         }),
     })

@@ -87,6 +87,13 @@ fn a_folder_is_judged_by_its_own_truths_family_by_family() {
     // Half of it is right.
     assert!((48..=52).contains(&said(3, "right")));
     assert_eq!(said(3, "right") + said(3, "wrong"), said(3, "all"));
+    // What is felt is judged by the same truths.
+    let felt = |scene: usize, key: &str| told["scenes"][scene]["felt"][key].as_f64().unwrap();
+    assert!(felt(0, "right") > 0.9 && felt(0, "wrong") == 0.0);
+    for scene in [1, 2] {
+        let (right, wrong) = (felt(scene, "right"), felt(scene, "wrong"));
+        assert!(right == 0.0 && wrong > 0.9, "{scene}: {right}, {wrong}");
+    }
     let tip = &told["families"][0];
     assert_eq!((&tip["name"], &tip["surfaces"]), (&"tip".into(), &2.into()));
     assert_eq!(tip["right"]["share"], 0.5);

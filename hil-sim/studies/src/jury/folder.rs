@@ -17,6 +17,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
+use hil_sim_core::judge::felt;
+use hil_sim_core::judge::phase::DuePhase;
+use hil_sim_core::judge::truth::Truth as Ground;
+use hil_sim_core::run::observer::{RunEvent, RunObserver, replay_to};
+use hil_sim_core::run::recording::Recording;
+
 use super::counts::{Counts, Worth};
 
 /// The name of the list.
@@ -206,6 +212,42 @@ impl Truth {
             }
         }
         counts
+    }
+
+    /// What is felt of a run on boards that are set as `ground` says, over the whole of it.
+    pub fn felt(&self, ground: &Ground<'_>, recording: &Recording) -> felt::Felt {
+        let mut finger = Finger {
+            truth: self,
+            due: DuePhase::new(ground),
+            felt: felt::Judge::default(),
+        };
+        replay_to(recording, &mut finger);
+        finger.felt.finish()
+    }
+}
+
+/// Feels what is played, and knows the truth.
+struct Finger<'a> {
+    truth: &'a Truth,
+    due: DuePhase,
+    felt: felt::Judge,
+}
+
+impl RunObserver for Finger<'_> {
+    fn see(&mut self, event: RunEvent<'_>) {
+        self.due.see(event);
+        match event {
+            RunEvent::Tick(tick) => {
+                let under_mm = self.truth.at(tick.at_ns as f64 * 1e-9);
+                let waves = felt::Waves {
+                    in_force_per_mm: self.due.in_force_per_mm(),
+                    under_mm: Some(under_mm).filter(|&mm| mm > 0.0),
+                };
+                self.felt.tick(tick, waves);
+            }
+            RunEvent::Output(output) => self.felt.output(output),
+            _ => {}
+        }
     }
 }
 
