@@ -43,7 +43,8 @@ pub(super) enum Chart {
     Delay(OfDisplay),
     /// Whether partials and a random part carry more of a surface than λ: coherence and spectral distance of what is
     /// played with the surface under the hand, and which surfaces of one λ a simulated observer tells apart. Exit
-    /// status 1 if partials or the random part bring a family of surfaces no nearer. Writes texture.csv, texture-pairs.csv and texture.svg
+    /// status 1 if of a family of surfaces partials cost more than 0.02 of coherence, the random part brings the spectrum
+    /// more than 0.3 dB further away, or nothing is played. Writes texture.csv, texture-pairs.csv and texture.svg
     Texture(Texture),
     /// Speed against accuracy of the contact models: every rung, every integrator, steps of many lengths,
     /// against the reference. Writes models.csv and models.svg

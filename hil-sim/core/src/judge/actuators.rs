@@ -131,7 +131,7 @@ impl Judge {
             ..Actuators::default()
         };
         let peak_v = self.peaks.volts(self.reference);
-        if peak_v < STILL_V {
+        if peak_v < STILL_V.min(0.5 * self.amplitude_v) {
             return actuators;
         }
         if let Some(stretch) = self.cycles.longest_stretch() {

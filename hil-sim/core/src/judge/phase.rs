@@ -148,7 +148,9 @@ impl DuePhase {
         }
         let per_mm = self.followed.tick();
         self.cycles += travel_mm * per_mm;
-        self.travelled += travel_mm.abs() * per_mm;
+        let due_cycles = self.cycles + self.place_mm * per_mm;
+        let before_cycles = self.last().map_or(due_cycles, |due| due.cycles);
+        self.travelled += (due_cycles - before_cycles).abs();
         if per_mm > 0.0 {
             let shortest_mm = self.shortest_mm.unwrap_or(f64::INFINITY);
             self.shortest_mm = Some(shortest_mm.min(1.0 / per_mm));
@@ -156,7 +158,7 @@ impl DuePhase {
         let t_s = seconds(tick.at_ns);
         self.ticks.push_back(Due {
             t_s,
-            cycles: self.cycles + self.place_mm * per_mm,
+            cycles: due_cycles,
             travelled_cycles: self.travelled,
             tick: (t_s, self.travelled),
         });

@@ -102,11 +102,18 @@ impl Reactions {
 
     /// The outputs have changed, while `shortest_mm` is the shortest λ̂ so far.
     pub fn output(&mut self, output: &OutputRecord, shortest_mm: Option<f64>) {
+        self.carry(output.at_ns, shortest_mm);
+        let is_at_rest = output.words.iter().all(|&word| word == ZERO_VOLT);
+        self.held = (!is_at_rest).then_some(output.words);
+    }
+
+    /// What has moved until now is carried at `at_ns`.
+    fn carry(&mut self, at_ns: u64, shortest_mm: Option<f64>) {
         if let Some(held) = &self.held {
             for moved in self.moved.drain(..) {
                 let spread = Spread {
-                    shortest_ns: output.at_ns - moved.to_ns,
-                    longest_ns: output.at_ns - moved.from_ns,
+                    shortest_ns: at_ns - moved.to_ns,
+                    longest_ns: at_ns - moved.from_ns,
                 };
                 let period_ns = moved.to_ns - moved.from_ns;
                 if spread.shortest_ns < period_ns {
@@ -122,12 +129,15 @@ impl Reactions {
                 }
             }
         }
-        let is_at_rest = output.words.iter().all(|&word| word == ZERO_VOLT);
-        self.held = (!is_at_rest).then_some(output.words);
     }
 
     /// The times, with the `peaks` and the shortest λ̂ of the whole run; none without movement.
     pub fn finish(mut self, peaks: &Peaks, shortest_mm: Option<f64>) -> Option<Reaction> {
+        // What no edge has carried by the end is that late at least; of the last tick an edge may be on its way.
+        let end_ns = self.tick.map_or(0, |tick| tick.at_ns);
+        self.moved
+            .retain(|moved| end_ns - moved.to_ns >= moved.to_ns - moved.from_ns);
+        self.carry(end_ns, shortest_mm);
         for late in &self.late {
             if !is_over_crests(&late.held, peaks, late.travel_mm, shortest_mm) {
                 *self.spreads.entry(late.spread).or_default() += 1;
@@ -241,6 +251,16 @@ mod tests {
         assert!((reaction.p50_ms - 0.5).abs() < 2e-4, "{reaction:?}");
         assert!((reaction.p99_ms - 0.89).abs() < 2e-4, "{reaction:?}");
         assert!(near(reaction.max_ms, 0.9), "{reaction:?}");
+    }
+
+    #[test]
+    fn outputs_that_stand_still_until_the_end_are_as_late_as_that() {
+        let mut recording = Run::steady(50.0, 2.0).record();
+        recording
+            .outputs
+            .retain(|output| output.at_ns < 1_000_000_000);
+        let reaction = measured(&recording).expect("a hand moves");
+        assert!(reaction.max_ms > 900.0, "{reaction:?}");
     }
 
     #[test]

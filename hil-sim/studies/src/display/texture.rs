@@ -353,7 +353,8 @@ fn spread(
 }
 
 /// Whether a family is played the better the more of it is: partials cost no coherence, where there is no grain they give
-/// nearly all of it, and where there is one the random part brings the spectrum no further away.
+/// nearly all of it, and where there is one the random part brings the spectrum no further away. Of what is not played at
+/// all nothing is carried.
 fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bool {
     let of = |value: fn(&Row) -> f64| {
         Rendering::ALL.map(|rendering| spread(rows, engine, family, rendering, value))
@@ -364,7 +365,8 @@ fn is_carried(rows: &[Row], engine: Engine, family: &str, has_grain: bool) -> bo
         // Not every family is run on the ELFs.
         return engine == Engine::Elf;
     };
-    shape.0 >= fundamental.0 - GOAL_LOSS
+    fundamental.0 > 0.0
+        && shape.0 >= fundamental.0 - GOAL_LOSS
         && (has_grain || shape.0 >= GOAL_COHERENCE)
         && (!has_grain || rough.0 <= plain.0 + GOAL_DB)
 }
@@ -474,6 +476,7 @@ mod tests {
             ("rough", [0.75, 0.85, 0.80], [6.0, 3.0, 1.5], true),
             ("rough", [0.75, 0.70, 0.80], [6.0, 3.0, 1.5], false),
             ("rough", [0.75, 0.85, 0.80], [6.0, 3.0, 3.5], false),
+            ("rough", [0.0; 3], [16.4; 3], false),
         ] {
             let rows = rows(family, coherences, distances);
             let has_grain = family == "rough";
