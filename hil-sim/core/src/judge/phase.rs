@@ -8,10 +8,14 @@ use crate::judge::seconds;
 use crate::judge::trust::Trust;
 use crate::judge::truth::Truth;
 use crate::run::observer::{RunEvent, RunObserver};
-use crate::run::recording::{Arrival, TickRecord, ZERO_VOLT};
+use crate::run::recording::{Arrival, TickRecord, WORD_V, ZERO_VOLT};
 
 /// Ticks kept: a point of the outputs is asked for at the next tick, and lies a tick or two before its edge.
 const TICKS_KEPT: usize = 8;
+/// Ticks at 0 V that are no wave's crossing.
+const CROSSING_TICKS: u32 = 3;
+/// Ticks within a tenth of the amplitude after which 0 V is no crossing: 4 ms, in which a wave of 5 Hz goes an eighth of it.
+const SOFT_TICKS: u32 = 8;
 
 /// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
 /// in which each estimate that is to be trusted ([`Trust`] says which) takes
@@ -35,8 +39,10 @@ pub struct DuePhase {
     last_tick_ns: Option<u64>,
     /// Whether the last output was other than 0 V.
     loud: bool,
-    /// Whether it was not, at the last tick. A wave crosses 0 V between ticks.
-    silent: bool,
+    /// Ticks since then, and since one was beyond a tenth of the amplitude. A wave crosses 0 V; silence stays there, or
+    /// has come softly.
+    silent_ticks: u32,
+    soft_ticks: u32,
 }
 
 /// The phase due at an instant.
@@ -66,7 +72,8 @@ impl DuePhase {
             arrived: VecDeque::new(),
             last_tick_ns: None,
             loud: false,
-            silent: true,
+            silent_ticks: CROSSING_TICKS,
+            soft_ticks: SOFT_TICKS,
         }
     }
 
@@ -108,6 +115,11 @@ impl DuePhase {
         self.followed.per_mm
     }
 
+    fn is_silent(&self) -> bool {
+        self.silent_ticks >= CROSSING_TICKS
+            || (self.silent_ticks > 0 && self.soft_ticks >= SOFT_TICKS)
+    }
+
     /// The shortest λ̂ that has been in force, in mm.
     pub fn shortest_mm(&self) -> Option<f64> {
         self.shortest_mm
@@ -119,7 +131,13 @@ impl RunObserver for DuePhase {
         match event {
             RunEvent::Received(arrival) => self.received(arrival),
             RunEvent::Output(output) => {
-                self.loud = output.words.iter().any(|&word| word != ZERO_VOLT);
+                let farthest = output.words.iter().map(|word| word.abs_diff(ZERO_VOLT));
+                let farthest = farthest.max().unwrap_or(0);
+                self.loud = farthest > 0;
+                let amplitude_v = f64::from(self.followed.configuration.amplitude_mv) * 1e-3;
+                if f64::from(farthest) * WORD_V > 0.1 * amplitude_v {
+                    self.soft_ticks = 0;
+                }
             }
             RunEvent::Tick(tick) => self.tick(tick),
             _ => {}
@@ -133,7 +151,7 @@ impl DuePhase {
             .last_tick_ns
             .is_some_and(|tick_ns| arrival.at_ns <= tick_ns)
         {
-            self.followed.hear(arrival, self.silent);
+            self.followed.hear(arrival, self.is_silent());
         } else {
             self.arrived.push_back(*arrival);
         }
@@ -142,8 +160,13 @@ impl DuePhase {
     fn tick(&mut self, tick: &TickRecord) {
         let travel_mm = tick.position_mm - self.before_mm.unwrap_or(tick.position_mm);
         self.before_mm = Some(tick.position_mm);
-        self.silent = !self.loud;
-        if self.silent {
+        self.soft_ticks = self.soft_ticks.saturating_add(1);
+        self.silent_ticks = if self.loud {
+            0
+        } else {
+            self.silent_ticks.saturating_add(1)
+        };
+        if self.is_silent() {
             self.followed.arrive();
         }
         let per_mm = self.followed.tick();
@@ -170,7 +193,8 @@ impl DuePhase {
             .arrived
             .pop_front_if(|arrival| arrival.at_ns <= tick.at_ns)
         {
-            self.followed.hear(&arrival, self.silent);
+            let silent = self.is_silent();
+            self.followed.hear(&arrival, silent);
         }
     }
 }
@@ -287,15 +311,17 @@ mod tests {
 
     #[test]
     fn where_silence_falls_the_wavelength_glided_to_is_in_force_at_once() {
-        // As above, but silent for two ticks in the middle of the glide.
+        // As above, but soft for 6 ms and then silent for two ticks in the middle of the glide.
         let mut recording = Run {
             estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
             ..Run::steady(50.0, 2.0)
         }
         .record();
         for output in &mut recording.outputs {
-            if (1.0112..1.0122).contains(&seconds(output.at_ns)) {
-                output.words = [ZERO_VOLT; ACTUATORS];
+            let t_s = seconds(output.at_ns);
+            if (1.0052..1.0122).contains(&t_s) {
+                let word = ZERO_VOLT + u16::from(t_s < 1.0112);
+                output.words = [word; ACTUATORS];
             }
         }
         let due = due_at(1.9, &recording).0;
