@@ -164,10 +164,13 @@ impl Spectrum {
         })
     }
 
-    /// Whether a fit is somewhere else than a period that the peaks tell. Beside its harmonics a weak one is off over three
-    /// waves more often than over five; those are not told every time, and a young one's are of what was there before.
+    /// Whether a fit is somewhere else than a period that the peaks tell. Beside its harmonics a weak period is off over
+    /// three waves more often than over five. But five are not fitted at each estimate, and on a new surface they reach
+    /// back over its border.
     fn is_refused(&self, found: &[Option<Fitted>; LENGTH_COUNT], here_mm: f32) -> bool {
-        let is_young = self.survey.maturity < MATURE || self.lengths < LENGTH_COUNT - 1;
+        let is_young = self.survey.maturity < MATURE
+            || self.line.young_waves > 0.0
+            || self.lengths < LENGTH_COUNT - 1;
         let told = if is_young { 2 } else { 3 };
         let is_new = is_young || self.shorter_so_far == 0;
         is_new && found[told].is_some_and(|fitted| off(fitted.wavelength_mm, here_mm) >= 0.05)

@@ -37,8 +37,8 @@ const COMBS: [Comb; 2] = [
 /// How high the period's lines stand together, relative to the peak, where the peak's wavelength is not the period. Two that
 /// fit are told from chance at half of that.
 const PERIOD: f32 = 0.4;
-/// Weight of the average from which on a line is told from the slope that it stands on: some four waves. Before, how high
-/// it is has to do: a strong wave is stood by sooner.
+/// Weight of the average from which on a line is told from the slope that it stands on: some seven waves from a start.
+/// Before, how high it is has to do: a strong wave is stood by sooner.
 pub(super) const MATURE: f32 = 0.25;
 
 /// The spectra's peaks, and what fits are under way.

@@ -121,15 +121,17 @@ impl Monitor {
             None => None,
         };
         // One that is not named is whichever is plugged in, maybe the other board's.
-        if let [Some(Origin::Probe(one)), Some(Origin::Probe(other))] =
-            [&bench.sensor, &bench.display].map(origin)
+        let roles = bench.roles();
+        if roles.len() > 1
+            && let [Some(Origin::Probe(one)), Some(Origin::Probe(other))] =
+                [&bench.sensor, &bench.display].map(origin)
             && (one.is_none() || other.is_none() || one == other)
         {
             anyhow::bail!(
                 "each board's log needs a probe of its own: name both as `usb` in the bench file"
             );
         }
-        for role in [Role::Sensor, Role::Display] {
+        for role in roles {
             let Some(seat) = bench.seat(role) else {
                 continue;
             };

@@ -132,6 +132,7 @@ impl Record {
             told,
             stops,
             stopping: None,
+            stopped: Vec::new(),
             lines,
             stream: GaugeStream::new(!self.no_gauges),
             absent: BOARDS.into(),
@@ -235,6 +236,8 @@ struct Session<'a> {
     stops: Receiver<()>,
     /// Until when boards that were told to stop may take to answer.
     stopping: Option<Instant>,
+    /// Those that have answered since, by their own names.
+    stopped: Vec<Role>,
     /// The boards' logs.
     lines: Receiver<(Role, LogEvent)>,
     stream: GaugeStream,
@@ -281,7 +284,13 @@ impl Session<'_> {
 
     /// Hears what the links tell for as long as `wait`, and says what is due.
     fn listen(&mut self, wait: Duration) {
-        match self.told.recv_timeout(wait) {
+        let heard = self.told.recv_timeout(wait);
+        // Before the answers to it.
+        if self.stops.try_iter().count() > 0 {
+            self.stopping = Some(Instant::now() + STOP_PATIENCE);
+            self.stopped.clear();
+        }
+        match heard {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
                 match &event {
@@ -301,9 +310,6 @@ impl Session<'_> {
                 other => self.screen.tell(&format!("{}: {other}", role.name())),
             }
         }
-        if self.stops.try_iter().count() > 0 {
-            self.stopping = Some(Instant::now() + STOP_PATIENCE);
-        }
         if self
             .stopping
             .take_if(|end| Instant::now() >= *end)
@@ -320,17 +326,19 @@ impl Session<'_> {
     /// Tells of a board that has stopped, by its own name: behind a port may be the other one.
     fn on_stopped(&mut self, role: Role, stopped: &Stopped) {
         if let Some(who) = self.link(role).and_then(|link| link.state().who(role)) {
+            self.stopped.push(who);
             self.screen.tell(&has_stopped(who, stopped));
         }
     }
 
     /// Tells of boards that have not answered a Stop.
     fn tell_unstopped(&mut self) {
-        let unstopped = self.links.iter().filter(|(_, link)| link.is_stopping());
-        let names: Vec<&str> = unstopped.map(|(role, _)| role.name()).collect();
+        let roles = self.links.iter().map(|(role, _)| *role);
+        let unstopped = roles.filter(|role| !self.stopped.contains(role));
+        let names: Vec<&str> = unstopped.map(Role::name).collect();
         if !names.is_empty() {
             self.screen.tell(&format!(
-                "NOT STOPPED: {}: no answer, told again: use the emergency stop",
+                "NOT STOPPED: {}: no answer: use the emergency stop",
                 names.join(" and ")
             ));
         }

@@ -14,8 +14,8 @@ use crate::run::recording::{Arrival, TickRecord, WORD_V, ZERO_VOLT};
 const TICKS_KEPT: usize = 8;
 /// Ticks at 0 V that are no wave's crossing.
 const CROSSING_TICKS: u32 = 3;
-/// Ticks within a tenth of the amplitude after which 0 V is no crossing: 4 ms, in which a wave of 5 Hz goes an eighth of it.
-const SOFT_TICKS: u32 = 8;
+/// Time in ms within a tenth of the amplitude after which 0 V is no crossing, but for waves slower than 4 Hz.
+const SOFT_MS: u32 = 4;
 
 /// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
 /// in which each estimate that is to be trusted ([`Trust`] says which) takes
@@ -39,8 +39,9 @@ pub struct DuePhase {
     last_tick_ns: Option<u64>,
     /// Whether the last output was other than 0 V.
     loud: bool,
-    /// Ticks since then, and since one was beyond a tenth of the amplitude. A wave crosses 0 V; silence stays there, or
-    /// has come softly.
+    /// Whether one is beyond a tenth of the amplitude.
+    beyond: bool,
+    /// Ticks at 0 V, and within that tenth. A wave crosses 0 V; silence stays there, or has come softly.
     silent_ticks: u32,
     soft_ticks: u32,
 }
@@ -73,7 +74,8 @@ impl DuePhase {
             last_tick_ns: None,
             loud: false,
             silent_ticks: CROSSING_TICKS,
-            soft_ticks: SOFT_TICKS,
+            beyond: false,
+            soft_ticks: u32::MAX,
         }
     }
 
@@ -116,8 +118,9 @@ impl DuePhase {
     }
 
     fn is_silent(&self) -> bool {
+        let soft_ticks = SOFT_MS * (self.followed.configuration.update_rate.hz() / 1_000);
         self.silent_ticks >= CROSSING_TICKS
-            || (self.silent_ticks > 0 && self.soft_ticks >= SOFT_TICKS)
+            || (self.silent_ticks > 0 && self.soft_ticks >= soft_ticks)
     }
 
     /// The shortest λ̂ that has been in force, in mm.
@@ -135,9 +138,7 @@ impl RunObserver for DuePhase {
                 let farthest = farthest.max().unwrap_or(0);
                 self.loud = farthest > 0;
                 let amplitude_v = f64::from(self.followed.configuration.amplitude_mv) * 1e-3;
-                if f64::from(farthest) * WORD_V > 0.1 * amplitude_v {
-                    self.soft_ticks = 0;
-                }
+                self.beyond = f64::from(farthest) * WORD_V > 0.1 * amplitude_v;
             }
             RunEvent::Tick(tick) => self.tick(tick),
             _ => {}
@@ -160,7 +161,11 @@ impl DuePhase {
     fn tick(&mut self, tick: &TickRecord) {
         let travel_mm = tick.position_mm - self.before_mm.unwrap_or(tick.position_mm);
         self.before_mm = Some(tick.position_mm);
-        self.soft_ticks = self.soft_ticks.saturating_add(1);
+        self.soft_ticks = if self.beyond {
+            0
+        } else {
+            self.soft_ticks.saturating_add(1)
+        };
         self.silent_ticks = if self.loud {
             0
         } else {

@@ -8,7 +8,7 @@ use protocol::{DisplayConfiguration, Hold};
 
 use crate::judge::trust::Trust;
 use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
-use crate::scene::fault::{Class, Fault, Kind, nanoseconds};
+use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
 
 /// From an arrival to the outputs: the tick that hears it, the next one, and its edge, at 2 kHz.
 const HEARD_NS: u64 = 3_000_000;
@@ -37,8 +37,9 @@ pub(super) struct Misconduct {
     pub held: Option<(Hold, u64)>,
     /// They were driven for the first time after the fault was over.
     pub again_ns: Option<u64>,
-    /// Of the time in which they have to be, for how long the hand moved and nothing held them, in ns.
+    /// Of the time in which they have to be, for how long the hand moved, in ns; and of that, with nothing to hold them.
     pub moved_ns: u64,
+    pub free_ns: u64,
 }
 
 /// Looks on from the scene's start, and judges while the fault is the only one.
@@ -53,6 +54,12 @@ pub(super) struct Conduct {
     /// When its memory of estimates goes.
     forgets_ns: Option<u64>,
     must_drive: bool,
+    /// What tells the display of the surface is broken itself.
+    spoils_estimates: bool,
+    /// It was held already when the fault began.
+    was_held: Option<bool>,
+    /// Estimates came that are not to be followed, when it has to drive again.
+    unfollowed: bool,
     max_age_ms: u16,
     fade_out_ns: u64,
     trust: Trust,
@@ -96,6 +103,7 @@ impl Conduct {
             },
             forgets_ns: cuts_power.then_some(over_ns),
             must_drive: !has_stopped,
+            spoils_estimates: row.signs.contains(&Sign::NoValidEstimate),
             max_age_ms: configuration.max_age_ms,
             fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
             trust: Trust::new(configuration.max_age_ms),
@@ -118,8 +126,9 @@ impl Conduct {
             .arrived
             .pop_front_if(|arrival| arrival.at_ns <= heard_ns)
         {
-            if let Some(mm) = self.trust.hear(arrival.at_ns, &arrival.estimate) {
-                self.wavelength_mm = mm;
+            match self.trust.hear(arrival.at_ns, &arrival.estimate) {
+                Some(mm) => self.wavelength_mm = mm,
+                None => self.unfollowed |= self.again_ns.contains(&arrival.at_ns),
             }
         }
     }
@@ -162,6 +171,7 @@ impl Conduct {
             }
         }
         if self.judged_ns.contains(&at_ns) {
+            self.was_held.get_or_insert(self.held_since.is_some());
             self.judge(at_ns);
         }
         self.hear();
@@ -175,8 +185,11 @@ impl Conduct {
         let speed_mm_s = (tick.position_mm - before_mm).abs() / (step_ns as f64 * 1e-9);
         if speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
             self.moves_since_ns.get_or_insert(before_ns);
-            if self.again_ns.contains(&tick.at_ns) && self.held_since.is_none() {
+            if self.again_ns.contains(&tick.at_ns) {
                 self.seen.moved_ns += step_ns;
+                if self.held_since.is_none() {
+                    self.seen.free_ns += step_ns;
+                }
             }
         } else {
             self.moves_since_ns = None;
@@ -229,8 +242,16 @@ impl Conduct {
         (!self.again_ns.is_empty() && self.must_drive).then_some(self.again_ns.end)
     }
 
-    /// Whether that can be seen: for half of the time the hand moves, over a surface of which something is known.
+    /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or
+    /// estimates come by which nothing is to be followed, only the time counts in which something is.
     pub fn shows_again(&self) -> bool {
-        2 * self.seen.moved_ns >= self.again_ns.end - self.again_ns.start
+        let knows_nothing =
+            self.was_held == Some(true) || self.unfollowed && !self.spoils_estimates;
+        let counted_ns = if knows_nothing {
+            self.seen.free_ns
+        } else {
+            self.seen.moved_ns
+        };
+        2 * counted_ns >= self.again_ns.end - self.again_ns.start
     }
 }

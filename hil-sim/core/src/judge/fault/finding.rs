@@ -29,7 +29,7 @@ pub struct Finding {
     pub unjudged: Vec<String>,
     /// Whether it is one that has to be seen and answered: long enough, and great enough.
     pub(super) must_show: bool,
-    /// The display never hears of it: what it does has other reasons.
+    /// It is a Stop that the display never hears: what the outputs do has other reasons.
     pub(super) is_unheard: bool,
     /// Why it need not be seen in time all the same.
     pub(super) unseen: Option<&'static str>,
@@ -59,7 +59,9 @@ impl Finding {
         if stuck > 0 {
             unmet.push(format!("{stuck} outputs stuck"));
         }
-        if self.is_restart_against_the_table() {
+        // What nobody has seen is over without a stop.
+        let is_answered = self.must_show || self.detected_ns.is_some() || self.resets > 0;
+        if is_answered && self.is_restart_against_the_table() {
             let again = if self.drives_again {
                 ", drives again"
             } else {

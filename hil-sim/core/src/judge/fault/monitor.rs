@@ -46,7 +46,7 @@ pub(super) struct FaultMonitor {
     of_others: Vec<Sign>,
     /// What the scene's own link shows, with and without the fault: no sign of it.
     weather: Vec<Sign>,
-    /// It is said while nothing that is said arrives.
+    /// See [`is_unheard`].
     is_unheard: bool,
     has_stopped: bool,
     must_show: bool,
@@ -118,6 +118,12 @@ fn weather_signs(link: &Link) -> Vec<Sign> {
         .collect()
 }
 
+/// Whether it is a Stop that is said while nothing that is said arrives.
+fn is_unheard(fault: &Fault, scene: &Scene) -> bool {
+    let cuts = |other: &Fault| other.kind.cuts_wire() && other.is_on(fault.begins_ns());
+    fault.kind == Kind::StopFromPeer && scene.faults.iter().any(cuts)
+}
+
 /// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
 /// a sound board.
 fn must_show(fault: &Fault, scene: &Scene) -> bool {
@@ -174,6 +180,7 @@ impl FaultMonitor {
             .max();
         let stops = |other: &&Fault| {
             other.kind.row().class == Class::Stops
+                && !is_unheard(other, scene)
                 && other.begins_ns() <= from_ns
                 && last_power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns)
         };
@@ -193,8 +200,6 @@ impl FaultMonitor {
             of_others.push(Sign::Fading(Hold::Stale));
         }
         let weather = weather_signs(&scene.link);
-        let is_unheard = fault.kind == Kind::StopFromPeer
-            && others().any(|other| other.kind.cuts_wire() && other.is_on(from_ns));
         of_others.extend(&weather);
         let configuration = scene.display_configuration();
         // Of a flood, which estimates find room is chance.
@@ -224,7 +229,7 @@ impl FaultMonitor {
             alone_ns,
             of_others,
             weather,
-            is_unheard,
+            is_unheard: is_unheard(&fault, scene),
             has_stopped,
             must_show: must_show(&fault, scene),
             until_ns,
@@ -258,7 +263,12 @@ impl FaultMonitor {
             return Some("the hand moves at less than 12 mm/s");
         }
         let hides = |sign: &Sign| self.weather.contains(sign);
-        (kind.row().signs.iter().any(hides)).then_some("the scene's link shows the same without it")
+        // Of these two, what else shows is chance.
+        let hidden = match kind {
+            Kind::LinkCorrupt | Kind::LinkGarbage => kind.row().signs.iter().any(hides),
+            _ => kind.row().signs.iter().all(hides) && !self.weather.is_empty(),
+        };
+        hidden.then_some("the scene's link shows the same without it")
     }
 
     /// From its beginning until nobody looks on any more, in ns.
@@ -422,6 +432,10 @@ impl FaultMonitor {
                 unjudged.push(format!("whether it drives {within}: {ends}"));
             } else if shows_again {
                 otherwise.push(format!("does not drive {within}"));
+            } else {
+                unjudged.push(format!(
+                    "whether it drives {within}: the hand rests, or nothing comes that is to be followed"
+                ));
             }
         }
         for (role, beat, what) in [

@@ -228,6 +228,29 @@ fn a_display_that_fades_when_estimates_are_too_old_and_drives_again_meets_everyt
 }
 
 #[test]
+fn a_display_that_hears_nothing_after_the_link_is_back_is_found() {
+    let mut recording = Run::steady(50.0, 2.0).record();
+    recording
+        .arrived
+        .retain(|arrival| arrival.at_ns < CUT_NS.start);
+    for output in &mut recording.outputs {
+        if output.at_ns >= 1_030 * MS {
+            output.words = [ZERO_VOLT; ACTUATORS];
+        }
+    }
+    recording.signs.display = vec![said(992, DisplayState::Fading(Hold::Stale))];
+    let mut fault = Fault::new(Kind::LinkDown, 0.5);
+    fault.for_s = Some(0.7);
+    let scene = Scene {
+        duration_s: 2.0,
+        faults: vec![fault],
+        ..Scene::constant(2.0, 50.0)
+    };
+    let unmet = finding(&scene, 0, 2_000 * MS, &recording).unmet();
+    assert_eq!(unmet, ["does not drive again within 300 ms of its end"]);
+}
+
+#[test]
 fn a_display_that_never_fades_is_found() {
     let stale_ms = (STALE_NS - CUT_NS.start) / MS;
     let unmet = cut(0..0, None);
@@ -374,6 +397,10 @@ fn what_need_not_be_seen_must_do_no_harm() {
     );
     let stands = short(driven(0, AT_MS + 2, 0x9000), FaultEvidence::default());
     assert_eq!(stands, ["50 outputs stuck"]);
+    // Of what nobody has seen, a pause is no answer.
+    let mut pauses = driven(0, AT_MS + 200, ZERO_VOLT);
+    pauses.extend(driven(600, END_MS, ZERO_VOLT));
+    assert_eq!(short(pauses, FaultEvidence::default()), [""; 0]);
 }
 
 /// A hand that moves all the time over what `spoil` makes of a sound recording, with a fault at 0.5 s.

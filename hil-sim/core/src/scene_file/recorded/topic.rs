@@ -53,7 +53,7 @@ pub fn each(
     let mut count: u64 = 0;
     let (mut start_ns, mut first_ns, mut first) = (None, None, None);
     let mut format: Option<Format> = None;
-    let mut lasts_s: Option<(f64, f64)> = None;
+    let mut logged_extent_s: Option<(f64, f64)> = None;
     let mut row = vec![0.0; fields.len()];
     for message in MessageReader::new_with_options(BufReader::new(file), options) {
         let message = match message {
@@ -73,7 +73,7 @@ pub fn each(
             continue;
         }
         let logged_s = message.log_time.saturating_sub(start_ns) as f64 / 1e9;
-        lasts_s = lasts_s.map_or(Some((logged_s, logged_s)), |(first_s, _)| {
+        logged_extent_s = logged_extent_s.map_or(Some((logged_s, logged_s)), |(first_s, _)| {
             Some((first_s, logged_s))
         });
         if !(from_s..=to_s).contains(&logged_s) {
@@ -129,7 +129,7 @@ pub fn each(
     }
     if count == 0 {
         topics.sort_unstable();
-        let message = if let Some((first_s, last_s)) = lasts_s {
+        let message = if let Some((first_s, last_s)) = logged_extent_s {
             format!(
                 "has messages on {topic} from {first_s} to {last_s} s, none between logged_from_s and logged_to_s: give others"
             )
