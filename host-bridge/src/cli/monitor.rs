@@ -11,7 +11,6 @@ use crate::monitor::{self, Options, RecordingFeed, Source};
 use anyhow::Context;
 use clap::ValueHint;
 use crossbeam_channel::unbounded;
-use protocol::Role;
 
 use super::signals::{self, Again};
 

@@ -338,7 +338,7 @@ impl Session<'_> {
         let names: Vec<&str> = unstopped.map(Role::name).collect();
         if !names.is_empty() {
             self.screen.tell(&format!(
-                "NOT STOPPED: {}: no answer: use the emergency stop",
+                "NOT STOPPED: {}: no answer, told again: use the emergency stop",
                 names.join(" and ")
             ));
         }
