@@ -11,6 +11,7 @@ use crate::monitor::{self, Options, RecordingFeed, Source};
 use anyhow::Context;
 use clap::ValueHint;
 use crossbeam_channel::unbounded;
+use protocol::Role;
 
 use super::signals::{self, Again};
 
@@ -120,17 +121,15 @@ impl Monitor {
             None => None,
         };
         // One that is not named is whichever is plugged in, maybe the other board's.
-        let roles = bench.roles();
-        if roles.len() > 1
-            && let [Some(Origin::Probe(one)), Some(Origin::Probe(other))] =
-                [&bench.sensor, &bench.display].map(origin)
+        if let [Some(Origin::Probe(one)), Some(Origin::Probe(other))] =
+            [&bench.sensor, &bench.display].map(origin)
             && (one.is_none() || other.is_none() || one == other)
         {
             anyhow::bail!(
                 "each board's log needs a probe of its own: name both as `usb` in the bench file"
             );
         }
-        for role in roles {
+        for role in [Role::Sensor, Role::Display] {
             let Some(seat) = bench.seat(role) else {
                 continue;
             };
