@@ -34,9 +34,11 @@ const COMBS: [Comb; 2] = [
         others: &[(2.0, 4), (4.0, -2), (5.0, -4)],
     },
 ];
-/// How high the period's lines stand together, relative to the peak, where the peak's wavelength is not the period. Two that
-/// fit are told from chance at half of that.
+/// How high the period's lines stand together, relative to the peak, where the peak's wavelength is not the period. Half of
+/// that will do where there are two: chance seldom makes two that fit, the lower one a quarter of the other.
 const PERIOD: f32 = 0.4;
+/// See [`PERIOD`].
+const SECOND: f32 = 0.25;
 /// Weight of the average from which on a line is told from the slope that it stands on: some seven waves from a start.
 /// Before, how high it is has to do: a strong wave is stood by sooner.
 pub(super) const MATURE: f32 = 0.25;
@@ -190,7 +192,7 @@ impl Spectrum {
                 }
             }
             let least = PERIOD * rise(averaged, peak);
-            let are_two = second > 0.25 * highest && sum > 0.5 * least;
+            let are_two = second > SECOND * highest && sum > 0.5 * least;
             let explains = own > 0.0 && (sum > least || are_two);
             if now > 0.09 * energies[peak] && (explains || is_high) {
                 return Some((period, period_mm));
@@ -268,6 +270,19 @@ mod tests {
             let found = spectrum.longer_period(&askew, &askew, PEAK);
             let wanted = is_period.then_some(PEAK + up);
             assert_eq!(found.map(|found| found.0), wanted, "{up} candidates up");
+        }
+    }
+
+    #[test]
+    fn a_comb_has_its_lines_at_the_candidates_next_to_them() {
+        let nearest =
+            |waves: f32, order: f32| (PER_OCTAVE as f32 * libm::log2f(waves / order)).round() as i8;
+        for comb in &COMBS {
+            assert_eq!(comb.up, nearest(comb.waves, 1.0));
+            for &(order, up) in comb.others {
+                assert_ne!(order % comb.waves, 0.0, "the peak's own");
+                assert_eq!(up, nearest(comb.waves, order), "{order} of {}", comb.waves);
+            }
         }
     }
 

@@ -41,6 +41,10 @@ fn said(at_ms: u64, state: DisplayState) -> TimedMessage {
 }
 
 fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: FaultEvidence) -> Finding {
+    judged_for(Fault::new(kind, AT_MS as f64 * 1e-3), outputs, signs)
+}
+
+fn judged_for(fault: Fault, outputs: Vec<OutputRecord>, signs: FaultEvidence) -> Finding {
     let recording = Recording {
         outputs,
         signs,
@@ -48,7 +52,7 @@ fn judged(kind: Kind, outputs: Vec<OutputRecord>, signs: FaultEvidence) -> Findi
     };
     let scene = Scene {
         duration_s: END_MS as f64 * 1e-3,
-        faults: vec![Fault::new(kind, AT_MS as f64 * 1e-3)],
+        faults: vec![fault],
         ..Scene::constant(2.0, 50.0)
     };
     finding(&scene, 0, END_MS * MS, &recording)
@@ -212,6 +216,10 @@ fn cut(silent_ms: std::ops::Range<u64>, says: Option<u64>) -> Vec<String> {
     }
     let holds = says.map(|at_ms| said(at_ms, DisplayState::Fading(Hold::Stale)));
     recording.signs.display = holds.into_iter().collect();
+    unmet_of_cut(&recording)
+}
+
+fn unmet_of_cut(recording: &Recording) -> Vec<String> {
     let mut fault = Fault::new(Kind::LinkDown, 0.5);
     fault.for_s = Some(0.7);
     let scene = Scene {
@@ -219,7 +227,7 @@ fn cut(silent_ms: std::ops::Range<u64>, says: Option<u64>) -> Vec<String> {
         faults: vec![fault],
         ..Scene::constant(2.0, 50.0)
     };
-    finding(&scene, 0, 2_000 * MS, &recording).unmet()
+    finding(&scene, 0, 2_000 * MS, recording).unmet()
 }
 
 #[test]
@@ -239,14 +247,7 @@ fn a_display_that_hears_nothing_after_the_link_is_back_is_found() {
         }
     }
     recording.signs.display = vec![said(992, DisplayState::Fading(Hold::Stale))];
-    let mut fault = Fault::new(Kind::LinkDown, 0.5);
-    fault.for_s = Some(0.7);
-    let scene = Scene {
-        duration_s: 2.0,
-        faults: vec![fault],
-        ..Scene::constant(2.0, 50.0)
-    };
-    let unmet = finding(&scene, 0, 2_000 * MS, &recording).unmet();
+    let unmet = unmet_of_cut(&recording);
     assert_eq!(unmet, ["does not drive again within 300 ms of its end"]);
 }
 
@@ -377,17 +378,7 @@ fn what_need_not_be_seen_must_do_no_harm() {
     let short = |outputs: Vec<OutputRecord>, signs: FaultEvidence| {
         let mut alarm = Fault::new(Kind::DacAlarm, AT_MS as f64 * 1e-3);
         alarm.for_s = Some(0.001);
-        let recording = Recording {
-            outputs,
-            signs,
-            ..Run::steady(50.0, 2.0).record()
-        };
-        let scene = Scene {
-            duration_s: END_MS as f64 * 1e-3,
-            faults: vec![alarm],
-            ..Scene::constant(2.0, 50.0)
-        };
-        finding(&scene, 0, END_MS * MS, &recording).unmet()
+        judged_for(alarm, outputs, signs).unmet()
     };
     let mut again = driven(0, AT_MS + 2, ZERO_VOLT);
     again.extend(driven(600, 700, ZERO_VOLT));
