@@ -54,7 +54,7 @@ impl Lines {
     }
 }
 
-/// A `host-bridge relay` that runs. Dropping it kills it.
+/// A `host-bridge relay` that runs. Dropping it kills it; where a test fails, what it said is told.
 pub struct Relay {
     child: Child,
     stdout: Lines,
@@ -153,6 +153,11 @@ impl Drop for Relay {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+        if thread::panicking() {
+            let lines = self.lines();
+            let last = lines.last().map_or("", String::as_str);
+            eprintln!("a relay that ran said:\n{}\n{last}", self.words());
+        }
     }
 }
 
