@@ -4,11 +4,11 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use protocol::{DisplayConfiguration, Hold};
+use protocol::{DisplayConfiguration, Hold, Role};
 
 use crate::judge::trust::Trust;
 use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
-use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
+use crate::scene::fault::{Class, Fault, Sign, nanoseconds};
 
 /// From an arrival to the outputs: the tick that hears it, the next one, and its edge, at 2 kHz.
 const HEARD_NS: u64 = 3_000_000;
@@ -87,7 +87,7 @@ impl Conduct {
         let row = fault.kind.row();
         let from_ns = fault.begins_ns();
         let over_ns = fault.ends_ns().unwrap_or(from_ns);
-        let cuts_power = matches!(fault.kind, Kind::PowerCycle | Kind::BrownOut);
+        let cuts_power = fault.cuts_power(Role::Display);
         let excused_ns = match row.class {
             Class::Stops => from_ns..u64::MAX,
             _ if cuts_power => from_ns..over_ns + nanoseconds(STARTS_S),

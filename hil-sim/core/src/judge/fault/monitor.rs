@@ -266,7 +266,7 @@ impl FaultMonitor {
         // Of these two, what else shows is chance.
         let hidden = match kind {
             Kind::LinkCorrupt | Kind::LinkGarbage => kind.row().signs.iter().any(hides),
-            _ => kind.row().signs.iter().all(hides) && !self.weather.is_empty(),
+            _ => kind.row().signs.iter().all(hides),
         };
         hidden.then_some("the scene's link shows the same without it")
     }
