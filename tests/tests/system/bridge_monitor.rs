@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use protocol::{DisplayState, Hello, Hold, Role, SensorConfiguration, Stop, StopReason};
+use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
 use tests::fake_board::{FakeBoard, wait_until};
