@@ -122,9 +122,9 @@ impl Record {
         let (said, stops) = channel();
         let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
         signals::on_stop(move || {
-            stop_all(&boards);
-            // Nobody listens any more when the recording ends.
+            // First, so that no answer comes before it. Nobody listens any more when the recording ends.
             let _ = said.send(());
+            stop_all(&boards);
         })?;
         let absent = Session {
             recorder: &recorder,
@@ -232,7 +232,7 @@ struct Session<'a> {
     recorder: &'a Recorder,
     links: &'a [(Role, Link)],
     told: Receiver<(Role, Event)>,
-    /// That Stop was said.
+    /// That a Stop is being said.
     stops: Receiver<()>,
     /// Until when boards that were told to stop may take to answer.
     stopping: Option<Instant>,

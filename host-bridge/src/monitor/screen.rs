@@ -138,13 +138,13 @@ fn listen(boards: Vec<LinkSender>) -> Receiver<Typed> {
     let (events, typed) = channel();
     thread::spawn(move || {
         while let Ok(event) = event::read() {
-            if let Typed::Key(key) = &event
-                && key.kind != KeyEventKind::Release
-                && is_stop(*key)
-            {
+            let stops = matches!(&event, Typed::Key(key) if key.kind != KeyEventKind::Release && is_stop(*key));
+            // First, so that no answer to a Stop comes before its key.
+            let told = events.send(event);
+            if stops {
                 stop_all(&boards);
             }
-            if events.send(event).is_err() {
+            if told.is_err() {
                 return;
             }
         }
