@@ -35,6 +35,7 @@ enum Order {
     Miss(bool),
     Disobey(bool),
     Restart,
+    UpSince(u64),
     Patience,
     End,
 }
@@ -165,6 +166,12 @@ impl FakeBoard {
         let _ = self.orders.send(Order::Restart);
     }
 
+    /// Has the board be up since `at_us` of [`clock`](Self::clock): it is one that was there before, and returns. To be
+    /// said before anybody hears of it.
+    pub fn be_up_since(&self, at_us: u64) {
+        let _ = self.orders.send(Order::UpSince(at_us));
+    }
+
     /// Has the board wait from now on for whoever reads its line slowly, instead of losing what finds no room.
     pub fn lose_nothing(&self) {
         let _ = self.orders.send(Order::Patience);
@@ -258,6 +265,7 @@ fn run(
                 Ok(Order::Deafen(now)) => is_deaf = now,
                 Ok(Order::Miss(now)) => misses = now,
                 Ok(Order::Disobey(now)) => obeys = !now,
+                Ok(Order::UpSince(at_us)) => started_us = at_us,
                 Ok(Order::Patience) => is_patient = true,
                 Ok(Order::Restart) => {
                     console = Console::new(hello);

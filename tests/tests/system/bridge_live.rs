@@ -381,6 +381,9 @@ fn the_page_moves_stops_the_boards_and_comes_back() {
     until("word of it", || {
         browser.text("said").contains("has stopped").then_some(())
     });
-    assert!(browser.text("supervisor").contains("by the operator"));
+    until("the reason", || {
+        let supervisor = browser.text("supervisor");
+        supervisor.contains("by the operator").then_some(())
+    });
     live.end();
 }

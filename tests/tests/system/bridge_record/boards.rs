@@ -5,6 +5,7 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use host_bridge::clock::{Clock, SystemClock};
 use host_bridge::recording::Entry;
 use host_bridge::recording::row::{LinkEvent, LinkRow, Lost, Row};
 use protocol::{Hello, Message, Ping, Role};
@@ -29,9 +30,12 @@ fn a_board_that_goes_and_returns_is_recorded_on_and_the_gap_is_written_down() {
     let folder = folder("returns");
     let path = folder.join("returns.mcap");
     let name = folder.join("ttySensor");
+    // One board, whose clock goes on while its cable is out.
+    let began_us = SystemClock.now_us();
     let sensor = || {
         let board = FakeBoard::new(Role::Sensor);
         board.lose_nothing();
+        board.be_up_since(began_us);
         symlink(board.path(), &name).expect("a link can be made");
         board
     };
