@@ -113,18 +113,17 @@ impl Bus {
         is_shifted_out(0).then_some(answer)
     }
 
-    /// Looks into a chip, some 16 µs. LDAC's edge may come meanwhile: it is no part of the bus, and the
-    /// words have been in the buffers since before.
-    pub fn look(&mut self, look: &Look) -> Readback {
+    /// Looks into a chip, some 16 µs; None if SPI1 does not send, for then nothing is learned of the chip. LDAC's edge may
+    /// come meanwhile: it is no part of the bus, and the words have been in the buffers since before.
+    pub fn look(&mut self, look: &Look) -> Option<Readback> {
         self.listen();
         let answers = look
             .frames()
             .map(|frame| self.exchange_frame(look.chip, frame));
         if look.agrees(&answers) {
-            Readback::Agrees
-        } else {
-            Readback::Differs
+            return Some(Readback::Agrees);
         }
+        is_shifted_out(0).then_some(Readback::Differs)
     }
 }
 

@@ -93,7 +93,7 @@ impl Chain {
 
     /// Looks into a chip while nothing is sent, and waits for it.
     pub fn look(&mut self, look: Look) {
-        with_line(|line| line.readback = line.bus.look(&look));
+        with_line(|line| line.look(&look));
     }
 
     /// How the last update went, if it has not been told yet, and the last look. An update that is still
@@ -246,7 +246,15 @@ impl Line {
             State::Late
         };
         if let Some(look) = self.look.take() {
-            self.readback = self.bus.look(&look);
+            self.look(&look);
+        }
+    }
+
+    /// Looks into a chip. An SPI1 that does not send fails as it does for words, so that it and no chip is to blame.
+    fn look(&mut self, look: &Look) {
+        match self.bus.look(look) {
+            Some(readback) => self.readback = readback,
+            None => self.state = State::Failed,
         }
     }
 

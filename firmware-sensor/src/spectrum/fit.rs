@@ -31,6 +31,9 @@ const LEAST_PIVOT: f32 = 1e-4;
 /// Rest that no gauge is better than, relative to its energy. A gauge counts by the inverse of its rest: by its noise, as
 /// least squares want it, whatever its gain.
 const LEAST_REST: f32 = 0.1;
+/// Rest that no gauge is better than, in ADC steps²: what a step of the converter leaves of a rounded code, 1/12, in the
+/// mean of a knot's eight scans or more. A gauge whose codes stand still has less, and it is rounding.
+const LEAST_NOISE: f32 = 0.01;
 
 /// What a solution costs, in knots.
 const SOLVING: usize = 4;
@@ -69,11 +72,11 @@ impl Fitted {
     }
 
     /// The mean of the `usable` gauges' own shares, 0 to 1: one that the wave has left counts as much as the others,
-    /// also if there is little in it now.
+    /// also if there is little in it now. One whose codes stand still does not.
     pub fn gauges_share(&self, usable: u8) -> f32 {
         let (mut sum, mut count) = (0.0, 0_u8);
         for gauge in 0..GAUGES {
-            if usable >> gauge & 1 == 1 && self.totals[gauge] > 0.0 {
+            if usable >> gauge & 1 == 1 && self.totals[gauge] > LEAST_NOISE {
                 sum += self.explaineds[gauge] / self.totals[gauge];
                 count += 1;
             }
@@ -248,7 +251,7 @@ impl Sums {
             let cosine = y[2] * pivots[2] - a[3][2] * sine;
             // d/d ln k of a cos θ + b sin θ is θ (b cos θ − a sin θ).
             let left = total - explained;
-            let weight = 1.0 / larger(left + LEAST_REST * total, f32::MIN_POSITIVE);
+            let weight = 1.0 / larger(left + LEAST_REST * total, LEAST_NOISE);
             along += weight * (sine * y[4] - cosine * y[5]);
             curvature += weight
                 * (sine * sine * a[4][4] - 2.0 * cosine * sine * a[5][4]

@@ -156,6 +156,27 @@ fn a_fit_knows_how_far_off_it_is_in_white_noise() {
 }
 
 #[test]
+fn a_gauge_that_says_nothing_takes_no_part_in_a_fit() {
+    // Its codes stand still; what is left of them beside their mean is rounding.
+    for standing in [0.0, 37.0, -301.7, 1_983.3] {
+        let felt = |mm: f32, gauge: usize| match gauge {
+            3 => standing,
+            _ => wave(mm, gauge, 2.0),
+        };
+        let (knots, _) = path(6_000, 0.05, 1_000_000, felt);
+        for (n, fitted) in run(&knots, 2.02).found.into_iter().enumerate() {
+            let fitted = fitted.expect("the path is long enough");
+            let off = (fitted.wavelength_mm / 2.0 - 1.0).abs();
+            assert!(
+                off < 3e-3,
+                "{off} over {} waves beside {standing}",
+                LENGTHS[n]
+            );
+        }
+    }
+}
+
+#[test]
 fn a_path_too_short_has_no_fit() {
     let (knots, _) = path(60, 0.04, 1_000_000, |mm, gauge| wave(mm, gauge, 2.0));
     assert_eq!(run(&knots, 2.0).found.iter().flatten().count(), 0);

@@ -150,6 +150,21 @@ fn a_dma_that_stalls_in_the_middle_of_an_update_is_named() {
     assert!(findings.iter().all(|(_, finding)| finding.was_driving));
 }
 
+/// While the hand rests no words are sent, and the next look into a converter is what meets it.
+#[test]
+fn an_spi_that_stalls_while_the_hand_rests_is_no_converters_fault() {
+    let stall = Fault::new(Kind::SpiStall, 0.5);
+    let scene = Scene {
+        duration_s: 0.6,
+        faults: vec![stall],
+        ..Scene::constant(2.0, 0.0)
+    };
+    let (recording, _) = hil_sim_boards::run(&scene, elves::both()).unwrap();
+    let finding = judge::fault::judge(&scene, &recording).remove(0);
+    assert_eq!(finding.unmet(), Vec::<String>::new());
+    assert!(finding.detected_ns.is_some(), "{finding:?}");
+}
+
 /// What comes over the UARTs waits for the samples: without DMA1's clock its interrupt, if it has just asked for one,
 /// cannot be ended and comes again and again.
 #[test]
