@@ -2,7 +2,7 @@
 //! be too fast to be drawn.
 //!
 //! A wave of more than [`FALLS_FROM_HZ`] is beyond what skin and gel follow, and 5 V of it would slew
-//! by more than 8 V/ms. From there its amplitude falls linearly, to 0 at [`SILENT_FROM_HZ`]: f (500 − f)
+//! by more than 8 V/ms. From there its amplitude falls linearly, to 0 at 500 Hz: f (500 − f)
 //! falls from 250 on, so that nothing slews faster than 5 V · 2π · 250 Hz = 7.9 V/ms.
 
 use protocol::{DisplayConfiguration, Friction, UpdateRate};
@@ -14,8 +14,6 @@ use crate::ticks_at;
 pub const FULL: u32 = 32_767 << 16;
 /// The frequency up to which the whole amplitude is played.
 pub const FALLS_FROM_HZ: u32 = 250;
-/// The frequency from which on nothing is played.
-pub const SILENT_FROM_HZ: u32 = 2 * FALLS_FROM_HZ;
 /// Time in which a new amplitude is reached.
 pub const GLIDE_MS: u16 = 20;
 

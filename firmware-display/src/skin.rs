@@ -204,3 +204,71 @@ impl Skin {
 fn fixed(value: f32) -> i32 {
     (value.clamp(-1.0, 1.0) * ONE as f32) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use protocol::Mode;
+    use protocol::actuators::DEFAULT_ACTUATORS;
+
+    use super::*;
+
+    fn modelled(resonance_dhz: u16, damping_percent: u16) -> Actuator {
+        Actuator {
+            resonance_dhz,
+            damping_percent,
+            ..DEFAULT_ACTUATORS[0]
+        }
+    }
+
+    #[test]
+    fn the_voltage_is_made_no_smaller_than_its_bounds_ask_for() {
+        use Rendering::{Fundamental, Shape, Texture};
+        for (rendering, resonance_dhz, damping_percent, bound) in [
+            (Texture, 0, 50, 1.0),
+            // w = 1, ζ = 0.5: 1 + w².
+            (Fundamental, 2_500, 50, 2.0),
+            // w = 2.5, ζ = 1.5: and 2 (ζ − 1) w more.
+            (Shape, 1_000, 150, 9.75),
+            // w = 0.25, ζ = 2: the random part's size, 1 + 2ζ 0.59 w + 0.71 w².
+            (Texture, 10_000, 200, 1.634_375),
+            // w = 2.5, ζ = 2: its slope, 0.59 + 2ζ 0.71 w + 1.23 w².
+            (Texture, 1_000, 200, 15.377_5),
+        ] {
+            let found = most(&modelled(resonance_dhz, damping_percent), rendering);
+            assert!((found / bound - 1.0).abs() < 1e-6, "{found} for {bound}");
+        }
+    }
+
+    #[test]
+    fn a_lane_is_told_from_that_of_another_place_or_model() {
+        let mut actuators = DEFAULT_ACTUATORS;
+        let pattern = Pattern::new(Mode::Travelling, &actuators);
+        let other = Pattern::new(Mode::Uniform, &actuators);
+        let bare = Skin::new(Rendering::Shape, &actuators, &pattern);
+        actuators[7] = Actuator {
+            resonance_dhz: 900,
+            ..actuators[7]
+        };
+        let skin = Skin::new(Rendering::Shape, &actuators, &pattern);
+        assert_eq!(skin.lanes(), pattern.places() + 1);
+        for (index, actuator) in actuators.iter().enumerate() {
+            assert!(skin.is_of(index, actuator, &pattern), "{index}");
+            // The place of all in a uniform wave is the first one's.
+            let at_first = pattern.place_of()[index] == other.place_of()[index];
+            assert_eq!(skin.is_of(index, actuator, &other), at_first, "{index}");
+            assert_eq!(bare.is_of(index, actuator, &pattern), index != 7, "{index}");
+            let twin = Actuator {
+                resonance_dhz: 901,
+                ..*actuator
+            };
+            assert!(!skin.is_of(index, &twin, &pattern), "{index}");
+        }
+        // A lane behind the last one is at the first place and has no model, too.
+        let mut changed = skin.clone();
+        changed.lane_of[0] = skin.lanes() as u8;
+        assert!(!changed.is_of(0, &actuators[0], &pattern));
+        let mut changed = bare;
+        changed.lane_of[0] = 1;
+        assert!(!changed.is_of(0, &DEFAULT_ACTUATORS[0], &pattern));
+    }
+}

@@ -295,3 +295,38 @@ const fn scale_behind(skin: &Skin) -> Scale {
 fn are_silent(words: &[u16; ACTUATORS]) -> bool {
     words.iter().all(|word| *word == ZERO_VOLT)
 }
+
+#[cfg(test)]
+mod tests {
+    use protocol::Mode;
+    use protocol::actuators::DEFAULT_ACTUATORS;
+
+    use super::*;
+
+    #[test]
+    fn what_the_words_are_made_with_is_held_against_each_trait_of_an_actuator() {
+        let configuration = DisplayConfiguration {
+            mode: Mode::Travelling,
+            ..DisplayConfiguration::DEFAULT
+        };
+        let mut actuators = DEFAULT_ACTUATORS;
+        actuators[3].resonance_dhz = 900;
+        let changes: [fn(&mut Actuator); 6] = [
+            |a| a.gain_q15 -= 1,
+            |a| a.inverted ^= true,
+            |a| a.x_um += 1,
+            |a| a.phase ^= 1,
+            |a| a.resonance_dhz = 901,
+            |a| a.resonance_dhz = 0,
+        ];
+        for change in changes {
+            let mut stimulus = Stimulus::new(&configuration, &actuators);
+            assert!((0..ACTUATORS).all(|index| stimulus.follows_from(index)));
+            change(&mut stimulus.description.actuators[3]);
+            for index in 0..ACTUATORS {
+                assert_eq!(stimulus.follows_from(index), index != 3, "{index}");
+            }
+        }
+        assert!(!Stimulus::new(&configuration, &actuators).follows_from(ACTUATORS));
+    }
+}

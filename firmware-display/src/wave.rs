@@ -392,6 +392,26 @@ mod tests {
     }
 
     #[test]
+    fn another_wave_is_reached_exactly_and_speed_is_averaged_as_long_at_both_rates() {
+        let texture = texture([3_333, 1_777], [1_234, 43_210], [77, 55, 33, 11]);
+        let travels = [UpdateRate::Hz2000, UpdateRate::Hz4000].map(|rate| {
+            let mut wave = Wave::new(Rendering::Texture, Scale::Whole);
+            wave.follow(&texture, wavelength(2.0), rate);
+            let ticks_of = |ms: u32| ms * rate.hz() / 1_000;
+            (0..ticks_of(4)).for_each(|_| wave.tick(16, 0, rate));
+            let travel = wave.travel;
+            (0..ticks_of(1_000)).for_each(|_| wave.tick(16, 0, rate));
+            assert_eq!(wave.now, wave.target, "{rate:?}");
+            travel
+        });
+        // After 4 ms, 1 − 1/e and a little more of it.
+        for travel in travels {
+            let share = f64::from(travel) / f64::from(16 << FRACTION);
+            assert!((0.6..0.68).contains(&share), "{travels:?}");
+        }
+    }
+
+    #[test]
     fn whatever_the_texture_is_the_wave_keeps_its_bounds() {
         for texture in textures() {
             for scale in [Scale::Whole, Scale::Calm] {
