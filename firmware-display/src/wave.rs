@@ -392,6 +392,27 @@ mod tests {
     }
 
     #[test]
+    fn whatever_the_texture_is_its_charge_has_room_beside_the_balances_margin() {
+        let mut closest = 0.0_f32;
+        for texture in textures() {
+            for mm in [0.6, 0.9, 1.3, 2.0, 2.8, 4.0, 5.6, 8.0] {
+                let mut wave = Wave::new(Rendering::Texture, Scale::Whole);
+                wave.follow(&texture, wavelength(mm), RATE);
+                let [a, re2, im2, re3, im3, bands @ ..] = wave.target;
+                let grain: f32 = (bands.iter().enumerate())
+                    .map(|(band, level)| level * grain::CHARGE * grain::spacing_mm(band))
+                    .sum();
+                let charge = 2.0 * a
+                    + re2.hypot(im2)
+                    + re3.hypot(im3) * (2.0 / 3.0)
+                    + grain * core::f32::consts::TAU / mm;
+                closest = closest.max(charge / MOST_CHARGE);
+            }
+        }
+        assert!((0.99..1.001).contains(&closest), "{closest}");
+    }
+
+    #[test]
     fn another_wave_is_reached_exactly_and_speed_is_averaged_as_long_at_both_rates() {
         let texture = texture([3_333, 1_777], [1_234, 43_210], [77, 55, 33, 11]);
         let travels = [UpdateRate::Hz2000, UpdateRate::Hz4000].map(|rate| {
