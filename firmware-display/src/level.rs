@@ -2,7 +2,7 @@
 //! be too fast to be drawn.
 //!
 //! A wave of more than [`FALLS_FROM_HZ`] is beyond what skin and gel follow, and 5 V of it would slew
-//! by more than 8 V/ms. From there its amplitude falls linearly, to 0 at 500 Hz: f (500 − f)
+//! by more than 8 V/ms. From there its amplitude falls linearly, to 0 at [`SILENT_FROM_HZ`]: f (500 − f)
 //! falls from 250 on, so that nothing slews faster than 5 V · 2π · 250 Hz = 7.9 V/ms.
 
 use protocol::{DisplayConfiguration, Friction, UpdateRate};
@@ -14,6 +14,8 @@ use crate::ticks_at;
 pub const FULL: u32 = 32_767 << 16;
 /// The frequency up to which the whole amplitude is played.
 pub const FALLS_FROM_HZ: u32 = 250;
+/// The frequency from which on nothing is played.
+pub const SILENT_FROM_HZ: u32 = 2 * FALLS_FROM_HZ;
 /// Time in which a new amplitude is reached.
 pub const GLIDE_MS: u16 = 20;
 
@@ -222,6 +224,22 @@ mod tests {
         assert!(at(400, Some(100), 100.0).abs_diff(FULL / 8) <= FULL >> 23);
         assert_eq!(at(400, Some(400), f32::NAN), 0);
         assert_eq!(at(400, Some(300), f32::NAN), 0);
+    }
+
+    #[test]
+    fn what_is_too_fast_to_be_drawn_is_played_weaker_and_then_not_at_all() {
+        let mut level = Level::new(&DisplayConfiguration::DEFAULT);
+        for rate in RATES {
+            let mut gain = |hz: u32| {
+                level.turn = ((u64::from(hz) << 32) / u64::from(rate.hz())) as i32;
+                level.roll_off(rate)
+            };
+            assert_eq!(gain(FALLS_FROM_HZ), OPEN);
+            assert!(gain(FALLS_FROM_HZ + 1) < OPEN);
+            assert_eq!(gain(375), OPEN / 2);
+            assert!(gain(SILENT_FROM_HZ - 1) > 0);
+            assert_eq!(gain(SILENT_FROM_HZ), 0);
+        }
     }
 
     #[test]
