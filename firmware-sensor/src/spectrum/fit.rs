@@ -31,8 +31,8 @@ const LEAST_PIVOT: f32 = 1e-4;
 /// Rest that no gauge is better than, relative to its energy. A gauge counts by the inverse of its rest: by its noise, as
 /// least squares want it, whatever its gain.
 const LEAST_REST: f32 = 0.1;
-/// Rest that no gauge is better than, in ADC steps²: what a step of the converter leaves of a rounded code, 1/12, in the
-/// mean of a knot's eight scans or more. A gauge whose codes stand still has less, and it is rounding.
+/// Rest that no gauge is better than, in ADC steps²: of the 1/12 that rounding leaves of a code some eighth is left behind
+/// the anti-alias filter and in a knot's mean. A gauge whose codes stand still has less, and it is rounding.
 const LEAST_NOISE: f32 = 0.01;
 
 /// What a solution costs, in knots.
