@@ -84,6 +84,8 @@ fn last_report(lines: &[String]) -> Value {
 fn estimates_and_motions_cross_in_order_and_nothing_else_does() {
     let sensor = talking_board(Role::Sensor);
     let display = talking_board(Role::Display);
+    // What a bridge reads too late is lost on its line, which is not the relay's to count.
+    display.lose_nothing();
     let pair = Pair::new(&sensor, &display, &[]);
     let motions = listen(&sensor, LIMIT, at_least(1_000));
     let estimates = listen(&display, LIMIT, at_least(200));
