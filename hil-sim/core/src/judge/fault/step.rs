@@ -45,6 +45,10 @@ pub(super) struct Step {
     was_zero: bool,
     /// Of a silence, in s.
     least_silence_s: f64,
+    /// How long the stimulus then takes to its full amplitude, and when it is there, in s. What still rises has more of
+    /// its later part in it: a cycle of it, or a part of one, would be found up to 0.2 cycles off.
+    fade_in_s: f64,
+    full_from_s: f64,
     rendering: Rendering,
     peak_v: f64,
 }
@@ -64,6 +68,8 @@ impl Step {
             quiet_since_s: None,
             was_zero: false,
             least_silence_s: SILENT_TICKS / f64::from(truth.display.update_rate.hz()),
+            fade_in_s: f64::from(truth.display.fade_in_ms) * 1e-3,
+            full_from_s: f64::NEG_INFINITY,
             rendering: truth.display.rendering,
             peak_v: f64::from(truth.display.amplitude_mv) * 1e-3,
         }
@@ -111,6 +117,7 @@ impl Step {
         {
             self.end_stretch();
             self.is_unplaced = true;
+            self.full_from_s = edge.t_s + self.fade_in_s;
         }
     }
 
@@ -140,7 +147,9 @@ impl Step {
                     None => self.stand(),
                 };
                 due.cycles += standing;
-                self.since.add(due, volts);
+                if edge.t_s >= self.full_from_s {
+                    self.since.add(due, volts);
+                }
             }
         }
     }

@@ -314,6 +314,43 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
 }
 
 #[test]
+fn what_fades_in_after_a_silence_tells_no_phase_until_it_is_all_there() {
+    // 5 cycles a second, of which the scene leaves two or three after the silence.
+    let judged = |drives_from_s: f64, until_ms: u64, ahead_cycles: f64| {
+        let run = Run {
+            ahead_cycles: Box::new(move |t_s| if t_s < 1.2 { 0.313_4 } else { ahead_cycles }),
+            ..Run::steady(10.0, 2.0)
+        };
+        let mut recording = run.record();
+        for output in &mut recording.outputs {
+            let t_s = output.at_ns as f64 * 1e-9;
+            let gain = if t_s < 0.6 {
+                1.0
+            } else {
+                ((t_s - drives_from_s) / 0.02).clamp(0.0, 1.0)
+            };
+            output.words = output.words.map(|word| word_of(gain * volts(word)));
+        }
+        let scene = Scene {
+            duration_s: until_ms as f64 * 1e-3,
+            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            ..Scene::constant(2.0, 10.0)
+        };
+        finding(&scene, 0, until_ms * MS, &recording).unmet()
+    };
+    for later in 0..20 {
+        let drives_from_s = 0.8 + 0.01 * f64::from(later);
+        assert_eq!(
+            judged(drives_from_s, 1_400, 0.313_4),
+            [""; 0],
+            "{drives_from_s}"
+        );
+        let lost = judged(drives_from_s, 1_600, 0.513_4);
+        assert!(lost[0].starts_with("out of step"), "{lost:?}");
+    }
+}
+
+#[test]
 fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
     let spoiled = |amplitude_mv: u16, words: &[u16]| {
         let run = Run {
