@@ -39,7 +39,7 @@ pub enum ReadError {
     Foreign(PathBuf, String),
     #[error("{0}: its format is {1}, this program reads {FORMAT}: take the program that made it")]
     Newer(PathBuf, String),
-    #[error("{path}: damaged after {after}: {reason}")]
+    #[error("{path}: damaged after {after}: {reason}: what lies before can be had with --to-time")]
     Damaged {
         path: PathBuf,
         after: String,

@@ -3,7 +3,7 @@
 use protocol::{DisplayConfiguration, Estimate, Gauges, Role, SensorConfiguration};
 
 use super::{LONGEST_S, SceneError};
-use crate::recording::reader::Reader;
+use crate::recording::reader::{ReadError, Reader};
 use crate::recording::row::{GaugeRow, Row};
 
 /// More samples than any scene has.
@@ -49,13 +49,22 @@ impl Excerpt {
         let mut excerpt = Self::default();
         let mut runs: Vec<Run> = Vec::new();
         let mut gap_s = None;
-        while let Some(entry) = recording.next_entry()? {
+        let mut has_all = false;
+        loop {
+            let entry = match recording.next_entry() {
+                Ok(Some(entry)) => entry,
+                Ok(None) => break,
+                // What is damaged lies behind the piece.
+                Err(ReadError::Damaged { .. }) if has_all => break,
+                Err(error) => return Err(error.into()),
+            };
             let at_s = recording.since_start_s(entry.log_ns);
             // In the order in which they were heard, not taken.
             if at_s > to_s + LATE_S {
                 break;
             }
             if at_s > to_s {
+                has_all |= matches!(entry.row, Row::Gauges(_));
                 continue;
             }
             for (role, row) in recording.take_told() {
@@ -94,7 +103,7 @@ impl Excerpt {
                 }
             }
         }
-        excerpt.cut = recording.is_cut();
+        excerpt.cut = recording.is_cut() && !has_all;
         excerpt.passed_over = recording.passed_over();
         if let Some(at_s) = gap_s {
             let longest = runs

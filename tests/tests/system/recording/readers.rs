@@ -138,7 +138,7 @@ fn the_readers_of_others_find_every_message_once_and_the_same_values() {
 }
 
 /// A recording that is kept with the tests: see the README beside them.
-fn golden(name: &str) -> PathBuf {
+pub fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("golden")
         .join(name)

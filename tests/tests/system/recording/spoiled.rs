@@ -128,6 +128,46 @@ fn damage_is_named_with_file_channel_and_time() {
 }
 
 #[test]
+fn a_scene_is_made_of_what_lies_before_damage() {
+    let folder = folder("before-damage");
+    let path = folder.join("damaged.mcap");
+    let mut bytes = fs::read(readers::golden("format-2-protocol-4.mcap")).expect("it is there");
+    let summary = Summary::read(&bytes)
+        .expect("well-formed")
+        .expect("there is one");
+    let last = summary.chunk_indexes.last().expect("there are some");
+    bytes[(last.chunk_start_offset + last.chunk_length / 2) as usize] ^= 0x55;
+    fs::write(&path, &bytes).expect("the file can be written");
+    let made_to = |to_s: f64| {
+        let settings = scene::Settings {
+            path: folder.join("before.toml"),
+            from_s: 1.0,
+            to_s: Some(to_s),
+            wavelength_mm: Some(2.0),
+            expect: false,
+            force: true,
+        };
+        let recording = Reader::open(&path).expect("its beginning is whole");
+        scene::write(recording, &settings)
+    };
+    // The damage lies between 4.13 s and the end.
+    let made = made_to(3.0).unwrap_or_else(|error| panic!("{error}"));
+    let scene = Scene::load(&made.path).unwrap_or_else(|error| panic!("{error}"));
+    assert!((scene.duration_s - made.duration_s).abs() < 1e-9);
+    assert!(made.duration_s >= 0.1 && !made.cut, "{made:?}");
+    let error = made_to(4.9).expect_err("it is damaged before");
+    let words = error.to_string();
+    assert!(
+        words.contains("damaged.mcap: damaged after /display/motion at 4.158 s: "),
+        "{words}"
+    );
+    assert!(
+        words.ends_with(": what lies before can be had with --to-time"),
+        "{words}"
+    );
+}
+
+#[test]
 fn other_files_are_refused_by_what_they_are() {
     let folder = folder("others");
     let refusal = |name: &str, bytes: &[u8]| {

@@ -59,6 +59,8 @@ pub fn each(
         let message = match message {
             Ok(message) => message,
             Err(McapError::UnexpectedEof) => break,
+            // What is damaged lies behind the piece that is wanted.
+            Err(_) if logged_extent_s.is_some_and(|(_, last_s)| last_s > to_s) => break,
             Err(error) => {
                 let key = format!("after message {count} of {topic}");
                 return Err(refuse(key, format!("damaged: {error}: give a sound file")));
