@@ -28,7 +28,7 @@ use crate::{ACTUATORS, ZERO_VOLT};
 /// ([`crate::plausibility::Plausibility::is_fresh`]), or there is another reason not to drive, the stimulus fades out; it fades in again when the reason is gone. What no link and no hand can make good
 /// stops it until the reset button or power: see [`crate::supervisor`] and `docs/src/explanation/safety.md`. Time is
 /// counted in ticks alone: the same calls give the same words.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Display {
     configuration: DisplayConfiguration,
     memory: Memory,

@@ -59,7 +59,7 @@ pub enum Breach {
 }
 
 /// The words so far.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Quarters of a millisecond in a tick.
     quarters: u32,

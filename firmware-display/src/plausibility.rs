@@ -65,7 +65,7 @@ pub enum Verdict {
 }
 
 /// The estimates so far.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Plausibility {
     last_sequence: Option<u32>,
     /// See [`Plausibility::take_beginning`].
@@ -254,7 +254,7 @@ pub fn contradicts_itself(estimate: &Estimate) -> bool {
 }
 
 /// The last few estimates that were not to be trusted.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Distrust {
     /// Ages in quarters of a millisecond, the youngest first.
     ages: [u32; DISTRUSTED],
@@ -282,7 +282,7 @@ impl Distrust {
 }
 
 /// How long the arm has been said to move while the hand rested.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Contradiction {
     arm_moves: bool,
     /// Time since the sensor was heard last, since it said last that the arm moves, and since the

@@ -30,7 +30,7 @@ pub enum Verdict {
 }
 
 /// The textures so far.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Relief {
     last_sequence: Option<u32>,
     flood: Flood,

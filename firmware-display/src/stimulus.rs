@@ -37,7 +37,7 @@ const LEAST_GLIDE_MS: u16 = 10;
 /// The display board's output, stepped once per output tick.
 ///
 /// Time is counted in ticks alone: the same calls give the same words.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Stimulus {
     rate: UpdateRate,
     glide_ms: u16,

@@ -1,7 +1,5 @@
 //! Replays what a display board did with its own library, word for word.
 
-use std::collections::HashSet;
-
 use firmware_display::{Display, Senses, Settings};
 use hil_sim_core::link::impairments::BYTE_NS;
 use hil_sim_core::run::recording::{ACTUATORS, EstimateRecord, Recording};
@@ -209,12 +207,15 @@ fn merge(histories: &mut Vec<History>, most: usize) {
         return;
     }
     histories.sort_by_key(History::oddness);
-    let mut seen = HashSet::new();
-    histories.retain(|history| {
-        seen.insert(format!(
-            "{} {} {:?}",
-            history.taken, history.waiting, history.display
-        ))
-    });
-    histories.truncate(most);
+    let mut kept: Vec<History> = Vec::new();
+    for history in histories.drain(..) {
+        let is_known = |other: &History| {
+            (other.taken, other.waiting) == (history.taken, history.waiting)
+                && other.display == history.display
+        };
+        if kept.len() < most && !kept.iter().any(is_known) {
+            kept.push(history);
+        }
+    }
+    *histories = kept;
 }
