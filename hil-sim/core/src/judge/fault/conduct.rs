@@ -26,8 +26,18 @@ const PLAYED_HZ: f64 = 250.0;
 const STARTS_S: f64 = 0.3;
 const MS: u64 = 1_000_000;
 
+/// Whether the display has stopped for good before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Stopped {
+    #[default]
+    No,
+    /// What may have stopped it was too short or too small for it to have to: its outputs tell.
+    IfSilent,
+    Yes,
+}
+
 /// What of it was not as it should be, each with its instant in ns since the scene's start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Misconduct {
     /// The outputs were not at 0 V though there was a reason to hold.
     pub loud: Option<(Hold, u64)>,
@@ -35,6 +45,8 @@ pub(super) struct Misconduct {
     pub silent_ns: Option<u64>,
     /// A reason to hold came up while it drove: the first.
     pub held: Option<(Hold, u64)>,
+    /// All that came up, also while the hand rested.
+    pub reasons: Vec<(Hold, u64)>,
     /// They were driven for the first time after the fault was over.
     pub again_ns: Option<u64>,
     /// Of the time in which they have to be, for how long the hand moved, in ns; and of that, with nothing to hold them.
@@ -53,7 +65,7 @@ pub(super) struct Conduct {
     again_ns: Range<u64>,
     /// When its memory of estimates goes.
     forgets_ns: Option<u64>,
-    must_drive: bool,
+    stopped: Stopped,
     /// What tells the display of the surface is broken itself.
     spoils_estimates: bool,
     /// It was held already when the fault began.
@@ -70,18 +82,20 @@ pub(super) struct Conduct {
     hand: Option<(u64, f64)>,
     moves_since_ns: Option<u64>,
     silent_since_ns: Option<u64>,
+    /// All were at 0 V for longer than a wave that passes it, while the hand moved, since the fault began.
+    has_fallen_silent: bool,
     held_since: Option<(Hold, u64)>,
     free_since_ns: u64,
     seen: Misconduct,
 }
 
 impl Conduct {
-    /// Judges until `until_ns`; a display that has stopped for good before need not drive. Messages take up to `way_ns`.
+    /// Judges until `until_ns`; a display that has `stopped` for good before need not drive. Messages take up to `way_ns`.
     pub fn new(
         fault: &Fault,
         until_ns: u64,
         configuration: &DisplayConfiguration,
-        has_stopped: bool,
+        stopped: Stopped,
         way_ns: u64,
     ) -> Self {
         let row = fault.kind.row();
@@ -102,7 +116,7 @@ impl Conduct {
                 None => over_ns..over_ns,
             },
             forgets_ns: cuts_power.then_some(over_ns),
-            must_drive: !has_stopped,
+            stopped,
             spoils_estimates: row.signs.contains(&Sign::NoValidEstimate),
             max_age_ms: configuration.max_age_ms,
             fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
@@ -167,11 +181,20 @@ impl Conduct {
                 let goes_on = |(before, _): &(Hold, u64)| *before == hold || *before != Hold::Stale;
                 if !self.held_since.as_ref().is_some_and(goes_on) {
                     self.held_since = Some((hold, at_ns));
+                    if self.judged_ns.contains(&at_ns) {
+                        self.seen.reasons.push((hold, at_ns));
+                    }
                 }
             }
         }
         if self.judged_ns.contains(&at_ns) {
             self.was_held.get_or_insert(self.held_since.is_some());
+            if self.stopped == Stopped::IfSilent {
+                let is_silent = self
+                    .silent_since_ns
+                    .is_some_and(|silent_ns| at_ns > silent_ns + SILENCE_NS);
+                self.stopped = if is_silent { Stopped::Yes } else { Stopped::No };
+            }
             self.judge(at_ns);
         }
         self.hear();
@@ -214,13 +237,20 @@ impl Conduct {
             }
         }
         // It has to have been driving once: what it waits for at first is not known here.
-        let may_rest = !self.must_drive
+        let may_rest = self.stopped != Stopped::No
             || self.held_since.is_some()
             || self.excused_ns.contains(&at_ns)
             || self.seen.again_ns.is_none() && self.excused_ns.end > self.judged_ns.start;
         let Some((silent_ns, moves_ns)) = self.silent_since_ns.zip(self.moves_since_ns) else {
             return;
         };
+        if at_ns > silent_ns + SILENCE_NS && silent_ns > self.judged_ns.start {
+            let is_first = !std::mem::replace(&mut self.has_fallen_silent, true);
+            // What drove on until then has not driven again.
+            self.seen
+                .again_ns
+                .take_if(|_| is_first && self.again_ns.contains(&at_ns));
+        }
         let free_ns = self.free_since_ns.max(self.judged_ns.start);
         if !may_rest
             && silent_ns > self.judged_ns.start
@@ -239,7 +269,7 @@ impl Conduct {
 
     /// Until when the display has to drive again, if it has to.
     pub fn due_again_ns(&self) -> Option<u64> {
-        (!self.again_ns.is_empty() && self.must_drive).then_some(self.again_ns.end)
+        (!self.again_ns.is_empty() && self.stopped == Stopped::No).then_some(self.again_ns.end)
     }
 
     /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or

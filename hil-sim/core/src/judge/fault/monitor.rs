@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use protocol::{Hold, Message, Role};
 
-use super::conduct::Conduct;
+use super::conduct::{Conduct, Stopped};
 use super::finding::Finding;
 use super::outputs::Outputs;
 use super::signs::Voice;
@@ -13,7 +13,7 @@ use crate::judge::truth::Truth;
 use crate::plant::motion::MM_PER_COUNT;
 use crate::run::decoder::TimedMessage;
 use crate::run::observer::{RunEvent, RunObserver};
-use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
+use crate::scene::fault::{Class, Fault, Kind, Lasts, Sign, nanoseconds};
 use crate::scene::{Follows, Link, Scene};
 
 /// From a reason to hold until the display says so, in ns: its next tick, and the message's way.
@@ -31,6 +31,10 @@ const NAMED_MS: f64 = 50.0;
 const FASTEST_HAND_MM_S: f64 = 2_000.0;
 /// At slower hands an encoder or a converter that stands still is told later than the table has it, or never.
 const TOLD_MM_S: f64 = 12.0;
+/// A dead encoder is told once an arm has moved so fast, in mm/s, for so long in s without its hand (docs' safety page),
+/// and a tenth of a second for what is said of it.
+const CONTRADICTS_MM_S: f64 = 10.0;
+const CONTRADICTED_S: f64 = 3.1;
 /// Share of the bytes from which on a corrupt frame is certain: one in ten frames.
 const CORRUPT_SHARE: f64 = 1e-3;
 
@@ -48,7 +52,11 @@ pub(super) struct FaultMonitor {
     weather: Vec<Sign>,
     /// See [`is_unheard`].
     is_unheard: bool,
-    has_stopped: bool,
+    stopped: Stopped,
+    /// Resets of the display that other faults may bring meanwhile.
+    resets_of_others: usize,
+    /// Who may be silent meanwhile.
+    silenced: Vec<Role>,
     must_show: bool,
     /// When nobody looks on any more.
     until_ns: u64,
@@ -144,16 +152,23 @@ fn must_show(fault: &Fault, scene: &Scene) -> bool {
         }
 }
 
-/// Whether the hand's mean speed is too low for an encoder, a converter or a gauge that stands still to show in time.
+/// Whether the hand is too slow for an encoder, a converter or a gauge that stands still to show in time: by its mean
+/// speed, or where an arm that moves without it has to contradict it, by how long it moves faster than what counts.
 fn is_slow(fault: &Fault, scene: &Scene) -> bool {
-    const PARTS: u32 = 100;
+    const PARTS: u32 = 1_000;
     let within_s = fault.kind.row().seen_within_ms.unwrap_or(0.0) * 1e-3;
     let at_s = |part: u32| fault.at_s + within_s * f64::from(part) / f64::from(PARTS);
     let speeds = (0..PARTS).map(|part| scene.motion.velocity_mm_s(at_s(part)).abs());
-    matches!(
-        fault.kind,
-        Kind::HandEncoderDead | Kind::AdcStuck | Kind::GaugeOpen | Kind::GaugeShort
-    ) && speeds.sum::<f64>() < TOLD_MM_S * f64::from(PARTS)
+    let is_slow = speeds.clone().sum::<f64>() < TOLD_MM_S * f64::from(PARTS);
+    let contradicts_s = || {
+        let parts = speeds.filter(|&speed| speed > CONTRADICTS_MM_S).count();
+        within_s * parts as f64 / f64::from(PARTS)
+    };
+    match fault.kind {
+        Kind::HandEncoderDead => is_slow || contradicts_s() < CONTRADICTED_S,
+        Kind::AdcStuck | Kind::GaugeOpen | Kind::GaugeShort => is_slow,
+        _ => false,
+    }
 }
 
 impl FaultMonitor {
@@ -178,19 +193,37 @@ impl FaultMonitor {
             .filter(|other| other.cuts_power(Role::Display) && other.begins_ns() <= from_ns)
             .map(Fault::begins_ns)
             .max();
+        let over_ns = fault.ends_ns().unwrap_or(from_ns);
+        // With the display's power ends what has stopped it, unless that is still there.
+        let ends_with_it = |other: &Fault| {
+            fault.cuts_power(Role::Display)
+                && (other.kind.row().lasts == Lasts::Once || !other.is_on(over_ns))
+        };
         let stops = |other: &&Fault| {
             other.kind.row().class == Class::Stops
                 && !is_unheard(other, scene)
                 && other.begins_ns() <= from_ns
                 && last_power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns)
+                && !ends_with_it(other)
         };
-        let has_stopped = others().any(|other| stops(&other));
-        let shows = |other: &&Fault| {
+        let stopped = match others()
+            .filter(stops)
+            .max_by_key(|other| must_show(other, scene))
+        {
+            None => Stopped::No,
+            Some(other) if must_show(other, scene) => Stopped::Yes,
+            Some(_) => Stopped::IfSilent,
+        };
+        let lingers = |other: &&Fault| {
             let over_ns = other.ends_ns().unwrap_or(other.begins_ns());
-            stops(other) || (over_ns + LINGERS_NS > from_ns && other.begins_ns() < alone_ns.end)
+            over_ns + LINGERS_NS > from_ns && other.begins_ns() < alone_ns.end
         };
+        let lingering = || others().filter(|other| lingers(other));
+        let resets_of_others = lingering().map(|other| other.kind.row().resets).sum();
+        let silenced = lingering().flat_map(|other| other.kind.row().silences);
+        let silenced = silenced.chain(row.silences).copied().collect();
         let mut of_others: Vec<Sign> = others()
-            .filter(|other| shows(other))
+            .filter(|other| stops(other) || lingers(other))
             .flat_map(|other| [other.kind.row().signs, other.kind.row().also])
             .flatten()
             .copied()
@@ -202,12 +235,15 @@ impl FaultMonitor {
         let weather = weather_signs(&scene.link);
         of_others.extend(&weather);
         let configuration = scene.display_configuration();
-        // Of a flood, which estimates find room is chance.
         let tires = f64::from(configuration.full_drive_s) < scene.duration_s;
+        if tires {
+            of_others.push(Sign::Fading(Hold::FullDrive));
+        }
+        // Of a flood, which estimates find room is chance.
         let keeps_step = row.class != Class::Stops
             && row.safe_within_ms.is_none()
             && fault.kind != Kind::LinkFlood
-            && !has_stopped;
+            && stopped != Stopped::Yes;
         let truth = Truth {
             display: configuration,
             actuators: *scene.display.actuators,
@@ -221,7 +257,7 @@ impl FaultMonitor {
                 &fault,
                 alone_ns.end,
                 &configuration,
-                has_stopped || tires,
+                if tires { Stopped::Yes } else { stopped },
                 nanoseconds((scene.link.delay_ms + scene.link.jitter_ms) * 1e-3),
             ),
             step: keeps_step.then(|| Step::new(&truth, alone_ns.clone())),
@@ -230,7 +266,9 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard: is_unheard(&fault, scene),
-            has_stopped,
+            stopped,
+            resets_of_others,
+            silenced,
             must_show: must_show(&fault, scene),
             until_ns,
             has_looked: false,
@@ -247,8 +285,8 @@ impl FaultMonitor {
     /// Why it need not show in that time.
     fn unseen(&self) -> Option<&'static str> {
         let kind = self.fault.kind;
-        let has_stopped = self.has_stopped && !self.outputs.was_driving;
-        if kind.row().class == Class::Stops && has_stopped {
+        let may_have_stopped = self.stopped != Stopped::No && !self.outputs.was_driving;
+        if kind.row().class == Class::Stops && may_have_stopped {
             return Some("the display has stopped before");
         }
         let back_ns = || nanoseconds(self.fault.values[0] * 1e-3);
@@ -260,7 +298,7 @@ impl FaultMonitor {
             return Some(self.ends());
         }
         if self.is_slow {
-            return Some("the hand moves at less than 12 mm/s");
+            return Some("the hand moves too slowly");
         }
         let hides = |sign: &Sign| self.weather.contains(sign);
         // Of these two, what else shows is chance.
@@ -294,7 +332,9 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard,
-            has_stopped,
+            stopped,
+            resets_of_others,
+            silenced,
             must_show,
             has_looked,
             until_ns,
@@ -309,6 +349,11 @@ impl FaultMonitor {
             .filter(|(sign, ..)| row.signs.contains(sign) && !weather.contains(sign))
             .min_by_key(|&(_, at_ns, words)| (at_ns, words));
         let outputs = self.outputs.finish();
+        let has_stopped = match stopped {
+            Stopped::No => false,
+            Stopped::IfSilent => !outputs.was_driving,
+            Stopped::Yes => true,
+        };
         // At rest there is nothing that a gauge or an encoder could be missed by.
         let must_show = must_show
             && !is_unheard
@@ -371,9 +416,10 @@ impl FaultMonitor {
         }
         // A reason to hold that arrived has to be said.
         let is_due = |hold: Hold, at_ns: u64| {
-            let said = conduct.held.is_some_and(|(due, due_ns)| {
-                due == hold && (due_ns..=due_ns + SAID_NS).contains(&at_ns)
-            });
+            let said = conduct
+                .reasons
+                .iter()
+                .any(|&(due, due_ns)| due == hold && (due_ns..=due_ns + SAID_NS).contains(&at_ns));
             said || row.signs.contains(&Sign::Fading(hold))
                 || row.also.contains(&Sign::Fading(hold))
         };
@@ -443,7 +489,7 @@ impl FaultMonitor {
             (Role::Display, self.motions, "motions"),
         ] {
             if let Some(at_ns) = beat.finish(&alone_ns)
-                && !row.silences.contains(&role)
+                && !silenced.contains(&role)
             {
                 otherwise.push(format!("no {what} from {:.2} ms on", ms(at_ns)));
             }
@@ -469,7 +515,7 @@ impl FaultMonitor {
             standing: outputs.standing(),
             drives_again: outputs.drives_again,
             again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
-            resets: self.resets,
+            resets: self.resets.saturating_sub(resets_of_others),
             unjudged,
             must_show,
             is_unheard,
@@ -527,7 +573,8 @@ impl RunObserver for FaultMonitor {
             RunEvent::Received(arrival) => self.conduct.received(arrival),
             RunEvent::Said(role, said) => self.said(role, said),
             RunEvent::Reset(reset) if self.due_ns.contains(&reset.at_ns) => {
-                self.resets += usize::from(reset.role == Role::Display);
+                let is_its_own = self.alone_ns.contains(&reset.at_ns);
+                self.resets += usize::from(reset.role == Role::Display && is_its_own);
                 if !reset.is_injected {
                     let words = format!("{} reset", reset.role.name());
                     self.note(reset.at_ns, Sign::Reset(reset.role), words);
