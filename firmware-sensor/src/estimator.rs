@@ -48,6 +48,8 @@ pub struct Finding {
     pub misfits: u8,
     /// The gauges hold more power at high frequencies than a slipping fingertip would make.
     pub jerky: bool,
+    /// The fingertip has come down since the last finding: what was felt before is of no surface, or of another one.
+    pub landed: bool,
 }
 
 /// An estimator of λ.

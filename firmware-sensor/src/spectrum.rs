@@ -111,6 +111,8 @@ pub struct Spectrum {
     jerk: Jerk,
     touch: Touch,
     rested: u32,
+    /// See [`Finding::landed`].
+    landed: bool,
     /// Speed in mm/s, falling no faster than the jerk is forgotten.
     speed_mm_s: f32,
     /// Travel since the last survey, and since the start or the last change of surface, in mm.
@@ -175,6 +177,7 @@ impl Spectrum {
             jerk: Jerk::default(),
             touch: Touch::default(),
             rested: 0,
+            landed: false,
             speed_mm_s: 0.0,
             fresh_mm: 0.0,
             travelled_mm: 0.0,
@@ -216,6 +219,7 @@ impl Spectrum {
 
     /// The surface begins here. What was felt before was none; the step of a landing would go on in all long waves.
     fn land(&mut self) {
+        self.landed = true;
         self.periodogram = Periodogram::new();
         self.knots.restart();
         self.travelled_mm = 0.0;
@@ -283,6 +287,7 @@ impl Spectrum {
             gauges_used: usable,
             misfits: misfits(&fitted, usable, valid),
             jerky,
+            landed: false,
         }
     }
 }
@@ -362,6 +367,7 @@ impl Estimator for Spectrum {
 
     fn find(&mut self, travel: &Travel) -> Finding {
         self.slot = 0;
+        let landed = core::mem::take(&mut self.landed);
         let speed_mm_s = travel.velocity_mm_s(0).abs();
         self.speed_mm_s = speed_mm_s.max(self.speed_mm_s * SPEED_KEPT);
         self.weighed = Weighed::default();
@@ -381,9 +387,17 @@ impl Estimator for Spectrum {
             (Some(line), Some(wave)) => likelier(line, wave),
             (line, wave) => match line.or(wave) {
                 Some(said) => said,
-                None => return Finding::default(),
+                None => {
+                    return Finding {
+                        landed,
+                        ..Finding::default()
+                    };
+                }
             },
         };
-        self.say(&said)
+        Finding {
+            landed,
+            ..self.say(&said)
+        }
     }
 }

@@ -229,17 +229,24 @@ impl Surface {
     /// Hears what the estimator says of λ.
     pub fn hear(&mut self, finding: &Finding) {
         self.stood_by = finding.valid;
+        if finding.landed {
+            self.begin_surface();
+        }
         let Some(wavelength_mm) = finding.wavelength_mm.filter(|_| finding.valid) else {
             return;
         };
         let another = (wavelength_mm / self.wavelength_mm - 1.0).abs() > ANOTHER;
         self.wavelength_mm = wavelength_mm;
         self.increment = (4_294_967_296.0 / (wavelength_mm * PLACES_PER_MM as f32)) as u32;
-        if another || self.averages.blocks == 0.0 && self.block.knots == 0 {
-            self.averages = Averages::default();
-            self.rest = None;
-            self.begin_block();
+        if another || self.averages.blocks == 0.0 && !self.block.is_begun() {
+            self.begin_surface();
         }
+    }
+
+    fn begin_surface(&mut self) {
+        self.averages = Averages::default();
+        self.rest = None;
+        self.begin_block();
     }
 
     /// What there is to say with the estimate of that number, made at `instant_us` of the board's clock.

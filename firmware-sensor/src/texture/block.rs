@@ -99,6 +99,11 @@ impl Block {
         self.normal = NormalEquations::default();
     }
 
+    /// Whether there is something in it that counts.
+    pub fn is_begun(&self) -> bool {
+        self.knots > 0 || self.sound && self.knot.touches > 0.0
+    }
+
     pub const fn is_complete(&self) -> bool {
         self.knots == KNOTS
     }

@@ -205,6 +205,57 @@ fn another_surface_is_not_told_of_by_what_was_felt_of_the_one_before() {
 }
 
 #[test]
+fn a_slow_stroke_tells_of_its_texture_too() {
+    let shape = [(0.4, 0.1), (0.25, 0.7)];
+    for (wavelength_mm, speed_mm_s) in [(8.0, 30.0), (4.0, 15.0), (2.0, 8.0), (0.7, 3.0)] {
+        let ground = Ground {
+            wavelength_mm,
+            shape,
+            random: None,
+        };
+        let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+        bench.noise_lsb = NOISE_20_DB;
+        let felt = |gauge: usize, x_mm: f64, _| ground.felt(gauge, x_mm);
+        bench.rub(12_000, |_| speed_mm_s, felt);
+        let (db, degrees) = off(&last_valid(&bench), shape);
+        assert!(db <= 1.0, "{wavelength_mm} mm, {speed_mm_s} mm/s: {db} dB");
+        assert!(
+            degrees <= 5.0,
+            "{wavelength_mm} mm, {speed_mm_s} mm/s: {degrees}°"
+        );
+    }
+}
+
+#[test]
+fn a_fingertip_that_comes_down_again_tells_nothing_of_the_surface_before() {
+    let surface = |shape| Ground {
+        wavelength_mm: 2.0,
+        shape,
+        random: None,
+    };
+    let (before, behind) = ([(0.5, 0.1), (0.1, 0.7)], [(0.1, 0.1), (0.5, 0.2)]);
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.noise_lsb = NOISE_20_DB;
+    // Down at 3 times the wave's amplitude, up at 100 mm, down again at 200.
+    let felt = |gauge: usize, x_mm: f64, _| match x_mm {
+        ..100.0 => surface(before).felt(gauge, x_mm) + 3.0 * CODES * GAINS[gauge],
+        ..200.0 => 0.0,
+        _ => surface(behind).felt(gauge, x_mm) + 3.0 * CODES * GAINS[gauge],
+    };
+    bench.rub(7_000, |_| 50.0, felt);
+    let told = bench.textures.iter().filter(|told| told.valid);
+    let told: Vec<_> = told.filter(|told| told.instant_us > 4_050_000).collect();
+    assert!(told.len() > 30, "{} are valid", told.len());
+    for texture in told {
+        let (db, degrees) = off(texture, behind);
+        assert!(
+            db <= 1.0 && degrees <= 5.0,
+            "{db} dB, {degrees}°: {texture:?}"
+        );
+    }
+}
+
+#[test]
 fn textures_bear_their_estimates_number_and_come_every_50_ms_while_the_arm_moves() {
     let ground = Ground {
         wavelength_mm: 2.0,

@@ -18,7 +18,7 @@ use crate::relay::network::{Ends, Network};
 use crate::relay::operator::{self, Progress};
 use crate::relay::refused;
 use crate::relay::remote::site;
-use crate::relay::report::{Notice, Report};
+use crate::relay::report::{Notice, Report, cause};
 use crate::relay::site::{Settings, Site, opposite};
 use crate::relay::transport::Transport;
 use crate::system::System;
@@ -35,6 +35,8 @@ use super::signals::{self, Again};
 const LOOK: Duration = Duration::from_millis(50);
 /// Between two lines of statistics.
 const REPORT: Duration = Duration::from_secs(1);
+/// How long an operator's connection takes to close, and its outcome to be told.
+const CLOSES: Duration = Duration::from_millis(500);
 
 /// How the parts play together.
 pub const EXAMPLES: &str = "\
@@ -291,15 +293,16 @@ impl Stopping {
         drop(outcomes);
         let mut progress = Progress::Unheard;
         let mut errors = Vec::new();
-        for outcome in told {
+        // Those that were never reached may take longer to say why: nobody waits for that to hear that nothing stopped.
+        let end = Instant::now() + within + CLOSES;
+        while let Ok(outcome) = told.recv_timeout(end.saturating_duration_since(Instant::now())) {
             match outcome {
-                Ok(stopping) => {
-                    if let Some(trip) = stopping.trip {
-                        say(&format!("Stop: the display has stopped: {}", trip.name()));
-                        return Ok(ExitCode::SUCCESS);
-                    }
-                    progress = progress.max(stopping.progress);
+                Ok(stopping) if stopping.progress == Progress::Stopped => {
+                    let cause = cause(stopping.trip);
+                    say(&format!("Stop: the display has stopped: {cause}"));
+                    return Ok(ExitCode::SUCCESS);
                 }
+                Ok(stopping) => progress = progress.max(stopping.progress),
                 Err(error) => errors.push(error),
             }
         }
@@ -316,7 +319,8 @@ impl Stopping {
             "NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
             self.within
         ));
-        for error in errors {
+        let late = told.into_iter().filter_map(Result::err);
+        for error in errors.into_iter().chain(late) {
             say(&error);
         }
         Ok(ExitCode::from(1))

@@ -39,11 +39,12 @@ pub enum ReadError {
     Foreign(PathBuf, String),
     #[error("{0}: its format is {1}, this program reads {FORMAT}: take the program that made it")]
     Newer(PathBuf, String),
-    #[error("{path}: damaged after {after}: {reason}: what lies before can be had with --to-time")]
+    #[error("{path}: damaged after {after}: {reason}: {advice}")]
     Damaged {
         path: PathBuf,
         after: String,
         reason: String,
+        advice: String,
     },
     #[error(
         "{path}: ends at {last_s:.3} s, and is to be read from {from_s} s on: give an earlier moment"
@@ -96,6 +97,8 @@ pub struct Reader {
     first_ns: Option<u64>,
     /// The last that was read, for error messages.
     last: Option<(String, f64)>,
+    /// The time of the last samples of gauges, in s since the recording's start.
+    last_gauges_s: Option<f64>,
     ended: Option<Ending>,
     /// Configurations that a later part of a recording tells at its beginning.
     told: Vec<(Role, Row)>,
@@ -138,6 +141,7 @@ impl Reader {
             samples: (0, Vec::with_capacity(GAUGE_BLOCK)),
             first_ns: None,
             last: None,
+            last_gauges_s: None,
             ended: None,
             told: Vec::new(),
         };
@@ -225,6 +229,9 @@ impl Reader {
             self.first_ns.get_or_insert(log_ns);
             let at_s = self.since_start_s(log_ns);
             self.last = Some((topic(role, kind), at_s));
+            if kind == Kind::Gauges {
+                self.last_gauges_s = Some(at_s);
+            }
             let (row, log_ns) = match read {
                 Ok(Read::Row(row)) => (row, log_ns),
                 Ok(Read::Sample(sample)) => match self.gather(sample, log_ns) {
@@ -320,10 +327,23 @@ impl Reader {
                         |(topic, at_s)| format!("{topic} at {at_s:.3} s"),
                     ),
                     reason: words(error),
+                    advice: self.advice(),
                 });
             }
         }
         Ok(None)
+    }
+
+    /// What to do about damage: rows behind that time have been read.
+    fn advice(&self) -> String {
+        let last_s = self.last.as_ref().map(|&(_, at_s)| at_s);
+        match self.last_gauges_s.or(last_s) {
+            Some(last_s) if last_s > 0.001 => format!(
+                "what lies before can be had with --to-time {:.3}",
+                last_s - 0.001
+            ),
+            _ => "nothing that lies before can be had".to_owned(),
+        }
     }
 
     fn note(&mut self, record: &Record<'_>) -> Result<(), ReadError> {

@@ -33,7 +33,7 @@ pub enum Progress {
 pub struct Stopping {
     /// How far it has come.
     pub progress: Progress,
-    /// The reason for which the display's board says that it has stopped, if it does.
+    /// The reason for which the display's board says that it has stopped, if it does and this program knows it.
     pub trip: Option<Trip>,
 }
 
@@ -100,10 +100,7 @@ pub fn stop(
 /// What the display's bridge says of the Stop numbered `ours`.
 fn told(content: &Content, ours: u64) -> Option<Stopping> {
     let (id, progress, trip) = match *content {
-        Content::Stopped {
-            id,
-            trip: Some(trip),
-        } => (id, Progress::Stopped, Some(trip)),
+        Content::Stopped { id, trip } => (id, Progress::Stopped, trip),
         Content::Stopping { id, is_told: true } => (id, Progress::Told, None),
         Content::Stopping { id, is_told: false } => (id, Progress::Heard, None),
         _ => return None,

@@ -290,7 +290,8 @@ impl fmt::Display for Notice {
     }
 }
 
-fn cause(trip: Option<Trip>) -> &'static str {
+/// Why a board has stopped, in words.
+pub fn cause(trip: Option<Trip>) -> &'static str {
     trip.map_or("a cause that only a later version knows", Trip::name)
 }
 

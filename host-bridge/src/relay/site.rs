@@ -81,6 +81,8 @@ struct Shared {
     board: OnceLock<LinkSender>,
     /// Who the board here is, while it is there.
     board_hello: Mutex<Option<Hello>>,
+    /// The other board is there in its place: what that says is not this board's.
+    is_other_board: AtomicBool,
     /// Until when the other site watches the board here, in µs.
     shown_until_us: AtomicU64,
     far_board: OnceLock<FarBoard>,
@@ -139,6 +141,7 @@ impl Site {
             outbox: Outbox::new(clock.notify()),
             board: OnceLock::new(),
             board_hello: Mutex::new(None),
+            is_other_board: AtomicBool::new(false),
             shown_until_us: AtomicU64::new(0),
             far_board: OnceLock::new(),
             stops: Mutex::new(Stops::default()),
@@ -165,6 +168,11 @@ impl Site {
                     State::Known(_, hello) => Some(*hello),
                     _ => None,
                 };
+                let is_other = state.who(role) != Some(role);
+                if carrier.is_other_board.swap(is_other, Ordering::AcqRel) && !is_other {
+                    // The other one may have answered for it.
+                    locked(&carrier.stops).tell_again();
+                }
                 carrier.tell(Notice::Board(state));
             }
             // Its numbers tell the other site, and sooner.
@@ -317,12 +325,13 @@ impl Shared {
     }
 
     fn carry(&self, at_us: u64, message: Message) {
-        let obeyed = {
+        let obeyed = || {
             let mut stops = locked(&self.stops);
             stops.on_state(&message);
             stops.obeyed(at_us, &message)
         };
-        if let Some((trip, ids)) = obeyed {
+        let is_other = self.is_other_board.load(Ordering::Acquire);
+        if let Some((trip, ids)) = (!is_other).then(obeyed).flatten() {
             // By another program, or by the board itself: both stop.
             let (id, reason) = (random_number(), StopReason::Host);
             let is_news = locked(&self.stops).spread(id, Stop { reason });

@@ -118,8 +118,18 @@ impl Stops {
         is_news
     }
 
+    /// The board has started anew. What it obeyed before counts no more: whoever has not heard of that, and goes on
+    /// saying Stop, may mean the board that runs now.
     pub fn on_restart(&mut self) {
         self.is_halted = false;
+        self.done.clear();
+    }
+
+    /// The board is to be told again of what it has not obeyed.
+    pub fn tell_again(&mut self) {
+        for pending in &mut self.pending {
+            pending.told_us = None;
+        }
     }
 
     /// The board said something. If it is that it goes, and no Stop is on its way to it, it has started anew.
@@ -294,6 +304,27 @@ mod tests {
         assert!(!stops.spread(5, STOP));
         stops.on_state(&status(None));
         assert!(stops.spread(6, STOP));
+    }
+
+    #[test]
+    fn a_stop_that_the_other_site_goes_on_saying_stops_a_board_that_has_started_anew() {
+        let mut stops = Stops::default();
+        stops.hear(1, STOP);
+        stops.tell(1, 5);
+        stops.obeyed(6, &stopped());
+        assert_eq!(stops.hear(1, STOP), Standing::Done(TRIP));
+        stops.on_restart();
+        assert_eq!(stops.hear(1, STOP), Standing::New);
+    }
+
+    #[test]
+    fn what_another_board_may_have_answered_is_told_again() {
+        let mut stops = Stops::default();
+        stops.hear(1, STOP);
+        stops.tell(1, 5);
+        assert!(stops.untold().is_empty());
+        stops.tell_again();
+        assert_eq!(stops.untold(), [(1, STOP)]);
     }
 
     #[test]

@@ -387,6 +387,19 @@ fn relay_stop_does_not_wait_for_an_end_that_is_dead() {
 }
 
 #[test]
+fn a_board_of_the_other_role_does_not_stop_for_the_display() {
+    let (sensor, other) = (talking_board(Role::Sensor), talking_board(Role::Sensor));
+    let pair = Pair::new(&sensor, &other, &[]);
+    pair.display.says("not the display", LIMIT);
+    let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
+    let (status, _, words) = Relay::start(["stop", "--connect", &at, "--within", "3"]).wait(LIMIT);
+    assert_eq!(status.code(), Some(1), "{words}");
+    assert!(words.contains("NOT STOPPED"), "{words}");
+    // It is told to stop all the same.
+    listen(&other, LIMIT, |heard| heard.iter().any(is_stop));
+}
+
+#[test]
 fn two_bridges_of_one_role_and_name_are_told_so() {
     let (first, second) = (FakeBoard::new(Role::Display), FakeBoard::new(Role::Display));
     let at = format!("tcp/127.0.0.1:{}", free_port());

@@ -619,7 +619,10 @@ fn what_was_too_small_to_stop_the_display_excuses_no_silence_later() {
         scene.faults[0].values[0] = 50.0;
         finding(&scene, 1, 2_000 * MS, &silent(2.0, silent_ms)).unmet()
     };
-    assert_eq!(unmet(800..1_000), ["silent from 300.00 ms on, without a reason"]);
+    assert_eq!(
+        unmet(800..1_000),
+        ["silent from 300.00 ms on, without a reason"]
+    );
     // If it did stop, nothing more is asked of it.
     assert_eq!(unmet(200..2_000), [""; 0]);
 }
