@@ -270,11 +270,12 @@ impl Session<'_> {
                 // What is safe: there will be no summary.
                 return self.count();
             }
-            if ended.load(Ordering::Relaxed) || past {
+            // What becomes of a Stop is told first.
+            if (ended.load(Ordering::Relaxed) || past) && !self.is_stopping() {
                 return;
             }
             let left = until.map_or(LOOK, |until| until.saturating_sub(self.started.elapsed()));
-            self.listen(LOOK.min(left));
+            self.listen(if past { LOOK } else { LOOK.min(left) });
             if Instant::now() >= due {
                 due += TOLD;
                 self.count();
@@ -286,10 +287,7 @@ impl Session<'_> {
     fn listen(&mut self, wait: Duration) {
         let heard = self.told.recv_timeout(wait);
         // Before the answers to it.
-        if self.stops.try_iter().count() > 0 {
-            self.stopping = Some(Instant::now() + STOP_PATIENCE);
-            self.stopped.clear();
-        }
+        self.is_stopping();
         match heard {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
@@ -321,6 +319,15 @@ impl Session<'_> {
             // Asked again if it is not answered.
             self.post(role, &message);
         }
+    }
+
+    /// Whether boards that were told to stop may still answer.
+    fn is_stopping(&mut self) -> bool {
+        if self.stops.try_iter().count() > 0 {
+            self.stopping = Some(Instant::now() + STOP_PATIENCE);
+            self.stopped.clear();
+        }
+        self.stopping.is_some()
     }
 
     /// Tells of a board that has stopped, by its own name: behind a port may be the other one.

@@ -1,6 +1,7 @@
 //! Everything that is said is recorded, and nothing is changed.
 
 use std::fs::{self, File};
+use std::process::Stdio;
 
 use host_bridge::recording::row::Row;
 use protocol::{
@@ -165,4 +166,30 @@ fn what_became_of_a_stop_is_told() {
     is_told("display has stopped: by the operator\n");
     signal(&running, "-INT");
     assert_eq!(running.wait(LIMIT).status.code(), Some(0));
+}
+
+#[test]
+fn a_recording_that_is_ended_tells_first_what_became_of_a_stop() {
+    let folder = folder("stop-and-end");
+    let pair = Pair::new();
+    pair.display.disobey(true);
+    let path = folder.join("stop.mcap");
+    let running = pair.record(
+        bridge::command().stderr(Stdio::piped()),
+        &[path.to_str().expect("UTF-8"), "--no-gauges", "--quiet"],
+    );
+    pair.wait_for_questions();
+    signal(&running, "-USR1");
+    let is_stop = |message: &Message| matches!(message, Message::Stop(_));
+    assert!(wait_until(LIMIT, || pair
+        .display
+        .take_heard()
+        .iter()
+        .any(is_stop)));
+    signal(&running, "-INT");
+    let output = running.wait(LIMIT);
+    let words = &output.stderr;
+    assert_eq!(output.status.code(), Some(0), "{words}");
+    assert!(words.contains("NOT STOPPED: "), "{words}");
+    assert!(words.contains("use the emergency stop"), "{words}");
 }
