@@ -23,8 +23,10 @@ pub struct Finding {
     pub drives_again: bool,
     /// From its end until the display drove again, in ns.
     pub again_ns: Option<u64>,
-    /// Resets of the display board that came of it.
+    /// Resets of the display board until the next fault.
     pub resets: usize,
+    /// Of these, how many may come of other faults.
+    pub(super) resets_of_others: usize,
     /// What is not judged, each with the reason.
     pub unjudged: Vec<String>,
     /// Whether it is one that has to be seen and answered: long enough, and great enough.
@@ -60,7 +62,8 @@ impl Finding {
             unmet.push(format!("{stuck} outputs stuck"));
         }
         // What nobody has seen is over without a stop.
-        let is_answered = self.must_show || self.detected_ns.is_some() || self.resets > 0;
+        let is_answered =
+            self.must_show || self.detected_ns.is_some() || self.resets > self.resets_of_others;
         if is_answered && self.is_restart_against_the_table() {
             let again = if self.drives_again {
                 ", drives again"
@@ -114,6 +117,7 @@ impl Finding {
     /// Whether the display drove again where it must not, or was reset more often than it may.
     pub fn is_restart_against_the_table(&self) -> bool {
         let row = self.fault.kind.row();
-        self.resets > row.resets || (self.drives_again && !row.class.may_drive_again())
+        self.resets > row.resets + self.resets_of_others
+            || (self.drives_again && !row.class.may_drive_again())
     }
 }

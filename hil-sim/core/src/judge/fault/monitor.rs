@@ -53,8 +53,9 @@ pub(super) struct FaultMonitor {
     /// See [`is_unheard`].
     is_unheard: bool,
     stopped: Stopped,
-    /// Resets of the display that other faults may bring meanwhile.
+    /// Resets of the display that other faults still may bring, and since when those count.
     resets_of_others: usize,
+    others_from_ns: u64,
     /// Who may be silent meanwhile.
     silenced: Vec<Role>,
     must_show: bool,
@@ -220,6 +221,7 @@ impl FaultMonitor {
         };
         let lingering = || others().filter(|other| lingers(other));
         let resets_of_others = lingering().map(|other| other.kind.row().resets).sum();
+        let others_from_ns = lingering().map(Fault::begins_ns).min().unwrap_or(from_ns);
         let silenced = lingering().flat_map(|other| other.kind.row().silences);
         let silenced = silenced.chain(row.silences).copied().collect();
         let mut of_others: Vec<Sign> = others()
@@ -268,6 +270,7 @@ impl FaultMonitor {
             is_unheard: is_unheard(&fault, scene),
             stopped,
             resets_of_others,
+            others_from_ns,
             silenced,
             must_show: must_show(&fault, scene),
             until_ns,
@@ -515,7 +518,8 @@ impl FaultMonitor {
             standing: outputs.standing(),
             drives_again: outputs.drives_again,
             again_ns: conduct.again_ns.map(|again_ns| again_ns - over_ns),
-            resets: self.resets.saturating_sub(resets_of_others),
+            resets: self.resets,
+            resets_of_others,
             unjudged,
             must_show,
             is_unheard,
@@ -572,6 +576,11 @@ impl RunObserver for FaultMonitor {
             }
             RunEvent::Received(arrival) => self.conduct.received(arrival),
             RunEvent::Said(role, said) => self.said(role, said),
+            RunEvent::Reset(reset) if reset.at_ns < self.due_ns.start => {
+                if reset.role == Role::Display && reset.at_ns >= self.others_from_ns {
+                    self.resets_of_others = self.resets_of_others.saturating_sub(1);
+                }
+            }
             RunEvent::Reset(reset) if self.due_ns.contains(&reset.at_ns) => {
                 let is_its_own = self.alone_ns.contains(&reset.at_ns);
                 self.resets += usize::from(reset.role == Role::Display && is_its_own);

@@ -45,9 +45,9 @@ pub(super) struct Step {
     was_zero: bool,
     /// Of a silence, in s.
     least_silence_s: f64,
-    /// How long the stimulus then takes to its full amplitude, and when it is there, in s. What still rises has more of
-    /// its later part in it: a cycle of it, or a part of one, would be found up to 0.2 cycles off.
+    /// What the stimulus then takes to its full amplitude, in s.
     fade_in_s: f64,
+    /// When it is there, in s. A cycle that still rises, or a part of one, would be found up to 0.2 cycles off.
     full_from_s: f64,
     rendering: Rendering,
     peak_v: f64,
