@@ -287,7 +287,7 @@ impl Spectrum {
             gauges_used: usable,
             misfits: misfits(&fitted, usable, valid),
             jerky,
-            landed: false,
+            ..Finding::default()
         }
     }
 }
@@ -384,20 +384,10 @@ impl Estimator for Spectrum {
             }
         };
         let said = match (line, wave) {
-            (Some(line), Some(wave)) => likelier(line, wave),
-            (line, wave) => match line.or(wave) {
-                Some(said) => said,
-                None => {
-                    return Finding {
-                        landed,
-                        ..Finding::default()
-                    };
-                }
-            },
+            (Some(line), Some(wave)) => Some(likelier(line, wave)),
+            (line, wave) => line.or(wave),
         };
-        Finding {
-            landed,
-            ..self.say(&said)
-        }
+        let finding = said.map_or_else(Finding::default, |said| self.say(&said));
+        Finding { landed, ..finding }
     }
 }

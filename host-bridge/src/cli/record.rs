@@ -270,8 +270,9 @@ impl Session<'_> {
                 // What is safe: there will be no summary.
                 return self.count();
             }
+            self.note_stops();
             // What becomes of a Stop is told first.
-            if (ended.load(Ordering::Relaxed) || past) && !self.is_stopping() {
+            if (ended.load(Ordering::Relaxed) || past) && self.stopping.is_none() {
                 return;
             }
             let left = until.map_or(LOOK, |until| until.saturating_sub(self.started.elapsed()));
@@ -287,7 +288,7 @@ impl Session<'_> {
     fn listen(&mut self, wait: Duration) {
         let heard = self.told.recv_timeout(wait);
         // Before the answers to it.
-        self.is_stopping();
+        self.note_stops();
         match heard {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
@@ -321,13 +322,12 @@ impl Session<'_> {
         }
     }
 
-    /// Whether boards that were told to stop may still answer.
-    fn is_stopping(&mut self) -> bool {
+    /// Gives boards that have been told to stop their time to answer.
+    fn note_stops(&mut self) {
         if self.stops.try_iter().count() > 0 {
             self.stopping = Some(Instant::now() + STOP_PATIENCE);
             self.stopped.clear();
         }
-        self.stopping.is_some()
     }
 
     /// Tells of a board that has stopped, by its own name: behind a port may be the other one.

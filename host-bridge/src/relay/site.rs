@@ -325,13 +325,14 @@ impl Shared {
     }
 
     fn carry(&self, at_us: u64, message: Message) {
-        let obeyed = || {
+        let obeyed = if self.is_other_board.load(Ordering::Acquire) {
+            None
+        } else {
             let mut stops = locked(&self.stops);
             stops.on_state(&message);
             stops.obeyed(at_us, &message)
         };
-        let is_other = self.is_other_board.load(Ordering::Acquire);
-        if let Some((trip, ids)) = (!is_other).then(obeyed).flatten() {
+        if let Some((trip, ids)) = obeyed {
             // By another program, or by the board itself: both stop.
             let (id, reason) = (random_number(), StopReason::Host);
             let is_news = locked(&self.stops).spread(id, Stop { reason });
