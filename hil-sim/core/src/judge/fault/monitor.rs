@@ -576,10 +576,11 @@ impl RunObserver for FaultMonitor {
             }
             RunEvent::Received(arrival) => self.conduct.received(arrival),
             RunEvent::Said(role, said) => self.said(role, said),
-            RunEvent::Reset(reset) if reset.at_ns < self.due_ns.start => {
-                if reset.role == Role::Display && reset.at_ns >= self.others_from_ns {
-                    self.resets_of_others = self.resets_of_others.saturating_sub(1);
-                }
+            RunEvent::Reset(reset)
+                if reset.role == Role::Display
+                    && (self.others_from_ns..self.due_ns.start).contains(&reset.at_ns) =>
+            {
+                self.resets_of_others = self.resets_of_others.saturating_sub(1);
             }
             RunEvent::Reset(reset) if self.due_ns.contains(&reset.at_ns) => {
                 let is_its_own = self.alone_ns.contains(&reset.at_ns);
