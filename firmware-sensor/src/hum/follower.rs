@@ -303,6 +303,14 @@ impl Follower {
         self.steady.rest(known);
         if known {
             self.known = self.found;
+            // Of a gauge that is not usable, what it has of its own may be gone when it is again.
+            let mean =
+                sum(&self.found, usable).map(|part| part / usable.count_ones().max(1) as f32);
+            for (gauge, z) in self.known.iter_mut().enumerate() {
+                if usable >> gauge & 1 == 0 {
+                    *z = mean;
+                }
+            }
             self.scale = (louder && self.is_significant(usable)).then_some(1.0);
             self.rested = true;
         }

@@ -30,6 +30,7 @@ struct Rub {
     wavelength_mm: f64,
     /// Whether v/λ is told.
     told: bool,
+    usable: u8,
     x_um: [f64; 17],
     ms: u32,
 }
@@ -49,6 +50,7 @@ impl Rub {
             lie,
             wavelength_mm,
             told,
+            usable: ALL,
             x_um: [0.0; 17],
             ms: 0,
         }
@@ -85,7 +87,7 @@ impl Rub {
                 let texture_hz = speed / self.wavelength_mm;
                 let told = self.told && self.ms > 400 && speed > 2.0;
                 self.hum
-                    .renew(ALL, speed as f32, told.then_some(texture_hz as f32));
+                    .renew(self.usable, speed as f32, told.then_some(texture_hz as f32));
             }
             see(&Step {
                 texture,
@@ -193,6 +195,26 @@ fn after_a_rest_they_are_gone_from_the_first_move_on() {
             }
         }
     }
+}
+
+#[test]
+fn what_a_gauge_at_fault_hums_by_itself_at_rest_is_not_taken_out_once_it_is_well() {
+    let faulty = |gauge, t_s| {
+        let own = if gauge == 3 {
+            8.0 * TEXTURE * libm::cos(TAU * 50.0 * t_s)
+        } else {
+            0.0
+        };
+        mains(50.0, 0.5)(gauge, t_s) + own
+    };
+    let mut rub = Rub::new(Lie::Apart, 1.3, false);
+    rub.usable = ALL & !(1 << 3);
+    let speed = after(0.4, |_| 40.0);
+    rub.on(400, &speed, faulty, |_| {});
+    rub.usable = ALL;
+    let left = rub.hum_left(500, &speed, mains(50.0, 0.5));
+    // Of its part of the common hum, 0.6 of the texture, the others' mean is 0.7 of that; and what leaks.
+    assert!(left < (0.3 * 0.6 + 0.04) * TEXTURE, "{left}");
 }
 
 #[test]
