@@ -17,6 +17,8 @@ const DOUBT: f32 = 1.0;
 const LEAST_VARIANCE: f32 = 1e-5;
 /// What the average's peak counts for among the fits, in waves of them: it lies far back, and so tells most of a slope.
 const PEAK_WEIGHT: f32 = 0.5;
+/// Weight, in waves of fits, below which they are forgotten.
+const LEAST_WEIGHT: f32 = 1e-6;
 /// Steepest slope of ln λ that a surface has, per mm.
 const STEEPEST: f32 = 0.015;
 
@@ -123,14 +125,14 @@ impl Trend {
         self.course = self.fit();
     }
 
-    /// What it says. `None` before the first fit.
+    /// What it says. `None` before the first fit, and long after the last one.
     pub fn course(&self) -> Option<Course> {
         self.course
     }
 
     /// The line by least squares, its slope shrunk by what may be chance.
     fn fit(&self) -> Option<Course> {
-        if self.weight <= 0.0 {
+        if self.weight < LEAST_WEIGHT {
             return None;
         }
         let (peak_x, peak_y) = (self.average_mm, self.peak);
