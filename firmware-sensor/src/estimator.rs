@@ -20,6 +20,8 @@ pub struct Touch {
     /// Where the fingertip's contact was at the instant of `gauges`, to the sample: the arm's position,
     /// less its deflection F/k where the force channel tells it.
     pub place: Place,
+    /// Whether the force channel does tell it: where the stiffness is not known, it does not.
+    pub deflection_known: bool,
     /// The counted gauge behind the band-pass, as the paper has it: with whatever hum there is.
     pub counted: f32,
     /// Variance of the noise in each of `gauges` as far as it reaches 200 to 500 Hz, in ADC steps²: see

@@ -198,6 +198,7 @@ impl Sensor {
         let touch = Touch {
             gauges,
             place: arm.wrapping_sub(lag),
+            deflection_known: self.slip.lag_um().is_some(),
             counted,
             noise: self.noise.variances(),
             pickup: self.hum.pickup(),

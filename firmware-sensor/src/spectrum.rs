@@ -84,7 +84,7 @@ const SAME: f32 = 0.1;
 const MEMORY_WAVES: f32 = 8.0;
 /// Probability of a wave from which on it is the surface, once it has been there for a wavelength.
 const CONVINCING: f32 = 0.8;
-/// What is left of a probability where the gauges hint at stick and slip, without a force channel: below the
+/// What is left of a probability where the gauges hint at stick and slip that no force channel tells: below the
 /// default level. A fingertip that hops over ridges makes a clean wave of another λ.
 const WHERE_JERKY: f32 = 0.55;
 /// Millisecond of the ten before an estimate in which its work begins. In those after it the line is fitted,
@@ -101,7 +101,6 @@ const SHORTER_LENGTHS: usize = 3;
 /// The estimator.
 #[derive(Clone, Debug)]
 pub struct Spectrum {
-    force_channel: bool,
     /// Lengths of [`LENGTHS`] that a fit may have.
     lengths: usize,
     level: f32,
@@ -168,7 +167,6 @@ impl Spectrum {
         };
         let waves = f32::from(configuration.waves);
         Self {
-            force_channel: configuration.force_channel,
             lengths: LENGTHS.iter().filter(|&&length| length <= waves).count(),
             level: f32::from(configuration.valid_percent) / 100.0,
             play: Play::new(play_um * PLACES_PER_UM),
@@ -247,7 +245,7 @@ impl Spectrum {
             .filter(|gauge| usable >> gauge & 1 == 1)
             .map(|gauge| self.touch.noise[gauge])
             .sum();
-        let jerky = !self.force_channel
+        let jerky = !self.touch.deflection_known
             && !said.new
             && self.jerk.is_slip(
                 said.wavelength_mm,
@@ -387,7 +385,12 @@ impl Estimator for Spectrum {
             (Some(line), Some(wave)) => Some(likelier(line, wave)),
             (line, wave) => line.or(wave),
         };
-        let finding = said.map_or_else(Finding::default, |said| self.say(&said));
+        let finding = if let Some(said) = said {
+            self.say(&said)
+        } else {
+            self.sure_times = 0;
+            Finding::default()
+        };
         Finding { landed, ..finding }
     }
 }

@@ -5,15 +5,17 @@ extern crate std;
 use core::f32::consts::TAU;
 use std::vec::Vec;
 
-use protocol::GAUGES;
+use protocol::{GAUGES, SensorConfiguration};
 
+use super::Spectrum;
 use super::fit::{Fitted, LENGTH_COUNT, LENGTHS, Pass};
 use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
 use super::periodogram::{
     CANDIDATES, Periodogram, clearest_peak, highest_peak, sharpness, vertex_mm, wavelength_mm,
 };
 use super::trend::Trend;
-use crate::travel::PLACES_PER_MM;
+use crate::estimator::{Estimator, Finding, Touch};
+use crate::travel::{PLACES_PER_MM, Travel};
 
 const ALL: u8 = 0b1_1111;
 const NO_BASE: [f32; GAUGES] = [0.0; GAUGES];
@@ -288,6 +290,75 @@ fn the_trend_finds_no_slope_in_chance() {
     let course = trend.course().unwrap();
     assert!((course.here - 1.0).abs() < 0.01, "{course:?}");
     assert!(course.slope.abs() < 0.001, "{course:?}");
+}
+
+#[test]
+fn the_trend_forgets_what_is_long_past() {
+    let (mut trend, _) = trend(|mm| 1.0 + 0.008 * mm, || 0.0);
+    let mm = libm::expf(1.0);
+    for step in 0..20_000 {
+        trend.advance(step, 0.2, mm);
+        for said in [trend.of_average(mm), trend.of_fit(mm, 0)] {
+            assert!(said.is_finite() && said > 0.0, "{said} mm after {step}");
+        }
+    }
+    assert!(trend.course().is_none());
+}
+
+/// What an estimator says last of an arm at 30 mm/s, by `touch` at each millisecond and place in mm.
+fn rubbed(configuration: &SensorConfiguration, touch: impl Fn(u16, f32) -> Touch) -> Finding {
+    let mut spectrum = Spectrum::new(configuration);
+    let mut travel = Travel::new(0);
+    let mut finding = Finding::default();
+    for ms in 0..3_000_u16 {
+        // 6 counts of 5 µm.
+        travel.push(6 * ms);
+        let place = travel.place(0);
+        let mm = place as f32 / PLACES_PER_MM as f32;
+        spectrum.push(&Touch {
+            place,
+            usable: ALL,
+            ..touch(ms, mm)
+        });
+        if ms % 10 == 9 {
+            finding = spectrum.find(&travel);
+        }
+    }
+    finding
+}
+
+#[test]
+fn slips_are_looked_for_as_long_as_the_force_channel_does_not_tell_them() {
+    // For 8 of 50 ms the fingertip slips.
+    let slips = |ms: u16, mm: f32| {
+        core::array::from_fn(|gauge| {
+            let slip = if ms % 50 < 8 { 100.0 } else { 0.0 };
+            wave(mm, gauge, 2.0) + slip * libm::sinf(TAU * 0.15 * f32::from(ms % 20))
+        })
+    };
+    for force_channel in [false, true] {
+        for deflection_known in [false, true] {
+            let configuration = SensorConfiguration {
+                force_channel,
+                ..SensorConfiguration::DEFAULT
+            };
+            let finding = rubbed(&configuration, |ms, mm| Touch {
+                gauges: slips(ms, mm),
+                deflection_known,
+                ..Touch::default()
+            });
+            assert_eq!(finding.jerky, !deflection_known, "{finding:?}");
+        }
+    }
+}
+
+#[test]
+fn what_was_found_several_times_in_a_row_is_not_counted_on_where_nothing_is_found() {
+    let mut spectrum = Spectrum::new(&SensorConfiguration::DEFAULT);
+    (spectrum.sure_mm, spectrum.sure_times) = (2.0, 4);
+    let nothing = spectrum.find(&Travel::new(0));
+    assert_eq!(nothing, Finding::default());
+    assert_eq!(spectrum.sure_times, 0);
 }
 
 #[test]
