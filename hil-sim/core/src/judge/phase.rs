@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::DisplayConfiguration;
+use protocol::{DisplayConfiguration, Role};
 
 use crate::judge::seconds;
 use crate::judge::trust::Trust;
@@ -141,12 +141,19 @@ impl RunObserver for DuePhase {
                 self.beyond = f64::from(farthest) * WORD_V > 0.1 * amplitude_v;
             }
             RunEvent::Tick(tick) => self.tick(tick),
+            RunEvent::Reset(reset) if reset.role == Role::Display => self.restart(),
             _ => {}
         }
     }
 }
 
 impl DuePhase {
+    /// The display was reset: it knows no λ until the next one comes.
+    fn restart(&mut self) {
+        self.followed = Followed::new(self.followed.configuration);
+        self.arrived.clear();
+    }
+
     fn received(&mut self, arrival: &Arrival) {
         if self
             .last_tick_ns

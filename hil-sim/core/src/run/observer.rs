@@ -14,7 +14,7 @@ use std::iter::Peekable;
 use protocol::{Estimate, Role};
 
 use crate::run::decoder::TimedMessage;
-use crate::run::fault_evidence::{FaultEvidence, Reset};
+use crate::run::fault_evidence::Reset;
 use crate::run::recording::{
     Arrival, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
@@ -95,7 +95,7 @@ impl RunObserver for Recording {
     }
 }
 
-/// Tells of a run as it was recorded; what shows of faults comes at the end.
+/// Tells of a run as it was recorded, in the order of time.
 pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
     type Events<'a> = Peekable<Box<dyn Iterator<Item = (u64, RunEvent<'a>)> + 'a>>;
     let scans = recording.scans.iter();
@@ -103,7 +103,12 @@ pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
     let ticks = recording.ticks.iter();
     let outputs = recording.outputs.iter();
     let arrivals = recording.arrived.iter();
-    let mut all: [Events; 5] = [
+    let signs = &recording.signs;
+    let of_display = signs.display.iter();
+    let of_sensor = signs.sensor.iter();
+    let resets = signs.resets.iter();
+    let clears_ns = signs.clears_ns.iter();
+    let mut all: [Events; 9] = [
         Box::new(scans.map(|scan| (scan.at_ns, RunEvent::Scan(scan))))
             as Box<dyn Iterator<Item = _>>,
         Box::new(made.map(|made| {
@@ -115,6 +120,10 @@ pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
         Box::new(ticks.map(|tick| (tick.at_ns, RunEvent::Tick(tick)))),
         Box::new(outputs.map(|output| (output.at_ns, RunEvent::Output(output)))),
         Box::new(arrivals.map(|arrival| (arrival.at_ns, RunEvent::Received(arrival)))),
+        Box::new(of_display.map(|said| (said.at_ns, RunEvent::Said(Role::Display, said)))),
+        Box::new(of_sensor.map(|said| (said.at_ns, RunEvent::Said(Role::Sensor, said)))),
+        Box::new(resets.map(|reset| (reset.at_ns, RunEvent::Reset(reset)))),
+        Box::new(clears_ns.map(|&at_ns| (at_ns, RunEvent::Cleared(at_ns)))),
     ]
     .map(Iterator::peekable);
     // The first of those that come at the same instant.
@@ -125,23 +134,5 @@ pub fn replay_to(recording: &Recording, to: &mut impl RunObserver) {
         .and_then(|(_, events)| events.next())
     {
         to.see(event);
-    }
-    retell_signs(&recording.signs, to);
-}
-
-/// Tells of what shows of faults alone.
-pub fn retell_signs(signs: &FaultEvidence, to: &mut impl RunObserver) {
-    for (role, said) in [
-        (Role::Display, &signs.display),
-        (Role::Sensor, &signs.sensor),
-    ] {
-        said.iter()
-            .for_each(|said| to.see(RunEvent::Said(role, said)));
-    }
-    for reset in &signs.resets {
-        to.see(RunEvent::Reset(reset));
-    }
-    for &at_ns in &signs.clears_ns {
-        to.see(RunEvent::Cleared(at_ns));
     }
 }

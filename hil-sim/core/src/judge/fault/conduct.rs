@@ -63,8 +63,6 @@ pub(super) struct Conduct {
     excused_ns: Range<u64>,
     /// When it has to drive again.
     again_ns: Range<u64>,
-    /// When its memory of estimates goes.
-    forgets_ns: Option<u64>,
     stopped: Stopped,
     /// What tells the display of the surface is broken itself.
     spoils_estimates: bool,
@@ -115,7 +113,6 @@ impl Conduct {
                 Some(ms) => over_ns..over_ns + nanoseconds(ms * 1e-3) + way_ns,
                 None => over_ns..over_ns,
             },
-            forgets_ns: cuts_power.then_some(over_ns),
             stopped,
             spoils_estimates: row.signs.contains(&Sign::NoValidEstimate),
             max_age_ms: configuration.max_age_ms,
@@ -125,6 +122,13 @@ impl Conduct {
             silent_since_ns: Some(0),
             ..Self::default()
         }
+    }
+
+    /// The display was reset: what it has heard is forgotten.
+    pub fn restart(&mut self) {
+        self.trust = Trust::new(self.max_age_ms);
+        self.wavelength_mm = f64::INFINITY;
+        self.arrived.clear();
     }
 
     /// An estimate has arrived at the display.
@@ -162,13 +166,6 @@ impl Conduct {
     /// A tick of the display's.
     pub fn tick(&mut self, tick: &TickRecord) {
         let at_ns = tick.at_ns;
-        if self
-            .forgets_ns
-            .take_if(|forgets_ns| at_ns > *forgets_ns)
-            .is_some()
-        {
-            self.trust = Trust::new(self.max_age_ms);
-        }
         self.follow_hand(tick);
         match self.trust.holds(at_ns).next() {
             None => {

@@ -565,6 +565,11 @@ impl FaultMonitor {
 impl RunObserver for FaultMonitor {
     fn see(&mut self, event: RunEvent<'_>) {
         self.step.see(event);
+        if let RunEvent::Reset(reset) = event
+            && reset.role == Role::Display
+        {
+            self.conduct.restart();
+        }
         match event {
             RunEvent::Tick(tick) => {
                 self.has_looked |= tick.at_ns < self.due_ns.start;

@@ -78,6 +78,7 @@ impl Step {
     fn restart(&mut self, at_ns: u64) {
         if at_ns < self.judged_ns.start {
             self.restarted_s = seconds(at_ns);
+            self.before = Demodulator::new(self.rendering);
         }
     }
 

@@ -81,6 +81,55 @@ fn a_hand_that_rests_until_its_estimates_are_too_old_is_no_false_alarm() {
     assert!(unmet(1_000)[0].starts_with("not to be expected: display: fading, Stale"));
 }
 
+/// A reset of the display's, by the scene.
+fn cut_off(at_ms: u64) -> Reset {
+    Reset {
+        role: Role::Display,
+        at_ns: at_ms * MS,
+        is_injected: true,
+    }
+}
+
+#[test]
+fn the_phase_is_compared_with_that_of_the_board_that_runs() {
+    let unmet = |resets: Vec<Reset>| {
+        let run = Run {
+            ahead_cycles: Box::new(|t_s| if t_s < 0.4 { 0.0 } else { 0.3 }),
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut recording = run.record();
+        for output in &mut recording.outputs {
+            if (350 * MS..400 * MS).contains(&output.at_ns) {
+                output.words = [ZERO_VOLT; ACTUATORS];
+            }
+        }
+        recording.signs.resets = resets;
+        let scene = several(2.0, &[(Kind::BrownOut, 0.35), (Kind::Nothing, 0.5)]);
+        finding(&scene, 1, 2_000 * MS, &recording).unmet()
+    };
+    assert_eq!(unmet(vec![cut_off(350)]), [""; 0]);
+    assert!(unmet(Vec::new())[0].starts_with("out of step by 0.3"));
+}
+
+#[test]
+fn what_a_display_knew_before_its_restart_counts_no_more() {
+    // It starts again, hears two estimates, and then nothing for 0.7 s.
+    let mut recording = silent(3.0, 911..1_430);
+    for output in &mut recording.outputs {
+        if (500 * MS..720 * MS).contains(&output.at_ns) {
+            output.words = [ZERO_VOLT; ACTUATORS];
+        }
+    }
+    let is_heard = |at_ns: u64| {
+        !(500 * MS..700 * MS).contains(&at_ns) && !(715 * MS..1_415 * MS).contains(&at_ns)
+    };
+    recording.arrived.retain(|arrival| is_heard(arrival.at_ns));
+    recording.signs.resets = vec![cut_off(500)];
+    recording.signs.display = vec![said(862, DisplayState::Fading(Hold::Stale))];
+    let scene = several(3.0, &[(Kind::BrownOut, 0.5), (Kind::LinkDown, 0.715)]);
+    assert_eq!(finding(&scene, 1, 3_000 * MS, &recording).unmet(), [""; 0]);
+}
+
 #[test]
 fn a_reset_that_another_fault_brings_is_charged_to_that() {
     let reset = |at_ms: u64| Reset {
