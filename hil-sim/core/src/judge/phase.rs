@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::{DisplayConfiguration, Role};
+use protocol::{DisplayConfiguration, Estimate, Role};
 
 use crate::judge::seconds;
 use crate::judge::trust::Trust;
@@ -155,13 +155,12 @@ impl DuePhase {
     }
 
     fn received(&mut self, arrival: &Arrival) {
-        if self
-            .last_tick_ns
-            .is_some_and(|tick_ns| arrival.at_ns <= tick_ns)
-        {
-            self.followed.hear(arrival, self.is_silent());
-        } else {
-            self.arrived.push_back(*arrival);
+        match self.last_tick_ns {
+            Some(tick_ns) if arrival.at_ns <= tick_ns => {
+                self.followed
+                    .hear(tick_ns, &arrival.estimate, self.is_silent());
+            }
+            _ => self.arrived.push_back(*arrival),
         }
     }
 
@@ -206,7 +205,7 @@ impl DuePhase {
             .pop_front_if(|arrival| arrival.at_ns <= tick.at_ns)
         {
             let silent = self.is_silent();
-            self.followed.hear(&arrival, silent);
+            self.followed.hear(tick.at_ns, &arrival.estimate, silent);
         }
     }
 }
@@ -233,14 +232,14 @@ impl Followed {
         }
     }
 
-    /// An estimate has come, while all was `silent` or not.
-    fn hear(&mut self, arrival: &Arrival, silent: bool) {
+    /// An estimate is heard at a tick, while all was `silent` or not.
+    fn hear(&mut self, tick_ns: u64, estimate: &Estimate, silent: bool) {
         let DisplayConfiguration {
             glide_ms,
             update_rate,
             ..
         } = self.configuration;
-        if let Some(wavelength_mm) = self.trust.hear(arrival.at_ns, &arrival.estimate) {
+        if let Some(wavelength_mm) = self.trust.hear(tick_ns, estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
             if target_per_mm != self.target_per_mm {
                 self.target_per_mm = target_per_mm;

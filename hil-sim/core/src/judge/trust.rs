@@ -10,8 +10,6 @@ const EARNED: u64 = 5;
 /// Confidence of one that says so without being stood by.
 const LIKELY: f32 = 0.5;
 const LEAST_AGE_NS: u64 = 150_000_000;
-/// For how long they have, a board knows to a tick.
-const TICK_NS: u64 = 500_000;
 /// λ that can be played, in mm.
 const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
 /// A λ that differs by more than this factor from the one held has to be confirmed by the next one.
@@ -34,8 +32,8 @@ const LARGEST_AMPLITUDE_LSB: f32 = 2_608.0;
 /// In µm/s.
 const FASTEST_ARM_UM_S: u32 = 20_000_000;
 
-/// What the estimates that arrived so far ask of a display. Instants are in ns since the scene's start, and fall by
-/// no more than a tick.
+/// What the estimates that arrived so far ask of a display. Instants are those of its ticks, in ns since the scene's
+/// start: a board counts by ticks, and hears what has arrived once the next one's words are on their way.
 #[derive(Clone, Debug, Default)]
 pub struct Trust {
     max_age_ns: u64,
@@ -64,7 +62,7 @@ impl Trust {
         }
     }
 
-    /// An estimate has arrived: the λ to be followed from now on, in mm, if it is one to follow.
+    /// An estimate is heard: the λ to be followed from now on, in mm, if it is one to follow.
     pub fn hear(&mut self, at_ns: u64, estimate: &Estimate) -> Option<f64> {
         self.elapse(at_ns);
         self.bucket.0 = (self.bucket.0 + 1.0).min(FLOOD + 1.0);
@@ -139,7 +137,7 @@ impl Trust {
 
     fn is_stale(&self, at_ns: u64) -> bool {
         let known_ns = self.said_ns.saturating_sub(self.since_ns);
-        let earned_ns = (EARNED * (known_ns + TICK_NS)).max(LEAST_AGE_NS);
+        let earned_ns = (EARNED * known_ns).max(LEAST_AGE_NS);
         self.is_older(at_ns, self.max_age_ns.min(earned_ns))
     }
 
@@ -274,10 +272,10 @@ mod tests {
         followed(&mut trust, 5, &[2.0]);
         assert_eq!(holds(&mut trust, 50 + 150), []);
         assert_eq!(holds(&mut trust, 50 + 151), [Hold::Stale]);
-        // Known for 60 ms, or a tick longer.
+        // Known for 60 ms.
         followed(&mut trust, 100, &[2.0; 7]);
-        assert_eq!(holds(&mut trust, 1_060 + 302), []);
-        assert_eq!(holds(&mut trust, 1_060 + 303), [Hold::Stale]);
+        assert_eq!(holds(&mut trust, 1_060 + 300), []);
+        assert_eq!(holds(&mut trust, 1_060 + 301), [Hold::Stale]);
         // What likely says the same makes it known, even if it is not to be followed.
         followed(&mut trust, 150, &[2.0]);
         let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;

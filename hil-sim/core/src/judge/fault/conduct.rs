@@ -144,7 +144,7 @@ impl Conduct {
             .arrived
             .pop_front_if(|arrival| arrival.at_ns <= heard_ns)
         {
-            match self.trust.hear(arrival.at_ns, &arrival.estimate) {
+            match self.trust.hear(heard_ns, &arrival.estimate) {
                 Some(mm) => self.wavelength_mm = mm,
                 None => self.unfollowed |= self.again_ns.contains(&arrival.at_ns),
             }
@@ -221,7 +221,8 @@ impl Conduct {
             && !self.excused_ns.contains(&since_ns)
             && self.silent_since_ns.is_none()
         {
-            // One that is over with the next estimate may be the judge's alone: it knows no ticks.
+            // One that is over with the next estimate may be the judge's alone: what comes with a tick may be heard by the
+            // next one.
             if since_ns >= self.judged_ns.start && at_ns > since_ns + HEARD_NS {
                 self.seen.held.get_or_insert((hold, since_ns));
             }

@@ -211,6 +211,35 @@ fn a_stopped_display_has_to_drive_again_once_its_power_has_gone() {
 }
 
 #[test]
+fn a_surface_that_was_met_just_now_counts_to_the_tick() {
+    let unmet = |said_ms: u64| {
+        let run = Run {
+            position_mm: Box::new(|t_s: f64| 50.0 * t_s.min(0.8)),
+            estimate: Box::new(|t_s| (2.0, (0.695..0.765).contains(&t_s))),
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut recording = run.record();
+        for arrival in &mut recording.arrived {
+            if !arrival.estimate.valid {
+                arrival.estimate.confidence = 0.3;
+            }
+        }
+        recording.outputs.retain(|output| output.at_ns < 819 * MS);
+        recording.outputs.push(OutputRecord {
+            at_ns: 819 * MS,
+            words: [ZERO_VOLT; ACTUATORS],
+            skew_ns: 0,
+        });
+        recording.signs.display = vec![said(said_ms, DisplayState::Fading(Hold::Stale))];
+        let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
+        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+    };
+    // Known for the 60 ms up to 0.761 s, so it counts for 300 ms more; the tick after that is at 1.0615 s.
+    assert_eq!(unmet(1_062), [""; 0]);
+    assert!(unmet(1_061)[0].starts_with("not to be expected: display: fading, Stale"));
+}
+
+#[test]
 fn what_drives_on_until_its_estimates_are_too_old_has_not_driven_again() {
     let unmet = |silent_ms| {
         let scene = several(3.0, &[(Kind::SensorHang, 0.5)]);
