@@ -253,7 +253,7 @@ impl FaultMonitor {
         };
         Self {
             fault,
-            outputs: Outputs::new(&fault, due_ns.end, &configuration),
+            outputs: Outputs::new(&fault, due_ns.end, &configuration, &scene.display.actuators),
             // When it has been driven for too long is not followed here.
             conduct: Conduct::new(
                 &fault,

@@ -1,6 +1,6 @@
 //! What the outputs did about a fault.
 
-use protocol::DisplayConfiguration;
+use protocol::{Actuator, DisplayConfiguration, UNITY_GAIN};
 
 use crate::run::recording::{ACTUATORS, OutputRecord, WORD_V, ZERO_VOLT};
 use crate::scene::fault::{Class, Fault};
@@ -8,8 +8,10 @@ use crate::scene::fault::{Class, Fault};
 /// Longest time in ns that an output may stand at one voltage that is not 0: as long as any fault's
 /// outputs have to be at 0 V.
 const STANDING_NS: u64 = 20_000_000;
-/// The same at the end of the range: there a crest is cut flat while a charge is worked off under it.
+/// The same at the end of a channel's range: there a crest is cut flat while a charge is worked off under it.
 const CREST_NS: u64 = 100_000_000;
+/// Rounding, and a range that ends a step earlier above 0 V, take no more off a crest, in steps of the DAC.
+const CREST_WORDS: u16 = 2;
 /// How long before a fault an output has to have been driven for the stimulus to be called on: half a
 /// cycle of 25 Hz passes 0 V once.
 const DRIVEN_NS: u64 = 20_000_000;
@@ -48,6 +50,8 @@ pub(super) struct Outputs {
     /// Whether any was driven after that.
     pub drives_again: bool,
     limits: Limits,
+    /// How far from 0 V each channel's crest is cut, in steps of the DAC.
+    crests: [u16; ACTUATORS],
     last_ns: u64,
     /// When one went beyond the amplitude, or faster than any may, in ns since the scene's start.
     pub beyond_ns: Option<u64>,
@@ -85,8 +89,20 @@ impl Limits {
     }
 }
 
+/// How far from 0 V a channel's crest is cut, in steps of the DAC: at its amplitude.
+fn crest(configuration: &DisplayConfiguration, actuator: &Actuator) -> u16 {
+    let gain = f64::from(actuator.gain_q15) / f64::from(UNITY_GAIN);
+    let volts = f64::from(configuration.amplitude_mv) * 1e-3 * gain;
+    (volts / WORD_V).round() as u16
+}
+
 impl Outputs {
-    pub fn new(fault: &Fault, until_ns: u64, configuration: &DisplayConfiguration) -> Self {
+    pub fn new(
+        fault: &Fault,
+        until_ns: u64,
+        configuration: &DisplayConfiguration,
+        actuators: &[Actuator; ACTUATORS],
+    ) -> Self {
         let from_ns = fault.begins_ns();
         let rest_ns = match fault.kind.row().class {
             // What is over stays answered.
@@ -111,6 +127,7 @@ impl Outputs {
             answered: false,
             drives_again: false,
             limits: Limits::of(configuration),
+            crests: actuators.map(|actuator| crest(configuration, &actuator)),
             last_ns: 0,
             beyond_ns: None,
         }
@@ -177,7 +194,8 @@ impl Outputs {
     /// An output has been at this word until now.
     fn stand(&mut self, actuator: usize, word: u16, until_ns: u64) {
         let stood_ns = until_ns.saturating_sub(self.since_ns[actuator]);
-        let is_cut = word.abs_diff(ZERO_VOLT) + 2 >= self.limits.words;
+        let from_crest = word.abs_diff(ZERO_VOLT).abs_diff(self.crests[actuator]);
+        let is_cut = from_crest <= CREST_WORDS;
         let most_ns = if is_cut { CREST_NS } else { STANDING_NS };
         self.stands[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
     }

@@ -2,7 +2,7 @@
 
 use protocol::{
     DisplayCounters, DisplayState, Hold, Message, PortCounters, Rendering, ResetCause, Role,
-    RoleCounters, Safety, Status, Trip,
+    RoleCounters, Safety, Status, Trip, UNITY_GAIN,
 };
 
 use super::*;
@@ -116,6 +116,35 @@ fn outputs_that_stand_at_a_voltage_are_stuck_and_not_at_zero() {
     let finding = judged(Kind::LdacStuck, outputs, stopped());
     assert_eq!(finding.stuck, 1);
     assert_eq!(finding.safe_ns, None);
+}
+
+#[test]
+fn a_crest_that_is_cut_flat_at_its_channels_gain_does_not_stand() {
+    const CHANNEL: usize = 17;
+    let standing = |gain_q15: u16, offset: i32| {
+        let mut recording = Run::steady(50.0, 2.0).record();
+        for output in &mut recording.outputs {
+            let is_flat = (700 * MS..760 * MS).contains(&output.at_ns);
+            let word = if is_flat { offset } else { 0 };
+            output.words[CHANNEL] = (i32::from(ZERO_VOLT) + word) as u16;
+        }
+        let mut scene = Scene {
+            duration_s: 2.0,
+            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            ..Scene::constant(2.0, 50.0)
+        };
+        scene.display.actuators[CHANNEL].gain_q15 = gain_q15;
+        finding(&scene, 0, 2_000 * MS, &recording).standing
+    };
+    for gain_q15 in [UNITY_GAIN, UNITY_GAIN / 2, UNITY_GAIN / 10 * 9, 1_000] {
+        let crest = 32_767 * i32::from(gain_q15) / i32::from(UNITY_GAIN);
+        for sign in [1, -1] {
+            assert_eq!(standing(gain_q15, sign * crest), 0, "{gain_q15}");
+            assert_eq!(standing(gain_q15, sign * (crest - 40)), 1, "{gain_q15}");
+        }
+    }
+    // What is further than its channel goes is no crest of it.
+    assert_eq!(standing(UNITY_GAIN / 2, 32_767), 1);
 }
 
 #[test]
