@@ -265,9 +265,14 @@ impl Conduct {
         self.seen
     }
 
-    /// Until when the display has to drive again, if it has to.
+    /// Until when the display has to drive again, if it has to, unless it [has stopped](Conduct::has_stopped).
     pub fn due_again_ns(&self) -> Option<u64> {
-        (!self.again_ns.is_empty() && self.stopped == Stopped::No).then_some(self.again_ns.end)
+        (!self.again_ns.is_empty()).then_some(self.again_ns.end)
+    }
+
+    /// Whether it has stopped for good before, so that it need not drive.
+    pub fn has_stopped(&self) -> bool {
+        self.stopped != Stopped::No
     }
 
     /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or

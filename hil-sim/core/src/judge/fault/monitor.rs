@@ -364,6 +364,7 @@ impl FaultMonitor {
             // A count from which nobody has counted yet is no jump.
             && (fault.kind != Kind::HandEncoderJump || has_looked);
         let due_again_ns = self.conduct.due_again_ns();
+        let need_not_drive = self.conduct.has_stopped();
         let shows_again = self.conduct.shows_again();
         let conduct = self.conduct.finish();
         let leaves_ms = |ms: f64| left_ns >= nanoseconds(ms * 1e-3);
@@ -471,7 +472,14 @@ impl FaultMonitor {
         {
             let within_ms = (due_ns - over_ns) as f64 * 1e-6;
             let within = format!("again within {within_ms:.0} ms of its end");
-            if !outputs.drove {
+            if need_not_drive {
+                let why = match stopped {
+                    Stopped::No => "it may have been driven for too long",
+                    _ if fault.cuts_power(Role::Display) => "what has stopped it is still there",
+                    _ => "the display has stopped before",
+                };
+                unjudged.push(format!("whether it drives {within}: {why}"));
+            } else if !outputs.drove {
                 unjudged.push(format!("whether it drives {within}: it never drove before"));
             } else if due_ns > alone_ns.end {
                 let ends = match alone_ns.end < until_ns {

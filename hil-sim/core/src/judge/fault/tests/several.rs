@@ -252,3 +252,24 @@ fn what_drives_on_until_its_estimates_are_too_old_has_not_driven_again() {
     assert!(unmet(1_040..3_000).contains(&never));
     assert!(!unmet(1_040..1_230).contains(&never));
 }
+
+#[test]
+fn that_a_display_need_not_drive_again_is_said() {
+    let unjudged = |stop: Kind, then: Kind| {
+        let scene = several(3.0, &[(stop, 0.5), (then, 1.0)]);
+        let finding = finding(&scene, 1, 3_000 * MS, &silent(3.0, 500..3_000));
+        let again = |line: &String| line.starts_with("whether it drives again");
+        finding.unjudged.into_iter().find(again)
+    };
+    assert_eq!(
+        unjudged(Kind::DacIgnoresWords, Kind::PowerCycle).as_deref(),
+        Some(
+            "whether it drives again within 1200 ms of its end: what has stopped it is still there"
+        )
+    );
+    assert_eq!(
+        unjudged(Kind::StopFromPeer, Kind::LinkDown).as_deref(),
+        Some("whether it drives again within 300 ms of its end: the display has stopped before")
+    );
+    assert_eq!(unjudged(Kind::StopFromPeer, Kind::PowerCycle), None);
+}
