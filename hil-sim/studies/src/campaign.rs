@@ -205,7 +205,9 @@ impl Shift {
         }
         let row = kind.row();
         scene.duration_s = ((at_s + row.watch_s) * 1e3).ceil() * 1e-3;
-        if row.lasts == Lasts::ForGood && row.class != Class::Stops {
+        // What a restart of its board ends is to be followed by driving again: counted from its beginning, as for good.
+        let ends_itself = row.again_within_ms.is_some();
+        if row.lasts == Lasts::ForGood && row.class != Class::Stops && !ends_itself {
             fault.for_s = Some(row.watch_s);
         }
         self.tried.push((scene.faults.len(), scene.duration_s));
@@ -267,6 +269,19 @@ mod tests {
         }
         assert_eq!(tried.len(), Kind::all().count());
         assert!(tried.values().all(|&times| times == 6));
+    }
+
+    #[test]
+    fn what_is_to_drive_again_is_looked_on_until_it_has_to() {
+        for shift in plan().shifts() {
+            for &(index, until_s) in &shift.tried {
+                let fault = &shift.scene.faults[index];
+                let again_ms = fault.kind.row().again_within_ms.unwrap_or(0.0);
+                let ends_s = fault.at_s + fault.for_s.unwrap_or(0.0);
+                let due_s = ends_s + again_ms * 1e-3;
+                assert!(due_s <= until_s + 1e-9, "{}", fault.kind.name());
+            }
+        }
     }
 
     #[test]
