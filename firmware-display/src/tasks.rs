@@ -3,7 +3,6 @@
 use core::cell::{Cell, RefCell};
 
 use embassy_executor::Spawner;
-use embassy_stm32::usart::RingBufferedUartRx;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::ThreadModeMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -16,6 +15,7 @@ use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
 use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
 use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::serial::Receiver;
 use nucleo::side::Side;
 use nucleo::spawn::once;
 use nucleo::stop;
@@ -225,7 +225,7 @@ impl Announced {
 
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
-async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
+async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
     ports
         .listen(side, uart, |message| match message {
             Message::Estimate(estimate) => {

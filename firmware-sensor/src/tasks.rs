@@ -4,7 +4,6 @@ use core::cell::Cell;
 
 use embassy_executor::Spawner;
 use embassy_futures::select::{Either, select};
-use embassy_stm32::usart::RingBufferedUartRx;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -15,6 +14,7 @@ use firmware_sensor::{Drive, Sensor, Settings, line};
 use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
 use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::serial::Receiver;
 use nucleo::side::Side;
 use nucleo::spawn::once;
 use nucleo::stop;
@@ -202,7 +202,7 @@ impl Announced {
 
 /// Hears a port. See [`Ports::listen`].
 #[embassy_executor::task(pool_size = 2)]
-async fn listen(ports: &'static Ports, side: Side, uart: RingBufferedUartRx<'static>) {
+async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
     ports
         .listen(side, uart, |message| match message {
             Message::Motion(motion) => MOTION.signal(motion),

@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{Error, RingBufferedUartRx, UartTx};
+use embassy_stm32::usart::{Error, UartTx};
 use embassy_sync::blocking_mutex::ThreadModeMutex;
 use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, ThreadModeRawMutex};
 use embassy_sync::channel::Channel;
@@ -13,6 +13,7 @@ use protocol::port::Port;
 use protocol::receiver::Peer;
 use protocol::{Console, Hello, Key, Latest, Message, PortCounters};
 
+use crate::serial::Receiver;
 use crate::side::Side;
 use crate::stop;
 
@@ -150,7 +151,7 @@ impl Ports {
     pub async fn listen(
         &self,
         side: Side,
-        mut uart: RingBufferedUartRx<'static>,
+        mut uart: Receiver,
         mut handle: impl FnMut(Message),
     ) -> ! {
         let mut bytes = [0; 128];

@@ -11,8 +11,8 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH3, DMA1_CH5, DMA1_CH6, PD5, PD6, PD8, PD9, USART2, USART3,
 };
-use embassy_stm32::usart::{self, Config, RingBufferedUartRx, Uart, UartTx};
-use embassy_stm32::{Peri, bind_interrupts, dma};
+use embassy_stm32::usart::{self, Config, Error, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac};
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<USART2>;
@@ -31,7 +31,7 @@ const PRIORITY: Priority = Priority::P7;
 /// One UART: its receiver runs already, so that what the other board says before the tasks run is kept.
 pub struct Serial {
     /// The receiver.
-    pub receiver: RingBufferedUartRx<'static>,
+    pub receiver: Receiver,
     /// The transmitter.
     pub transmitter: UartTx<'static, Async>,
 }
@@ -51,6 +51,7 @@ pub fn peer(
     yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM5>();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
+        5,
         ring,
     )
 }
@@ -69,6 +70,7 @@ pub fn console(
     yield_to_deadlines::<interrupt::typelevel::DMA1_STREAM1>();
     start(
         Uart::new(uart, rx, tx, tx_dma, rx_dma, Irqs, configuration()),
+        1,
         ring,
     )
 }
@@ -85,16 +87,77 @@ fn configuration() -> Config {
 
 fn start(
     uart: Result<Uart<'static, Async>, usart::ConfigError>,
+    stream: usize,
     ring: &'static mut [u8],
 ) -> Serial {
     let Ok(uart) = uart else {
         defmt::panic!("{} baud divides from 42 MHz", BAUD);
     };
     let (transmitter, receiver) = uart.split();
-    let mut receiver = receiver.into_ring_buffered(ring);
-    receiver.start_uart();
+    let length = ring.len();
+    let mut uart = receiver.into_ring_buffered(ring);
+    uart.start_uart();
     Serial {
-        receiver,
+        receiver: Receiver {
+            uart,
+            stream,
+            length,
+            place: 0,
+            written: length,
+        },
         transmitter,
+    }
+}
+
+/// A receiver that gives each byte once. An error ends the DMA, which then begins at the ring's start again, and the
+/// driver takes the rest of the ring, which was read before, for new.
+pub struct Receiver {
+    uart: RingBufferedUartRx<'static>,
+    /// Of DMA1.
+    stream: usize,
+    /// Bytes of the ring.
+    length: usize,
+    /// Where in the ring the next byte is read.
+    place: usize,
+    /// Up to where it was written on this way through it.
+    written: usize,
+}
+
+impl Receiver {
+    /// Waits for bytes, and says how many there are.
+    ///
+    /// # Errors
+    /// If bytes were lost, or the line had noise or a framing error. What came before is still to be read.
+    pub async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Error> {
+        loop {
+            let room = bytes.len().min(self.length - self.place);
+            let count = match self.uart.read(&mut bytes[..room]).await {
+                Ok(count) => count,
+                Err(error) => {
+                    self.end(error);
+                    return Err(error);
+                }
+            };
+            let new = self.written.saturating_sub(self.place).min(count);
+            self.place += count;
+            if self.place == self.length {
+                (self.place, self.written) = (0, self.length);
+            }
+            if new > 0 {
+                return Ok(new);
+            }
+        }
+    }
+
+    fn end(&mut self, error: Error) {
+        let stream = pac::DMA1.st(self.stream);
+        if stream.cr().read().en() {
+            return;
+        }
+        self.written = self.length - usize::from(stream.ndtr().read().ndt());
+        if error == Error::Overrun {
+            // The driver leaves all that was not read.
+            self.place = self.written % self.length;
+        }
     }
 }

@@ -193,3 +193,19 @@ fn uarts_without_their_dma_cost_no_samples() {
     // At least so often something was lost of what the display says, 500 times a second.
     assert!(status.peer.lost as usize > TIMES, "{status:?}");
 }
+
+/// An error on the line ends the DMA, which then begins at its ring's start again.
+#[test]
+fn what_a_display_heard_before_its_line_broke_is_not_heard_again() {
+    let mut stuck = Fault::new(Kind::WireStuckLow, 0.6);
+    stuck.for_s = Some(0.02);
+    let scene = Scene {
+        duration_s: 2.1,
+        faults: vec![stuck],
+        ..Scene::constant(2.0, 50.0)
+    };
+    let (recording, _) = hil_sim_boards::run(&scene, elves::both()).unwrap();
+    let port = recording.display_status.expect("two a run").peer;
+    assert!(port.line_errors > 100, "{port:?}");
+    assert_eq!((port.late, port.duplicated), (0, 0), "{port:?}");
+}
