@@ -12,6 +12,8 @@ use crate::scene::fault::{Class, Fault, Sign, nanoseconds};
 
 /// From an arrival to the outputs: the tick that hears it, the next one, and its edge, at 2 kHz.
 const HEARD_NS: u64 = 3_000_000;
+/// From a reason to hold until the display says so: its next tick, and the message's way.
+pub(super) const SAID_NS: u64 = 5_000_000;
 /// In which every reason to hold but age brings the outputs to 0 V.
 const QUICKLY_NS: u64 = 8_000_000;
 /// All outputs at 0 V for so long are no wave's passing.
@@ -41,6 +43,8 @@ pub(super) enum Stopped {
 pub(super) struct Misconduct {
     /// The outputs were not at 0 V though there was a reason to hold.
     pub loud: Option<(Hold, u64)>,
+    /// It said that it drives though there was a reason to hold, and went on to be.
+    pub says_driving: Option<(Hold, u64)>,
     /// They were at 0 V though the hand moved and nothing held it.
     pub silent_ns: Option<u64>,
     /// A reason to hold came up while it drove: the first.
@@ -83,6 +87,8 @@ pub(super) struct Conduct {
     /// All were at 0 V for longer than a wave that passes it, while the hand moved, since the fault began.
     has_fallen_silent: bool,
     held_since: Option<(Hold, u64)>,
+    /// When it said while it was held that it drives.
+    said_driving_ns: Option<u64>,
     free_since_ns: u64,
     seen: Misconduct,
 }
@@ -163,12 +169,21 @@ impl Conduct {
         }
     }
 
+    /// The display has said that it drives.
+    pub fn says_driving(&mut self, at_ns: u64) {
+        let is_held = |(_, since_ns): (Hold, u64)| at_ns > since_ns + SAID_NS;
+        if self.held_since.is_some_and(is_held) && self.judged_ns.contains(&at_ns) {
+            self.said_driving_ns.get_or_insert(at_ns);
+        }
+    }
+
     /// A tick of the display's.
     pub fn tick(&mut self, tick: &TickRecord) {
         let at_ns = tick.at_ns;
         self.follow_hand(tick);
         match self.trust.holds(at_ns).next() {
             None => {
+                self.said_driving_ns = None;
                 if self.held_since.take().is_some() {
                     self.free_since_ns = at_ns;
                 }
@@ -217,6 +232,13 @@ impl Conduct {
     }
 
     fn judge(&mut self, at_ns: u64) {
+        if let Some((hold, _)) = self.held_since
+            && let Some(said_ns) = self
+                .said_driving_ns
+                .filter(|said_ns| at_ns > said_ns + HEARD_NS)
+        {
+            self.seen.says_driving.get_or_insert((hold, said_ns));
+        }
         if let Some((hold, since_ns)) = self.held_since
             && !self.excused_ns.contains(&since_ns)
             && self.silent_since_ns.is_none()

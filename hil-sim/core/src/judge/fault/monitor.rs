@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use protocol::{Hold, Message, Role};
+use protocol::{DisplayState, Hold, Message, Role};
 
-use super::conduct::{Conduct, Stopped};
+use super::conduct::{Conduct, SAID_NS, Stopped};
 use super::finding::Finding;
 use super::outputs::Outputs;
 use super::signs::Voice;
@@ -16,8 +16,6 @@ use crate::run::observer::{RunEvent, RunObserver};
 use crate::scene::fault::{Class, Fault, Kind, Lasts, Sign, nanoseconds};
 use crate::scene::{Follows, Link, Scene};
 
-/// From a reason to hold until the display says so, in ns: its next tick, and the message's way.
-const SAID_NS: u64 = 5_000_000;
 /// How far the stimulus may be from its due phase, in cycles rms, while something is broken that must not reach it.
 const IN_STEP_CYCLES: f64 = 0.05;
 /// What a fault leaves shows so much later still: counters are told once a second.
@@ -457,6 +455,12 @@ impl FaultMonitor {
                 ));
             }
         }
+        if let Some((hold, at_ns)) = conduct.says_driving {
+            otherwise.push(format!(
+                "says that it drives at {:.2} ms, {hold:?}",
+                ms(at_ns)
+            ));
+        }
         if let Some((hold, at_ns)) = conduct.loud {
             otherwise.push(format!("drives at {:.2} ms, {hold:?}", ms(at_ns)));
         }
@@ -544,6 +548,11 @@ impl FaultMonitor {
             }
             Message::Motion(_) if role == Role::Display => {
                 self.motions.heard(said.at_ns, &self.alone_ns);
+            }
+            Message::Safety(safety)
+                if role == Role::Display && safety.state == DisplayState::Driving =>
+            {
+                self.conduct.says_driving(said.at_ns);
             }
             _ => {}
         }

@@ -234,8 +234,13 @@ fn a_sign_of_what_is_no_fault_is_a_false_alarm() {
 const CUT_NS: std::ops::Range<u64> = 500 * MS..1_200 * MS;
 const STALE_NS: u64 = 991 * MS;
 
-/// A display that hears nothing meanwhile, and what it does in `silent_ms`, of which it says `says`.
+/// A display that hears nothing meanwhile, and what it does in `silent_ms`, of which it says at `says` ms that it fades.
 fn cut(silent_ms: std::ops::Range<u64>, says: Option<u64>) -> Vec<String> {
+    let fading = |at_ms| said(at_ms, DisplayState::Fading(Hold::Stale));
+    cut_and_said(silent_ms, says.map(fading).into_iter().collect())
+}
+
+fn cut_and_said(silent_ms: std::ops::Range<u64>, says: Vec<TimedMessage>) -> Vec<String> {
     let mut recording = Run::steady(50.0, 2.0).record();
     recording
         .arrived
@@ -245,8 +250,7 @@ fn cut(silent_ms: std::ops::Range<u64>, says: Option<u64>) -> Vec<String> {
             output.words = [ZERO_VOLT; ACTUATORS];
         }
     }
-    let holds = says.map(|at_ms| said(at_ms, DisplayState::Fading(Hold::Stale)));
-    recording.signs.display = holds.into_iter().collect();
+    recording.signs.display = says;
     unmet_of_cut(&recording)
 }
 
@@ -290,6 +294,20 @@ fn a_display_that_never_fades_is_found() {
     assert!(unmet[0].starts_with(&format!("does not say that it holds, Stale, at {stale_ms}")));
     // It has 50 ms to fade, and 3 ms to notice.
     assert!(unmet[1].starts_with("drives at 54"), "{unmet:?}");
+}
+
+#[test]
+fn a_display_that_says_that_it_drives_while_it_is_held_is_found() {
+    let unmet = |drives_ms: u64| {
+        let says = vec![
+            said(992, DisplayState::Fading(Hold::Stale)),
+            said(drives_ms, DisplayState::Driving),
+        ];
+        cut_and_said(1_030..1_210, says)
+    };
+    // It hears from the link again at 1.201 s.
+    assert_eq!(unmet(1_202), [""; 0]);
+    assert_eq!(unmet(1_045), ["says that it drives at 545.00 ms, Stale"]);
 }
 
 #[test]
