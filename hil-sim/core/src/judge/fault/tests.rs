@@ -197,6 +197,25 @@ fn more_resets_than_the_kind_has_are_against_the_table() {
 }
 
 #[test]
+fn a_panic_has_to_pull_clr_before_the_missing_ticks_let_it_fall() {
+    let unmet = |silent_ms: u64| {
+        let signs = FaultEvidence {
+            resets: vec![Reset {
+                role: Role::Display,
+                at_ns: (AT_MS + 400) * MS,
+                is_injected: false,
+            }],
+            display: vec![said(AT_MS + 600, DisplayState::Stopped(Trip::Panic))],
+            clears_ns: vec![silent_ms * MS],
+            ..FaultEvidence::default()
+        };
+        judged(Kind::Panic, driven(0, silent_ms, ZERO_VOLT), signs).unmet()
+    };
+    assert_eq!(unmet(AT_MS + 1), [""; 0]);
+    assert_eq!(unmet(AT_MS + 2), ["0 V after 2.00 ms of 1"]);
+}
+
+#[test]
 fn what_was_said_before_the_fault_or_after_its_time_is_no_sign_of_it() {
     let signs = FaultEvidence {
         display: vec![
