@@ -20,8 +20,8 @@ use crate::scene::{Follows, Link, Scene};
 const IN_STEP_CYCLES: f64 = 0.05;
 /// What a fault leaves shows so much later still: counters are told once a second.
 const LINGERS_NS: u64 = 1_050_000_000;
-/// So long does a board that goes on never say nothing, in ns: five estimates, ten motions.
-const ESTIMATES_NS: u64 = 50_000_000;
+/// So long does a board that goes on never say nothing, in ns: one and a half estimates' time, ten motions'.
+const ESTIMATES_NS: u64 = 15_000_000;
 const MOTIONS_NS: u64 = 20_000_000;
 /// A stop is told of so long after it has to show, in ms: the words may wait for others.
 const NAMED_MS: f64 = 50.0;
@@ -97,8 +97,12 @@ impl Beat {
     fn heard(&mut self, at_ns: u64, alone_ns: &Range<u64>) {
         let last_ns = self.last_ns.replace(at_ns);
         if let Some(last_ns) = last_ns.filter(|&last_ns| at_ns > last_ns + self.most_ns) {
-            let missed_ns = last_ns + self.most_ns;
-            if alone_ns.contains(&missed_ns) && at_ns > alone_ns.start {
+            // What has been missing since before is missed anew.
+            let missed_ns = match last_ns + self.most_ns {
+                before_ns if before_ns < alone_ns.start => alone_ns.start + self.most_ns,
+                missed_ns => missed_ns,
+            };
+            if at_ns > missed_ns && alone_ns.contains(&missed_ns) {
                 self.missed_ns.get_or_insert(missed_ns);
             }
         }

@@ -177,6 +177,24 @@ fn who_another_fault_silences_is_not_missed() {
 }
 
 #[test]
+fn estimates_at_half_their_rate_are_missed() {
+    let unmet = |every: usize| {
+        let mut recording = silent(2.0, 0..0);
+        let told = recording.estimates.iter().step_by(every);
+        recording.signs.sensor = told
+            .map(|made| TimedMessage {
+                at_ns: made.made_ns,
+                message: Message::Estimate(made.estimate),
+            })
+            .collect();
+        let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
+        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+    };
+    assert_eq!(unmet(1), [""; 0]);
+    assert!(unmet(2)[0].starts_with("no estimates from"));
+}
+
+#[test]
 fn an_encoder_that_stands_still_under_a_slow_swing_need_not_be_contradicted() {
     let unmet = |amplitude_mm_s: f64| {
         let scene = Scene {
