@@ -41,13 +41,18 @@ pub enum SceneError {
     )]
     NoSamples { path: PathBuf, count: usize },
     #[error(
-        "samples are missing at {at_s:.3} s, and what is made of them has no gaps: the longest piece without is --from {from_s:.3} --to-time {to_s:.3}"
+        "{path}: samples are missing at {at_s:.3} s, and what is made of them has no gaps: the longest piece without is --from {from_s:.3} --to-time {to_s:.3}"
     )]
-    Gap { at_s: f64, from_s: f64, to_s: f64 },
+    Gap {
+        path: PathBuf,
+        at_s: f64,
+        from_s: f64,
+        to_s: f64,
+    },
     #[error(
-        "the sensor was configured anew at {at_s:.3} s, and what is made of it has one configuration: end before it or begin after it, with --from and --to-time"
+        "{path}: the sensor was configured anew at {at_s:.3} s, and what is made of it has one configuration: end before it or begin after it, with --from and --to-time"
     )]
-    Reconfigured { at_s: f64 },
+    Reconfigured { path: PathBuf, at_s: f64 },
     #[error("that is too long: give --from and --to-time, {LONGEST_S} s apart at most")]
     TooLong,
     #[error("no valid estimate tells what was rubbed: give its wavelength with --wavelength")]

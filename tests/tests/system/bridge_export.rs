@@ -18,6 +18,7 @@ use serde_json::Value;
 use tests::bridge;
 use tests::recorded::{record, said_of};
 use tests::run::scene as scene_of;
+use tests::utterance::Speaker;
 
 mod hjif;
 
@@ -357,6 +358,10 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
     let (resting, _) = recording(&resting, &still);
     let mute = folder.join("mute.mcap");
     record(&mute, [] as [(u64, Role, Message); 0]);
+    let gap = folder.join("gap.mcap");
+    let mut speaker = Speaker::new(1);
+    let blocks = [0, 16].map(|first| (0, Role::Sensor, speaker.gauges(first)));
+    record(&gap, blocks);
     let scene = folder.join("weave.toml");
     let toml = format!("duration_s = 0.2\n{SURFACE}{MOTION}");
     fs::write(&scene, &toml).expect("a file can be written");
@@ -402,6 +407,10 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
         (
             vec![path("mute.mcap"), path("x.wav")],
             "mute.mcap: 0 samples of the gauges there",
+        ),
+        (
+            vec![path("gap.mcap"), path("x.wav")],
+            "gap.mcap: samples are missing at ",
         ),
         (vec![resting, path("x.hjif")], "the arm does not move there"),
         (

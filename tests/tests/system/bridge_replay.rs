@@ -444,7 +444,10 @@ fn samples_that_are_missing_are_named_with_the_longest_piece_without() {
     };
     let open = || Reader::open(&path).expect("a recording");
     let error = scene::write(open(), &settings).expect_err("there is a gap");
-    let scene::SceneError::Gap { at_s, from_s, to_s } = error else {
+    let scene::SceneError::Gap {
+        at_s, from_s, to_s, ..
+    } = error
+    else {
         panic!("{error}");
     };
     assert!(

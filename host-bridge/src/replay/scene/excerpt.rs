@@ -46,6 +46,7 @@ impl Excerpt {
     /// has no samples there, more than a scene holds or a gap there, or if the sensor was configured otherwise
     /// meanwhile.
     pub fn take(mut recording: Reader, from_s: f64, to_s: f64) -> Result<Self, SceneError> {
+        let path = recording.path().to_owned();
         let mut excerpt = Self::default();
         let mut runs: Vec<Run> = Vec::new();
         let mut gap_s = None;
@@ -68,7 +69,7 @@ impl Excerpt {
                 continue;
             }
             for (role, row) in recording.take_told() {
-                excerpt.configured(role, &row, None)?;
+                excerpt.configured(role, &row);
             }
             let within = at_s >= from_s;
             match entry.row {
@@ -98,8 +99,10 @@ impl Excerpt {
                 }
                 Row::Estimate(row) if within => excerpt.estimates.push(row.into()),
                 row => {
-                    let changed_s = (within && !excerpt.samples.is_empty()).then_some(at_s);
-                    excerpt.configured(entry.role, &row, changed_s)?;
+                    let is_changed = excerpt.configured(entry.role, &row);
+                    if is_changed && within && !excerpt.samples.is_empty() {
+                        return Err(SceneError::Reconfigured { path, at_s });
+                    }
                 }
             }
         }
@@ -110,29 +113,26 @@ impl Excerpt {
                 .into_iter()
                 .max_by(|one, other| one.length_s().total_cmp(&other.length_s()));
             let (from_s, to_s) = longest.map_or((0.0, 0.0), |run| (run.from_s, run.to_s));
-            return Err(SceneError::Gap { at_s, from_s, to_s });
+            return Err(SceneError::Gap {
+                path,
+                at_s,
+                from_s,
+                to_s,
+            });
         }
         Ok(excerpt)
     }
 
-    /// Takes a reported configuration; one that changes what the samples belong to is refused.
-    fn configured(
-        &mut self,
-        role: Role,
-        row: &Row,
-        changed_s: Option<f64>,
-    ) -> Result<(), SceneError> {
+    /// Takes a reported configuration; whether it is another one of the sensor's than before.
+    fn configured(&mut self, role: Role, row: &Row) -> bool {
         match (role, row) {
             (Role::Sensor, Row::SensorConfiguration(row)) => {
                 let before = self.sensor.replace(row.in_force);
-                let changed = before.is_some_and(|before| before != row.in_force);
-                if let Some(at_s) = changed_s.filter(|_| changed) {
-                    return Err(SceneError::Reconfigured { at_s });
-                }
+                return before.is_some_and(|before| before != row.in_force);
             }
             (Role::Display, Row::DisplayConfiguration(row)) => self.display = Some(row.in_force),
             _ => {}
         }
-        Ok(())
+        false
     }
 }
