@@ -1,5 +1,6 @@
 //! From what a link tells to rows with their times; what is missing is found and written down, too.
 
+use firmware_sensor::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 use protocol::{ClockOffset, GAUGE_BLOCK, Message, Pong, PortCounters, Role, RoleCounters};
 
 use super::row::{
@@ -10,6 +11,9 @@ use crate::clock::unix_ns;
 use crate::link::Event;
 
 const SAMPLE_NS: u64 = 1_000_000;
+const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
+/// So many samples in a row, a second of them, are not lost where no estimate is: their stream was off.
+const PAUSE_SAMPLES: u32 = SAMPLE_RATE_HZ;
 /// How far a clock may be from where its offset says, in µs, beyond the instants between which it was read:
 /// twice what two crystals 100 ppm apart drift over the eight exchanges that the offset is the best of.
 const DRIFT_US: u64 = 1_600;
@@ -49,7 +53,7 @@ pub struct Tally {
     pub messages: u64,
     /// Samples of the gauges, at 1 kHz.
     pub samples: u64,
-    /// Samples, estimates and motions that were not heard.
+    /// Samples, estimates and motions that were said and not heard.
     pub lost: u64,
     /// Times that some were not heard.
     pub gaps: u64,
@@ -77,6 +81,8 @@ struct Board {
     samples: Numbers,
     estimates: Numbers,
     motions: Numbers,
+    /// Estimates that came one after the other since the last block of samples; none if some are missing.
+    estimates_in_a_row: Option<u32>,
 }
 
 /// Numbers that count up by one.
@@ -99,6 +105,33 @@ impl Numbers {
 }
 
 impl Board {
+    /// Takes an estimate's number; how many were skipped.
+    fn take_estimate(&mut self, sequence: u32) -> u32 {
+        let skipped = self.estimates.take(sequence, 1);
+        let count = self.estimates_in_a_row.filter(|_| skipped == 0);
+        self.estimates_in_a_row = count.map(|count| count.saturating_add(1));
+        skipped
+    }
+
+    /// Takes a block's first number; how many samples were said before it and not heard. What nobody wanted was not
+    /// said: a stream that begins anew seldom begins whole blocks after the last one, and estimates go on without it.
+    fn take_block(&mut self, first_sample: u32) -> u32 {
+        let skipped = self.samples.take(first_sample, GAUGE_BLOCK as u32);
+        let estimates = self.estimates_in_a_row.replace(0);
+        let has_heard_all = estimates
+            .is_some_and(|count| count.saturating_add(2) >= skipped / SAMPLES_PER_ESTIMATE);
+        let was_off = !skipped.is_multiple_of(GAUGE_BLOCK as u32)
+            || (skipped >= PAUSE_SAMPLES && has_heard_all);
+        if was_off { 0 } else { skipped }
+    }
+
+    /// Numbers that were heard and not written don't tell what was not heard.
+    fn forget_numbers(&mut self) {
+        self.samples = Numbers::default();
+        self.estimates = Numbers::default();
+        self.motions = Numbers::default();
+    }
+
     /// An instant of the board's on the calendar.
     fn calendar_ns(&self, instant_us: u64) -> Option<u64> {
         let own_us = self.clock.to_own_us(instant_us);
@@ -142,6 +175,7 @@ impl RowBuilder {
             Note::Log(level, text) => Row::Log(LogRow::new(role.name(), *level, text, heard_ns)),
             Note::Unwritten(missing) => {
                 self.tally.unwritten += missing;
+                self.board(role).forget_numbers();
                 Row::Link(LinkRow::gap(Lost::Unwritten, *missing))
             }
         };
@@ -154,14 +188,10 @@ impl RowBuilder {
         let board = self.board(role);
         let (lost, skipped) = match message {
             Message::Estimate(estimate) => {
-                (Lost::Estimates, board.estimates.take(estimate.sequence, 1))
+                (Lost::Estimates, board.take_estimate(estimate.sequence))
             }
             Message::Motion(motion) => (Lost::Motions, board.motions.take(motion.sequence, 1)),
-            Message::Gauges(gauges) => {
-                let count = GAUGE_BLOCK as u32;
-                let skipped = board.samples.take(gauges.first_sample, count);
-                (Lost::Samples, skipped)
-            }
+            Message::Gauges(gauges) => (Lost::Samples, board.take_block(gauges.first_sample)),
             _ => (Lost::Samples, 0),
         };
         let (row, instant_us) = row(role, message, at_us, board);
@@ -267,7 +297,7 @@ fn row(role: Role, message: &Message, at_us: u64, board: &mut Board) -> (Row, Op
 
 #[cfg(test)]
 mod tests {
-    use protocol::Motion;
+    use protocol::{Contact, Estimate, GAUGES, GaugeHealth, GaugeSample, Gauges, Motion, Range};
 
     use super::*;
 
@@ -307,6 +337,96 @@ mod tests {
             }
         }
         times
+    }
+
+    /// What is counted, and the links' rows in words, of notes on the sensor.
+    fn counted(notes: impl IntoIterator<Item = Note>) -> (Tally, Vec<String>) {
+        let mut builder = RowBuilder::default();
+        let notes = notes.into_iter();
+        let entries: Vec<Entry> = notes
+            .flat_map(|note| builder.enter(Role::Sensor, 0, &note))
+            .collect();
+        let words = entries.into_iter().filter_map(|entry| match entry.row {
+            Row::Link(link) => Some(link.text.0),
+            _ => None,
+        });
+        (builder.tally(), words.collect())
+    }
+
+    fn heard(message: Message) -> Note {
+        Note::Event(Event::Heard { at_us: 0, message })
+    }
+
+    fn motion(sequence: u32) -> Note {
+        heard(Message::Motion(Motion {
+            sequence,
+            instant_us: 0,
+            position_um: 0,
+            velocity_um_s: 0,
+        }))
+    }
+
+    fn estimate(sequence: u32) -> Note {
+        heard(Message::Estimate(Estimate {
+            sequence,
+            instant_us: 0,
+            wavelength_mm: None,
+            valid: false,
+            confidence: 0.0,
+            amplitude_lsb: 0.0,
+            counted_mm: None,
+            range: Range::T1,
+            contact: Contact::Stick,
+            velocity_um_s: 0,
+            lag_um: None,
+            gauges_used: 0,
+            health: [GaugeHealth::Good; GAUGES],
+        }))
+    }
+
+    fn block(first_sample: u32) -> Note {
+        heard(Message::Gauges(Gauges {
+            first_sample,
+            instant_us: 0,
+            position_um: 0,
+            samples: [GaugeSample::default(); GAUGE_BLOCK],
+        }))
+    }
+
+    #[test]
+    fn what_the_disk_was_too_slow_for_was_heard() {
+        let notes = [
+            motion(0),
+            block(0),
+            Note::Unwritten(5),
+            motion(4),
+            block(16),
+            motion(6),
+        ];
+        let (tally, words) = counted(notes);
+        assert_eq!((tally.unwritten, tally.lost, tally.gaps), (5, 1, 1));
+        let want = [
+            "5 messages heard but not written, the disk being too slow",
+            "1 motions lost",
+        ];
+        assert_eq!(words, want);
+    }
+
+    #[test]
+    fn samples_that_nobody_wanted_are_not_lost() {
+        // A stream begins anew wherever the sensor is by then: in the middle of a block, as it was.
+        let (tally, words) = counted([block(0), block(8), block(37), block(45)]);
+        assert_eq!((tally.lost, tally.gaps), (0, 0), "{words:?}");
+        // Or by chance where a block would have begun; the estimates came all the while.
+        let estimates = |missing: Option<u32>| {
+            let sequences = (0..100).filter(move |sequence| Some(*sequence) != missing);
+            sequences.map(estimate)
+        };
+        for (missing, lost) in [(None, 0), (Some(50), 1_001)] {
+            let before = [block(0)].into_iter();
+            let (tally, words) = counted(before.chain(estimates(missing)).chain([block(1_008)]));
+            assert_eq!(tally.lost, lost, "{words:?}");
+        }
     }
 
     #[test]

@@ -142,10 +142,14 @@ impl LinkRow {
 
     /// So many are missing.
     pub fn gap(lost: Lost, missing: u64) -> Self {
+        let text = match lost {
+            Lost::Unwritten => format!("{missing} {}", lost.name()),
+            _ => format!("{missing} {} lost", lost.name()),
+        };
         Self {
             lost: Some(lost),
             missing: Some(missing),
-            ..Self::new(LinkEvent::Gap, format!("{missing} {} lost", lost.name()))
+            ..Self::new(LinkEvent::Gap, text)
         }
     }
 
