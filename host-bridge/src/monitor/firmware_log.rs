@@ -1,10 +1,11 @@
 //! The firmwares' logs: the bytes of an RTT channel, from wherever they can be had, decoded by defmt's own
 //! decoder with the strings in the ELF.
 
+use std::cell::Cell;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, ErrorKind, IsTerminal, Read, Write};
+use std::io::{self, ErrorKind, IsTerminal, Read, Seek, Write};
 use std::net::TcpStream;
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,6 +68,8 @@ struct Log {
     elf: Vec<u8>,
     table: Table,
     lines: Sender<(Role, LogEvent)>,
+    /// Whether a line has come since it was told last why none does.
+    has_come: Cell<bool>,
     ended: Arc<AtomicBool>,
 }
 
@@ -97,6 +100,7 @@ impl Logs {
             elf: bytes,
             table,
             lines: self.lines.clone(),
+            has_come: Cell::new(false),
             ended: Arc::clone(&self.ended),
         };
         thread::spawn(move || log.read(&origin));
@@ -111,7 +115,7 @@ impl Drop for Logs {
 }
 
 impl Log {
-    /// Reads until the end of it all; what can't be read is tried again, and told once.
+    /// Reads until the end of it all; what can't be read is tried again, and told once until a line comes.
     fn read(&self, origin: &Origin) {
         let mut told = None;
         while !self.is_ended() {
@@ -124,7 +128,8 @@ impl Log {
                 Ok(()) => "its source has ended".to_owned(),
                 Err(reason) => reason,
             };
-            if told.as_ref() != Some(&reason) && !self.is_ended() {
+            let is_told = !self.has_come.take() && told.as_ref() == Some(&reason);
+            if !is_told && !self.is_ended() {
                 told = Some(reason.clone());
                 let _ = self.lines.send((self.role, LogEvent::LogLost(reason)));
             }
@@ -138,7 +143,7 @@ impl Log {
 
     fn read_file(&self, path: &Path) -> Result<(), String> {
         let failed = |error: io::Error| format!("{}: {error}", path.display());
-        let mut file = open_at_once(path).map_err(failed)?;
+        let file = open_at_once(path).map_err(failed)?;
         if file.is_terminal() {
             // Opened as a line, so that the system does not take the bytes for text.
             let opened = SharedPorts.open(path).map_err(|state| state.to_string())?;
@@ -147,12 +152,15 @@ impl Log {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::empty())).map_err(|error| failed(error.into()))?;
         let kind = file.metadata().map_err(failed)?.file_type();
         let mut has_come = false;
-        let read = |bytes: &mut [u8]| match file.read(bytes) {
+        let read = |bytes: &mut [u8]| match (&file).read(bytes) {
             // Nobody writes to the pipe yet.
             Ok(0) if kind.is_fifo() && !has_come => {
                 thread::park_timeout(LOOK);
                 Err(ErrorKind::WouldBlock.into())
             }
+            Ok(0) if kind.is_file() && is_renewed(path, &file) => Err(io::Error::other(
+                "was cut short or replaced: read from its beginning",
+            )),
             read => {
                 has_come |= read.is_ok();
                 read
@@ -206,6 +214,7 @@ impl Log {
                         if self.lines.send(line).is_err() {
                             return Ok(());
                         }
+                        self.has_come.set(true);
                     }
                     Err(DecodeError::UnexpectedEof) => break,
                     Err(DecodeError::Malformed) if self.table.encoding().can_recover() => {}
@@ -227,6 +236,16 @@ fn open_at_once(path: &Path) -> io::Result<File> {
         .read(true)
         .custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY)
         .open(path)
+}
+
+/// Whether a file that was read to its end has been cut short since, or another one has taken its name.
+fn is_renewed(path: &Path, mut file: &File) -> bool {
+    let facts = (fs::metadata(path), file.metadata(), file.stream_position());
+    let (Ok(named), Ok(open), Ok(read_bytes)) = facts else {
+        // Its name leads to nothing while it is being replaced.
+        return false;
+    };
+    (named.dev(), named.ino()) != (open.dev(), open.ino()) || open.len() < read_bytes
 }
 
 /// The chip of both boards, by probe-rs's name.

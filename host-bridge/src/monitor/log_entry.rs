@@ -35,7 +35,7 @@ pub enum LogEvent {
         /// The line.
         text: String,
     },
-    /// Its log can't be read at the moment.
+    /// Its log can't be read at the moment, or begins anew.
     LogLost(String),
 }
 
@@ -75,7 +75,7 @@ impl fmt::Display for LogEvent {
                 Some(level) => write!(f, "{level}: {text}"),
                 None => f.write_str(text),
             },
-            Self::LogLost(reason) => write!(f, "its log can't be read: {reason}"),
+            Self::LogLost(reason) => write!(f, "its log is interrupted: {reason}"),
         }
     }
 }

@@ -1,13 +1,16 @@
 //! `host-bridge monitor` with the boards' own firmwares at the far side.
 #![cfg(target_os = "linux")]
 
-use std::io::{BufRead, BufReader};
+use std::fs;
+use std::io::{self, BufRead, BufReader, Read};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use hil_sim_boards::bench::{Command as Order, PortName};
-use tests::bench::{ExclusiveBench, bench, until};
+use protocol::Role;
+use tests::bench::{BAUD, ExclusiveBench, bench, folder, until};
 use tests::bridge;
+use tests::elves;
 use tests::terminal::Terminal;
 
 /// Only what hangs takes so long.
@@ -28,6 +31,20 @@ fn steady(name: &str) -> ExclusiveBench {
     })
 }
 
+/// The next line with all of these words.
+fn next_with(lines: &mut impl Iterator<Item = io::Result<String>>, words: &[&str]) -> String {
+    let end = Instant::now() + LIMIT;
+    let mut seen = String::new();
+    while Instant::now() < end {
+        let line = lines.next().expect("it goes on").expect("text");
+        if words.iter().all(|words| line.contains(words)) {
+            return line;
+        }
+        seen += &format!("{line}\n");
+    }
+    panic!("no line with {words:?} after\n{seen}");
+}
+
 #[test]
 fn lines_tell_of_the_surface_the_cable_and_the_boards_logs() {
     let alone = steady("monitor-lines");
@@ -36,18 +53,7 @@ fn lines_tell_of_the_surface_the_cable_and_the_boards_logs() {
         .spawn()
         .expect("the program can be started");
     let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
-    let mut with = |words: &[&str]| {
-        let end = Instant::now() + LIMIT;
-        let mut seen = String::new();
-        while Instant::now() < end {
-            let line = lines.next().expect("it goes on").expect("text");
-            if words.iter().all(|words| line.contains(words)) {
-                return line;
-            }
-            seen += &format!("{line}\n");
-        }
-        panic!("no line with {words:?} after\n{seen}");
-    };
+    let mut with = |words: &[&str]| next_with(&mut lines, words);
     let line = with(&[" valid ", " driving"]);
     let wavelength_mm: f64 = line
         .split_whitespace()
@@ -62,8 +68,67 @@ fn lines_tell_of_the_surface_the_cable_and_the_boards_logs() {
     order(Order::Plug(PortName::DisplayConsole));
     with(&["# ", "display known: "]);
     // Started anew, which its firmware logs.
-    order(Order::Reset(protocol::Role::Sensor));
+    order(Order::Reset(Role::Sensor));
     with(&["# ", "sensor log: info: "]);
+    child.kill().expect("it runs");
+    child.wait().expect("it has run");
+}
+
+/// What the sensor board logs at its start, as bytes of its RTT channel.
+fn logged_at_start(alone: &ExclusiveBench) -> Vec<u8> {
+    let name = alone.bench.path(PortName::SensorRtt);
+    let mut port = serialport::new(name.to_string_lossy(), BAUD)
+        .timeout(Duration::from_millis(20))
+        .open()
+        .expect("the port can be opened");
+    let reset = alone.bench.command(Order::Reset(Role::Sensor));
+    reset.expect("it can be done");
+    let mut logged = Vec::new();
+    until("a line and its end", || {
+        let mut bytes = [0; 1_024];
+        let count = port.read(&mut bytes).unwrap_or(0);
+        logged.extend_from_slice(&bytes[..count]);
+        (logged.len() > 1 && logged.last() == Some(&0)).then_some(())
+    });
+    logged
+}
+
+#[test]
+fn a_log_in_a_file_that_is_cut_short_or_replaced_is_read_from_its_beginning() {
+    let logged = {
+        let alone = steady("monitor-log-file");
+        logged_at_start(&alone)
+    };
+    let folder = folder("monitor-log-file");
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    let [log, other, bench] = ["log", "other", "file.toml"].map(|name| folder.join(name));
+    fs::write(&log, logged.repeat(3)).expect("it can be written");
+    let elf = elves::path(Role::Sensor);
+    let seat = format!("[sensor]\nport = \"/dev/null/s\"\nelf = {elf:?}\nrtt = {log:?}\n");
+    fs::write(&bench, seat).expect("it can be written");
+    let mut child = bridge::command()
+        .args(["monitor", "--plain", "--every", "600", "--bench"])
+        .arg(&bench)
+        .spawn()
+        .expect("the program can be started");
+    let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+    let started = ["sensor log: info: ", " started"];
+    let lost = ["sensor log-lost: ", "log: was cut short or replaced"];
+    for _ in 0..3 {
+        next_with(&mut lines, &started);
+    }
+    fs::write(&log, logged.repeat(2)).expect("it can be written");
+    next_with(&mut lines, &lost);
+    for _ in 0..2 {
+        next_with(&mut lines, &started);
+    }
+    // What is longer is another one all the same.
+    fs::write(&other, logged.repeat(4)).expect("it can be written");
+    fs::rename(&other, &log).expect("it can be renamed");
+    next_with(&mut lines, &lost);
+    for _ in 0..4 {
+        next_with(&mut lines, &started);
+    }
     child.kill().expect("it runs");
     child.wait().expect("it has run");
 }
