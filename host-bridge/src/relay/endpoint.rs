@@ -156,14 +156,11 @@ impl Endpoint {
     /// resolved.
     pub fn addresses_to_bind(&self, is_listening: bool) -> io::Result<Vec<SocketAddr>> {
         let addresses = self.resolve()?;
-        if is_listening {
-            return Ok(addresses);
-        }
-        let any: IpAddr = match addresses.first() {
-            Some(SocketAddr::V6(_)) => Ipv6Addr::UNSPECIFIED.into(),
-            _ => Ipv4Addr::UNSPECIFIED.into(),
-        };
-        Ok(vec![(any, 0).into()])
+        Ok(if is_listening {
+            addresses
+        } else {
+            ports_towards(&addresses)
+        })
     }
 
     /// Tries whether one may listen here, so that who may not is told why in plain words. Fails with the system's reason.
@@ -174,6 +171,15 @@ impl Endpoint {
         }
         TcpListener::bind(addresses).map(drop)
     }
+}
+
+/// Any port that reaches all of these: one of IPv6 reaches IPv4 as well, but not every system has it.
+pub fn ports_towards(addresses: &[SocketAddr]) -> Vec<SocketAddr> {
+    let mut ports = vec![(Ipv4Addr::UNSPECIFIED, 0).into()];
+    if addresses.iter().any(SocketAddr::is_ipv6) {
+        ports.insert(0, (Ipv6Addr::UNSPECIFIED, 0).into());
+    }
+    ports
 }
 
 /// Longest wait for the other end, at each step.

@@ -91,6 +91,7 @@ impl Port {
     }
 
     /// Looks up where it connects if nothing comes from there, since its address may have changed; forgets who is gone.
+    /// Whoever has several addresses is told at each of them until one answers.
     fn look(&self, at_us: u64) {
         let mut peers = locked(&self.peers);
         let is_gone = |heard_us: u64| at_us.saturating_sub(heard_us) >= SILENCE_US;
@@ -100,13 +101,24 @@ impl Port {
             }
             drop(peers);
             // A name look-up may take its time, in which nothing is heard.
-            let Some(address) = towards.resolve().ok().and_then(|all| all.first().copied()) else {
-                return;
-            };
-            *locked(&self.peers) = vec![(address, at_us)];
+            if let Ok(addresses) = towards.resolve() {
+                self.reach_out(&addresses, at_us);
+            }
         } else {
             peers.retain(|&(_, heard_us)| !is_gone(heard_us));
         }
+    }
+
+    /// Tells whoever is at one of these addresses, from `at_us` on.
+    fn reach_out(&self, addresses: &[SocketAddr], at_us: u64) {
+        let is_ipv6 = self.socket.local_addr().is_ok_and(|own| own.is_ipv6());
+        // What a port of IPv6 calls an address of IPv4.
+        let named = |address: &SocketAddr| match address {
+            SocketAddr::V4(v4) if is_ipv6 => (v4.ip().to_ipv6_mapped(), v4.port()).into(),
+            address => *address,
+        };
+        let named = addresses.iter().take(PEERS).map(named);
+        *locked(&self.peers) = named.map(|address| (address, at_us)).collect();
     }
 
     /// Somebody was heard: whether he is listened to.
@@ -115,6 +127,10 @@ impl Port {
         let known = peers.iter_mut().find(|(known, _)| *known == peer);
         if let Some((_, heard_us)) = known {
             *heard_us = at_us;
+            if self.towards.is_some() {
+                // His other addresses need not be tried any more.
+                peers.retain(|(known, _)| *known == peer);
+            }
             return true;
         }
         let has_room = self.towards.is_none() && peers.len() < PEERS;
@@ -128,28 +144,74 @@ impl Port {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relay::datagrams::End;
+    use crate::relay::endpoint::ports_towards;
+
+    /// Only what hangs takes so long.
+    const LIMIT: Duration = Duration::from_secs(120);
+
+    fn port(socket: UdpSocket) -> Port {
+        Port {
+            socket,
+            towards: Some("udp/127.0.0.1:7".parse().expect("an endpoint")),
+            peers: Mutex::default(),
+            is_ended: AtomicBool::new(false),
+        }
+    }
+
+    fn addresses(port: &Port) -> Vec<SocketAddr> {
+        locked(&port.peers).iter().map(|peer| peer.0).collect()
+    }
 
     #[test]
     fn a_name_is_looked_up_while_nobody_answers_and_not_otherwise() {
-        let towards: Endpoint = "udp/127.0.0.1:7".parse().expect("an endpoint");
-        let port = Port {
-            socket: UdpSocket::bind("127.0.0.1:0").expect("a socket"),
-            towards: Some(towards),
-            peers: Mutex::default(),
-            is_ended: AtomicBool::new(false),
-        };
-        let addresses =
-            || -> Vec<SocketAddr> { locked(&port.peers).iter().map(|peer| peer.0).collect() };
+        let port = port(UdpSocket::bind("127.0.0.1:0").expect("a socket"));
         let looked_up = ["127.0.0.1:7".parse().expect("an address")];
         let answering: SocketAddr = "127.0.0.1:8".parse().expect("an address");
         port.look(SILENCE_US);
-        assert_eq!(addresses(), looked_up);
+        assert_eq!(addresses(&port), looked_up);
         // The name means another address by now, which the one that answers does not care for.
         *locked(&port.peers) = vec![(answering, 0)];
         assert!(port.meet(answering, 10 * SILENCE_US));
         port.look(11 * SILENCE_US - 1);
-        assert_eq!(addresses(), [answering]);
+        assert_eq!(addresses(&port), [answering]);
         port.look(11 * SILENCE_US);
-        assert_eq!(addresses(), looked_up);
+        assert_eq!(addresses(&port), looked_up);
+    }
+
+    #[test]
+    fn whoever_has_several_addresses_is_told_at_each_until_one_answers() {
+        let [deaf, there] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").expect("a socket"));
+        let of = |socket: &UdpSocket| socket.local_addr().expect("it has one");
+        // Nobody is at the first one, maybe not even this computer.
+        let at = ["[::1]:7".parse().expect("one"), of(&deaf), of(&there)];
+        let socket = UdpSocket::bind(&ports_towards(&at)[..]).expect("a socket");
+        let plain = Plain {
+            port: Arc::new(port(socket)),
+            thread: None,
+        };
+        plain.port.reach_out(&at, 0);
+        let send = |text: &[u8]| assert!(plain.send(text));
+        for socket in [&there, &plain.port.socket] {
+            socket.set_read_timeout(Some(LIMIT)).expect("it waits");
+        }
+        let is_heard = |text: &[u8]| {
+            let mut bytes = [0; 8];
+            let (count, from) = there.recv_from(&mut bytes).expect("it comes");
+            assert_eq!(&bytes[..count], text);
+            from
+        };
+        send(b"first");
+        let client = is_heard(b"first");
+        there.send_to(b"answer", client).expect("it goes back");
+        let mut bytes = [0; 8];
+        let (_, answering) = plain.port.socket.recv_from(&mut bytes).expect("it comes");
+        assert!(plain.port.meet(answering, 1));
+        assert_eq!(addresses(&plain.port), [answering]);
+        send(b"second");
+        is_heard(b"second");
+        deaf.set_nonblocking(true).expect("it does not wait");
+        let told = (0..2).filter(|_| deaf.recv_from(&mut [0; 8]).is_ok());
+        assert_eq!(told.count(), 1, "the first one only");
     }
 }

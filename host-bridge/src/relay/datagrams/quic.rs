@@ -6,7 +6,7 @@
 
 use std::any::Any;
 use std::io;
-use std::net::UdpSocket;
+use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -228,14 +228,29 @@ async fn connect(
         let looking = towards.clone();
         let addresses = spawn_blocking(move || looking.resolve()).await;
         if let Ok(Ok(addresses)) = addresses
-            && let Some(&address) = addresses.first()
-            && let Ok(connecting) = port.connect_with(client.clone(), address, &towards.host)
-            && let Ok(Ok(connection)) = timeout(2 * IDLE, connecting).await
+            && let Some(connection) = reach(port, &client, &addresses, &towards.host).await
         {
             peers.hear(connection).await;
         }
         sleep(AGAIN).await;
     }
+}
+
+/// Connects to the first of the addresses of `host` that answers.
+async fn reach(
+    port: &quinn::Endpoint,
+    client: &ClientConfig,
+    addresses: &[SocketAddr],
+    host: &str,
+) -> Option<Connection> {
+    for &address in addresses {
+        if let Ok(connecting) = port.connect_with(client.clone(), address, host)
+            && let Ok(Ok(connection)) = timeout(2 * IDLE, connecting).await
+        {
+            return Some(connection);
+        }
+    }
+    None
 }
 
 impl Peers {
@@ -458,6 +473,28 @@ mod tests {
         while told.try_recv().is_ok() {}
         let (good, _) = open(&at, false, ours.identity("bench.display", YEAR));
         speak_until(&[&good], &told, |heard| heard == Some(KEY));
+    }
+
+    #[test]
+    fn each_address_of_a_host_is_tried_until_one_answers() {
+        let ours = Authority::new("addresses");
+        let at = Endpoint {
+            host: "127.0.0.1".to_owned(),
+            ..free_port()
+        };
+        let (_listener, _told) = open(&at, true, ours.identity("bench.sensor", YEAR));
+        let identity = ours.identity("bench.display", YEAR);
+        let client = connecting(identity.connecting).expect("a configuration");
+        let runtime = Builder::new_current_thread().enable_all().build();
+        let connection = runtime.expect("a runtime").block_on(async {
+            let any = "127.0.0.1:0".parse().expect("an address");
+            let port = quinn::Endpoint::client(any).expect("a port");
+            // Nobody gets to the first one from there.
+            let mut addresses = vec!["[::1]:7".parse().expect("an address")];
+            addresses.extend(at.resolve().expect("an address"));
+            reach(&port, &client, &addresses, "localhost").await
+        });
+        assert!(connection.is_some());
     }
 
     #[test]
