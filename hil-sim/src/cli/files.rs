@@ -1,10 +1,18 @@
 //! Files that commands write.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
 use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::Context;
+#[cfg(target_os = "linux")]
+use signal_hook::{
+    consts::{SIGINT, SIGTERM},
+    iterator::Signals,
+    low_level::emulate_default_handler,
+};
 
 use super::say::say;
 
@@ -51,7 +59,8 @@ impl Format {
 /// A file for results, opened before there are any: an hour is not to be lost for a folder that is not there.
 ///
 /// What is written goes to a draft beside it, named `FILE.part`, which takes the file's place at the end: until
-/// then an earlier result is there. A device or a pipe is written to at once.
+/// then an earlier result is there. A signal that ends the program takes the draft away. A device or a pipe is written
+/// to at once.
 pub(super) struct Results<'a> {
     pub path: &'a Path,
     file: BufWriter<File>,
@@ -108,6 +117,8 @@ impl<'a> Results<'a> {
         let mut draft = place.clone().into_os_string();
         draft.push(".part");
         let draft = PathBuf::from(draft);
+        #[cfg(target_os = "linux")]
+        take_away_at_signals().with_context(wrong)?;
         let file = File::options()
             .write(true)
             .create(true)
@@ -121,6 +132,7 @@ impl<'a> Results<'a> {
             ),
             Err(TryLockError::Error(error)) => return Err(error).with_context(wrong),
         }
+        drafts().insert(draft.clone());
         file.set_len(0).with_context(wrong)?;
         Ok(Self {
             path,
@@ -153,7 +165,11 @@ impl<'a> Results<'a> {
     /// Nothing more is to come: it takes its place.
     pub fn end(mut self) -> anyhow::Result<()> {
         let placed = self.file.flush().and_then(|()| match self.draft.take() {
-            Some([draft, place]) => fs::rename(draft, place),
+            Some([draft, place]) => {
+                let mut drafts = drafts();
+                drafts.remove(&draft);
+                fs::rename(draft, place)
+            }
             None => Ok(()),
         });
         placed.with_context(|| self.path.display().to_string())
@@ -166,11 +182,42 @@ impl Drop for Results<'_> {
         // What is not written shows in what is there.
         let _ = self.file.flush();
         if let Some([draft, _]) = &self.draft
+            && drafts().remove(draft)
             && fs::metadata(draft).is_ok_and(|draft| draft.len() == 0)
         {
             let _ = fs::remove_file(draft);
         }
     }
+}
+
+/// The drafts that are being written, each until it has taken its place or has been given up.
+fn drafts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    static DRAFTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    DRAFTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Has a signal that ends the program take all drafts away before.
+#[cfg(target_os = "linux")]
+fn take_away_at_signals() -> std::io::Result<()> {
+    static ARE_HEARD: Mutex<bool> = Mutex::new(false);
+    let mut are_heard = ARE_HEARD.lock().unwrap_or_else(PoisonError::into_inner);
+    if *are_heard {
+        return Ok(());
+    }
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            // Held to the end: none takes its place any more.
+            let drafts = drafts();
+            for draft in &*drafts {
+                // There is nobody to tell.
+                let _ = fs::remove_file(draft);
+            }
+            let _ = emulate_default_handler(signal);
+        }
+    });
+    *are_heard = true;
+    Ok(())
 }
 
 /// Writes a file of a folder that is there, and tells of it.

@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -199,6 +200,34 @@ fn results_from_before_stay_until_there_are_new_ones() {
     run.wait().unwrap();
     let text = fs::read_to_string(folder.join("o.json")).unwrap();
     assert_eq!(text, before);
+}
+
+#[test]
+fn a_run_that_a_signal_ends_leaves_no_draft() {
+    let folder = folder("ended");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    fs::write(folder.join("long.toml"), SOUND.replace("0.5", "600.0")).unwrap();
+    for (name, number) in [("INT", 2), ("TERM", 15)] {
+        let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+            .current_dir(&folder)
+            .args(["run", "a.toml", "long.toml", "--json", "o.json", "--junit"])
+            .arg("o.xml")
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(run.stdout.take().unwrap()).lines();
+        assert_eq!(lines.take(2).map_while(Result::ok).count(), 2);
+        assert!(folder.join("o.json.part").exists() && folder.join("o.xml.part").exists());
+        let sent = Command::new("kill")
+            .args(["-s", name, &run.id().to_string()])
+            .status();
+        assert!(sent.unwrap().success());
+        assert_eq!(run.wait().unwrap().signal(), Some(number));
+        let left = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap());
+        let mut left: Vec<_> = left.map(|entry| entry.file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["a.toml", "long.toml"], "{name}");
+    }
 }
 
 #[test]
