@@ -73,10 +73,7 @@ impl Ports for SharedPorts {
 
     fn open(&self, path: &Path) -> Result<Opened, State> {
         if is_far(path) {
-            let absent = State::Absent(format!(
-                "{}: no relay that shows it runs here",
-                path.display()
-            ));
+            let absent = State::Absent(path.display().to_string());
             return open_source(&path.to_string_lossy(), move || Err(absent.clone()));
         }
         // What is no port is refused in the words of who knows ports.

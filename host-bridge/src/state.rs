@@ -1,9 +1,11 @@
 //! How a board's console stands, in words that say what to do.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use protocol::{Hello, PROTOCOL_VERSION, Role};
+
+use crate::place::is_far;
 
 /// How the way to one board stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -108,6 +110,9 @@ impl State {
     /// What to do about it; none if there is nothing to be done.
     pub fn advice(&self) -> Option<&'static str> {
         Some(match self {
+            Self::Absent(place) if is_far(Path::new(place)) => {
+                "start the relay at this site, `host-bridge relay`, with that --name: it shows the other site's board"
+            }
             Self::Absent { .. } => {
                 "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display"
             }

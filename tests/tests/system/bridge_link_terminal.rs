@@ -140,6 +140,16 @@ fn when_the_owner_of_a_port_ends_another_goes_on_without_a_word_to_its_user() {
 }
 
 #[test]
+fn a_board_at_another_site_that_no_relay_shows_is_absent_and_the_relay_to_be_started() {
+    let name = format!("relay:no-bench-{}.sensor", std::process::id());
+    let (_link, told) = link_to(Role::Sensor, Place::Port(name.clone().into()));
+    let state = turns_to(&told, "absent");
+    assert_eq!(state.to_string(), format!("{name}: not there"));
+    let advice = state.advice().expect("there is something to be done");
+    assert!(advice.starts_with("start the relay"), "{advice}");
+}
+
+#[test]
 fn what_is_no_serial_port_is_refused_by_what_it_is() {
     for (path, what) in [
         (std::env::temp_dir(), "is a folder, not a serial port"),

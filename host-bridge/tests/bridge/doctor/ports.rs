@@ -30,6 +30,12 @@ fn each_state_of_a_port_is_named_with_advice() {
             "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display",
         ),
         (
+            State::Absent("relay:bench.sensor".to_owned()),
+            "absent",
+            "sensor: relay:bench.sensor: not there",
+            "start the relay at this site, `host-bridge relay`, with that --name: it shows the other site's board",
+        ),
+        (
             State::Busy(port()),
             "busy",
             "sensor: /dev/ttyACM0: another program has it",
