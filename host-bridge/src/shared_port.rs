@@ -189,18 +189,11 @@ impl Seat {
             match Guest::open(&self.device.socket()) {
                 Ok(guest) => return Ok(Part::Guest(Hearing::new(guest))),
                 Err(_) if Instant::now() >= until => {
-                    let holder = self.device.holder();
-                    return Err(self.failed(format!(
-                        "{holder} has it and stands still: let it go on, or end it"
-                    )));
+                    return Err(State::Hung(self.path.clone(), self.device.holder()));
                 }
                 Err(_) => std::thread::park_timeout(READ_TIMEOUT),
             }
         }
-    }
-
-    fn failed(&self, reason: String) -> State {
-        State::Failed(self.path.clone(), reason)
     }
 }
 

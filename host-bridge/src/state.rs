@@ -14,6 +14,8 @@ pub enum State {
     Absent(String),
     /// Another program has the port.
     Busy(PathBuf),
+    /// A program of this user's that shares its ports has the port, and does not answer: which one.
+    Hung(PathBuf, String),
     /// This user may not open the port.
     Denied(PathBuf),
     /// The port can't be used, for another reason.
@@ -69,6 +71,7 @@ impl State {
         match self {
             Self::Absent { .. } => None,
             Self::Busy(port)
+            | Self::Hung(port, _)
             | Self::Denied(port)
             | Self::Failed(port, _)
             | Self::Opened(port)
@@ -96,7 +99,7 @@ impl State {
             Self::Absent(..) => (0, "absent"),
             Self::Stranger { .. } => (1, "wrong-role"),
             Self::Opened(..) => (2, "opened"),
-            Self::Busy(..) => (3, "busy"),
+            Self::Busy(..) | Self::Hung(..) => (3, "busy"),
             Self::Silent(..) => (4, "silent"),
             Self::Failed(..) => (5, "failed"),
             Self::Deaf(..) => (6, "deaf"),
@@ -117,6 +120,9 @@ impl State {
                 "plug the board in at its ST-LINK's USB socket, or name its port with --sensor or --display"
             }
             Self::Busy { .. } => "close the other program (tio, screen, or one of another user's)",
+            Self::Hung { .. } => {
+                "let that process go on (`kill -CONT`), or end it (`kill -KILL`): then the port is had without it"
+            }
             Self::Denied { .. } => {
                 "join the group that owns it (often dialout: `sudo usermod -aG dialout $USER`, then log in again)"
             }
@@ -157,6 +163,7 @@ impl fmt::Display for State {
         match self {
             Self::Absent(place) => write!(f, "{place}: not there"),
             Self::Busy { .. } => f.write_str("another program has it"),
+            Self::Hung(_, holder) => write!(f, "{holder} has it and does not answer"),
             Self::Denied { .. } => f.write_str("no permission to open it"),
             Self::Failed(_, reason) => f.write_str(reason),
             Self::Opened { .. } => f.write_str("opened"),

@@ -249,6 +249,7 @@ impl Flash {
                 )
             }
             State::Busy { .. }
+            | State::Hung { .. }
             | State::Denied { .. }
             | State::Failed { .. }
             | State::Absent { .. } => {

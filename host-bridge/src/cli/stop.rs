@@ -40,6 +40,8 @@ impl StopBoards {
         let end = Instant::now() + Duration::from_secs(self.within.into());
         let mut answers: Vec<(Role, Stopped)> = Vec::new();
         let mut heard = HeardAnswers::default();
+        // Those whose ports have been looked at.
+        let mut seen = Vec::new();
         while !waiting.is_empty() {
             match told.recv_timeout(end.saturating_duration_since(Instant::now())) {
                 Ok((
@@ -49,6 +51,7 @@ impl StopBoards {
                         ..
                     },
                 )) => answers.push((role, stopped)),
+                Ok((role, Event::StateChanged(_))) => seen.push(role),
                 Ok(_) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
             }
@@ -68,6 +71,10 @@ impl StopBoards {
             let state = link.state();
             match answers.iter().find(|(of, _)| of == role) {
                 Some((_, stopped)) => heard.take(*role, &state, stopped),
+                None if !seen.contains(role) => {
+                    let why = "its port is not open yet: a program that has it may not answer; a longer --within tells";
+                    heard.missed.push((*role, why.to_owned()));
+                }
                 None => {
                     let advice = state.advice().unwrap_or("it does not answer");
                     let why = format!("{state} ({advice})");

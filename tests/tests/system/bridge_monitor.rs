@@ -226,6 +226,31 @@ fn a_second_monitor_sees_the_same_and_goes_on_when_the_first_one_ends() {
 }
 
 #[test]
+fn a_program_that_has_a_port_and_stands_still_is_named_with_what_to_do() {
+    let board = FakeBoard::new(Role::Sensor);
+    let absent = name_of_a_port("stands-still");
+    let owner = Lines::of(monitor_at(board.path(), &absent).arg("--plain"));
+    owner.with("sensor known: ");
+    owner.signal("STOP");
+    // Sooner than it is known who has it.
+    let mut command = bridge::command();
+    command.args(["stop", "--within", "1", "--sensor"]);
+    let stop = bridge::Running::start(command.arg(board.path())).wait(LIMIT);
+    assert_eq!(stop.status.code(), Some(1), "{}", stop.stderr);
+    let words = "NOT STOPPED as far as is known: sensor: its port is not open yet";
+    assert!(stop.stderr.contains(words), "{}", stop.stderr);
+    let guest = Lines::of(monitor_at(board.path(), &absent).arg("--plain"));
+    let line = guest.with("sensor busy: ");
+    let words = format!(
+        "host-bridge monitor (process {}) has it and does not answer: let that process go on",
+        owner.child.id()
+    );
+    assert!(line.contains(&words), "{line}");
+    owner.signal("CONT");
+    guest.with("sensor known: ");
+}
+
+#[test]
 fn a_cable_that_is_put_back_is_seen() {
     let name = name_of_a_port("cable");
     let absent = name.with_extension("absent");

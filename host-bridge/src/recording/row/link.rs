@@ -21,7 +21,7 @@ pub struct LinkRow {
     /// The port, or where the board is looked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub port: Option<Text>,
-    /// The system's reason, if the port can't be opened.
+    /// Why the port can't be opened: the system's reason, or the program that has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<Text>,
     /// What the board said of itself.
@@ -160,7 +160,7 @@ impl LinkRow {
             state => state.port().map(|port| port.display().to_string()),
         };
         let reason = match state {
-            State::Failed(_, reason) => Some(reason.clone()),
+            State::Failed(_, reason) | State::Hung(_, reason) => Some(reason.clone()),
             _ => None,
         };
         let hello = match state {
@@ -188,7 +188,10 @@ impl LinkRow {
         let port = port.into();
         Some(match word.0.as_str() {
             "absent" => State::Absent(place),
-            "busy" => State::Busy(port),
+            "busy" => match &self.reason {
+                Some(holder) => State::Hung(port, holder.0.clone()),
+                None => State::Busy(port),
+            },
             "denied" => State::Denied(port),
             "failed" => State::Failed(port, self.reason.as_ref()?.0.clone()),
             "opened" => State::Opened(port),
@@ -252,5 +255,20 @@ impl OtherRow {
     /// The message. Fails if it is none.
     pub fn message(&self) -> serde_json::Result<Message> {
         serde_json::from_str(&self.json.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_has_a_port_comes_back_from_its_row() {
+        let port = "/dev/ttyACM0";
+        let held = State::Hung(port.into(), "host-bridge record (process 4711)".to_owned());
+        for state in [State::Busy(port.into()), held] {
+            let row = LinkRow::turned(&state);
+            assert_eq!(row.state(Role::Sensor), Some(state));
+        }
     }
 }

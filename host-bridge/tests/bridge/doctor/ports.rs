@@ -42,6 +42,12 @@ fn each_state_of_a_port_is_named_with_advice() {
             "close the other program (tio, screen, or one of another user's)",
         ),
         (
+            State::Hung(port(), "host-bridge record (process 4711)".to_owned()),
+            "busy",
+            "sensor: /dev/ttyACM0: host-bridge record (process 4711) has it and does not answer",
+            "let that process go on (`kill -CONT`), or end it (`kill -KILL`): then the port is had without it",
+        ),
+        (
             State::Failed(port(), "is a folder, not a serial port".to_owned()),
             "failed",
             "sensor: /dev/ttyACM0: is a folder, not a serial port",
