@@ -48,6 +48,16 @@ pub struct Options {
     pub folder: PathBuf,
 }
 
+impl Options {
+    /// How lines are written; none where a dashboard is drawn.
+    pub fn lines(&self) -> Option<Format> {
+        match self.plain {
+            None if io::stdout().is_terminal() => None,
+            plain => Some(plain.unwrap_or_default()),
+        }
+    }
+}
+
 /// Why the watching ended before its time.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
@@ -67,12 +77,7 @@ pub fn run(
     ended: &Arc<AtomicBool>,
 ) -> Result<bool, MonitorError> {
     let session = Session::new(source, options.folder.clone());
-    let format = match options.plain {
-        None if io::stdout().is_terminal() => None,
-        None => Some(Format::default()),
-        plain => plain,
-    };
-    match format {
+    match options.lines() {
         Some(format) => {
             let mut output = io::stdout().lock();
             Ok(line::run(

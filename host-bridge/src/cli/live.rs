@@ -5,9 +5,11 @@ use std::process::ExitCode;
 
 use crate::live::{PORT, Settings, Viewer};
 use anyhow::bail;
+use crossbeam_channel::unbounded;
 
 use super::output;
 use super::signals::{self, Again};
+use super::stop::Teller;
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -58,8 +60,15 @@ impl Live {
         }
         let bench = self.boards.find()?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
-        let (links, told) = super::told_links(&bench);
-        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())?;
+        let teller = Teller::start(bench.roles());
+        let (events, told) = unbounded();
+        let hears = teller.clone();
+        let links = super::links(&bench, move |role, event| {
+            hears.on_event(role, &event);
+            super::tell(&events, role, event);
+        });
+        let begins = teller.clone();
+        signals::stop_boards(&links, move || begins.begin())?;
         let settings = Settings {
             address: self.listen,
             port: self.port,
@@ -78,6 +87,7 @@ impl Live {
             viewer.page(),
         ))?;
         viewer.run(&ended);
+        teller.end();
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -14,6 +14,7 @@ use crossbeam_channel::unbounded;
 use protocol::Role;
 
 use super::signals::{self, Again};
+use super::stop::Teller;
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -87,19 +88,6 @@ impl Monitor {
         self.follow_logs(&bench, &logs)?;
         let (happens, events) = unbounded();
         let feed = RecordingFeed::default();
-        let feeds = feed.clone();
-        let links = super::links(&bench, move |role, event| {
-            feeds.on_event(role, &event);
-            super::tell(&happens, role, event);
-        });
-        signals::stop_boards(links.iter().map(|(_, link)| link.sender()).collect())
-            .context("can't listen to signals")?;
-        let source = Source {
-            events,
-            links,
-            logs: Some(feed.pass_on(lines)),
-            feed,
-        };
         let format = Format {
             is_json: self.json,
             every: self.every,
@@ -109,7 +97,38 @@ impl Monitor {
             limit: self.limit,
             folder: self.record_to,
         };
-        let has_met = monitor::run(source, &options, &ended)?;
+        // A dashboard shows it.
+        let teller = options.lines().map(|_| Teller::start(bench.roles()));
+        let (feeds, hears) = (feed.clone(), teller.clone());
+        let links = super::links(&bench, move |role, event| {
+            feeds.on_event(role, &event);
+            if let Some(teller) = &hears {
+                teller.on_event(role, &event);
+            }
+            super::tell(&happens, role, event);
+        });
+        let (said, stops) = unbounded();
+        let begins = teller.clone();
+        signals::stop_boards(&links, move || {
+            // Nobody listens any more at the end.
+            let _ = said.send(());
+            if let Some(teller) = &begins {
+                teller.begin();
+            }
+        })
+        .context("can't listen to signals")?;
+        let source = Source {
+            events,
+            stops,
+            links,
+            logs: Some(feed.pass_on(lines)),
+            feed,
+        };
+        let watched = monitor::run(source, &options, &ended);
+        if let Some(teller) = teller {
+            teller.end();
+        }
+        let has_met = watched?;
         Ok(ExitCode::from(u8::from(!has_met)))
     }
 

@@ -11,19 +11,19 @@ use std::time::{Duration, Instant};
 
 use crate::bench::Bench;
 use crate::clock::now_us;
-use crate::link::{Event, Link, stop_all};
+use crate::link::{Event, Link};
 use crate::monitor::firmware_log::{LogError, Logs, Origin};
 use crate::monitor::log_entry::LogEvent;
 use crate::recording::gauge_stream::GaugeStream;
 use crate::recording::{PART, Progress, Recorder, Settings};
 use crate::state::{Advised, State};
 use clap::ValueHint;
-use protocol::{Message, Role, Stopped};
+use protocol::{Message, Role};
 use serde_json::json;
 
 use super::output;
 use super::signals::{self, Again};
-use super::stop::has_stopped;
+use super::stop::Outcome;
 
 /// What the command does.
 pub const ABOUT: &str = "\
@@ -56,8 +56,6 @@ const TOLD: Duration = Duration::from_secs(1);
 const WAITING_LINES: usize = 64;
 /// How long the last ones may take.
 const LINGER: Duration = Duration::from_secs(1);
-/// A board answers a Stop within milliseconds.
-const STOP_PATIENCE: Duration = Duration::from_millis(500);
 const BOARDS: [Role; 2] = [Role::Sensor, Role::Display];
 
 /// What `record` is asked for.
@@ -120,19 +118,16 @@ impl Record {
             }
         });
         let (said, stops) = channel();
-        let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
-        signals::on_stop(move || {
-            // First, so that no answer comes before it. Nobody listens any more when the recording ends.
+        signals::stop_boards(&links, move || {
+            // Nobody listens any more when the recording ends.
             let _ = said.send(());
-            stop_all(&boards);
         })?;
         let absent = Session {
             recorder: &recorder,
             links: &links,
             told,
             stops,
-            stopping: None,
-            stopped: Vec::new(),
+            outcome: Outcome::new(roles.clone()),
             lines,
             stream: GaugeStream::new(!self.no_gauges),
             absent: BOARDS.into(),
@@ -234,10 +229,7 @@ struct Session<'a> {
     told: Receiver<(Role, Event)>,
     /// That a Stop is being said.
     stops: Receiver<()>,
-    /// Until when boards that were told to stop may take to answer.
-    stopping: Option<Instant>,
-    /// Those that have answered since, by their own names.
-    stopped: Vec<Role>,
+    outcome: Outcome,
     /// The boards' logs.
     lines: Receiver<(Role, LogEvent)>,
     stream: GaugeStream,
@@ -272,7 +264,7 @@ impl Session<'_> {
             }
             self.note_stops();
             // What becomes of a Stop is told first.
-            if (ended.load(Ordering::Relaxed) || past) && self.stopping.is_none() {
+            if (ended.load(Ordering::Relaxed) || past) && self.outcome.until().is_none() {
                 return;
             }
             let left = until.map_or(LOOK, |until| until.saturating_sub(self.started.elapsed()));
@@ -292,13 +284,11 @@ impl Session<'_> {
         match heard {
             Ok((role, event)) => {
                 self.stream.on_event(role, &event);
-                match &event {
-                    Event::StateChanged(state) => self.on_state(role, state),
-                    Event::Heard {
-                        message: Message::Stopped(stopped),
-                        ..
-                    } => self.on_stopped(role, stopped),
-                    _ => {}
+                if let Event::StateChanged(state) = &event {
+                    self.on_state(role, state);
+                }
+                if let Some(words) = self.outcome.hear(role, &event) {
+                    self.screen.tell(&words);
                 }
             }
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
@@ -309,12 +299,8 @@ impl Session<'_> {
                 other => self.screen.tell(&format!("{}: {other}", role.name())),
             }
         }
-        if self
-            .stopping
-            .take_if(|end| Instant::now() >= *end)
-            .is_some()
-        {
-            self.tell_unstopped();
+        if let Some(words) = self.outcome.overdue() {
+            self.screen.tell(&words);
         }
         while let Some((role, message)) = self.stream.due(now_us()) {
             // Asked again if it is not answered.
@@ -325,29 +311,7 @@ impl Session<'_> {
     /// Gives boards that have been told to stop their time to answer.
     fn note_stops(&mut self) {
         if self.stops.try_iter().count() > 0 {
-            self.stopping = Some(Instant::now() + STOP_PATIENCE);
-            self.stopped.clear();
-        }
-    }
-
-    /// Tells of a board that has stopped, by its own name: behind a port may be the other one.
-    fn on_stopped(&mut self, role: Role, stopped: &Stopped) {
-        if let Some(who) = self.link(role).and_then(|link| link.state().who(role)) {
-            self.stopped.push(who);
-            self.screen.tell(&has_stopped(who, stopped));
-        }
-    }
-
-    /// Tells of boards that have not answered a Stop.
-    fn tell_unstopped(&mut self) {
-        let roles = self.links.iter().map(|(role, _)| *role);
-        let unstopped = roles.filter(|role| !self.stopped.contains(role));
-        let names: Vec<&str> = unstopped.map(Role::name).collect();
-        if !names.is_empty() {
-            self.screen.tell(&format!(
-                "NOT STOPPED: {}: no answer, told again: use the emergency stop",
-                names.join(" and ")
-            ));
+            self.outcome.begin();
         }
     }
 

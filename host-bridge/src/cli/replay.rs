@@ -202,6 +202,7 @@ impl Replay {
         });
         let source = Source {
             events: told,
+            stops: crossbeam_channel::never(),
             links: Vec::new(),
             logs: None,
             feed,

@@ -4,7 +4,8 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::link::{LinkSender, stop_all};
+use crate::link::{Link, stop_all};
+use protocol::Role;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
@@ -12,13 +13,16 @@ use signal_hook::iterator::Signals;
 /// What asks for an end; a terminal that goes away does.
 pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 
-/// Has SIGUSR1 stop the boards, by a thread that waits for nothing else. Fails if the system does not let one
-/// listen to signals.
-pub fn stop_boards(boards: Vec<LinkSender>) -> io::Result<()> {
-    on_stop(move || stop_all(&boards))
+/// Has SIGUSR1 stop the boards, and call `before` right before. Fails if the system does not let one listen to signals.
+pub fn stop_boards(links: &[(Role, Link)], before: impl Fn() + Send + 'static) -> io::Result<()> {
+    let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
+    on_stop(move || {
+        before();
+        stop_all(&boards);
+    })
 }
 
-/// Has SIGUSR1 call `stop`, on a thread of its own. Fails if the system does not let one listen to signals.
+/// Has SIGUSR1 call `stop`, by a thread that waits for nothing else. Fails if the system does not let one listen to signals.
 pub fn on_stop(stop: impl Fn() + Send + 'static) -> io::Result<()> {
     let mut signals = Signals::new([SIGUSR1])?;
     std::thread::spawn(move || signals.forever().for_each(|_| stop()));

@@ -1,11 +1,12 @@
-//! `host-bridge stop`.
+//! `host-bridge stop`, and what becomes of the Stops that others of these commands say.
 
 use std::process::ExitCode;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::link::{Event, stop_all};
 use crate::state::State;
-use crossbeam_channel::RecvTimeoutError;
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use protocol::{Message, Role, Stopped, Trip};
 
 use super::output::say;
@@ -131,8 +132,168 @@ impl HeardAnswers {
 }
 
 /// A board's answer to a Stop, in words.
-pub fn has_stopped(role: Role, stopped: &Stopped) -> String {
+fn has_stopped(role: Role, stopped: &Stopped) -> String {
     let trip = stopped.trip().map(Trip::name);
     let trip = trip.unwrap_or("a reason that this program does not know");
     format!("{} has stopped: {trip}", role.name())
+}
+
+/// A board answers a Stop within milliseconds.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// What becomes of Stops that a program says beside its work.
+pub struct Outcome {
+    boards: Vec<Role>,
+    /// How the ways to them stand.
+    states: Vec<(Role, State)>,
+    /// Until when boards that were told to stop may take to answer.
+    until: Option<Instant>,
+    /// Those that have answered since, by their own names.
+    stopped: Vec<Role>,
+}
+
+impl Outcome {
+    /// Nothing was said yet to these.
+    pub const fn new(boards: Vec<Role>) -> Self {
+        Self {
+            boards,
+            states: Vec::new(),
+            until: None,
+            stopped: Vec::new(),
+        }
+    }
+
+    /// A Stop is being said. To be called before any answer to it is heard.
+    pub fn begin(&mut self) {
+        self.until = Some(Instant::now() + PATIENCE);
+        self.stopped.clear();
+    }
+
+    /// Until when boards may take to answer; none if no Stop waits for that.
+    pub const fn until(&self) -> Option<Instant> {
+        self.until
+    }
+
+    /// Takes what the link to the board of `role` tells. Words if a board has stopped: by its own name, for behind a
+    /// port may be the other one.
+    pub fn hear(&mut self, role: Role, event: &Event) -> Option<String> {
+        match event {
+            Event::StateChanged(state) => {
+                self.states.retain(|(of, _)| *of != role);
+                self.states.push((role, state.clone()));
+                None
+            }
+            Event::Heard {
+                message: Message::Stopped(stopped),
+                ..
+            } => {
+                let state = self.states.iter().find(|(of, _)| *of == role);
+                let who = state.map_or(Some(role), |(_, state)| state.who(role))?;
+                self.stopped.push(who);
+                Some(has_stopped(who, stopped))
+            }
+            Event::Heard { .. } | Event::Restarted => None,
+        }
+    }
+
+    /// Words for the boards that have not answered in time, once.
+    pub fn overdue(&mut self) -> Option<String> {
+        self.until.take_if(|end| Instant::now() >= *end)?;
+        self.unstopped("no answer, told again")
+    }
+
+    /// Words for those that are not told again.
+    fn given_up(&mut self) -> Option<String> {
+        self.until.take()?;
+        self.unstopped("no answer by the end of this program")
+    }
+
+    fn unstopped(&self, why: &str) -> Option<String> {
+        let boards = self.boards.iter();
+        let unstopped = boards.filter(|board| !self.stopped.contains(board));
+        let names: Vec<&str> = unstopped.map(|board| board.name()).collect();
+        let names = names.join(" and ");
+        (!names.is_empty()).then(|| format!("NOT STOPPED: {names}: {why}: use the emergency stop"))
+    }
+}
+
+/// How long the last words of a teller may take.
+const LINGER: Duration = Duration::from_secs(1);
+
+/// Says on standard error what becomes of Stops. By a thread of its own: nobody who says or hears them waits for who
+/// reads it.
+#[derive(Clone)]
+pub struct Teller {
+    told: Sender<Told>,
+    /// Closed when all has been said.
+    said: Receiver<()>,
+}
+
+enum Told {
+    Stop,
+    Event(Role, Event),
+    End,
+}
+
+impl Teller {
+    /// Tells of these boards.
+    pub fn start(boards: Vec<Role>) -> Self {
+        let (told, tells) = unbounded();
+        let (saying, said) = bounded(0);
+        thread::spawn(move || {
+            tell(Outcome::new(boards), &tells);
+            drop(saying);
+        });
+        Self { told, said }
+    }
+
+    /// A Stop is being said. To be called before it is.
+    pub fn begin(&self) {
+        // It is there for as long as this is.
+        let _ = self.told.send(Told::Stop);
+    }
+
+    /// Takes what the link to the board of `role` tells.
+    pub fn on_event(&self, role: Role, event: &Event) {
+        if let Event::StateChanged(_)
+        | Event::Heard {
+            message: Message::Stopped(_),
+            ..
+        } = event
+        {
+            let _ = self.told.send(Told::Event(role, event.clone()));
+        }
+    }
+
+    /// Nothing is said to the boards any more: says what is left to be said, but not to who takes nothing.
+    pub fn end(self) {
+        let _ = self.told.send(Told::End);
+        let _ = self.said.recv_timeout(LINGER);
+    }
+}
+
+fn tell(mut outcome: Outcome, tells: &Receiver<Told>) {
+    loop {
+        let told = match outcome.until() {
+            Some(until) => tells.recv_deadline(until),
+            None => tells.recv().map_err(RecvTimeoutError::from),
+        };
+        let words = match told {
+            Ok(Told::Stop) => {
+                outcome.begin();
+                None
+            }
+            Ok(Told::Event(role, event)) => outcome.hear(role, &event),
+            Err(RecvTimeoutError::Timeout) => outcome.overdue(),
+            Ok(Told::End) | Err(RecvTimeoutError::Disconnected) => {
+                if let Some(words) = outcome.given_up() {
+                    say(&words);
+                }
+                return;
+            }
+        };
+        if let Some(words) = words {
+            say(&words);
+        }
+    }
 }

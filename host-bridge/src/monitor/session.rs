@@ -27,6 +27,8 @@ const LOOK: Duration = Duration::from_millis(50);
 pub struct Source {
     /// What the boards say, as it comes. When its senders are gone the monitor has seen all.
     pub events: Receiver<(Role, Event)>,
+    /// That a Stop is being said to all of them, each time before it is.
+    pub stops: Receiver<()>,
     /// The ways to the boards; none where a recording is watched.
     pub links: Vec<(Role, Link)>,
     /// The boards' logs, if they are read.
@@ -184,6 +186,7 @@ impl Session {
                 }
             }
         }
+        self.note_stops();
         let now_us = now_us();
         self.dashboard.elapse(now_us);
         if let Some(logs) = &self.source.logs {
@@ -340,7 +343,16 @@ impl Session {
         self.has_met
     }
 
+    /// Shows what becomes of a Stop that was said elsewhere.
+    fn note_stops(&mut self) {
+        if self.source.stops.try_iter().count() > 0 {
+            self.dashboard.stop();
+        }
+    }
+
     fn on(&mut self, role: Role, event: Event) {
+        // Before the answers to it.
+        self.note_stops();
         self.has_met |= matches!(&event, Event::StateChanged(state) if state.is_known());
         self.dashboard.on(now_us(), role, event);
     }
@@ -416,6 +428,7 @@ mod tests {
         let feed = RecordingFeed::default();
         let source = Source {
             events: happens,
+            stops: crossbeam_channel::never(),
             links: Vec::new(),
             logs: Some(feed.pass_on(read)),
             feed,

@@ -3,7 +3,7 @@
 
 mod recorded;
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
@@ -13,7 +13,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use protocol::{DisplayState, Hello, Hold, Role, Stop, StopReason};
+use protocol::{DisplayState, Hello, Hold, Message, Role, Stop, StopReason};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
 use tests::fake_board::{FakeBoard, wait_until};
@@ -418,6 +418,83 @@ fn a_signal_stops_the_boards_although_nobody_reads_what_the_monitor_writes() {
     assert!(wait_until(LIMIT, || running.bench().stopped.is_some()));
     let _ = child.kill();
     let _ = child.wait();
+}
+
+#[test]
+fn a_signal_stops_the_boards_and_the_dashboard_shows_their_answers() {
+    let running = bench();
+    let terminal = Terminal::new();
+    let mut command = monitor(&running);
+    terminal.hold(&mut command);
+    let mut child = command.spawn().expect("the program can be started");
+    assert!(terminal.shows(LIMIT, "DRIVING"));
+    signal(&child, "USR1");
+    let words = "confirmed by the sensor and the display";
+    assert!(terminal.shows(LIMIT, words), "{}", terminal.last_shown());
+    terminal.type_keys("q");
+    assert!(ended(&mut child).success());
+}
+
+/// Without a terminal, and for others to watch.
+const WITHOUT_A_SCREEN: [&[&str]; 2] = [&["monitor", "--plain"], &["live", "--port", "0"]];
+
+/// Two boards of which the display takes no notice of a Stop, a program that knows both, and what it says beside its
+/// results.
+fn beside_a_display_that_disobeys(words: &[&str]) -> ([FakeBoard; 2], bridge::Running, PathBuf) {
+    let told = name_of_a_port(&format!("stop-{}", words[0])).with_file_name("told");
+    let boards = [Role::Sensor, Role::Display].map(FakeBoard::new);
+    let [sensor, display] = &boards;
+    display.disobey(true);
+    let mut command = bridge::command();
+    command.args(words);
+    command.arg("--sensor").arg(sensor.path());
+    command.arg("--display").arg(display.path());
+    command.stderr(File::create(&told).expect("a file can be made"));
+    let running = bridge::Running::start(&mut command);
+    for board in &boards {
+        let is_asked = |message: &Message| matches!(message, Message::Question(_));
+        let heard = || board.take_heard().iter().any(is_asked);
+        assert!(wait_until(LIMIT, heard), "{words:?}");
+    }
+    (boards, running, told)
+}
+
+#[test]
+fn what_became_of_a_stop_by_a_signal_is_told_without_a_screen() {
+    for words in WITHOUT_A_SCREEN {
+        let ([_sensor, display], running, told) = beside_a_display_that_disobeys(words);
+        running.signal("USR1");
+        let text = || fs::read_to_string(&told).unwrap_or_default();
+        let is_told = |line: &str| wait_until(LIMIT, || text().contains(line));
+        let unanswered = "display: no answer, told again: use the emergency stop\n";
+        assert!(is_told(unanswered), "{words:?}: {}", text());
+        assert!(text().contains("NOT STOPPED: "), "{}", text());
+        let stopped = |board: &str| format!("{board} has stopped: by the operator\n");
+        assert!(is_told(&stopped("sensor")), "{words:?}: {}", text());
+        assert!(!text().contains(&stopped("display")), "{}", text());
+        // It is told again until it answers.
+        display.disobey(false);
+        assert!(is_told(&stopped("display")), "{words:?}: {}", text());
+        running.signal("INT");
+        assert_eq!(running.wait(LIMIT).status.code(), Some(0));
+    }
+}
+
+#[test]
+fn a_program_that_ends_before_a_board_has_answered_a_stop_says_so() {
+    for words in WITHOUT_A_SCREEN {
+        let ([_sensor, display], running, told) = beside_a_display_that_disobeys(words);
+        running.signal("USR1");
+        let is_stop = |message: &Message| matches!(message, Message::Stop(_));
+        let heard = || display.take_heard().iter().any(is_stop);
+        assert!(wait_until(LIMIT, heard), "{words:?}");
+        running.signal("INT");
+        assert_eq!(running.wait(LIMIT).status.code(), Some(0));
+        let text = fs::read_to_string(&told).expect("text");
+        let (_, after) = text.split_once("NOT STOPPED: ").expect("it is told");
+        assert!(after.contains("display: no answer"), "{text}");
+        assert!(after.ends_with("use the emergency stop\n"), "{text}");
+    }
 }
 
 #[test]
