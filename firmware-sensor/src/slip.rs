@@ -5,7 +5,7 @@
 //! the texture is a function of. It repairs what stick and slip do to λ: see `docs/src/explanation/estimation.md`.
 //!
 //! If k is not known it is found where the contact sticks: there ΔF/Δx is k, elsewhere it is less. One stretch may
-//! be a bump: what makes k more than it was is told by two.
+//! be a bump: another k is told by two.
 
 use protocol::{Contact, SensorConfiguration};
 
@@ -55,6 +55,8 @@ pub struct Slip {
     stiffness_n_per_m: Option<f32>,
     find_stiffness: bool,
     stretch: Option<Stretch>,
+    /// Another stretch has told the same.
+    is_confirmed: bool,
     /// A slope in N/m that tells another k, if the next one agrees.
     other_n_per_m: Option<f32>,
     /// Lags of the last [`COMPARED_MS`], in places.
@@ -72,6 +74,7 @@ impl Slip {
             stiffness_n_per_m: (given > 0).then_some(f32::from(given)),
             find_stiffness: given == 0,
             stretch: None,
+            is_confirmed: false,
             other_n_per_m: None,
             lags: [0; COMPARED_MS],
             next: 0,
@@ -122,16 +125,21 @@ impl Slip {
         if !BELIEVED_N_PER_M.contains(&slope) {
             return;
         }
-        let known = self.stiffness_n_per_m.unwrap_or(0.0);
-        if slope > STIFFER * known {
+        let Some(known) = self.stiffness_n_per_m else {
+            // Whatever comes later changes where the contact is said to be: the sooner, the less.
+            self.stiffness_n_per_m = Some(slope);
+            return;
+        };
+        if (STICKING * known..=STIFFER * known).contains(&slope) {
+            self.stiffness_n_per_m = Some(known + LEARNING * (slope - known));
+            self.is_confirmed = true;
+            self.other_n_per_m = None;
+        } else if slope > known || !self.is_confirmed {
             let agrees = |other| (other / STIFFER..=other * STIFFER).contains(&slope);
             if self.other_n_per_m.is_some_and(agrees) {
                 self.stiffness_n_per_m = Some(slope);
             }
             self.other_n_per_m = Some(slope);
-        } else if slope > STICKING * known {
-            self.stiffness_n_per_m = Some(known + LEARNING * (slope - known));
-            self.other_n_per_m = None;
         }
     }
 
