@@ -100,6 +100,8 @@ impl Slip {
         lag
     }
 
+    /// Inlined, it would cost each millisecond its registers, also without a force channel.
+    #[inline(never)]
     fn learn(&mut self, arm: Place, force_n: f32) {
         let begun = Stretch {
             from: arm,
