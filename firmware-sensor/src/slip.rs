@@ -59,7 +59,9 @@ pub struct Slip {
     is_confirmed: bool,
     /// A slope in N/m that tells another k, if the next one agrees.
     other_n_per_m: Option<f32>,
-    /// Lags of the last [`COMPARED_MS`], in places.
+    /// What k, as it became known, has added to the lag, in places.
+    known_later: Place,
+    /// Lags of the last [`COMPARED_MS`] without that, in places.
     lags: [Place; COMPARED_MS],
     next: usize,
     present: bool,
@@ -76,6 +78,7 @@ impl Slip {
             stretch: None,
             is_confirmed: false,
             other_n_per_m: None,
+            known_later: 0,
             lags: [0; COMPARED_MS],
             next: 0,
             present: configuration.force_channel,
@@ -83,21 +86,30 @@ impl Slip {
     }
 
     /// Takes the arm's place and the force channel's sample of the same instant, in ADC steps from
-    /// mid-rail; returns how far the contact lags behind the arm, in places.
+    /// mid-rail; returns how far the contact lags behind the arm, in places: but for what is constant, so that the contact
+    /// jumps nowhere when k becomes known.
     pub fn push(&mut self, arm: Place, force_lsb: f32) -> Place {
         if !self.present {
             return 0;
         }
         let force_n = force_lsb * self.newtons_per_lsb;
         if self.find_stiffness {
+            let before = self.deflection(force_n);
             self.learn(arm, force_n);
+            self.known_later = self
+                .known_later
+                .wrapping_add(self.deflection(force_n).wrapping_sub(before));
         }
-        let lag = self
-            .stiffness_n_per_m
-            .map_or(0, |k| (force_n / k * PLACES_PER_M) as Place);
+        let lag = self.deflection(force_n).wrapping_sub(self.known_later);
         self.lags[self.next] = lag;
         self.next = (self.next + 1) % COMPARED_MS;
         lag
+    }
+
+    /// F/k in places; 0 as long as k is unknown.
+    fn deflection(&self, force_n: f32) -> Place {
+        self.stiffness_n_per_m
+            .map_or(0, |k| (force_n / k * PLACES_PER_M) as Place)
     }
 
     /// Inlined, it would cost each millisecond its registers, also without a force channel.
@@ -155,7 +167,7 @@ impl Slip {
     pub fn lag_um(&self) -> Option<i32> {
         self.stiffness_n_per_m
             .filter(|_| self.present)
-            .map(|_| self.newest() / PLACES_PER_UM)
+            .map(|_| self.newest().wrapping_add(self.known_later) / PLACES_PER_UM)
     }
 
     /// Stick or slip, from how contact and arm moved over the last 8 ms; unknown at rest and without a
@@ -366,6 +378,28 @@ mod tests {
             );
         }
         assert!(rub.found_n_per_m().is_some());
+    }
+
+    #[test]
+    fn the_contact_jumps_nowhere_when_its_stiffness_becomes_known() {
+        for (sticks_up_to_n, slips_down_to_n) in [(0.6, 0.6), (0.6, 0.3)] {
+            let mut rub = Rub::new(&configuration(0), sticks_up_to_n, slips_down_to_n);
+            let mut before = rub.step(0.0, 0.0);
+            // Until it slips for the first time, at 1.5 mm.
+            for ms in 1..30 {
+                let lag = rub.step(f64::from(ms) * 50.0, 0.0);
+                // As far as the arm goes, and a count, and what rounding of the force makes.
+                let moved_um = f64::from(lag - before) / f64::from(PLACES_PER_UM);
+                assert!(
+                    (-5.0..=60.0).contains(&moved_um),
+                    "{moved_um} µm at {ms} ms"
+                );
+                before = lag;
+            }
+            assert!(rub.found_n_per_m().is_some());
+            let lag_um = rub.slip.lag_um().unwrap();
+            assert!((lag_um - 1_450).abs() <= 45, "{lag_um}");
+        }
     }
 
     #[test]
