@@ -140,7 +140,7 @@ impl Slip {
             return;
         }
         let Some(known) = self.stiffness_n_per_m else {
-            // Whatever comes later changes where the contact is said to be: the sooner, the less.
+            // Until then the contact is taken to be where the arm is: better a k that another stretch corrects.
             self.stiffness_n_per_m = Some(slope);
             return;
         };

@@ -303,7 +303,7 @@ impl Follower {
         self.steady.rest(known);
         if known {
             self.known = self.found;
-            // Of a gauge that is not usable, what it has of its own may be gone when it is again.
+            // What a gauge that is not usable has of its own may be gone when it is usable again.
             let mean =
                 sum(&self.found, usable).map(|part| part / usable.count_ones().max(1) as f32);
             for (gauge, z) in self.known.iter_mut().enumerate() {
