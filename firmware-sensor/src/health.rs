@@ -38,6 +38,9 @@ const TOO_NOISY: f32 = 3.0;
 const TOO_MUCH_HUM: f32 = 0.5;
 /// Estimates in a row that a gauge does not fit before it is called noisy.
 const MISFIT_ESTIMATES: u8 = 30;
+/// Travel, in mm, for which it must not fit, too: more than a fingertip is long. While it is across a boundary, the gauges
+/// in front feel another wave than those behind, and nothing is wrong with either.
+const MISFIT_MM: f32 = 10.0;
 /// Estimates without a fault before a gauge is taken back.
 const SOUND_ESTIMATES: u8 = 50;
 
@@ -69,7 +72,9 @@ struct History {
     power: f32,
     /// Power over the time since the judgement before, about the mean of that time.
     now: f32,
+    /// Estimates, and travel in mm, since it last fitted.
     misfits: u8,
+    misfit_mm: f32,
     /// Estimates until it is taken back.
     sentence: u8,
     health: GaugeHealth,
@@ -86,6 +91,8 @@ pub struct Signs {
     pub misfits: u8,
     /// The others agree on one.
     pub agreed: bool,
+    /// Travel since the last judgement, in mm.
+    pub travel_mm: f32,
     /// Bit g set: gauge g is allowed to take part. The others are judged too, but not the measure of
     /// anything: they may not be connected.
     pub allowed: u8,
@@ -133,12 +140,12 @@ impl Health {
         let measure = Measure::of(&self.gauges, signs);
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             let misfit = signs.misfits >> gauge & 1 == 1;
-            if signs.agreed {
-                history.misfits = if misfit {
-                    history.misfits.saturating_add(1)
-                } else {
-                    0
-                };
+            if signs.agreed && misfit {
+                history.misfits = history.misfits.saturating_add(1);
+                history.misfit_mm += signs.travel_mm;
+            } else if signs.agreed {
+                history.misfits = 0;
+                history.misfit_mm = 0.0;
             }
             let fault = if history.at_rails > AT_RAILS {
                 GaugeHealth::Saturated
@@ -154,7 +161,7 @@ impl Health {
                 GaugeHealth::Noisy
             } else if signs.hum[gauge] > TOO_MUCH_HUM * measure.typical {
                 GaugeHealth::Hum
-            } else if history.misfits >= MISFIT_ESTIMATES {
+            } else if history.misfits >= MISFIT_ESTIMATES && history.misfit_mm > MISFIT_MM {
                 GaugeHealth::Noisy
             } else {
                 GaugeHealth::Good
@@ -276,6 +283,7 @@ mod tests {
                 noise: Noise::default(),
                 signs: Signs {
                     allowed: ALL,
+                    travel_mm: 0.5,
                     ..Signs::default()
                 },
                 ms: 0,
@@ -570,6 +578,29 @@ mod tests {
         assert_eq!(ward.health.good(), 0b10111);
         ward.signs.agreed = true;
         assert_eq!(ward.until(3, GaugeHealth::Good, texture), 51);
+    }
+
+    #[test]
+    fn a_gauge_on_another_surface_is_not_blamed_until_a_fingertip_has_passed() {
+        let mut ward = Ward::new();
+        ward.signs.agreed = true;
+        ward.estimates(100, texture);
+        // At 2 mm/s a fingertip of 6 mm is across a boundary for 3 s.
+        ward.signs.travel_mm = 0.02;
+        ward.signs.misfits = 0b11000;
+        ward.estimates(300, texture);
+        ward.signs.misfits = 0;
+        ward.estimates(1, texture);
+        ward.signs.misfits = 0b11000;
+        ward.estimates(300, texture);
+        assert_eq!(ward.changes, 0);
+        // At rest it is not known any better.
+        ward.signs.travel_mm = 0.0;
+        ward.estimates(1_000, texture);
+        assert_eq!(ward.changes, 0);
+        ward.signs.travel_mm = 0.02;
+        ward.estimates(210, texture);
+        assert_eq!(ward.health.good(), 0b00111);
     }
 
     #[test]

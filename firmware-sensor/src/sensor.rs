@@ -236,6 +236,7 @@ impl Sensor {
                 hum: self.hum.own_powers(witnesses),
                 misfits: finding.misfits,
                 agreed: finding.valid || finding.misfits != 0,
+                travel_mm: started.travel.velocity_mm_s(0).abs() / ESTIMATE_RATE_HZ as f32,
                 allowed: self.configuration.gauges,
             });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);

@@ -1,7 +1,7 @@
 //! What becomes of the estimates of the whole [`firmware_sensor::Sensor`] as gauges fail and recover,
 //! mains hum comes in, and settings change on the way.
 
-use crate::felt::{Bench, CODES, texture, valid_and_worst};
+use crate::felt::{Bench, CODES, PLACES_MM, texture, valid_and_worst};
 use protocol::{GAUGES, GaugeHealth, Method, SensorConfiguration};
 use std::f64::consts::TAU;
 
@@ -260,5 +260,28 @@ fn a_new_configuration_on_the_way_starts_the_estimator_over_and_nothing_else() {
         }
         // At once it knows nothing.
         assert!(!estimates[0].valid);
+    }
+}
+
+#[test]
+fn a_boundary_that_a_slow_fingertip_takes_seconds_for_makes_no_gauge_noisy() {
+    for (from_mm, to_mm, speed_mm_s) in [(0.7, 1.0, 3.0), (1.0, 0.7, 4.0), (0.6, 0.75, 6.0)] {
+        let (before, behind) = (texture(from_mm), texture(to_mm));
+        let felt = |gauge: usize, x_mm: f64, t_s: f64| {
+            if x_mm + PLACES_MM[gauge] < 15.0 {
+                before(gauge, x_mm, t_s)
+            } else {
+                behind(gauge, x_mm, t_s)
+            }
+        };
+        let mut bench = Bench::new(DEFAULT);
+        let estimates = bench.rub((30e3 / speed_mm_s) as u64, |_| speed_mm_s, felt);
+        let (valid, worst) = valid_and_worst(&estimates[estimates.len() * 4 / 5..], to_mm);
+        assert!(valid == 1.0 && worst < 0.03, "{to_mm} mm: {valid} {worst}");
+        let blamed = estimates
+            .iter()
+            .filter(|estimate| estimate.health != [GaugeHealth::Good; GAUGES])
+            .count();
+        assert_eq!(blamed, 0, "{from_mm} to {to_mm} mm at {speed_mm_s} mm/s");
     }
 }
