@@ -35,11 +35,12 @@ use hil_sim_core::run::observer::{RunEvent, RunObserver};
 use hil_sim_core::run::recording::{Engine, volts};
 use hil_sim_core::scene::{Gauges, Kinematic, Motion, Scene, SceneError};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Message, Rendering, Role};
+use realfft::num_complex::Complex;
 
 use super::{seconds, through};
 use crate::bench::BenchError;
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
-use likeness::{TICKS_HZ, coherence, distance_db, segments, thirds_db};
+use likeness::{THIRDS, TICKS_HZ, coherence, distance_db, segments, thirds_db};
 use observer::{Pair, pairs};
 use surfaces::{Ground, known, unseen};
 
@@ -174,10 +175,18 @@ fn row_on_boards(
         held
     });
     let played: Vec<f64> = played.collect();
-    Ok(row(case, Engine::Elf, rendering, delay_ms, &played))
+    let felt = UnderTheHand::of(case);
+    Ok(row(case, Engine::Elf, rendering, delay_ms, &felt, &played))
 }
 
-fn row(case: &Case, engine: Engine, rendering: Rendering, delay_ms: f64, played: &[f64]) -> Row {
+fn row(
+    case: &Case,
+    engine: Engine,
+    rendering: Rendering,
+    delay_ms: f64,
+    felt: &UnderTheHand,
+    played: &[f64],
+) -> Row {
     Row {
         surface: case.ground.name.clone(),
         family: case.ground.family.to_owned(),
@@ -186,8 +195,8 @@ fn row(case: &Case, engine: Engine, rendering: Rendering, delay_ms: f64, played:
         speeds_mm_s: (case.arm.0, case.hand.0),
         delay_ms,
         rendering,
-        coherence: coherence_at_best(case, played),
-        distance_db: distance_db(&thirds_db(played), &thirds_db(&under_the_hand(case, 0.0))),
+        coherence: felt.coherence_at_best(played),
+        distance_db: distance_db(&thirds_db(played), &felt.thirds_db),
     }
 }
 
@@ -212,7 +221,7 @@ fn cases(quick: bool) -> Vec<Case> {
 }
 
 fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
-    let said = said(&scene(case))?;
+    let (said, felt) = (said(&scene(case))?, UnderTheHand::of(case));
     let delays = if quick || case.ground.unseen {
         &DELAYS_MS[..1]
     } else {
@@ -223,7 +232,8 @@ fn rows(case: &Case, quick: bool) -> Result<Vec<Row>, SceneError> {
         for rendering in Rendering::ALL {
             let hand_mm = |t_s| case.hand.position_mm(t_s);
             let played = played(&said, hand_mm, &ticks(), rendering, delay_ms);
-            rows.push(row(case, Engine::Native, rendering, delay_ms, &played));
+            let engine = Engine::Native;
+            rows.push(row(case, engine, rendering, delay_ms, &felt, &played));
         }
     }
     Ok(rows)
@@ -305,21 +315,34 @@ fn ticks() -> Range<u64> {
     (from_s * TICKS_HZ) as u64..(to_s * TICKS_HZ) as u64
 }
 
-/// What a point under the operator's hand would feel of the surface, at each tick of [`LOOKS_S`].
-fn under_the_hand(case: &Case, shift_mm: f64) -> Vec<f64> {
-    let surface = surface::Surface::new(&case.ground.surface(), 0.0);
-    ticks()
-        .map(|tick| case.hand.position_mm(tick as f64 / TICKS_HZ) + shift_mm)
-        .map(|x_mm| f64::from(surface.feel(x_mm, 0)))
-        .collect()
+/// What a point under the operator's hand would feel of the surface, at the ticks that are looked at.
+struct UnderTheHand {
+    thirds_db: [f64; THIRDS],
+    /// Its segments, at each shift of place.
+    shifted: Vec<Vec<Vec<Complex<f64>>>>,
 }
 
-fn coherence_at_best(case: &Case, played: &[f64]) -> f64 {
-    let played = segments(played);
-    let shifts = (0..SHIFTS).map(|n| case.ground.wavelength_mm * n as f64 / SHIFTS as f64);
-    shifts
-        .map(|shift_mm| coherence(&segments(&under_the_hand(case, shift_mm)), &played))
-        .fold(0.0, f64::max)
+impl UnderTheHand {
+    fn of(case: &Case) -> Self {
+        let surface = surface::Surface::new(&case.ground.surface(), 0.0);
+        let felt = |shift_mm: f64| -> Vec<f64> {
+            ticks()
+                .map(|tick| case.hand.position_mm(tick as f64 / TICKS_HZ) + shift_mm)
+                .map(|x_mm| f64::from(surface.feel(x_mm, 0)))
+                .collect()
+        };
+        let shifts = (0..SHIFTS).map(|n| case.ground.wavelength_mm * n as f64 / SHIFTS as f64);
+        Self {
+            thirds_db: thirds_db(&felt(0.0)),
+            shifted: shifts.map(|shift_mm| segments(&felt(shift_mm))).collect(),
+        }
+    }
+
+    fn coherence_at_best(&self, played: &[f64]) -> f64 {
+        let played = segments(played);
+        let coherences = self.shifted.iter().map(|felt| coherence(felt, &played));
+        coherences.fold(0.0, f64::max)
+    }
 }
 
 /// Families in the order of their first row, the unseen ones last.
