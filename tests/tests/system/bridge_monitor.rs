@@ -14,6 +14,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use protocol::{DisplayState, Hello, Hold, Message, Role, Stop, StopReason};
+use rustix::process::{Pid, WaitOptions, waitpid};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
 use tests::fake_board::{FakeBoard, wait_until};
@@ -109,6 +110,11 @@ fn signal(child: &Child, name: &str) {
         .status()
         .expect("kill can be run");
     assert!(status.success());
+    if name == "STOP" {
+        // On a busy computer a program goes on for a while after it was sent.
+        let stopped = waitpid(Some(Pid::from_child(child)), WaitOptions::UNTRACED);
+        assert!(stopped.is_ok_and(|of| of.is_some_and(|(_, status)| status.stopped())));
+    }
 }
 
 /// A name in a folder of its own, free to be linked to a board's port.

@@ -52,11 +52,16 @@ fn recorder(path: &Path) -> Recorder {
     .expect("a file can be made")
 }
 
-/// Records `blocks` blocks of samples.
+/// Blocks that may wait for the disk: nearly as many as the recorder's queue takes.
+const AHEAD: u64 = 30_000;
+
+/// Records `blocks` blocks of samples, no faster than the disk takes them.
 fn record_gauges(path: &Path, blocks: u32) {
     let recorder = recorder(path);
     let mut speaker = Speaker::new(3);
     for block in 0..blocks {
+        let has_room = || recorder.progress().tally.samples / 8 + AHEAD > u64::from(block);
+        assert!(has_room() || wait_until(LIMIT, has_room), "{block} blocks");
         let gauges = speaker.gauges(block * GAUGE_BLOCK as u32);
         recorder.on_event(Role::Sensor, &heard(gauges));
     }
