@@ -187,10 +187,12 @@ impl Display {
         let travel = self.hand.read(encoder, elapsed);
         self.elapse(elapsed);
         self.sense(senses, travel, elapsed);
-        self.on(match self.hold() {
-            Some(hold) => Event::Hold(hold),
-            None => Event::Fresh,
-        });
+        match self.hold() {
+            Some(hold) => self.on(Event::Hold(hold)),
+            // What CLR took to 0 V stays there for this tick, and fades in.
+            None if senses.clear_fell => {}
+            None => self.on(Event::Fresh),
+        }
         let send = self.drive(travel.unwrap_or(0), quarters);
         count(&mut self.counters.updates, send);
         Output {

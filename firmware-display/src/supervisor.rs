@@ -14,8 +14,8 @@ use protocol::{DisplayState, Hold, Trip};
 
 use crate::fade::Aim;
 
-/// What the supervisor is told, in this order in each tick: Started, Cleared, Trip, Hold or Fresh,
-/// Silent.
+/// What the supervisor is told, in this order in each tick: Started, Cleared, Trip, Hold or Fresh (which does not
+/// come with Cleared), Silent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The converters were started and hold what they were given.

@@ -1,7 +1,7 @@
 //! How long it takes from each fault to 0 V on all channels: the numbers of the table of hazards in
 //! docs/src/explanation/safety.md.
 
-use firmware_display::{ConverterFault, Display, Output, Readback, Senses, Transfer};
+use firmware_display::{ConverterFault, Display, Output, Readback, Senses, Transfer, ZERO_VOLT};
 use protocol::{DisplayConfiguration, DisplayState, Estimate, Hold, StopReason, Trip, UpdateRate};
 
 use crate::rig::{RATES, Rig, at, configured, sound};
@@ -289,19 +289,39 @@ fn an_arm_that_stops_a_second_after_the_hand_is_none() {
 }
 
 #[test]
-fn outputs_that_were_cleared_begin_again_from_zero_volt() {
+fn outputs_that_were_cleared_begin_again_from_zero_volt_and_fade_in() {
     for rate in RATES {
-        let mut rig = Rig::driving(&at(rate));
-        rig.senses.clear_fell = true;
-        rig.senses.missed_ticks = 3;
-        rig.estimate(2.0);
-        let Output { send, release } = rig.move_on();
-        assert!(send && release && rig.is_silent());
-        rig.senses = Default::default();
-        assert_eq!(rig.display.counters().clears, 1);
-        let ticks = rig.rub_while(100, 2.0, |rig| rig.is_silent());
-        assert!(ticks <= rig.ticks(2));
-        assert_eq!(rig.state(), DisplayState::Driving);
+        // At different phases of the wave: at a crossing all words are 0 V anyway.
+        for further_ms in [0, 1, 3, 8, 13, 22] {
+            let fade_in_ms = 100;
+            let mut rig = Rig::driving(&DisplayConfiguration {
+                fade_in_ms,
+                ..at(rate)
+            });
+            rig.rub(further_ms, 2.0);
+            rig.senses.clear_fell = true;
+            rig.senses.missed_ticks = 3;
+            rig.estimate(2.0);
+            let Output { send, release } = rig.move_on();
+            assert!(send && release && rig.is_silent(), "{further_ms} ms");
+            rig.senses = Default::default();
+            assert_eq!(rig.display.counters().clears, 1);
+            let ticks = rig.rub_while(100, 2.0, |rig| rig.is_silent());
+            assert!(ticks <= rig.ticks(2));
+            assert_eq!(rig.state(), DisplayState::Driving);
+            for passed in ticks..rig.ticks(fade_in_ms.into()) {
+                // What has passed of the fade, of 5 V, and the step that rounds.
+                let most = 32_767 * (passed + 1) / rig.ticks(fade_in_ms.into()) + 1;
+                let words = rig.display.words();
+                assert!(
+                    words
+                        .iter()
+                        .all(|word| u32::from(word.abs_diff(ZERO_VOLT)) <= most),
+                    "{passed} ticks after {further_ms} ms"
+                );
+                rig.rub_while(1, 2.0, |_| false);
+            }
+        }
     }
 }
 
