@@ -109,6 +109,13 @@ impl Display {
         self.stimulus.configure(&configuration, actuators);
         self.limits
             .set(configuration.update_rate, configuration.amplitude_mv);
+        // A lower age makes too old at once what no tick will see to become so.
+        if !self.relief.wave_is_fresh(configuration.max_age_ms) {
+            self.stimulus.wear_off();
+        }
+        if !self.relief.friction_is_fresh(configuration.max_age_ms) {
+            self.stimulus.rub(None);
+        }
     }
 
     /// The configuration in force.

@@ -80,6 +80,30 @@ fn a_valid_texture_is_played_until_it_is_too_old() {
 }
 
 #[test]
+fn what_a_lower_age_makes_too_old_is_played_no_longer() {
+    let mut rig = Rig::driving(&DisplayConfiguration {
+        max_age_ms: 5_000,
+        reference_mn: 200,
+        ..SHAPE
+    });
+    rig.display.on_texture(&Texture {
+        friction: weak(0).friction,
+        ..texture(1)
+    });
+    settle(&mut rig, 2.0);
+    rig.rub(300, 2.0);
+    assert!(peak(&mut rig, 2.0) < 8_192, "flattened and weak");
+    // Neither the wave nor the force is as young as that.
+    rig.configure(&DisplayConfiguration {
+        max_age_ms: 400,
+        reference_mn: 200,
+        ..SHAPE
+    });
+    settle(&mut rig, 2.0);
+    assert!(is_sine(&mut rig, 2.0));
+}
+
+#[test]
 fn what_is_not_stood_by_late_unsound_or_one_too_many_changes_nothing() {
     let mut rig = Rig::driving(&SHAPE);
     rig.display.on_texture(&Texture {
