@@ -11,10 +11,13 @@
 //! What is read is a channel's buffer. That LDAC moved it to the output can't be read; the board looks
 //! at LDAC's own level instead.
 
+use protocol::UpdateRate;
+
 use crate::dac81416::{
     self, ALL_CHANNELS, CHANNELS, CHANNELS_PER_CHIP, CHIPS, FRAME_CHANNELS, NO_CHANNEL, PRODUCT,
     REFERENCE_ON, register, spiconfig,
 };
+use crate::pace::{per_tick, quarters};
 use crate::senses::ConverterFault;
 use crate::{ACTUATORS, ZERO_VOLT};
 
@@ -156,9 +159,12 @@ const TURNS: usize = CHANNELS_PER_CHIP - 1 + SETTINGS.len();
 /// Time in ms within which everything that can be read has been.
 pub const ROUND_MS: u32 = 2 * (TURNS * CHIPS) as u32 * PERIOD_MS;
 
-/// Whose turn it is, and for what.
+/// Whose turn it is, when, and for what. A configuration does not begin it anew: one after the other would put off
+/// what comes late in a round.
 #[derive(Clone, Debug, Default)]
 pub struct Rounds {
+    /// Since the last look, in quarters of a millisecond.
+    waited: u32,
     chip: usize,
     turn: usize,
     /// Whether power is looked at, instead of what has its turn.
@@ -166,8 +172,17 @@ pub struct Rounds {
 }
 
 impl Rounds {
-    /// The next look, into chips that were given `words`.
-    pub fn next(&mut self, words: &[u16; ACTUATORS]) -> Look {
+    /// A tick at `rate`, with chips that were given `words`: a look into one of them, if it is due.
+    pub fn tick(&mut self, rate: UpdateRate, words: &[u16; ACTUATORS]) -> Option<Look> {
+        self.waited += per_tick(rate);
+        if self.waited < quarters(PERIOD_MS) {
+            return None;
+        }
+        self.waited = 0;
+        Some(self.next(words))
+    }
+
+    fn next(&mut self, words: &[u16; ACTUATORS]) -> Look {
         let chip = self.chip;
         let words = words.chunks(CHANNELS_PER_CHIP).nth(chip).unwrap_or(&[]);
         let channel = |channel: usize| {
@@ -245,6 +260,23 @@ mod tests {
         // A wire that hangs low or high says nothing.
         assert!(!look.agrees(&[[0; 3]; FRAMES]));
         assert!(!look.agrees(&[[0xFF; 3]; FRAMES]));
+    }
+
+    #[test]
+    fn a_look_comes_every_two_milliseconds_whatever_becomes_of_the_rate() {
+        let mut rounds = Rounds::default();
+        let rates = [UpdateRate::Hz2000, UpdateRate::Hz4000];
+        let (mut waited, mut looks) = (0, 0);
+        for tick in 0..4_000 {
+            let rate = rates[tick / 3 % 2];
+            waited += per_tick(rate);
+            if rounds.tick(rate, &WORDS).is_some() {
+                // A long tick may end it a quarter late.
+                assert!((8..=9).contains(&waited), "{tick}: {waited}");
+                (waited, looks) = (0, looks + 1);
+            }
+        }
+        assert!(looks > 600, "{looks}");
     }
 
     #[test]

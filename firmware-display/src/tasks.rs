@@ -10,8 +10,8 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_time::Instant;
 use firmware_display::capabilities::CAPABILITIES;
-use firmware_display::look::{self, Look, Rounds};
-use firmware_display::{ACTUATORS, Display, Senses, Settings, Transfer, line};
+use firmware_display::look::Rounds;
+use firmware_display::{Display, Senses, Settings, Transfer, line};
 use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
 use nucleo::ports::{OUTBOX, Ports, report, speak};
@@ -95,7 +95,7 @@ async fn drive(
     let settings = Settings::DEFAULT;
     let mut display = Display::new(&settings, persisted);
     display.started(converters.start());
-    let mut pace = Pace::new(&settings);
+    let mut rounds = Rounds::default();
     let mut announced = Announced::default();
     let mut unheard = false;
     let mut released = false;
@@ -124,7 +124,8 @@ async fn drive(
         }
         // What CLR took away is not looked for before it is there again.
         let quiet = transfer == Transfer::Done && !senses.clear_fell;
-        let look = pace.next(display.words()).filter(|_| quiet);
+        let rate = display.configuration().update_rate;
+        let look = rounds.tick(rate, display.words()).filter(|_| quiet);
         match look {
             look if output.send => converters.update(display.words(), look),
             Some(look) => converters.look(look),
@@ -137,7 +138,6 @@ async fn drive(
             && let Some(settings) = CONFIGURE.try_take()
         {
             ticks.set_rate(settings.configuration().update_rate);
-            pace = Pace::new(&settings);
             display.configure(&settings);
         }
         while let Ok(estimate) = ESTIMATES.try_receive() {
@@ -155,34 +155,6 @@ async fn drive(
             announced.tell_off(display.off());
         }
         COUNTERS.lock(|shared| shared.set(display.counters()));
-    }
-}
-
-/// When to look into the converters.
-struct Pace {
-    rounds: Rounds,
-    ticks: u32,
-    period_ticks: u32,
-}
-
-impl Pace {
-    fn new(settings: &Settings) -> Self {
-        let ticks_per_ms = settings.configuration().update_rate.hz() / 1_000;
-        Self {
-            rounds: Rounds::default(),
-            ticks: 0,
-            period_ticks: ticks_per_ms * look::PERIOD_MS,
-        }
-    }
-
-    /// One tick, with the chips holding `words`: a look, if it is due.
-    fn next(&mut self, words: &[u16; ACTUATORS]) -> Option<Look> {
-        self.ticks += 1;
-        if self.ticks < self.period_ticks {
-            return None;
-        }
-        self.ticks = 0;
-        Some(self.rounds.next(words))
     }
 }
 

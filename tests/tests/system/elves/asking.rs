@@ -5,8 +5,9 @@ use std::sync::{Arc, LazyLock, Mutex};
 use hil_sim_boards::{Terminal, Terminals};
 use hil_sim_core::run::recording::Recording;
 use protocol::{
-    Capabilities, Configuration, ConfigurationReport, Configure, DisplayConfiguration, GAUGE_BLOCK,
-    Hello, MAX_FRAME, Message, Port, Question, Role, SensorConfiguration, Setting, StreamGauges,
+    Capabilities, Configuration, ConfigurationReport, Configure, DisplayConfiguration,
+    DisplayState, GAUGE_BLOCK, Hello, MAX_FRAME, Message, Port, Question, Role,
+    SensorConfiguration, Setting, StreamGauges, Trip,
 };
 use tests::elves;
 use tests::run::scene;
@@ -260,4 +261,46 @@ fn a_configuration_outlives_a_crash_and_not_the_power() {
         );
         assert_eq!(told.configuration, in_force, "{fault}");
     }
+}
+
+/// What came of a display whose host says this, while a hand rubs at 50 mm/s, with `faults` in a scene's words.
+fn told_the_display(script: &[(u64, Message)], faults: &str) -> (Recording, Heard) {
+    let (display, heard) = Host::following(script);
+    let terminals = Terminals {
+        display: Some(display),
+        ..Terminals::default()
+    };
+    let surface = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]";
+    let motion = "[motion]\nkind = \"constant\"\nspeed_mm_s = 50.0";
+    let scene = scene(&format!(
+        "duration_s = 2.2\n{surface}\n{motion}\n{faults}\n"
+    ));
+    let (recording, _) = hil_sim_boards::run_at(&scene, elves::both(), terminals)
+        .unwrap_or_else(|error| panic!("{error}"));
+    (recording, heard)
+}
+
+/// The states that a display's supervisor told of, and when, in ns.
+fn states(recording: &Recording) -> Vec<(u64, DisplayState)> {
+    let said = recording.signs.display.iter();
+    said.filter_map(|said| match said.message {
+        Message::Safety(safety) => Some((said.at_ns, safety.state)),
+        _ => None,
+    })
+    .collect()
+}
+
+#[test]
+fn a_host_that_configures_without_a_pause_puts_off_no_look_into_the_converters() {
+    let script: Vec<_> = (1_000..1_500)
+        .map(|at_ms| (at_ms * MS, Message::Configure(Configure::anyway(DISPLAY))))
+        .collect();
+    let lost = "[[fault]]\nat_s = 1.2\nkind = \"dac-power-lost\"";
+    let (recording, heard) = told_the_display(&script, lost);
+    assert!(reports(&heard.lock().unwrap()).len() > 300);
+    let states = states(&recording);
+    let (at_ns, last) = states[states.len() - 1];
+    assert_eq!(last, DisplayState::Stopped(Trip::Converter), "{states:?}");
+    // What a look finds within 16 ms, and what waits on the wire.
+    assert!(at_ns < 1_220 * MS, "{at_ns}");
 }
