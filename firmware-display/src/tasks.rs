@@ -14,7 +14,7 @@ use firmware_display::look::Rounds;
 use firmware_display::{Display, Senses, Settings, Transfer, line};
 use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::ports::{OUTBOX, Ports, reply, report, speak};
 use nucleo::serial::Receiver;
 use nucleo::side::Side;
 use nucleo::spawn::once;
@@ -211,7 +211,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
             Message::Actuators(block) => {
                 let refused = SETTINGS.lock(|settings| settings.borrow_mut().on_actuators(&block));
                 if let Some(answer) = refused {
-                    let _ = OUTBOX.try_send(Message::Configuration(answer));
+                    reply(Message::Configuration(answer));
                 }
             }
             Message::Configure(asked) => {
@@ -222,8 +222,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
                 if answer.refused.is_none() {
                     CONFIGURE.signal(settings);
                 }
-                // Full only if the thread is held up: the host asks again.
-                let _ = OUTBOX.try_send(Message::Configuration(answer));
+                reply(Message::Configuration(answer));
             }
             Message::Question(question) => {
                 let answer = match question {
@@ -232,7 +231,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
                     }
                     Question::Capabilities => Message::Capabilities(CAPABILITIES),
                 };
-                let _ = OUTBOX.try_send(answer);
+                reply(answer);
             }
             _ => {}
         })

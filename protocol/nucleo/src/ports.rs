@@ -23,6 +23,14 @@ const BURST_BYTES: usize = 256;
 /// What tasks of any priority want said on both ports; full only if the thread is held up for 8 ms.
 pub static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
 
+/// Says what a host asked for, if that leaves a place in the [`OUTBOX`] for what a task with a deadline says: else
+/// the host asks again.
+pub fn reply(message: Message) {
+    if OUTBOX.free_capacity() > 1 {
+        let _ = OUTBOX.try_send(message);
+    }
+}
+
 /// Puts what is in the [`OUTBOX`] on both ports. Deadline: 2 ms, the display's next motion.
 #[embassy_executor::task]
 pub async fn report(ports: &'static Ports) {

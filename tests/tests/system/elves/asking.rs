@@ -6,7 +6,7 @@ use hil_sim_boards::{Terminal, Terminals};
 use hil_sim_core::run::recording::Recording;
 use protocol::{
     Capabilities, Configuration, ConfigurationReport, Configure, DisplayConfiguration,
-    DisplayState, GAUGE_BLOCK, Hello, MAX_FRAME, Message, Port, Question, Role,
+    DisplayState, GAUGE_BLOCK, Hello, MAX_FRAME, Message, Port, Question, Role, RoleCounters,
     SensorConfiguration, Setting, StreamGauges, Trip,
 };
 use tests::elves;
@@ -303,4 +303,22 @@ fn a_host_that_configures_without_a_pause_puts_off_no_look_into_the_converters()
     assert_eq!(last, DisplayState::Stopped(Trip::Converter), "{states:?}");
     // What a look finds within 16 ms, and what waits on the wire.
     assert!(at_ns < 1_220 * MS, "{at_ns}");
+}
+
+#[test]
+fn a_host_that_asks_without_a_pause_holds_nothing_up() {
+    // 92 bytes a millisecond are nine questions.
+    let script: Vec<_> = (1_000..1_500)
+        .flat_map(|at_ms| [at_ms * MS; 9])
+        .map(|at_ns| (at_ns, Message::Question(Question::Configuration)))
+        .collect();
+    let (recording, heard) = told_the_display(&script, "");
+    assert!(reports(&heard.lock().unwrap()).len() > 100);
+    let last = states(&recording).pop().map(|(_, state)| state);
+    assert_eq!(last, Some(DisplayState::Driving));
+    let Some(RoleCounters::Display(counters)) = recording.display_status.map(|told| told.role)
+    else {
+        panic!("no status of the display");
+    };
+    assert_eq!(counters.unheard, 0);
 }
