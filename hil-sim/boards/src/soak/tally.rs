@@ -78,6 +78,8 @@ pub(super) struct Outputs {
     /// What the encoder counted last, and since when it has.
     still: Option<(u16, u64)>,
     standing: u64,
+    /// Ticks at which the encoder had counted.
+    moving: u64,
 }
 
 impl Outputs {
@@ -105,7 +107,10 @@ impl Outputs {
     fn watch_rest(&mut self, tick: &TickRecord) {
         let since_ns = match self.still {
             Some((encoder, since_ns)) if encoder == tick.encoder => since_ns,
-            _ => tick.at_ns,
+            before => {
+                self.moving += u64::from(before.is_some());
+                tick.at_ns
+            }
         };
         self.still = Some((tick.encoder, since_ns));
         let silent = self.words.is_none_or(|words| words == [0x8000; ACTUATORS]);
@@ -379,6 +384,13 @@ fn of_display(checks: &mut Checks, display: &Left) {
     let seen = format!("{step_v:.3}, at most {LARGEST_STEP_V}");
     let what = "largest step of a channel, V";
     checks.add("display", what, seen, step_v <= LARGEST_STEP_V);
+    // Not at once, since λ has to be known, and not while a hold lasts; a display at 0 V changes nothing.
+    checks.within(
+        "display",
+        "changes of the outputs, for the ticks at which the hand had moved",
+        outputs.changes,
+        (outputs.moving / 2, outputs.ticks),
+    );
     let Some(RoleCounters::Display(counters)) = display.status().map(|status| status.role) else {
         return;
     };
@@ -458,6 +470,34 @@ mod tests {
         assert_eq!(outputs.standing, 40);
         assert_eq!((outputs.ticks, outputs.loads), (200, 199));
         assert!((outputs.largest_step_v - 0.625).abs() < 1e-9);
+    }
+
+    #[test]
+    fn outputs_that_do_not_follow_the_hand_are_not_as_they_must_be() {
+        for (follows, holds) in [(100, true), (50, true), (49, false), (0, false)] {
+            let mut outputs = Outputs::default();
+            for ms in 0..=200 {
+                let moved = ms.min(100);
+                let word = 0x8000 + moved.min(follows) as u16;
+                outputs.take(records(ms, moved as u16, word), 0);
+            }
+            let mut checks = Checks::default();
+            let display = Left {
+                name: "display",
+                side: Side::default(),
+                outputs,
+                resets: 0,
+                panics: Vec::new(),
+                told: true,
+            };
+            of_display(&mut checks, &display);
+            let check = checks
+                .0
+                .iter()
+                .find(|check| check.what.contains("the hand had moved"));
+            let check = check.unwrap();
+            assert_eq!(check.holds, holds, "{follows}: {}", check.seen);
+        }
     }
 
     #[test]
