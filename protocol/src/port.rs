@@ -80,10 +80,16 @@ impl Port {
         self.queue.capacity() - self.queue.len() >= MAX_FRAME
     }
 
-    /// Drops all that waits to be sent, and counts its frames.
+    /// Drops all that waits to be sent, and counts its frames. A 0x00 at the front, or behind another one, takes
+    /// nothing away: the one that is queued instead ends what has gone out just as well.
     fn give_up(&mut self) {
-        let ends = self.queue.iter().filter(|&&byte| byte == 0).count();
-        self.dropped = self.dropped.wrapping_add(ends as u32);
+        let mut before = 0;
+        for &byte in &self.queue {
+            self.dropped = self
+                .dropped
+                .wrapping_add(u32::from(byte == 0 && before != 0));
+            before = byte;
+        }
         self.queue.clear();
         let fits = self.queue.push_back(0);
         debug_assert!(fits.is_ok(), "the queue is empty");

@@ -184,6 +184,27 @@ fn a_stop_takes_the_place_of_all_that_waits_and_nothing_that_went_out_before_spo
 }
 
 #[test]
+fn a_stop_that_is_said_again_counts_each_frame_once_that_it_takes_the_place_of() {
+    let (mut host, mut board) = acquainted();
+    host.post(&WORD);
+    // All of the word has gone out but its end, which the Stop's 0x00 is.
+    let mut bytes = [0; QUEUE_BYTES];
+    let count = host.take(&mut bytes);
+    host.post(&WORD);
+    let mut again = [0; QUEUE_BYTES];
+    let but_its_end = host.take(&mut again[..count - 1]);
+    board.receive(1, &bytes[..count], |message| assert_eq!(message, WORD));
+    board.receive(1, &again[..but_its_end], |message| panic!("{message:?}"));
+    host.post(&STOP);
+    assert_eq!(host.counters().dropped, 0);
+    for said in 1..4 {
+        host.post(&STOP);
+        assert_eq!(host.counters().dropped, said);
+    }
+    assert_eq!(carry(&mut host, &mut board, 1), [WORD, STOP]);
+}
+
+#[test]
 fn the_answer_to_a_stop_finds_room_in_a_full_queue() {
     let (mut board, mut host) = acquainted();
     while board.counters().dropped == 0 {
