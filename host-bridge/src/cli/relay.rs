@@ -192,8 +192,6 @@ impl Bridge {
         } else {
             Ends::Listening(self.ends.listen)
         };
-        let words = in_words(&ends);
-        warn_of(&ends, self.insecure);
         let names = vec![self.meeting.name.clone()];
         let network = Network::new(
             ends,
@@ -201,6 +199,8 @@ impl Bridge {
             names,
             self.insecure,
         )?;
+        let words = in_words(network.ends());
+        warn_of(network.ends(), self.insecure);
         // Leaving a network that is stuck may take a while.
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let mut hand = Hand::new(self.meeting.name.clone(), role);
@@ -248,9 +248,9 @@ impl Bridge {
 impl Router {
     fn execute(self) -> anyhow::Result<ExitCode> {
         let ends = Ends::Listening(self.listen);
-        let words = in_words(&ends);
-        warn_of(&ends, self.insecure);
         let network = Network::new(ends, self.proofs.credentials(), self.names, self.insecure)?;
+        let words = in_words(network.ends());
+        warn_of(network.ends(), self.insecure);
         let wait_for_end = signals::wait_for(&signals::USUAL)?;
         let session = network.open_router()?;
         say(&format!("router, {words}"));

@@ -119,13 +119,14 @@ impl FromStr for Endpoint {
 }
 
 impl Endpoint {
-    /// Whether only this computer reaches it.
-    pub fn is_loopback(&self) -> bool {
+    /// Whether whoever listens there lets in anybody beyond this computer who reaches it.
+    pub fn is_open(&self) -> bool {
         let host = self.host.trim_start_matches('[').trim_end_matches(']');
-        host == "localhost"
+        let is_loopback = host == "localhost"
             || host
                 .parse::<IpAddr>()
-                .is_ok_and(|address| address.is_loopback())
+                .is_ok_and(|address| address.is_loopback());
+        !is_loopback && !self.carrier.has_certificates()
     }
 }
 
@@ -150,6 +151,21 @@ impl Endpoint {
     pub fn resolve(&self) -> io::Result<Vec<SocketAddr>> {
         let found = format!("{}:{}", self.host, self.port).to_socket_addrs()?;
         Ok(found.collect())
+    }
+
+    /// An endpoint for each address behind the name, at this moment. Fails if the name can't be resolved.
+    pub fn each_address(&self) -> io::Result<Vec<Self>> {
+        let at = |address: SocketAddr| {
+            let text = address.to_string();
+            let host = text
+                .rsplit_once(':')
+                .map_or(text.as_str(), |(host, _)| host);
+            Self {
+                host: host.to_owned(),
+                ..self.clone()
+            }
+        };
+        Ok(self.resolve()?.into_iter().map(at).collect())
     }
 
     /// Where a socket for its datagrams is bound: there, or to any port that can reach it. Fails if the name can't be

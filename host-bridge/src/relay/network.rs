@@ -1,6 +1,7 @@
 //! The network's engine, set up for two bridges, and the keys that a bridge speaks on and listens to: nothing is looked
 //! for, lost connections come back soon, little waits to be sent.
 
+use std::io;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
@@ -37,7 +38,7 @@ const MAX_MESSAGE_BYTES: u32 = 65_536;
 /// How a program takes part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// Others connect to it.
+    /// Others connect to it, at any address of these names.
     Listening(Vec<Endpoint>),
     /// It connects to the first of these that answers, and to another one when it is lost.
     Connecting(Vec<Endpoint>),
@@ -121,7 +122,7 @@ impl Network {
     ) -> Result<Self, NetworkError> {
         let is_listening = ends.is_listening();
         for endpoint in ends.endpoints() {
-            let is_open = is_listening && !endpoint.is_loopback() && !is_insecure;
+            let is_open = is_listening && endpoint.is_open() && !is_insecure;
             let is_numbered = !is_listening && endpoint.host.starts_with('[');
             let refusal = match (endpoint.carrier.has_certificates(), &credentials) {
                 (true, None) => NetworkError::WithoutCertificates,
@@ -133,11 +134,10 @@ impl Network {
             return Err(refusal(endpoint.clone()));
         }
         let loaded = credentials.as_ref().map(Credentials::load).transpose()?;
-        for endpoint in ends.endpoints().iter().filter(|_| is_listening) {
-            endpoint
-                .try_listening()
-                .map_err(|reason| NetworkError::Listening(endpoint.clone(), reason))?;
-        }
+        let ends = match ends {
+            Ends::Listening(endpoints) => Ends::Listening(listened_at(&endpoints, is_insecure)?),
+            connecting @ Ends::Connecting(_) => connecting,
+        };
         Ok(Self {
             ends,
             credentials,
@@ -147,6 +147,11 @@ impl Network {
             identity: loaded.map(|loaded| Identity::new(loaded, names.clone())),
             names,
         })
+    }
+
+    /// How it takes part: who listens does so at each address of his names that this computer has.
+    pub const fn ends(&self) -> &Ends {
+        &self.ends
     }
 
     fn open(&self) -> Result<Session, NetworkError> {
@@ -226,6 +231,46 @@ pub struct Wire {
     /// In the order of [`Channel::ALL`].
     publishers: [Publisher<'static>; 4],
     _subscribers: Vec<Subscriber<()>>,
+}
+
+/// Each address of these names at which one can listen here: whoever connects may try any of them. Fails if a name has
+/// none, if another program listens at one of them, or one is beyond this computer and that is not meant.
+fn listened_at(names: &[Endpoint], is_insecure: bool) -> Result<Vec<Endpoint>, NetworkError> {
+    let mut all = Vec::new();
+    for name in names {
+        let addresses = name
+            .each_address()
+            .map_err(|reason| NetworkError::Listening(name.clone(), reason))?;
+        all.extend(usable(addresses, is_insecure)?);
+    }
+    Ok(all)
+}
+
+/// Those of one name's addresses at which one can listen here.
+fn usable(addresses: Vec<Endpoint>, is_insecure: bool) -> Result<Vec<Endpoint>, NetworkError> {
+    let mut usable = Vec::new();
+    let mut refused = None;
+    for at in addresses {
+        if usable.contains(&at) {
+            continue;
+        }
+        if at.is_open() && !is_insecure {
+            return Err(NetworkError::Insecure(at));
+        }
+        match at.try_listening() {
+            Ok(()) => usable.push(at),
+            // Whoever tries this one would find another.
+            Err(reason) if reason.kind() == io::ErrorKind::AddrInUse => {
+                return Err(NetworkError::Listening(at, reason));
+            }
+            // Another computer's of that name, most likely.
+            Err(reason) => refused = Some(NetworkError::Listening(at, reason)),
+        }
+    }
+    match refused {
+        Some(refusal) if usable.is_empty() => Err(refusal),
+        _ => Ok(usable),
+    }
 }
 
 fn engine(error: zenoh::Error) -> NetworkError {
@@ -328,5 +373,55 @@ impl Connection for Wire {
     fn close(&self) {
         // One who leaves has nobody to complain to.
         let _ = self.session.close().wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    /// One end at each of these hosts, at a port that is free.
+    fn at(carrier: &str, hosts: &[&str]) -> Vec<Endpoint> {
+        let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
+        let port = port.expect("a port is free").port();
+        let of = |host: &&str| format!("{carrier}/{host}:{port}").parse();
+        hosts.iter().map(|host| of(host).expect("one")).collect()
+    }
+
+    #[test]
+    fn one_listens_at_each_address_of_a_name_that_this_computer_has() {
+        for carrier in ["tcp", "udp", "tls", "quic"] {
+            // The second one is nobody's (RFC 5737).
+            let all = at(
+                carrier,
+                &["127.0.0.1", "192.0.2.1", "127.0.0.2", "127.0.0.1"],
+            );
+            let found = usable(all.clone(), true).expect("there are some");
+            assert_eq!(found, [all[0].clone(), all[2].clone()]);
+            let none = usable(all[1..2].to_vec(), true).expect_err("it is another's");
+            assert!(none.to_string().contains("can't listen"), "{none}");
+            // Whoever tries the one that is taken would find somebody else.
+            let taken = TcpListener::bind(("127.0.0.2", all[2].port)).expect("it is free");
+            let refused = usable(all.clone(), true).expect_err("one is taken");
+            assert!(
+                refused.to_string().starts_with(&all[2].to_string()),
+                "{refused}"
+            );
+            drop(taken);
+        }
+    }
+
+    #[test]
+    fn no_address_of_a_name_is_open_beyond_this_computer_unless_that_is_meant() {
+        let all = at("tcp", &["127.0.0.1", "0.0.0.0"]);
+        let refused = usable(all.clone(), false).expect_err("the second one is open");
+        assert!(
+            matches!(&refused, NetworkError::Insecure(at) if *at == all[1]),
+            "{refused}"
+        );
+        let safe = at("tls", &["127.0.0.1", "127.0.0.2"]);
+        assert_eq!(usable(safe.clone(), false).expect("nobody is let in"), safe);
     }
 }
