@@ -3,9 +3,9 @@
 
 use std::cell::Cell;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, ErrorKind, IsTerminal, Read, Seek, Write};
+use std::io::{self, ErrorKind, IsTerminal, Read, Write};
 use std::net::TcpStream;
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,6 +32,8 @@ const LOOK: Duration = Duration::from_millis(100);
 const AGAIN: Duration = Duration::from_secs(1);
 /// Most bytes of a read.
 const READ_BYTES: usize = 4_096;
+/// So much of what was read of a file is looked at again, in bytes: some lines, which have the board's time in them.
+const PASSED_BYTES: usize = 256;
 
 /// Where the bytes come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -152,18 +154,26 @@ impl Log {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::empty())).map_err(|error| failed(error.into()))?;
         let kind = file.metadata().map_err(failed)?.file_type();
         let mut has_come = false;
-        let read = |bytes: &mut [u8]| match (&file).read(bytes) {
-            // Nobody writes to the pipe yet.
-            Ok(0) if kind.is_fifo() && !has_come => {
-                thread::park_timeout(LOOK);
-                Err(ErrorKind::WouldBlock.into())
-            }
-            Ok(0) if kind.is_file() && is_renewed(path, &file) => Err(io::Error::other(
-                "was cut short or replaced: read from its beginning",
-            )),
-            read => {
-                has_come |= read.is_ok();
-                read
+        let mut passed = Passed::default();
+        let read = |bytes: &mut [u8]| {
+            let read = (&file).read(bytes);
+            // After it, since the file may be cut short at any moment before.
+            let is_lost = |count| !passed.is_in(&file) || count == 0 && is_replaced(path, &file);
+            match read {
+                // Nobody writes to the pipe yet.
+                Ok(0) if kind.is_fifo() && !has_come => {
+                    thread::park_timeout(LOOK);
+                    Err(ErrorKind::WouldBlock.into())
+                }
+                Ok(count) if kind.is_file() && is_lost(count) => Err(io::Error::other(
+                    "was cut short or replaced: read from its beginning",
+                )),
+                Ok(count) => {
+                    has_come = true;
+                    passed.add(&bytes[..count]);
+                    Ok(count)
+                }
+                error => error,
             }
         };
         self.decode(!kind.is_file(), read).map_err(failed)
@@ -238,14 +248,36 @@ fn open_at_once(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// Whether a file that was read to its end has been cut short since, or another one has taken its name.
-fn is_renewed(path: &Path, mut file: &File) -> bool {
-    let facts = (fs::metadata(path), file.metadata(), file.stream_position());
-    let (Ok(named), Ok(open), Ok(read_bytes)) = facts else {
-        // Its name leads to nothing while it is being replaced.
+/// The last of what was read of a file: one that was cut short has something else there, also when it has grown again.
+#[derive(Default)]
+struct Passed {
+    last: Vec<u8>,
+    /// Where it ends, in bytes from the file's beginning.
+    end: u64,
+}
+
+impl Passed {
+    fn add(&mut self, bytes: &[u8]) {
+        self.last.extend_from_slice(bytes);
+        let before = self.last.len().saturating_sub(PASSED_BYTES);
+        self.last.drain(..before);
+        self.end += bytes.len() as u64;
+    }
+
+    fn is_in(&self, file: &File) -> bool {
+        let mut there = vec![0; self.last.len()];
+        let start = self.end - there.len() as u64;
+        file.read_exact_at(&mut there, start).is_ok() && there == self.last
+    }
+}
+
+/// Whether another file than this one has its name by now.
+fn is_replaced(path: &Path, file: &File) -> bool {
+    // Its name leads to nothing while it is being replaced.
+    let (Ok(named), Ok(open)) = (fs::metadata(path), file.metadata()) else {
         return false;
     };
-    (named.dev(), named.ino()) != (open.dev(), open.ino()) || open.len() < read_bytes
+    (named.dev(), named.ino()) != (open.dev(), open.ino())
 }
 
 /// The chip of both boards, by probe-rs's name.

@@ -122,11 +122,17 @@ fn a_log_in_a_file_that_is_cut_short_or_replaced_is_read_from_its_beginning() {
     for _ in 0..2 {
         next_with(&mut lines, &started);
     }
-    // What is longer is another one all the same.
-    fs::write(&other, logged.repeat(4)).expect("it can be written");
+    // Also when it is longer than it was before anybody looks again.
+    let longer = [&[0], &*logged.repeat(5)].concat();
+    fs::write(&log, longer).expect("it can be written");
+    next_with(&mut lines, &lost);
+    for _ in 0..5 {
+        next_with(&mut lines, &started);
+    }
+    fs::write(&other, logged.repeat(6)).expect("it can be written");
     fs::rename(&other, &log).expect("it can be renamed");
     next_with(&mut lines, &lost);
-    for _ in 0..4 {
+    for _ in 0..6 {
         next_with(&mut lines, &started);
     }
     child.kill().expect("it runs");
