@@ -56,9 +56,9 @@ pub enum ExportError {
     )]
     Uneven(String),
     #[error(
-        "the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
+        "{path}: the arm is {position_um} µm from its start, a WAV sample holds ± 2 147 483 647: give another part"
     )]
-    Far { position_um: i64 },
+    Far { path: PathBuf, position_um: i64 },
     #[error(transparent)]
     File(#[from] OutputFileError),
 }
@@ -145,7 +145,7 @@ pub fn write(settings: &Settings) -> Result<Exports, ExportError> {
         let texture = of_recording::texture(&excerpt, settings)?;
         write_texture(settings, texture)?
     } else {
-        write_groups(settings, of_recording::groups(&excerpt)?)?
+        write_groups(settings, of_recording::groups(&excerpt, &settings.from)?)?
     };
     let is_cut = excerpt.cut;
     Ok(Exports { files, is_cut })

@@ -17,7 +17,7 @@ use crate::recording::reader::Reader;
 use crate::replay::StandIn;
 use crate::replay::scene;
 use crate::replay::{Pace, Played, SPEEDS, play};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::ValueHint;
 use protocol::Role;
 
@@ -154,8 +154,7 @@ impl Replay {
             expect: self.expect,
             force: self.force,
         };
-        let made = scene::write(recording, &settings)
-            .with_context(|| format!("{}: no scene", self.file.display()))?;
+        let made = scene::write(recording, &settings)?;
         let scene = made.path.display();
         let (valid, all) = made.estimates;
         output::print(&format!(

@@ -1,6 +1,7 @@
 //! What a recording has to export: the gauges' samples, over time and over the arm's way.
 
 use std::ops::Range;
+use std::path::Path;
 
 use firmware_sensor::SAMPLE_RATE_HZ;
 use protocol::GAUGES;
@@ -19,7 +20,7 @@ const AT_SAMPLES: Along = Along::Time {
 
 /// The gauges, the force if there is one, and the arm's place, over time. Fails if the arm is too far from its
 /// start.
-pub fn groups(excerpt: &Excerpt) -> Result<Vec<Group>, ExportError> {
+pub fn groups(excerpt: &Excerpt, path: &Path) -> Result<Vec<Group>, ExportError> {
     let samples = &excerpt.samples;
     let code = |code: u16| (i32::from(code) - MID_CODE) as i16;
     let mut gauges = Vec::with_capacity(samples.len() * GAUGES);
@@ -30,6 +31,7 @@ pub fn groups(excerpt: &Excerpt) -> Result<Vec<Group>, ExportError> {
         gauges.extend(all.map(code));
         forces.push(code(force));
         let far = |_| ExportError::Far {
+            path: path.to_owned(),
             position_um: sample.position_um,
         };
         places.push(i32::try_from(sample.position_um).map_err(far)?);

@@ -53,12 +53,15 @@ pub enum SceneError {
         "{path}: the sensor was configured anew at {at_s:.3} s, and what is made of it has one configuration: end before it or begin after it, with --from and --to-time"
     )]
     Reconfigured { path: PathBuf, at_s: f64 },
-    #[error("that is too long: give --from and --to-time, {LONGEST_S} s apart at most")]
-    TooLong,
-    #[error("no valid estimate tells what was rubbed: give its wavelength with --wavelength")]
-    NoWavelength,
-    #[error("{setting} was {value}, which a scene can't have: give {give}")]
+    #[error("{path}: that is too long: give --from and --to-time, {LONGEST_S} s apart at most")]
+    TooLong { path: PathBuf },
+    #[error(
+        "{path}: no valid estimate tells what was rubbed: give its wavelength with --wavelength"
+    )]
+    NoWavelength { path: PathBuf },
+    #[error("{path}: {setting} was {value}, which a scene can't have: give {give}")]
     Setting {
+        path: PathBuf,
         setting: &'static str,
         value: f64,
         give: &'static str,
@@ -119,7 +122,9 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
         count,
     })?;
     if layout.duration_s > LONGEST_S {
-        return Err(SceneError::TooLong);
+        return Err(SceneError::TooLong {
+            path: recording_path,
+        });
     }
     let within: Vec<Estimate> = excerpt
         .estimates
@@ -131,7 +136,9 @@ pub fn write(recording: Reader, settings: &Settings) -> Result<Made, SceneError>
     let wavelength_mm = settings
         .wavelength_mm
         .or_else(|| median(&valid))
-        .ok_or(SceneError::NoWavelength)?;
+        .ok_or_else(|| SceneError::NoWavelength {
+            path: recording_path.clone(),
+        })?;
     let is_off = |mm: &&f64| (**mm / wavelength_mm - 1.0).abs() > 0.1;
     let off = valid.iter().filter(is_off).count();
     let expected = settings

@@ -362,6 +362,15 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
     let mut speaker = Speaker::new(1);
     let blocks = [0, 16].map(|first| (0, Role::Sensor, speaker.gauges(first)));
     record(&gap, blocks);
+    let beyond = folder.join("beyond.mcap");
+    let blocks = [0, 8].map(|first| match speaker.gauges(first) {
+        Message::Gauges(gauges) => Message::Gauges(Gauges {
+            position_um: 1 << 40,
+            ..gauges
+        }),
+        other => other,
+    });
+    record(&beyond, blocks.map(|block| (0, Role::Sensor, block)));
     let scene = folder.join("weave.toml");
     let toml = format!("duration_s = 0.2\n{SURFACE}{MOTION}");
     fs::write(&scene, &toml).expect("a file can be written");
@@ -411,6 +420,10 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
         (
             vec![path("gap.mcap"), path("x.wav")],
             "gap.mcap: samples are missing at ",
+        ),
+        (
+            vec![path("beyond.mcap"), path("x.wav")],
+            "beyond.mcap: the arm is ",
         ),
         (vec![resting, path("x.hjif")], "the arm does not move there"),
         (

@@ -206,6 +206,11 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
     let path = folder.join("half.mcap");
     record(&path, half_a_second());
     let file = path.to_str().expect("UTF-8");
+    let unsaid = folder.join("unsaid.mcap");
+    let mut speaker = Speaker::new(1);
+    let blocks = [0, 8, 16, 24].map(|first| (0, Role::Sensor, speaker.gauges(first)));
+    record(&unsaid, blocks);
+    let unsaid = unsaid.to_str().expect("UTF-8");
     let none = folder.join("none.mcap");
     fs::write(&none, "none at all").expect("the file can be written");
     let none = none.to_str().expect("UTF-8");
@@ -224,6 +229,10 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
         (
             vec![file, "--to", toml],
             "half.mcap: 0 samples of the gauges there: record without --no-gauges",
+        ),
+        (
+            vec![unsaid, "--to", toml],
+            "unsaid.mcap: no valid estimate tells what was rubbed: give its wavelength",
         ),
         (
             vec![file, "--to", "nowhere"],

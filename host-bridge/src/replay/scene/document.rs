@@ -43,7 +43,7 @@ specimens = [{{ wavelength_mm = {wavelength_mm:.4} }}]
         piece.offset_mm,
     );
     if let Some(sensor) = &excerpt.sensor {
-        text += &force(sensor)?;
+        text += &force(sensor, piece.recording)?;
         text += "\n[estimator]\n";
         let settings = &settings::SENSOR[..ESTIMATOR];
         text += &lines(settings, &Configuration::Sensor(*sensor));
@@ -113,7 +113,7 @@ fn file_beside(scene: &Path, recording: &Path) -> PathBuf {
     }
 }
 
-fn force(sensor: &SensorConfiguration) -> Result<String, SceneError> {
+fn force(sensor: &SensorConfiguration, path: &Path) -> Result<String, SceneError> {
     let mut text = format!("tangential = {}\n", sensor.force_channel);
     if !sensor.force_channel {
         return Ok(text);
@@ -121,6 +121,7 @@ fn force(sensor: &SensorConfiguration) -> Result<String, SceneError> {
     let n_per_v = f64::from(sensor.force_mn_per_v) / 1_000.0;
     if !(0.05..=20.0).contains(&n_per_v) {
         return Err(SceneError::Setting {
+            path: path.to_owned(),
             setting: "the force channel's scale",
             value: n_per_v,
             give: "0.05 to 20 N/V",
@@ -132,6 +133,7 @@ fn force(sensor: &SensorConfiguration) -> Result<String, SceneError> {
         stiffness @ 10..=10_000 => text += &format!("stiffness_n_per_m = {stiffness}\n"),
         stiffness => {
             return Err(SceneError::Setting {
+                path: path.to_owned(),
                 setting: "the fingertip's stiffness",
                 value: stiffness.into(),
                 give: "10 to 10 000 N/m",

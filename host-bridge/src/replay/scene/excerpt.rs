@@ -94,7 +94,7 @@ impl Excerpt {
                     }
                     excerpt.samples.extend(GaugeRow::all(&Gauges::from(&row)));
                     if excerpt.samples.len() > MOST {
-                        return Err(SceneError::TooLong);
+                        return Err(SceneError::TooLong { path });
                     }
                 }
                 Row::Estimate(row) if within => excerpt.estimates.push(row.into()),

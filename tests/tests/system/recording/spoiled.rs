@@ -25,7 +25,12 @@ fn a_recording_that_is_too_long_for_a_scene_is_refused_before_it_is_read_to_its_
     };
     let recording = Reader::open(&path).expect("its beginning is whole");
     let error = scene::write(recording, &settings).expect_err("800 s are too long");
-    assert!(matches!(error, scene::SceneError::TooLong), "{error}");
+    assert!(
+        matches!(error, scene::SceneError::TooLong { .. }),
+        "{error}"
+    );
+    let words = error.to_string();
+    assert!(words.contains("long.mcap: that is too long"), "{words}");
 }
 
 #[test]
