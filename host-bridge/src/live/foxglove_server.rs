@@ -4,15 +4,21 @@ use std::collections::HashMap;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
+use std::time::Duration;
 
 use foxglove::{
     ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema, WebSocketServer,
     WebSocketServerHandle,
 };
 use protocol::Role;
+use tokio::runtime::Builder;
+use tokio::time::timeout;
 
 use crate::link::Event;
 use crate::recording::{CdrEncoder, Note, RowBuilder, SchemaError};
+
+/// How long those who listen may take to hear that nothing more comes.
+const FAREWELL: Duration = Duration::from_millis(500);
 
 /// Why nothing can be shown.
 #[derive(Debug, thiserror::Error)]
@@ -98,7 +104,49 @@ impl FoxgloveServer {
         }
     }
 
+    /// Takes leave of who listens, and waits for nobody who takes nothing.
     pub fn stop(self) {
-        self.server.stop().wait_blocking();
+        let left = self.server.stop().wait();
+        // Dropped unfinished, it ends the connections that are left.
+        if let Ok(runtime) = Builder::new_current_thread().enable_time().build() {
+            let _ = runtime.block_on(async { timeout(FAREWELL, left).await });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead, BufReader, Write};
+    use std::net::TcpStream;
+    use std::sync::mpsc::channel;
+    use std::thread;
+
+    use super::*;
+
+    /// Only what hangs takes so long.
+    const LIMIT: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn who_is_connected_and_neither_speaks_nor_listens_does_not_keep_it_from_ending() {
+        let here = IpAddr::from([127, 0, 0, 1]);
+        let server = FoxgloveServer::start(here, 0).expect("any port will do");
+        let connect = || TcpStream::connect((here, server.port())).expect("it listens");
+        let silent = connect();
+        // Who comes later is let in: so was the first one.
+        let mut later = connect();
+        let request = "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
+             Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n";
+        later.write_all(request.as_bytes()).expect("it reads");
+        let mut answer = String::new();
+        let mut reader = BufReader::new(&later);
+        reader.read_line(&mut answer).expect("it answers");
+        assert!(answer.starts_with("HTTP/1.1 101 "), "{answer}");
+        let (ending, ended) = channel();
+        thread::spawn(move || {
+            server.stop();
+            ending.send(())
+        });
+        assert_eq!(ended.recv_timeout(LIMIT), Ok(()));
+        drop((silent, later));
     }
 }
