@@ -235,10 +235,14 @@ impl Bridge {
                 due += REPORT;
                 let report = bridge.report(false);
                 if !print(&report, before.as_ref(), self.json)? {
-                    return Ok(ExitCode::SUCCESS);
+                    break;
                 }
                 before = Some(report);
             }
+        }
+        // Nobody tells the boards again.
+        for notice in notices.try_iter().chain(bridge.unstopped()) {
+            say(&notice.to_string());
         }
         print(&bridge.report(true), None, self.json)?;
         Ok(ExitCode::SUCCESS)

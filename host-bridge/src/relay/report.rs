@@ -212,6 +212,8 @@ pub enum Notice {
     StopPassed,
     /// This site's board says that it has stopped, for this reason, if this program knows it.
     Stopped(Option<Trip>),
+    /// A board has not answered a Stop, and is told again: that at the other site of this role, or this site's.
+    NotStopped(Option<Role>),
     /// The Stop said here is done at that site: the reason for which its board says that it has stopped,
     /// if this program knows it.
     StopHeard(Role, Option<Trip>),
@@ -280,6 +282,13 @@ impl fmt::Display for Notice {
             Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),
             Self::StopPassed => f.write_str("Stop: with the board here"),
             Self::Stopped(trip) => write!(f, "Stop: the board here has stopped: {}", cause(*trip)),
+            Self::NotStopped(other) => {
+                let place = other.map_or_else(|| "here".to_owned(), |role| format!("at {}", site(role)));
+                write!(
+                    f,
+                    "NOT STOPPED as far as is known: the board {place} has not answered: press the emergency stop, or cut its power"
+                )
+            }
             Self::StopHeard(role, trip) => write!(
                 f,
                 "Stop: the board at {} has stopped: {}",

@@ -204,6 +204,12 @@ impl Site {
         self.shared.stop(stop);
     }
 
+    /// The boards that have not answered a Stop.
+    pub fn unstopped(&self) -> Vec<Notice> {
+        let unanswered = locked(&self.shared.stops).unanswered();
+        self.shared.not_stopped(unanswered)
+    }
+
     /// A way to hand the bench over that can be handed to other threads: see [`Site::hand_over`].
     pub fn hander_over(&self) -> impl Fn() + Send + Sync + 'static {
         let shared = Arc::clone(&self.shared);
@@ -514,6 +520,13 @@ impl Shared {
             self.tell(Notice::StopSaid(self.settings.role));
             self.say(Channel::Stop, Content::Stop { id, stop });
         }
+    }
+
+    /// Words of the boards that have not answered: this site's, and the other site's.
+    fn not_stopped(&self, [here, there]: [bool; 2]) -> Vec<Notice> {
+        let here = here.then_some(Notice::NotStopped(None));
+        let there = there.then_some(Notice::NotStopped(Some(self.other_role)));
+        here.into_iter().chain(there).collect()
     }
 
     /// Says Stop to the board, whose link says it again until it is answered.

@@ -5,10 +5,15 @@ use std::collections::VecDeque;
 
 use protocol::{DisplayState, Message, RoleCounters, Stop, Trip};
 
+use crate::relay::remote::SILENCE_US;
+
 /// Stops that may wait for this site's board at once; each is the same to it.
 const PENDING: usize = 8;
 /// Stops that are remembered as done.
 const DONE: usize = 64;
+/// How long this site's board may take to answer, in µs: it does within milliseconds. The other site's may take
+/// [`SILENCE_US`].
+const PATIENCE_US: u64 = 500_000;
 
 /// How a Stop stands with this site's board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +35,26 @@ struct Pending {
     told_us: Option<u64>,
 }
 
+/// An answer that may be missing.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answer {
+    missing_since_us: Option<u64>,
+    is_told: bool,
+}
+
+impl Answer {
+    /// True once, when it has been missing for `patience_us`.
+    fn is_overdue(&mut self, is_missing: bool, patience_us: u64, now_us: u64) -> bool {
+        if !is_missing {
+            *self = Self::default();
+            return false;
+        }
+        let since_us = *self.missing_since_us.get_or_insert(now_us);
+        let is_overdue = now_us.saturating_sub(since_us) >= patience_us;
+        is_overdue && !std::mem::replace(&mut self.is_told, true)
+    }
+}
+
 /// Stops on their way.
 #[derive(Clone, Debug, Default)]
 pub struct Stops {
@@ -38,12 +63,16 @@ pub struct Stops {
     done: VecDeque<(u64, Option<Trip>)>,
     /// The board has stopped since its last start, or is about to.
     is_halted: bool,
+    /// This site's board's, and the other site's.
+    answers: [Answer; 2],
 }
 
 impl Stops {
     /// Stop was said here, for both boards: its number, and whether it is a new one. As long as the other site has not
     /// heard one for the same reason it is that one, not the one numbered `id`, however often it is said.
     pub fn say(&mut self, id: u64, stop: Stop) -> (u64, bool) {
+        // Whoever says it again wants to know again.
+        self.answers = Default::default();
         let said = self.pass_on(id, stop);
         self.hear(said.0, stop);
         said
@@ -155,6 +184,21 @@ impl Stops {
         let before = self.unheard.len();
         self.unheard.retain(|(unheard, _)| *unheard != id);
         self.unheard.len() < before
+    }
+
+    /// Which boards have not answered a Stop: this site's, and the other site's.
+    pub fn unanswered(&self) -> [bool; 2] {
+        [!self.pending.is_empty(), !self.unheard.is_empty()]
+    }
+
+    /// Which of them have not for so long by `now_us` that a person is to know of it, once.
+    pub fn overdue(&mut self, now_us: u64) -> [bool; 2] {
+        let [here, there] = self.unanswered();
+        let [own, other] = &mut self.answers;
+        [
+            own.is_overdue(here, PATIENCE_US, now_us),
+            other.is_overdue(there, SILENCE_US, now_us),
+        ]
     }
 
     /// Those to be said to the other site again.

@@ -290,6 +290,24 @@ fn a_signal_says_stop_at_both_sites() {
 }
 
 #[test]
+fn a_bridge_that_ends_before_a_stop_is_answered_says_who_has_not_stopped() {
+    let sensor = talking_board(Role::Sensor);
+    sensor.disobey(true);
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let bridge = Relay::bridge(Role::Sensor, sensor.path(), &["--listen", &at]);
+    bridge.says("board: ", LIMIT);
+    bridge.signal(Signal::USR1);
+    listen(&sensor, LIMIT, |heard| heard.iter().any(is_stop));
+    bridge.signal(Signal::TERM);
+    let (status, _, words) = bridge.wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+    for whose in ["the board here", "the board at the display's site"] {
+        let part = format!("NOT STOPPED as far as is known: {whose} has not answered");
+        assert!(words.contains(&part), "{words}");
+    }
+}
+
+#[test]
 fn relay_stop_says_what_has_come_of_it() {
     let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
     let pair = Pair::new(&sensor, &display, &["--max-age", "60000"]);

@@ -66,6 +66,7 @@ impl Keeper {
             let at_us = self.shared.now_us();
             self.ping(at_us);
             self.repeat_stops(at_us);
+            self.tell_unstopped(at_us);
             self.hand_over(at_us);
             self.watch(at_us);
             self.look(at_us);
@@ -105,6 +106,13 @@ impl Keeper {
         }
         for (id, stop) in unheard {
             self.shared.say(Channel::Stop, Content::Stop { id, stop });
+        }
+    }
+
+    fn tell_unstopped(&self, at_us: u64) {
+        let overdue = locked(&self.shared.stops).overdue(at_us);
+        for notice in self.shared.not_stopped(overdue) {
+            self.shared.tell(notice);
         }
     }
 

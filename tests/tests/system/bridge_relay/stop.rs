@@ -180,3 +180,48 @@ fn a_board_that_started_anew_unseen_is_known_to_go_again() {
     display.say(Message::Stopped(Stopped::by(Trip::EmergencyStop)));
     listen(&sensor, LIMIT, is_told);
 }
+
+#[test]
+fn a_board_that_does_not_answer_a_stop_is_named_once_at_both_sites() {
+    let Sites {
+        sensor,
+        display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(10));
+    const NOT_STOPPED: &str = "NOT STOPPED as far as is known: ";
+    let unstopped = |site: &VirtualSite| -> Vec<String> {
+        let mut words = site.words();
+        words.retain(|line| line.contains("NOT STOPPED"));
+        words
+    };
+    // Who answers is not named.
+    pair.sensor.site.stop(STOP);
+    pair.sensor
+        .says("the board at the display's site has stopped", LIMIT);
+    pass(&pair.bench, Duration::from_secs(5));
+    for site in [&pair.sensor, &pair.display] {
+        assert_eq!(unstopped(site), [""; 0]);
+    }
+    display.disobey(true);
+    pair.sensor.site.stop(STOP);
+    let there = format!("{NOT_STOPPED}the board at the display's site has not answered");
+    let here = format!("{NOT_STOPPED}the board here has not answered");
+    pair.display.says(&here, Duration::from_secs(1));
+    pair.sensor.says(&there, Duration::from_secs(3));
+    pass(&pair.bench, Duration::from_secs(5));
+    for site in [&pair.sensor, &pair.display] {
+        assert_eq!(unstopped(site).len(), 1, "{:?}", site.words());
+    }
+    // Whoever says it again wants to know again.
+    pair.sensor.site.stop(STOP);
+    let again = || unstopped(&pair.sensor).len() == 2;
+    assert!(wait_by(&display, LIMIT, again), "{:?}", pair.sensor.words());
+    display.disobey(false);
+    let stopped = || {
+        let words = pair.sensor.words();
+        words.iter().rposition(|line| line.contains("has stopped"))
+            > words.iter().rposition(|line| line.contains("NOT STOPPED"))
+    };
+    assert!(wait_by(&display, LIMIT, stopped));
+}
