@@ -278,11 +278,18 @@ impl Stopping {
         let within = Duration::from_secs(self.within.into());
         let name = self.meeting.name;
         let credentials = self.meeting.proofs.credentials();
-        let (outcomes, told) = channel();
-        // All at once: one that is dead must not hold up the others.
+        let (mut networks, mut refusals) = (Vec::new(), Vec::new());
         for endpoint in self.connect {
             let ends = Ends::Connecting(vec![endpoint.clone()]);
-            let network = Network::new(ends, credentials.clone(), vec![name.clone()], false)?;
+            match Network::new(ends, credentials.clone(), vec![name.clone()], false) {
+                Ok(network) => networks.push((endpoint, network)),
+                Err(refusal) => refusals.push(refusal),
+            }
+        }
+        let nobody_can_be_told = networks.is_empty();
+        let (outcomes, told) = channel();
+        // All at once: one that is dead must not hold up the others, nor one that can't be used.
+        for (endpoint, network) in networks {
             let (outcomes, name) = (outcomes.clone(), name.clone());
             thread::spawn(move || {
                 let clock = System::default().clock;
@@ -295,6 +302,12 @@ impl Stopping {
             });
         }
         drop(outcomes);
+        for refusal in refusals {
+            if nobody_can_be_told {
+                return Err(refusal.into());
+            }
+            say(&refusal.to_string());
+        }
         let mut progress = Progress::Unheard;
         let mut errors = Vec::new();
         // Those that were never reached may take longer to say why: nobody waits for that to hear that nothing stopped.

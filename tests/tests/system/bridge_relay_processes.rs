@@ -405,6 +405,29 @@ fn relay_stop_does_not_wait_for_an_end_that_is_dead() {
 }
 
 #[test]
+fn an_end_that_cannot_be_used_keeps_no_stop_from_the_others() {
+    let (sensor, display) = (talking_board(Role::Sensor), talking_board(Role::Display));
+    let pair = Pair::new(&sensor, &display, &[]);
+    listen(&sensor, LIMIT, at_least(10));
+    // It wants certificates.
+    let unusable = ["stop", "--connect", "tls/127.0.0.1:1"];
+    let at = format!("tcp/127.0.0.1:{}", pair.weather.port());
+    let words = unusable.into_iter().chain(["--connect", &at]);
+    let (status, _, words) = Relay::start(words).wait(LIMIT);
+    assert_eq!(status.code(), Some(0), "{words}");
+    assert!(
+        words.contains("tls/127.0.0.1:1 wants certificates"),
+        "{words}"
+    );
+    let (status, _, words) = Relay::start(unusable).wait(LIMIT);
+    assert_eq!(status.code(), Some(2), "{words}");
+    assert!(
+        words.contains("tls/127.0.0.1:1 wants certificates"),
+        "{words}"
+    );
+}
+
+#[test]
 fn a_board_of_the_other_role_does_not_stop_for_the_display() {
     let (sensor, other) = (talking_board(Role::Sensor), talking_board(Role::Sensor));
     let pair = Pair::new(&sensor, &other, &[]);
