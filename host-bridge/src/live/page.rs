@@ -1,7 +1,7 @@
 //! The page of our own: what it is made of, what it is told, and its Stop; and as much of HTTP as it needs: one request a
 //! connection.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -10,6 +10,7 @@ use std::{io, thread};
 
 use super::foxglove_server::LiveError;
 use crate::lock::locked;
+use crate::relay::endpoint::Within;
 
 const PAGE: &str = include_str!("page.html");
 /// What a page of ours says with its Stop: no other site's page may, for its browser asks here first.
@@ -156,23 +157,6 @@ const HEAD_WITHIN: Duration = Duration::from_secs(2);
 /// How long it may take to take what it gets.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A stream that fails from an instant on, however little comes at a time.
-struct Within<'a> {
-    stream: &'a TcpStream,
-    end: Instant,
-}
-
-impl Read for Within<'_> {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let left = self.end.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        self.stream.set_read_timeout(Some(left))?;
-        (&mut &*self.stream).read(bytes)
-    }
-}
-
 /// What a browser asks for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Request {
@@ -268,6 +252,7 @@ pub fn event(mut stream: &TcpStream, line: &str) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
     use std::net::Ipv4Addr;
     use std::sync::atomic::AtomicBool;
 

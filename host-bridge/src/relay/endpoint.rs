@@ -1,13 +1,13 @@
 //! Where a bridge listens or connects: `tcp/HOST:PORT`, `udp/HOST:PORT`, or with certificates `tls/HOST:PORT`,
 //! `quic/HOST:PORT`; and why nobody is reached there: what the network's engine keeps to itself, found out by trying.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::net::{
     IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs, UdpSocket,
 };
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use std::{fmt, io};
 
 use rustls::pki_types::ServerName;
@@ -236,7 +236,7 @@ impl Reach {
         for address in addresses {
             match TcpStream::connect_timeout(&address, PATIENCE) {
                 Ok(stream) => {
-                    return tls.map_or(Self::Reached, |tls| shake_hands(endpoint, stream, tls));
+                    return tls.map_or(Self::Reached, |tls| shake_hands(endpoint, &stream, tls));
                 }
                 Err(error) => reach = Self::from_io(&error),
             }
@@ -268,26 +268,56 @@ impl Reach {
     }
 }
 
-fn shake_hands(endpoint: &Endpoint, mut stream: TcpStream, tls: &Arc<ClientConfig>) -> Reach {
+/// A stream that fails from an instant on, however little comes at a time.
+pub(crate) struct Within<'a> {
+    pub stream: &'a TcpStream,
+    pub end: Instant,
+}
+
+impl Read for Within<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let left = self.end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        self.stream.set_read_timeout(Some(left))?;
+        (&mut &*self.stream).read(bytes)
+    }
+}
+
+impl Write for Within<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        (&mut &*self.stream).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn shake_hands(endpoint: &Endpoint, stream: &TcpStream, tls: &Arc<ClientConfig>) -> Reach {
     let Ok(name) = ServerName::try_from(endpoint.host.clone()) else {
         return Reach::Unresolved("no name that a certificate could have".to_owned());
     };
-    let timed = stream
-        .set_read_timeout(Some(PATIENCE))
-        .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
+    let timed = stream.set_write_timeout(Some(PATIENCE));
     let connection = ClientConnection::new(Arc::clone(tls), name);
     let (Ok(()), Ok(mut connection)) = (timed, connection) else {
         return Reach::NotTls;
     };
+    let within = |span| Within {
+        stream,
+        end: Instant::now() + span,
+    };
+    let mut timed = within(2 * PATIENCE);
     while connection.is_handshaking() {
-        if let Err(error) = connection.complete_io(&mut stream) {
+        if let Err(error) = connection.complete_io(&mut timed) {
             return Reach::from_tls(&error);
         }
     }
     // In TLS 1.3 the other end judges one's certificate after one's own handshake is over: what it thinks
     // of it can be read. One that is content waits for the engine's first words.
-    let _ = stream.set_read_timeout(Some(Duration::from_millis(500)));
-    match StreamOwned::new(connection, stream).read(&mut [0]) {
+    let timed = within(Duration::from_millis(500));
+    match StreamOwned::new(connection, timed).read(&mut [0]) {
         Err(error) if error.get_ref().is_some_and(|inner| inner.is::<Error>()) => {
             Reach::from_tls(&error)
         }
@@ -320,6 +350,12 @@ impl fmt::Display for Reach {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc;
+    use std::thread;
+
+    use rustls::RootCertStore;
+    use rustls::crypto::ring;
+
     use super::*;
 
     #[test]
@@ -348,6 +384,38 @@ mod tests {
             let host = host.to_owned();
             assert_eq!(error(&format!("tls/{host}:1")), EndpointError::Host(host));
         }
+    }
+
+    #[test]
+    fn who_answers_byte_by_byte_is_not_listened_to_for_ever() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let at = listener.local_addr().expect("an address");
+        let (told, reached) = mpsc::channel();
+        thread::spawn(move || {
+            let endpoint: Endpoint = format!("tls/{at}").parse().expect("an endpoint");
+            let mut roots = RootCertStore::empty();
+            let own = rcgen::generate_simple_self_signed(["localhost".to_owned()]);
+            let own = own.expect("a certificate").cert;
+            roots.add(own.der().clone()).expect("it is one");
+            let provider = Arc::new(ring::default_provider());
+            let tls = ClientConfig::builder_with_provider(provider)
+                .with_safe_default_protocol_versions()
+                .expect("it has them")
+                .with_root_certificates(roots)
+                .with_no_client_auth();
+            told.send(Reach::of(&endpoint, Some(&Arc::new(tls))))
+        });
+        let (mut slow, _) = listener.accept().expect("it comes");
+        // The head of a record, which is as long as any, and then some of it, now and then.
+        slow.write_all(&[22, 3, 3, 0x40, 0]).expect("it is there");
+        let found = (0..200).find_map(|_| {
+            let found = reached.recv_timeout(PATIENCE / 20).ok();
+            if found.is_none() {
+                let _ = slow.write_all(&[2]);
+            }
+            found
+        });
+        assert_eq!(found, Some(Reach::NotTls));
     }
 
     #[test]
