@@ -197,7 +197,14 @@ fn a_sound_bench_passes_every_step_that_needs_no_person(bench: &VirtualBoards) {
 }
 
 fn what_a_person_reads_off_is_judged(bench: &VirtualBoards) {
-    for (answers, status) in [("\n3.5\n", 0), ("\n12\ns\n", 1), ("q\n", 1), ("", 1)] {
+    for (answers, status) in [
+        ("\n3.5\n", 0),
+        ("\n-3.5\n", 0),
+        ("\n12\ns\n", 1),
+        ("\n-35\ns\n", 1),
+        ("q\n", 1),
+        ("", 1),
+    ] {
         let path = fresh_state("answers");
         let ended = command(bench, &path, &["--only", "zero-volt"], answers);
         assert_eq!(ended.status, Some(status), "{}", ended.output);
