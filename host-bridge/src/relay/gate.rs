@@ -192,7 +192,7 @@ impl Gate {
             return Order::Newer;
         };
         if let Some(ahead @ 1..) = counter.checked_sub(newest) {
-            self.arrivals.lost += ahead - 1;
+            self.arrivals.lost = self.arrivals.lost.saturating_add(ahead - 1);
             // The skipped ones are bits 1 to ahead - 1.
             let moved = u32::try_from(ahead)
                 .ok()
@@ -384,6 +384,17 @@ mod tests {
         assert_eq!(gate.judge(1, 4, say(1, 0)), Order::Newer);
         assert_eq!(gate.judge(1, 5, say(1, 1)), Order::Newer);
         assert_eq!(gate.arrivals().superseded, 2);
+    }
+
+    #[test]
+    fn more_lost_ones_than_any_number_holds_are_as_many_as_it_holds() {
+        let mut gate = held(1);
+        for session in [1, 2] {
+            gate.ask(session, session * LEASE_US);
+            assert_eq!(gate.judge(session, 0, said(0)), Order::Newer);
+            assert_eq!(gate.judge(session, u64::MAX, said(1)), Order::Newer);
+        }
+        assert_eq!(gate.arrivals().lost, u64::MAX);
     }
 
     #[test]
