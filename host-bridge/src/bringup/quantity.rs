@@ -188,7 +188,14 @@ impl Quantity {
             Self::MotionsHz => sight.hand.rate_hz()?,
             Self::MissedSamples => {
                 let counters = sight.sensor()?;
-                f64::from(counters.adc_overruns + counters.dma_overruns + counters.deadline_misses)
+                [
+                    counters.adc_overruns,
+                    counters.dma_overruns,
+                    counters.deadline_misses,
+                ]
+                .map(f64::from)
+                .into_iter()
+                .sum()
             }
             Self::LostHere(role) => sight.board(role.into())?.line_counters().lost.into(),
             Self::DriftPpm(role) => {
@@ -309,4 +316,37 @@ fn of_encoder(track: &Track, whose: &str) -> String {
 fn arm_over_hand(sight: &Sight) -> Option<f64> {
     let hand_mm_s = sight.hand.speed_mm_s().filter(|speed| speed.abs() > 1.0)?;
     Some(sight.arm.speed_mm_s()? / hand_mm_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{PortCounters, ResetCause, RoleCounters, SensorCounters, Status};
+
+    use super::*;
+    use crate::doctor::examination::BoardFacts;
+    use crate::state::State;
+
+    #[test]
+    fn more_missed_samples_than_a_counter_holds_are_counted_all_the_same() {
+        let counters = SensorCounters {
+            adc_overruns: u32::MAX,
+            deadline_misses: 2,
+            ..SensorCounters::ZERO
+        };
+        let absent = State::Absent(String::new());
+        let mut board = BoardFacts::new(protocol::Role::Sensor, absent);
+        board.first = Some(Status {
+            uptime_us: 0,
+            reset: ResetCause::Power,
+            watchdog_resets: 0,
+            peer: PortCounters::new(),
+            console: PortCounters::new(),
+            role: RoleCounters::Sensor(counters),
+            stack_free_bytes: 0,
+        });
+        let mut sight = Sight::default();
+        sight.examination.boards.push(board);
+        let missed = Quantity::MissedSamples.value(&sight);
+        assert_eq!(missed, Some(Value::Number(4_294_967_297.0)));
+    }
 }
