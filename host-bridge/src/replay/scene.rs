@@ -213,7 +213,7 @@ impl Layout {
         let begin = start
             .sample
             .saturating_sub(DELAY_SAMPLES - 1)
-            .next_multiple_of(SAMPLES_PER_ESTIMATE);
+            .checked_next_multiple_of(SAMPLES_PER_ESTIMATE)?;
         let first = (begin + DELAY_SAMPLES - 1).checked_sub(start.sample)? as usize;
         let before = samples.get(first)?;
         // A whole number of estimates, so that nothing is cut in the middle.
@@ -246,24 +246,34 @@ impl Layout {
 mod tests {
     use super::*;
 
+    /// Forty samples from this number and this instant on.
+    fn rows(first: u32, start_us: u64) -> Vec<GaugeRow> {
+        let row = |index: u32| GaugeRow {
+            sample: first.wrapping_add(index),
+            block: 0,
+            instant_us: start_us.wrapping_add(1_000 * u64::from(index)),
+            position_um: 0,
+            travel_um: 0,
+            g0_v: 0.0,
+            g1_v: 0.0,
+            g2_v: 0.0,
+            g3_v: 0.0,
+            g4_v: 0.0,
+            tangential_v: 0.0,
+        };
+        (0..40).map(row).collect()
+    }
+
+    #[test]
+    fn samples_whose_numbers_begin_anew_amid_them_are_none_of_a_scene_and_no_trouble() {
+        assert!(Layout::of(&rows(u32::MAX - 1, 0)).is_none());
+        assert!(Layout::of(&rows(u32::MAX - 60, 0)).is_some());
+    }
+
     #[test]
     fn a_layout_holds_its_instants_wherever_the_clock_stands() {
         for start_us in [0, i64::MAX.cast_unsigned() - 20_000, u64::MAX - 20_000] {
-            let rows: Vec<GaugeRow> = (0..40)
-                .map(|sample| GaugeRow {
-                    sample,
-                    block: 0,
-                    instant_us: start_us.wrapping_add(1_000 * u64::from(sample)),
-                    position_um: 0,
-                    travel_um: 0,
-                    g0_v: 0.0,
-                    g1_v: 0.0,
-                    g2_v: 0.0,
-                    g3_v: 0.0,
-                    g4_v: 0.0,
-                    tangential_v: 0.0,
-                })
-                .collect();
+            let rows = rows(0, start_us);
             let layout = Layout::of(&rows).expect("enough of them");
             let first_us = rows[layout.first].instant_us;
             assert!(layout.holds(first_us.wrapping_add(1_000)), "{start_us}");
