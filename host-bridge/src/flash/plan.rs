@@ -162,11 +162,6 @@ impl Plan {
         100.0 * self.bytes as f64 / (self.flash.end - self.flash.start) as f64
     }
 
-    /// How many bytes are erased.
-    pub fn erased_bytes(&self) -> u64 {
-        self.sectors.iter().map(|sector| sector.bytes).sum()
-    }
-
     /// The same for probe-rs, with all that goes into the flash. Fails if probe-rs sees what this plan did not.
     pub fn loader(&self) -> Result<FlashLoader, FlashError> {
         let mut loader = self.target.flash_loader();

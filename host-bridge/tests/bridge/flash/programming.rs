@@ -88,7 +88,10 @@ fn a_chip_is_erased_written_verified_and_started() {
     };
     let page_bytes = plan.page_bytes * plan.pages as u64;
     assert!(
-        told.contains(&ends(Stage::Erase, plan.erased_bytes())),
+        told.contains(&ends(
+            Stage::Erase,
+            plan.sectors.iter().map(|sector| sector.bytes).sum()
+        )),
         "{told:?}"
     );
     assert!(told.contains(&ends(Stage::Write, page_bytes)), "{told:?}");
