@@ -25,6 +25,9 @@ mod texture;
 
 pub use group::{Along, Group, Samples};
 
+/// The longest texture, in mm.
+const LONGEST_MM: f64 = 10_000.0;
+
 /// Why nothing is exported.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
@@ -43,14 +46,10 @@ pub enum ExportError {
         "{0}: the arm does not move there, and a texture is a function of place: give another part, or a .wav"
     )]
     AtRest(PathBuf),
-    #[error("the way is {length_mm:.0} mm: a texture has {most_mm:.0} mm at most: {advice}")]
-    TooLong {
-        /// Its length in mm.
-        length_mm: f64,
-        /// The longest in mm.
-        most_mm: f64,
-        advice: &'static str,
-    },
+    #[error(
+        "the way is {length_mm:.0} mm: a texture has {LONGEST_MM:.0} mm at most: give the scene a shorter duration_s"
+    )]
+    TooLong { length_mm: f64 },
     #[error(
         "{0}: the sensor's clock goes wrong in this scene, so its scans are not evenly spaced, as a WAV file's samples are: take that fault out"
     )]

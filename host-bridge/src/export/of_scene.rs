@@ -12,14 +12,12 @@ use hil_sim_core::scene::{Motion, Scene};
 use protocol::GAUGES;
 
 use super::texture::{Made, Trace};
-use super::{Along, ExportError, Group, Samples, Settings};
+use super::{Along, ExportError, Group, LONGEST_MM, Samples, Settings};
 
 /// Points of a texture in a metre, and their spacing in µm: as the simulator stores a surface.
 const PER_METRE: u32 = (1e3 / GRID_MM) as u32;
 const SPACING_UM: u64 = (GRID_MM * 1e3) as u64;
 const _: () = assert!(PER_METRE as u64 * SPACING_UM == 1_000_000);
-/// The longest texture, in mm.
-const MOST_MM: f64 = 10_000.0;
 /// Points beside the outermost gauges' ways, on either side.
 const BESIDE: f64 = 2.0;
 /// How often a hand's place is looked at, per s.
@@ -51,12 +49,8 @@ impl Felt {
         let first = ((low_mm + PLACES_MM[0]) / GRID_MM).floor() - BESIDE;
         let last = ((high_mm + PLACES_MM[GAUGES - 1]) / GRID_MM).ceil() + BESIDE;
         let length_mm = (last - first) * GRID_MM;
-        if length_mm > MOST_MM {
-            return Err(ExportError::TooLong {
-                length_mm,
-                most_mm: MOST_MM,
-                advice: "give the scene a shorter duration_s",
-            });
+        if length_mm > LONGEST_MM {
+            return Err(ExportError::TooLong { length_mm });
         }
         let place_mm = |point: i64| point as f64 / f64::from(PER_METRE) * 1e3;
         let points = first as i64..=last as i64;
