@@ -417,7 +417,6 @@ impl<F: FnMut(Event)> Reader<F> {
         let port = path.to_owned();
         match verdict {
             Verdict::Open => State::Opened(port),
-            // Whether it asks in return does not make another board of it.
             // A Hello's role stands where it stood in every version.
             Verdict::Known(hello) | Verdict::Foreign(hello)
                 if hello.role != self.shared.role.byte() =>

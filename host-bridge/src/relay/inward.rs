@@ -267,7 +267,7 @@ impl Inward {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Waiting {
     pub message: Message,
-    /// Until when it waits, in µs of the bridge's clock.
+    /// From when on it may be said, in µs of the bridge's clock.
     pub from_us: u64,
     /// When it is too old to be said, in µs of the bridge's clock.
     pub until_us: u64,
