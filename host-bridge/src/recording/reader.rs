@@ -99,6 +99,8 @@ pub struct Reader {
     last: Option<(String, f64)>,
     /// The time of the last samples of gauges, in s since the recording's start.
     last_gauges_s: Option<f64>,
+    /// The record behind the last of what was recorded has been read.
+    has_all_data: bool,
     ended: Option<Ending>,
     /// Configurations that a later part of a recording tells at its beginning.
     told: Vec<(Role, Row)>,
@@ -128,6 +130,8 @@ impl Reader {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
+            // What lies between the chunks, and their heads, has no other.
+            .with_validate_data_section_crc(true)
             .with_record_length_limit(LONGEST_RECORD);
         let mut reader = Self {
             path: path.to_owned(),
@@ -142,6 +146,7 @@ impl Reader {
             first_ns: None,
             last: None,
             last_gauges_s: None,
+            has_all_data: false,
             ended: None,
             told: Vec::new(),
         };
@@ -305,11 +310,14 @@ impl Reader {
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => McapError::UnexpectedEof,
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                     match mcap::parse_record(opcode, data).map(Record::into_owned) {
+                        // What it was is missing, with all that lies behind it.
+                        Ok(Record::Footer(_)) if !self.has_all_data => McapError::BadFooter,
                         Ok(Record::Footer(_)) => {
                             self.ended = Some(Ending::Whole);
                             break;
                         }
                         Ok(record) => {
+                            self.has_all_data |= matches!(record, Record::DataEnd(_));
                             self.note(&record)?;
                             return Ok(Some(record));
                         }
@@ -326,8 +334,11 @@ impl Reader {
                         || "its beginning".to_owned(),
                         |(topic, at_s)| format!("{topic} at {at_s:.3} s"),
                     ),
+                    advice: match error {
+                        McapError::BadDataCrc { .. } => "some of it may be missing".to_owned(),
+                        _ => self.advice(),
+                    },
                     reason: words(error),
-                    advice: self.advice(),
                 });
             }
         }

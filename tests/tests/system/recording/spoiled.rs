@@ -133,6 +133,30 @@ fn damage_is_named_with_file_channel_and_time() {
 }
 
 #[test]
+fn no_flipped_bit_of_a_chunks_head_loses_anything_unnoticed() {
+    const BLOCKS: u32 = 4_000;
+    let folder = folder("flipped");
+    let path = folder.join("flipped.mcap");
+    record_gauges(&path, BLOCKS);
+    let bytes = fs::read(&path).expect("the file can be read");
+    let summary = Summary::read(&bytes)
+        .expect("well-formed")
+        .expect("there is one");
+    let index = summary.chunk_indexes.last().expect("there are some");
+    let head = index.chunk_start_offset as usize;
+    // Kind and length, times, sizes, checksum, and how it is compressed.
+    let length = 9 + 16 + 8 + 4 + 4 + "zstd".len() + 8;
+    for bit in 0..8 * length {
+        let mut flipped = bytes.clone();
+        flipped[head + bit / 8] ^= 1 << (bit % 8);
+        fs::write(&path, &flipped).expect("the file can be written");
+        if let Ok((read, false)) = entries(&path) {
+            assert_eq!(read.len(), BLOCKS as usize, "bit {bit}");
+        }
+    }
+}
+
+#[test]
 fn a_scene_is_made_of_what_lies_before_damage() {
     let folder = folder("before-damage");
     let path = folder.join("damaged.mcap");
