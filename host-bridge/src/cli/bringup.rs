@@ -223,8 +223,15 @@ impl Session<'_> {
                         if self.desk.is_ended() {
                             return Ok(false);
                         }
-                        let figures =
-                            step.judge(&sight, |measure| self.ask_for(measure).ok().flatten());
+                        let mut has_left = false;
+                        let figures = step.judge(&sight, |measure| {
+                            let answer = self.ask_for(measure).ok().flatten();
+                            has_left |= answer.is_none();
+                            answer
+                        });
+                        if has_left {
+                            return Ok(false);
+                        }
                         if self.keep(step, figures, &sight)? {
                             break;
                         }

@@ -148,6 +148,7 @@ fn an_afternoon_at_one_bench() {
     bench.pass(STARTS_S);
     a_sound_bench_passes_every_step_that_needs_no_person(bench);
     what_a_person_reads_off_is_judged(bench);
+    who_leaves_at_a_question_has_found_no_fault(bench);
     a_pressed_emergency_stop_is_seen(bench);
     for (mistake, step, word) in MET_BY {
         the_step_that_meets_it_names_it(bench, mistake, step, word);
@@ -210,6 +211,15 @@ fn what_a_person_reads_off_is_judged(bench: &VirtualBoards) {
         assert_eq!(ended.status, Some(status), "{}", ended.output);
         assert!(ended.output.contains("with a meter"), "{}", ended.output);
     }
+}
+
+fn who_leaves_at_a_question_has_found_no_fault(bench: &VirtualBoards) {
+    let path = fresh_state("left");
+    let ended = command(bench, &path, &["--only", "zero-volt"], "\n");
+    assert_eq!(ended.status, Some(1), "{}", ended.output);
+    let text = fs::read_to_string(&path).expect("a state");
+    let document: Value = serde_json::from_str(&text).expect("the state is JSON");
+    assert_eq!(*records(&document), [Value::Null; 0], "{text}");
 }
 
 fn a_pressed_emergency_stop_is_seen(bench: &VirtualBoards) {
