@@ -404,10 +404,10 @@ mod tests {
         // The mean over 0.3 s falls from 0.85 of the scans at the ends, at most, to 0.1.
         let off_the_rails = 30.0 * libm::log(0.85 / 0.1);
         // ±1 900 evenly, of which a quarter of the power is left in the band, is 22 times the median power of the
-        // others; the threshold is at 3. The second quietest of eight looks is noisy after seven, quiet after two;
-        // then it is followed with a time constant of fifty, and swings by a third before.
+        // others; the threshold is at 3. The second quietest of eight looks is noisy after seven, and believed at once; quiet
+        // after two, and then followed with a time constant of fifty, with swings of a third before.
         let ratio = 22.0 / 3.0;
-        let noisy = 7.0 + 50.0 * libm::log(ratio / (ratio - 1.5));
+        let noisy = 7;
         let quiet_again = 2.0 + 50.0 * libm::log(1.5 * ratio);
         let faults: [(usize, GaugeHealth, Fault, u32, f64); 5] = [
             (1, GaugeHealth::Dead, |_, _| 3.0, still, 1.0),
@@ -424,7 +424,7 @@ mod tests {
                 4,
                 GaugeHealth::Noisy,
                 |_, noise| 1_900.0 * noise,
-                noisy as u32 + 1,
+                noisy + 1,
                 quiet_again,
             ),
         ];

@@ -13,7 +13,7 @@ use firmware_sensor::capabilities::CAPABILITIES;
 use firmware_sensor::{Drive, Sensor, Settings, line};
 use nucleo::answer::answer;
 use nucleo::console::ConsoleOutput;
-use nucleo::ports::{OUTBOX, Ports, report, speak};
+use nucleo::ports::{OUTBOX, Ports, reply, report, speak};
 use nucleo::serial::Receiver;
 use nucleo::side::Side;
 use nucleo::spawn::once;
@@ -221,8 +221,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
                     nucleo::kept_configuration::keep(&answer);
                     CONFIGURE.signal(*settings.configuration());
                 }
-                // Full only if the thread is held up: the host asks again.
-                let _ = OUTBOX.try_send(Message::Configuration(answer));
+                reply(Message::Configuration(answer));
             }
             Message::Question(question) => {
                 let answer = match question {
@@ -231,7 +230,7 @@ async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
                     }
                     Question::Capabilities => Message::Capabilities(CAPABILITIES),
                 };
-                let _ = OUTBOX.try_send(answer);
+                reply(answer);
             }
             _ => {}
         })

@@ -23,10 +23,10 @@ const BURST_BYTES: usize = 256;
 /// What tasks of any priority want said on both ports; full only if the thread is held up for 8 ms.
 pub static OUTBOX: Channel<CriticalSectionRawMutex, Message, 4> = Channel::new();
 
-/// Says what a host asked for, if that leaves a place in the [`OUTBOX`] for what a task with a deadline says: else
-/// the host asks again.
+/// Says what a host asked for, if that leaves two places in the [`OUTBOX`] for what tasks with a deadline say (an estimate,
+/// and a texture that still waits): else the host asks again.
 pub fn reply(message: Message) {
-    if OUTBOX.free_capacity() > 1 {
+    if OUTBOX.free_capacity() > 2 {
         let _ = OUTBOX.try_send(message);
     }
 }

@@ -263,13 +263,14 @@ fn a_configuration_outlives_a_crash_and_not_the_power() {
     }
 }
 
-/// What came of a display whose host says this, while a hand rubs at 50 mm/s, with `faults` in a scene's words.
-fn told_the_display(script: &[(u64, Message)], faults: &str) -> (Recording, Heard) {
-    let (display, heard) = Host::following(script);
-    let terminals = Terminals {
-        display: Some(display),
-        ..Terminals::default()
-    };
+/// What came of a board whose host says this, while a hand rubs at 50 mm/s, with `faults` in a scene's words.
+fn told(role: Role, script: &[(u64, Message)], faults: &str) -> (Recording, Heard) {
+    let (host, heard) = Host::following(script);
+    let mut terminals = Terminals::default();
+    match role {
+        Role::Sensor => terminals.sensor = Some(host),
+        _ => terminals.display = Some(host),
+    }
     let surface = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]";
     let motion = "[motion]\nkind = \"constant\"\nspeed_mm_s = 50.0";
     let scene = scene(&format!(
@@ -296,7 +297,7 @@ fn a_host_that_configures_without_a_pause_puts_off_no_look_into_the_converters()
         .map(|at_ms| (at_ms * MS, Message::Configure(Configure::anyway(DISPLAY))))
         .collect();
     let lost = "[[fault]]\nat_s = 1.2\nkind = \"dac-power-lost\"";
-    let (recording, heard) = told_the_display(&script, lost);
+    let (recording, heard) = told(Role::Display, &script, lost);
     assert!(reports(&heard.lock().unwrap()).len() > 300);
     let states = states(&recording);
     let (at_ns, last) = states[states.len() - 1];
@@ -312,7 +313,7 @@ fn a_host_that_asks_without_a_pause_holds_nothing_up() {
         .flat_map(|at_ms| [at_ms * MS; 9])
         .map(|at_ns| (at_ns, Message::Question(Question::Configuration)))
         .collect();
-    let (recording, heard) = told_the_display(&script, "");
+    let (recording, heard) = told(Role::Display, &script, "");
     assert!(reports(&heard.lock().unwrap()).len() > 100);
     let last = states(&recording).pop().map(|(_, state)| state);
     assert_eq!(last, Some(DisplayState::Driving));
@@ -321,4 +322,12 @@ fn a_host_that_asks_without_a_pause_holds_nothing_up() {
         panic!("no status of the display");
     };
     assert_eq!(counters.unheard, 0);
+
+    let (_, heard) = told(Role::Sensor, &script, "");
+    let heard = heard.lock().unwrap();
+    assert!(reports(&heard).len() > 100);
+    let estimates = heard.iter().filter(|(at_ns, message)| {
+        (1_010 * MS..1_510 * MS).contains(at_ns) && matches!(message, Message::Estimate(_))
+    });
+    assert_eq!(estimates.count(), 50);
 }

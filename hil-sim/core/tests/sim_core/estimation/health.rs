@@ -174,13 +174,12 @@ fn a_saturated_gauge_is_found_and_forgiven() {
 #[test]
 fn a_noisy_gauge_is_found_and_forgiven() {
     // Noise of three times the signal drives the converter into its ends, too: either name is right.
-    // Measured: 0.5 to 1.3 s until it is found.
+    // Measured: 0.24 s until it is found, 0.69 s until it is back, 0.97 valid meanwhile.
     let names = [GaugeHealth::Noisy, GaugeHealth::Saturated];
-    is_found_and_forgiven("noisy", &names, 1.5, 1.0);
+    is_found_and_forgiven("noisy", &names, 0.3, 0.8);
 }
 
 #[test]
-#[ignore = "nothing is valid until a noisy gauge is found, and its second costs more than a fifth of the time"]
 fn the_others_go_on_while_a_gauge_is_noisy() {
     goes_on("noisy", 0.8);
 }
