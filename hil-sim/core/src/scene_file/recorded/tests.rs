@@ -289,6 +289,24 @@ fn integers_of_any_width_are_shares_of_full_scale() {
 }
 
 #[test]
+fn what_else_a_wav_file_holds_is_passed_over_whatever_its_length() {
+    let folder = Folder::new("chunks");
+    let section = "[gauges]\nkind = \"recorded\"\nfile = \"x.wav\"\n";
+    let plain = wav(4_000, (0..8_800).map(|_| 0.5));
+    let data = plain.windows(4).position(|name| name == b"data").unwrap();
+    for length in [3_u8, 4] {
+        let mut bytes = plain.clone();
+        // A byte pads what is of odd length.
+        let mut chunk = [b"LIST", &[length, 0, 0, 0][..], b"abcd"].concat();
+        chunk[11] *= u8::from(length == 4);
+        bytes.splice(data..data, chunk);
+        let scene = folder.load(section, "x.wav", &bytes).unwrap();
+        let mut world = World::new(&scene).unwrap();
+        assert_eq!(world.codes(1.0, 0.0)[..5], [2668; 5], "{length}");
+    }
+}
+
+#[test]
 fn our_own_recordings_are_read_without_a_word_about_their_columns() {
     let folder = Folder::new("own");
     let rows = (0..2_100_u64).map(|sample| {

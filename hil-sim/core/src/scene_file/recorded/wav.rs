@@ -1,7 +1,7 @@
 //! Reads WAV: samples of any width, integers as a share of full scale.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 use hound::{SampleFormat, WavReader};
@@ -12,14 +12,17 @@ use crate::scene::SceneError;
 /// A WAV file, its head read.
 pub struct Wav {
     path: String,
-    reader: WavReader<BufReader<File>>,
+    reader: WavReader<Chunks>,
 }
+
+/// A head with nothing but the format, and the file from its samples on.
+type Chunks = Chain<Cursor<Vec<u8>>, BufReader<File>>;
 
 impl Wav {
     /// Opens a file.
     pub fn open(path: &Path) -> Result<Self, SceneError> {
         let path_text = path.display().to_string();
-        match WavReader::open(path) {
+        match chunks(path).and_then(WavReader::new) {
             Ok(reader) if reader.spec().sample_rate == 0 => Err(SceneError::of(
                 path_text,
                 "",
@@ -95,6 +98,31 @@ impl Wav {
                 .reader
                 .samples::<i32>()
                 .try_for_each(|sample| each(sample.map(|sample| f64::from(sample) / full))),
+        }
+    }
+}
+
+/// What else a file holds before its samples is passed over here: a chunk of odd length has a byte behind it that hound
+/// would take for the beginning of the next one.
+fn chunks(path: &Path) -> hound::Result<Chunks> {
+    let mut file = BufReader::new(File::open(path)?);
+    let mut head = vec![0; 12];
+    file.read_exact(&mut head)?;
+    loop {
+        let mut chunk = [0; 8];
+        file.read_exact(&mut chunk)?;
+        let [name @ .., a, b, c, d] = chunk;
+        if name == *b"data" {
+            head.extend(chunk);
+            return Ok(Cursor::new(head).chain(file));
+        }
+        let length = u64::from(u32::from_le_bytes([a, b, c, d]));
+        let mut content = file.by_ref().take(length + length % 2);
+        if name == *b"fmt " {
+            head.extend(chunk);
+            content.read_to_end(&mut head)?;
+        } else {
+            io::copy(&mut content, &mut io::sink())?;
         }
     }
 }
