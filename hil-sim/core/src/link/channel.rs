@@ -29,6 +29,8 @@ pub struct LinkChannel {
     /// Whether any fault makes it necessary to know what went by.
     listens: bool,
     frame: Vec<u8>,
+    /// The bits of each of its bytes that a fault turns.
+    turned: Vec<u8>,
     /// Whether it is held until it is whole.
     holds_frame: bool,
     /// Frames gone by, for replays.
@@ -74,6 +76,7 @@ impl LinkChannel {
             forger: Forger::new(),
             restarts_ns: restarts.into(),
             frame: Vec::new(),
+            turned: Vec::new(),
             holds_frame: false,
             history: VecDeque::new(),
             held: BTreeMap::new(),
@@ -161,24 +164,26 @@ impl LinkChannel {
                 || self.on(at_ns, changes_frames).next().is_some();
         }
         let is_cut = self.on(at_ns, cuts).next().is_some();
-        let mut carried = byte;
+        let mut turned = 0;
         let shares: Vec<f64> = self
             .on(at_ns, |kind| kind == Kind::LinkCorrupt)
             .map(|fault| fault.values[0])
             .collect();
         for share in shares {
             if self.draws.random_bool(share) {
-                carried ^= 1 << (self.draws.next_u32() % 8);
+                turned ^= 1 << (self.draws.next_u32() % 8);
             }
         }
         self.frame.push(byte);
+        self.turned.push(turned);
         if !is_cut && !self.holds_frame {
-            self.emit(at_ns, &[carried]);
+            self.emit(at_ns, &[byte ^ turned]);
         }
         if byte != 0 {
             return;
         }
         let frame = std::mem::take(&mut self.frame);
+        let turned = std::mem::take(&mut self.turned);
         self.history.push_back((at_ns, frame.clone()));
         let is_old = |frame: &mut (u64, _)| frame.0 + HISTORY_NS < at_ns;
         while self.history.pop_front_if(is_old).is_some() {}
@@ -187,6 +192,12 @@ impl LinkChannel {
         if is_cut || !self.holds_frame {
             return;
         }
+        let turn = |mut frame: Vec<u8>| {
+            for (byte, turned) in frame.iter_mut().zip(&turned) {
+                *byte ^= turned;
+            }
+            frame
+        };
         match (fault.map(|fault| (fault.kind, fault.values[0])), passed) {
             (Some((Kind::LinkReplay, back_ms)), _) => {
                 // What had been heard before the fault, again and again.
@@ -197,15 +208,15 @@ impl LinkChannel {
                     .history
                     .partition_point(|&(old_ns, _)| old_ns < then_ns);
                 if let Some((_, frame)) = self.history.get(old).cloned() {
-                    self.emit(at_ns, &frame);
+                    self.emit(at_ns, &turn(frame));
                 }
             }
             (Some((Kind::LinkLate, delay_ms)), Some(frame)) => {
                 let due_ns = at_ns + nanoseconds(delay_ms * 1e-3);
                 self.held_count += 1;
-                self.held.insert((due_ns, self.held_count), frame);
+                self.held.insert((due_ns, self.held_count), turn(frame));
             }
-            (_, Some(frame)) => self.emit(at_ns, &frame),
+            (_, Some(frame)) => self.emit(at_ns, &turn(frame)),
             (_, None) => {}
         }
     }

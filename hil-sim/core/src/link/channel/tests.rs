@@ -118,6 +118,19 @@ fn corruption_spoils_frames() {
 }
 
 #[test]
+fn corruption_spoils_frames_that_are_numbered_anew_as_well() {
+    for renumbers in [Kind::LinkFlood, Kind::SensorSilent, Kind::StopFromPeer] {
+        let corrupt = Fault {
+            at_s: FROM_S + 1.5 * FOR_S,
+            ..fault(Kind::LinkCorrupt)
+        };
+        let arrived = arrive_during(vec![fault(renumbers), corrupt]);
+        let counters = arrived.receiver.counters();
+        assert!(counters.corrupt > 3, "{renumbers:?}: {counters:?}");
+    }
+}
+
+#[test]
 fn a_flood_is_of_good_frames_at_line_rate_and_leaves_no_gap_in_their_numbers() {
     let arrived = arrive(fault(Kind::LinkFlood));
     let counters = arrived.receiver.counters();
