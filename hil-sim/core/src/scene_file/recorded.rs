@@ -177,7 +177,7 @@ pub(super) fn gauges(
     let own_time = (GAUGE_TOPIC, GAUGE_TIME);
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
-    covers_time(table, extent, rows.at.len(), duration_s)?;
+    covers_time(table, extent, &rows, duration_s)?;
     let rows = if filtered {
         let is_sample = |step: &Even| (step.step - 1e-3).abs() < 1e-6;
         if lines.is_some() || Even::of(&rows.at).filter(is_sample).is_none() {
@@ -223,7 +223,7 @@ pub(super) fn motion(
     let is_plain = source.is_plain();
     let own_time = (GAUGE_TOPIC, GAUGE_TIME);
     let (rows, extent) = source.read(table, columns, own_time, EVERYWHERE, conversion, check)?;
-    covers_time(table, extent, rows.at.len(), duration_s)?;
+    covers_time(table, extent, &rows, duration_s)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
     if is_plain || !is_denser(&rows, per_unit) {
         return Ok(Arc::new(rows));
@@ -357,10 +357,14 @@ const LAST_ROW_S: f64 = 0.05;
 fn covers_time(
     table: &Table<'_>,
     (first, last): (f64, f64),
-    rows: usize,
+    kept: &Series,
     duration_s: f64,
 ) -> Result<(), SceneError> {
-    let apart_s = (last - first) / rows.saturating_sub(1).max(1) as f64;
+    // Of a long recording only what is about the scene is kept.
+    let apart_s = match kept.at[..] {
+        [from, .., to] => (to - from) / (kept.at.len() - 1) as f64,
+        _ => 0.0,
+    };
     // The last scan is one scan before the end, and a board's clock tells whole µs.
     let goes_on_s = apart_s.min(LAST_ROW_S) + 1.01 / f64::from(SCAN_RATE_HZ);
     if first <= 0.0 && last >= duration_s - goes_on_s {

@@ -2,10 +2,24 @@
 
 use super::*;
 
+const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"f\"\n";
+
+#[test]
+fn the_end_of_a_long_recording_goes_on_for_no_longer_than_a_short_ones() {
+    let folder = Folder::new("long");
+    // At 1 kHz, 40 ms less than the scene's 2 s, behind so many s.
+    for (start_s, from) in [(0, "0"), (300, "-300")] {
+        let section = format!("{GAUGES}start_s = {start_s}\n");
+        let rows = (0..1_000 * start_s + 1_960).map(|_| 0.0);
+        let refusal = folder.refusal(&section, "f", &wav(1_000, rows));
+        let want = format!("x.toml:6: gauges.file: lasts from {from} to 1.959");
+        assert!(refusal.starts_with(&want), "{refusal}");
+    }
+}
+
 #[test]
 fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
     let folder = Folder::new("refused");
-    let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"f\"\n";
     let tone = || wav(8_000, (0..20_000).map(|_| 0.0));
     let stereo = {
         let spec = WavSpec {
@@ -179,7 +193,7 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
             "f:703: column 1 (t_s): \"1.404\" comes 4.000 ms after the row before",
         ),
     ] {
-        let refusal = folder.refusal(&format!("{gauges}{keys}\n"), "f", &bytes);
+        let refusal = folder.refusal(&format!("{GAUGES}{keys}\n"), "f", &bytes);
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
 }
