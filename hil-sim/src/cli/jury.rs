@@ -326,13 +326,14 @@ fn judge_scene(bench: &Bench, entry: &Entry, scene: &Scene) -> anyhow::Result<Ju
         (estimate.t_s, said_mm)
     });
     let felt = entry.truth.felt(&outcome.truth(), &outcome.recording);
+    let right = felt.right_share.zip(felt.waves_share);
     Ok(JudgedScene {
         name: entry.name.clone(),
         family: entry.family.clone(),
         method: scene.estimator.method.name(),
         said: entry.truth.judge(said),
         felt: felt.wrong_share.map(|wrong| Felt {
-            right: felt.right_share.unwrap_or(0.0),
+            right: right.map_or(0.0, |(right, waves)| right * waves),
             wrong,
         }),
     })

@@ -101,6 +101,19 @@ fn a_folder_is_judged_by_its_own_truths_family_by_family() {
 }
 
 #[test]
+fn what_is_felt_right_and_wrong_are_shares_of_the_same_time() {
+    let index = r#"[{ "name": "a", "truth": [[0, 2.0], [1.0, 0]] }]"#;
+    let folder = folder("felt", &[("index.json", index), ("a.toml", CLEAN)]);
+    let output = jury(&folder, &["--folder", ".", "--json", "out.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    let told = json(&folder.join("out.json"));
+    let felt = |key: &str| told["scenes"][0]["felt"][key].as_f64().unwrap();
+    // Driven from some 0.1 s on; from 1 s on, half of the time, there is nothing that could be right.
+    assert!((0.4..0.5).contains(&felt("right")), "{}", felt("right"));
+    assert!((felt("wrong") - 0.5).abs() < 0.01, "{}", felt("wrong"));
+}
+
+#[test]
 fn a_folder_that_cannot_be_judged_is_refused_with_what_where_and_what_to_do() {
     let judge = ["--folder", "."];
     refuses(

@@ -27,6 +27,8 @@ pub struct Felt {
     pub right_share: Option<f64>,
     /// Driven at a λ more than [`WRONG`] off, or at any where there is none; none without motion.
     pub wrong_share: Option<f64>,
+    /// The time over a λ, of which `right_share` is; none without motion.
+    pub waves_share: Option<f64>,
 }
 
 /// The λ in force and the one under the sensor, at a tick.
@@ -115,6 +117,7 @@ impl Judge {
         Felt {
             right_share: share(self.right_ns, self.over_waves_ns),
             wrong_share: share(self.wrong_ns, self.moving_ns),
+            waves_share: share(self.over_waves_ns, self.moving_ns),
         }
     }
 }
