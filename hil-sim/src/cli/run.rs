@@ -168,7 +168,11 @@ impl Books<'_> {
         let (hash, wall_s) = (judgement.ran.hash, judgement.ran.wall_s);
         let mut row = row(&scene.name, self.width, &judgement);
         let mut unmet = judgement.unmet.clone();
-        let text = fs::read_to_string(path).unwrap_or_default();
+        // What came out of a pipe is gone, and nothing more may come.
+        let text = match path.is_file() {
+            true => fs::read_to_string(path).unwrap_or_default(),
+            false => String::new(),
+        };
         // Each line with the file and the line of it that it is about.
         let place = |line: &String| (path.as_path(), line_of(&text, &keys_of(line)));
         let mut places: Vec<(&Path, Option<usize>)> = unmet.iter().map(place).collect();

@@ -5,6 +5,9 @@ use std::io::{BufRead, BufReader};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 
 use hil_sim_core::scene::Estimator;
 
@@ -386,6 +389,33 @@ fn a_device_without_an_end_is_no_scene_and_holds_no_hashes() {
         let want = format!("{file}: cannot be read: is no file, and does not end within 64 MB");
         assert!(errors(&output).starts_with(&want), "{}", errors(&output));
     }
+}
+
+#[test]
+fn a_scene_out_of_a_pipe_is_read_once() {
+    let folder = folder("pipe");
+    let pipe = folder.join("p.toml");
+    let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
+        .current_dir(&folder)
+        .args(["run", "p.toml"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    fs::write(&pipe, SOUND).unwrap();
+    // All scenes have been read by the first line.
+    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines();
+    assert!(lines.next().is_some_and(|line| line.is_ok()));
+    let is_read_again = Arc::new(AtomicBool::new(false));
+    let again = is_read_again.clone();
+    // Waits until somebody reads.
+    thread::spawn(move || {
+        let _pipe = File::options().write(true).open(&pipe).unwrap();
+        again.store(true, Ordering::SeqCst);
+    });
+    assert_eq!(run.wait().unwrap().code(), Some(0));
+    assert!(!is_read_again.load(Ordering::SeqCst));
 }
 
 #[test]
