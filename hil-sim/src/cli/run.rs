@@ -204,7 +204,10 @@ impl Books<'_> {
             let written = list.write(&SceneResult::of(&judgement, scene), json.file());
             written.with_context(|| json.path.display().to_string())?;
         }
-        self.outcomes.extend(outcome);
+        if let Some(mut outcome) = outcome {
+            outcome.unmet.clone_from(&unmet);
+            self.outcomes.push(outcome);
+        }
         let (row, unmet) = (&row, &unmet);
         let fate = Fate::Ran {
             wall_s,

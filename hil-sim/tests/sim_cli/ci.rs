@@ -284,6 +284,20 @@ fn golden_hashes_hold_until_a_run_changes_and_are_renewed_by_one_command() {
 }
 
 #[test]
+fn a_report_says_that_a_run_has_changed_since_its_golden_hash() {
+    let folder = folder("golden-report");
+    scenes(&folder, &["a", "b"]);
+    assert_eq!(hil_sim(&folder, &["golden", "renew", "."]).0, Some(0));
+    let text = fs::read_to_string(folder.join("b.toml")).unwrap();
+    fs::write(folder.join("b.toml"), text.replace("seed = 1", "seed = 2")).unwrap();
+    let arguments = ["run", ".", "--golden", "golden.toml", "--report", "o.html"];
+    assert_eq!(hil_sim(&folder, &arguments).0, Some(1));
+    let page = fs::read_to_string(folder.join("o.html")).unwrap();
+    assert_eq!(page.matches("<span class=unmet>unmet</span>").count(), 1);
+    assert_eq!(page.matches("Not as expected: golden: ").count(), 1);
+}
+
+#[test]
 fn the_first_scene_is_written_once_loads_and_passes() {
     let folder = folder("init");
     let (status, output, errors) = hil_sim(&folder, &["init", "mine.toml"]);
