@@ -187,7 +187,7 @@ impl LinkChannel {
         self.history.push_back((at_ns, frame.clone()));
         let is_old = |frame: &mut (u64, _)| frame.0 + HISTORY_NS < at_ns;
         while self.history.pop_front_if(is_old).is_some() {}
-        let fault = self.on(at_ns, changes_frames).next().copied();
+        let fault = self.on(at_ns, changes_frames).last().copied();
         let passed = self.forger.pass(&frame, fault.as_ref());
         if is_cut || !self.holds_frame {
             return;
@@ -229,6 +229,8 @@ impl LinkChannel {
         }
     }
 
+    /// The faults of some kinds that are on, in the order in which they began: of several that exclude each other the last
+    /// is done.
     fn on(&self, at_ns: u64, choose: fn(Kind) -> bool) -> impl Iterator<Item = &Fault> {
         self.faults
             .iter()
@@ -264,7 +266,7 @@ impl LinkChannel {
     }
 
     fn talk(&mut self, at_ns: u64) {
-        let talking = self.on(at_ns, talks).next().map(|fault| fault.kind);
+        let talking = self.on(at_ns, talks).last().map(|fault| fault.kind);
         // A Stop comes in between, unless the wire carries nothing.
         let bytes = if self.next_stop().is_some_and(|stop_ns| stop_ns <= at_ns) {
             self.stops += 1;

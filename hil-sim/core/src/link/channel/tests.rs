@@ -147,6 +147,25 @@ fn a_flood_is_of_good_frames_at_line_rate_and_leaves_no_gap_in_their_numbers() {
 }
 
 #[test]
+fn of_two_faults_that_exclude_each_other_the_one_that_began_last_is_done() {
+    let later = |kind| Fault {
+        at_s: FROM_S + 0.5 * FOR_S,
+        ..fault(kind)
+    };
+    let arrived = arrive_during(vec![fault(Kind::LinkGarbage), later(Kind::LinkFlood)]);
+    let flooded_ms = arrived.messages.iter().map(|(at_ns, _)| at_ns / 1_000_000);
+    let at_once = flooded_ms.filter(|ms| (150..200).contains(ms)).count();
+    assert!(at_once > 80, "{at_once}");
+    let arrived = arrive_during(vec![
+        fault(Kind::EstimateOutOfRange),
+        later(Kind::EstimateNan),
+    ]);
+    let estimates = estimates(&arrived);
+    let are_none = |e: &&protocol::Estimate| e.wavelength_mm.is_some_and(f32::is_nan);
+    assert_eq!(estimates.iter().filter(are_none).count(), 10);
+}
+
+#[test]
 fn replayed_frames_have_been_there_before() {
     let mut replay = fault(Kind::LinkReplay);
     replay.values[0] = 50.0;
