@@ -67,6 +67,8 @@ pub(super) struct Conduct {
     excused_ns: Range<u64>,
     /// When it has to drive again.
     again_ns: Range<u64>,
+    /// When it can't tell that the hand moves.
+    blind_ns: Vec<Range<u64>>,
     stopped: Stopped,
     /// What tells the display of the surface is broken itself.
     spoils_estimates: bool,
@@ -94,12 +96,14 @@ pub(super) struct Conduct {
 }
 
 impl Conduct {
-    /// Judges until `until_ns`; a display that has `stopped` for good before need not drive. Messages take up to `way_ns`.
+    /// Judges until `until_ns`; a display that has `stopped` for good before need not drive, nor one whose hand's encoder
+    /// stands still by another fault, `blind_ns`. Messages take up to `way_ns`.
     pub fn new(
         fault: &Fault,
         until_ns: u64,
         configuration: &DisplayConfiguration,
         stopped: Stopped,
+        blind_ns: Vec<Range<u64>>,
         way_ns: u64,
     ) -> Self {
         let row = fault.kind.row();
@@ -119,6 +123,7 @@ impl Conduct {
                 Some(ms) => over_ns..over_ns + nanoseconds(ms * 1e-3) + way_ns,
                 None => over_ns..over_ns,
             },
+            blind_ns,
             stopped,
             spoils_estimates: row.signs.contains(&Sign::NoValidEstimate),
             max_age_ms: configuration.max_age_ms,
@@ -218,7 +223,8 @@ impl Conduct {
         };
         let step_ns = tick.at_ns.saturating_sub(before_ns);
         let speed_mm_s = (tick.position_mm - before_mm).abs() / (step_ns as f64 * 1e-9);
-        if speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
+        let is_blind = self.blind_ns.iter().any(|of| of.contains(&tick.at_ns));
+        if !is_blind && speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
             self.moves_since_ns.get_or_insert(before_ns);
             if self.again_ns.contains(&tick.at_ns) {
                 self.seen.moved_ns += step_ns;

@@ -245,6 +245,8 @@ impl FaultMonitor {
         }
         // Of a flood, which estimates find room is chance.
         let keeps_step = row.class != Class::Stops
+        let blind_ns = others().filter(|other| other.kind == Kind::HandEncoderDead);
+        let blind_ns = blind_ns.map(|other| other.begins_ns()..other.ends_ns().unwrap_or(u64::MAX));
             && row.safe_within_ms.is_none()
             && fault.kind != Kind::LinkFlood
             && stopped != Stopped::Yes;
@@ -268,6 +270,7 @@ impl FaultMonitor {
             due_ns,
             alone_ns,
             of_others,
+                blind_ns.collect(),
             weather,
             is_unheard: is_unheard(&fault, scene),
             stopped,

@@ -291,3 +291,20 @@ fn that_a_display_need_not_drive_again_is_said() {
     );
     assert_eq!(unjudged(Kind::StopFromPeer, Kind::PowerCycle), None);
 }
+
+#[test]
+fn under_an_encoder_that_stands_still_by_another_fault_nothing_has_to_be_driven() {
+    let unmet = |dead_s: f64| {
+        let mut scene = several(
+            3.0,
+            &[(Kind::HandEncoderDead, 0.5), (Kind::LinkReplay, 0.6)],
+        );
+        scene.faults[0].for_s = Some(dead_s);
+        finding(&scene, 1, 3_000 * MS, &silent(3.0, 519..3_000)).unmet()
+    };
+    assert_eq!(unmet(2.0), [""; 0]);
+    assert_eq!(
+        unmet(0.5),
+        ["does not drive again within 300 ms of its end"]
+    );
+}
