@@ -219,7 +219,13 @@ impl FaultMonitor {
         };
         let lingers = |other: &&Fault| {
             let over_ns = other.ends_ns().unwrap_or(other.begins_ns());
-            over_ns + LINGERS_NS > from_ns && other.begins_ns() < alone_ns.end
+            // What was held up comes as much later.
+            let late_ms = match other.kind {
+                Kind::LinkLate => other.values[0],
+                _ => 0.0,
+            };
+            over_ns + nanoseconds(late_ms * 1e-3) + LINGERS_NS > from_ns
+                && other.begins_ns() < alone_ns.end
         };
         let lingering = || others().filter(|other| lingers(other));
         let resets_of_others = lingering().map(|other| other.kind.row().resets).sum();

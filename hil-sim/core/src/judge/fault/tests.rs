@@ -499,6 +499,27 @@ fn what_need_not_be_seen_must_do_no_harm() {
     assert_eq!(short(pauses, FaultEvidence::default()), [""; 0]);
 }
 
+/// What a display has counted.
+fn counted(at_ms: u64, corrupt: u32, late: u32) -> TimedMessage {
+    let status = Status {
+        uptime_us: at_ms * 1_000,
+        reset: ResetCause::Power,
+        watchdog_resets: 0,
+        peer: PortCounters {
+            corrupt,
+            late,
+            ..PortCounters::default()
+        },
+        console: PortCounters::default(),
+        role: RoleCounters::Display(DisplayCounters::default()),
+        stack_free_bytes: 0,
+    };
+    TimedMessage {
+        at_ns: at_ms * MS,
+        message: Message::Status(status),
+    }
+}
+
 /// A hand that moves all the time over what `spoil` makes of a sound recording, with a fault at 0.5 s.
 fn spoiled(
     fault: Kind,
@@ -518,25 +539,6 @@ fn spoiled(
 
 #[test]
 fn what_the_scenes_link_shows_by_itself_is_neither_a_sign_nor_a_false_alarm() {
-    let counted = |at_ms: u64, corrupt: u32, late: u32| {
-        let status = Status {
-            uptime_us: at_ms * 1_000,
-            reset: ResetCause::Power,
-            watchdog_resets: 0,
-            peer: PortCounters {
-                corrupt,
-                late,
-                ..PortCounters::default()
-            },
-            console: PortCounters::default(),
-            role: RoleCounters::Display(DisplayCounters::default()),
-            stack_free_bytes: 0,
-        };
-        TimedMessage {
-            at_ns: at_ms * MS,
-            message: Message::Status(status),
-        }
-    };
     let judged = |kind: Kind, corrupt: f64, reorder: f64| {
         let mut scene = Scene::constant(2.0, 50.0);
         (scene.link.corrupt, scene.link.reorder) = (corrupt, reorder);

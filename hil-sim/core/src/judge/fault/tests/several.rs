@@ -308,3 +308,19 @@ fn under_an_encoder_that_stands_still_by_another_fault_nothing_has_to_be_driven(
         ["does not drive again within 300 ms of its end"]
     );
 }
+
+#[test]
+fn frames_that_another_fault_has_held_up_are_no_false_alarm_when_they_come() {
+    let unmet = |late_from_s: f64| {
+        let faults = [(Kind::LinkLate, late_from_s), (Kind::Nothing, 2.4)];
+        let mut recording = silent(3.0, 0..0);
+        recording.signs.display = vec![counted(2_000, 0, 10), counted(2_900, 0, 40)];
+        finding(&several(3.0, &faults), 1, 3_000 * MS, &recording).unmet()
+    };
+    // It lasts 0.7 s, holds up for 0.6 s, and the counters come once a second.
+    assert_eq!(unmet(0.5), [""; 0]);
+    assert_eq!(
+        unmet(0.0),
+        ["not to be expected: display: late 40, at 500.00 ms"]
+    );
+}
