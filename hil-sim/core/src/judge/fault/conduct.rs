@@ -303,11 +303,15 @@ impl Conduct {
         self.stopped != Stopped::No
     }
 
+    /// Whether there was a reason to hold when the fault began.
+    pub fn was_held(&self) -> bool {
+        self.was_held == Some(true)
+    }
+
     /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or
     /// estimates come by which nothing is to be followed, only the time counts in which something is.
     pub fn shows_again(&self) -> bool {
-        let knows_nothing =
-            self.was_held == Some(true) || self.unfollowed && !self.spoils_estimates;
+        let knows_nothing = self.was_held() || self.unfollowed && !self.spoils_estimates;
         let counted_ns = if knows_nothing {
             self.seen.free_ns
         } else {

@@ -245,14 +245,14 @@ impl FaultMonitor {
         let weather = weather_signs(&scene.link);
         of_others.extend(&weather);
         let configuration = scene.display_configuration();
+        let blind_ns = others().filter(|other| other.kind == Kind::HandEncoderDead);
+        let blind_ns = blind_ns.map(|other| other.begins_ns()..other.ends_ns().unwrap_or(u64::MAX));
         let tires = f64::from(configuration.full_drive_s) < scene.duration_s;
         if tires {
             of_others.push(Sign::Fading(Hold::FullDrive));
         }
         // Of a flood, which estimates find room is chance.
         let keeps_step = row.class != Class::Stops
-        let blind_ns = others().filter(|other| other.kind == Kind::HandEncoderDead);
-        let blind_ns = blind_ns.map(|other| other.begins_ns()..other.ends_ns().unwrap_or(u64::MAX));
             && row.safe_within_ms.is_none()
             && fault.kind != Kind::LinkFlood
             && stopped != Stopped::Yes;
@@ -270,13 +270,13 @@ impl FaultMonitor {
                 alone_ns.end,
                 &configuration,
                 if tires { Stopped::Yes } else { stopped },
+                blind_ns.collect(),
                 nanoseconds((scene.link.delay_ms + scene.link.jitter_ms) * 1e-3),
             ),
             step: keeps_step.then(|| Step::new(&truth, alone_ns.clone())),
             due_ns,
             alone_ns,
             of_others,
-                blind_ns.collect(),
             weather,
             is_unheard: is_unheard(&fault, scene),
             stopped,
@@ -310,6 +310,16 @@ impl FaultMonitor {
         let within_ms = kind.row().seen_within_ms.unwrap_or(0.0);
         if self.left_ns() < nanoseconds(within_ms * 1e-3) {
             return Some(self.ends());
+        }
+        if kind.row().class != Class::Stops {
+            if self.alone_ns.end - self.alone_ns.start < nanoseconds(within_ms * 1e-3) {
+                return Some("the next fault begins before");
+            }
+            // Of what is on its way to 0 V already, no other reason is told.
+            let fades = |sign: &Sign| matches!(sign, Sign::Fading(_));
+            if self.conduct.was_held() && kind.row().signs.iter().all(fades) {
+                return Some("the display is held already");
+            }
         }
         if self.is_slow {
             return Some("the hand moves too slowly");

@@ -324,3 +324,39 @@ fn frames_that_another_fault_has_held_up_are_no_false_alarm_when_they_come() {
         ["not to be expected: display: late 40, at 500.00 ms"]
     );
 }
+
+#[test]
+fn a_sign_that_the_next_fault_leaves_no_time_for_is_not_judged_and_said() {
+    let judged = |faults: &[(Kind, f64)]| {
+        let mut recording = silent(5.0, 519..5_000);
+        recording.signs.display = vec![said(1_002, DisplayState::Stopped(Trip::Host))];
+        finding(&several(5.0, faults), 0, 5_000 * MS, &recording)
+    };
+    let alone = judged(&[(Kind::HandEncoderDead, 0.5)]).unmet();
+    assert!(alone.contains(&"no sign of it".to_owned()), "{alone:?}");
+    let hidden = judged(&[(Kind::HandEncoderDead, 0.5), (Kind::StopFromPeer, 1.0)]);
+    assert_eq!(hidden.unmet(), [""; 0]);
+    let why = "whether it shows within 3500 ms: the next fault begins before";
+    assert!(
+        hidden.unjudged.contains(&why.to_owned()),
+        "{:?}",
+        hidden.unjudged
+    );
+}
+
+#[test]
+fn a_display_that_is_held_already_need_not_give_another_reason() {
+    let unmet = |untrue_ms: std::ops::Range<u64>| {
+        let mut recording = silent(2.0, 500..2_000);
+        for arrival in &mut recording.arrived {
+            if (untrue_ms.start * MS..untrue_ms.end * MS).contains(&arrival.at_ns) {
+                arrival.estimate.wavelength_mm = Some(f32::NAN);
+            }
+        }
+        recording.signs.display = vec![said(492, DisplayState::Fading(Hold::Distrust))];
+        let scene = several(2.0, &[(Kind::EstimateNan, 0.44), (Kind::LinkFlood, 0.5)]);
+        finding(&scene, 1, 2_000 * MS, &recording).unmet()
+    };
+    assert!(!unmet(450..500).contains(&"no sign of it".to_owned()));
+    assert!(unmet(0..0).contains(&"no sign of it".to_owned()));
+}
