@@ -34,7 +34,9 @@ impl HandFault {
             .filter(|fault| fault.kind == Kind::HandEncoderJump && fault.begins_ns() <= at_ns);
         for jump in jumps.skip(self.jumped) {
             self.jumped += 1;
-            self.offset = self.offset.wrapping_add(jump.values[0] as u16);
+            let counts = jump.values[0] as u16;
+            self.offset = self.offset.wrapping_add(counts);
+            self.last = self.last.wrapping_add(counts);
         }
         let is_dead = |fault: &Fault| fault.kind == Kind::HandEncoderDead && fault.is_on(at_ns);
         if self.faults.iter().any(is_dead) {
@@ -58,6 +60,17 @@ mod tests {
         }]);
         let read: Vec<u16> = (0..8).map(|ns| hand.counts(ns, 100 + ns as u16)).collect();
         assert_eq!(read, [100, 101, 102, 102, 102, 103, 104, 105]);
+    }
+
+    #[test]
+    fn an_encoder_that_stands_still_jumps_as_well() {
+        let jump = Fault {
+            values: [500.0, 0.0],
+            ..Fault::new(Kind::HandEncoderJump, 4e-9)
+        };
+        let mut hand = HandFault::new(&[Fault::new(Kind::HandEncoderDead, 2e-9), jump]);
+        let read: Vec<u16> = (0..6).map(|ns| hand.counts(ns, ns as u16)).collect();
+        assert_eq!(read, [0, 1, 1, 1, 501, 501]);
     }
 
     #[test]
