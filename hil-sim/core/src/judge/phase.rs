@@ -26,8 +26,6 @@ const SOFT_MS: u32 = 4;
 /// first: the board hears what has come once a tick's words are on their way.
 #[derive(Clone, Debug)]
 pub struct DuePhase {
-    /// Of the reference actuator, in mm.
-    place_mm: f64,
     followed: Followed,
     ticks: VecDeque<Due>,
     before_mm: Option<f64>,
@@ -63,8 +61,7 @@ impl DuePhase {
     /// Before the first tick.
     pub fn new(truth: &Truth) -> Self {
         Self {
-            place_mm: truth.reference_place_mm(),
-            followed: Followed::new(truth.display),
+            followed: Followed::new(truth.display, truth.reference_place_mm()),
             ticks: VecDeque::with_capacity(TICKS_KEPT + 1),
             before_mm: None,
             cycles: 0.0,
@@ -150,7 +147,7 @@ impl RunObserver for DuePhase {
 impl DuePhase {
     /// The display was reset: it knows no λ until the next one comes.
     fn restart(&mut self) {
-        self.followed = Followed::new(self.followed.configuration);
+        self.followed = Followed::new(self.followed.configuration, self.followed.place_mm);
         self.arrived.clear();
     }
 
@@ -182,7 +179,7 @@ impl DuePhase {
         }
         let per_mm = self.followed.tick();
         self.cycles += travel_mm * per_mm;
-        let due_cycles = self.cycles + self.place_mm * per_mm;
+        let due_cycles = self.cycles + self.followed.ahead_cycles;
         let before_cycles = self.last().map_or(due_cycles, |due| due.cycles);
         self.travelled += (due_cycles - before_cycles).abs();
         if per_mm > 0.0 {
@@ -215,19 +212,27 @@ impl DuePhase {
 struct Followed {
     configuration: DisplayConfiguration,
     trust: Trust,
+    /// Of the reference actuator, in mm.
+    place_mm: f64,
     /// In cycles per mm.
     per_mm: f64,
     target_per_mm: f64,
+    /// What the actuator is ahead by for its place: it glides as well, the shorter way.
+    ahead_cycles: f64,
+    target_cycles: f64,
     ticks_left: u32,
 }
 
 impl Followed {
-    fn new(configuration: DisplayConfiguration) -> Self {
+    fn new(configuration: DisplayConfiguration, place_mm: f64) -> Self {
         Self {
             configuration,
             trust: Trust::new(configuration.max_age_ms),
+            place_mm,
             per_mm: 0.0,
             target_per_mm: 0.0,
+            ahead_cycles: 0.0,
+            target_cycles: 0.0,
             ticks_left: 0,
         }
     }
@@ -243,6 +248,8 @@ impl Followed {
             let target_per_mm = 1.0 / wavelength_mm;
             if target_per_mm != self.target_per_mm {
                 self.target_per_mm = target_per_mm;
+                let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
+                self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
                 let glide_ms = if silent { 0 } else { u32::from(glide_ms) };
                 self.ticks_left = glide_ms * (update_rate.hz() / 1_000);
             }
@@ -252,6 +259,7 @@ impl Followed {
     /// Glides no further.
     fn arrive(&mut self) {
         self.per_mm = self.target_per_mm;
+        self.ahead_cycles = self.target_cycles;
         self.ticks_left = 0;
     }
 
@@ -259,6 +267,7 @@ impl Followed {
     fn tick(&mut self) -> f64 {
         let left = f64::from(self.ticks_left.max(1));
         self.per_mm += (self.target_per_mm - self.per_mm) / left;
+        self.ahead_cycles += (self.target_cycles - self.ahead_cycles) / left;
         self.ticks_left = self.ticks_left.saturating_sub(1);
         self.per_mm
     }
@@ -266,6 +275,8 @@ impl Followed {
 
 #[cfg(test)]
 mod tests {
+    use protocol::Mode;
+
     use super::*;
     use crate::judge::synthetic::Run;
     use crate::run::observer::replay_to;
@@ -292,9 +303,12 @@ mod tests {
 
     /// The phase due at `t_s` over a surface of 2 mm, and the shortest λ̂ in force until the end.
     fn due_at(t_s: f64, recording: &Recording) -> (Due, f64) {
-        let surface = |_| 2.0;
+        due_of(&Truth::new("", "", &|_| 2.0), t_s, recording)
+    }
+
+    fn due_of(truth: &Truth, t_s: f64, recording: &Recording) -> (Due, f64) {
         let mut asking = Asking {
-            due: DuePhase::new(&Truth::new("", "", &surface)),
+            due: DuePhase::new(truth),
             t_s,
             answer: None,
         };
@@ -318,6 +332,26 @@ mod tests {
         let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
         assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
         assert!((shortest_mm - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_actuators_own_phase_glides_the_shorter_way() {
+        // 2 mm, then 1 mm from 1 s on.
+        let run = Run {
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 1.0 }, true)),
+            ..Run::steady(50.0, 2.0)
+        };
+        let recording = run.record();
+        let travelled = |mode| {
+            let mut truth = Truth::new("", "", &|_| 2.0);
+            truth.display.mode = mode;
+            // At −6.75 mm, behind by 3.375 cycles and then by 6.75: it gets behind by 0.375 more.
+            truth.reference_actuator = 20;
+            let at = |t_s| due_of(&truth, t_s, &recording).0.travelled_cycles;
+            at(1.9) - at(0.9)
+        };
+        let behind = travelled(Mode::Uniform) - travelled(Mode::Travelling);
+        assert!((behind - 0.375).abs() < 1e-6, "{behind}");
     }
 
     #[test]
