@@ -4,7 +4,6 @@
 use protocol::{CHANNELS, Contact, Estimate, GAUGES, GaugeHealth, Range};
 
 use crate::plant::motion::MM_PER_COUNT;
-use crate::run::fault_evidence::FaultEvidence;
 use crate::run::recording::{
     ACTUATORS, Arrival, Engine, EstimateRecord, OutputRecord, Recording, ScanRecord, TickRecord,
 };
@@ -102,9 +101,6 @@ impl Run {
             })
             .collect();
         Recording {
-            engine: Engine::Native,
-            duration_s: self.duration_s,
-            warm_up_s: 0.0,
             wall_s: 0.001,
             hash: 0x0123_4567_89ab_cdef,
             scans: instants(SCAN_S, self.duration_s)
@@ -114,10 +110,7 @@ impl Run {
             ticks,
             arrived: Arrival::of(&estimates),
             estimates,
-            sensor_status: None,
-            display_status: None,
-            log: Vec::new(),
-            signs: FaultEvidence::default(),
+            ..Recording::empty(Engine::Native, self.duration_s)
         }
     }
 

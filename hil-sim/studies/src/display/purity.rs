@@ -372,7 +372,6 @@ impl Study for Vec<Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hil_sim_core::run::fault_evidence::FaultEvidence;
     use hil_sim_core::run::recording::{Engine, OutputRecord, TickRecord};
 
     const RATE: UpdateRate = UpdateRate::Hz2000;
@@ -418,20 +417,9 @@ mod tests {
             })
             .collect();
         Recording {
-            engine: Engine::Native,
-            duration_s: 5.0,
-            warm_up_s: 0.0,
-            wall_s: 1.0,
-            hash: 0,
-            signs: FaultEvidence::default(),
-            scans: Vec::new(),
             ticks,
-            estimates: Vec::new(),
-            arrived: Vec::new(),
             outputs,
-            sensor_status: None,
-            display_status: None,
-            log: Vec::new(),
+            ..Recording::empty(Engine::Native, 5.0)
         }
     }
 

@@ -247,7 +247,6 @@ impl Study for Vec<Stop> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hil_sim_core::run::fault_evidence::FaultEvidence;
     use hil_sim_core::run::recording::{Engine, TickRecord};
 
     /// A hand that stops at 1 s and goes on at 1.4 s; channel 24 stands at 0x9000 and channel 3 at
@@ -285,20 +284,9 @@ mod tests {
             })
             .collect();
         Recording {
-            engine: Engine::Native,
-            duration_s: 2.0,
-            warm_up_s: 0.0,
-            wall_s: 1.0,
-            hash: 0,
-            signs: FaultEvidence::default(),
-            scans: Vec::new(),
             ticks,
-            estimates: Vec::new(),
-            arrived: Vec::new(),
             outputs,
-            sensor_status: None,
-            display_status: None,
-            log: Vec::new(),
+            ..Recording::empty(Engine::Native, 2.0)
         }
     }
 
