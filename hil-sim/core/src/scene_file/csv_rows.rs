@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::line::line_at;
 use crate::scene::SceneError;
 
 /// A CSV file in memory, its first line read.
@@ -145,8 +146,7 @@ impl<'f> CsvRows<'f> {
     }
 
     fn line_at(&self, position: Option<&csv::Position>) -> Option<usize> {
-        let before = &self.bytes[..self.start(position)?];
-        Some(1 + before.iter().filter(|&&byte| byte == b'\n').count())
+        Some(line_at(self.bytes, self.start(position)?))
     }
 
     fn broken(&self, error: &csv::Error) -> SceneError {

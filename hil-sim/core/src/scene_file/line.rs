@@ -25,8 +25,13 @@ pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
             _ => break,
         }
     }
-    let before = text.as_bytes().get(..at)?;
-    Some(1 + before.iter().filter(|&&byte| byte == b'\n').count())
+    Some(line_at(text.as_bytes(), at))
+}
+
+/// The line, from 1 on, of a place in a text; of one behind its end the last.
+pub fn line_at(text: &[u8], at: usize) -> usize {
+    let before = &text[..at.min(text.len())];
+    1 + before.iter().filter(|&&byte| byte == b'\n').count()
 }
 
 #[cfg(test)]

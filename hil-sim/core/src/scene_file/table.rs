@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::bounds::Bounds;
+use super::line::line_at;
 use crate::scene::SceneError;
 
 /// The scene's text and where it came from.
@@ -61,10 +62,9 @@ impl<'t> Source<'t> {
     }
 
     pub fn error(&self, offset: usize, key: &str, message: String) -> SceneError {
-        let before = &self.text.as_bytes()[..offset.min(self.text.len())];
         SceneError {
             file: self.path.display().to_string(),
-            line: Some(1 + before.iter().filter(|&&byte| byte == b'\n').count()),
+            line: Some(line_at(self.text.as_bytes(), offset)),
             key: key.to_owned(),
             message,
         }

@@ -12,7 +12,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use hil_sim_core::run::recording::Engine;
-use hil_sim_core::scene_file::line::line_of;
+use hil_sim_core::scene_file::line::{line_at, line_of};
 use hil_sim_core::scene_file::read_text;
 
 use super::replace;
@@ -82,9 +82,8 @@ impl Golden {
         })?;
         let foreign = |line, what| GoldenError::Foreign(path.to_owned(), line, what);
         let hashes: Hashes = toml::from_str(&text).map_err(|error| {
-            let before = &text.as_bytes()[..error.span().map_or(0, |at| at.start.min(text.len()))];
-            let lines = before.iter().filter(|&&byte| byte == b'\n');
-            foreign(1 + lines.count(), error.message().to_owned())
+            let at = error.span().map_or(0, |span| span.start);
+            foreign(line_at(text.as_bytes(), at), error.message().to_owned())
         })?;
         for (scene, engines) in &hashes {
             for (engine, hash) in engines {
