@@ -14,13 +14,10 @@ use protocol::SensorConfiguration;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::jury::counts::{RIGHT, WRONG};
 use crate::psychophysics::interval::{Interval, middle};
 use crate::study::{Progress, Record, Study, Table, csv, fixed, number, short};
 
-/// Relative error within which an estimate is right.
-const RIGHT: f64 = 0.05;
-/// Relative error above which it is wrong, if it is stood by.
-const WRONG: f64 = 0.1;
 /// Goal of the expected calibration error.
 const GOAL: f64 = 0.05;
 /// Bins of the diagram, equally wide.

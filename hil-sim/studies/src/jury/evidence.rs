@@ -9,12 +9,11 @@ use firmware_sensor::spectrum::{HIGHEST_HZ, LONGEST_MM, LOWEST_HZ, SHORTEST_MM, 
 use protocol::{Contact, SensorConfiguration};
 
 use super::counts::RIGHT;
+use super::play::MOVING_MM_S;
 use super::stranger::Record;
 
 /// One estimate in so many is looked at: neighbours say the same.
 const STRIDE: usize = 4;
-/// Slower than this the arm rests, in mm/s.
-const MOVING_MM_S: f32 = 5.0;
 /// Steps of the regression: it has converged after eight or so.
 const STEPS: usize = 20;
 /// What keeps weights finite where clues tell everything apart, relative to the trials' number.

@@ -8,7 +8,7 @@ use super::counts::{Counts, Worth};
 use super::stranger::Record;
 
 /// Slower than this the arm rests, in mm/s.
-const MOVING_MM_S: f32 = 5.0;
+pub(super) const MOVING_MM_S: f32 = 5.0;
 /// v/λ that the sensor promises to follow, in Hz.
 const LOWEST_HZ: f32 = 2.5;
 const HIGHEST_HZ: f32 = 150.0;

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use protocol::{DisplayConfiguration, Hold, Role};
 
+use super::outputs::SILENCE_NS;
 use crate::judge::trust::Trust;
 use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
 use crate::scene::fault::{Class, Fault, Sign, nanoseconds};
@@ -16,8 +17,6 @@ const HEARD_NS: u64 = 3_000_000;
 pub(super) const SAID_NS: u64 = 5_000_000;
 /// In which every reason to hold but age brings the outputs to 0 V.
 const QUICKLY_NS: u64 = 8_000_000;
-/// All outputs at 0 V for so long are no wave's passing.
-const SILENCE_NS: u64 = 5_000_000;
 /// From which speed on a hand moves, in mm/s, and for how long it has to until the display must drive: it takes a
 /// hand without a count for 19 ms for one at rest.
 const MOVES_MM_S: f64 = 10.0;

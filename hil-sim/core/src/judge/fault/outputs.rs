@@ -16,7 +16,7 @@ const CREST_WORDS: u16 = 2;
 /// cycle of 25 Hz passes 0 V once.
 const DRIVEN_NS: u64 = 20_000_000;
 /// All outputs at 0 V for so long, in ns, is no wave's passing: ten ticks.
-const SILENCE_NS: u64 = 5_000_000;
+pub(super) const SILENCE_NS: u64 = 5_000_000;
 /// Steepest that an output may rise or fall, in V/ms.
 const SLEW_V_PER_MS: f64 = 10.0;
 
