@@ -128,7 +128,7 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 /// The mean of the values; none if there are none.
-fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0usize);
     for value in values {
         sum += value;

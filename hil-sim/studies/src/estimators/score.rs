@@ -1,6 +1,6 @@
 //! What a contestant makes of a family of scenes.
 
-use hil_sim_core::judge::Summary;
+use hil_sim_core::judge::{Summary, mean};
 use hil_sim_core::scene::Scene;
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,11 +35,6 @@ impl Score {
             longest_settling_ms: settling.and_then(|times| times.into_iter().reduce(f64::max)),
         }
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0u32), |(sum, count), value| (sum + value, count + 1));
-    (count > 0).then(|| sum / f64::from(count))
 }
 
 #[cfg(test)]
