@@ -25,6 +25,8 @@ pub mod truth;
 mod voltage;
 mod words;
 
+use protocol::Role;
+
 use crate::judge::truth::Truth;
 use crate::run::observer::{RunEvent, RunObserver, replay_to};
 use crate::run::recording::Recording;
@@ -111,6 +113,7 @@ impl RunObserver for Judge<'_> {
                 self.needed.tick(tick);
             }
             RunEvent::Output(output) => self.felt.output(output),
+            RunEvent::Reset(reset) if reset.role == Role::Display => self.felt.restart(),
             RunEvent::Said(role, said) => self.needed.said(role, said),
             _ => {}
         }

@@ -188,7 +188,7 @@ impl RunObserver for Judge {
         match event {
             RunEvent::Tick(tick) => self.tick(tick),
             RunEvent::Output(output) => self.output(output),
-            RunEvent::Received(_) => self.stimulus.see(event),
+            RunEvent::Received(_) | RunEvent::Reset(_) => self.stimulus.see(event),
             _ => {}
         }
     }
@@ -221,10 +221,11 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
-    use protocol::Mode;
+    use protocol::{Mode, Role};
 
     use super::*;
     use crate::judge::synthetic::{Run, TICK_S};
+    use crate::run::fault_evidence::Reset;
     use crate::run::recording::Recording;
 
     fn judged(run: &Run) -> Actuators {
@@ -297,6 +298,45 @@ mod tests {
         // Counts are floored, so the display is behind by half a count, 0.00125 cycles, more.
         assert!((actuators.phase_error_mean_cycles.unwrap() + 0.05).abs() < 0.0025);
         assert!((actuators.phase_error_rms_cycles.unwrap() - 0.05).abs() < 0.0025);
+    }
+
+    #[test]
+    fn a_display_that_starts_again_counts_from_there() {
+        // 2 s, off for a quarter, and the same again: the hand is 55.66 cycles on, the display begins at 0.
+        let run = Run::steady(47.0, 1.9);
+        let mut recording = run.record();
+        let off_ns = 2_000_000_000;
+        recording.signs.resets.push(Reset {
+            role: Role::Display,
+            at_ns: off_ns,
+            is_injected: true,
+        });
+        recording.outputs.push(OutputRecord {
+            at_ns: off_ns,
+            words: [0x8000; ACTUATORS],
+            skew_ns: 0,
+        });
+        let (later_ns, farther_mm) = (2_250_000_000, 47.0 * 2.25);
+        let Recording {
+            mut ticks,
+            mut outputs,
+            mut arrived,
+            ..
+        } = run.record();
+        for tick in &mut ticks {
+            tick.at_ns += later_ns;
+            tick.position_mm += farther_mm;
+        }
+        outputs.iter_mut().for_each(|one| one.at_ns += later_ns);
+        arrived.iter_mut().for_each(|one| one.at_ns += later_ns);
+        recording.ticks.append(&mut ticks);
+        recording.outputs.append(&mut outputs);
+        recording.arrived.append(&mut arrived);
+        let actuators = judge(&Truth::new("", "", &*run.surface_mm), &recording);
+        assert!(
+            actuators.phase_error_rms_cycles.unwrap() < 0.005,
+            "{actuators:?}"
+        );
     }
 
     #[test]

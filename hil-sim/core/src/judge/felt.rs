@@ -76,6 +76,11 @@ impl Judge {
         self.at_zero = output.words.iter().all(|&word| word == ZERO_VOLT);
     }
 
+    /// The display was reset: with its outputs at 0 V it drives nothing, however far off its next tick is.
+    pub fn restart(&mut self) {
+        self.zero_ticks = CROSSING_TICKS;
+    }
+
     /// A tick, and the waves at its end: judges the time since the last one.
     pub fn tick(&mut self, tick: &TickRecord, waves: Waves) {
         self.zero_ticks = if self.at_zero {
@@ -124,10 +129,13 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
+    use protocol::Role;
+
     use crate::judge::synthetic::{Run, TICK_S};
     use crate::judge::truth::Truth;
     use crate::judge::{Summary, judge};
-    use crate::run::recording::{ACTUATORS, OutputRecord, Recording};
+    use crate::run::fault_evidence::Reset;
+    use crate::run::recording::{ACTUATORS, OutputRecord, Recording, ZERO_VOLT};
 
     /// What is felt of a run, as the summary has it.
     fn felt_of(run: &Run, recording: &Recording) -> (Option<f64>, Option<f64>) {
@@ -163,6 +171,43 @@ mod tests {
             assert_seconds(right, 2.0 - FIRST_S);
             assert_eq!(wrong, Some(0.0));
         }
+    }
+
+    #[test]
+    fn while_a_display_has_no_power_nothing_is_felt() {
+        let run = Run::steady(50.0, 2.0);
+        let mut recording = run.record();
+        let off_ns = 1_000_000_000..1_300_000_000;
+        recording.ticks.retain(|one| !off_ns.contains(&one.at_ns));
+        // It drives again once it has heard a λ, at 1.321 s.
+        let unheard_ns = off_ns.start..1_320_000_000;
+        let silent_ns = off_ns.start..1_322_500_000;
+        recording
+            .arrived
+            .retain(|one| !unheard_ns.contains(&one.at_ns));
+        recording
+            .outputs
+            .retain(|one| !silent_ns.contains(&one.at_ns));
+        let after = recording
+            .outputs
+            .partition_point(|one| one.at_ns < off_ns.start);
+        recording.outputs.insert(
+            after,
+            OutputRecord {
+                at_ns: off_ns.start,
+                words: [ZERO_VOLT; ACTUATORS],
+                skew_ns: 0,
+            },
+        );
+        recording.signs.resets.push(Reset {
+            role: Role::Display,
+            at_ns: off_ns.start,
+            is_injected: true,
+        });
+        let (right, wrong) = felt_of(&run, &recording);
+        // From its last tick on, half a ms before.
+        assert_seconds(right, 2.0 - FIRST_S - 0.323);
+        assert_seconds(wrong, 0.0);
     }
 
     #[test]

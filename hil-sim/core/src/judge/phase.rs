@@ -145,10 +145,18 @@ impl RunObserver for DuePhase {
 }
 
 impl DuePhase {
-    /// The display was reset: it knows no λ until the next one comes.
+    /// The display was reset: it counts anew, and knows no λ until the next one comes.
     fn restart(&mut self) {
         self.followed = Followed::new(self.followed.configuration, self.followed.place_mm);
         self.arrived.clear();
+        self.cycles = 0.0;
+        if let Some(last) = self.last() {
+            self.ticks.clear();
+            self.ticks.push_back(Due {
+                cycles: 0.0,
+                ..last
+            });
+        }
     }
 
     fn received(&mut self, arrival: &Arrival) {
