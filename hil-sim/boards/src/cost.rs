@@ -36,7 +36,7 @@ pub(super) struct Bare;
 impl Pins for Bare {
     type Records = ();
 
-    fn take_records(&mut self, _part: &mut Stm32f427) {}
+    fn take_records(&mut self) {}
 
     fn on_trigger(&mut self, _part: &mut Stm32f427, _at_ns: u64) -> u16 {
         0

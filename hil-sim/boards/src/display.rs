@@ -1,18 +1,19 @@
 //! What is on the display board's pins: the hand's encoder, the emergency-stop button, and four DAC81416
 //! on SPI1 with common LDAC, CLR and ALMOUT. Some of it can be broken on purpose.
 
-use rigless::chip::Timeline;
-use rigless::chip::spi::Peer;
-use rigless::device::Level;
+mod spi;
+
+use rigless::device::{ErasedDevice, Level};
 use rigless::mcu::Operate;
-use rigless::snapshot::Store;
-use rigless::soc::Width;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::TIM3;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
-use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::stm32f427::peripherals::tim;
+use rigless::soc::{Bus, Width};
 use rigless::time::VirtualNanos;
+
+pub use spi::CHIPS;
+use spi::Spi;
 
 use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
 use crate::dac81416::{Dac81416, Defects};
@@ -23,15 +24,8 @@ use hil_sim_core::plant::world::World;
 use hil_sim_core::run::recording::{OutputRecord, TickRecord};
 use hil_sim_core::scene::fault::{Fault, Kind};
 
-/// Chips on the bus, and the actuators on each but the last.
-pub const CHIPS: usize = 4;
+/// Actuators on each chip but the last.
 const ACTUATORS_PER_CHIP: usize = 13;
-/// Channels of a DAC81416, used or not.
-const CHANNELS_PER_CHIP: usize = 16;
-/// Chip selects: D10 D9 D8 D7.
-const SELECTS: [(&str, u8); CHIPS] = [("GPIOD", 14), ("GPIOD", 15), ("GPIOF", 12), ("GPIOF", 13)];
-/// The place of SPI1 among the part's.
-const SPI: usize = 0;
 /// LDAC is D16 (PC6), channel 1 of TIM3; ALMOUT is D3 (PE13); the emergency stop is D4 (PF14).
 const LOAD: Line = Line(2, 6);
 const ALARM: Line = Line(4, 13);
@@ -40,9 +34,6 @@ const BUTTON: Line = Line(5, 14);
 const TIM3_INDEX: usize = 1;
 const TIM3_SIZE: u64 = 0x400;
 const CCR1: u64 = 0x34;
-const EIGHT_BITS: u8 = 8;
-/// What an open line is pulled to.
-const ONES: u8 = 0xFF;
 
 /// A pin with a wire on it: the port's index and the pin's.
 #[derive(Clone, Copy, Debug)]
@@ -68,58 +59,6 @@ impl Line {
     }
 }
 
-/// A chip behind the emulator's SPI seam, and when its voltages last changed.
-#[derive(Debug, Default)]
-struct OnBus {
-    chip: Dac81416,
-    volts: [f64; CHANNELS_PER_CHIP],
-    changed_ns: Option<u64>,
-    /// Whether its SDI hears nothing but ones.
-    sdi_open: bool,
-    /// Whether nothing of its SDO is heard but ones.
-    sdo_open: bool,
-}
-
-impl Store for OnBus {}
-
-impl OnBus {
-    /// A byte over its wires, both ways.
-    fn byte(&mut self, mosi: u8) -> u8 {
-        let heard = if self.sdi_open { ONES } else { mosi };
-        let said = self.chip.transfer(heard);
-        if self.sdo_open { ONES } else { said }
-    }
-
-    /// Does something to the chip at `at_ns` and sees what comes of it.
-    fn drive<R>(&mut self, at_ns: u64, act: impl FnOnce(&mut Dac81416) -> R) -> R {
-        let result = act(&mut self.chip);
-        let volts = std::array::from_fn(|channel| self.chip.voltage(channel));
-        if volts != self.volts {
-            self.volts = volts;
-            self.changed_ns = Some(at_ns);
-        }
-        result
-    }
-}
-
-impl Peer for OnBus {
-    fn transfer(&mut self, mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {
-        let [low, high, ..] = mosi.to_le_bytes();
-        if bits == EIGHT_BITS {
-            return self.byte(low).into();
-        }
-        u32::from(self.byte(high)) << 8 | u32::from(self.byte(low))
-    }
-
-    fn select(&mut self, _context: &mut Timeline<'_, '_>) {
-        self.chip.select();
-    }
-
-    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
-        self.drive(context.now().0, Dac81416::deselect);
-    }
-}
-
 /// What is kept of the display board's run.
 #[derive(Debug, Default)]
 pub struct DisplayRecords {
@@ -138,6 +77,7 @@ pub struct DisplayRecords {
 /// The display board's surroundings.
 #[derive(Debug)]
 pub struct DisplayPins {
+    spi: Spi,
     world: World,
     hand: HandFault,
     clear: Option<Level>,
@@ -158,6 +98,7 @@ impl DisplayPins {
     /// The surroundings that `world` describes.
     pub fn new(world: World, hand: HandFault) -> Self {
         Self {
+            spi: Spi::default(),
             world,
             hand,
             clear: None,
@@ -173,17 +114,8 @@ impl DisplayPins {
         }
     }
 
-    /// Wires the converters up, and the emergency-stop button, closed.
+    /// Wires the emergency-stop button up, closed.
     pub fn fit(part: &mut Stm32f427) {
-        for (port, pin) in SELECTS {
-            let pin = Pin::new(pin).expect("a port has sixteen pins");
-            let select = Select {
-                port,
-                pin,
-                active: Level::Low,
-            };
-            part.spi[SPI].attach_selected(OnBus::default(), select);
-        }
         BUTTON.drive(part, 0, Some(Level::Low));
     }
 
@@ -215,10 +147,15 @@ impl DisplayPins {
         nth: usize,
         act: impl FnOnce(&mut Dac81416) -> R,
     ) -> R {
-        let result = on_bus(part, nth).drive(at_ns, act);
-        self.record(part, at_ns);
+        let result = self.spi.chips_at(at_ns)[nth].drive(at_ns, act);
+        self.record(at_ns);
         self.follow_alarm(part, at_ns);
         result
+    }
+
+    /// Loads by LDAC that the first chip has seen since power-up.
+    pub fn loads(&self) -> u64 {
+        self.spi.chips[0].chip.counters().loads
     }
 
     /// Puts what TIM3's channel 1 says on LDAC's wire.
@@ -233,11 +170,11 @@ impl DisplayPins {
         self.load = Some(level);
         let at_ns = self.exactly(part, at_ns);
         LOAD.drive_function(part, at_ns, level);
-        for chip in 0..CHIPS {
-            on_bus(part, chip).drive(at_ns, |dac| dac.ldac(level == Level::High));
+        for chip in self.spi.chips_at(at_ns) {
+            chip.drive(at_ns, |dac| dac.ldac(level == Level::High));
         }
         if level == Level::Low {
-            self.record(part, at_ns);
+            self.record(at_ns);
         }
     }
 
@@ -269,15 +206,15 @@ impl DisplayPins {
             self.records.clears_ns.push(at_ns);
         }
         self.clear = Some(level);
-        for chip in 0..CHIPS {
-            on_bus(part, chip).drive(at_ns, |dac| dac.clr(level == Level::Low));
+        for chip in self.spi.chips_at(at_ns) {
+            chip.drive(at_ns, |dac| dac.clr(level == Level::Low));
         }
-        self.record(part, at_ns);
+        self.record(at_ns);
     }
 
     /// The chips' alarm outputs pull one wire low together.
     fn follow_alarm(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let alarm = self.alarm_stuck || (0..CHIPS).any(|chip| on_bus(part, chip).chip.alarm());
+        let alarm = self.alarm_stuck || self.spi.chips.iter().any(|on_bus| on_bus.chip.alarm());
         if alarm != self.alarm {
             self.alarm = alarm;
             ALARM.drive(part, at_ns, alarm.then_some(Level::Low));
@@ -285,15 +222,17 @@ impl DisplayPins {
     }
 
     /// Keeps the voltages, if any channel has changed since they were kept last.
-    fn record(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        let changes: Vec<u64> = (0..CHIPS)
-            .filter_map(|chip| on_bus(part, chip).changed_ns.take())
+    fn record(&mut self, at_ns: u64) {
+        let chips = &mut self.spi.chips;
+        let changes: Vec<u64> = chips
+            .iter_mut()
+            .filter_map(|chip| chip.changed_ns.take())
             .collect();
         let (Some(first), Some(last)) = (changes.iter().min(), changes.iter().max()) else {
             return;
         };
         let words = std::array::from_fn(|actuator| {
-            let chip = on_bus(part, actuator / ACTUATORS_PER_CHIP);
+            let chip = &chips[actuator / ACTUATORS_PER_CHIP];
             word_of(chip.volts[actuator % ACTUATORS_PER_CHIP])
         });
         let skew_ns = last - first;
@@ -315,23 +254,14 @@ fn word_of(volts: f64) -> u16 {
         .clamp(0.0, 65_535.0) as u16
 }
 
-/// Loads by LDAC that the first chip has seen since power-up.
-pub fn loads(part: &mut Stm32f427) -> u64 {
-    on_bus(part, 0).chip.counters().loads
-}
-
-fn on_bus(part: &mut Stm32f427, chip: usize) -> &mut OnBus {
-    part.spi[SPI]
-        .chip_mut(chip)
-        .expect("attached by fit, and kept through resets")
-}
-
 impl Pins for DisplayPins {
+    const STAND_INS: &'static [&'static str] = &["SPI1"];
+
     type Records = DisplayRecords;
 
-    fn take_records(&mut self, part: &mut Stm32f427) -> DisplayRecords {
-        let errors = |chip| on_bus(part, chip).chip.counters().faults;
-        self.records.dac_frame_errors = (0..CHIPS).map(errors).sum();
+    fn take_records(&mut self) -> DisplayRecords {
+        let chips = self.spi.chips.iter();
+        self.records.dac_frame_errors = chips.map(|on_bus| on_bus.chip.counters().faults).sum();
         std::mem::take(&mut self.records)
     }
 
@@ -348,7 +278,13 @@ impl Pins for DisplayPins {
         counted
     }
 
+    fn stand_in(&mut self, _nth: usize, bus: &Bus) -> Option<&mut dyn ErasedDevice> {
+        self.spi.expect_words(bus);
+        Some(&mut self.spi)
+    }
+
     fn on_reset(&mut self, part: &mut Stm32f427, at_ns: u64) {
+        self.spi.restart();
         self.load = None;
         self.alarm = false;
         self.set_stop_button(part, at_ns, self.button_open);
@@ -386,8 +322,14 @@ impl Pins for DisplayPins {
             Mistake::SelectOpen => {
                 self.with_chip(part, at_ns, CHIP, |dac| dac.defects.deaf = wrong);
             }
-            Mistake::SdiOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdi_open = wrong),
-            Mistake::SdoOpen => (0..CHIPS).for_each(|chip| on_bus(part, chip).sdo_open = wrong),
+            Mistake::SdiOpen => {
+                let chips = self.spi.chips_at(at_ns).iter_mut();
+                chips.for_each(|chip| chip.sdi_open = wrong);
+            }
+            Mistake::SdoOpen => {
+                let chips = self.spi.chips_at(at_ns).iter_mut();
+                chips.for_each(|chip| chip.sdo_open = wrong);
+            }
             _ => {}
         }
     }

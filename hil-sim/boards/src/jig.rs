@@ -176,7 +176,7 @@ fn load(part: &mut Stm32f427) -> Level {
 impl Pins for Jig {
     type Records = ();
 
-    fn take_records(&mut self, _part: &mut Stm32f427) {}
+    fn take_records(&mut self) {}
 
     /// The encoder is what the wires make of it: it stays where it is.
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {

@@ -20,7 +20,7 @@ use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::rcc::{Register, csr};
 use rigless::soc::stm32f427::generated::{TIM3 as TIM3_REGISTERS, TIM4};
-use rigless::soc::{Bus, Error, Width};
+use rigless::soc::{Bus, Error, Slot, Width};
 use rigless::time::VirtualNanos;
 
 use super::wire::Wire;
@@ -57,11 +57,19 @@ const ARR: u64 = 0x2C;
 
 /// What is wired to a board's pins.
 pub trait Pins: Debug + Send + 'static {
+    /// The instances of the part that are modelled here instead of by the emulator.
+    const STAND_INS: &'static [&'static str] = &[];
+
     /// What is written down at the pins.
     type Records: Send;
 
     /// Takes what has been written down since the last call.
-    fn take_records(&mut self, part: &mut Stm32f427) -> Self::Records;
+    fn take_records(&mut self) -> Self::Records;
+
+    /// The model of the `nth` of [`Pins::STAND_INS`]; `bus` tells what other instances' registers hold.
+    fn stand_in(&mut self, _nth: usize, _bus: &Bus) -> Option<&mut dyn ErasedDevice> {
+        None
+    }
 
     /// TIM3 triggered at `at_ns`, for the `nth` time: the encoder's counter at this instant.
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16;
@@ -103,6 +111,8 @@ pub struct Wired<P> {
     loses_power: bool,
     /// When the last trigger came.
     triggered_ns: u64,
+    /// By the slot on the part's bus, which of [`Pins::STAND_INS`] it is.
+    stand_ins: Vec<Option<usize>>,
 }
 
 impl<P: Pins> Nucleo<P> {
@@ -114,6 +124,11 @@ impl<P: Pins> Nucleo<P> {
         part.usart[PEER_UART].attach(Wire::default());
         part.usart[CONSOLE_UART].attach(Wire::default());
         fit(&mut part);
+        let nth = |slot: &Slot| {
+            let name = slot.peripheral().name;
+            P::STAND_INS.iter().position(|instance| *instance == name)
+        };
+        let stand_ins = part.bus().slots().iter().map(nth).collect();
         Ok(Self {
             mcu: Wired {
                 part,
@@ -121,6 +136,7 @@ impl<P: Pins> Nucleo<P> {
                 triggers: 0,
                 loses_power: false,
                 triggered_ns: 0,
+                stand_ins,
             },
             program: None,
             processor: None,
@@ -278,6 +294,11 @@ impl<P: Pins> Mcu for Wired<P> {
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        if let Some(nth) = self.stand_ins[slot]
+            && let Some(model) = self.pins.stand_in(nth, self.part.bus())
+        {
+            return (self.part.bus_mut(), Some(model));
+        }
         self.part.split(slot)
     }
 }
@@ -326,5 +347,44 @@ impl<P: Pins> Board for Nucleo<P> {
             processor_pool::keep(&mut core, program);
         }
         vec![Target::new("stm32f427", &mut self.mcu, core)]
+    }
+}
+
+/// A part that no firmware runs on, but a test that sets registers and looks at them.
+#[cfg(test)]
+pub mod by_hand {
+    use super::*;
+    use rigless::emulator::{Error, Memory};
+
+    /// RAM that holds its own addresses.
+    struct Addresses;
+
+    impl Memory for Addresses {
+        fn read(&mut self, address: u64, width: Width) -> Result<u64, Error> {
+            Ok(address & width.mask())
+        }
+
+        fn write(&mut self, _address: u64, _width: Width, _value: u64) -> Result<(), Error> {
+            Ok(())
+        }
+    }
+
+    /// Writes `value` to a register at `at_ns`.
+    pub fn set(mcu: &mut dyn Mcu, at_ns: u64, address: u64, value: u64) {
+        let at = VirtualNanos(at_ns);
+        mcu.advance_to(at);
+        assert_eq!(mcu.settle(&mut Addresses).unwrap(), []);
+        mcu.write(at, address, Width::W32, value).unwrap();
+        assert_eq!(mcu.settle(&mut Addresses).unwrap(), []);
+    }
+
+    /// Reads a register at `at_ns`.
+    pub fn get(mcu: &mut dyn Mcu, at_ns: u64, address: u64) -> u64 {
+        let at = VirtualNanos(at_ns);
+        mcu.advance_to(at);
+        assert_eq!(mcu.settle(&mut Addresses).unwrap(), []);
+        let value = mcu.read(at, address, Width::W32).unwrap();
+        assert_eq!(mcu.settle(&mut Addresses).unwrap(), []);
+        value
     }
 }

@@ -154,9 +154,9 @@ pub(super) fn drive<P: Pins, W: BoardHook<P>>(
         is_injected: cuts_ns.contains(&reset.at.0),
     });
     let resets = resets.collect();
-    let (pins, part) = finished.session.board_mut().pins();
+    let (pins, _) = finished.session.board_mut().pins();
     Ok(Finished {
-        records: pins.take_records(part),
+        records: pins.take_records(),
         witness: finished.driver.witness,
         clock,
         instructions: finished.stop.map_or(0, |stop| stop.instruction_count),

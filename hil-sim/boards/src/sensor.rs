@@ -1,16 +1,19 @@
 //! What is on the sensor board's pins: five gauges and the force channel on ADC3, the arm's encoder,
 //! and the arm's servo drive.
 
+mod pwm;
+
 use protocol::CHANNELS;
-use rigless::device::Level;
-use rigless::mcu::Operate;
-use rigless::soc::Width;
+use rigless::device::{ErasedDevice, Level};
+use rigless::mcu::{Mcu, Operate};
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::generated::ADC3;
 use rigless::soc::stm32f427::peripherals::adc::Channel;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
-use rigless::soc::stm32f427::peripherals::tim;
+use rigless::soc::{Bus, Width};
 use rigless::time::VirtualNanos;
+
+use pwm::Pwm;
 
 use super::nucleo::Pins;
 use crate::wiring::{EncoderWires, GAUGE, Mistake};
@@ -26,6 +29,8 @@ const ADC_CHANNELS: [u8; CHANNELS] = [3, 10, 13, 9, 15, 8];
 /// Index of ADC3, and of port F.
 const ADC: usize = 2;
 const PORT_F: usize = 5;
+/// What drives D6, the arm's speed.
+const DRIVE: &str = "TIM1";
 /// D7, the arm's direction.
 const DIRECTION_PIN: u8 = 13;
 /// The model converts ⌊input · 4095 / reference⌋; microvolts resolve every code.
@@ -43,6 +48,7 @@ const EXTSEL_TIM3_TRGO: u64 = 0b1000 << 24;
 /// The sensor board's surroundings.
 #[derive(Debug)]
 pub struct SensorPins {
+    drive: Pwm,
     world: World,
     arm: Arm,
     arm_full_scale_mm_s: f64,
@@ -66,6 +72,7 @@ impl SensorPins {
     pub fn of_scene(scene: &Scene) -> Result<Self, SceneError> {
         let configuration = scene.sensor_configuration();
         Ok(Self {
+            drive: Pwm::default(),
             world: World::new(scene)?,
             arm: Arm::new(&scene.arm, &scene.motion),
             arm_full_scale_mm_s: f64::from(configuration.arm_full_scale_um_s) * 1e-3,
@@ -117,11 +124,8 @@ impl SensorPins {
 
     /// The speed in mm/s that the firmware asks for on its PWM and direction pins.
     fn command_mm_s(&self, part: &mut Stm32f427) -> f64 {
-        let channel = tim::Channel::new(1).expect("a timer has a channel 1");
-        let (timer, registers) = part.advanced_timer(0);
-        let duty = timer
-            .pulse(channel, registers)
-            .map_or(0.0, |pulse| pulse.width.0 as f64 / pulse.period.0 as f64);
+        let registers = part.bus().registers(DRIVE).expect("the part has a TIM1");
+        let duty = self.drive.duty(registers);
         let direction = Pin::new(DIRECTION_PIN).expect("a port has sixteen pins");
         let (port, registers) = part.port(PORT_F);
         let sign = if port.level(direction, registers) == Level::High {
@@ -140,10 +144,20 @@ fn microvolts(code: u16) -> u32 {
 }
 
 impl Pins for SensorPins {
+    const STAND_INS: &'static [&'static str] = &[DRIVE];
+
     type Records = Vec<ScanRecord>;
 
-    fn take_records(&mut self, _part: &mut Stm32f427) -> Vec<ScanRecord> {
+    fn take_records(&mut self) -> Vec<ScanRecord> {
         std::mem::take(&mut self.scans)
+    }
+
+    fn stand_in(&mut self, _nth: usize, _bus: &Bus) -> Option<&mut dyn ErasedDevice> {
+        Some(&mut self.drive)
+    }
+
+    fn on_reset(&mut self, _part: &mut Stm32f427, _at_ns: u64) {
+        self.drive = Pwm::default();
     }
 
     fn on_trigger(&mut self, part: &mut Stm32f427, at_ns: u64) -> u16 {

@@ -151,16 +151,16 @@ trait Drained: Pins {
 
 impl Drained for SensorPins {
     fn drain(board: &mut Nucleo<Self>, _outputs: &mut Outputs) {
-        let (pins, part) = board.pins();
-        pins.take_records(part);
+        let (pins, _) = board.pins();
+        pins.take_records();
     }
 }
 
 impl Drained for DisplayPins {
     fn drain(board: &mut Nucleo<Self>, outputs: &mut Outputs) {
-        let (pins, part) = board.pins();
-        let records = pins.take_records(part);
-        let loads = super::display::loads(part);
+        let (pins, _) = board.pins();
+        let records = pins.take_records();
+        let loads = pins.loads();
         outputs.take(records, loads);
     }
 }

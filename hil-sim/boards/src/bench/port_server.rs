@@ -9,7 +9,6 @@ use std::time::Duration;
 use protocol::receiver::{Event, Receiver};
 use protocol::{Estimate, Message, Role};
 use rigless::emulator::Host;
-use rigless::soc::stm32f427::Stm32f427;
 
 use super::socket::Socket;
 use super::surroundings::Surroundings;
@@ -128,19 +127,19 @@ impl Shared {
 /// What differs between the two boards' pins.
 pub trait BenchPins: Pins {
     /// Shows what the pins have come to since the last call, and forgets it.
-    fn show(&mut self, part: &mut Stm32f427, shared: &Shared);
+    fn show(&mut self, shared: &Shared);
 }
 
 impl BenchPins for SensorPins {
-    fn show(&mut self, part: &mut Stm32f427, shared: &Shared) {
-        self.take_records(part);
+    fn show(&mut self, shared: &Shared) {
+        self.take_records();
         lock(&shared.sensed).wavelength_mm = self.wavelength_mm();
     }
 }
 
 impl BenchPins for DisplayPins {
-    fn show(&mut self, part: &mut Stm32f427, shared: &Shared) {
-        let last = self.take_records(part).outputs.pop();
+    fn show(&mut self, shared: &Shared) {
+        let last = self.take_records().outputs.pop();
         let mut outputs = lock(&shared.outputs);
         outputs.is_clear = self.is_clear();
         if let Some(last) = last {
@@ -320,8 +319,8 @@ impl<P: BenchPins> BoardHook<P> for PortServer {
             is_on,
         } = between;
         let board = session.board_mut();
-        let (pins, part) = board.pins();
-        pins.show(part, &self.shared);
+        let (pins, _) = board.pins();
+        pins.show(&self.shared);
         if self.set_up(board, now_ns) {
             let moment = (now_ns, is_on);
             let [console, link, rtt] = self.ports();
