@@ -26,6 +26,25 @@ fn refusal_of(section: &str) -> String {
     refusal(&format!("{SURFACE}{section}"))
 }
 
+/// The rows of a table of "what is given => the words of its refusal", in which "; " is a line break of what is given.
+pub(super) fn refusals(table: &str) -> impl Iterator<Item = (String, &str)> {
+    let rows = table.lines().filter(|row| !row.trim().is_empty());
+    rows.map(|row| {
+        let (given, words) = row.split_once("=> ").expect("every row has an arrow");
+        (given.trim().replace("; ", "\n"), words)
+    })
+}
+
+/// Every row of such a table, held against what is refused; " … " stands between words that are apart.
+fn assert_refused(refusal: impl Fn(&str) -> String, table: &str) {
+    for (given, words) in refusals(table) {
+        let refusal = refusal(&given);
+        for want in words.split(" … ") {
+            assert!(refusal.contains(want), "{refusal}\nwanted {want}");
+        }
+    }
+}
+
 #[test]
 fn an_irregular_surface_has_the_scenes_seed_and_a_grating_is_none() {
     let text = format!(

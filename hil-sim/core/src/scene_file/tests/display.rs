@@ -154,28 +154,16 @@ fn an_array_may_be_described_with_its_resonances() {
     );
     assert_eq!(actuators[7].resonance_dhz, 0);
     assert_eq!(actuators::check(actuators), Ok(()));
-    for (columns, want) in [
-        (
-            "19.9,0.7",
-            "data.csv:9: column 7 (resonance_hz): \"19.9\" is no resonance: give 20 to 2000 Hz",
-        ),
-        (
-            "2001,0.7",
-            "data.csv:9: column 7 (resonance_hz): \"2001\" is no resonance",
-        ),
-        (
-            "50,0.19",
-            "data.csv:9: column 8 (damping): \"0.19\" is no damping: give 0.2 to 10",
-        ),
-        (
-            "50,10.1",
-            "data.csv:9: column 8 (damping): \"10.1\" is no damping",
-        ),
-    ] {
-        let refusal = described("modelled-badly", &modelled_rows(7, columns));
-        let refusal = refusal.unwrap_err().to_string();
-        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
-    }
+    let badly = |columns: &str| described("modelled-badly", &modelled_rows(7, columns));
+    assert_refused(
+        |columns| badly(columns).unwrap_err().to_string(),
+        r#"
+        19.9,0.7 => data.csv:9: column 7 (resonance_hz): "19.9" is no resonance: give 20 to 2000 Hz
+        2001,0.7 => data.csv:9: column 7 (resonance_hz): "2001" is no resonance
+        50,0.19 => data.csv:9: column 8 (damping): "0.19" is no damping: give 0.2 to 10
+        50,10.1 => data.csv:9: column 8 (damping): "10.1" is no damping
+        "#,
+    );
 }
 
 #[test]
@@ -196,41 +184,18 @@ fn more_than_the_fundamental_is_refused_for_more_places_than_are_worked_out_in_t
 
 #[test]
 fn a_description_with_a_fault_is_refused_at_its_line() {
-    for (name, row, want) in [
-        (
-            "order",
-            "8,0,0,1,0,0",
-            "data.csv:9: column 1 (actuator): \"8\" is not the next actuator: give 7",
-        ),
-        (
-            "far",
-            "7,20001,0,1,0,0",
-            "data.csv:9: column 2 (x_um): \"20001\" is no place",
-        ),
-        (
-            "part",
-            "7,0,0.5,1,0,0",
-            "data.csv:9: column 3 (y_um): \"0.5\" is no place",
-        ),
-        (
-            "gain",
-            "7,0,0,1.1,0,0",
-            "data.csv:9: column 4 (gain): \"1.1\" is no gain",
-        ),
-        (
-            "phase",
-            "7,0,0,1,1,0",
-            "data.csv:9: column 5 (phase_turns): \"1\" is no phase",
-        ),
-        (
-            "polarity",
-            "7,0,0,1,0,2",
-            "data.csv:9: column 6 (inverted): \"2\" is neither",
-        ),
-    ] {
-        let refusal = described(name, &rows(7, row)).unwrap_err().to_string();
-        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
-    }
+    let faulty = |row: &str| described("faulty", &rows(7, row));
+    assert_refused(
+        |row| faulty(row).unwrap_err().to_string(),
+        r#"
+        8,0,0,1,0,0 => data.csv:9: column 1 (actuator): "8" is not the next actuator: give 7
+        7,20001,0,1,0,0 => data.csv:9: column 2 (x_um): "20001" is no place
+        7,0,0.5,1,0,0 => data.csv:9: column 3 (y_um): "0.5" is no place
+        7,0,0,1.1,0,0 => data.csv:9: column 4 (gain): "1.1" is no gain
+        7,0,0,1,1,0 => data.csv:9: column 5 (phase_turns): "1" is no phase
+        7,0,0,1,0,2 => data.csv:9: column 6 (inverted): "2" is neither
+        "#,
+    );
     let short = described("short", &format!("{HEADER}0,0,0,1,0,0\n1,0,0,1,0,0\n"));
     let short = short.unwrap_err().to_string();
     assert!(

@@ -1,6 +1,6 @@
 //! `[[fault]]`.
 
-use super::{SURFACE, refusal_of};
+use super::{SURFACE, assert_refused, refusal, refusal_of};
 use crate::scene::Scene;
 use crate::scene::fault::{Fault, Kind};
 use std::path::Path;
@@ -49,58 +49,23 @@ fn faults_are_kept_in_the_order_of_the_file() {
 
 #[test]
 fn what_is_wrong_with_a_fault_is_refused_with_line_and_key() {
-    for (section, want) in [
-        (
-            "[[fault]]\nkind = \"panic\"",
-            "x.toml:3: fault[0].at_s: is missing",
-        ),
-        ("[[fault]]\nat_s = 1", "x.toml:3: fault[0].kind: is missing"),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"gremlin\"",
-            "x.toml:5: fault[0].kind: \"gremlin\" is unknown: give one of nothing, power-cycle, ",
-        ),
-        (
-            "[[fault]]\nat_s = -1\nkind = \"panic\"",
-            "x.toml:4: fault[0].at_s: -1 is not an instant",
-        ),
-        (
-            "[[fault]]\nat_s = 3\nkind = \"panic\"",
-            "x.toml:4: fault[0].at_s: comes after the scene's end at 3 s",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"panic\"\nfor_s = 1",
-            "x.toml:6: fault[0].for_s: no such key here with kind = \"panic\"",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"link-down\"\nfor_s = 0",
-            "x.toml:6: fault[0].for_s: 0 is not a duration",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"link-down\"\nchip = 1",
-            "x.toml:6: fault[0].chip: no such key here with kind = \"link-down\"",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"panic\"\n[[fault]]\nat_s = 1\nkind = \"dac-alarm\"\nchip = 4",
-            "x.toml:9: fault[1].chip: 4 is out of range: give a whole number from 0 to 3",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"gauge-open\"\ngauge = 1.5",
-            "x.toml:6: fault[0].gauge: 1.5 is out of range: give a whole number from 0 to 4",
-        ),
-        (
-            "[[fault]]\nat_s = 1\nkind = \"link-corrupt\"\nshare = 2",
-            "x.toml:6: fault[0].share: 2 is out of range: give a number from 0 to 1",
-        ),
-        (
-            "fault = 1",
-            "x.toml:1: fault: holds a whole number: give an array of tables",
-        ),
-    ] {
-        let refusal = if section.starts_with("fault") {
-            super::refusal(&format!("{section}\n{SURFACE}"))
-        } else {
-            refusal_of(section)
-        };
-        assert!(refusal.contains(want), "{refusal}\nwanted {want}");
-    }
+    assert_refused(
+        refusal_of,
+        r#"
+        [[fault]]; kind = "panic" => x.toml:3: fault[0].at_s: is missing
+        [[fault]]; at_s = 1 => x.toml:3: fault[0].kind: is missing
+        [[fault]]; at_s = 1; kind = "gremlin" => x.toml:5: fault[0].kind: "gremlin" is unknown: give one of nothing, power-cycle, link-down
+        [[fault]]; at_s = -1; kind = "panic" => x.toml:4: fault[0].at_s: -1 is not an instant
+        [[fault]]; at_s = 3; kind = "panic" => x.toml:4: fault[0].at_s: comes after the scene's end at 3 s
+        [[fault]]; at_s = 1; kind = "panic"; for_s = 1 => x.toml:6: fault[0].for_s: no such key here with kind = "panic"
+        [[fault]]; at_s = 1; kind = "link-down"; for_s = 0 => x.toml:6: fault[0].for_s: 0 is not a duration
+        [[fault]]; at_s = 1; kind = "link-down"; chip = 1 => x.toml:6: fault[0].chip: no such key here with kind = "link-down"
+        [[fault]]; at_s = 1; kind = "panic"; [[fault]]; at_s = 1; kind = "dac-alarm"; chip = 4 => x.toml:9: fault[1].chip: 4 is out of range: give a whole number from 0 to 3
+        [[fault]]; at_s = 1; kind = "gauge-open"; gauge = 1.5 => x.toml:6: fault[0].gauge: 1.5 is out of range: give a whole number from 0 to 4
+        [[fault]]; at_s = 1; kind = "link-corrupt"; share = 2 => x.toml:6: fault[0].share: 2 is out of range: give a number from 0 to 1
+        "#,
+    );
+    let whole = refusal(&format!("fault = 1\n{SURFACE}"));
+    let want = "x.toml:1: fault: holds a whole number: give an array of tables";
+    assert!(whole.contains(want), "{whole}");
 }

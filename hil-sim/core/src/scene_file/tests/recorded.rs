@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::SURFACE;
+use super::{SURFACE, refusals};
 use crate::scene::{Motion, Scene, SceneError};
 
 /// A folder of its own for a test's CSV files, removed at the end.
@@ -49,53 +49,27 @@ fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
         .unwrap();
     assert_eq!(scene.motion.position_mm(0.5), 25.0);
     assert_eq!(scene.motion.velocity_mm_s(2.0), -12.5);
-    for (csv, want) in [
-        (
-            "t_s,x_mm\n0,0\n1,fast\n3,1\n",
-            "data.csv:3: column 2 (x_mm): \"fast\" is no number",
-        ),
-        (
-            "t_s,x_mm\n0,0\n1,NaN\n3,1\n",
-            "data.csv:3: column 2 (x_mm): \"NaN\" is not finite",
-        ),
-        (
-            "t_s,x_mm\n0,0\n\n1,\n3,1\n",
-            "data.csv:4: column 2 (x_mm): \"\" is no number",
-        ),
-        (
-            "t_s,x_mm\n0,0\n2,0\n2,1\n",
-            "data.csv:4: column 1 (t_s): \"2\" does not increase, after 2",
-        ),
-        (
-            "t_s,x_mm\n0,0\n1\n",
-            "data.csv:3: 1 cells where the first line has 2",
-        ),
-        (
-            "t_s,x_mm\n0,0\n",
-            "data.csv: 1 row(s) of numbers: give two or more",
-        ),
-        ("t_s,x_mm\n", "data.csv: 0 row(s) of numbers"),
-        (
-            "",
-            "data.csv:1: the first line is \"\": it must be t_s,x_mm",
-        ),
-        (
-            "t,x\n0,0\n3,1\n",
-            "data.csv:1: the first line is \"t,x\": it must be t_s,x_mm",
-        ),
-        ("0,0\n3,1\n", "data.csv:1: the first line is \"0,0\""),
-        (
-            "t_s,x_mm\n0,0\n0.001,2\n3,1\n",
-            "data.csv:3: column 2 (x_mm): \"2\" is 2000 mm/s from the row before",
-        ),
-        (
-            "t_s,x_mm\n0,0\n2,50\n",
-            "x.toml:5: motion.file: lasts from 0 to 2 s, the scene from 0 to 3 s",
-        ),
-    ] {
-        let refusal = folder.refusal(MOTION, csv);
+    for (csv, want) in refusals(
+        r#"
+        t_s,x_mm; 0,0; 1,fast; 3,1 => data.csv:3: column 2 (x_mm): "fast" is no number
+        t_s,x_mm; 0,0; 1,NaN; 3,1 => data.csv:3: column 2 (x_mm): "NaN" is not finite
+        t_s,x_mm; 0,0; ; 1,; 3,1 => data.csv:4: column 2 (x_mm): "" is no number
+        t_s,x_mm; 0,0; 2,0; 2,1 => data.csv:4: column 1 (t_s): "2" does not increase, after 2
+        t_s,x_mm; 0,0; 1 => data.csv:3: 1 cells where the first line has 2
+        t_s,x_mm; 0,0 => data.csv: 1 row(s) of numbers: give two or more
+        t_s,x_mm => data.csv: 0 row(s) of numbers
+        t,x; 0,0; 3,1 => data.csv:1: the first line is "t,x": it must be t_s,x_mm
+        0,0; 3,1 => data.csv:1: the first line is "0,0"
+        t_s,x_mm; 0,0; 0.001,2; 3,1 => data.csv:3: column 2 (x_mm): "2" is 2000 mm/s from the row before
+        t_s,x_mm; 0,0; 2,50 => x.toml:5: motion.file: lasts from 0 to 2 s, the scene from 0 to 3 s
+        "#,
+    ) {
+        let refusal = folder.refusal(MOTION, &format!("{csv}\n"));
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
+    let refusal = folder.refusal(MOTION, "");
+    let want = "data.csv:1: the first line is \"\": it must be t_s,x_mm";
+    assert!(refusal.starts_with(want), "{refusal}");
 }
 
 #[test]
@@ -117,21 +91,14 @@ fn recorded_gauges_are_played_and_refused_below_200_hz() {
     load(whole).expect("3 s at 1 kHz are 3 000 rows");
     let short = whole.rsplit_once('\n').expect("rows").0;
     load(short).expect_err("2.999 s are no 3 s");
-    for (csv, want) in [
-        (
-            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.01,1,1,1,1,1\n",
-            "data.csv:3: column 1 (t_s): \"0.01\" comes more than 5 ms",
-        ),
-        (
-            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,12\n",
-            "data.csv:2: column 6 (g4): \"12\" is no voltage",
-        ),
-        (
-            "t_s,g0,g1,g2,g3,g4\n0,1,1,1,1,1\n0.001,1,1,1,1,1\n",
-            "x.toml:5: gauges.file: lasts from 0 to 0.001 s",
-        ),
-    ] {
-        let refusal = folder.refusal(GAUGES, csv);
+    for (csv, want) in refusals(
+        r#"
+        0,1,1,1,1,1; 0.01,1,1,1,1,1 => data.csv:3: column 1 (t_s): "0.01" comes more than 5 ms
+        0,1,1,1,1,12 => data.csv:2: column 6 (g4): "12" is no voltage
+        0,1,1,1,1,1; 0.001,1,1,1,1,1 => x.toml:5: gauges.file: lasts from 0 to 0.001 s
+        "#,
+    ) {
+        let refusal = folder.refusal(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{csv}\n"));
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
     let both = folder.refusal(

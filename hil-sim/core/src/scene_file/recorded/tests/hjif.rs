@@ -1,6 +1,7 @@
 //! Textures of ISO/IEC 23090-31.
 
 use super::*;
+use crate::scene_file::tests::refusals;
 
 /// A texture with these channels, each an id, a description and its bands.
 fn hjif(channels: &[(u32, &str, String)]) -> Vec<u8> {
@@ -62,50 +63,42 @@ fn a_texture_of_iso_23090_31_is_rubbed_as_a_profile() {
             assert!(off.abs() < 0.002, "{keys}: {off} at {x_mm}");
         }
     }
-    for (keys, bytes, want) in [
-        (
-            "",
-            several.clone(),
-            "x.toml:2: surface.channels: is missing: name one by its id or its description, of 3 (\"silk\"), 8 (\"linen\")",
-        ),
-        (
-            "channels = [5]\n",
-            several.clone(),
-            "x.toml:7: surface.channels: 5 is the id or the description of no channel",
-        ),
-        (
-            "mm_per_sample = 0.1\n",
-            one.clone(),
-            "x.toml:7: surface.mm_per_sample: an .hjif file has places of its own: take it out",
-        ),
-        (
-            "topic = \"/h\"\n",
-            one.clone(),
-            "x.toml:7: surface.topic: the file is no MCAP: take it out",
-        ),
-        (
-            "",
-            hjif(&[(0, "", sine_band(20_000))]),
-            "t.hjif: perceptions[0].channels[0].bands[0].effects[0].keyframes[0].frequency_modulation: 20000: give 0 to 10 000",
-        ),
-        (
-            "",
-            one[..one.len() - 40].to_vec(),
-            "t.hjif:4: perceptions[0].channels[0].bands[0].effects[0].keyframes[0]: EOF while parsing",
-        ),
-        (
-            "",
-            String::from_utf8(one.clone())
-                .unwrap()
-                .replace("\"mixing_coefficient\":1,", "")
-                .into_bytes(),
-            "t.hjif:5: perceptions[0].channels[0]: missing field `mixing_coefficient`",
-        ),
-        ("", b"{}".to_vec(), "t.hjif:1: missing field `version`"),
-    ] {
-        let refusal = folder.refusal(&format!("{section}{keys}"), "t.hjif", &bytes);
-        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
-    }
+    let refused = |bytes: &[u8], table: &str| {
+        for (keys, want) in refusals(table) {
+            let refusal = folder.refusal(&format!("{section}{keys}\n"), "t.hjif", bytes);
+            assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+        }
+    };
+    refused(
+        &several,
+        r#"
+        => x.toml:2: surface.channels: is missing: name one by its id or its description, of 3 ("silk"), 8 ("linen")
+        channels = [5] => x.toml:7: surface.channels: 5 is the id or the description of no channel
+        "#,
+    );
+    refused(
+        &one,
+        r#"
+        mm_per_sample = 0.1 => x.toml:7: surface.mm_per_sample: an .hjif file has places of its own: take it out
+        topic = "/h" => x.toml:7: surface.topic: the file is no MCAP: take it out
+        "#,
+    );
+    let first = "perceptions[0].channels[0]";
+    let keyframe = format!("{first}.bands[0].effects[0].keyframes[0]");
+    refused(
+        &hjif(&[(0, "", sine_band(20_000))]),
+        &format!("=> t.hjif: {keyframe}.frequency_modulation: 20000: give 0 to 10 000"),
+    );
+    refused(
+        &one[..one.len() - 40],
+        &format!("=> t.hjif:4: {keyframe}: EOF while parsing"),
+    );
+    let unmixed = String::from_utf8(one.clone()).unwrap();
+    refused(
+        unmixed.replace("\"mixing_coefficient\":1,", "").as_bytes(),
+        &format!("=> t.hjif:5: {first}: missing field `mixing_coefficient`"),
+    );
+    refused(b"{}", "=> t.hjif:1: missing field `version`");
     let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"t.hjif\"\n";
     let refusal = folder.refusal(gauges, "t.hjif", &one);
     let want = "x.toml:6: gauges.file: a texture is a function of place, not of time";

@@ -1,6 +1,7 @@
 //! What cannot be read.
 
 use super::*;
+use crate::scene_file::tests::refusals;
 
 const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"f\"\n";
 
@@ -20,7 +21,7 @@ fn the_end_of_a_long_recording_goes_on_for_no_longer_than_a_short_ones() {
 #[test]
 fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
     let folder = Folder::new("refused");
-    let tone = || wav(8_000, (0..20_000).map(|_| 0.0));
+    let tone = wav(8_000, (0..20_000).map(|_| 0.0));
     let stereo = {
         let spec = WavSpec {
             channels: 2,
@@ -55,147 +56,97 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
         })
         .collect();
     // Rate and bytes a second.
-    let mut unpaced = tone();
+    let mut unpaced = tone.clone();
     unpaced[24..32].fill(0);
     let header = "t_s,g0,g1,g2,g3,g4\n";
-    for (keys, bytes, want) in [
-        (
-            "",
-            stereo.clone(),
-            "x.toml:4: gauges.channels: is missing: the file has 2 channels",
-        ),
-        (
-            "channels = [0, 1, 2, 0, 0]",
-            stereo.clone(),
-            "x.toml:7: gauges.channels: 2 is no channel of the WAV file: give numbers from 0 to 1",
-        ),
-        (
-            "channels = [0, 1]",
-            stereo.clone(),
-            "x.toml:7: gauges.channels: names 2 channels",
-        ),
-        (
-            "channels = [0, 1, 0, 1, -1]",
-            stereo.clone(),
-            "x.toml:7: gauges.channels[4]: -1 is no column",
-        ),
-        (
-            "channels = [0, 0, 0, 0, 0]",
-            stereo,
-            "f: 0 row(s) of numbers",
-        ),
-        ("", tone()[..tone().len() - 6].to_vec(), "f: sample 19998"),
-        ("", tone()[..20].to_vec(), "f: cannot be read as WAV"),
-        (
-            "rate_hz = 8000",
-            tone(),
-            "x.toml:7: gauges.rate_hz: a WAV file has none but its own",
-        ),
-        (
-            "topic = \"/x\"",
-            tone(),
-            "x.toml:7: gauges.topic: the file is no MCAP",
-        ),
-        (
-            "start_s = 2",
-            tone(),
-            "x.toml:6: gauges.file: lasts from -2 to 0.49",
-        ),
-        (
-            "volts_per_unit = 0",
-            tone(),
-            "x.toml:7: gauges.volts_per_unit: 0 is not a scale",
-        ),
-        (
-            "",
-            loud,
-            "f: sample 77 (0.009625 s), channel 0: 9 makes 10.650 V, which no ADC pin bears",
-        ),
-        (
-            "",
-            own.clone(),
-            "f: has no messages on /sensor/gauges: give topic as one of /imu, /other",
-        ),
-        (
-            "topic = \"/imu\"\nchannels = [\"ax\", \"ax\", \"ax\", \"ax\", \"ax\"]\nlogged_from_s = 100",
-            own.clone(),
-            "f: has messages on /imu from 0 to ",
-        ),
-        (
-            "topic = \"/imu\"",
-            own.clone(),
-            "x.toml:4: gauges.channels: is missing: name the messages' fields",
-        ),
-        (
-            "topic = \"/imu\"\nchannels = [\"ay\", \"ay\", \"ay\", \"ay\", \"ay\"]",
-            own.clone(),
-            "f: message 0 of /imu, field ay: is no number there: there are ax, b.c",
-        ),
-        (
-            "topic = \"/imu\"\nchannels = [1, 1, 1, 1, 1]",
-            own.clone(),
-            "x.toml:8: gauges.channels: 1 is a number: name",
-        ),
-        ("", own[..30].to_vec(), "f: "),
-        (
-            "",
-            unpaced,
-            "f: its head says 0 samples a second: give a file that says its rate",
-        ),
-        (
-            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\nrate_hz = 1000",
-            b"w,t,w\n0,1,2\n".to_vec(),
-            "x.toml:7: gauges.channels: \"w\" is the name of 2 columns: give numbers, from 0 on",
-        ),
-        (
-            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\ntime = \"t\"",
-            b"t,t,w\n0,1,2\n".to_vec(),
-            "x.toml:8: gauges.time: \"t\" is the name of 2 columns",
-        ),
-        (
-            "time_s_per_unit = 1",
-            format!("{header}0,1,1,1,1,1\n").into_bytes(),
-            "x.toml:7: gauges.time_s_per_unit: is no column's",
-        ),
-        (
-            "channels = [\"v\", \"v\", \"v\", \"v\", \"v\"]\nrate_hz = 1000",
-            b"t,w\n0,1\n".to_vec(),
-            "x.toml:7: gauges.channels: \"v\" is no column: there are t, w",
-        ),
-        (
-            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]",
-            b"t,w\n0,1\n".to_vec(),
-            "x.toml:4: gauges.time: is missing",
-        ),
-        (
-            "channels = [\"w\", \"w\", \"w\", \"w\", \"w\"]\nrate_hz = 1000",
-            b"t,w\n0,1\n0,x\n".to_vec(),
-            "f:3: column 2 (w): \"x\" is no number",
-        ),
-        (
-            "channels = [1, 1, 1, 1, 7]\nrate_hz = 1000",
-            b"0,1\n0,1\n".to_vec(),
-            "x.toml:7: gauges.channels: 7 is no column: the file's first line holds numbers, so give numbers from 0 to 1",
-        ),
-        (
-            "channels = [1, 1, 1, 1, 1]\nrate_hz = 1000",
-            b"0,1\n0,99\n".to_vec(),
-            "f:2: column 2: \"99\" makes 100.650 V",
-        ),
-        (
-            "",
-            format!("{header}{slow}").into_bytes(),
-            "f:3: column 1 (t_s): \"0.01\" comes more than 5 ms after the row before: give 200 Hz or more",
-        ),
-        (
-            "",
-            format!("{header}{gap}").into_bytes(),
-            "f:703: column 1 (t_s): \"1.404\" comes 4.000 ms after the row before",
-        ),
-    ] {
-        let refusal = folder.refusal(&format!("{GAUGES}{keys}\n"), "f", &bytes);
-        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
-    }
+    let refused = |bytes: &[u8], table: &str| {
+        for (keys, want) in refusals(table) {
+            let refusal = folder.refusal(&format!("{GAUGES}{keys}\n"), "f", bytes);
+            assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+        }
+    };
+    refused(
+        &stereo,
+        r#"
+        => x.toml:4: gauges.channels: is missing: the file has 2 channels
+        channels = [0, 1, 2, 0, 0] => x.toml:7: gauges.channels: 2 is no channel of the WAV file: give numbers from 0 to 1
+        channels = [0, 1] => x.toml:7: gauges.channels: names 2 channels
+        channels = [0, 1, 0, 1, -1] => x.toml:7: gauges.channels[4]: -1 is no column
+        channels = [0, 0, 0, 0, 0] => f: 0 row(s) of numbers
+        "#,
+    );
+    refused(&tone[..tone.len() - 6], "=> f: sample 19998");
+    refused(&tone[..20], "=> f: cannot be read as WAV");
+    refused(
+        &tone,
+        r#"
+        rate_hz = 8000 => x.toml:7: gauges.rate_hz: a WAV file has none but its own
+        topic = "/x" => x.toml:7: gauges.topic: the file is no MCAP
+        start_s = 2 => x.toml:6: gauges.file: lasts from -2 to 0.49
+        volts_per_unit = 0 => x.toml:7: gauges.volts_per_unit: 0 is not a scale
+        "#,
+    );
+    refused(
+        &loud,
+        "=> f: sample 77 (0.009625 s), channel 0: 9 makes 10.650 V, which no ADC pin bears",
+    );
+    refused(
+        &own,
+        r#"
+        => f: has no messages on /sensor/gauges: give topic as one of /imu, /other
+        topic = "/imu" => x.toml:4: gauges.channels: is missing: name the messages' fields
+        topic = "/imu"; channels = ["ay", "ay", "ay", "ay", "ay"] => f: message 0 of /imu, field ay: is no number there: there are ax, b.c
+        topic = "/imu"; channels = [1, 1, 1, 1, 1] => x.toml:8: gauges.channels: 1 is a number: name
+        "#,
+    );
+    refused(
+        &own,
+        r#"topic = "/imu"; channels = ["ax", "ax", "ax", "ax", "ax"]; logged_from_s = 100 => f: has messages on /imu from 0 to "#,
+    );
+    refused(&own[..30], "=> f: ");
+    refused(
+        &unpaced,
+        "=> f: its head says 0 samples a second: give a file that says its rate",
+    );
+    refused(
+        b"w,t,w\n0,1,2\n",
+        r#"channels = ["w", "w", "w", "w", "w"]; rate_hz = 1000 => x.toml:7: gauges.channels: "w" is the name of 2 columns: give numbers, from 0 on"#,
+    );
+    refused(
+        b"t,t,w\n0,1,2\n",
+        r#"channels = ["w", "w", "w", "w", "w"]; time = "t" => x.toml:8: gauges.time: "t" is the name of 2 columns"#,
+    );
+    refused(
+        format!("{header}0,1,1,1,1,1\n").as_bytes(),
+        "time_s_per_unit = 1 => x.toml:7: gauges.time_s_per_unit: is no column's",
+    );
+    refused(
+        b"t,w\n0,1\n",
+        r#"
+        channels = ["v", "v", "v", "v", "v"]; rate_hz = 1000 => x.toml:7: gauges.channels: "v" is no column: there are t, w
+        channels = ["w", "w", "w", "w", "w"] => x.toml:4: gauges.time: is missing
+        "#,
+    );
+    refused(
+        b"t,w\n0,1\n0,x\n",
+        r#"channels = ["w", "w", "w", "w", "w"]; rate_hz = 1000 => f:3: column 2 (w): "x" is no number"#,
+    );
+    refused(
+        b"0,1\n0,1\n",
+        "channels = [1, 1, 1, 1, 7]; rate_hz = 1000 => x.toml:7: gauges.channels: 7 is no column: the file's first line holds numbers, so give numbers from 0 to 1",
+    );
+    refused(
+        b"0,1\n0,99\n",
+        r#"channels = [1, 1, 1, 1, 1]; rate_hz = 1000 => f:2: column 2: "99" makes 100.650 V"#,
+    );
+    refused(
+        format!("{header}{slow}").as_bytes(),
+        r#"=> f:3: column 1 (t_s): "0.01" comes more than 5 ms after the row before: give 200 Hz or more"#,
+    );
+    refused(
+        format!("{header}{gap}").as_bytes(),
+        r#"=> f:703: column 1 (t_s): "1.404" comes 4.000 ms after the row before"#,
+    );
 }
 
 #[test]
