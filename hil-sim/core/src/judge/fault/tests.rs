@@ -34,6 +34,24 @@ fn driven(from_ms: u64, to_ms: u64, then: u16) -> Vec<OutputRecord> {
     ticks.chain([last]).collect()
 }
 
+/// Takes the outputs to 0 V for a time, in ms.
+fn silence(recording: &mut Recording, silent_ms: std::ops::Range<u64>) {
+    for output in &mut recording.outputs {
+        if (silent_ms.start * MS..silent_ms.end * MS).contains(&output.at_ns) {
+            output.words = [ZERO_VOLT; ACTUATORS];
+        }
+    }
+}
+
+/// A scene of these faults with a hand at 50 mm/s over 2 mm.
+fn with_faults(duration_s: f64, faults: Vec<Fault>) -> Scene {
+    Scene {
+        duration_s,
+        faults,
+        ..Scene::constant(2.0, 50.0)
+    }
+}
+
 fn said(at_ms: u64, state: DisplayState) -> TimedMessage {
     let instant_us = at_ms * 1_000;
     TimedMessage {
@@ -52,11 +70,7 @@ fn judged_for(fault: Fault, outputs: Vec<OutputRecord>, signs: FaultEvidence) ->
         signs,
         ..Run::steady(50.0, 2.0).record()
     };
-    let scene = Scene {
-        duration_s: END_MS as f64 * 1e-3,
-        faults: vec![fault],
-        ..Scene::constant(2.0, 50.0)
-    };
+    let scene = with_faults(END_MS as f64 * 1e-3, vec![fault]);
     finding(&scene, 0, END_MS * MS, &recording)
 }
 
@@ -128,11 +142,7 @@ fn a_crest_that_is_cut_flat_at_its_channels_gain_does_not_stand() {
             let word = if is_flat { offset } else { 0 };
             output.words[CHANNEL] = (i32::from(ZERO_VOLT) + word) as u16;
         }
-        let mut scene = Scene {
-            duration_s: 2.0,
-            faults: vec![Fault::new(Kind::Nothing, 0.5)],
-            ..Scene::constant(2.0, 50.0)
-        };
+        let mut scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, 0.5)]);
         scene.display.actuators[CHANNEL].gain_q15 = gain_q15;
         finding(&scene, 0, 2_000 * MS, &recording).standing
     };
@@ -264,11 +274,7 @@ fn cut_and_said(silent_ms: std::ops::Range<u64>, says: Vec<TimedMessage>) -> Vec
     recording
         .arrived
         .retain(|arrival| !CUT_NS.contains(&arrival.at_ns));
-    for output in &mut recording.outputs {
-        if (silent_ms.start * MS..silent_ms.end * MS).contains(&output.at_ns) {
-            output.words = [ZERO_VOLT; ACTUATORS];
-        }
-    }
+    silence(&mut recording, silent_ms);
     recording.signs.display = says;
     unmet_of_cut(&recording)
 }
@@ -276,11 +282,7 @@ fn cut_and_said(silent_ms: std::ops::Range<u64>, says: Vec<TimedMessage>) -> Vec
 fn unmet_of_cut(recording: &Recording) -> Vec<String> {
     let mut fault = Fault::new(Kind::LinkDown, 0.5);
     fault.for_s = Some(0.7);
-    let scene = Scene {
-        duration_s: 2.0,
-        faults: vec![fault],
-        ..Scene::constant(2.0, 50.0)
-    };
+    let scene = with_faults(2.0, vec![fault]);
     finding(&scene, 0, 2_000 * MS, recording).unmet()
 }
 
@@ -295,11 +297,7 @@ fn a_display_that_hears_nothing_after_the_link_is_back_is_found() {
     recording
         .arrived
         .retain(|arrival| arrival.at_ns < CUT_NS.start);
-    for output in &mut recording.outputs {
-        if output.at_ns >= 1_030 * MS {
-            output.words = [ZERO_VOLT; ACTUATORS];
-        }
-    }
+    silence(&mut recording, 1_030..2_000);
     recording.signs.display = vec![said(992, DisplayState::Fading(Hold::Stale))];
     let unmet = unmet_of_cut(&recording);
     assert_eq!(unmet, ["does not drive again within 300 ms of its end"]);
@@ -355,11 +353,7 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
             let gain = gain(output.at_ns as f64 * 1e-9);
             output.words = output.words.map(|word| word_of(gain * volts(word)));
         }
-        let mut scene = Scene {
-            duration_s: 2.0,
-            faults: vec![Fault::new(Kind::Nothing, at_s)],
-            ..Scene::constant(2.0, 50.0)
-        };
+        let mut scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, at_s)]);
         scene.display.configuration.rendering = rendering;
         finding(&scene, 0, 2_000 * MS, &recording).unmet()
     };
@@ -433,11 +427,7 @@ fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
         for (output, &word) in late.zip(words) {
             output.words[3] = word;
         }
-        let mut scene = Scene {
-            duration_s: 2.0,
-            faults: vec![Fault::new(Kind::Nothing, 0.5)],
-            ..Scene::constant(2.0, 50.0)
-        };
+        let mut scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, 0.5)]);
         scene.display.configuration.amplitude_mv = amplitude_mv;
         finding(&scene, 0, 2_000 * MS, &recording).unmet()
     };
@@ -457,11 +447,7 @@ fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
 #[test]
 fn what_is_too_short_or_too_small_need_not_be_seen() {
     let judged = |fault: Fault| {
-        let scene = Scene {
-            duration_s: 2.0,
-            faults: vec![fault],
-            ..Scene::constant(2.0, 50.0)
-        };
+        let scene = with_faults(2.0, vec![fault]);
         finding(&scene, 0, 2_000 * MS, &Run::steady(50.0, 2.0).record()).unmet()
     };
     let jump = |counts: f64| {
@@ -611,34 +597,26 @@ fn a_stop_after_a_stop_need_not_show_and_outputs_have_to_stay_at_zero() {
         Fault::new(Kind::StopFromPeer, 0.5),
         Fault::new(Kind::StopFromPeer, 1.0),
     ];
-    let scene = Scene {
-        duration_s: 2.0,
-        faults,
-        ..Scene::constant(2.0, 50.0)
-    };
+    let scene = with_faults(2.0, faults);
     let mut recording = Run::steady(50.0, 2.0).record();
-    let mut silence = |to_ms: u64| {
-        for output in &mut recording.outputs {
-            if (500 * MS..to_ms * MS).contains(&output.at_ns) {
-                output.words = [ZERO_VOLT; ACTUATORS];
-            }
-        }
+    let mut silent_to = |to_ms: u64| {
+        silence(&mut recording, 500..to_ms);
         recording.outputs.dedup_by_key(|output| output.words);
         judge(&scene, &recording).remove(1)
     };
     // It has not stopped.
     assert_eq!(
-        silence(0).unmet(),
+        silent_to(0).unmet(),
         ["no sign of it", "outputs not at 0 V", "50 outputs stuck"]
     );
     assert_eq!(
-        silence(1_500).unmet(),
+        silent_to(1_500).unmet(),
         [
             "outputs not at 0 V",
             "restarted against the table: 0 resets, drives again"
         ]
     );
-    let finding = silence(2_000);
+    let finding = silent_to(2_000);
     assert_eq!(finding.unmet(), [""; 0]);
     assert_eq!(
         finding.unjudged,

@@ -6,11 +6,7 @@ use crate::scene::Motion;
 /// A scene of some faults with a hand at 50 mm/s over 2 mm.
 fn several(duration_s: f64, faults: &[(Kind, f64)]) -> Scene {
     let faults = faults.iter().map(|&(kind, at_s)| Fault::new(kind, at_s));
-    Scene {
-        duration_s,
-        faults: faults.collect(),
-        ..Scene::constant(2.0, 50.0)
-    }
+    with_faults(duration_s, faults.collect())
 }
 
 /// A sound recording of that, with the outputs at 0 V for a time, in ms.
@@ -20,11 +16,7 @@ fn silent(duration_s: f64, silent_ms: std::ops::Range<u64>) -> Recording {
         ..Run::steady(50.0, 2.0)
     }
     .record();
-    for output in &mut recording.outputs {
-        if (silent_ms.start * MS..silent_ms.end * MS).contains(&output.at_ns) {
-            output.words = [ZERO_VOLT; ACTUATORS];
-        }
-    }
+    silence(&mut recording, silent_ms);
     recording
 }
 
@@ -65,20 +57,24 @@ fn a_hand_that_rests_until_its_estimates_are_too_old_is_no_false_alarm() {
             estimate: Box::new(move |t_s| (2.0, t_s < stands_s)),
             ..Run::steady(50.0, 2.0)
         };
-        let mut recording = run.record();
-        recording.outputs.retain(|output| output.at_ns < 819 * MS);
-        recording.outputs.push(OutputRecord {
-            at_ns: 819 * MS,
-            words: [ZERO_VOLT; ACTUATORS],
-            skew_ns: 0,
-        });
-        recording.signs.display = vec![said(said_ms, DisplayState::Fading(Hold::Stale))];
-        let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
-        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+        faded_out(run.record(), said_ms)
     };
     // The last valid one is of 0.79 s, and has come 1 ms later.
     assert_eq!(unmet(1_293), [""; 0]);
     assert!(unmet(1_000)[0].starts_with("not to be expected: display: fading, Stale"));
+}
+
+/// What is unmet of a display that is at 0 V from 819 ms on and says at `said_ms` that it has heard nothing for too long.
+fn faded_out(mut recording: Recording, said_ms: u64) -> Vec<String> {
+    recording.outputs.retain(|output| output.at_ns < 819 * MS);
+    recording.outputs.push(OutputRecord {
+        at_ns: 819 * MS,
+        words: [ZERO_VOLT; ACTUATORS],
+        skew_ns: 0,
+    });
+    recording.signs.display = vec![said(said_ms, DisplayState::Fading(Hold::Stale))];
+    let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
+    finding(&scene, 0, 2_000 * MS, &recording).unmet()
 }
 
 /// A reset of the display's, by the scene.
@@ -98,11 +94,7 @@ fn the_phase_is_compared_with_that_of_the_board_that_runs() {
             ..Run::steady(50.0, 2.0)
         };
         let mut recording = run.record();
-        for output in &mut recording.outputs {
-            if (350 * MS..400 * MS).contains(&output.at_ns) {
-                output.words = [ZERO_VOLT; ACTUATORS];
-            }
-        }
+        silence(&mut recording, 350..400);
         recording.signs.resets = resets;
         let scene = several(2.0, &[(Kind::BrownOut, 0.35), (Kind::Nothing, 0.5)]);
         finding(&scene, 1, 2_000 * MS, &recording).unmet()
@@ -115,11 +107,7 @@ fn the_phase_is_compared_with_that_of_the_board_that_runs() {
 fn what_a_display_knew_before_its_restart_counts_no_more() {
     // It starts again, hears two estimates, and then nothing for 0.7 s.
     let mut recording = silent(3.0, 911..1_430);
-    for output in &mut recording.outputs {
-        if (500 * MS..720 * MS).contains(&output.at_ns) {
-            output.words = [ZERO_VOLT; ACTUATORS];
-        }
-    }
+    silence(&mut recording, 500..720);
     let is_heard = |at_ns: u64| {
         !(500 * MS..700 * MS).contains(&at_ns) && !(715 * MS..1_415 * MS).contains(&at_ns)
     };
@@ -242,15 +230,7 @@ fn a_surface_that_was_met_just_now_counts_to_the_tick() {
                 arrival.estimate.confidence = 0.3;
             }
         }
-        recording.outputs.retain(|output| output.at_ns < 819 * MS);
-        recording.outputs.push(OutputRecord {
-            at_ns: 819 * MS,
-            words: [ZERO_VOLT; ACTUATORS],
-            skew_ns: 0,
-        });
-        recording.signs.display = vec![said(said_ms, DisplayState::Fading(Hold::Stale))];
-        let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
-        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+        faded_out(recording, said_ms)
     };
     // Known for the 60 ms up to 0.761 s, so it counts for 300 ms more; the tick after that is at 1.0615 s.
     assert_eq!(unmet(1_062), [""; 0]);
