@@ -133,6 +133,13 @@ mod tests {
 
     const FRAME_SPACING_NS: u64 = 1_000_000;
 
+    /// A fair link but for what `spoil` does to it.
+    fn link(spoil: fn(&mut Link)) -> Link {
+        let mut link = Link::default();
+        spoil(&mut link);
+        link
+    }
+
     /// Sends frames `n n 0` for n from 1 to 200, again and again, a millisecond apart; gives what arrives.
     fn send(link: Link, seed: u64, frames: usize) -> Vec<(u64, u8)> {
         let mut weather = Impairments::new(&link, seed, 0);
@@ -171,14 +178,7 @@ mod tests {
     #[test]
     fn delay_moves_every_byte_by_the_same_time() {
         let fair = send(Link::default(), 1, 100);
-        let late = send(
-            Link {
-                delay_ms: 20.0,
-                ..Link::default()
-            },
-            1,
-            100,
-        );
+        let late = send(link(|link| link.delay_ms = 20.0), 1, 100);
         assert!(
             fair.iter()
                 .zip(&late)
@@ -188,14 +188,7 @@ mod tests {
 
     #[test]
     fn loss_takes_whole_frames_at_its_share() {
-        let arrived = send(
-            Link {
-                loss: 0.25,
-                ..Link::default()
-            },
-            7,
-            20_000,
-        );
+        let arrived = send(link(|link| link.loss = 0.25), 7, 20_000);
         assert!(
             arrived
                 .chunks(3)
@@ -204,30 +197,13 @@ mod tests {
         // Binomial: σ = √(20 000 · 0.25 · 0.75) = 61; 5 σ.
         let lost = 20_000 - arrived.len() as i64 / 3;
         assert!((lost - 5_000).abs() < 306, "{lost} lost");
-        assert!(
-            send(
-                Link {
-                    loss: 1.0,
-                    ..Link::default()
-                },
-                7,
-                100
-            )
-            .is_empty()
-        );
+        assert!(send(link(|link| link.loss = 1.0), 7, 100).is_empty());
     }
 
     #[test]
     fn jitter_spreads_frames_within_its_bound_and_keeps_their_order() {
         let fair = send(Link::default(), 3, 200);
-        let arrived = send(
-            Link {
-                jitter_ms: 5.0,
-                ..Link::default()
-            },
-            3,
-            200,
-        );
+        let arrived = send(link(|link| link.jitter_ms = 5.0), 3, 200);
         assert_eq!(numbers(&arrived), numbers(&fair));
         assert!(
             arrived
@@ -242,14 +218,7 @@ mod tests {
 
     #[test]
     fn reordered_frames_come_right_after_the_one_that_followed_them() {
-        let arrived = numbers(&send(
-            Link {
-                reorder: 0.1,
-                ..Link::default()
-            },
-            5,
-            200,
-        ));
+        let arrived = numbers(&send(link(|link| link.reorder = 0.1), 5, 200));
         // Nothing is lost, but a held last frame has nothing to come after.
         assert!(arrived.len() >= 199);
         let mut swapped = 0;
@@ -265,28 +234,14 @@ mod tests {
         }
         // A frame that follows a held one is never held: a share of 0.1 / 1.1 of 200; σ < 4.3; 4 σ.
         assert!((2..=35).contains(&swapped), "{swapped} swapped");
-        let all = numbers(&send(
-            Link {
-                reorder: 1.0,
-                ..Link::default()
-            },
-            5,
-            4,
-        ));
+        let all = numbers(&send(link(|link| link.reorder = 1.0), 5, 4));
         assert_eq!(all, [2, 1, 4, 3]);
     }
 
     #[test]
     fn corruption_turns_one_bit_of_its_share_of_bytes() {
         let fair = send(Link::default(), 9, 20_000);
-        let arrived = send(
-            Link {
-                corrupt: 0.01,
-                ..Link::default()
-            },
-            9,
-            20_000,
-        );
+        let arrived = send(link(|link| link.corrupt = 0.01), 9, 20_000);
         assert_eq!(arrived.len(), fair.len());
         let turned: Vec<u32> = arrived
             .iter()
@@ -318,10 +273,7 @@ mod tests {
 
     #[test]
     fn the_two_directions_have_their_own_weather() {
-        let link = Link {
-            loss: 0.5,
-            ..Link::default()
-        };
+        let link = link(|link| link.loss = 0.5);
         let survivors = |direction| {
             let mut weather = Impairments::new(&link, 1, direction);
             (0..64u64).for_each(|at| weather.push(at * BYTE_NS, 0));

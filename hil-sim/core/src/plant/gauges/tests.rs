@@ -9,6 +9,13 @@ fn surface() -> Surface {
     Surface::new(&Scene::constant(2.0, 50.0).surface, 0.0)
 }
 
+/// Gauges in good order but for what `spoil` does to them.
+fn spoilt(spoil: fn(&mut Kinematic)) -> Kinematic {
+    let mut kinematic = Kinematic::default();
+    spoil(&mut kinematic);
+    kinematic
+}
+
 /// Ten seconds at 50 mm/s.
 fn scans(kinematic: Kinematic, seed: u64) -> Vec<[u16; GAUGES]> {
     let surface = surface();
@@ -25,6 +32,13 @@ fn lane(scans: &[[u16; GAUGES]], channel: usize) -> Vec<f64> {
     scans
         .iter()
         .map(|codes| f64::from(codes[channel]))
+        .collect()
+}
+
+fn difference(one: &[f64], other: &[f64]) -> Vec<f64> {
+    one.iter()
+        .zip(other)
+        .map(|(one, other)| one - other)
         .collect()
 }
 
@@ -65,17 +79,10 @@ fn each_gauge_has_its_gain_place_and_phase() {
 
 #[test]
 fn the_noise_has_the_power_that_the_ratio_asks_for_and_is_white() {
-    let noisy = Kinematic {
-        snr_db: Some(10.0),
-        ..Kinematic::default()
-    };
+    let noisy = spoilt(|gauges| gauges.snr_db = Some(10.0));
     let (clean, noisy) = (scans(Kinematic::default(), 1), scans(noisy, 1));
     for gauge in 0..GAUGES {
-        let noise: Vec<f64> = lane(&noisy, gauge)
-            .iter()
-            .zip(lane(&clean, gauge))
-            .map(|(noisy, clean)| noisy - clean)
-            .collect();
+        let noise = difference(&lane(&noisy, gauge), &lane(&clean, gauge));
         let power = noise.iter().map(|n| n * n).sum::<f64>() / SCANS as f64;
         // A quarter of it lies in 0–500 of 2000 Hz.
         let signal = 0.5 * CODES_PER_UNIT * CODES_PER_UNIT;
@@ -91,13 +98,7 @@ fn the_noise_has_the_power_that_the_ratio_asks_for_and_is_white() {
 
 #[test]
 fn hum_is_common_to_all_gauges_and_relative_to_the_signal() {
-    let scans = scans(
-        Kinematic {
-            hum_50_hz: 0.5,
-            ..Kinematic::default()
-        },
-        1,
-    );
+    let scans = scans(spoilt(|gauges| gauges.hum_50_hz = 0.5), 1);
     for gauge in 0..GAUGES {
         let (amplitude, phase) = tone(&lane(&scans, gauge), 50.0);
         assert!(
@@ -111,19 +112,9 @@ fn hum_is_common_to_all_gauges_and_relative_to_the_signal() {
 #[test]
 fn mains_of_60_hz_and_off_nominal_are_where_they_are_said_to_be() {
     for (kinematic, hz) in [
+        (spoilt(|gauges| gauges.hum_60_hz = 2.0), 60.0),
         (
-            Kinematic {
-                hum_60_hz: 2.0,
-                ..Kinematic::default()
-            },
-            60.0,
-        ),
-        (
-            Kinematic {
-                hum_50_hz: 2.0,
-                hum_off_hz: -0.5,
-                ..Kinematic::default()
-            },
+            spoilt(|gauges| (gauges.hum_50_hz, gauges.hum_off_hz) = (2.0, -0.5)),
             49.5,
         ),
     ] {
@@ -169,10 +160,7 @@ fn a_dead_gauge_rests_a_saturated_one_clips_and_the_others_stay_as_they_were() {
 
 #[test]
 fn noise_is_the_seed_s() {
-    let noisy = Kinematic {
-        snr_db: Some(20.0),
-        ..Kinematic::default()
-    };
+    let noisy = spoilt(|gauges| gauges.snr_db = Some(20.0));
     assert_eq!(scans(noisy, 3), scans(noisy, 3));
     assert_ne!(scans(noisy, 3), scans(noisy, 4));
 }
@@ -214,10 +202,7 @@ fn rms(values: &[f64]) -> f64 {
 
 #[test]
 fn a_stuck_a_noisy_and_a_humming_gauge_are_so_and_the_others_stay_as_they_were() {
-    let mut broken = Kinematic {
-        snr_db: Some(20.0),
-        ..Kinematic::default()
-    };
+    let mut broken = spoilt(|gauges| gauges.snr_db = Some(20.0));
     let whole = scans(broken, 5);
     broken.stuck[0] = true;
     broken.noisy[2] = true;
@@ -244,10 +229,7 @@ fn a_stuck_a_noisy_and_a_humming_gauge_are_so_and_the_others_stay_as_they_were()
 
 #[test]
 fn troubles_come_and_go() {
-    let sound = Kinematic {
-        snr_db: Some(20.0),
-        ..Kinematic::default()
-    };
+    let sound = spoilt(|gauges| gauges.snr_db = Some(20.0));
     let mut broken = Kinematic {
         trouble_from_s: 2.0,
         trouble_for_s: Some(0.5),
@@ -273,20 +255,10 @@ fn troubles_come_and_go() {
 
 #[test]
 fn drift_and_offset_are_what_they_are_said_to_be() {
-    let offset = Kinematic {
-        offset: 2.0,
-        ..Kinematic::default()
-    };
-    let drift = Kinematic {
-        drift: 0.2,
-        ..Kinematic::default()
-    };
-    let quiet = scans(Kinematic::default(), 1);
+    let offset = spoilt(|gauges| gauges.offset = 2.0);
+    let drift = spoilt(|gauges| gauges.drift = 0.2);
     for gauge in 0..GAUGES {
-        let quiet: Vec<f64> = lane(&quiet, gauge)
-            .into_iter()
-            .map(|code| (code - 2047.5) / CODES_PER_UNIT)
-            .collect();
+        let quiet = units(Kinematic::default(), gauge);
         // A code is 0.0027 units.
         let offset = units(offset, gauge);
         let share = [-2.0, -1.0, 0.0, 1.0, 2.0][gauge];
@@ -311,11 +283,7 @@ fn pink_noise_has_its_rms_its_slope_and_its_own_stream() {
     let white = Kinematic { pink: 0.0, ..pink };
     let (mut power, mut slow, mut fast) = (0.0, 0.0, 0.0);
     for gauge in 0..GAUGES {
-        let noise: Vec<f64> = units(pink, gauge)
-            .iter()
-            .zip(units(white, gauge))
-            .map(|(pink, white)| pink - white)
-            .collect();
+        let noise = difference(&units(pink, gauge), &units(white, gauge));
         power += rms(&noise).powi(2) / 5.0;
         // An octave from 20 of its tones.
         let octave = |low_hz: f64| -> f64 {
