@@ -2,43 +2,18 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use quick_junit::Report;
 use serde_json::Value;
 
+use crate::{command, folder, told};
+
 const SOUND: &str = "duration_s = 0.3\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
-
-/// A folder of the test's own, empty.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ci").join(test);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hil-sim"));
-    command
-        .current_dir(folder)
-        .args(arguments)
-        .env_remove("GITHUB_ACTIONS");
-    command
-}
 
 /// Runs `hil-sim` in `folder`: exit status, standard output, standard error.
 fn hil_sim(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
-    told(command(folder, arguments).output().unwrap())
-}
-
-fn told(output: Output) -> (Option<i32>, String, String) {
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (
-        output.status.code(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+    told(crate::hil_sim(folder, arguments))
 }
 
 /// Scenes of these names, all sound, with the name's place as seed.
@@ -60,7 +35,7 @@ fn json(folder: &Path, file: &str) -> Vec<Value> {
 
 #[test]
 fn what_is_not_as_expected_is_a_failure_and_an_annotation_at_its_line() {
-    let folder = folder("failure");
+    let folder = folder("ci/failure");
     scenes(&folder, &["good"]);
     let bad = format!("{SOUND}\n[expect]\nwrong_share_max = 0.5\nmean_mm = 3.0\n");
     fs::write(folder.join("bad.toml"), bad).unwrap();
@@ -121,7 +96,7 @@ fn what_is_not_as_expected_is_a_failure_and_an_annotation_at_its_line() {
 
 #[test]
 fn what_cannot_be_used_is_an_error_at_its_line_and_nothing_runs() {
-    let folder = folder("error");
+    let folder = folder("ci/error");
     scenes(&folder, &["good"]);
     fs::write(folder.join("bad.toml"), "seed = 1\nduration_s = 0\n").unwrap();
     let board = format!("{SOUND}[[fault]]\nkind = \"panic\"\nat_s = 0.1\n");
@@ -159,7 +134,7 @@ fn what_cannot_be_used_is_an_error_at_its_line_and_nothing_runs() {
 
 #[test]
 fn every_scene_is_in_one_shard_and_threads_change_nothing() {
-    let folder = folder("shards");
+    let folder = folder("ci/shards");
     let names = ["a", "b", "c", "d", "e", "f", "g"];
     fs::create_dir(folder.join("more")).unwrap();
     scenes(&folder, &names[..4]);
@@ -216,7 +191,7 @@ fn every_scene_is_in_one_shard_and_threads_change_nothing() {
 
 #[test]
 fn golden_hashes_hold_until_a_run_changes_and_are_renewed_by_one_command() {
-    let folder = folder("golden");
+    let folder = folder("ci/golden");
     scenes(&folder, &["a", "b"]);
     let (status, _, errors) = hil_sim(&folder, &["golden", "check", "a.toml"]);
     assert_eq!(status, Some(2));
@@ -285,7 +260,7 @@ fn golden_hashes_hold_until_a_run_changes_and_are_renewed_by_one_command() {
 
 #[test]
 fn a_report_says_that_a_run_has_changed_since_its_golden_hash() {
-    let folder = folder("golden-report");
+    let folder = folder("ci/golden-report");
     scenes(&folder, &["a", "b"]);
     assert_eq!(hil_sim(&folder, &["golden", "renew", "."]).0, Some(0));
     let text = fs::read_to_string(folder.join("b.toml")).unwrap();
@@ -299,7 +274,7 @@ fn a_report_says_that_a_run_has_changed_since_its_golden_hash() {
 
 #[test]
 fn the_first_scene_is_written_once_loads_and_passes() {
-    let folder = folder("init");
+    let folder = folder("ci/init");
     let (status, output, errors) = hil_sim(&folder, &["init", "mine.toml"]);
     assert_eq!(status, Some(0), "{errors}");
     assert!(output.contains("hil-sim run mine.toml"), "{output}");
@@ -319,7 +294,7 @@ fn the_first_scene_is_written_once_loads_and_passes() {
 
 #[test]
 fn every_line_of_the_first_scene_that_is_not_in_force_may_be() {
-    let folder = folder("init-all");
+    let folder = folder("ci/init-all");
     hil_sim(&folder, &["init", "mine.toml"]);
     let text = fs::read_to_string(folder.join("mine.toml")).unwrap();
     // A key or a section behind "# ", at the line's beginning.
@@ -360,7 +335,7 @@ fn the_committed_golden_hashes_hold() {
 
 #[test]
 fn a_file_that_holds_no_hashes_is_made_anew_as_its_refusal_says() {
-    let folder = folder("golden-garbage");
+    let folder = folder("ci/golden-garbage");
     scenes(&folder, &["a"]);
     let renew = ["golden", "renew", "--file", "g.toml", "a.toml"];
     for garbage in ["garbage [", "[\"a.toml\"]\nnative = \"7\"\n"] {

@@ -1,49 +1,25 @@
 //! What is measured on the display's ELF, a little of each. Needs the two ELFs, as ./test builds them.
 
-use std::env;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-/// Where cargo, or the folder named in RIDGELINK_ELVES, has a board's ELF.
-fn elf(board: &str) -> PathBuf {
-    let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/thumbv7em-none-eabihf/release"),
-        PathBuf::from,
-    );
-    folder.join(format!("firmware-{board}"))
-}
+use protocol::Role;
 
-/// A folder of the test's own, empty.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("display-cli")
-        .join(name);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
+use crate::{elf, folder, hil_sim_anywhere, told};
 
 /// Runs a command on the display's ELF: exit status, what it printed, what it complained about.
 fn run(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .args(arguments)
-        .arg("--display-elf")
-        .arg(elf("display"))
-        .output()
-        .unwrap();
-    (
-        output.status.code(),
-        String::from_utf8(output.stdout).unwrap(),
-        String::from_utf8(output.stderr).unwrap(),
-    )
+    let elf = elf(Role::Display).display().to_string();
+    told(hil_sim_anywhere(
+        &[arguments, &["--display-elf", &elf]].concat(),
+    ))
 }
 
 /// Runs a chart that meets its goals; its picture and its table are there, the table with rows.
 fn assert_drawn(name: &str, arguments: &[&str]) {
-    let folder = folder(name);
+    let folder = folder(&format!("display-cli/{name}"));
     let out = folder.display().to_string();
     let arguments = [arguments, &["--quick", "--out", &out]].concat();
     let (status, printed, complaint) = run(&arguments);
@@ -72,14 +48,14 @@ fn the_link_s_delay_leaves_the_stimulus_in_step() {
 
 #[test]
 fn partials_and_the_random_part_carry_more_of_a_surface() {
-    let sensor = elf("sensor").display().to_string();
+    let sensor = elf(Role::Sensor).display().to_string();
     assert_drawn("texture", &["chart", "texture", "--sensor-elf", &sensor]);
 }
 
 /// A folder with one recording of a stroke over ridges of 2 mm and three partials, in which the arm is at `x_mm` at an
 /// instant in s; half a second at rest in front.
 fn recording(name: &str, x_mm: impl Fn(f64) -> f64) -> PathBuf {
-    let folder = folder(name);
+    let folder = folder(&format!("display-cli/{name}"));
     let (mut motion, mut gauges) = ("t_s,x_mm\n".to_owned(), "t_s,g0,g1,g2,g3,g4\n".to_owned());
     for row in 0..=4_000 {
         let t_s = f64::from(row) * 1e-3;
@@ -177,7 +153,7 @@ fn instructions_stay_within_their_budget() {
 
 #[test]
 fn a_short_soak_finds_every_counter_as_it_must_be() {
-    let sensor = elf("sensor").display().to_string();
+    let sensor = elf(Role::Sensor).display().to_string();
     let (status, printed, complaint) = run(&["soak", "--minutes", "0.2", "--sensor-elf", &sensor]);
     assert_eq!(status, Some(0), "{printed}{complaint}");
     assert!(printed.contains("all as it must be"), "{printed}");
@@ -192,12 +168,9 @@ fn a_soak_of_no_time_is_refused() {
 
 #[test]
 fn a_missing_elf_exits_2_with_the_command_that_builds_it() {
-    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .args(["timing", "--display-elf", "no-such-elf", "--out"])
-        .arg(folder("missing"))
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    let complaint = String::from_utf8(output.stderr).unwrap();
+    let out = folder("display-cli/missing").display().to_string();
+    let arguments = ["timing", "--display-elf", "no-such-elf", "--out", &out];
+    let (status, _, complaint) = told(hil_sim_anywhere(&arguments));
+    assert_eq!(status, Some(2));
     assert!(complaint.contains("cargo build"), "{complaint}");
 }

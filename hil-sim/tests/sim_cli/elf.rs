@@ -1,23 +1,15 @@
 //! `hil-sim run --engine elf` with files that are not the firmware wanted. Needs the two ELFs, as
 //! ./test builds them.
 
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use protocol::{Hello, PROTOCOL_VERSION, Role};
 
-const SCENE: &str = "duration_s = 0.3\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+use crate::{command, elf as built, folder, told};
 
-/// Where cargo, or the folder named in RIDGELINK_ELVES, has the ELF of a board.
-fn built(role: Role) -> PathBuf {
-    let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/thumbv7em-none-eabihf/release"),
-        PathBuf::from,
-    );
-    folder.join(format!("firmware-{}", role.name()))
-}
+const SCENE: &str = "duration_s = 0.3\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
 
 fn elf(role: Role) -> Vec<u8> {
     let path = built(role);
@@ -30,43 +22,17 @@ fn elf(role: Role) -> Vec<u8> {
     })
 }
 
-/// An empty folder of a test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("elf-cli")
-        .join(name);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 /// Runs a scene with this file as the sensor's firmware, in a folder of the test's own: exit status,
 /// what it printed, and what it complained about.
 fn run_with_sensor(name: &str, bytes: Option<&[u8]>) -> (Option<i32>, String, String) {
-    let folder = folder(name);
+    let folder = folder(&format!("elf-cli/{name}"));
     fs::write(folder.join("a.toml"), SCENE).unwrap();
     if let Some(bytes) = bytes {
         fs::write(folder.join("sensor.elf"), bytes).unwrap();
     }
-    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(&folder)
-        .args([
-            "run",
-            "a.toml",
-            "--engine",
-            "elf",
-            "--sensor-elf",
-            "sensor.elf",
-        ])
-        .arg("--display-elf")
-        .arg(built(Role::Display))
-        .output()
-        .unwrap();
-    (
-        output.status.code(),
-        String::from_utf8(output.stdout).unwrap(),
-        String::from_utf8(output.stderr).unwrap(),
-    )
+    let mut run = command(&folder, &["run", "a.toml", "--engine", "elf"]);
+    run.args(["--sensor-elf", "sensor.elf", "--display-elf"]);
+    told(run.arg(built(Role::Display)).output().unwrap())
 }
 
 fn assert_refused(name: &str, bytes: Option<&[u8]>, says: &[&str]) {
@@ -89,18 +55,23 @@ fn the_two_firmwares_run_a_scene() {
     assert!(printed.contains("ok"), "{printed}");
 }
 
+/// `hil-sim` with the two firmwares.
+fn with_elves(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = command(folder, arguments);
+    command.arg("--sensor-elf").arg(built(Role::Sensor));
+    command.arg("--display-elf").arg(built(Role::Display));
+    command
+}
+
 /// The hashes of scenes that are run one after the other, by one process.
 fn hashes(folder: &Path, scenes: &[&str]) -> Vec<String> {
-    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(folder)
-        .args(["run", "--engine", "elf", "-j", "1", "--json", "out.json"])
-        .arg("--sensor-elf")
-        .arg(built(Role::Sensor))
-        .arg("--display-elf")
-        .arg(built(Role::Display))
-        .args(scenes)
-        .output()
-        .unwrap();
+    let output = with_elves(
+        folder,
+        &["run", "--engine", "elf", "-j", "1", "--json", "out.json"],
+    )
+    .args(scenes)
+    .output()
+    .unwrap();
     assert!(output.status.success(), "{output:?}");
     let results: Vec<serde_json::Value> =
         serde_json::from_slice(&fs::read(folder.join("out.json")).unwrap()).unwrap();
@@ -110,7 +81,7 @@ fn hashes(folder: &Path, scenes: &[&str]) -> Vec<String> {
 
 #[test]
 fn boards_that_have_run_other_scenes_run_as_fresh_ones_do() {
-    let folder = folder("one-after-the-other");
+    let folder = folder("elf-cli/one-after-the-other");
     fs::write(folder.join("a.toml"), SCENE).unwrap();
     // Another method, on a sensor that is led through its configuration, and a board that starts anew.
     let other = format!(
@@ -197,14 +168,9 @@ fn table_rows(text: &str) -> Vec<Vec<f64>> {
 fn the_demo_prints_the_table_that_the_documents_show() {
     /// What two compilers may make of it, in the columns' units.
     const ALIKE: f64 = 0.02;
-    let output = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .args(["demo", "--report", "demo.html", "--sensor-elf"])
-        .arg(built(Role::Sensor))
-        .arg("--display-elf")
-        .arg(built(Role::Display))
-        .current_dir(folder("demo"))
-        .output()
-        .unwrap();
+    let arguments = ["demo", "--report", "demo.html"];
+    let output = with_elves(&folder("elf-cli/demo"), &arguments).output();
+    let output = output.unwrap();
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let printed = table_rows(&String::from_utf8(output.stdout).unwrap());
     assert_eq!(printed.len(), 12);

@@ -2,7 +2,6 @@
 //! could break.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use hil_sim_core::judge::fault::judge;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
@@ -10,6 +9,8 @@ use hil_sim_core::native;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::catalogue::{Class, Needs};
 use hil_sim_core::scene::fault::{Fault, Kind};
+
+use crate::{errors, hil_sim_anywhere, text};
 
 /// The estimator is sure by then.
 const AT_S: f64 = 1.0;
@@ -141,18 +142,11 @@ fn a_fault_that_nothing_noticed_is_not_as_the_scene_expects() {
     );
 }
 
-fn hil_sim(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
 #[test]
 fn the_list_tells_of_every_kind_and_every_key() {
-    let output = hil_sim(&["faults"]);
+    let output = hil_sim_anywhere(&["faults"]);
     assert_eq!(output.status.code(), Some(0));
-    let list = String::from_utf8(output.stdout).unwrap();
+    let list = text(&output.stdout);
     for kind in Kind::all() {
         let row = kind.row();
         let entry = list.split(&format!("\n{}: ", row.name)).nth(1);
@@ -172,17 +166,17 @@ fn the_list_tells_of_every_kind_and_every_key() {
 
 #[test]
 fn a_campaign_of_an_unknown_kind_is_refused() {
-    let output = hil_sim(&["campaign", "--kinds", "panic,gremlin"]);
+    let output = hil_sim_anywhere(&["campaign", "--kinds", "panic,gremlin"]);
     assert_eq!(output.status.code(), Some(2));
-    let errors = String::from_utf8(output.stderr).unwrap();
+    let errors = errors(&output);
     assert!(errors.contains("gremlin: no such kind"), "{errors}");
 }
 
 #[test]
 fn a_campaign_that_would_try_nothing_is_refused() {
-    let output = hil_sim(&["campaign", "--instants", "0"]);
+    let output = hil_sim_anywhere(&["campaign", "--instants", "0"]);
     assert_eq!(output.status.code(), Some(2));
-    let errors = String::from_utf8(output.stderr).unwrap();
+    let errors = errors(&output);
     assert!(errors.contains("a whole number of 1 or more"), "{errors}");
 }
 
@@ -240,9 +234,9 @@ fn what_the_scenes_end_leaves_no_time_for_is_said_on_the_terminal() {
     let scene = "duration_s = 1.5\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n\
         [[fault]]\nat_s = 0.6\nkind = \"hand-encoder-dead\"\n";
     std::fs::write(&path, scene).unwrap();
-    let output = hil_sim(&["run", path.to_str().unwrap()]);
+    let output = hil_sim_anywhere(&["run", path.to_str().unwrap()]);
     std::fs::remove_file(&path).unwrap();
-    let said = String::from_utf8(output.stdout).unwrap();
+    let said = text(&output.stdout);
     let line = "  not judged: fault[0] hand-encoder-dead: whether it shows within 3500 ms: the scene ends before\n";
     assert!(said.contains(line), "{said}");
     assert_eq!(output.status.code(), Some(0), "{said}");

@@ -2,20 +2,18 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
+
+use crate::{errors, hil_sim, json};
 
 /// 2 mm, seen without noise.
 const CLEAN: &str = "duration_s = 2.0\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
 
 /// A folder of the test's own, with these files in it and no others.
 fn folder(test: &str, files: &[(&str, &str)]) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("jury")
-        .join(test);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
+    let folder = crate::folder(&format!("jury/{test}"));
     for (name, text) in files {
         fs::write(folder.join(name), text).unwrap();
     }
@@ -23,20 +21,7 @@ fn folder(test: &str, files: &[(&str, &str)]) -> PathBuf {
 }
 
 fn jury(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(folder)
-        .arg("jury")
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+    hil_sim(folder, &[&["jury"], arguments].concat())
 }
 
 /// Expects a refusal that says all of this.

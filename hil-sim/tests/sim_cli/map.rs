@@ -1,20 +1,8 @@
 //! `hil-sim map` as a person or a script meets it.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
-/// Runs `hil-sim` in a folder where it may write.
-fn hil_sim(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(Path::new(env!("CARGO_TARGET_TMPDIR")))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use crate::{hil_sim_anywhere, text};
 
 #[test]
 fn what_cannot_be_done_exits_2_and_says_what_can() {
@@ -35,7 +23,7 @@ fn what_cannot_be_done_exits_2_and_says_what_can() {
         ),
         (&["map", "--jobs", "0"], "--jobs"),
     ] {
-        let output = hil_sim(arguments);
+        let output = hil_sim_anywhere(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         assert!(output.stdout.is_empty(), "{arguments:?}");
         let errors = text(&output.stderr);
@@ -45,7 +33,7 @@ fn what_cannot_be_done_exits_2_and_says_what_can() {
 
 #[test]
 fn the_list_names_every_map_with_its_cells() {
-    let output = hil_sim(&["map", "--list"]);
+    let output = hil_sim_anywhere(&["map", "--list"]);
     assert_eq!(output.status.code(), Some(0));
     let list = text(&output.stdout);
     for map in hil_sim_studies::map::catalogue() {
@@ -64,7 +52,7 @@ fn a_cell_s_scene_is_printed_and_can_be_run() {
         "--method",
         "counting",
     ];
-    let output = hil_sim(&place);
+    let output = hil_sim_anywhere(&place);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let scene = text(&output.stdout);
     assert!(
@@ -73,5 +61,8 @@ fn a_cell_s_scene_is_printed_and_can_be_run() {
     );
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("map-cell.toml");
     std::fs::write(&file, scene).unwrap();
-    assert_eq!(hil_sim(&["run", "map-cell.toml"]).status.code(), Some(0));
+    assert_eq!(
+        hil_sim_anywhere(&["run", "map-cell.toml"]).status.code(),
+        Some(0)
+    );
 }

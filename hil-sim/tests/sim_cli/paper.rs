@@ -1,31 +1,12 @@
 //! `hil-sim paper` as a person or a script meets it: on the libraries, which take seconds.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use hil_sim_core::native;
 use hil_sim_core::scene::Scene;
 
-/// A folder of the test's own, empty.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use crate::{folder, hil_sim, text};
 
 /// A CSV's rows, each of as many cells as its header.
 fn rows(path: &Path) -> Vec<Vec<String>> {

@@ -1,24 +1,11 @@
 //! `hil-sim people` as a person or a script meets it: on the libraries, which take seconds.
 
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn hil_sim(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(Path::new(env!("CARGO_TARGET_TMPDIR")))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
+use crate::{hil_sim_anywhere, text};
 
 #[test]
 fn the_tables_say_what_they_do_not_show_and_where_the_paper_errs() {
     let arguments = ["people", "--engine", "native", "--out", "people-tables"];
-    let output = hil_sim(&arguments);
+    let output = hil_sim_anywhere(&arguments);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let said = text(&output.stdout);
     for say in [
@@ -30,12 +17,12 @@ fn the_tables_say_what_they_do_not_show_and_where_the_paper_errs() {
     }
     assert!(!said.contains("NaN"), "{said}");
     // The same seed says the same again.
-    assert_eq!(text(&hil_sim(&arguments).stdout), said);
+    assert_eq!(text(&hil_sim_anywhere(&arguments).stdout), said);
 }
 
 #[test]
 fn json_holds_every_pair_of_either_method() {
-    let output = hil_sim(&[
+    let output = hil_sim_anywhere(&[
         "people",
         "--engine",
         "native",
@@ -68,7 +55,7 @@ fn json_holds_every_pair_of_either_method() {
 
 #[test]
 fn no_trials_are_refused() {
-    let output = hil_sim(&["people", "--trials", "0"]);
+    let output = hil_sim_anywhere(&["people", "--trials", "0"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("--trials"));
 }

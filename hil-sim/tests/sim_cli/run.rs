@@ -3,36 +3,18 @@
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::os::unix::process::ExitStatusExt;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use hil_sim_core::scene::Estimator;
+use protocol::Role;
+
+use crate::{command, elf, errors, folder, hil_sim, json};
 
 const SOUND: &str = "duration_s = 0.5\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
-
-/// A folder of the test's own, empty.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-/// Runs `hil-sim` in `folder`.
-fn hil_sim(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-fn errors(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
 
 #[test]
 fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
@@ -43,8 +25,7 @@ fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
         &["run", "a.toml", "--json", "o.json", "--report", "o.html"],
     );
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
-    let json: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    let json = json(&folder.join("o.json"));
     assert_eq!(json[0]["name"], "a");
     assert_eq!(json[0]["engine"], "native");
     assert_eq!(json[0]["method"], Estimator::default().method.name());
@@ -84,11 +65,8 @@ fn a_demo_or_a_paper_is_never_written_over_anything_else() {
             ("note.html", "is there, and no result from before"),
         ] {
             fs::write(folder.join(name), SOUND).unwrap();
-            let elves = concat!(
-                env!("CARGO_MANIFEST_DIR"),
-                "/../target/thumbv7em-none-eabihf/release/firmware-"
-            );
-            let [sensor, display] = ["sensor", "display"].map(|board| format!("{elves}{board}"));
+            let [sensor, display] =
+                [Role::Sensor, Role::Display].map(|role| elf(role).display().to_string());
             let output = hil_sim(
                 &folder,
                 &[
@@ -190,9 +168,7 @@ fn results_from_before_stay_until_there_are_new_ones() {
     fs::write(folder.join("a.toml"), SOUND).unwrap();
     let long = SOUND.replace("0.5", "600.0");
     fs::write(folder.join("long.toml"), long).unwrap();
-    let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(&folder)
-        .args(["run", "a.toml", "long.toml", "--json", "o.json"])
+    let mut run = command(&folder, &["run", "a.toml", "long.toml", "--json", "o.json"])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
@@ -211,10 +187,8 @@ fn a_run_that_a_signal_ends_leaves_no_draft() {
     fs::write(folder.join("a.toml"), SOUND).unwrap();
     fs::write(folder.join("long.toml"), SOUND.replace("0.5", "600.0")).unwrap();
     for (name, number) in [("INT", 2), ("TERM", 15)] {
-        let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-            .current_dir(&folder)
-            .args(["run", "a.toml", "long.toml", "--json", "o.json", "--junit"])
-            .arg("o.xml")
+        let mut run = command(&folder, &["run", "a.toml", "long.toml"])
+            .args(["--json", "o.json", "--junit", "o.xml"])
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -261,8 +235,7 @@ fn a_scene_of_the_banks_runs_with_its_successor_and_standard_error_says_so_once(
         errors(&output),
         "a.toml:5: estimator.method: method = \"bank\" is now \"spectrum\", its successor\n"
     );
-    let json: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    let json = json(&folder.join("o.json"));
     assert_eq!(json[0]["method"], "spectrum");
     // What is felt is in the summary, and in the line that is printed.
     let right = json[0]["summary"]["felt_right_share"].as_f64().unwrap();
@@ -357,9 +330,7 @@ fn a_reader_that_goes_away_changes_neither_files_nor_exit_status() {
     let folder = folder("unread");
     let scene = format!("{SOUND}[expect]\nmean_mm = 3.0\n");
     fs::write(folder.join("a.toml"), scene).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(&folder)
-        .args(["run", "a.toml", "--json", "o.json"])
+    let mut child = command(&folder, &["run", "a.toml", "--json", "o.json"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -368,8 +339,7 @@ fn a_reader_that_goes_away_changes_neither_files_nor_exit_status() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", errors(&output));
     assert_eq!(errors(&output), "");
-    let json: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(folder.join("o.json")).unwrap()).unwrap();
+    let json = json(&folder.join("o.json"));
     assert_eq!(json[0]["name"], "a");
 }
 
@@ -397,9 +367,7 @@ fn a_scene_out_of_a_pipe_is_read_once() {
     let pipe = folder.join("p.toml");
     let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    let mut run = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(&folder)
-        .args(["run", "p.toml"])
+    let mut run = command(&folder, &["run", "p.toml"])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
@@ -422,9 +390,7 @@ fn a_scene_out_of_a_pipe_is_read_once() {
 fn where_nobody_can_be_told_the_exit_status_says_it() {
     let folder = folder("untold");
     let full = File::options().write(true).open("/dev/full").unwrap();
-    let status = Command::new(env!("CARGO_BIN_EXE_hil-sim"))
-        .current_dir(&folder)
-        .args(["run", "nosuch"])
+    let status = command(&folder, &["run", "nosuch"])
         .stderr(full)
         .status()
         .unwrap();

@@ -2,10 +2,9 @@
 //! ./test builds them.
 #![cfg(target_os = "linux")]
 
-use std::env;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,6 +12,8 @@ use std::time::{Duration, Instant};
 use object::{Object, ObjectSection};
 use protocol::Role;
 use rustix::process::{Pid, Signal, kill_process};
+
+use crate::{elf as built, folder};
 
 /// Only what hangs takes so long.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -30,24 +31,6 @@ static ALONE: Mutex<()> = Mutex::new(());
 
 fn turn() -> MutexGuard<'static, ()> {
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Where cargo, or the folder named in RIDGELINK_ELVES, has the ELF of a board.
-fn built(role: Role) -> PathBuf {
-    let folder = env::var_os("RIDGELINK_ELVES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/thumbv7em-none-eabihf/release"),
-        PathBuf::from,
-    );
-    folder.join(format!("firmware-{}", role.name()))
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("serve-cli")
-        .join(name);
-    fs::remove_dir_all(&folder).ok();
-    fs::create_dir_all(&folder).unwrap();
-    folder
 }
 
 fn serve(folder: &Path) -> Command {
@@ -124,7 +107,7 @@ fn wait_for(what: &str, condition: impl Fn() -> bool) {
 #[test]
 fn lines_on_standard_input_move_cables_and_quit_takes_everything_away() {
     let _turn = turn();
-    let folder = folder("lines");
+    let folder = folder("serve-cli/lines");
     let mut bench = Standing::new(serve(&folder).arg("--quiet"));
     assert_eq!(are_there(&folder), [true; 4]);
     assert!(folder.join("bench.toml").exists());
@@ -167,7 +150,7 @@ fn lines_on_standard_input_move_cables_and_quit_takes_everything_away() {
 fn a_signal_takes_everything_away_and_a_second_bench_in_the_folder_is_refused() {
     let _turn = turn();
     for signal in [Signal::TERM, Signal::INT] {
-        let folder = folder("signal");
+        let folder = folder("serve-cli/signal");
         let bench = Standing::new(serve(&folder).arg("--apart"));
         assert!(folder.join("sensor-link").exists());
         let second = serve(&folder).output().unwrap();
@@ -188,7 +171,7 @@ fn a_signal_takes_everything_away_and_a_second_bench_in_the_folder_is_refused() 
 #[test]
 fn after_its_time_it_ends_and_tells_its_status_meanwhile() {
     let _turn = turn();
-    let folder = folder("time");
+    let folder = folder("serve-cli/time");
     let hand = folder.join("hand.csv");
     fs::write(&hand, "t_s,x_mm\n0,0\n0.5,20\n").unwrap();
     let output = serve(&folder)
@@ -208,7 +191,7 @@ fn after_its_time_it_ends_and_tells_its_status_meanwhile() {
 #[test]
 fn a_board_whose_firmware_goes_astray_ends_it_with_the_reason() {
     let _turn = turn();
-    let folder = folder("astray");
+    let folder = folder("serve-cli/astray");
     // Without vectors it begins at address 0, and nowhere.
     let mut elf = fs::read(built(Role::Display)).unwrap();
     let vectors = object::File::parse(&*elf)
@@ -234,7 +217,7 @@ fn a_board_whose_firmware_goes_astray_ends_it_with_the_reason() {
 
 #[test]
 fn what_it_cannot_do_is_refused_with_what_to_do() {
-    let folder = folder("refused");
+    let folder = folder("serve-cli/refused");
     let complaint = |command: &mut Command| {
         let output = command.output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{command:?}");
