@@ -5,7 +5,8 @@ mod fault;
 mod recorded;
 mod refusal;
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use protocol::{Method, SensorConfiguration};
 
@@ -24,6 +25,52 @@ fn refusal(text: &str) -> String {
 /// The refusal of a scene that is sound but for `section`, which starts at line 3.
 fn refusal_of(section: &str) -> String {
     refusal(&format!("{SURFACE}{section}"))
+}
+
+/// A folder of its own for a test's files, removed at the end.
+pub(super) struct Folder {
+    path: PathBuf,
+    /// What its scenes begin with.
+    head: &'static str,
+}
+
+impl Folder {
+    pub(super) fn new(test: &str, head: &'static str) -> Self {
+        let path = std::env::temp_dir().join(format!("hil-sim-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self { path, head }
+    }
+
+    /// Loads a scene with `section`, beside a file.
+    pub(super) fn load(
+        &self,
+        section: &str,
+        file: &str,
+        bytes: &(impl AsRef<[u8]> + ?Sized),
+    ) -> Result<Scene, SceneError> {
+        fs::write(self.path.join(file), bytes).unwrap();
+        let scene = self.path.join("x.toml");
+        fs::write(&scene, format!("{}{section}", self.head)).unwrap();
+        Scene::load(&scene)
+    }
+
+    /// The refusal, without the folder's name.
+    pub(super) fn refusal(
+        &self,
+        section: &str,
+        file: &str,
+        bytes: &(impl AsRef<[u8]> + ?Sized),
+    ) -> String {
+        let error = self.load(section, file, bytes).unwrap_err().to_string();
+        let folder = format!("{}{}", self.path.display(), std::path::MAIN_SEPARATOR);
+        error.replace(&folder, "")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        fs::remove_dir_all(&self.path).ok();
+    }
 }
 
 /// The rows of a table of "what is given => the words of its refusal", in which "; " is a line break of what is given.

@@ -2,9 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::fs;
 use std::io::Cursor;
-use std::path::PathBuf;
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use mcap::WriteOptions;
@@ -15,45 +13,13 @@ use crate::judge::outcome::Outcome;
 use crate::native;
 use crate::plant::surface::Surface;
 use crate::plant::world::World;
-use crate::scene::{Motion, Scene, SceneError};
+use crate::scene::{Motion, Scene};
+use crate::scene_file::tests::Folder;
 
 mod hjif;
 mod refused;
 
 const SURFACE: &str = "duration_s = 2.0\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
-
-/// A folder for a test's files, removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        let name = format!("hil-sim-recorded-{}-{test}", std::process::id());
-        let path = std::env::temp_dir().join(name);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    /// Loads a scene with `section`, beside a file.
-    fn load(&self, section: &str, file: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
-        fs::write(self.0.join(file), bytes).unwrap();
-        let scene = self.0.join("x.toml");
-        fs::write(&scene, format!("{SURFACE}{section}")).unwrap();
-        Scene::load(&scene)
-    }
-
-    /// The refusal, without the folder's name.
-    fn refusal(&self, section: &str, file: &str, bytes: &[u8]) -> String {
-        let error = self.load(section, file, bytes).unwrap_err().to_string();
-        let folder = format!("{}{}", self.0.display(), std::path::MAIN_SEPARATOR);
-        error.replace(&folder, "")
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        fs::remove_dir_all(&self.0).ok();
-    }
-}
 
 /// Mono, floats.
 fn wav(rate_hz: u32, samples: impl Iterator<Item = f64>) -> Vec<u8> {
@@ -213,7 +179,7 @@ fn amplitude(volts: &[f64], tone_hz: f64) -> (f64, f64) {
 
 #[test]
 fn a_tone_at_any_rate_in_any_format_comes_out_at_the_adc_as_it_was() {
-    let folder = Folder::new("tone");
+    let folder = Folder::new("tone", SURFACE);
     // Whole numbers of cycles in the second that is looked at; prime, so that the ADC's steps are met evenly.
     for (rate_hz, tone_hz) in [
         (1_000, 59.0),
@@ -246,7 +212,7 @@ fn a_tone_at_any_rate_in_any_format_comes_out_at_the_adc_as_it_was() {
 
 #[test]
 fn a_tone_above_half_the_adcs_rate_does_not_come_out() {
-    let folder = Folder::new("above");
+    let folder = Folder::new("above", SURFACE);
     for (rate_hz, tone_hz) in [(8_000, 2_100.0), (44_100, 4_025.0), (48_000, 3_975.0)] {
         for (file, section, bytes) in tone(rate_hz, tone_hz) {
             let scene = folder.load(&section, file, &bytes).unwrap();
@@ -263,7 +229,7 @@ fn a_tone_above_half_the_adcs_rate_does_not_come_out() {
 
 #[test]
 fn integers_of_any_width_are_shares_of_full_scale() {
-    let folder = Folder::new("integers");
+    let folder = Folder::new("integers", SURFACE);
     for bits in [8, 16, 24, 32] {
         let spec = WavSpec {
             channels: 2,
@@ -290,7 +256,7 @@ fn integers_of_any_width_are_shares_of_full_scale() {
 
 #[test]
 fn what_else_a_wav_file_holds_is_passed_over_whatever_its_length() {
-    let folder = Folder::new("chunks");
+    let folder = Folder::new("chunks", SURFACE);
     let section = "[gauges]\nkind = \"recorded\"\nfile = \"x.wav\"\n";
     let plain = wav(4_000, (0..8_800).map(|_| 0.5));
     let data = plain.windows(4).position(|name| name == b"data").unwrap();
@@ -308,7 +274,7 @@ fn what_else_a_wav_file_holds_is_passed_over_whatever_its_length() {
 
 #[test]
 fn our_own_recordings_are_read_without_a_word_about_their_columns() {
-    let folder = Folder::new("own");
+    let folder = Folder::new("own", SURFACE);
     let rows = (0..2_100_u64).map(|sample| {
         let json = format!(
             "{{\"sample\":{sample},\"block\":0,\"instant_us\":{},\"position_um\":{},\"travel_um\":50,\"g0_v\":0.5,\"g1_v\":0.825,\"g2_v\":1.0,\"g3_v\":1.5,\"g4_v\":2.5,\"tangential_v\":2.475}}",
@@ -344,7 +310,7 @@ fn our_own_recordings_are_read_without_a_word_about_their_columns() {
 
 #[test]
 fn the_wavelength_of_a_recorded_tone_is_estimated() {
-    let folder = Folder::new("estimate");
+    let folder = Folder::new("estimate", SURFACE);
     // 50 mm/s over ridges of 2 mm: 25 Hz.
     let bytes = wav(
         44_100,
@@ -370,7 +336,7 @@ fn the_wavelength_of_a_recorded_tone_is_estimated() {
 
 #[test]
 fn heights_finer_than_the_surface_is_stored_are_band_limited() {
-    let folder = Folder::new("heights");
+    let folder = Folder::new("heights", SURFACE);
     // A sine of 2 mm, and ripples of 0.0208 mm that points 0.02 mm apart would take for 0.52 mm.
     let heights = || {
         (0..120_000).map(|row| {
@@ -419,7 +385,7 @@ fn heights_finer_than_the_surface_is_stored_are_band_limited() {
 
 #[test]
 fn a_hand_is_read_from_wav_too() {
-    let folder = Folder::new("hand");
+    let folder = Folder::new("hand", SURFACE);
     let bytes = wav(
         48_000,
         (0..100_000).map(|row| f64::from(row) / 48_000.0 / 4.0),
@@ -438,7 +404,7 @@ fn a_hand_is_read_from_wav_too() {
 
 #[test]
 fn volts_are_band_limited_between_their_rows_unless_straight_lines_are_asked_for() {
-    let folder = Folder::new("lines");
+    let folder = Folder::new("lines", SURFACE);
     let code = |step_s: f64, keys: &str| {
         let rows: String = (0..=(2.0 / step_s) as u32)
             .map(|row| {

@@ -3,7 +3,6 @@
 use protocol::actuators::{self, grid};
 use protocol::{DEFAULT_ACTUATORS, DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::recorded::Folder;
 use super::*;
 
 fn taken(section: &str) -> Scene {
@@ -13,7 +12,8 @@ fn taken(section: &str) -> Scene {
 
 /// What a scene makes of a description of the actuators that stands in a file beside it.
 fn described(name: &str, csv: &str) -> Result<Scene, SceneError> {
-    Folder::new(&format!("display-{name}")).load("[display]\nfile = \"data.csv\"\n", csv)
+    let folder = Folder::new(&format!("display-{name}"), SURFACE);
+    folder.load("[display]\nfile = \"data.csv\"\n", "data.csv", csv)
 }
 
 const HEADER: &str = "actuator,x_um,y_um,gain,phase_turns,inverted\n";
@@ -27,10 +27,7 @@ fn rows(change: usize, row: &str) -> String {
             format!("{index},{},-700,0.5,0.25,1\n", 10 * index)
         }
     });
-    HEADER
-        .chars()
-        .chain(rows.flat_map(|row| row.chars().collect::<Vec<_>>()))
-        .collect()
+    format!("{HEADER}{}", rows.collect::<String>())
 }
 
 #[test]
@@ -172,7 +169,7 @@ fn more_than_the_fundamental_is_refused_for_more_places_than_are_worked_out_in_t
         let rows = (0..50).map(|index| format!("{index},{},0,1,0,0\n", 10 * index));
         let csv = format!("{HEADER}{}", rows.collect::<String>());
         let section = format!("[display]\nmode = \"travelling\"\nfile = \"data.csv\"\n{section}");
-        Folder::new("display-scattered").load(&section, &csv)
+        Folder::new("display-scattered", SURFACE).load(&section, "data.csv", &csv)
     };
     assert!(scattered("rendering = \"fundamental\"\n").is_ok());
     let refusal = scattered("rendering = \"shape\"\n")

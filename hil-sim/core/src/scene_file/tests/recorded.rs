@@ -1,51 +1,14 @@
 //! The CSV files that a scene names.
 
-use std::fs;
-use std::path::PathBuf;
-
-use super::{SURFACE, refusals};
-use crate::scene::{Motion, Scene, SceneError};
-
-/// A folder of its own for a test's CSV files, removed at the end.
-pub(super) struct Folder(PathBuf);
-
-impl Folder {
-    pub(super) fn new(test: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("hil-sim-{}-{test}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-
-    /// Loads a scene with `section`, whose CSV file `data.csv` holds `csv`.
-    pub(super) fn load(&self, section: &str, csv: &str) -> Result<Scene, SceneError> {
-        fs::write(self.0.join("data.csv"), csv).unwrap();
-        let scene = self.0.join("x.toml");
-        fs::write(&scene, format!("{SURFACE}{section}")).unwrap();
-        Scene::load(&scene)
-    }
-
-    /// The refusal, without the folder's name.
-    fn refusal(&self, section: &str, csv: &str) -> String {
-        let error = self.load(section, csv).unwrap_err().to_string();
-        error.replace(
-            &format!("{}{}", self.0.display(), std::path::MAIN_SEPARATOR),
-            "",
-        )
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        fs::remove_dir_all(&self.0).ok();
-    }
-}
+use super::{Folder, SURFACE, refusals};
+use crate::scene::Motion;
 
 #[test]
 fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
     const MOTION: &str = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
-    let folder = Folder::new("motion");
+    let folder = Folder::new("motion", SURFACE);
     let scene = folder
-        .load(MOTION, "t_s, x_mm\n0, 0\n1, 50\n3, 25\n")
+        .load(MOTION, "data.csv", "t_s, x_mm\n0, 0\n1, 50\n3, 25\n")
         .unwrap();
     assert_eq!(scene.motion.position_mm(0.5), 25.0);
     assert_eq!(scene.motion.velocity_mm_s(2.0), -12.5);
@@ -64,10 +27,10 @@ fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
         t_s,x_mm; 0,0; 2,50 => x.toml:5: motion.file: lasts from 0 to 2 s, the scene from 0 to 3 s
         "#,
     ) {
-        let refusal = folder.refusal(MOTION, &format!("{csv}\n"));
+        let refusal = folder.refusal(MOTION, "data.csv", &format!("{csv}\n"));
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
-    let refusal = folder.refusal(MOTION, "");
+    let refusal = folder.refusal(MOTION, "data.csv", "");
     let want = "data.csv:1: the first line is \"\": it must be t_s,x_mm";
     assert!(refusal.starts_with(want), "{refusal}");
 }
@@ -75,18 +38,19 @@ fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
 #[test]
 fn recorded_gauges_are_played_and_refused_below_200_hz() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
-    let folder = Folder::new("gauges");
+    let folder = Folder::new("gauges", SURFACE);
     let rows: String = (0..=3000)
         .map(|ms| format!("{},0,0.825,1.65,2.475,3.3\n", f64::from(ms) / 1000.0))
         .collect();
     let scene = folder
-        .load(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{rows}"))
+        .load(GAUGES, "data.csv", &format!("t_s,g0,g1,g2,g3,g4\n{rows}"))
         .unwrap();
     let mut world = crate::plant::world::World::new(&scene).unwrap();
     assert_eq!(world.codes(1.00025, 0.0), [0, 1024, 2048, 3072, 4095, 2048]);
     // The last row goes on for as long as the others do.
     let whole = rows.trim_end().rsplit_once('\n').expect("rows").0;
-    let load = |rows: &str| folder.load(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{rows}\n"));
+    let load =
+        |rows: &str| folder.load(GAUGES, "data.csv", &format!("t_s,g0,g1,g2,g3,g4\n{rows}\n"));
     assert!(whole.contains("\n2.999,") && !whole.contains("\n3,"));
     load(whole).expect("3 s at 1 kHz are 3 000 rows");
     let short = whole.rsplit_once('\n').expect("rows").0;
@@ -98,11 +62,12 @@ fn recorded_gauges_are_played_and_refused_below_200_hz() {
         0,1,1,1,1,1; 0.001,1,1,1,1,1 => x.toml:5: gauges.file: lasts from 0 to 0.001 s
         "#,
     ) {
-        let refusal = folder.refusal(GAUGES, &format!("t_s,g0,g1,g2,g3,g4\n{csv}\n"));
+        let refusal = folder.refusal(GAUGES, "data.csv", &format!("t_s,g0,g1,g2,g3,g4\n{csv}\n"));
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
     }
     let both = folder.refusal(
         &format!("{GAUGES}snr_db = 20"),
+        "data.csv",
         &format!("t_s,g0,g1,g2,g3,g4\n{rows}"),
     );
     assert!(
@@ -114,7 +79,7 @@ fn recorded_gauges_are_played_and_refused_below_200_hz() {
 #[test]
 fn a_recorded_force_is_played_unless_it_is_taken_out() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
-    let folder = Folder::new("force");
+    let folder = Folder::new("force", SURFACE);
     let rows = |force: &str| -> String {
         (0..=3000)
             .map(|ms| format!("{},0,1,1,1,1{force}\n", f64::from(ms) / 1000.0))
@@ -130,7 +95,7 @@ fn a_recorded_force_is_played_unless_it_is_taken_out() {
         ("tangential = false", &without, false, 2048),
     ] {
         let keys = format!("{GAUGES}{keys}\ntangential_n_per_v = 2\nstiffness_n_per_m = 500\n");
-        let scene = folder.load(&keys, csv).unwrap();
+        let scene = folder.load(&keys, "data.csv", csv).unwrap();
         let force = scene.force;
         assert_eq!(
             (force.present, force.n_per_v, force.stiffness_n_per_m),
@@ -139,7 +104,7 @@ fn a_recorded_force_is_played_unless_it_is_taken_out() {
         let mut world = crate::plant::world::World::new(&scene).unwrap();
         assert_eq!(world.codes(1.0, 0.0)[5], code);
     }
-    let refusal = folder.refusal(&format!("{GAUGES}tangential = true"), &without);
+    let refusal = folder.refusal(&format!("{GAUGES}tangential = true"), "data.csv", &without);
     assert!(
         refusal.starts_with("x.toml:6: gauges.tangential: true, but the file has no column"),
         "{refusal}"
@@ -147,10 +112,16 @@ fn a_recorded_force_is_played_unless_it_is_taken_out() {
     // What says that there is none of it goes with recorded gauges.
     let nothing =
         "dead = []\nhum_50_hz = 0\npink = 0.0\n[contact]\nmodel = \"auto\"\nfriction = \"none\"\n";
-    folder.load(&format!("{GAUGES}{nothing}"), &with).unwrap();
-    let refusal = folder.refusal(&format!("{GAUGES}pink = 0.1\n"), &with);
+    folder
+        .load(&format!("{GAUGES}{nothing}"), "data.csv", &with)
+        .unwrap();
+    let refusal = folder.refusal(&format!("{GAUGES}pink = 0.1\n"), "data.csv", &with);
     assert!(refusal.contains("gauges.pink"), "{refusal}");
-    let refusal = folder.refusal(&format!("{GAUGES}[contact]\nfriction = \"mild\""), &with);
+    let refusal = folder.refusal(
+        &format!("{GAUGES}[contact]\nfriction = \"mild\""),
+        "data.csv",
+        &with,
+    );
     assert!(
         refusal.contains("does not apply to recorded gauges"),
         "{refusal}"
@@ -159,7 +130,7 @@ fn a_recorded_force_is_played_unless_it_is_taken_out() {
 
 #[test]
 fn a_recorded_profile_must_cover_the_travel() {
-    let folder = Folder::new("profile");
+    let folder = Folder::new("profile", SURFACE);
     let profile = "profile = \"recorded\"\nfile = \"data.csv\"\n";
     let heights = |to: i32| {
         let rows: String = (-40..=to)
@@ -168,8 +139,8 @@ fn a_recorded_profile_must_cover_the_travel() {
         format!("x_mm,height\n{rows}")
     };
     // 3 s at 50 mm/s, and the outermost gauges 3 mm further.
-    folder.load(profile, &heights(1530)).unwrap();
-    let refusal = folder.refusal(profile, &heights(1500));
+    folder.load(profile, "data.csv", &heights(1530)).unwrap();
+    let refusal = folder.refusal(profile, "data.csv", &heights(1500));
     assert!(
         refusal.contains("the gauges come from -3.000 to 153.000 mm"),
         "{refusal}"
@@ -178,7 +149,7 @@ fn a_recorded_profile_must_cover_the_travel() {
 
 #[test]
 fn lines_of_blanks_in_a_csv_file_are_passed_over_as_empty_ones_are() {
-    let folder = Folder::new("blank-lines");
+    let folder = Folder::new("blank-lines", SURFACE);
     let motion = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
     for csv in [
         "t_s,x_mm\n0,0\n\n3,10\n",
@@ -186,17 +157,17 @@ fn lines_of_blanks_in_a_csv_file_are_passed_over_as_empty_ones_are() {
         "t_s,x_mm\n0,0\n \t\n3,10\n \r\n",
         "t_s\tx_mm\n0\t0\n\t\n3\t10\n\t",
     ] {
-        let Ok(scene) = folder.load(motion, csv) else {
-            panic!("{}", folder.refusal(motion, csv));
+        let Ok(scene) = folder.load(motion, "data.csv", csv) else {
+            panic!("{}", folder.refusal(motion, "data.csv", csv));
         };
         let Motion::Recorded(rows) = scene.motion else {
             panic!("{csv:?}");
         };
         assert_eq!(rows.at, [0.0, 3.0], "{csv:?}");
     }
-    let refusal = folder.refusal(motion, "t_s,x_mm\n0,0\n \n3,x\n");
+    let refusal = folder.refusal(motion, "data.csv", "t_s,x_mm\n0,0\n \n3,x\n");
     assert!(refusal.starts_with("data.csv:4: "), "{refusal}");
     // A cell in quotes is one, though there is nothing in it.
-    let refusal = folder.refusal(motion, "t_s,x_mm\n0,0\n\"\"\n3,10\n");
+    let refusal = folder.refusal(motion, "data.csv", "t_s,x_mm\n0,0\n\"\"\n3,10\n");
     assert!(refusal.starts_with("data.csv:3: 1 cells"), "{refusal}");
 }

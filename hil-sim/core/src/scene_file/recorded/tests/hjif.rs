@@ -33,7 +33,7 @@ fn sine_band(per_metre: u32) -> String {
 
 #[test]
 fn a_texture_of_iso_23090_31_is_rubbed_as_a_profile() {
-    let folder = Folder::new("texture");
+    let folder = Folder::new("texture", SURFACE);
     let one = hjif(&[(3, "silk", sine_band(500))]);
     let several = hjif(&[(3, "silk", sine_band(250)), (8, "linen", sine_band(500))]);
     let section = "profile = \"recorded\"\nfile = \"t.hjif\"\nshift_mm = -10\n";
@@ -107,7 +107,7 @@ fn a_texture_of_iso_23090_31_is_rubbed_as_a_profile() {
 
 #[test]
 fn what_is_felt_is_neither_blurred_nor_scaled_whatever_the_format() {
-    let folder = Folder::new("felt");
+    let folder = Folder::new("felt", SURFACE);
     // 0.3 mm, of which the contact's blur would leave 4 %.
     let heights: Vec<(f64, f64)> = (-500..12_000)
         .map(|row| f64::from(row) * 0.01)

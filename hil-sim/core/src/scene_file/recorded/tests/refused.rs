@@ -7,7 +7,7 @@ const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"f\"\n";
 
 #[test]
 fn the_end_of_a_long_recording_goes_on_for_no_longer_than_a_short_ones() {
-    let folder = Folder::new("long");
+    let folder = Folder::new("long", SURFACE);
     // At 1 kHz, 40 ms less than the scene's 2 s, behind so many s.
     for (start_s, from) in [(0, "0"), (300, "-300")] {
         let section = format!("{GAUGES}start_s = {start_s}\n");
@@ -20,7 +20,7 @@ fn the_end_of_a_long_recording_goes_on_for_no_longer_than_a_short_ones() {
 
 #[test]
 fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
-    let folder = Folder::new("refused");
+    let folder = Folder::new("refused", SURFACE);
     let tone = wav(8_000, (0..20_000).map(|_| 0.0));
     let stereo = {
         let spec = WavSpec {
@@ -151,7 +151,7 @@ fn what_cannot_be_read_is_refused_with_its_place_and_a_way_out() {
 
 #[test]
 fn a_profile_is_no_longer_and_no_higher_than_a_surface_and_its_scale_does_not_matter() {
-    let folder = Folder::new("profile-bounds");
+    let folder = Folder::new("profile-bounds", SURFACE);
     let profile = "profile = \"recorded\"\nfile = \"p.csv\"\n";
     let channels = format!("{profile}place = \"a\"\nchannels = [\"b\"]\nplace_mm_per_unit = 1e9\n");
     for (section, csv, want) in [
