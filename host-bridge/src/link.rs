@@ -223,6 +223,23 @@ pub fn stop_all(boards: &[LinkSender]) {
     }
 }
 
+/// What is left to do by hand for these boards, which have not stopped: the emergency stop ends the stimulus alone,
+/// and the arm does not hear it.
+pub fn by_hand(unstopped: &[Role]) -> String {
+    let each = unstopped.iter().map(|role| match role {
+        Role::Sensor => "cut the power of the arm's drive",
+        Role::Display | Role::Host => "press the emergency stop",
+    });
+    each.collect::<Vec<_>>().join(" and ")
+}
+
+/// Words for boards that have not stopped, and what to do about them.
+pub fn not_stopped(boards: &[Role], why: &str) -> String {
+    let names: Vec<&str> = boards.iter().map(|role| role.name()).collect();
+    let names = names.join(" and ");
+    format!("NOT STOPPED: {names}: {why}: {}", by_hand(boards))
+}
+
 impl Shared {
     fn counters(&self) -> PortCounters {
         match &*locked(&self.line) {

@@ -74,7 +74,8 @@ enum Part {
     /// Carries on what bridges say, where neither site can be reached from the other
     Router(Router),
     /// Says Stop to the boards; exit status 0 as soon as the display's board itself says that it has
-    /// stopped, 1 if it does not: then press the emergency stop, or cut the display's power
+    /// stopped, 1 if it does not: then press the emergency stop, or cut the display's power;
+    /// and cut the power of the arm's drive, of which nothing is known
     Stop(Stopping),
 }
 
@@ -333,7 +334,7 @@ impl Stopping {
             }
         };
         say(&format!(
-            "NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power",
+            "NOT STOPPED as far as is known: {so_far}, in {} s: press the emergency stop, or cut the display's power; and cut the power of the arm's drive, of which nothing is known",
             self.within
         ));
         let late = told.into_iter().filter_map(Result::err);

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::link::{Event, stop_all};
+use crate::link::{Event, by_hand, not_stopped, stop_all};
 use crate::state::State;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use protocol::{Message, Role, Stopped, Trip};
@@ -18,7 +18,7 @@ power. Every version of the firmware understands it, and a board that has anothe
 With two sites, `relay stop` reaches them from anywhere.
 
 Exit status: 0 every board of the bench says that it has stopped; 1 one does not, or its port leads to another \
-board: then press the emergency stop, or cut the power.";
+board: then press the emergency stop for the display, and cut the power of the arm's drive for the sensor.";
 
 /// What `stop` is asked for.
 #[derive(Debug, clap::Args)]
@@ -122,8 +122,9 @@ impl HeardAnswers {
             if !self.stopped.contains(role) {
                 is_missed = true;
                 say(&format!(
-                    "NOT STOPPED as far as is known: {}: {why}: press the emergency stop, or cut its power",
-                    role.name()
+                    "NOT STOPPED as far as is known: {}: {why}: {}",
+                    role.name(),
+                    by_hand(&[*role])
                 ));
             }
         }
@@ -209,11 +210,11 @@ impl Outcome {
     }
 
     fn unstopped(&self, why: &str) -> Option<String> {
-        let boards = self.boards.iter();
-        let unstopped = boards.filter(|board| !self.stopped.contains(board));
-        let names: Vec<&str> = unstopped.map(|board| board.name()).collect();
-        let names = names.join(" and ");
-        (!names.is_empty()).then(|| format!("NOT STOPPED: {names}: {why}: use the emergency stop"))
+        let boards = self.boards.iter().copied();
+        let unstopped: Vec<_> = boards
+            .filter(|board| !self.stopped.contains(board))
+            .collect();
+        (!unstopped.is_empty()).then(|| not_stopped(&unstopped, why))
     }
 }
 

@@ -14,7 +14,7 @@ use super::orders::Outcome;
 use super::settings;
 use super::settings::Setting;
 use super::trace::Trace;
-use crate::link::{Clocks, Event, NotSent};
+use crate::link::{Clocks, Event, NotSent, by_hand, not_stopped};
 
 const LOG_ENTRIES: usize = 500;
 /// A message to the person who watches stands for so long, in µs.
@@ -173,10 +173,7 @@ impl Dashboard {
         if let Some((since_us, boards)) = &self.stopping
             && now_us.saturating_sub(*since_us) >= STOP_US
         {
-            let names: Vec<&str> = boards.iter().map(|role| role.name()).collect();
-            let names = names.join(" and ");
-            let words =
-                format!("NOT STOPPED: {names}: no answer, told again: use the emergency stop");
+            let words = not_stopped(boards, "no answer, told again");
             self.notify(true, words);
         }
         let is_over = |notice: &mut Notice| now_us.saturating_sub(notice.at_us) > NOTICE_US;
@@ -196,8 +193,9 @@ impl Dashboard {
     /// Stop was said on every way there is: shows who has answered.
     pub fn stop(&mut self) {
         if self.linked.is_empty() {
-            let words = "NOT STOPPED: there is no way to the boards from here";
-            return self.notify(true, words.to_owned());
+            let by_hand = by_hand(&[Role::Sensor, Role::Display]);
+            let words = format!("NOT STOPPED: there is no way to the boards from here: {by_hand}");
+            return self.notify(true, words);
         }
         self.stopping = Some((self.now_us, self.linked.clone()));
         self.notify(false, "stop: sent, not confirmed yet".to_owned());

@@ -6,6 +6,7 @@ use hdrhistogram::Histogram as Counts;
 use protocol::{Role, Trip};
 use serde::Serialize;
 
+use crate::link::by_hand;
 use crate::relay::endpoint::{Endpoint, Reach};
 use crate::relay::gate::Arrivals;
 use crate::relay::refused::Refused;
@@ -212,8 +213,13 @@ pub enum Notice {
     StopPassed,
     /// This site's board says that it has stopped, for this reason, if this program knows it.
     Stopped(Option<Trip>),
-    /// A board has not answered a Stop, and is told again: that at the other site of this role, or this site's.
-    NotStopped(Option<Role>),
+    /// A board has not answered a Stop, and is told again.
+    NotStopped {
+        /// Whose it is.
+        role: Role,
+        /// Whether it is this site's.
+        is_here: bool,
+    },
     /// The Stop said here is done at that site: the reason for which its board says that it has stopped,
     /// if this program knows it.
     StopHeard(Role, Option<Trip>),
@@ -282,11 +288,12 @@ impl fmt::Display for Notice {
             Self::StopSaid(role) => write!(f, "Stop, said by {}", site(*role)),
             Self::StopPassed => f.write_str("Stop: with the board here"),
             Self::Stopped(trip) => write!(f, "Stop: the board here has stopped: {}", cause(*trip)),
-            Self::NotStopped(other) => {
-                let place = other.map_or_else(|| "here".to_owned(), |role| format!("at {}", site(role)));
+            Self::NotStopped { role, is_here } => {
+                let place = if *is_here { "here".to_owned() } else { format!("at {}", site(*role)) };
                 write!(
                     f,
-                    "NOT STOPPED as far as is known: the board {place} has not answered: press the emergency stop, or cut its power"
+                    "NOT STOPPED as far as is known: the board {place} has not answered: {}",
+                    by_hand(&[*role])
                 )
             }
             Self::StopHeard(role, trip) => write!(

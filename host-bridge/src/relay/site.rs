@@ -524,9 +524,14 @@ impl Shared {
 
     /// Words of the boards that have not answered: this site's, and the other site's.
     fn not_stopped(&self, [here, there]: [bool; 2]) -> Vec<Notice> {
-        let here = here.then_some(Notice::NotStopped(None));
-        let there = there.then_some(Notice::NotStopped(Some(self.other_role)));
-        here.into_iter().chain(there).collect()
+        let each = [
+            (here, self.settings.role, true),
+            (there, self.other_role, false),
+        ];
+        let unstopped = each.into_iter().filter(|(is_unstopped, ..)| *is_unstopped);
+        unstopped
+            .map(|(_, role, is_here)| Notice::NotStopped { role, is_here })
+            .collect()
     }
 
     /// Says Stop to the board, whose link says it again until it is answered.

@@ -201,6 +201,24 @@ fn a_stop_is_confirmed_by_whoever_answers_and_not_by_whose_port_it_was_to_be() {
 }
 
 #[test]
+fn for_an_arm_that_has_not_stopped_the_emergency_stop_is_no_advice() {
+    let mut dashboard = connected();
+    dashboard.linked = vec![Role::Sensor, Role::Display];
+    dashboard.stop();
+    dashboard.elapse(500_000);
+    let text = |dashboard: &Dashboard| dashboard.notice().expect("it is told").text.clone();
+    let none = "NOT STOPPED: sensor and display: no answer, told again: ";
+    let both = "cut the power of the arm's drive and press the emergency stop";
+    assert_eq!(text(&dashboard), format!("{none}{both}"));
+    let message = Message::Stopped(Stopped::by(Trip::Operator));
+    let stopped = Event::Heard { at_us: 10, message };
+    dashboard.on(10, Role::Display, stopped);
+    dashboard.elapse(600_000);
+    let arm = "NOT STOPPED: sensor: no answer, told again: cut the power of the arm's drive";
+    assert_eq!(text(&dashboard), arm);
+}
+
+#[test]
 fn a_stop_that_has_no_way_to_any_board_is_called_so() {
     let mut dashboard = connected();
     dashboard.stop();

@@ -194,7 +194,7 @@ fn a_notice_is_told_to_its_end() {
             &shown,
             " NOT STOPPED: sensor and display: no answer, told again",
         );
-        assert_has(&shown, "use the emergency stop");
+        assert_has(&shown, "press the emergency stop");
     }
 }
 

@@ -149,15 +149,18 @@ fn what_became_of_a_stop_is_told() {
     signal(&running, "-USR1");
     let text = || fs::read_to_string(&told).unwrap_or_default();
     let is_told = |words: &str| assert!(wait_until(LIMIT, || text().contains(words)), "{}", text());
-    is_told("use the emergency stop\n");
+    is_told("press the emergency stop\n");
     let text_so_far = text();
     let (before, after) = text_so_far.split_once("NOT STOPPED: ").expect("who");
     // On a busy machine the sensor may not have answered by then either.
-    let names = match before.contains("sensor has stopped: by the operator\n") {
-        true => "display",
-        false => "sensor and display",
+    let (names, advice) = match before.contains("sensor has stopped: by the operator\n") {
+        true => ("display", ""),
+        false => (
+            "sensor and display",
+            "cut the power of the arm's drive and ",
+        ),
     };
-    let words = format!("{names}: no answer, told again: use the emergency stop\n");
+    let words = format!("{names}: no answer, told again: {advice}press the emergency stop\n");
     assert!(after.starts_with(&words), "{text_so_far}");
     is_told("sensor has stopped: by the operator\n");
     assert!(!text().contains("display has stopped"), "{}", text());
@@ -191,5 +194,5 @@ fn a_recording_that_is_ended_tells_first_what_became_of_a_stop() {
     let words = &output.stderr;
     assert_eq!(output.status.code(), Some(0), "{words}");
     assert!(words.contains("NOT STOPPED: "), "{words}");
-    assert!(words.contains("use the emergency stop"), "{words}");
+    assert!(words.contains("press the emergency stop"), "{words}");
 }
