@@ -15,11 +15,15 @@ use crate::relay::endpoint::Within;
 const PAGE: &str = include_str!("page.html");
 /// What a page of ours says with its Stop: no other site's page may, for its browser asks here first.
 const STOP_HEADER: &str = "x-ridgelink-stop";
-/// Browsers that may look on at once; more are answered, and sent away.
+/// What asks for the next picture; the number of the last one stands behind it. Each takes a connection of its own and
+/// not one for as long as somebody looks on: a browser has six to a place for all its tabs, and Stop needs one.
+const PICTURE: &str = "/picture/";
+const NOTHING: &[u8] = b"there is nothing\n";
+/// Connections on which somebody may look on at once; more are answered, and sent away.
 const MOST: usize = 32;
 /// Connections that are looked after at once. Another waits until one of them has said what it wants, or its time is over.
 const MOST_AT_ONCE: usize = 128;
-/// A browser that has gone is noticed at the next thing that is said to it.
+/// How long a browser waits for a picture that does not change.
 const LOOK: Duration = Duration::from_secs(1);
 
 /// The newest picture, and its number.
@@ -134,16 +138,15 @@ impl Shared {
                 "text/html; charset=utf-8",
                 PAGE.as_bytes(),
             ),
-            ("GET", "/events") => {
-                begin_events(stream)?;
-                let mut last = 0;
-                loop {
-                    let (number, picture) = self.newest.after(last);
-                    last = number;
-                    event(stream, &picture)?;
-                }
+            ("GET", path) => {
+                let Some(last) = path.strip_prefix(PICTURE).and_then(|n| n.parse().ok()) else {
+                    return answer(stream, "404 Not Found", TEXT, NOTHING);
+                };
+                let (number, picture) = self.newest.after(last);
+                let body = format!(r#"{{"number":{number},"picture":{picture}}}"#);
+                answer(stream, "200 OK", "application/json", body.as_bytes())
             }
-            _ => answer(stream, "404 Not Found", TEXT, b"there is nothing\n"),
+            _ => answer(stream, "404 Not Found", TEXT, NOTHING),
         }
     }
 }
@@ -232,21 +235,6 @@ pub fn answer(mut stream: &TcpStream, status: &str, kind: &str, body: &[u8]) -> 
         body.len()
     )?;
     stream.write_all(body)?;
-    stream.flush()
-}
-
-/// Begins a stream of events, each to be said by [`event`]. Fails if the connection fails.
-pub fn begin_events(mut stream: &TcpStream) -> io::Result<()> {
-    write!(
-        stream,
-        "HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\nConnection: close\r\n\r\n"
-    )?;
-    stream.flush()
-}
-
-/// Says an event of one line. Fails if the connection fails.
-pub fn event(mut stream: &TcpStream, line: &str) -> io::Result<()> {
-    stream.write_all(format!("data: {line}\n\n").as_bytes())?;
     stream.flush()
 }
 

@@ -220,18 +220,17 @@ fn the_page_says_who_moves_the_arm() {
         "/dev/null/display",
     ];
     let live = Live::of(&words).expect("it says where");
-    let mut stream = TcpStream::connect(&live.page).expect("it listens");
-    stream.set_read_timeout(Some(LIMIT)).expect("above 0");
-    write!(
-        stream,
-        "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
-        live.page
-    )
-    .expect("it reads");
-    let mut pictures = BufReader::new(stream).lines().filter_map(|line| {
-        let line = line.expect("it goes on");
-        let picture: Value = serde_json::from_str(line.strip_prefix("data: ")?).expect("JSON");
-        Some(picture)
+    let mut last = 0;
+    let mut pictures = std::iter::repeat_with(|| {
+        let request = format!(
+            "GET /picture/{last} HTTP/1.1\r\nHost: {}\r\n\r\n",
+            live.page
+        );
+        let answer = answer(&live.page, &request);
+        let (_, body) = answer.split_once("\r\n\r\n").expect("a body");
+        let mut newest: Value = serde_json::from_str(body).expect("JSON");
+        last = newest["number"].as_u64().expect("a number");
+        newest["picture"].take()
     });
     let mut told = |wanted: &[&str]| {
         let begin = format!("relay of bench {name}: ");
@@ -293,6 +292,31 @@ fn the_page_of_one_board_tells_of_its_stop() {
     }));
     until("its end", || {
         let words = "The sensor has stopped: by the operator";
+        browser.text("said").contains(words).then_some(())
+    });
+    live.end();
+}
+
+#[test]
+fn a_stop_is_said_however_many_tabs_of_one_browser_look_on() {
+    let Some(browser) = Browser::start(1_024, 1_366, false) else {
+        eprintln!("skipped: needs Debian's chromium and chromium-driver");
+        return;
+    };
+    let board = FakeBoard::new(Role::Sensor);
+    let port = board.path().to_str().expect("UTF-8");
+    let live = Live::of(&["--port", "0", "--sensor", port]).expect("it says where");
+    browser.open(&format!("http://{}/", live.page));
+    // More than the connections that a browser has for one place.
+    browser.run("window.tabs = Array.from({ length: 9 }, () => window.open(location.href))");
+    let looks =
+        "return tabs.filter(tab => tab.document.getElementById('boards')?.children.length).length";
+    until("six tabs that look on, this one as well", || {
+        (browser.run(looks).as_u64() >= Some(5)).then_some(())
+    });
+    browser.click("#stop");
+    until("word of it", || {
+        let words = "Stop was said to the sensor";
         browser.text("said").contains(words).then_some(())
     });
     live.end();
