@@ -8,7 +8,7 @@ use anyhow::bail;
 use crossbeam_channel::unbounded;
 
 use super::output;
-use super::signals::{self, Again};
+use super::signals::{self, Again, Orders};
 use super::stop::Teller;
 
 /// What the command does.
@@ -58,6 +58,7 @@ impl Live {
                 self.listen
             );
         }
+        let orders = Orders::to_stop()?;
         let bench = self.boards.find()?;
         let ended = signals::flag_set_by(&signals::USUAL, Again::EndsAtOnce)?;
         let teller = Teller::start(bench.roles());
@@ -68,7 +69,7 @@ impl Live {
             super::tell(&events, role, event);
         });
         let begins = teller.clone();
-        signals::stop_boards(&links, move || begins.begin())?;
+        orders.stop_boards(&links, move || begins.begin());
         let settings = Settings {
             address: self.listen,
             port: self.port,

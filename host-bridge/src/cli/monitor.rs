@@ -13,7 +13,7 @@ use clap::ValueHint;
 use crossbeam_channel::unbounded;
 use protocol::Role;
 
-use super::signals::{self, Again};
+use super::signals::{self, Again, Orders};
 use super::stop::Teller;
 
 /// What the command does.
@@ -74,6 +74,7 @@ pub struct Monitor {
 impl Monitor {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
+        let orders = Orders::to_stop().context("can't listen to signals")?;
         let mut bench = self.boards.find()?;
         if let Some(elf) = &self.sensor_elf {
             bench.sensor.elf = Some(elf.clone());
@@ -109,14 +110,13 @@ impl Monitor {
         });
         let (said, stops) = unbounded();
         let begins = teller.clone();
-        signals::stop_boards(&links, move || {
+        orders.stop_boards(&links, move || {
             // Nobody listens any more at the end.
             let _ = said.send(());
             if let Some(teller) = &begins {
                 teller.begin();
             }
-        })
-        .context("can't listen to signals")?;
+        });
         let source = Source {
             events,
             stops,

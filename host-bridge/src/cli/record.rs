@@ -22,7 +22,7 @@ use protocol::{Message, Role};
 use serde_json::json;
 
 use super::output;
-use super::signals::{self, Again};
+use super::signals::{self, Again, Orders};
 use super::stop::Outcome;
 
 /// What the command does.
@@ -93,6 +93,7 @@ pub struct Record {
 impl Record {
     /// Records.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
+        let orders = Orders::to_stop()?;
         let bench = self.boards.find()?;
         let part = Duration::try_from_secs_f64(self.split * 60.0);
         let part = part.map_err(|_| anyhow::anyhow!("--split: give minutes, 0 or more"))?;
@@ -118,10 +119,10 @@ impl Record {
             }
         });
         let (said, stops) = channel();
-        signals::stop_boards(&links, move || {
+        orders.stop_boards(&links, move || {
             // Nobody listens any more when the recording ends.
             let _ = said.send(());
-        })?;
+        });
         let absent = Session {
             recorder: &recorder,
             links: &links,

@@ -26,10 +26,9 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueHint};
 use protocol::Role;
 use signal_hook::consts::SIGUSR2;
-use signal_hook::iterator::Signals;
 
 use super::output::{self, say};
-use super::signals::{self, Again};
+use super::signals::{self, Again, Orders};
 
 /// Between two looks whether the bridge is to end.
 const LOOK: Duration = Duration::from_millis(50);
@@ -186,6 +185,8 @@ impl Relay {
 
 impl Bridge {
     fn execute(self, role: Role) -> anyhow::Result<ExitCode> {
+        let stops = Orders::to_stop()?;
+        let hand_overs = Orders::of(SIGUSR2)?;
         let bench = self.boards.find()?;
         let seat = bench.seat(role).context("a host has no seat")?;
         let ends = if self.ends.listen.is_empty() {
@@ -215,10 +216,8 @@ impl Bridge {
             system: System::default(),
         })?;
         let stop = bridge.stopper();
-        signals::on_stop(move || stop(OPERATOR_STOP))?;
-        let hand_over = bridge.hander_over();
-        let mut orders = Signals::new([SIGUSR2])?;
-        thread::spawn(move || orders.forever().for_each(|_| hand_over()));
+        stops.obey(move || stop(OPERATOR_STOP));
+        hand_overs.obey(bridge.hander_over());
         let far = opposite(role).map_or("the other site", site);
         say(&format!("{words}, waiting for {far}"));
         let mut before = None;

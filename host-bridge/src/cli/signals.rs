@@ -13,20 +13,34 @@ use signal_hook::iterator::Signals;
 /// What asks for an end; a terminal that goes away does.
 pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
 
-/// Has SIGUSR1 stop the boards, and call `before` right before. Fails if the system does not let one listen to signals.
-pub fn stop_boards(links: &[(Role, Link)], before: impl Fn() + Send + 'static) -> io::Result<()> {
-    let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
-    on_stop(move || {
-        before();
-        stop_all(&boards);
-    })
-}
+/// SIGUSR1, or another signal that asks for something. A command listens before it does anything that may take its
+/// time: until then the signal ends the program, and afterwards it is kept until somebody can obey.
+pub struct Orders(Signals);
 
-/// Has SIGUSR1 call `stop`, by a thread that waits for nothing else. Fails if the system does not let one listen to signals.
-pub fn on_stop(stop: impl Fn() + Send + 'static) -> io::Result<()> {
-    let mut signals = Signals::new([SIGUSR1])?;
-    std::thread::spawn(move || signals.forever().for_each(|_| stop()));
-    Ok(())
+impl Orders {
+    /// Listens for Stops. Fails if the system does not let one listen to signals.
+    pub fn to_stop() -> io::Result<Self> {
+        Self::of(SIGUSR1)
+    }
+
+    /// Listens for `signal`. Fails if the system does not let one listen to signals.
+    pub fn of(signal: i32) -> io::Result<Self> {
+        Signals::new([signal]).map(Self)
+    }
+
+    /// Has them stop the boards, and call `before` right before.
+    pub fn stop_boards(self, links: &[(Role, Link)], before: impl Fn() + Send + 'static) {
+        let boards: Vec<_> = links.iter().map(|(_, link)| link.sender()).collect();
+        self.obey(move || {
+            before();
+            stop_all(&boards);
+        });
+    }
+
+    /// Has them call `act`, by a thread that waits for nothing else.
+    pub fn obey(mut self, act: impl Fn() + Send + 'static) {
+        std::thread::spawn(move || self.0.forever().for_each(|_| act()));
+    }
 }
 
 /// What a second signal does.

@@ -4,7 +4,7 @@
 mod recorded;
 
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -14,10 +14,12 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use protocol::{DisplayState, Hello, Hold, Message, Role, Stop, StopReason};
+use rustix::fs::{CWD, FileType, Mode, mknodat};
 use rustix::process::{Pid, WaitOptions, waitpid};
 use tests::bridge;
 use tests::fake_bench::{FakeBench, Running};
 use tests::fake_board::{FakeBoard, wait_until};
+use tests::relay::free_port;
 use tests::terminal::Terminal;
 
 /// Only what hangs takes so long.
@@ -474,9 +476,9 @@ fn what_became_of_a_stop_by_a_signal_is_told_without_a_screen() {
         let is_told = |line: &str| wait_until(LIMIT, || text().contains(line));
         let unanswered = "display: no answer, told again: ";
         assert!(is_told(unanswered), "{words:?}: {}", text());
+        assert!(is_told("press the emergency stop\n"), "{}", text());
         assert!(text().contains("NOT STOPPED: "), "{}", text());
         let stopped = |board: &str| format!("{board} has stopped: by the operator\n");
-        assert!(is_told("press the emergency stop\n"), "{}", text());
         assert!(is_told(&stopped("sensor")), "{words:?}: {}", text());
         assert!(!text().contains(&stopped("display")), "{}", text());
         // It is told again until it answers.
@@ -484,6 +486,36 @@ fn what_became_of_a_stop_by_a_signal_is_told_without_a_screen() {
         assert!(is_told(&stopped("display")), "{words:?}: {}", text());
         running.signal("INT");
         assert_eq!(running.wait(LIMIT).status.code(), Some(0));
+    }
+}
+
+#[test]
+fn a_signal_that_comes_while_a_program_still_starts_stops_the_boards() {
+    let at = format!("tcp/127.0.0.1:{}", free_port());
+    let relay: &[&str] = &["relay", "sensor", "--listen", &at];
+    for words in [
+        &WITHOUT_A_SCREEN[..],
+        &[&["record", "/dev/null", "--force"], relay],
+    ]
+    .concat()
+    {
+        let board = FakeBoard::new(Role::Sensor);
+        let port = board.path().to_str().expect("UTF-8");
+        let file = name_of_a_port(&format!("start-{}", words[0])).with_file_name("bench.toml");
+        // Nobody writes to it yet: the program waits for its bench.
+        mknodat(CWD, &file, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
+            .expect("a pipe can be made");
+        let mut command = bridge::command();
+        let running = bridge::Running::start(command.args(words).arg("--bench").arg(&file));
+        let mut bench = File::options().write(true).open(&file).expect("it is read");
+        running.signal("USR1");
+        write!(bench, "[sensor]\nport = {port:?}\n").expect("it is read");
+        drop(bench);
+        let is_stop = |message: &Message| matches!(message, Message::Stop(_));
+        let heard = || board.take_heard().iter().any(is_stop);
+        assert!(wait_until(LIMIT, heard), "{words:?}");
+        running.signal("INT");
+        assert_eq!(running.wait(LIMIT).status.code(), Some(0), "{words:?}");
     }
 }
 
