@@ -316,9 +316,12 @@ impl Outbox {
         replaced
     }
 
-    /// Puts one back that was taken out, unless there is a newer one.
-    pub fn put_back(&self, waiting: Waiting) {
-        self.contents().newest.get_or_insert(waiting);
+    /// Puts one back that was taken out, unless there is a newer one. True if there is.
+    pub fn put_back(&self, waiting: Waiting) -> bool {
+        let newest = &mut self.contents().newest;
+        let makes_way = newest.is_some();
+        newest.get_or_insert(waiting);
+        makes_way
     }
 
     pub fn close(&self) {
@@ -387,11 +390,11 @@ mod tests {
     #[test]
     fn what_is_put_back_makes_way_for_what_came_meanwhile() {
         let outbox = outbox();
-        outbox.put_back(waiting(1));
-        outbox.put_back(waiting(2));
+        assert!(!outbox.put_back(waiting(1)));
+        assert!(outbox.put_back(waiting(2)));
         assert_eq!(outbox.take(0), Due::Message(waiting(1)));
         outbox.put(waiting(3));
-        outbox.put_back(waiting(1));
+        assert!(outbox.put_back(waiting(1)));
         assert_eq!(outbox.take(0), Due::Message(waiting(3)));
     }
 

@@ -477,7 +477,9 @@ impl Shared {
                 Due::Message(waiting) if self.now_us() < waiting.from_us => {
                     let left_us = waiting.from_us.saturating_sub(self.now_us());
                     self.pause(Duration::from_micros(left_us));
-                    self.outbox.put_back(waiting);
+                    if self.outbox.put_back(waiting) {
+                        locked(&self.inward).counts_mut().replaced += 1;
+                    }
                 }
                 Due::Message(waiting) if self.now_us() > waiting.until_us => {
                     locked(&self.inward).counts_mut().stale += 1;

@@ -385,6 +385,33 @@ fn between_two_holders_the_board_hears_nothing_for_as_long_as_it_follows_the_fir
 }
 
 #[test]
+fn what_makes_way_for_a_newer_one_between_two_holders_is_counted() {
+    let Sites {
+        sensor,
+        display: _display,
+        pair,
+    } = Sites::new(MAX_AGE);
+    listen(&sensor, LIMIT, at_least(100));
+    let other_board = FakeBoard::on(&pair.bench, Role::Display);
+    let waiting = rival(&pair, &other_board);
+    waiting.says("another bridge of this site holds the bench", LIMIT);
+    pair.display.site.hand_over();
+    waiting.says("this bridge holds the bench", LIMIT);
+    let before = pair.sensor.site.report(true).incoming;
+    // The board is told nothing yet: only the last of them is passed on.
+    const SAID: u32 = 5;
+    for number in 1..=SAID {
+        other_board.say(motion(1_000_000 + number, 0));
+        pass(&pair.bench, Duration::from_millis(2));
+    }
+    pass(&pair.bench, Duration::from_secs(1));
+    let after = pair.sensor.site.report(true).incoming;
+    assert_eq!(after.passed - before.passed, 1, "{before:?}, {after:?}");
+    let replaced = after.replaced - before.replaced;
+    assert_eq!(replaced, u64::from(SAID - 1), "{before:?}, {after:?}");
+}
+
+#[test]
 fn what_a_bridge_said_before_it_left_moves_nothing_whoever_says_it_again() {
     let bench = VirtualBench::default();
     let [sensor, display] =
