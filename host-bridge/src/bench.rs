@@ -56,7 +56,7 @@ impl Seat {
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum BenchError {
-    #[error("{0}: can't be read: {1}")]
+    #[error("{0}: can't be read: {1}: name a bench file with --bench, or in RIDGELINK_BENCH")]
     Unreadable(PathBuf, #[source] io::Error),
     #[error("{0}: {1}")]
     Malformed(PathBuf, #[source] Box<toml::de::Error>),

@@ -11,8 +11,24 @@ pub enum OutputFileError {
     Exists(PathBuf),
     #[error("{0}: is what is read: give another name")]
     IsInput(PathBuf),
-    #[error("{0}: can't be written: {1}")]
+    #[error("{0}: can't be written: {1}{advice}", advice = advice(.1))]
     NotWritten(PathBuf, #[source] io::Error),
+}
+
+/// What to do about a file that can't be made or written, to stand behind the system's reason.
+pub fn advice(reason: &io::Error) -> &'static str {
+    use io::ErrorKind;
+    match reason.kind() {
+        ErrorKind::NotFound => ": make its folder first",
+        ErrorKind::NotADirectory => ": a file is in the way: give another place",
+        ErrorKind::IsADirectory => ": give the name of a file",
+        ErrorKind::InvalidFilename => ": give a shorter name",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            ": give a place that you may write to"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => ": make room, or give another place",
+        _ => "",
+    }
 }
 
 impl OutputFileError {
@@ -22,12 +38,16 @@ impl OutputFileError {
 }
 
 /// Refuses a file that is there already, unless it is written over by `force`; and `input`, which is read for it,
-/// even then. Fails with [`OutputFileError::Exists`] or [`OutputFileError::IsInput`].
+/// even then; and a folder in any case. Fails with [`OutputFileError`].
 pub fn refuse_taken(path: &Path, force: bool, input: &Path) -> Result<(), OutputFileError> {
     if let (Ok(place), Ok(input)) = (fs::canonicalize(path), fs::canonicalize(input))
         && place == input
     {
         return Err(OutputFileError::IsInput(path.to_owned()));
+    }
+    if path.is_dir() {
+        let reason = io::ErrorKind::IsADirectory.into();
+        return Err(OutputFileError::not_written(path, reason));
     }
     // A link is there even if it leads to nothing.
     if !force && fs::symlink_metadata(path).is_ok() {

@@ -24,6 +24,7 @@ pub use row_builder::{Entry, Note, RowBuilder, Tally};
 use crate::clock::now_us;
 use crate::link::Event;
 use crate::lock::locked;
+use crate::output_file::advice;
 
 mod csv_folder;
 mod descriptions;
@@ -225,9 +226,12 @@ pub enum RecordingError {
         "{0}: would be in the way of this recording's parts, and is none of an earlier one: give another name"
     )]
     NoPart(PathBuf),
-    #[error("{0}: can't be made: {1}")]
+    #[error("{0}: can't be made: {1}{advice}", advice = advice(.1))]
     NotMade(PathBuf, #[source] io::Error),
-    #[error("{path}: can't be written any further: {source}; {safe_bytes} bytes of it are safe")]
+    #[error(
+        "{path}: can't be written any further: {source}{advice}; {safe_bytes} bytes of it are safe",
+        advice = advice(source)
+    )]
     NotWritten {
         path: PathBuf,
         safe_bytes: u64,

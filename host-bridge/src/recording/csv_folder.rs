@@ -46,6 +46,9 @@ impl CsvFolder {
     pub fn create(folder: &Path, force: bool) -> Result<Self, RecordingError> {
         let not_made = |source| RecordingError::not_made(folder, source);
         let fresh = !folder.exists();
+        if !fresh && !folder.is_dir() {
+            return Err(not_made(io::ErrorKind::NotADirectory.into()));
+        }
         fs::create_dir_all(folder).map_err(not_made)?;
         let full = fs::read_dir(folder).map_err(not_made)?.next().is_some();
         if full && !force {

@@ -41,6 +41,11 @@ impl Sink {
     /// and not of the link, and writes to a device or a pipe that is there at once. Dropping it before takes it away
     /// again. Fails if there is one already, or it can't be made.
     pub fn create(path: &Path, force: bool) -> Result<Self, RecordingError> {
+        // Nothing takes the place of a folder, whatever is asked for.
+        if path.is_dir() {
+            let reason = io::ErrorKind::IsADirectory.into();
+            return Err(RecordingError::not_made(path, reason));
+        }
         let place = if force {
             leads_to(path)
         } else {

@@ -117,6 +117,55 @@ fn a_folder_that_cant_be_written_is_named() {
 }
 
 #[test]
+fn a_file_that_cannot_be_made_or_read_is_told_with_what_to_do() {
+    let folder = folder("what-to-do");
+    fs::create_dir_all(folder.join("folder.hjif")).expect("a folder can be made");
+    fs::write(folder.join("file"), "mine").expect("a file can be written");
+    let scene = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    fs::write(folder.join("scene.toml"), scene).expect("a file can be written");
+    let long = "x".repeat(300);
+    for (words, want) in [
+        (
+            &["record", "absent/x.mcap"][..],
+            "absent/x.mcap: can't be made: No such file or directory (os error 2): make its folder first",
+        ),
+        (&["record", &long], ": give a shorter name"),
+        (&["record", "folder.hjif"], "give the name of a file"),
+        (
+            &["record", "folder.hjif", "--force"],
+            "give the name of a file",
+        ),
+        (
+            &["record", "--csv", "file"],
+            "a file is in the way: give another place",
+        ),
+        (
+            &["record", "--csv", "file", "--force"],
+            "a file is in the way: give another place",
+        ),
+        (
+            &["record", "/dev/full", "--force"],
+            "make room, or give another place; 0 bytes of it are safe",
+        ),
+        (
+            &["export", "scene.toml", "folder.hjif"],
+            "folder.hjif: can't be written: is a directory: give the name of a file",
+        ),
+        (
+            &["doctor", "--bench", "absent.toml"],
+            "name a bench file with --bench, or in RIDGELINK_BENCH",
+        ),
+    ] {
+        let run = command(words).current_dir(&folder).output();
+        let output = run.expect("the program can be started");
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        let said = text(&output.stderr);
+        assert!(said.contains(want), "{words:?}: {said}");
+    }
+    assert_eq!(fs::read_to_string(folder.join("file")).unwrap(), "mine");
+}
+
+#[test]
 fn an_unknown_command_is_refused() {
     let output = host_bridge(&["dance"]);
     assert_eq!(output.status.code(), Some(2));
