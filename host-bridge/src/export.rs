@@ -8,6 +8,7 @@
 //!
 //! What is written is what is there: nothing is filtered, and codes and words keep their steps.
 
+use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,8 @@ pub enum ExportError {
     Scene(#[from] SceneError),
     #[error("{0}: give a name that ends in .hjif or in .wav")]
     Format(PathBuf),
+    #[error("{0}: is no UTF-8, and a scene could not name it: give another name")]
+    Name(PathBuf),
     #[error("--from and --to-time are a recording's: a scene is as long as its duration_s says")]
     Part,
     #[error(
@@ -120,6 +123,9 @@ pub fn write(settings: &Settings) -> Result<Exports, ExportError> {
             return Err(ExportError::Format(settings.to.clone()));
         }
     };
+    if settings.to.file_name().and_then(OsStr::to_str).is_none() {
+        return Err(ExportError::Name(settings.to.clone()));
+    }
     if ending(&settings.from).as_deref() == Some("toml") {
         if settings.from_s.is_some() || settings.to_s.is_some() {
             return Err(ExportError::Part);

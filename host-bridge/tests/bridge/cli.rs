@@ -1,7 +1,9 @@
 //! The command line, where no board is needed.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -163,6 +165,26 @@ fn a_file_that_cannot_be_made_or_read_is_told_with_what_to_do() {
         assert!(said.contains(want), "{words:?}: {said}");
     }
     assert_eq!(fs::read_to_string(folder.join("file")).unwrap(), "mine");
+}
+
+#[test]
+fn nothing_is_exported_to_a_name_that_no_scene_can_say() {
+    let folder = folder("name");
+    let scene = "[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n";
+    fs::write(folder.join("scene.toml"), scene).expect("a file can be written");
+    for ending in ["wav", "hjif"] {
+        let name = [b"\xff.", ending.as_bytes()].concat();
+        let mut command = command(&["export", "scene.toml"]);
+        let run = command
+            .arg(OsStr::from_bytes(&name))
+            .current_dir(&folder)
+            .output();
+        let output = run.expect("the program can be started");
+        assert_eq!(output.status.code(), Some(2));
+        let said = text(&output.stderr);
+        assert!(said.contains("is no UTF-8"), "{said}");
+    }
+    assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 1);
 }
 
 #[test]
