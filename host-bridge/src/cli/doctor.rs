@@ -17,7 +17,7 @@ pub struct Doctor {
     #[command(flatten)]
     boards: super::Where,
     /// How long to listen to the boards, 0.5 to 3600; Ctrl-C ends it early, with what has been seen by then
-    #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = seconds, allow_negative_numbers = true)]
     span: Duration,
     /// Prints everything as JSON, for scripts
     #[arg(long)]

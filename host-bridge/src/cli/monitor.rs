@@ -52,10 +52,10 @@ pub struct Monitor {
     #[arg(long)]
     json: bool,
     /// Time between two lines
-    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = super::seconds)]
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = super::seconds, allow_negative_numbers = true)]
     every: Duration,
     /// Ends by itself after so long
-    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds, allow_negative_numbers = true)]
     limit: Option<Duration>,
     /// The sensor board's firmware, to read its log
     #[arg(long, value_name = "ELF", value_hint = ValueHint::FilePath)]

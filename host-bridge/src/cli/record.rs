@@ -71,11 +71,11 @@ pub struct Record {
     #[arg(long)]
     no_gauges: bool,
     /// Ends after so many seconds
-    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = super::seconds, allow_negative_numbers = true)]
     until: Option<Duration>,
     /// Begins another MCAP file, FILE-2.mcap and so on, after so many minutes; 0 for never: the file's
     /// index takes 2.5 MB of memory for each hour of it
-    #[arg(long, value_name = "MINUTES", default_value_t = PART.as_secs() as f64 / 60.0)]
+    #[arg(long, value_name = "MINUTES", default_value_t = PART.as_secs() as f64 / 60.0, allow_negative_numbers = true)]
     split: f64,
     /// Writes over files that are there already
     #[arg(long)]

@@ -61,7 +61,7 @@ pub struct Replay {
     #[arg(long, value_name = "TARGET", value_hint = ValueHint::FilePath)]
     to: Target,
     /// How fast, 0.1 to 100 times its own time; not for a scene
-    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = speed)]
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
     /// From so many seconds after its start on
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = super::place_s, allow_negative_numbers = true)]

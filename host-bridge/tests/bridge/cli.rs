@@ -188,6 +188,26 @@ fn nothing_is_exported_to_a_name_that_no_scene_can_say() {
 }
 
 #[test]
+fn a_number_below_0_is_refused_by_what_may_be_given() {
+    for (words, want) in [
+        (&["record", "x.mcap", "--for", "-1"][..], "seconds above 0"),
+        (&["record", "x.mcap", "--split", "-1"], "minutes, 0 or more"),
+        (&["monitor", "--plain", "--for", "-1"], "seconds above 0"),
+        (&["monitor", "--plain", "--every", "-1"], "seconds above 0"),
+        (&["doctor", "--for", "-1"], "give 0.5 to 3600"),
+        (
+            &["replay", "x", "--to", "monitor", "--speed", "-1"],
+            "give 0.1 to 100",
+        ),
+    ] {
+        let output = host_bridge(words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        let said = text(&output.stderr);
+        assert!(said.contains(want), "{words:?}: {said}");
+    }
+}
+
+#[test]
 fn an_unknown_command_is_refused() {
     let output = host_bridge(&["dance"]);
     assert_eq!(output.status.code(), Some(2));
