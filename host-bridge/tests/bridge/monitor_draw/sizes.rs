@@ -228,7 +228,7 @@ fn the_help_is_there_to_its_last_word() {
         let shown = picture(&widest(), &view, width, height);
         for words in [
             "┌ any key closes this ──",
-            "│ s, space      stop: 0 V until the display board's reset button or power",
+            "│ s, space      stop: 0 V, no arm drive, until each board's reset or power",
             "│ Tab           gauges, ports, boards or log, where there is no room for all │",
             "│ range         T1: v kept its sign over the counting window; T2: it did not │",
             "│ unread        good frames that hold no message of this version",
