@@ -1,5 +1,6 @@
 //! Bridges that relay, each in a process of its own, and the boards at their consoles.
 
+use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::path::Path;
@@ -114,6 +115,17 @@ impl Relay {
             "{part:?} is not said: {}",
             self.words()
         );
+    }
+
+    /// The names of its threads.
+    ///
+    /// # Panics
+    /// If it has ended.
+    pub fn threads(&self) -> Vec<String> {
+        let tasks = fs::read_dir(format!("/proc/{}/task", self.child.id())).expect("it runs");
+        let names =
+            tasks.filter_map(|task| fs::read_to_string(task.ok()?.path().join("comm")).ok());
+        names.collect()
     }
 
     /// Sends it a signal.

@@ -174,6 +174,14 @@ impl Proofs {
 impl Relay {
     /// Does it.
     pub fn execute(self) -> anyhow::Result<ExitCode> {
+        let proofs = match &self.part {
+            Part::Sensor(bridge) | Part::Display(bridge) => &bridge.meeting.proofs,
+            Part::Router(router) => &router.proofs,
+            Part::Stop(stopping) => &stopping.meeting.proofs,
+        };
+        if proofs.ca.is_some() {
+            read_and_write_on_one_thread();
+        }
         match self.part {
             Part::Sensor(bridge) => bridge.execute(Role::Sensor),
             Part::Display(bridge) => bridge.execute(Role::Display),
@@ -342,6 +350,15 @@ impl Stopping {
         }
         Ok(ExitCode::from(1))
     }
+}
+
+/// Has zenoh read on the thread on which it writes. On two it does both at once to one TLS connection, whose owner
+/// forbids that: memory is spoiled, and the program crashes (eclipse-zenoh/zenoh#2557). To be called before there is
+/// another thread.
+#[expect(unsafe_code, reason = "zenoh takes this from the environment alone")]
+fn read_and_write_on_one_thread() {
+    // SAFETY: no other thread looks at the environment, for there is none.
+    unsafe { std::env::set_var("ZENOH_RUNTIME", "(rx:(handover:tx))") };
 }
 
 /// Says what an open end means.
