@@ -180,7 +180,7 @@ impl Relay {
             Part::Stop(stopping) => &stopping.meeting.proofs,
         };
         if proofs.ca.is_some() {
-            read_and_write_on_one_thread();
+            read_and_write_by_one_worker();
         }
         match self.part {
             Part::Sensor(bridge) => bridge.execute(Role::Sensor),
@@ -352,13 +352,14 @@ impl Stopping {
     }
 }
 
-/// Has zenoh read on the thread on which it writes. On two it does both at once to one TLS connection, whose owner
-/// forbids that: memory is spoiled, and the program crashes (eclipse-zenoh/zenoh#2557). To be called before there is
-/// another thread.
+/// Has zenoh read where it writes, by one worker. By two it does both at once to one TLS connection, whose owner
+/// forbids that: memory is spoiled, and the program crashes (eclipse-zenoh/zenoh#2557). Where zenoh blocks while it
+/// reads, as when a session comes or goes, another thread takes the worker's place, and for a moment the two may still
+/// meet. To be called before there is another thread.
 #[expect(unsafe_code, reason = "zenoh takes this from the environment alone")]
-fn read_and_write_on_one_thread() {
+fn read_and_write_by_one_worker() {
     // SAFETY: no other thread looks at the environment, for there is none.
-    unsafe { std::env::set_var("ZENOH_RUNTIME", "(rx:(handover:tx))") };
+    unsafe { std::env::set_var("ZENOH_RUNTIME", "(rx:(handover:tx),tx:(worker_threads:1))") };
 }
 
 /// Says what an open end means.

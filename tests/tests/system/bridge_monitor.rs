@@ -46,6 +46,9 @@ fn monitor_at(sensor: &Path, display: &Path) -> Command {
     command
 }
 
+/// Lines of a fifth of a second in which both boards have long answered.
+const SOON_KNOWN: usize = 1_500;
+
 /// A program that is read line by line.
 struct Lines {
     child: Child,
@@ -136,14 +139,22 @@ fn a_line_a_second_tells_what_both_boards_say_in_columns() {
     let heading = lines.with("lambda_mm");
     let names: Vec<&str> = heading.trim_start_matches('#').split_whitespace().collect();
     lines.with("display safety: driving");
-    // The surface is told of while the hand is fast enough.
-    let line = lines.with(" valid ");
+    let column = |name: &str| {
+        let column = names.iter().position(|each| *each == name);
+        column.unwrap_or_else(|| panic!("no column {name}"))
+    };
+    let trips = ["rtt_s_ms", "rtt_d_ms"].map(column);
+    // The surface is told of while the hand is fast enough, a round trip once a ping has been answered.
+    let line = std::iter::repeat_with(|| lines.with(" valid "))
+        .take(SOON_KNOWN)
+        .find(|line| {
+            let cells: Vec<&str> = line.split_whitespace().collect();
+            trips.iter().all(|&trip| cells[trip] != "-")
+        })
+        .expect("each board answers a ping");
     let cells: Vec<&str> = line.split_whitespace().collect();
     assert_eq!(names.len(), cells.len(), "{heading}\n{line}");
-    let cell = |name: &str| {
-        let column = names.iter().position(|each| *each == name);
-        cells[column.unwrap_or_else(|| panic!("no column {name}"))]
-    };
+    let cell = |name: &str| cells[column(name)];
     let number = |name: &str| -> f64 { cell(name).parse().expect("a number") };
     assert_eq!((cell("sensor"), cell("display")), ("known", "known"));
     assert!((number("lambda_mm") - 2.0).abs() < 0.01, "{line}");
