@@ -284,7 +284,7 @@ impl Pins for DisplayPins {
     }
 
     fn on_reset(&mut self, part: &mut Stm32f427, at_ns: u64) {
-        self.spi.restart();
+        self.spi.restart(at_ns);
         self.load = None;
         self.alarm = false;
         self.set_stop_button(part, at_ns, self.button_open);

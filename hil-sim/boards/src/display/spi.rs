@@ -5,7 +5,7 @@
 //! each crosses the wire at the instant at which it would have. The stream is asked for its last word when it would
 //! have been, so it interrupts when it should. Whoever looks at SPI1 meanwhile, or moves a chip select, finds what it
 //! would have found. The one difference: the stream reads a frame from memory as it begins, and so it counts down, and
-//! says that half is done, too early.
+//! says that half is done, too early; and one that is switched off in the middle has left more words to SPI1.
 //!
 //! As RM0090, chapter 28, has it, for a master that sends and receives 8 or 16 bits, the highest first. Left out, for
 //! the display's firmware uses none of it: CRC, receive-only and one-wire transfers, a slave, interrupts, requests to
@@ -120,7 +120,8 @@ impl Spi {
     }
 
     /// The part has been reset, with the clock off; the chips have not.
-    pub fn restart(&mut self) {
+    pub fn restart(&mut self, at_ns: u64) {
+        self.catch_up(VirtualNanos(at_ns));
         let chips = std::mem::take(&mut self.chips);
         *self = Self {
             chips: chips.map(|chip| OnBus {
@@ -166,6 +167,12 @@ impl Spi {
             value,
             ends: run.ends,
         });
+    }
+
+    /// Loses all words but so many, the first ones.
+    fn cut_off(&mut self, kept: usize) {
+        self.words.truncate(kept);
+        self.run = self.words.back().map(|word| Run::at(word.ends));
     }
 
     /// Asks for the next word, or no more, as the buffer is: see 28.3.9.
@@ -241,7 +248,7 @@ impl Device for Spi {
         self.catch_up(context.now());
         match register {
             Register::Dr => self.begin(value as u16, registers, context.now()),
-            Register::Cr1 if !cr1::SPE.is_set(value) => self.words.truncate(1),
+            Register::Cr1 if !cr1::SPE.is_set(value) => self.cut_off(1),
             _ => {}
         }
         self.ask(registers, context);
@@ -288,7 +295,7 @@ impl Device for Spi {
         self.catch_up(context.now());
         self.clock_hz = hz;
         if hz == 0 {
-            self.words.clear();
+            self.cut_off(0);
             self.free = None;
             return;
         }
@@ -350,6 +357,8 @@ mod tests {
     const OFF: u64 = 1 << 2 | 1 << 8 | 1 << 9;
     const BYTES: u64 = OFF | 1 << 6;
     const WORDS: u64 = BYTES | 1 << 11;
+    /// BSY.
+    const BUSY: u64 = 1 << 7;
     const SELECT: u64 = 1 << (16 + 14);
     const DESELECT: u64 = 1 << 14;
     /// Channel 3, 16 bits, from memory, on.
@@ -373,16 +382,18 @@ mod tests {
         ]
     }
 
+    /// Clocks, the chip select's pin, the stream's far end, and SPI1 to ask it.
+    const SET_UP: [(u64, u64, u64); 6] = [
+        (100, AHB1ENR, 1 << 22 | 1 << 3),
+        (100, APB2ENR, 1 << 12),
+        (200, BSRR, DESELECT),
+        (200, MODER, 1 << 28),
+        (200, PAR, DR),
+        (200, CR2, 1 << 1),
+    ];
+
     /// What SPI1 and its stream say every 100 ns while frames are sent.
     fn said(mcu: &mut dyn Mcu) -> Vec<(u64, u64)> {
-        let set_up = [
-            (100, AHB1ENR, 1 << 22 | 1 << 3),
-            (100, APB2ENR, 1 << 12),
-            (200, BSRR, DESELECT),
-            (200, MODER, 1 << 28),
-            (200, PAR, DR),
-            (200, CR2, 1 << 1),
-        ];
         let frames = [
             // Of one word, two, three, and of a chip's sixteen and one: all whole.
             frame(10, 1, 30),
@@ -393,7 +404,7 @@ mod tests {
             frame(200, 9, 210),
         ];
         let off = [(250_000, S3CR, STREAM & !1)];
-        let mut script = set_up
+        let mut script = SET_UP
             .into_iter()
             .chain(frames.into_iter().flatten())
             .chain(off)
@@ -458,6 +469,25 @@ mod tests {
         let said = said(&mut part);
         let chip = &part.spi[0].chip_mut::<Alone>(0).unwrap().0;
         (said, chip.counters(), chip.faults().to_vec())
+    }
+
+    #[test]
+    fn what_is_cut_off_holds_up_no_word_that_comes_after_it() {
+        let world = World::new(&Scene::constant(2.0, 50.0)).unwrap();
+        let pins = DisplayPins::new(world, HandFault::new(&[]));
+        let mut board = Nucleo::new(pins, DisplayPins::fit).unwrap();
+        let mcu = board.mcu(0).unwrap();
+        for (at_ns, address, value) in SET_UP.into_iter().chain(frame(10, 17, 13)) {
+            set(mcu, at_ns, address, value);
+        }
+        // Before the first of seventeen words has crossed, the stream is switched off, and SPI1 off and on again.
+        for (address, value) in [(S3CR, STREAM & !1), (CR1, OFF), (CR1, BYTES)] {
+            set(mcu, 13_250, address, value);
+        }
+        // That word ends at 13.5 µs, at 8 MHz; a byte behind it takes 1 µs.
+        set(mcu, 13_300, DR, 0x14);
+        assert_ne!(get(mcu, 14_400, SR) & BUSY, 0);
+        assert_eq!(get(mcu, 14_600, SR) & BUSY, 0);
     }
 
     #[test]
