@@ -26,6 +26,7 @@ use crate::travel::MIN_SPEED_MM_S;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 use common::{Amplitudes, power};
 use follower::{DIFFERENCE_SAMPLES, Follower, MAINS, Moment, RESTED_ESTIMATES};
+use own::Steadily;
 
 mod common;
 mod follower;
@@ -81,6 +82,9 @@ pub struct Hum {
     pickup: Pickup,
     /// Whose hum is taken out, and what of each gauge: renewed with every estimate.
     removed: Option<(usize, Amplitudes)>,
+    /// Power of each gauge's own hum, in ADC steps².
+    own: [f32; GAUGES],
+    own_steadily: Steadily,
 }
 
 impl Default for Hum {
@@ -95,6 +99,8 @@ impl Default for Hum {
             resting: 0,
             pickup: Pickup::default(),
             removed: None,
+            own: [0.0; GAUGES],
+            own_steadily: Steadily::default(),
         }
     }
 }
@@ -162,6 +168,15 @@ impl Hum {
             mains_hz: follower.frequency_hz(),
             heard_s,
         };
+
+        let rests = self.resting >= RESTED_ESTIMATES;
+        let [low, high] = [0, 1].map(|number| self.followers[number].own_powers(usable, rests));
+        let own = core::array::from_fn(|gauge| larger(low[gauge], high[gauge]));
+        self.own = if rests {
+            own
+        } else {
+            self.own_steadily.of(own)
+        };
     }
 
     /// What may be hum or texture and is not told apart yet; nothing from 0.2 s of rest on, or, if there
@@ -170,12 +185,10 @@ impl Hum {
         self.pickup
     }
 
-    /// Power of each gauge's own hum in ADC steps², beyond what the `usable` ones have in common; 0 as
-    /// long as it may be texture.
-    pub fn own_powers(&self, usable: u8) -> [f32; GAUGES] {
-        let [low, high] =
-            [0, 1].map(|n| self.followers[n].own_powers(usable, self.resting >= RESTED_ESTIMATES));
-        core::array::from_fn(|gauge| larger(low[gauge], high[gauge]))
+    /// Power of each gauge's own hum in ADC steps², beyond what the usable ones have in common; 0 as
+    /// long as it may be texture, or a blow.
+    pub fn own_powers(&self) -> [f32; GAUGES] {
+        self.own
     }
 }
 

@@ -233,7 +233,7 @@ impl Sensor {
             );
             self.health.judge(&Signs {
                 noise: touch.noise,
-                hum: self.hum.own_powers(witnesses),
+                hum: self.hum.own_powers(),
                 misfits: finding.misfits,
                 agreed: finding.valid || finding.misfits != 0,
                 travel_mm: started.travel.velocity_mm_s(0).abs() / ESTIMATE_RATE_HZ as f32,

@@ -4,7 +4,7 @@ use protocol::GAUGES;
 
 use super::common::{Amplitudes, conjugate_product, square, sum};
 use crate::ESTIMATE_RATE_HZ;
-use crate::float::larger;
+use crate::float::{larger, smaller};
 
 /// Estimates in a row without a texture that is known to be at the frequency, before what a gauge holds
 /// there may be blamed on it: three of the followers' time constants of 0.25 s.
@@ -14,6 +14,9 @@ const FIRST_ESTIMATES: u16 = 40;
 /// Power relative to the median of three gauges or more, from which on it is hum of the gauge's own whatever
 /// the texture does: that would be in all of them.
 const OUTSTANDING: f32 = 16.0;
+/// Hum is steady: in motion a gauge is blamed for no more than twice what it has had for so many estimates, or up to twice as
+/// many. A shorter blow, as where one gauge lands before the others, is none.
+const STEADY_ESTIMATES: u8 = 3;
 /// A gauge's gain for common hum, relative to the others' mean, above which it is its own: amplifiers
 /// differ from 0.3 to 1.5.
 const MOST_GAIN: f32 = 5.0;
@@ -61,6 +64,31 @@ impl Own {
     }
 }
 
+/// What has been there for a while.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Steadily {
+    /// The least in so many estimates, and in the [`STEADY_ESTIMATES`] before.
+    now: [f32; GAUGES],
+    before: [f32; GAUGES],
+    estimates: u8,
+}
+
+impl Steadily {
+    /// Takes an estimate's powers.
+    pub fn of(&mut self, powers: [f32; GAUGES]) -> [f32; GAUGES] {
+        if self.estimates == STEADY_ESTIMATES {
+            self.estimates = 0;
+            self.before = core::mem::replace(&mut self.now, powers);
+        }
+        self.estimates += 1;
+        core::array::from_fn(|gauge| {
+            self.now[gauge] = smaller(self.now[gauge], powers[gauge]);
+            let least = smaller(self.now[gauge], self.before[gauge]);
+            smaller(powers[gauge], 2.0 * least)
+        })
+    }
+}
+
 /// Power beyond what the other usable gauges have in common.
 fn not_common(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
     let sum = sum(found, usable);
@@ -88,14 +116,17 @@ fn not_common(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
 fn outstanding(found: &Amplitudes, usable: u8) -> [f32; GAUGES] {
     let powers = found.map(|z| 0.5 * square(z));
     let mut sorted = [0.0; GAUGES];
-    let mut count = 0;
-    for (gauge, power) in powers.iter().enumerate() {
+    let (mut count, mut least, mut most) = (0, f32::MAX, 0.0);
+    for (gauge, &power) in powers.iter().enumerate() {
+        most = larger(most, power);
         if usable >> gauge & 1 == 1 {
-            sorted[count] = *power;
+            least = smaller(least, power);
+            sorted[count] = power;
             count += 1;
         }
     }
-    if count < 3 {
+    // None stands out of the median that does not stand out of the least: no need to sort.
+    if count < 3 || most <= OUTSTANDING * least {
         return [0.0; GAUGES];
     }
     let sorted = &mut sorted[..count];

@@ -98,6 +98,34 @@ fn one_gauges_faults_are_found_reported_left_out_and_forgiven_while_the_others_g
 }
 
 #[test]
+fn gauges_that_land_one_after_another_are_sound() {
+    for (first, ahead_s) in
+        (0..GAUGES).flat_map(|first| [0.01, 0.02, 0.03, 0.04].map(|s| (first, s)))
+    {
+        let mut bench = Bench::new(DEFAULT);
+        bench.rub(1_000, |_| 40.0, |_, _, _| 0.0);
+        let landed_s = bench.t_s();
+        let texture = texture(2.0);
+        let lands = |gauge, x_mm: f64, t_s: f64| {
+            let at_s = landed_s + if gauge == first { 0.0 } else { ahead_s };
+            if t_s < at_s {
+                0.0
+            } else {
+                texture(gauge, x_mm, t_s) + 1_200.0 * ((at_s - t_s) / 0.1).exp()
+            }
+        };
+        for estimate in bench.rub(2_000, |_| 40.0, lands) {
+            let (health, at_us) = (estimate.health, estimate.instant_us);
+            assert_eq!(
+                health,
+                [GaugeHealth::Good; GAUGES],
+                "{first} {ahead_s} s ahead, at {at_us} us"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_gauge_that_breaks_off_is_not_taken_for_stick_and_slip() {
     for speed_mm_s in [6.0, 20.0, 50.0] {
         let mut bench = Bench::new(DEFAULT);
