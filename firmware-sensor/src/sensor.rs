@@ -187,7 +187,7 @@ impl Sensor {
         let raw: [f32; GAUGES] = core::array::from_fn(|gauge| sample[gauge]);
         self.noise.push(&raw);
         self.health.push(scans, &raw);
-        let usable = self.health.good() & self.configuration.gauges;
+        let usable = self.health.believed() & self.configuration.gauges;
         let mut gauges = raw;
         self.hum.remove(&mut gauges);
 

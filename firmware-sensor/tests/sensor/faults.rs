@@ -126,6 +126,35 @@ fn gauges_that_land_one_after_another_are_sound() {
 }
 
 #[test]
+fn codes_that_never_change_are_stood_by_for_no_longer_than_a_twentieth_of_a_second() {
+    for (wavelength_mm, speed_mm_s) in [(1.0, 50.0), (2.0, 60.0), (4.0, 30.0)] {
+        for later_ms in (0..120).step_by(5) {
+            let mut bench = Bench::new(DEFAULT);
+            let speed = |t_s: f64| speed_mm_s + 10.0 * (TAU * 0.8 * t_s).sin();
+            bench.rub(2_000 + later_ms, speed, texture(wavelength_mm));
+            let (noise_lsb, x_mm) = (bench.noise_lsb, bench.x_mm);
+            bench.noise_lsb = 0.0;
+            let stuck = |gauge, _, _| texture(wavelength_mm)(gauge, x_mm, 0.0);
+            bench.rub(60, speed, stuck);
+            let what = format!("{wavelength_mm} mm, {later_ms} ms later");
+            for estimate in bench.rub(700, speed, stuck) {
+                assert!(!estimate.valid, "{what}: {estimate:?}");
+                assert_eq!(estimate.gauges_used, 0, "{what}");
+            }
+            // Nor does it have a hold on what comes after.
+            bench.noise_lsb = noise_lsb;
+            let estimates = bench.rub(1_500, speed, texture(wavelength_mm));
+            let (_, worst) = valid_and_worst(&estimates, wavelength_mm);
+            assert!(worst < 0.05, "{what}: {worst}");
+            assert!(
+                estimates[100..].iter().all(|estimate| estimate.valid),
+                "{what}"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_gauge_that_breaks_off_is_not_taken_for_stick_and_slip() {
     for speed_mm_s in [6.0, 20.0, 50.0] {
         let mut bench = Bench::new(DEFAULT);

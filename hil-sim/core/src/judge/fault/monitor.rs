@@ -73,6 +73,8 @@ pub(super) struct FaultMonitor {
     /// The first of each, with its instant in ns and in words.
     seen: Vec<(Sign, u64, String)>,
     estimates: Beat,
+    /// When the sensor first stood by an estimate though its converter or gauges tell it nothing.
+    stood_by_ns: Option<u64>,
     motions: Beat,
 }
 
@@ -292,6 +294,7 @@ impl FaultMonitor {
             sensor: Voice::new(Role::Sensor),
             seen: Vec::new(),
             estimates: Beat::new(ESTIMATES_NS),
+            stood_by_ns: None,
             motions: Beat::new(MOTIONS_NS),
         }
     }
@@ -532,6 +535,11 @@ impl FaultMonitor {
                 otherwise.push(format!("no {what} from {:.2} ms on", ms(at_ns)));
             }
         }
+        if let Some(at_ns) = self.stood_by_ns
+            && unseen.is_none()
+        {
+            otherwise.push(format!("stands by an estimate at {:.2} ms", ms(at_ns)));
+        }
         if let Some(off) = self.step.and_then(Step::finish)
             && off > IN_STEP_CYCLES
         {
@@ -566,8 +574,23 @@ impl FaultMonitor {
 
     fn said(&mut self, role: Role, said: &TimedMessage) {
         match said.message {
-            Message::Estimate(_) if role == Role::Sensor => {
+            Message::Estimate(estimate) if role == Role::Sensor => {
                 self.estimates.heard(said.at_ns, &self.alone_ns);
+                let is_silent = |within_ms: f64| {
+                    said.at_ns >= self.alone_ns.start + nanoseconds(within_ms * 1e-3)
+                        && self.alone_ns.contains(&said.at_ns)
+                        && self.fault.is_on(said.at_ns)
+                };
+                if estimate.valid
+                    && self
+                        .fault
+                        .kind
+                        .row()
+                        .silent_within_ms
+                        .is_some_and(is_silent)
+                {
+                    self.stood_by_ns.get_or_insert(said.at_ns);
+                }
             }
             Message::Motion(_) if role == Role::Display => {
                 self.motions.heard(said.at_ns, &self.alone_ns);

@@ -1,5 +1,9 @@
 //! Faults beside others, beside what the scene brings by itself, and beside a hand that rests or turns.
 
+use std::ops::Range;
+
+use protocol::Estimate;
+
 use super::*;
 use crate::scene::Motion;
 
@@ -10,7 +14,7 @@ fn several(duration_s: f64, faults: &[(Kind, f64)]) -> Scene {
 }
 
 /// A sound recording of that, with the outputs at 0 V for a time, in ms.
-fn silent(duration_s: f64, silent_ms: std::ops::Range<u64>) -> Recording {
+fn silent(duration_s: f64, silent_ms: Range<u64>) -> Recording {
     let mut recording = Run {
         duration_s,
         ..Run::steady(50.0, 2.0)
@@ -180,6 +184,33 @@ fn estimates_at_half_their_rate_are_missed() {
     };
     assert_eq!(unmet(1), [""; 0]);
     assert!(unmet(2)[0].starts_with("no estimates from"));
+}
+
+#[test]
+fn an_estimate_that_is_stood_by_while_the_converter_stands_still_is_named() {
+    let stood_by = |silent_ms: Range<u64>| {
+        let mut recording = silent(2.0, 0..0);
+        let told = recording.estimates.iter().map(|made| {
+            let valid = !silent_ms.contains(&(made.made_ns / MS));
+            let estimate = Estimate {
+                valid,
+                ..made.estimate
+            };
+            TimedMessage {
+                at_ns: made.made_ns,
+                message: Message::Estimate(estimate),
+            }
+        });
+        recording.signs.sensor = told.collect();
+        let scene = several(2.0, &[(Kind::AdcStuck, 0.5)]);
+        let mut unmet = finding(&scene, 0, 2_000 * MS, &recording).unmet();
+        unmet.retain(|unmet| unmet.starts_with("stands by an estimate at "));
+        unmet
+    };
+    // A tenth of a second from its beginning, and it lasts for 0.7 s.
+    assert_eq!(stood_by(600..1_200), [""; 0]);
+    assert_eq!(stood_by(620..1_200).len(), 1);
+    assert_eq!(stood_by(600..1_180).len(), 1);
 }
 
 #[test]
