@@ -73,6 +73,11 @@ const PLAY_WITH_FORCE_UM: i32 = 12;
 const SPEED_KEPT: f32 = 0.967;
 /// Samples without travel after which nothing is stood by any more.
 const REST_SAMPLES: u32 = SAMPLE_RATE_HZ / 2;
+/// Of its last third of a wave a wave that goes on has more than this share of its power: a gauge that has just met a crest has
+/// 0.045, the others have more.
+const LATEST_WAVES: f32 = 1.0 / 3.0;
+/// See [`LATEST_WAVES`].
+const LATEST_POWER: f32 = 0.05;
 /// Share over two waves from which on a wave is strong: its fit needs no average to lean on.
 const STRONG: f32 = 0.8;
 /// Estimates in a row that must find a weak wave that is not known yet before it is stood by: chance makes such a wave, and
@@ -234,6 +239,17 @@ impl Spectrum {
         self.trend = Trend::default();
     }
 
+    /// Whether a wave that explains so much `power` is felt still. A step, such as a fingertip's that is lifted and springs
+    /// back, looks like a wave, and leaves nothing behind.
+    fn goes_on(&self, wavelength_mm: f32, power: f32) -> bool {
+        let spacing = knots::spacing_for(wavelength_mm);
+        let latest_mm = LATEST_WAVES * wavelength_mm;
+        let latest = self
+            .knots
+            .latest_power(spacing, latest_mm, self.touch.usable);
+        latest > LATEST_POWER * power
+    }
+
     /// What is said of the likelier supposition.
     fn say(&mut self, said: &Supposition) -> Finding {
         let usable = self.touch.usable;
@@ -258,20 +274,25 @@ impl Spectrum {
             && (LOWEST_HZ..=HIGHEST_HZ).contains(&hz)
             && amplitude_lsb >= MIN_AMPLITUDE_LSB
             && self.rested < REST_SAMPLES;
-        let stands = in_range && usable != 0 && !self.touch.pickup.hides(amplitude_lsb, hz);
+        let is_new = off(said.wavelength_mm, self.known_mm) >= SAME;
+        let fades = is_new
+            && said.probability >= self.level
+            && !self.goes_on(said.wavelength_mm, fitted.explained);
+        let stands =
+            in_range && usable != 0 && !fades && !self.touch.pickup.hides(amplitude_lsb, hz);
         let confidence = match (stands, jerky) {
             (true, false) => said.probability,
             (true, true) => WHERE_JERKY * said.probability,
             (false, _) => 0.0,
         };
         let is_sure = confidence >= self.level;
-        if !is_sure || off(said.wavelength_mm, self.sure_mm) >= SAME {
+        // Under a crest nothing is told of it, for or against.
+        if !is_sure && !fades || off(said.wavelength_mm, self.sure_mm) >= SAME {
             self.sure_times = 0;
         }
         self.sure_times = (self.sure_times + u8::from(is_sure)).min(TIMES);
         self.sure_mm = said.wavelength_mm;
-        let at_once =
-            said.new || fitted.share() > STRONG || off(said.wavelength_mm, self.known_mm) < SAME;
+        let at_once = said.new || fitted.share() > STRONG || !is_new;
         let valid = is_sure && (at_once || self.sure_times == TIMES);
         if valid {
             self.known_mm = said.wavelength_mm;

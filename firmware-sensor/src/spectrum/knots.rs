@@ -173,6 +173,34 @@ impl Knots {
         (partial, reader)
     }
 
+    /// Variance over the last `travel_mm` of the path, summed over the `usable` gauges, in ADC steps².
+    pub fn latest_power(&self, spacing: usize, travel_mm: f32, usable: u8) -> f32 {
+        let (_, mut reader) = self.backwards(spacing);
+        let (mut sums, mut squares) = ([0.0; GAUGES], [0.0; GAUGES]);
+        let (mut travelled_mm, mut count) = (0.0, 0.0);
+        let mut first = None;
+        while travelled_mm < travel_mm
+            && let Some(knot) = self.next(&mut reader)
+        {
+            let first = first.get_or_insert(knot.gauges);
+            for gauge in 0..GAUGES {
+                let x = knot.gauges[gauge] - first[gauge];
+                sums[gauge] += x;
+                squares[gauge] += x * x;
+            }
+            travelled_mm += knot.travel_mm;
+            count += 1.0;
+        }
+        if count == 0.0 {
+            return 0.0;
+        }
+        let share = 1.0 / count;
+        (0..GAUGES)
+            .filter(|gauge| usable >> gauge & 1 == 1)
+            .map(|gauge| share * (squares[gauge] - share * sums[gauge] * sums[gauge]))
+            .sum()
+    }
+
     /// The next knot back of a reader.
     #[inline]
     pub fn next(&self, reader: &mut Backwards) -> Option<&Knot> {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::felt::{Bench, CODES, GAINS, PHASES_RAD, PLACES_MM, valid_and_worst};
+use crate::felt::{Bench, CODES, GAINS, PHASES_RAD, PLACES_MM, texture, valid_and_worst};
 use firmware_sensor::counting::predicted_mean_mm;
 use firmware_sensor::texture::Surface;
 use firmware_sensor::{
@@ -463,4 +463,30 @@ fn a_weaves_period_is_told_though_its_half_is_the_strongest() {
     assert!(valid_and_worst(&begun, 3.3).0 > 0.0);
     let (valid, worst) = valid_and_worst(&bench.rub(3_000, |_| 40.0, weave), 3.3);
     assert!(valid > 0.95 && worst < 0.05, "{valid} valid, {worst} off");
+}
+
+#[test]
+fn a_fingertip_that_is_lifted_from_a_stroke_soon_feels_no_other_wave() {
+    for (wavelength_mm, speed_mm_s) in [(1.0, 50.0), (2.0, 60.0), (4.0, 30.0)] {
+        for later_ms in (0..120).step_by(10) {
+            for deflection in [-800.0, 0.0, 800.0] {
+                let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+                bench.noise_lsb = 1.0;
+                let texture = texture(wavelength_mm);
+                let felt = |gauge, x_mm, t_s| texture(gauge, x_mm, t_s) + deflection;
+                bench.rub(2_000 + later_ms, |_| speed_mm_s, felt);
+                let lifted_s = bench.t_s();
+                let springs_back =
+                    |gauge, x_mm, t_s| felt(gauge, x_mm, t_s) * (-(t_s - lifted_s) / 0.01).exp();
+                // That the deflection goes may look like a longer wave while it is all that there is to see.
+                bench.rub(150, |_| speed_mm_s, springs_back);
+                let estimates = bench.rub(1_000, |_| speed_mm_s, springs_back);
+                let (_, worst) = valid_and_worst(&estimates, wavelength_mm);
+                assert!(
+                    worst < 0.1,
+                    "{wavelength_mm} mm, {later_ms} ms later, {deflection} steps: {worst}"
+                );
+            }
+        }
+    }
 }
