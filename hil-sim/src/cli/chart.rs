@@ -7,7 +7,7 @@ use clap::Subcommand;
 use hil_sim_boards::Firmware;
 use hil_sim_studies::contact::{models, stability};
 use hil_sim_studies::display::{delay, purity, rendering_of_word, stop, texture, timing};
-use hil_sim_studies::estimators::{self, confidence, efficiency, family};
+use hil_sim_studies::estimators::{self, confidence, efficiency};
 use hil_sim_studies::jury::seeds::{REPORTING, Seeds};
 use hil_sim_studies::study::{Progress, Study};
 use indicatif::ProgressBar;
@@ -146,7 +146,7 @@ impl Chart {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         match self {
             Self::Estimators(Estimators { scenes, out, elf }) => {
-                let families = family::load(&scenes)?;
+                let families = run_options::families(&scenes)?;
                 out.draw("scenes", |bar| {
                     Ok(estimators::compare(families, &elf, bar)?)
                 })

@@ -7,9 +7,10 @@ use hil_sim_core::judge::Summary;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::scene::Scene;
 use hil_sim_studies::bench::Bench;
-use hil_sim_studies::estimators::family::{self, Family};
+use hil_sim_studies::estimators::family::Family;
 use hil_sim_studies::study::{Record, Table, short};
 
+use super::run_options;
 use super::say::say;
 use super::{Elves, EngineName, number, status, threads, under_bar};
 
@@ -35,7 +36,7 @@ type Judged = (Summary, Vec<String>);
 
 impl Goals {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let families = family::load(&self.scenes)?;
+        let families = run_options::families(&self.scenes)?;
         let bench = self.engine.bench(&self.elves)?;
         let scenes: Vec<&Scene> = families.iter().flat_map(|family| &family.scenes).collect();
         let judged = run(&scenes, &bench)?;

@@ -11,6 +11,7 @@ use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::{Scene, SceneError};
 use hil_sim_core::scene_file::line::line_of;
 use hil_sim_studies::bench::Bench;
+use hil_sim_studies::estimators::family::{self, Family, FamilyError};
 use hil_sim_studies::jury::folder::{self, Entry};
 use hil_sim_studies::output::annotation::annotation;
 
@@ -130,6 +131,16 @@ pub(super) fn of_folder(folder: &Path, engine: EngineName) -> anyhow::Result<Vec
         Ok((entry, scene))
     });
     loaded.collect()
+}
+
+/// The scenes of all families. What their authors should know goes to standard error.
+pub(super) fn families(root: &Path) -> Result<Vec<Family>, FamilyError> {
+    let families = family::load(root)?;
+    families
+        .iter()
+        .flat_map(|family| &family.scenes)
+        .for_each(tell_notes);
+    Ok(families)
 }
 
 /// A refusal of an engine's, with the scene's file and line.

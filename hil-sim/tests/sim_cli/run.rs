@@ -38,6 +38,36 @@ fn a_scene_that_is_as_expected_exits_0_and_writes_json_and_report() {
 }
 
 #[test]
+fn what_a_scene_s_author_should_know_is_told_by_goals_as_by_run() {
+    let folder = folder("notes-of-goals");
+    for family in [
+        "table-1-20-db",
+        "table-1-0-db",
+        "off-grid",
+        "fig7",
+        "reversals",
+        "boundary",
+        "slow-fast",
+        "gauge-trouble",
+        "hum",
+        "stick-slip-force",
+        "stick-slip-blind",
+    ] {
+        fs::create_dir(folder.join(family)).unwrap();
+        fs::write(folder.join(family).join("a.toml"), SOUND).unwrap();
+    }
+    let old = format!("{SOUND}[estimator]\nmethod = \"bank\"\n");
+    fs::write(folder.join("hum/a.toml"), old).unwrap();
+    for words in [&["run", "hum/a.toml"][..], &["goals", "--scenes", "."]] {
+        let output = hil_sim(&folder, words);
+        assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+        let told = errors(&output);
+        let note = "hum/a.toml:5: estimator.method: method = \"bank\" is now \"spectrum\"";
+        assert!(told.contains(note), "{words:?}: {told}");
+    }
+}
+
+#[test]
 fn a_scene_is_never_written_over_with_results() {
     let folder = folder("over-a-scene");
     for name in ["a.toml", "b.toml"] {
