@@ -1,7 +1,9 @@
 //! The CSV files that a scene names.
 
+use std::path::Path;
+
 use super::{Folder, SURFACE, refusals};
-use crate::scene::Motion;
+use crate::scene::{Motion, Scene};
 
 #[test]
 fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
@@ -33,6 +35,19 @@ fn recorded_motion_is_read_and_bad_rows_are_refused_at_line_and_column() {
     let refusal = folder.refusal(MOTION, "data.csv", "");
     let want = "data.csv:1: the first line is \"\": it must be t_s,x_mm";
     assert!(refusal.starts_with(want), "{refusal}");
+}
+
+#[test]
+fn a_byte_order_mark_in_front_of_a_scene_or_of_csv_is_no_part_of_it() {
+    const MOTION: &str = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("marked", SURFACE);
+    let scene = folder.load(MOTION, "data.csv", "\u{feff}t_s,x_mm\r\n0,0\r\n3,150\r\n");
+    assert_eq!(scene.unwrap().motion.position_mm(1.0), 50.0);
+    let text = format!("\u{feff}{SURFACE}seeds = 1\n");
+    let refusal = Scene::parse(Path::new("x.toml"), &text)
+        .unwrap_err()
+        .to_string();
+    assert!(refusal.starts_with("x.toml:3: surface.seeds"), "{refusal}");
 }
 
 #[test]
