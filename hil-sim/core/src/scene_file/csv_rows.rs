@@ -111,12 +111,12 @@ impl<'f> CsvRows<'f> {
         let key = if self.is_bare() {
             format!("column {}", column + 1)
         } else {
-            format!("column {} ({})", column + 1, self.first[column])
+            format!("column {} ({})", column + 1, shortened(&self.first[column]))
         };
         let line = self.line_at(record.position());
         SceneError {
             key,
-            ..self.refuse(line, format!("{:?} {message}", &record[column]))
+            ..self.refuse(line, format!("{} {message}", quoted(&record[column])))
         }
     }
 
@@ -161,6 +161,20 @@ impl<'f> CsvRows<'f> {
         };
         self.refuse(self.line_at(error.position()), message)
     }
+}
+
+/// As much of a cell or a line as a refusal repeats: a file that is no CSV may be a single one.
+fn shortened(text: &str) -> String {
+    const LETTERS: usize = 80;
+    match text.char_indices().nth(LETTERS) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// The same in quotes.
+pub(super) fn quoted(text: &str) -> String {
+    format!("{:?}", shortened(text))
 }
 
 /// Whether a row was read, of however many cells.

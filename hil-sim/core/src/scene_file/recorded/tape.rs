@@ -1,7 +1,7 @@
 //! Rows as they are read from a file: scaled, checked, and cut to what a scene needs.
 
 use crate::scene::{SceneError, Series};
-use crate::scene_file::csv_rows::CsvRows;
+use crate::scene_file::csv_rows::{CsvRows, quoted};
 
 /// What a reader says of a row that is refused: index of the column, 0 being the time or place, and what to
 /// do.
@@ -107,7 +107,8 @@ pub fn plain<H: AsRef<str>>(
     let headers: Vec<&str> = headers.iter().map(AsRef::as_ref).collect();
     if !headers.contains(&&*header) {
         let wanted = headers.join(" or ");
-        let message = format!("the first line is {header:?}: it must be {wanted}{otherwise}");
+        let header = quoted(&header);
+        let message = format!("the first line is {header}: it must be {wanted}{otherwise}");
         return Err(rows.refuse(Some(1), message));
     }
     let columns: Vec<usize> = (0..rows.first().len()).collect();

@@ -51,6 +51,22 @@ fn a_byte_order_mark_in_front_of_a_scene_or_of_csv_is_no_part_of_it() {
 }
 
 #[test]
+fn a_refusal_repeats_no_more_of_a_file_than_can_be_read() {
+    const MOTION: &str = "[motion]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
+    let folder = Folder::new("long", SURFACE);
+    let zeros = "\0".repeat(10_000);
+    for csv in [
+        zeros.clone(),
+        format!("t_s,x_mm\n0,{zeros}\n"),
+        format!("t_s,{zeros}\n0,0\n"),
+    ] {
+        let refusal = folder.refusal(MOTION, "data.csv", &csv);
+        assert!(refusal.starts_with("data.csv:"), "{refusal}");
+        assert!(refusal.contains('…') && refusal.len() < 500, "{refusal}");
+    }
+}
+
+#[test]
 fn recorded_gauges_are_played_and_refused_below_200_hz() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
     let folder = Folder::new("gauges", SURFACE);
