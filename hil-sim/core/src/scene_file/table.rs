@@ -55,8 +55,14 @@ impl<'t> Source<'t> {
         match DeTable::parse(self.text) {
             Ok(table) => Ok(table.into_inner()),
             Err(error) => {
-                let offset = error.span().map_or(0, |span| span.start);
-                Err(self.error(offset, "", format!("{}: mend the TOML", error.message())))
+                let span = error.span().unwrap_or_default();
+                // That it stands there twice does not say which.
+                let key = match error.message() {
+                    "duplicate key" => self.text.get(span.clone()).unwrap_or_default(),
+                    _ => "",
+                };
+                let message = format!("{}: mend the TOML", error.message());
+                Err(self.error(span.start, key, message))
             }
         }
     }

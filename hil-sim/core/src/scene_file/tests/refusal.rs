@@ -16,6 +16,23 @@ fn a_refusal_says_file_line_key_and_what_to_do() {
 }
 
 #[test]
+fn a_key_that_stands_twice_is_named() {
+    for (text, want) in [
+        (
+            "seed = 1\nseed = 2\n",
+            "scenes/x.toml:2: seed: duplicate key",
+        ),
+        (
+            "[link]\nloss = 0\n[link]\n",
+            "scenes/x.toml:3: link: duplicate key",
+        ),
+    ] {
+        let refusal = refusal(text);
+        assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
+    }
+}
+
+#[test]
 fn impossible_values_are_refused_at_their_line_and_key() {
     assert_refused(
         refusal_of,
