@@ -184,8 +184,14 @@ impl<'t> Source<'t> {
         let tape = |width| Tape::new(width, window, conversion);
         let tape = match self.format {
             Format::Csv(ref bytes) if is_plain => {
+                // Columns that are named are no volts unless it is said.
+                let volts = if self.headers[0].contains("g0") {
+                    ", with offset_v = 0 if they hold volts"
+                } else {
+                    ""
+                };
                 let otherwise = format!(
-                    ", or name other columns by channels and {} in the scene",
+                    ", or name other columns by channels and {} in the scene{volts}",
                     self.words.column
                 );
                 plain(

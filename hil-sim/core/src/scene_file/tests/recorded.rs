@@ -67,6 +67,23 @@ fn a_refusal_repeats_no_more_of_a_file_than_can_be_read() {
 }
 
 #[test]
+fn whoever_is_told_to_name_the_gauges_columns_is_told_that_volts_must_be_said() {
+    let folder = Folder::new("volts", SURFACE);
+    let refusal = |section: &str| {
+        let keys = format!("[{section}]\nkind = \"recorded\"\nfile = \"data.csv\"\n");
+        folder.refusal(&keys, "data.csv", "t_s,g0,g1,g2,g3,g4,x\n0,1,1,1,1,1,1\n")
+    };
+    let want = "by channels and time in the scene, with offset_v = 0 if they hold volts";
+    let gauges = refusal("gauges");
+    assert!(gauges.ends_with(want), "{gauges}");
+    let motion = refusal("motion");
+    assert!(
+        motion.ends_with("by channels and time in the scene"),
+        "{motion}"
+    );
+}
+
+#[test]
 fn recorded_gauges_are_played_and_refused_below_200_hz() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
     let folder = Folder::new("gauges", SURFACE);
