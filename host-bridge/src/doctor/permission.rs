@@ -4,10 +4,12 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use nix::unistd::{Gid, Group, getegid, getgroups};
+use nix::unistd::{Gid, Group, Uid, User, getegid, getgroups};
 
 /// Where the rules of one's own go.
 pub const RULES: &str = "/etc/udev/rules.d/70-st-link.rules";
+/// Where Linux has its pseudo-terminals.
+const PSEUDO_TERMINALS: &str = "/dev/pts";
 /// What makes them hold at once.
 pub const RELOAD: &str = "sudo udevadm control --reload && sudo udevadm trigger";
 
@@ -22,6 +24,8 @@ pub struct Permission {
     pub is_member: bool,
     /// Whether this user is listed in that group, since when ever.
     pub is_listed: bool,
+    /// Whose pseudo-terminal it is, by name if the user has one; none if it is another device.
+    pub pseudo_terminal_of: Option<String>,
 }
 
 impl Permission {
@@ -32,7 +36,9 @@ impl Permission {
         let group = Group::from_gid(gid).ok().flatten();
         let own = getgroups().unwrap_or_default();
         let user = std::env::var("USER").unwrap_or_default();
+        let is_pseudo = fs::canonicalize(path).is_ok_and(|port| port.starts_with(PSEUDO_TERMINALS));
         Some(Self {
+            pseudo_terminal_of: is_pseudo.then(|| name_of(facts.uid())),
             is_member: gid == getegid() || own.contains(&gid),
             is_listed: group
                 .as_ref()
@@ -45,7 +51,13 @@ impl Permission {
     /// What lets this user open the port.
     pub fn advice(&self) -> String {
         let Self { group, .. } = self;
-        if self.mode & 0o060 != 0o060 || group == "root" {
+        // No rule and no group opens it: it is its owner's.
+        if let Some(owner) = &self.pseudo_terminal_of {
+            format!(
+                "it is a pseudo-terminal of {owner}'s: run this as {owner}, or start the program behind it \
+                 (`hil-sim serve`, `host-bridge relay`) as yourself"
+            )
+        } else if self.mode & 0o060 != 0o060 || group == "root" {
             format!(
                 "put this line into {RULES}, then `{RELOAD}`: {}",
                 port_rule()
@@ -58,6 +70,12 @@ impl Permission {
             )
         }
     }
+}
+
+/// A user's name; the number if there is none.
+fn name_of(uid: u32) -> String {
+    let user = User::from_uid(Uid::from_raw(uid)).ok().flatten();
+    user.map_or_else(|| uid.to_string(), |user| user.name)
 }
 
 /// Whether the system has the group that many distributions have for plugged-in devices.
@@ -103,6 +121,22 @@ mod tests {
     }
 
     #[test]
+    fn a_pseudo_terminal_is_no_matter_of_groups_or_udev() {
+        let (_host, port) = serialport::TTYPort::pair().expect("a pseudo-terminal");
+        let name = serialport::SerialPort::name(&port).expect("it has a name");
+        let advice = Permission::of(Path::new(&name))
+            .expect("the system tells")
+            .advice();
+        let owner = name_of(nix::unistd::geteuid().as_raw());
+        let want = format!("it is a pseudo-terminal of {owner}'s: run this as {owner}, or start");
+        assert!(advice.starts_with(&want), "{advice}");
+        assert!(
+            !advice.contains("udev") && !advice.contains("usermod"),
+            "{advice}"
+        );
+    }
+
+    #[test]
     fn advice_fits_the_permission() {
         let advice = |group: &str, mode, is_listed| {
             let permission = Permission {
@@ -110,6 +144,7 @@ mod tests {
                 mode,
                 is_member: false,
                 is_listed,
+                pseudo_terminal_of: None,
             };
             permission.advice()
         };

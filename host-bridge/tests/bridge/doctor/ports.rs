@@ -107,6 +107,7 @@ fn a_port_of_another_group_names_the_group() {
                 mode: 0o660,
                 is_member: false,
                 is_listed: false,
+                pseudo_terminal_of: None,
             });
         }),
         "denied",
