@@ -1,6 +1,5 @@
 //! Where a board's console is looked for.
 
-use std::convert::Infallible;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -77,15 +76,21 @@ impl fmt::Display for Place {
     }
 }
 
+/// Words that name no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("give a port, such as /dev/ttyACM0, or usb:SERIAL of an ST-LINK")]
+pub struct NoPlace;
+
 /// `usb:SERIAL`, or the name of a port.
 impl FromStr for Place {
-    type Err = Infallible;
+    type Err = NoPlace;
 
-    fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text.strip_prefix("usb:") {
-            Some(serial) => Self::Usb(serial.to_owned()),
-            None => Self::Port(PathBuf::from(text)),
-        })
+    fn from_str(text: &str) -> Result<Self, NoPlace> {
+        match text.strip_prefix("usb:").unwrap_or(text) {
+            "" => Err(NoPlace),
+            serial if text.starts_with("usb:") => Ok(Self::Usb(serial.to_owned())),
+            port => Ok(Self::Port(PathBuf::from(port))),
+        }
     }
 }
 
@@ -167,6 +172,9 @@ mod tests {
             "/dev/ttyACM0".parse(),
             Ok(Place::Port("/dev/ttyACM0".into()))
         );
+        for nothing in ["", "usb:"] {
+            assert_eq!(nothing.parse::<Place>(), Err(NoPlace), "{nothing:?}");
+        }
     }
 
     #[test]

@@ -230,6 +230,20 @@ fn a_bad_bench_file_is_refused_by_file_line_and_key() {
 }
 
 #[test]
+fn an_empty_name_of_a_port_is_refused_by_its_argument() {
+    for (argument, name) in [("--sensor", ""), ("--display", ""), ("--sensor", "usb:")] {
+        let output = host_bridge(&["doctor", argument, name]);
+        assert_eq!(output.status.code(), Some(2), "{argument} {name:?}");
+        let said = text(&output.stderr);
+        let want = format!("invalid value '{name}' for '{argument} <PORT>'");
+        for want in [&*want, "give a port, such as /dev/ttyACM0, or usb:SERIAL"] {
+            // clap has words of its own for an empty value.
+            assert!(said.contains(want), "{argument} {name:?}: {said}");
+        }
+    }
+}
+
+#[test]
 fn a_bench_file_that_is_not_there_is_refused_by_name() {
     let output = host_bridge(&["doctor", "--bench", "no-such-bench.toml"]);
     assert_eq!(output.status.code(), Some(2));
