@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use hil_sim_core::scene_file::line::{line_at, line_of};
 use protocol::Role;
 use serde::Deserialize;
 
@@ -24,7 +25,7 @@ pub struct Bench {
 
 /// What is known of one board. All of it may be left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table")]
 pub struct Seat {
     /// Its console's port.
     pub port: Option<PathBuf>,
@@ -58,8 +59,13 @@ impl Seat {
 pub enum BenchError {
     #[error("{0}: can't be read: {1}: name a bench file with --bench, or in RIDGELINK_BENCH")]
     Unreadable(PathBuf, #[source] io::Error),
-    #[error("{0}: {1}")]
-    Malformed(PathBuf, #[source] Box<toml::de::Error>),
+    #[error("{}:{line}: {}{message}", file.display(), key.as_ref().map_or(String::new(), |key| format!("{key}: ")))]
+    Malformed {
+        file: PathBuf,
+        line: usize,
+        key: Option<String>,
+        message: String,
+    },
     #[error("{0} can't be both boards: give each its own port or serial number")]
     Twice(String),
 }
@@ -69,8 +75,35 @@ impl Bench {
     pub fn read(path: &Path) -> Result<Self, BenchError> {
         let text = fs::read_to_string(path)
             .map_err(|source| BenchError::Unreadable(path.to_owned(), source))?;
-        toml::from_str(&text)
-            .map_err(|source| BenchError::Malformed(path.to_owned(), Box::new(source)))
+        let bench: Self = toml::from_str(&text).map_err(|error| malformed(path, &text, error))?;
+        bench.names_something(path, &text)?;
+        Ok(bench)
+    }
+
+    /// Fails if a name in it is empty.
+    fn names_something(&self, path: &Path, text: &str) -> Result<(), BenchError> {
+        for (board, seat) in [("sensor", &self.sensor), ("display", &self.display)] {
+            let is_empty = |path: &Option<PathBuf>| {
+                path.as_ref()
+                    .is_some_and(|path| path.as_os_str().is_empty())
+            };
+            let names = [
+                ("port", is_empty(&seat.port)),
+                ("link", is_empty(&seat.link)),
+                ("usb", seat.usb.as_deref() == Some("")),
+                ("elf", is_empty(&seat.elf)),
+                ("rtt", seat.rtt.as_deref() == Some("")),
+            ];
+            if let Some((name, _)) = names.into_iter().find(|(_, is_empty)| *is_empty) {
+                return Err(BenchError::Malformed {
+                    file: path.to_owned(),
+                    line: line_of(text, &[board, name]).unwrap_or(1),
+                    key: Some(format!("{board}.{name}")),
+                    message: "is empty: give a name, or take the line out".to_owned(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// The bench file to be used: `given`, else [`FILE_NAME`] in the current folder, else `ridgelink/bench.toml` in
@@ -120,6 +153,24 @@ impl Bench {
             Role::Display => Some(&self.display),
             Role::Host => None,
         }
+    }
+}
+
+/// A refusal in one line, where the parser's own draws the file.
+fn malformed(path: &Path, text: &str, mut error: toml::de::Error) -> BenchError {
+    let at = error.span().map_or(0, |span| span.start);
+    // Without the text it says the key instead.
+    error.set_input(None);
+    let said = error.to_string();
+    let key = said
+        .trim_end()
+        .rsplit_once("\nin `")
+        .map(|(_, key)| key.trim_end_matches('`').to_owned());
+    BenchError::Malformed {
+        file: path.to_owned(),
+        line: line_at(text.as_bytes(), at),
+        key,
+        message: format!("{}: mend it", error.message().replace('\n', ", ")),
     }
 }
 

@@ -216,15 +216,35 @@ fn an_unknown_command_is_refused() {
 }
 
 #[test]
-fn a_bad_bench_file_is_refused_by_file_line_and_key() {
-    let bench = folder("bench").join("bad.toml");
-    fs::write(&bench, "[sensor]\nprot = \"/dev/ttyACM0\"\n").expect("a file can be written");
-    for command in ["doctor", "monitor"] {
-        let output = host_bridge(&[command, "--bench", &bench.to_string_lossy()]);
-        assert_eq!(output.status.code(), Some(2), "{command}");
-        let said = text(&output.stderr);
-        for fact in [&*bench.to_string_lossy(), "line 2", "prot"] {
-            assert!(said.contains(fact), "{command}: {said}");
+fn a_bad_bench_file_is_refused_in_one_line_by_file_line_and_key() {
+    let folder = folder("bench");
+    let bench = folder.join("bad.toml");
+    for (bad, want) in [
+        (
+            "[sensor]\nprot = \"/dev/ttyACM0\"\n",
+            "2: sensor: unknown field `prot`, expected one of `port`, `link`, `usb`, `elf`, `rtt`",
+        ),
+        (
+            "[display]\nport = 3\n",
+            "2: display.port: invalid type: integer `3`, expected path string",
+        ),
+        (
+            "sensor = 3\n",
+            "1: sensor: invalid type: integer `3`, expected a table",
+        ),
+        ("\n[sensor\n", "2: unclosed table, expected `]`"),
+        ("[sensor]\nport = \"a\"\nport = \"b\"\n", "3: duplicate key"),
+        ("[display]\nport = \"\"\n", "2: display.port: is empty"),
+        ("[sensor]\nusb = \"\"\n", "2: sensor.usb: is empty"),
+    ] {
+        fs::write(&bench, bad).expect("a file can be written");
+        for command in ["doctor", "monitor"] {
+            let output = host_bridge(&[command, "--bench", &bench.to_string_lossy()]);
+            assert_eq!(output.status.code(), Some(2), "{command}");
+            let said = text(&output.stderr);
+            let want = format!("{}:{want}", bench.display());
+            assert!(said.contains(&want), "{command}: {said}");
+            assert_eq!(said.lines().count(), 1, "{command}: {said}");
         }
     }
 }
