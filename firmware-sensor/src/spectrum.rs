@@ -274,13 +274,13 @@ impl Spectrum {
             && (LOWEST_HZ..=HIGHEST_HZ).contains(&hz)
             && amplitude_lsb >= MIN_AMPLITUDE_LSB
             && self.rested < REST_SAMPLES;
+        let stands = in_range && usable != 0 && !self.touch.pickup.hides(amplitude_lsb, hz);
         let is_new = off(said.wavelength_mm, self.known_mm) >= SAME;
-        let fades = is_new
+        let fades = stands
+            && is_new
             && said.probability >= self.level
             && !self.goes_on(said.wavelength_mm, fitted.explained);
-        let stands =
-            in_range && usable != 0 && !fades && !self.touch.pickup.hides(amplitude_lsb, hz);
-        let confidence = match (stands, jerky) {
+        let confidence = match (stands && !fades, jerky) {
             (true, false) => said.probability,
             (true, true) => WHERE_JERKY * said.probability,
             (false, _) => 0.0,
