@@ -357,7 +357,7 @@ fn a_sign_that_the_next_fault_leaves_no_time_for_is_not_judged_and_said() {
 
 #[test]
 fn a_display_that_is_held_already_need_not_give_another_reason() {
-    let unmet = |untrue_ms: std::ops::Range<u64>| {
+    let unmet = |untrue_ms: Range<u64>| {
         let mut recording = silent(2.0, 500..2_000);
         for arrival in &mut recording.arrived {
             if (untrue_ms.start * MS..untrue_ms.end * MS).contains(&arrival.at_ns) {
