@@ -115,7 +115,9 @@ pub fn read(folder: &Path) -> Result<Vec<Entry>, FolderError> {
         path: path.clone(),
         source,
     })?;
-    let value: Value = serde_json::from_str(&text).map_err(|source| FolderError::NotJson {
+    // As editors on Windows write it: TOML and CSV let it pass too.
+    let json = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let value: Value = serde_json::from_str(json).map_err(|source| FolderError::NotJson {
         path: path.clone(),
         source,
     })?;
@@ -278,6 +280,21 @@ mod tests {
         ] {
             assert_eq!(parsed(bad), None, "{bad}");
         }
+    }
+
+    #[test]
+    fn a_byte_order_mark_in_front_of_the_list_is_no_part_of_it() {
+        let name = format!("hil-sim-{}-marked-list", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        fs::create_dir_all(&folder).unwrap();
+        let list = "\u{feff}[{\"name\": \"a\", \"truth\": 2}]\r\n";
+        fs::write(folder.join(INDEX), list).unwrap();
+        fs::write(folder.join("a.toml"), "").unwrap();
+        let entries = read(&folder);
+        fs::remove_dir_all(&folder).unwrap();
+        let entries = entries.unwrap();
+        assert_eq!(entries.len(), 1);
+        assert_eq!((&*entries[0].name, entries[0].truth.at(0.0)), ("a", 2.0));
     }
 
     #[test]
