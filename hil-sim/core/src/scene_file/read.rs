@@ -31,7 +31,8 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
     let surface = surface(root.table("surface")?, seed)?;
     let motion = motion(root.table("motion")?, duration_s)?;
     let arm = arm(root.table("arm")?)?;
-    let (gauges, force) = gauges(root.table("gauges")?, duration_s)?;
+    let mut notes = Vec::new();
+    let (gauges, force) = gauges(root.table("gauges")?, duration_s, &mut notes)?;
     let (contact, contact_reason) = match &gauges {
         Gauges::Kinematic(_) => contact::read(
             root.table("contact")?,
@@ -53,7 +54,6 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Scene, SceneError> {
         }
     };
     let link = link(root.table("link")?)?;
-    let mut notes = Vec::new();
     let estimator = estimator(root.table("estimator")?, &force, &mut notes)?;
     let display = display::read(root.table("display")?)?;
     let faults = fault::read(root.tables("fault")?, duration_s)?;
@@ -304,7 +304,11 @@ const NOISE: [&str; 13] = [
     "skew_us",
 ];
 
-fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), SceneError> {
+fn gauges(
+    mut table: Table<'_>,
+    duration_s: f64,
+    notes: &mut Vec<SceneError>,
+) -> Result<(Gauges, Force), SceneError> {
     let kind = table.choice("kind", &[("kinematic", 'k'), ("recorded", 'r')])?;
     let tangential = table.boolean("tangential")?;
     let defaults = Force::default();
@@ -320,7 +324,7 @@ fn gauges(mut table: Table<'_>, duration_s: f64) -> Result<(Gauges, Force), Scen
     if kind == 'k' {
         return Ok((Gauges::Kinematic(kinematic(table, duration_s)?), force));
     }
-    let volts = recorded::gauges(&mut table, duration_s, tangential)?;
+    let volts = recorded::gauges(&mut table, duration_s, tangential, notes)?;
     if tangential == Some(true) && volts.width() == 5 {
         return Err(table.refuse(
             "tangential",

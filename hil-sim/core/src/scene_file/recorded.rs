@@ -53,6 +53,8 @@ const GAP: f64 = 1.6;
 const AROUND_S: f64 = 3.0;
 pub(super) const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 const PIN_VOLTS: std::ops::RangeInclusive<f64> = -0.3..=4.0;
+/// What of them the ADC converts, with a little slack for what is scaled to just that.
+const ADC_VOLTS: std::ops::RangeInclusive<f64> = -1e-6..=2.0 * MID_RAIL_VOLTS + 1e-6;
 
 const TIME: Words = Words {
     column: "time",
@@ -76,11 +78,12 @@ fn on_lines(table: &mut Table<'_>) -> Result<Option<bool>, SceneError> {
 }
 
 /// The voltages of `[gauges]`: five columns or six, band-limited and laid on the native engine's instants unless they
-/// lie on lines. `tangential` is the key of that name.
+/// lie on lines. `tangential` is the key of that name. `notes` tell of what the ADC clips.
 pub(super) fn gauges(
     table: &mut Table<'_>,
     duration_s: f64,
     tangential: Option<bool>,
+    notes: &mut Vec<SceneError>,
 ) -> Result<Arc<Waveform>, SceneError> {
     let headers = ["t_s,g0,g1,g2,g3,g4", "t_s,g0,g1,g2,g3,g4,tangential"];
     let source = Source::of(table, &TIME, &headers)?;
@@ -178,6 +181,23 @@ pub(super) fn gauges(
     let (rows, extent) = source.read(table, columns, own_time, window, conversion, check)?;
     let per_unit = f64::from(SCAN_RATE_HZ);
     covers_time(table, extent, &rows, duration_s)?;
+    let counted = GAUGES + usize::from(tangential != Some(false));
+    if let Some(shares) = clipped_shares(&rows, duration_s, counted) {
+        let give = match offset_v {
+            None if !is_own => {
+                "1.65 V is added: give offset_v = 0 if the file holds volts, else a smaller volts_per_unit"
+            }
+            _ => "give another volts_per_unit or offset_v, or record with less gain",
+        };
+        let key = match table.contains("channels") {
+            true => "channels",
+            false => "file",
+        };
+        let message = format!(
+            "of the rows {shares} lie beyond the 0 to 3.3 V that the ADC converts, and are clipped: {give}"
+        );
+        notes.push(table.refuse(key, message));
+    }
     let rows = if filtered {
         let is_sample = |step: &Even| (step.step - 1e-3).abs() < 1e-6;
         if lines.is_some() || Even::of(&rows.at).filter(is_sample).is_none() {
@@ -348,6 +368,32 @@ fn laid(table: &Table<'_>, rows: Series, raster: Raster) -> Result<Series, Scene
             Err(table.refuse("file", message))
         }
     }
+}
+
+/// Of the rows within a scene, the share that the ADC clips, by gauge, where it is more than a tenth; of the first
+/// `counted` columns.
+fn clipped_shares(rows: &Series, duration_s: f64, counted: usize) -> Option<String> {
+    const MOST: f64 = 0.1;
+    let mut clipped = vec![0_usize; rows.width.min(counted)];
+    let mut count = 0_usize;
+    for (at_s, row) in rows.at.iter().zip(rows.values.chunks_exact(rows.width)) {
+        if (0.0..=duration_s).contains(at_s) {
+            count += 1;
+            for (clipped, volts) in clipped.iter_mut().zip(row) {
+                *clipped += usize::from(!ADC_VOLTS.contains(volts));
+            }
+        }
+    }
+    let told = clipped.iter().enumerate().filter_map(|(column, &clipped)| {
+        let share = clipped as f64 / count as f64;
+        let which = match column {
+            GAUGES => "the tangential force".to_owned(),
+            gauge => format!("gauge {gauge}"),
+        };
+        (share > MOST).then(|| format!("of {which} {:.0} %", 100.0 * share))
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| told.join(", "))
 }
 
 /// Longest that the last row of a recording goes on, in s.

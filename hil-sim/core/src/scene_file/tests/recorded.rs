@@ -125,6 +125,68 @@ fn recorded_gauges_are_played_and_refused_below_200_hz() {
 }
 
 #[test]
+fn gauges_that_are_recorded_beyond_the_converters_range_are_told_and_played() {
+    let folder = Folder::new("beyond", SURFACE);
+    // The force and g0 always, g1 in a fifth and g2 in a twentieth of the rows, g3 and g4 nowhere, once 1.65 V is added.
+    let rows: String = (0..=3000)
+        .map(|ms| {
+            let g1 = if ms % 5 == 0 { 1.7 } else { 1.65 };
+            let g2 = if ms % 20 == 0 { -1.7 } else { -1.65 };
+            format!("{},1.8,{g1},{g2},0,1,2\n", f64::from(ms) / 1000.0)
+        })
+        .collect();
+    let csv = format!("t_s,a,b,c,d,e,f\n{rows}");
+    let notes = |keys: &str| -> Vec<String> {
+        let section = format!("[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n{keys}");
+        let scene = folder.load(&section, "data.csv", &csv).unwrap();
+        let notes = scene.notes.iter().map(ToString::to_string);
+        let place = |note: String| note[note.find("x.toml").expect("the scene")..].to_owned();
+        notes.map(place).collect()
+    };
+    let all = "channels = [\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]\n";
+    let lie = "x.toml:6: gauges.channels: of the rows of gauge 0 100 %, of gauge 1 20 %, of the tangential force 100 % \
+               lie beyond the 0 to 3.3 V that the ADC converts, and are clipped: ";
+    assert_eq!(
+        notes(all),
+        [format!(
+            "{lie}1.65 V is added: give offset_v = 0 if the file holds volts, else a smaller volts_per_unit"
+        )]
+    );
+    assert_eq!(
+        notes(&format!("{all}tangential = false\noffset_v = 1.65\n")),
+        [format!(
+            "{}give another volts_per_unit or offset_v, or record with less gain",
+            lie.replace(", of the tangential force 100 %", "")
+        )]
+    );
+    assert_eq!(
+        notes(&format!("{all}volts_per_unit = 0.5\n")),
+        [] as [&str; 0]
+    );
+    // Only what the scene plays of a recording counts.
+    let rows: String = (0..=5000)
+        .map(|ms| {
+            let volts = if ms < 1000 { 3.5 } else { 3.3 };
+            format!("{},{volts},0,0,0,0\n", f64::from(ms) / 1000.0)
+        })
+        .collect();
+    let csv = format!("t_s,g0,g1,g2,g3,g4\n{rows}");
+    for (start, count) in [("start_s = 1.0\n", 0), ("", 1)] {
+        let section = format!("[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n{start}");
+        let scene = folder.load(&section, "data.csv", &csv).unwrap();
+        assert_eq!(scene.notes.len(), count, "{:?}", scene.notes);
+    }
+    let note = folder.load(
+        "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n",
+        "data.csv",
+        &csv,
+    );
+    let note = note.unwrap().notes[0].to_string();
+    let want = "x.toml:5: gauges.file: of the rows of gauge 0 33 % lie beyond";
+    assert!(note.contains(want), "{note}");
+}
+
+#[test]
 fn a_recorded_force_is_played_unless_it_is_taken_out() {
     const GAUGES: &str = "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\n";
     let folder = Folder::new("force", SURFACE);
