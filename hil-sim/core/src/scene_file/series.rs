@@ -33,14 +33,8 @@ pub(super) fn series(
     headers: &[&str],
     check: Check<'_>,
 ) -> Result<Series, SceneError> {
-    let Some(name) = table.text("file")? else {
-        let message = format!(
-            "is missing: give a CSV file with the columns {}",
-            headers[0]
-        );
-        return Err(table.refuse("file", message));
-    };
-    let path = table.source().beside(name);
+    let give = format!("give a CSV file with the columns {}", headers[0]);
+    let path = table.file(&give)?;
     let bytes = read_bytes(&path).map_err(|error| table.unreadable(&path, &error))?;
     Series::read(&path, &bytes, headers, check)
 }

@@ -105,6 +105,15 @@ impl<'t> Table<'t> {
             .error(offset, &self.path_of(key), message.into())
     }
 
+    /// The path of the file that the section names; `give` says which there may be.
+    pub fn file(&mut self, give: &str) -> Result<PathBuf, SceneError> {
+        match self.text("file")? {
+            Some("") => Err(self.refuse("file", format!("is empty: {give}"))),
+            Some(name) => Ok(self.source.beside(name)),
+            None => Err(self.refuse("file", format!("is missing: {give}"))),
+        }
+    }
+
     /// A refusal of the file that `file` names.
     pub fn unreadable(&self, path: &Path, error: &std::io::Error) -> SceneError {
         let path = path.display();
@@ -132,10 +141,6 @@ impl<'t> Table<'t> {
     pub fn contains(&self, key: &str) -> bool {
         self.entries
             .is_some_and(|entries| entries.contains_key(key))
-    }
-
-    pub fn source(&self) -> &'t Source<'t> {
-        self.source
     }
 
     /// A section. If it is absent, all its keys are.

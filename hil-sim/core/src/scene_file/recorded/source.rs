@@ -63,19 +63,15 @@ impl<'t> Source<'t> {
         words: &'static Words,
         headers: &[&str],
     ) -> Result<Self, SceneError> {
-        let Some(name) = table.text("file")? else {
-            let message = format!(
-                "is missing: give a CSV file with the columns {}, or a WAV or MCAP{} file",
-                headers[0],
-                if words.every == "rate_hz" {
-                    ""
-                } else {
-                    " or .hjif"
-                }
-            );
-            return Err(table.refuse("file", message));
-        };
-        let path = table.source().beside(name);
+        let path = table.file(&format!(
+            "give a CSV file with the columns {}, or a WAV or MCAP{} file",
+            headers[0],
+            if words.every == "rate_hz" {
+                ""
+            } else {
+                " or .hjif"
+            }
+        ))?;
         let format = format(table, &path)?;
         let source = Self {
             channels: table.columns("channels")?,

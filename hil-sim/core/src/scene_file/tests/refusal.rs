@@ -209,3 +209,15 @@ fn control_characters_of_a_scene_do_not_reach_the_terminal() {
     let told = refusal(word);
     assert!(told.contains("\"\\u{7}\" is unknown"), "{told}");
 }
+
+#[test]
+fn an_empty_name_of_a_file_is_called_empty() {
+    assert_refused(
+        refusal_of,
+        r#"
+        [gauges]; kind = "recorded"; file = "" => x.toml:5: gauges.file: is empty: give a CSV file with the columns t_s,g0,g1,g2,g3,g4, or a WAV or MCAP file
+        [motion]; kind = "recorded"; file = "" => x.toml:5: motion.file: is empty: give a CSV file with the columns t_s,x_mm
+        profile = "recorded"; file = "" => x.toml:4: surface.file: is empty: give a CSV file with the columns x_mm,height
+        "#,
+    );
+}
