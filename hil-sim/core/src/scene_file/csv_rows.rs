@@ -163,16 +163,24 @@ impl<'f> CsvRows<'f> {
     }
 }
 
-/// As much of a cell or a line as a refusal repeats: a file that is no CSV may be a single one.
-fn shortened(text: &str) -> String {
-    const LETTERS: usize = 80;
-    match text.char_indices().nth(LETTERS) {
+/// As much of a cell, a line, a key or a value as a refusal repeats: a file that is no CSV may be a single one.
+pub(super) fn shortened(text: &str) -> String {
+    cut(text, 80)
+}
+
+/// As much of a path or a list of names.
+pub(super) fn cut_list(text: &str) -> String {
+    cut(text, 1000)
+}
+
+fn cut(text: &str, letters: usize) -> String {
+    match text.char_indices().nth(letters) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
     }
 }
 
-/// The same in quotes.
+/// The shortened text in quotes.
 pub(super) fn quoted(text: &str) -> String {
     format!("{:?}", shortened(text))
 }

@@ -1,5 +1,6 @@
 //! `[[fault]]`: what breaks, and when.
 
+use super::csv_rows::quoted;
 use super::table::Table;
 use crate::scene::SceneError;
 use crate::scene::fault::{Fault, Kind, Lasts, MOST_KEYS};
@@ -22,7 +23,11 @@ fn one(mut table: Table<'_>, duration_s: f64) -> Result<Fault, SceneError> {
     };
     let Some(kind) = Kind::from_name(name) else {
         let names: Vec<&str> = Kind::all().map(Kind::name).collect();
-        let message = format!("\"{name}\" is unknown: give one of {}", names.join(", "));
+        let message = format!(
+            "{} is unknown: give one of {}",
+            quoted(name),
+            names.join(", ")
+        );
         return Err(table.refuse("kind", message));
     };
     let row = kind.row();

@@ -10,6 +10,7 @@ use toml::de::DeValue;
 use super::bounds::Bounds;
 use super::contact;
 use super::contact::Scenery;
+use super::csv_rows::quoted;
 use super::display;
 use super::table::{Source, Table};
 use super::{fault, read_bytes, recorded};
@@ -108,7 +109,7 @@ fn name(root: &mut Table<'_>, path: &Path) -> Result<String, SceneError> {
     } else {
         Err(root.refuse(
             "name",
-            format!("{name:?} cannot name a file everywhere: give 1 to {LONGEST_NAME} of A–Z a–z 0–9 . _ - without a dot in front"),
+            format!("{} cannot name a file everywhere: give 1 to {LONGEST_NAME} of A–Z a–z 0–9 . _ - without a dot in front", quoted(name)),
         ))
     }
 }

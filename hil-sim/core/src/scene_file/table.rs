@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::bounds::Bounds;
+use super::csv_rows::{cut_list, quoted, shortened};
 use super::line::line_at;
 use crate::scene::SceneError;
 
@@ -40,7 +41,7 @@ pub(super) enum Column<'t> {
 impl std::fmt::Display for Column<'_> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Named(name) => write!(formatter, "{name:?}"),
+            Self::Named(name) => formatter.write_str(&quoted(name)),
             Self::Numbered(number) => write!(formatter, "{number}"),
         }
     }
@@ -71,7 +72,7 @@ impl<'t> Source<'t> {
         SceneError {
             file: self.path.display().to_string(),
             line: Some(line_at(self.text.as_bytes(), offset)),
-            key: key.to_owned(),
+            key: shortened(key),
             message,
         }
     }
@@ -116,7 +117,7 @@ impl<'t> Table<'t> {
 
     /// A refusal of the file that `file` names.
     pub fn unreadable(&self, path: &Path, error: &std::io::Error) -> SceneError {
-        let path = path.display();
+        let path = cut_list(&path.display().to_string());
         let message =
             format!("{path} cannot be read: {error}: names are relative to the scene's own folder");
         self.refuse("file", message)
@@ -210,7 +211,7 @@ impl<'t> Table<'t> {
                 let span = self
                     .entries
                     .and_then(|entries| Some(entries.get(key)?.span()));
-                let written = &self.source.text[span.unwrap_or_default()];
+                let written = shortened(&self.source.text[span.unwrap_or_default()]);
                 let Bounds { what, give, .. } = bounds;
                 Err(self.refuse(key, format!("{written} is not {what}: give {give}")))
             }
@@ -233,7 +234,13 @@ impl<'t> Table<'t> {
         };
         match u64::from_str_radix(integer.as_str(), integer.radix()) {
             Ok(number) if (low..=high).contains(&number) => Ok(Some(number)),
-            _ => Err(self.refuse(key, format!("{integer} is out of range: {give}"))),
+            _ => Err(self.refuse(
+                key,
+                format!(
+                    "{} is out of range: {give}",
+                    shortened(&integer.to_string())
+                ),
+            )),
         }
     }
 
@@ -289,7 +296,7 @@ impl<'t> Table<'t> {
             .map(|(name, _)| format!("\"{name}\""))
             .collect();
         let give = names.join(" or ");
-        Err(self.refuse(key, format!("\"{word}\" is unknown: give {give}")))
+        Err(self.refuse(key, format!("{} is unknown: give {give}", quoted(word))))
     }
 
     /// A variant by its name; none of them with the word `none`, or if the key is absent.
@@ -326,7 +333,7 @@ impl<'t> Table<'t> {
     }
 
     fn refuse_item(&self, key: &str, index: usize, item: &Value<'_>, what: &str) -> SceneError {
-        let written = &self.source.text[item.span()];
+        let written = shortened(&self.source.text[item.span()]);
         let path = format!("{}[{index}]", self.path_of(key));
         let message = format!("{written} {what}");
         self.source.error(item.span().start, &path, message)

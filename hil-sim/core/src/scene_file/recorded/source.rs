@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::super::csv_rows::CsvRows;
+use super::super::csv_rows::{CsvRows, cut_list};
 use super::super::read_bytes;
 use super::super::table::{Column, Table};
 use super::tape::{Check, Conversion, Tape, plain, too_few};
@@ -314,7 +314,7 @@ impl<'t> Source<'t> {
                         rows.first().len() - 1
                     )
                 } else {
-                    format!("{column} is no column: there are {}", rows.first().join(", "))
+                    format!("{column} is no column: there are {}", cut_list(&rows.first().join(", ")))
                 };
                 table.refuse(key, message)
             })

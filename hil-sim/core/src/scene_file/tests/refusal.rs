@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{assert_refused, refusal, refusal_of};
+use super::{Folder, SURFACE, assert_refused, refusal, refusal_of};
 use crate::scene::Scene;
 
 #[test]
@@ -220,4 +220,31 @@ fn an_empty_name_of_a_file_is_called_empty() {
         profile = "recorded"; file = "" => x.toml:4: surface.file: is empty: give a CSV file with the columns x_mm,height
         "#,
     );
+}
+
+#[test]
+fn a_refusal_repeats_no_more_of_a_scene_than_can_be_read() {
+    let long = "7".repeat(50_000);
+    for section in [
+        format!("{long} = 1\n"),
+        format!("a{long} = 1\na{long} = 1\n"),
+        format!("random = {long}\n"),
+        format!("random = {long}.0\n"),
+        format!("profile = \"{long}\"\n"),
+        format!("profile = \"recorded\"\nfile = \"{long}\"\n"),
+        format!("[estimator]\nwindow_ms = {long}\n"),
+        format!("[gauges]\ndead = [{long}]\n"),
+        format!("[[fault]]\nat_s = 1\nkind = \"{long}\"\n"),
+    ] {
+        let refusal = refusal_of(&section);
+        assert!(refusal.contains('…') && refusal.len() < 1_500, "{refusal}");
+    }
+    let refusal = refusal(&format!("name = \"{long}\"\n{SURFACE}"));
+    assert!(refusal.contains('…') && refusal.len() < 500, "{refusal}");
+    let folder = Folder::new("long-names", SURFACE);
+    let section = format!(
+        "[gauges]\nkind = \"recorded\"\nfile = \"data.csv\"\nchannels = [0, 0, 0, 0, \"{long}\"]\n"
+    );
+    let refusal = folder.refusal(&section, "data.csv", &format!("t_s,{long}x\n0,1\n"));
+    assert!(refusal.contains('…') && refusal.len() < 1_500, "{refusal}");
 }
