@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
-use std::io::{BufWriter, ErrorKind, Read, Write};
+use std::io::{self, BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -148,8 +148,7 @@ impl<'a> Results<'a> {
 
     /// All of it.
     pub fn write(mut self, text: &str) -> anyhow::Result<()> {
-        let written = self.file.write_all(text.as_bytes());
-        written.with_context(|| self.path.display().to_string())?;
+        self.part(|file| file.write_all(text.as_bytes()))?;
         self.end()
     }
 
@@ -157,22 +156,36 @@ impl<'a> Results<'a> {
         self.write(&(serde_json::to_string_pretty(content)? + "\n"))
     }
 
-    /// Where parts of it are written.
-    pub fn file(&mut self) -> &mut impl Write {
-        &mut self.file
+    /// A part of it.
+    pub fn part(
+        &mut self,
+        write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    ) -> anyhow::Result<()> {
+        write(&mut self.file).map_err(|error| self.given_up(error))
+    }
+
+    /// A draft that could not be written would only take the room that is missing.
+    fn given_up(&mut self, error: io::Error) -> anyhow::Error {
+        if let Some([draft, _]) = self.draft.take()
+            && drafts().remove(&draft)
+        {
+            let _ = fs::remove_file(draft);
+        }
+        anyhow::Error::new(error).context(unwritten(self.path))
     }
 
     /// Nothing more is to come: it takes its place.
     pub fn end(mut self) -> anyhow::Result<()> {
-        let placed = self.file.flush().and_then(|()| match self.draft.take() {
-            Some([draft, place]) => {
-                let mut drafts = drafts();
-                drafts.remove(&draft);
-                fs::rename(draft, place)
-            }
-            None => Ok(()),
-        });
-        placed.with_context(|| self.path.display().to_string())
+        self.part(BufWriter::flush)?;
+        let Some([draft, place]) = self.draft.take() else {
+            return Ok(());
+        };
+        let mut drafts = drafts();
+        drafts.remove(&draft);
+        fs::rename(&draft, place).with_context(|| {
+            let (here, draft) = (self.path.display(), draft.display());
+            format!("{here}: cannot be written over: the results are in {draft}")
+        })
     }
 }
 
@@ -190,6 +203,12 @@ impl Drop for Results<'_> {
     }
 }
 
+/// What is said of a file that could not be written to its end.
+fn unwritten(path: &Path) -> String {
+    let path = path.display();
+    format!("{path}: can't be written: make room there, or give a file elsewhere")
+}
+
 /// The drafts that are being written, each until it has taken its place or has been given up.
 fn drafts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     static DRAFTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -198,7 +217,7 @@ fn drafts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Has a signal that ends the program take all drafts away before.
 #[cfg(target_os = "linux")]
-fn take_away_at_signals() -> std::io::Result<()> {
+fn take_away_at_signals() -> io::Result<()> {
     static ARE_HEARD: Mutex<bool> = Mutex::new(false);
     let mut are_heard = ARE_HEARD.lock().unwrap_or_else(PoisonError::into_inner);
     if *are_heard {
@@ -222,7 +241,7 @@ fn take_away_at_signals() -> std::io::Result<()> {
 
 /// Writes a file of a folder that is there, and tells of it.
 pub(super) fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    fs::write(path, text).with_context(|| format!("{}: can't be written", path.display()))?;
+    fs::write(path, text).with_context(|| unwritten(path))?;
     say!("{}", path.display());
     Ok(())
 }
@@ -234,7 +253,7 @@ pub(super) fn write_all<'a>(
 ) -> anyhow::Result<()> {
     for (name, text) in files {
         let path = folder.join(name);
-        fs::write(&path, text).with_context(|| path.display().to_string())?;
+        fs::write(&path, text).with_context(|| unwritten(&path))?;
     }
     Ok(())
 }

@@ -5,7 +5,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::Context;
 use hil_sim_core::judge::expectation::keys_of;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::run::batch;
@@ -123,8 +122,7 @@ impl Run {
         }
         // Of those that have run, if one could not.
         if let Some((mut json, list)) = books.json {
-            let written = json.file().write_all(list.end().as_bytes());
-            written.with_context(|| json.path.display().to_string())?;
+            json.part(|file| file.write_all(list.end().as_bytes()))?;
             json.end()?;
         }
         ran?;
@@ -201,8 +199,7 @@ impl Books<'_> {
         }
         self.met &= is_met;
         if let Some((json, list)) = &mut self.json {
-            let written = list.write(&SceneResult::of(&judgement, scene), json.file());
-            written.with_context(|| json.path.display().to_string())?;
+            json.part(|file| list.write(&SceneResult::of(&judgement, scene), file))?;
         }
         if let Some(mut outcome) = outcome {
             outcome.unmet.clone_from(&unmet);

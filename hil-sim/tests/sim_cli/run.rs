@@ -255,6 +255,31 @@ fn a_device_takes_results_as_a_file_does() {
 }
 
 #[test]
+fn results_that_find_no_room_leave_no_draft_and_the_earlier_ones_in_place() {
+    let folder = folder("no-room");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    for (option, file, before) in [("--json", "o.json", "[]\n"), ("--junit", "o.xml", "<?xml")] {
+        fs::write(folder.join(file), before).unwrap();
+        // A limit on a file's length stands in for a full disk.
+        let limited = "trap '' XFSZ; ulimit -f 0; exec \"$@\"";
+        let run = command(&folder, &["run", "a.toml", option, file]);
+        let output = Command::new("sh")
+            .args(["-c", limited, "sh"])
+            .arg(run.get_program())
+            .args(run.get_args())
+            .current_dir(&folder)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}", errors(&output));
+        let told = errors(&output);
+        let want = format!("{file}: can't be written: make room there, or give a file elsewhere: ");
+        assert!(told.contains(&want), "{told}");
+        assert!(!folder.join(format!("{file}.part")).exists(), "{told}");
+        assert_eq!(fs::read_to_string(folder.join(file)).unwrap(), before);
+    }
+}
+
+#[test]
 fn a_scene_of_the_banks_runs_with_its_successor_and_standard_error_says_so_once() {
     let folder = folder("successor");
     let text = format!("{SOUND}[estimator]\nmethod = \"bank\"\n");
