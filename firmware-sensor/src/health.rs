@@ -19,9 +19,9 @@ const FOLLOWED_ESTIMATES: f32 = 30.0;
 const AT_RAILS: f32 = 0.1;
 /// Estimates without a change of the code after which a gauge is stuck, if another speaks.
 const STILL_ESTIMATES: u32 = 20;
-/// Estimates of a moving arm without a change of any gauge's code from which on nothing is felt: the converter says the same for
-/// ever, or what there is is less than one of its steps.
-const ALL_STILL_ESTIMATES: u32 = 4;
+/// Travel without a change of any gauge's code, in mm, from which on nothing is felt: the converter says the same for ever, or
+/// what there is is less than one of its steps. A fingertip that sticks where the arm turns lets go before.
+const ALL_STILL_MM: f32 = 4.0;
 /// A stuck code this near mid-rail is a gauge that is not connected.
 const MID_RAIL: core::ops::RangeInclusive<u16> = 2_048 - 16..=2_048 + 16;
 /// Power of a gauge relative to the second strongest below which it says next to nothing. To the second,
@@ -58,8 +58,8 @@ pub struct Health {
     judgements: u16,
     /// Bit g set: gauge g is left out.
     left_out: u8,
-    /// No gauge's code has changed, though the arm has moved.
-    all_still: bool,
+    /// Travel since a gauge's code last changed, in mm.
+    still_mm: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -146,10 +146,11 @@ impl Health {
         let settled = f32::from(self.judgements) >= FOLLOWED_ESTIMATES;
         let measure = Measure::of(&self.gauges, signs);
         self.left_out = 0;
-        // An arm that turns rests for a moment.
-        self.all_still |= signs.travel_mm > 0.0;
+        self.still_mm += signs.travel_mm;
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
-            self.all_still &= history.still >= ALL_STILL_ESTIMATES;
+            if history.still == 0 {
+                self.still_mm = 0.0;
+            }
             let misfit = signs.misfits >> gauge & 1 == 1;
             if signs.agreed && misfit {
                 history.misfits = history.misfits.saturating_add(1);
@@ -201,7 +202,11 @@ impl Health {
 
     /// Bit g set: gauge g can be believed. None while no gauge feels anything.
     pub fn believed(&self) -> u8 {
-        if self.all_still { 0 } else { self.good() }
+        if self.still_mm > ALL_STILL_MM {
+            0
+        } else {
+            self.good()
+        }
     }
 }
 
