@@ -1,5 +1,6 @@
 //! Takes a TOML table apart, key by key, so that every refusal can say its file, line and key.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use protocol::GAUGES;
@@ -59,12 +60,25 @@ impl<'t> Source<'t> {
                 let span = error.span().unwrap_or_default();
                 // That it stands there twice does not say which.
                 let key = match error.message() {
-                    "duplicate key" => self.text.get(span.clone()).unwrap_or_default(),
-                    _ => "",
+                    "duplicate key" => self.key_at(span.clone()),
+                    _ => String::new(),
                 };
                 let message = format!("{}: mend the TOML", error.message());
-                Err(self.error(span.start, key, message))
+                Err(self.error(span.start, &key, message))
             }
+        }
+    }
+
+    /// The key that stands there, with its section.
+    fn key_at(&self, span: Range<usize>) -> String {
+        let key = self.text.get(span.clone()).unwrap_or_default();
+        let before = self.text.get(..span.start).unwrap_or_default();
+        let is_header = |line: &&str| line.starts_with('[') && line.ends_with(']');
+        match before.lines().map(str::trim).rev().find(is_header) {
+            Some(header) if !before.trim_end().ends_with('[') => {
+                format!("{}.{key}", header.trim_matches(['[', ']', ' ']))
+            }
+            _ => key.to_owned(),
         }
     }
 

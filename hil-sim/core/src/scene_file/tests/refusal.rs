@@ -26,6 +26,10 @@ fn a_key_that_stands_twice_is_named() {
             "[link]\nloss = 0\n[link]\n",
             "scenes/x.toml:3: link: duplicate key",
         ),
+        (
+            "[link]\nloss = 0\n[gauges]\ndead = [1]\ndead = [2]\n",
+            "scenes/x.toml:5: gauges.dead: duplicate key",
+        ),
     ] {
         let refusal = refusal(text);
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
