@@ -13,6 +13,15 @@ use super::csv_rows::{cut_list, quoted, shortened};
 use super::line::line_at;
 use crate::scene::SceneError;
 
+/// The section that a line begins: a line of a list over several is none.
+fn header(line: &str) -> Option<&str> {
+    let line = line.split('#').next()?.trim();
+    let name = line.strip_prefix('[')?.strip_suffix(']')?;
+    let name = name.trim_matches(['[', ']', ' ']);
+    name.starts_with(|first: char| first.is_ascii_alphabetic())
+        .then_some(name)
+}
+
 /// The scene's text and where it came from.
 pub(super) struct Source<'t> {
     path: &'t Path,
@@ -73,11 +82,8 @@ impl<'t> Source<'t> {
     fn key_at(&self, span: Range<usize>) -> String {
         let key = self.text.get(span.clone()).unwrap_or_default();
         let before = self.text.get(..span.start).unwrap_or_default();
-        let is_header = |line: &&str| line.starts_with('[') && line.ends_with(']');
-        match before.lines().map(str::trim).rev().find(is_header) {
-            Some(header) if !before.trim_end().ends_with('[') => {
-                format!("{}.{key}", header.trim_matches(['[', ']', ' ']))
-            }
+        match before.lines().rev().find_map(header) {
+            Some(section) if !before.trim_end().ends_with('[') => format!("{section}.{key}"),
             _ => key.to_owned(),
         }
     }

@@ -30,6 +30,10 @@ fn a_key_that_stands_twice_is_named() {
             "[link]\nloss = 0\n[gauges]\ndead = [1]\ndead = [2]\n",
             "scenes/x.toml:5: gauges.dead: duplicate key",
         ),
+        (
+            "[link]\n[gauges] # five\ndead = [\n[1]\n]\ndead = [2]\n",
+            "scenes/x.toml:6: gauges.dead: duplicate key",
+        ),
     ] {
         let refusal = refusal(text);
         assert!(refusal.starts_with(want), "{refusal}\nwanted {want}");
