@@ -26,7 +26,7 @@ use crate::travel::MIN_SPEED_MM_S;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ};
 use common::{Amplitudes, power};
 use follower::{DIFFERENCE_SAMPLES, Follower, MAINS, Moment, RESTED_ESTIMATES};
-use own::Steadily;
+use own::SteadyPowers;
 
 mod common;
 mod follower;
@@ -84,7 +84,7 @@ pub struct Hum {
     removed: Option<(usize, Amplitudes)>,
     /// Power of each gauge's own hum, in ADC steps².
     own: [f32; GAUGES],
-    own_steadily: Steadily,
+    own_steady: SteadyPowers,
 }
 
 impl Default for Hum {
@@ -100,7 +100,7 @@ impl Default for Hum {
             pickup: Pickup::default(),
             removed: None,
             own: [0.0; GAUGES],
-            own_steadily: Steadily::default(),
+            own_steady: SteadyPowers::default(),
         }
     }
 }
@@ -175,7 +175,7 @@ impl Hum {
         self.own = if rests {
             own
         } else {
-            self.own_steadily.of(own)
+            self.own_steady.update(own)
         };
     }
 

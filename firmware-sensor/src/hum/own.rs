@@ -64,18 +64,18 @@ impl Own {
     }
 }
 
-/// What has been there for a while.
+/// Powers that have been there for a while.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Steadily {
+pub(super) struct SteadyPowers {
     /// The least in so many estimates, and in the [`STEADY_ESTIMATES`] before.
     now: [f32; GAUGES],
     before: [f32; GAUGES],
     estimates: u8,
 }
 
-impl Steadily {
-    /// Takes an estimate's powers.
-    pub fn of(&mut self, powers: [f32; GAUGES]) -> [f32; GAUGES] {
+impl SteadyPowers {
+    /// Takes an estimate's powers; gives what of them is steady.
+    pub fn update(&mut self, powers: [f32; GAUGES]) -> [f32; GAUGES] {
         if self.estimates == STEADY_ESTIMATES {
             self.estimates = 0;
             self.before = core::mem::replace(&mut self.now, powers);

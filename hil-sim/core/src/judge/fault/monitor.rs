@@ -576,8 +576,8 @@ impl FaultMonitor {
         match said.message {
             Message::Estimate(estimate) if role == Role::Sensor => {
                 self.estimates.heard(said.at_ns, &self.alone_ns);
-                let is_silent = |within_ms: f64| {
-                    said.at_ns >= self.alone_ns.start + nanoseconds(within_ms * 1e-3)
+                let is_against_it = |after_ms: f64| {
+                    said.at_ns >= self.alone_ns.start + nanoseconds(after_ms * 1e-3)
                         && self.alone_ns.contains(&said.at_ns)
                         && self.fault.is_on(said.at_ns)
                 };
@@ -586,8 +586,8 @@ impl FaultMonitor {
                         .fault
                         .kind
                         .row()
-                        .silent_within_ms
-                        .is_some_and(is_silent)
+                        .nothing_valid_after_ms
+                        .is_some_and(is_against_it)
                 {
                     self.stood_by_ns.get_or_insert(said.at_ns);
                 }

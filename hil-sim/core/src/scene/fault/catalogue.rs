@@ -118,7 +118,7 @@ pub struct Row {
     /// In which time in ms; none if that depends on what arrives: then when that is a reason to hold.
     pub seen_within_ms: Option<f64>,
     /// From which time in ms on no estimate is stood by until it ends; none if what the sensor says is not affected.
-    pub silent_within_ms: Option<f64>,
+    pub nothing_valid_after_ms: Option<f64>,
     /// What else may show. Anything else must not.
     #[serde(default, deserialize_with = "list")]
     pub also: &'static [Sign],
