@@ -2,17 +2,26 @@
 
 use protocol::{ArmState, Motion, Trip};
 
+use crate::MICROMETRES_PER_COUNT;
+
 /// Milliseconds without a [`Motion`] after which the arm stands still.
 pub const SILENCE_MS: u32 = 100;
 /// kp: the velocity that an error of position adds, in µm/s per µm. The error decays with a time
 /// constant of 1/kp, 100 ms: slow beside the drive, so that no drive of this kind oscillates with it.
 const POSITION_GAIN_PER_S: i64 = 10;
+/// Commands below this part of full speed are not what a stall is seen by: so weak a one a drive may not obey.
+const WEAK_PART: u32 = 20;
+/// An arm that has not left its place by more than this while it was told to go as far as full speed brings it in
+/// [`STALLED_MS`] has stalled, in µm: two counts, which an encoder may tremble by.
+const TREMBLE_UM: u64 = 2 * MICROMETRES_PER_COUNT as u64;
+/// See [`TREMBLE_UM`]. From rest, a drive with a lag as long as the controller can bear, 100 ms, takes 3 ms to leave them.
+const STALLED_MS: i64 = 50;
 /// Errors of position are taken for no larger than this, in µm: any such error asks for full speed, and
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
 
-/// What a hand may be away from where its last motion would have it, in µm a µs since then and in µm: it turns from no
-/// more than 2 m/s. What is further away is another hand, with a zero of its own.
+/// What a hand, or an arm, may be away from where its last motion would have it, in µm a µs since then and in µm: it turns from no
+/// more than 2 m/s. A hand that is further away is another one, with a zero of its own; an arm's encoder has jumped.
 const MOST_TURN_M_S: u64 = 2;
 /// See [`MOST_TURN_M_S`].
 const LEAST_TURN_UM: u64 = 1_000;
@@ -54,6 +63,18 @@ struct Following {
     velocity_um_s: i32,
     /// Since the last motion came.
     age_ms: u32,
+    watch: Watch,
+}
+
+/// Looks whether the arm does what its drive is told.
+#[derive(Clone, Copy, Debug)]
+struct Watch {
+    /// When it was where, if it has been seen.
+    seen: Option<(u64, i64)>,
+    /// Where it was when it was last seen to move.
+    stood_um: i64,
+    /// How far its drive was told to go since then, in nm.
+    told_nm: i64,
 }
 
 impl Arm {
@@ -72,6 +93,10 @@ impl Arm {
             Some(f) if f.leads_to(motion) => f.offset_um,
             _ => motion.position_um.saturating_sub(arm_um),
         };
+        let watch = match &self.following {
+            Some(f) => f.watch,
+            None => Watch::new(arm_um),
+        };
         self.following = Some(Following {
             sequence: motion.sequence,
             instant_us: motion.instant_us,
@@ -79,6 +104,7 @@ impl Arm {
             hand_um: motion.position_um,
             velocity_um_s: motion.velocity_um_s,
             age_ms: 0,
+            watch,
         });
         true
     }
@@ -103,15 +129,20 @@ impl Arm {
         }
     }
 
-    /// The drive for the next millisecond, with the arm at `arm_um`: the hand's velocity plus kp times
-    /// the distance to the hand, which is taken to move on with its last velocity. Within
-    /// ±`full_scale_um_s`; 0 after 100 ms without a motion.
-    pub fn step(&mut self, arm_um: i64, full_scale_um_s: u32) -> Drive {
+    /// The drive for the next millisecond, with the arm at `arm_um` at `instant_us`: the hand's velocity plus kp
+    /// times the distance to the hand, which is taken to move on with its last velocity. Within
+    /// ±`full_scale_um_s`; 0 after 100 ms without a motion, and for good once the arm [has stalled](Trip::ArmStall) or
+    /// its encoder [has jumped](Trip::ArmEncoder): without an encoder to be believed it would run on.
+    pub fn step(&mut self, instant_us: u64, arm_um: i64, full_scale_um_s: u32) -> Drive {
         let Some(f) = &mut self.following else {
             return Drive::default();
         };
         if f.age_ms >= SILENCE_MS {
             self.following = None;
+            return Drive::default();
+        }
+        if let Some(trip) = f.watch.look(instant_us, arm_um, full_scale_um_s) {
+            self.stop(trip);
             return Drive::default();
         }
         let velocity_um_s = i64::from(f.velocity_um_s);
@@ -121,10 +152,48 @@ impl Arm {
             .saturating_sub(arm_um);
         let error_um = error_um.clamp(-MAX_ERROR_UM, MAX_ERROR_UM);
         f.age_ms += 1;
-        drive(
-            velocity_um_s + POSITION_GAIN_PER_S * error_um,
-            full_scale_um_s,
-        )
+        let full_scale = i64::from(full_scale_um_s);
+        let command_um_s =
+            (velocity_um_s + POSITION_GAIN_PER_S * error_um).clamp(-full_scale, full_scale);
+        f.watch.tell(command_um_s, full_scale_um_s);
+        drive(command_um_s, full_scale_um_s)
+    }
+}
+
+impl Watch {
+    fn new(arm_um: i64) -> Self {
+        Self {
+            seen: None,
+            stood_um: arm_um,
+            told_nm: 0,
+        }
+    }
+
+    /// Takes where the arm is. What is wrong with it, if something is.
+    fn look(&mut self, instant_us: u64, arm_um: i64, full_scale_um_s: u32) -> Option<Trip> {
+        if let Some((before_us, before_um)) = self.seen.replace((instant_us, arm_um)) {
+            let us = instant_us.saturating_sub(before_us);
+            let most_um = MOST_TURN_M_S
+                .saturating_mul(us)
+                .saturating_add(LEAST_TURN_UM);
+            if before_um.abs_diff(arm_um) > most_um {
+                return Some(Trip::ArmEncoder);
+            }
+        }
+        if self.stood_um.abs_diff(arm_um) > TREMBLE_UM {
+            self.stood_um = arm_um;
+            self.told_nm = 0;
+        }
+        let has_stalled = self.told_nm.abs() > i64::from(full_scale_um_s) * STALLED_MS;
+        has_stalled.then_some(Trip::ArmStall)
+    }
+
+    /// Takes what the drive is told for the next millisecond.
+    fn tell(&mut self, command_um_s: i64, full_scale_um_s: u32) {
+        if command_um_s.abs() >= i64::from(full_scale_um_s / WEAK_PART) {
+            // µm/s for a ms are nm.
+            self.told_nm += command_um_s;
+        }
     }
 }
 
@@ -172,6 +241,11 @@ mod tests {
         }
     }
 
+    /// The same instant each time: an arm that then goes no further than a millimetre a step is one.
+    fn step(arm: &mut Arm, arm_um: i64) -> Drive {
+        arm.step(0, arm_um, FULL_SCALE_UM_S)
+    }
+
     fn command_um_s(drive: Drive) -> f64 {
         let speed = f64::from(drive.duty) * f64::from(FULL_SCALE_UM_S) / f64::from(Drive::FULL);
         if drive.forward { speed } else { -speed }
@@ -180,7 +254,7 @@ mod tests {
     #[test]
     fn stands_still_until_the_first_motion() {
         assert_eq!(
-            Arm::default().step(123, FULL_SCALE_UM_S),
+            step(&mut Arm::default(), 123),
             Drive {
                 duty: 0,
                 forward: false
@@ -192,7 +266,7 @@ mod tests {
     fn starts_from_wherever_the_hand_and_the_arm_are() {
         let mut arm = Arm::default();
         assert!(arm.on_motion(&motion(9, 5_000_000, 0), -777));
-        assert_eq!(arm.step(-777, FULL_SCALE_UM_S).duty, 0);
+        assert_eq!(step(&mut arm, -777).duty, 0);
     }
 
     #[test]
@@ -200,7 +274,7 @@ mod tests {
         let mut arm = Arm::default();
         arm.on_motion(&motion(0, 0, 50_000), 0);
         assert_eq!(
-            arm.step(0, FULL_SCALE_UM_S),
+            step(&mut arm, 0),
             Drive {
                 duty: Drive::FULL / 4,
                 forward: true
@@ -208,7 +282,7 @@ mod tests {
         );
         arm.on_motion(&motion(1, 100, -50_000), 0);
         // One duty step is full scale / 4200 = 48 µm/s; rounding makes half of it.
-        let command = command_um_s(arm.step(0, FULL_SCALE_UM_S));
+        let command = command_um_s(step(&mut arm, 0));
         assert!((command + 49_000.0).abs() <= 24.0, "{command}");
     }
 
@@ -219,7 +293,7 @@ mod tests {
         assert!(arm.on_motion(&motion(1, 0, 2_000), 0));
         assert!(!arm.on_motion(&motion(1, 0, 3_000), 0));
         assert!(!arm.on_motion(&motion(u32::MAX, 0, 4_000), 0));
-        assert_eq!(arm.step(0, FULL_SCALE_UM_S).duty, Drive::FULL / 100);
+        assert_eq!(step(&mut arm, 0).duty, Drive::FULL / 100);
     }
 
     #[test]
@@ -227,11 +301,11 @@ mod tests {
         let mut arm = Arm::default();
         arm.on_motion(&motion(1_000, 0, 50_000), 0);
         for ms in 0..100 {
-            assert!(arm.step(ms * 50, FULL_SCALE_UM_S).duty > 0, "at {ms} ms");
+            assert!(step(&mut arm, ms * 50).duty > 0, "at {ms} ms");
         }
-        assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+        assert_eq!(step(&mut arm, 5_000).duty, 0);
         assert!(arm.on_motion(&motion(0, 900_000, 0), 5_000));
-        assert_eq!(arm.step(5_000, FULL_SCALE_UM_S).duty, 0);
+        assert_eq!(step(&mut arm, 5_000).duty, 0);
     }
 
     #[test]
@@ -244,12 +318,12 @@ mod tests {
                 ..motion(sequence, position_um, 0)
             };
             assert!(arm.on_motion(&at(10, 10_000, 0), 700));
-            assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+            assert_eq!(step(&mut arm, 700).duty, 0);
             assert!(arm.on_motion(&at(1_000, instant_us, position_um), 700));
-            assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, 0);
+            assert_eq!(step(&mut arm, 700).duty, 0);
             // From there on it is followed.
             assert!(arm.on_motion(&at(1_001, instant_us + 2_000, position_um + 100), 700));
-            assert!(arm.step(700, FULL_SCALE_UM_S).duty > 0);
+            assert!(step(&mut arm, 700).duty > 0);
         }
     }
 
@@ -261,21 +335,21 @@ mod tests {
             ..motion(sequence, position_um, 0)
         };
         assert!(arm.on_motion(&at(10, 10_000, 0), 700));
-        arm.step(700, FULL_SCALE_UM_S);
+        step(&mut arm, 700);
         // A tenth of a second later by its clock, and a millisecond later here.
         assert!(arm.on_motion(&at(60, 110_000, 80_000), 700));
-        assert_eq!(arm.step(700, FULL_SCALE_UM_S).duty, Drive::FULL);
+        assert_eq!(step(&mut arm, 700).duty, Drive::FULL);
     }
 
     #[test]
     fn after_a_rest_the_next_motion_is_a_first_one() {
         let mut arm = Arm::default();
         arm.on_motion(&motion(10, 0, 50_000), 0);
-        arm.step(0, FULL_SCALE_UM_S);
+        step(&mut arm, 0);
         arm.rest();
-        assert_eq!(arm.step(0, FULL_SCALE_UM_S), Drive::default());
+        assert_eq!(step(&mut arm, 0), Drive::default());
         assert!(arm.on_motion(&motion(9, 900, 0), 0));
-        assert_eq!(arm.step(0, FULL_SCALE_UM_S).duty, 0);
+        assert_eq!(step(&mut arm, 0).duty, 0);
     }
 
     #[test]
@@ -288,7 +362,7 @@ mod tests {
         arm.stop(Trip::Host);
         for sequence in 1..300 {
             assert!(!arm.on_motion(&motion(sequence, 5_000_000, 50_000), 0));
-            assert_eq!(arm.step(0, FULL_SCALE_UM_S), Drive::default());
+            assert_eq!(step(&mut arm, 0), Drive::default());
         }
         assert_eq!(arm.state(), ArmState::Stopped(Trip::Operator));
     }
@@ -301,7 +375,7 @@ mod tests {
                 arm.on_motion(&motion(0, 0, 0), i64::MAX);
                 arm.on_motion(&motion(1, position_um, velocity_um_s), 0);
                 for _ in 0..100 {
-                    assert!(arm.step(i64::MIN, FULL_SCALE_UM_S).duty <= Drive::FULL);
+                    assert!(step(&mut arm, i64::MIN).duty <= Drive::FULL);
                 }
             }
         }
@@ -323,9 +397,86 @@ mod tests {
                     arm_um as i64,
                 );
             }
-            arm_um += command_um_s(arm.step(arm_um as i64, FULL_SCALE_UM_S)) / 1_000.0;
+            arm_um += command_um_s(step(&mut arm, arm_um as i64)) / 1_000.0;
             let error = arm_um - hand(ms + 1);
             assert!(error.abs() < 100.0, "{error} µm at {ms} ms");
         }
+    }
+
+    /// An arm behind a drive with a lag, in its encoder's counts, and the hand that it follows at a steady speed.
+    /// `encoder` makes of the ms and where the arm is what is read. Where the arm was when it stopped, in µm, when, and
+    /// why, within a second.
+    fn led(
+        lag_ms: f64,
+        speed_um_s: i32,
+        encoder: impl Fn(u32, f64) -> f64,
+    ) -> Option<(f64, u32, Trip)> {
+        let mut arm = Arm::default();
+        let (mut arm_um, mut velocity_um_s) = (0.0, 0.0);
+        for ms in 0..1_000_u32 {
+            let read_um = 5 * (encoder(ms, arm_um) / 5.0).floor() as i64;
+            let hand_um = i64::from(speed_um_s) * i64::from(ms) / 1_000;
+            arm.on_motion(&motion(ms, hand_um, speed_um_s), read_um);
+            let drive = arm.step(u64::from(ms) * 1_000, read_um, FULL_SCALE_UM_S);
+            if let Some(trip) = arm.state().trip() {
+                assert_eq!(drive, Drive::default());
+                return Some((arm_um, ms, trip));
+            }
+            velocity_um_s += (command_um_s(drive) - velocity_um_s) / (1.0 + lag_ms);
+            arm_um += velocity_um_s / 1_000.0;
+        }
+        None
+    }
+
+    #[test]
+    fn an_arm_whose_encoder_dies_is_stopped_within_a_centimetre() {
+        for speed_um_s in [-150_000, -20_000, 30_000, 70_000] {
+            for lag_ms in [0.0, 20.0] {
+                let died_um = f64::from(speed_um_s) * 0.3;
+                let dead = |ms, arm_um: f64| if ms < 300 { arm_um } else { died_um };
+                let (arm_um, ms, trip) = led(lag_ms, speed_um_s, dead).expect("it is noticed");
+                assert_eq!(trip, Trip::ArmStall);
+                // As far as full speed brings it in 50 ms, and what it is behind its command.
+                let astray_um = (arm_um - died_um).abs();
+                assert!(astray_um < 11_000.0, "{astray_um} µm at {speed_um_s} µm/s");
+                assert!(ms < 700, "{ms} ms at {speed_um_s} µm/s");
+            }
+        }
+    }
+
+    #[test]
+    fn an_arm_that_can_t_move_is_stopped() {
+        for tremble_um in [0.0, 10.0] {
+            let blocked = |ms, _| if ms % 2 == 0 { 0.0 } else { tremble_um };
+            let (_, ms, trip) = led(20.0, 50_000, blocked).expect("it is noticed");
+            assert_eq!(trip, Trip::ArmStall);
+            assert!(ms < 150, "{ms} ms");
+        }
+    }
+
+    #[test]
+    fn an_encoder_that_jumps_further_than_an_arm_moves_stops_it_at_once() {
+        for (jump_um, trip) in [(3_100.0, Some(Trip::ArmEncoder)), (1_000.0, None)] {
+            let jumps = |ms, arm_um| if ms < 300 { arm_um } else { arm_um + jump_um };
+            let stopped = led(20.0, 70_000, jumps);
+            assert_eq!(stopped.map(|(.., trip)| trip), trip);
+            assert!(stopped.is_none_or(|(_, ms, _)| ms == 300));
+        }
+    }
+
+    #[test]
+    fn a_slow_drive_a_weak_one_and_lost_samples_are_no_stall() {
+        // As slow as the controller can bear.
+        assert_eq!(led(100.0, 150_000, |_, arm_um| arm_um), None);
+        // One that does not obey the last of a millimetre.
+        let mut arm = Arm::default();
+        for ms in 0..10_000 {
+            arm.on_motion(&motion(ms, 10_000, 0), if ms == 0 { 10_000 } else { 9_010 });
+            arm.step(u64::from(ms) * 1_000, 9_010, FULL_SCALE_UM_S);
+        }
+        assert_eq!(arm.state(), ArmState::Following);
+        // A tenth of a second without a sample, at full speed.
+        arm.step(10_100_000, 9_010 + 20_000, FULL_SCALE_UM_S);
+        assert_eq!(arm.state(), ArmState::Following);
     }
 }

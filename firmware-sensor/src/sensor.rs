@@ -19,7 +19,7 @@ use crate::noise::Noise;
 use crate::slip::Slip;
 use crate::spectrum::Spectrum;
 use crate::texture::{Surface, TEXTURE_RATE_HZ};
-use crate::travel::Travel;
+use crate::travel::{self, Travel};
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
 /// Time after the start, in samples, until the estimators begin: three time constants of the
@@ -32,6 +32,9 @@ const MOVING_MM_S: f32 = 2.0;
 const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
 const SAMPLES_PER_TEXTURE: u32 = SAMPLE_RATE_HZ / TEXTURE_RATE_HZ;
 const _: () = assert!(SAMPLES_PER_TEXTURE.is_multiple_of(SAMPLES_PER_ESTIMATE));
+/// Samples from a jump of the encoder on until no place and no velocity that the estimators take has to do with it.
+const LOST_SAMPLES: u32 = travel::SPAN_MS as u32 + 1;
+const _: () = assert!(travel::SPAN_MS > decimate::DELAY_MS);
 /// Samples after an estimate in which there is little to do.
 const QUIET_SAMPLES: u32 = 3;
 const MICROSECONDS_PER_SAMPLE: u64 = 1_000_000 / SAMPLE_RATE_HZ as u64;
@@ -72,6 +75,8 @@ pub struct Sensor {
     streaming: u32,
     /// Samples that are still to pass before the estimators begin.
     settling: u32,
+    /// Samples after which what is known of the surface is forgotten; 0: it is not to be.
+    lost: u32,
     samples: u32,
     estimates: u32,
 }
@@ -104,6 +109,7 @@ impl Sensor {
             block: Block::default(),
             streaming: 0,
             settling: SETTLING_SAMPLES,
+            lost: 0,
             samples: 0,
             estimates: 0,
         }
@@ -120,9 +126,15 @@ impl Sensor {
             }
         }
         self.configuration = configuration;
-        self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
-        self.estimator = Running::new(&configuration);
+        self.start_over();
+    }
+
+    /// What is known of the surface is forgotten. Not a part of what calls it: new estimators need much of the stack.
+    #[inline(never)]
+    fn start_over(&mut self) {
+        self.counted = Counted::new(&self.configuration);
+        self.estimator = Running::new(&self.configuration);
         self.surface = Surface::new();
     }
 
@@ -269,9 +281,10 @@ impl Sensor {
             self.surface
                 .say(sequence, instant_us, contact == Contact::Slip)
         });
-        let drive = self
-            .arm
-            .step(arm_um, self.configuration.arm_full_scale_um_s);
+        let before = self.arm.state();
+        let full_scale_um_s = self.configuration.arm_full_scale_um_s;
+        let drive = self.arm.step(instant_us, arm_um, full_scale_um_s);
+        let is_lost = before == ArmState::Following && self.arm.state().trip().is_some();
         let mut output = Output {
             estimate,
             texture,
@@ -287,6 +300,16 @@ impl Sensor {
             }
         } else {
             self.block.clear();
+        }
+        if is_lost {
+            // Where it is, and so what is under it, nobody knows.
+            self.lost = LOST_SAMPLES;
+        }
+        if self.lost > 0 {
+            self.lost -= 1;
+            if self.lost == 0 {
+                self.start_over();
+            }
         }
         output
     }

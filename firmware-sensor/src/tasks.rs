@@ -154,7 +154,13 @@ async fn sample(
         let output = sensor.step(begun.as_micros(), &scans, encoder);
         arm.set(output.drive);
         counters.samples = counters.samples.wrapping_add(1);
-        counters.stopped = sensor.arm().trip();
+        let stopped = sensor.arm().trip();
+        if let Some(trip) = stopped
+            && counters.stopped.is_none()
+        {
+            nucleo::trip::latch(trip);
+        }
+        counters.stopped = stopped;
         if let Some(estimate) = output.estimate {
             let taken = OUTBOX.try_send(Message::Estimate(estimate)).is_ok();
             counters.estimates = counters.estimates.wrapping_add(u32::from(taken));

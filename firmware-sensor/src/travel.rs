@@ -25,6 +25,8 @@ pub const ALIGNMENT_MS: usize = decimate::DELAY_MS + BAND_PASS_DELAY_MS;
 /// Half of the time over which a velocity is taken, in ms. 5 µm counts make an error of ±1 count in
 /// 16 ms, ±0.31 mm/s or 1 % of 30 mm/s, at worst; its mean is 0 and its RMS 0.4 %.
 const HALF_SPAN_MS: usize = ALIGNMENT_MS;
+/// So long does a jump of the encoder make velocities, in ms.
+pub const SPAN_MS: usize = 2 * HALF_SPAN_MS + 1;
 
 /// Milliseconds of positions kept: a power of two, so that indices wrap freely.
 const HISTORY_MS: usize = 256;

@@ -36,7 +36,7 @@ use crate::stop::{Stop, Stopped};
 use crate::texture::Texture;
 
 /// The version of everything in this crate that crosses the wire. Raised whenever a golden byte changes.
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;
 
 /// A hash of the shape of every message (names, types, order), so that two builds that disagree
 /// in a single field recognise it by [`Hello`] even if someone forgot to raise the version.

@@ -74,11 +74,15 @@ pub enum Trip {
     Fault,
     /// The stack was full.
     StackOverflow,
+    /// The arm's encoder jumped further than an arm moves.
+    ArmEncoder,
+    /// The arm was told to move and did not: it is blocked, its drive is off, or its encoder is dead.
+    ArmStall,
 }
 
 impl Trip {
     /// Every reason, in the wire's order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Operator,
         Self::Host,
         Self::EmergencyStop,
@@ -91,6 +95,8 @@ impl Trip {
         Self::Panic,
         Self::Fault,
         Self::StackOverflow,
+        Self::ArmEncoder,
+        Self::ArmStall,
     ];
 
     /// The reason in words, as used in messages to people.
@@ -108,6 +114,8 @@ impl Trip {
             Self::Panic => "panic",
             Self::Fault => "processor fault",
             Self::StackOverflow => "stack full",
+            Self::ArmEncoder => "arm encoder",
+            Self::ArmStall => "arm stalled",
         }
     }
 }

@@ -18,7 +18,7 @@ use spi::Spi;
 use super::nucleo::{LATE_NS, Pins, TIM3_CLOCK_MHZ};
 use crate::dac81416::{Dac81416, Defects};
 use crate::wiring::{CHIP, EncoderWires, Mistake};
-use hil_sim_core::plant::fault::hand::HandFault;
+use hil_sim_core::plant::fault::encoder::EncoderFaults;
 use hil_sim_core::plant::motion::encoder;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::recording::{OutputRecord, TickRecord};
@@ -79,7 +79,7 @@ pub struct DisplayRecords {
 pub struct DisplayPins {
     spi: Spi,
     world: World,
-    hand: HandFault,
+    hand: EncoderFaults,
     clear: Option<Level>,
     /// LDAC's level on the wire.
     load: Option<Level>,
@@ -96,7 +96,7 @@ pub struct DisplayPins {
 
 impl DisplayPins {
     /// The surroundings that `world` describes.
-    pub fn new(world: World, hand: HandFault) -> Self {
+    pub fn new(world: World, hand: EncoderFaults) -> Self {
         Self {
             spi: Spi::default(),
             world,

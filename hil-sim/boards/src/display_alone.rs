@@ -28,7 +28,7 @@ use super::rtt::Log;
 use super::wire::TimedByte;
 use super::{ElfError, Firmware, pair, recorder};
 use hil_sim_core::link::impairments::{BYTE_NS, Impairments};
-use hil_sim_core::plant::fault::hand::HandFault;
+use hil_sim_core::plant::fault::encoder::EncoderFaults;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::decoder::MessageDecoder;
 use hil_sim_core::run::digest::Digest;
@@ -185,7 +185,7 @@ pub(super) fn run_before<W: Watcher>(
         duration_s: alone.duration_s,
         ..Scene::constant(2.0, 50.0)
     };
-    let pins = DisplayPins::new(World::new(&scene)?, HandFault::new(&[]));
+    let pins = DisplayPins::new(World::new(&scene)?, EncoderFaults::of_hand(&[]));
     let update_rate = alone.configuration.update_rate;
     let far = ScriptedSensor::new(alone, Log::find(&firmware.elf), watcher);
     let started = Instant::now();

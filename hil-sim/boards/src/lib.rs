@@ -187,7 +187,14 @@ fn record(
         let witness = &display.witness;
         digest.link(&witness.sent);
         digest.outputs(&display.records.outputs);
-        heard.hear(&witness.heard);
+        let mut rest = &witness.heard[..];
+        for reset in &display.resets {
+            let before = rest.partition_point(|&(at_ns, _)| at_ns < reset.at_ns);
+            heard.hear(&rest[..before]);
+            heard.restart();
+            rest = &rest[before..];
+        }
+        heard.hear(rest);
         display_said.hear(&witness.sent);
         log_of("display", witness);
         resets.extend(display.resets);

@@ -13,7 +13,7 @@ use super::sensor::SensorPins;
 use super::traps::Traps;
 use super::{ElfError, Firmware, Firmwares};
 use hil_sim_core::plant::fault::clock::Clock;
-use hil_sim_core::plant::fault::hand::HandFault;
+use hil_sim_core::plant::fault::encoder::EncoderFaults;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::fault_evidence::Reset;
 use hil_sim_core::scene::Scene;
@@ -76,7 +76,7 @@ where
             )
         });
         let firmware = &firmwares.display;
-        let pins = DisplayPins::new(display_world, HandFault::new(&scene.faults));
+        let pins = DisplayPins::new(display_world, EncoderFaults::of_hand(&scene.faults));
         let display = drive(
             Role::Display,
             Nucleo::new(pins, DisplayPins::fit),

@@ -19,6 +19,7 @@ use super::nucleo::Pins;
 use crate::wiring::{EncoderWires, GAUGE, Mistake};
 use hil_sim_core::plant::arm::Arm;
 use hil_sim_core::plant::fault::clock::Clock;
+use hil_sim_core::plant::fault::encoder::EncoderFaults;
 use hil_sim_core::plant::fault::gauges::GaugeFaults;
 use hil_sim_core::plant::world::World;
 use hil_sim_core::run::recording::ScanRecord;
@@ -54,6 +55,7 @@ pub struct SensorPins {
     arm_full_scale_mm_s: f64,
     position_mm: f64,
     gauges: GaugeFaults,
+    encoder_faults: EncoderFaults,
     clock: Clock,
     encoder: EncoderWires,
     /// The level that the pin of gauge [`GAUGE`] is held at by its wire.
@@ -78,6 +80,7 @@ impl SensorPins {
             arm_full_scale_mm_s: f64::from(configuration.arm_full_scale_um_s) * 1e-3,
             position_mm: 0.0,
             gauges: GaugeFaults::new(&scene.faults),
+            encoder_faults: EncoderFaults::of_arm(&scene.faults),
             clock: Clock::new(&scene.faults),
             encoder: EncoderWires::Sound,
             held: None,
@@ -112,6 +115,7 @@ impl SensorPins {
             }
         }
         let encoder = self.world.arm_encoder(t_s, self.position_mm);
+        let encoder = self.encoder_faults.counts(at_ns, encoder);
         let encoder = self.encoder.counts(encoder);
         self.scans.push(ScanRecord {
             at_ns,

@@ -14,8 +14,8 @@ use crate::link::channel::LinkChannel;
 use crate::link::impairments::BYTE_NS;
 use crate::plant::arm::Arm;
 use crate::plant::fault::clock::Clock;
+use crate::plant::fault::encoder::EncoderFaults;
 use crate::plant::fault::gauges::GaugeFaults;
-use crate::plant::fault::hand::HandFault;
 use crate::plant::motion::encoder;
 use crate::plant::world::World;
 use crate::run::decoder::TimedMessage;
@@ -122,7 +122,8 @@ struct Pair<'o, O> {
     clock: Clock,
     scan_count: u64,
     gauges: GaugeFaults,
-    hand: HandFault,
+    hand: EncoderFaults,
+    arm_encoder: EncoderFaults,
     digest: Digest,
     /// The supervisor's last state.
     state: Option<DisplayState>,
@@ -149,7 +150,8 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             clock: Clock::new(&scene.faults),
             scan_count: 0,
             gauges: GaugeFaults::new(&scene.faults),
-            hand: HandFault::new(&scene.faults),
+            hand: EncoderFaults::of_hand(&scene.faults),
+            arm_encoder: EncoderFaults::of_arm(&scene.faults),
             digest: Digest::default(),
             state: None,
             onlooker,
@@ -237,6 +239,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
         let codes = self.world.codes(t_s, position_mm);
         let codes = self.gauges.apply(now_ns, codes);
         let encoder = self.world.arm_encoder(t_s, position_mm);
+        let encoder = self.arm_encoder.counts(now_ns, encoder);
         self.onlooker.see(RunEvent::Scan(&ScanRecord {
             at_ns: now_ns,
             codes,
@@ -252,6 +255,16 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             .sensor
             .step(step * STEP_NS / 1_000, &self.scans, encoder);
         self.sensor_counters.samples = self.sensor_counters.samples.wrapping_add(1);
+        let state = self.sensor.arm();
+        if state.trip() != self.sensor_counters.stopped {
+            self.sensor_counters.stopped = state.trip();
+            let instant_us = now_ns / 1_000;
+            self.tell(
+                Role::Sensor,
+                now_ns,
+                Message::Arm(protocol::Arm { instant_us, state }),
+            );
+        }
         if output.drive != self.drive {
             self.drive = output.drive;
             self.arm.command(t_s, self.command_mm_s());

@@ -173,6 +173,13 @@ impl Shift {
         let from_s = scene.duration_s
             + match before {
                 None => STARTS_S,
+                // An arm that was stopped is nobody's that its encoder could be missed by.
+                Some(_) if kind.is_of_arm() => {
+                    scene
+                        .faults
+                        .push(Fault::new(Kind::PowerCycle, scene.duration_s));
+                    STARTS_S
+                }
                 Some(before) if before.row().class == Class::Stops => {
                     let mut power = Fault::new(Kind::PowerCycle, scene.duration_s);
                     power.values[0] = 0.0;

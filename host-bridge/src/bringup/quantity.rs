@@ -252,7 +252,7 @@ impl Quantity {
                     "it goes backwards: power off, then invert the direction D7 (PF13) or exchange the motor's wires"
                 }
                 Some(ratio) if ratio < 0.2 => {
-                    "it stands: see the PWM's wire D6 (PE9), the drive's supply and its enable input"
+                    "it stands: see the PWM's wire D6 (PE9), the drive's supply and its enable input; then press the sensor board's reset button"
                 }
                 Some(_) => {
                     "see the drive's scale: full duty is arm_full_scale_um_s of the configuration"

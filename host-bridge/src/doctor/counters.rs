@@ -158,6 +158,20 @@ const fn of_trip(trip: Trip) -> &'static str {
             "keep the log (`host-bridge monitor` with its ELF), report it, then press reset"
         }
         Trip::Watchdog => "the firmware hung: keep the log, report it, then press reset",
+        Trip::ArmEncoder => {
+            "see the arm's encoder and its wires (PD12, PD13), then press the sensor board's reset button"
+        }
+        Trip::ArmStall => {
+            "see what blocks the arm, its drive (supply, PWM D6) and encoder (PD12, PD13), then reset the sensor board"
+        }
+    }
+}
+
+/// What to do about an arm that was stopped.
+pub const fn arm_advice(trip: Trip) -> &'static str {
+    match trip {
+        Trip::ArmEncoder | Trip::ArmStall => of_trip(trip),
+        _ => "press the sensor board's reset button when the arm may move again",
     }
 }
 

@@ -304,7 +304,7 @@ impl Findings {
                     self.add(
                         "arm-stopped",
                         format!("arm {}", ArmState::Stopped(trip)),
-                        "press the sensor board's reset button when the arm may move again",
+                        counters::arm_advice(trip),
                     );
                 }
             }

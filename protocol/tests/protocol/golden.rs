@@ -20,8 +20,8 @@ const SEQUENCE: u16 = 0x0102;
 const GOLDEN: &[(&str, &str)] = &[
     (
         "hello",
-        "030201065244474c06153d54fc71a8843a127353544d3332463432395a490101010101020106017\
-         1b454ef00",
+        "030201065244474c0715b9c9410febd844997353544d3332463432395a4901010101010201060107\
+         e819e200",
     ),
     (
         "estimate",
@@ -180,13 +180,16 @@ fn every_choice_within_a_message_has_its_byte() {
         std::array::from_fn::<u8, 26, _>(|n| n as u8)
     );
     assert_eq!(bytes(&Hold::ALL), [0, 1, 2, 3, 4, 5]);
-    assert_eq!(bytes(&Trip::ALL), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    assert_eq!(
+        bytes(&Trip::ALL),
+        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13]
+    );
 }
 
 #[test]
 fn version_and_schema_are_those_of_the_golden_frames() {
-    assert_eq!(PROTOCOL_VERSION, 6);
-    assert_eq!(SCHEMA_HASH, 0x123a_84a8_71fc_543d);
+    assert_eq!(PROTOCOL_VERSION, 7);
+    assert_eq!(SCHEMA_HASH, 0x9944_d8eb_0f41_c9b9);
 }
 
 #[test]

@@ -332,7 +332,7 @@ mod tests {
     use crate::display::DisplayPins;
     use crate::nucleo::Nucleo;
     use crate::nucleo::by_hand::{get, set};
-    use hil_sim_core::plant::fault::hand::HandFault;
+    use hil_sim_core::plant::fault::encoder::EncoderFaults;
     use hil_sim_core::plant::world::World;
     use hil_sim_core::scene::Scene;
 
@@ -451,7 +451,7 @@ mod tests {
 
     fn here() -> Outcome {
         let world = World::new(&Scene::constant(2.0, 50.0)).unwrap();
-        let pins = DisplayPins::new(world, HandFault::new(&[]));
+        let pins = DisplayPins::new(world, EncoderFaults::of_hand(&[]));
         let mut board = Nucleo::new(pins, DisplayPins::fit).unwrap();
         let said = said(board.mcu(0).unwrap());
         let chip = &board.pins().0.spi.chips[0].chip;
@@ -474,7 +474,7 @@ mod tests {
     #[test]
     fn what_is_cut_off_holds_up_no_word_that_comes_after_it() {
         let world = World::new(&Scene::constant(2.0, 50.0)).unwrap();
-        let pins = DisplayPins::new(world, HandFault::new(&[]));
+        let pins = DisplayPins::new(world, EncoderFaults::of_hand(&[]));
         let mut board = Nucleo::new(pins, DisplayPins::fit).unwrap();
         let mcu = board.mcu(0).unwrap();
         for (at_ns, address, value) in SET_UP.into_iter().chain(frame(10, 17, 13)) {

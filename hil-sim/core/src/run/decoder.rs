@@ -34,6 +34,11 @@ impl MessageDecoder {
         }
     }
 
+    /// Whoever listened has started again, and knows nothing of the frames before.
+    pub fn restart(&mut self) {
+        self.receiver = Receiver::default();
+    }
+
     /// Takes what was said since the last call.
     pub fn take(&mut self) -> Vec<TimedMessage> {
         std::mem::take(&mut self.said)
@@ -47,5 +52,47 @@ impl MessageDecoder {
     /// The same, for good.
     pub fn into_messages(self) -> Vec<TimedMessage> {
         self.said
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::frame::encode;
+    use protocol::{Hello, MAX_FRAME, Ping, Role};
+
+    use super::*;
+
+    /// What a board says that has just started: a greeting, and so many pings.
+    fn said(asks: u8, pings: u16) -> Vec<(u64, u8)> {
+        let hello = Message::Hello(Hello {
+            asks,
+            ..Hello::new(Role::Sensor, "chip", [0, 1, 0])
+        });
+        let pings = (0..pings).map(|_| Message::Ping(Ping { sent_us: 1 }));
+        let mut bytes = Vec::new();
+        let messages = [hello].into_iter().chain(pings);
+        for (sequence, message) in (0_u16..).zip(messages) {
+            let mut out = [0; MAX_FRAME];
+            let frame = encode(sequence, &message, &mut out).expect("it has room");
+            bytes.extend(frame.iter().map(|&byte| (0_u64, byte)));
+        }
+        bytes
+    }
+
+    #[test]
+    fn a_listener_that_has_started_again_reads_frames_of_any_number() {
+        let read = |restarts: bool| {
+            let mut decoder = MessageDecoder::default();
+            decoder.hear(&said(1, 50));
+            assert_eq!(decoder.take().len(), 51);
+            if restarts {
+                decoder.restart();
+            }
+            // The other board has started too, and answers.
+            decoder.hear(&said(0, 5));
+            decoder.take().len()
+        };
+        assert_eq!(read(true), 6);
+        assert_eq!(read(false), 1);
     }
 }

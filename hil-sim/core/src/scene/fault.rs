@@ -1,9 +1,9 @@
 //! Faults: what a scene's `[[fault]]` tables break, and what is expected of the boards then.
 //!
 //! ```text
-//! [[fault]] ─> Fault ─┬─> Way      (bytes between the boards)      ┐
-//!                     ├─> GaugeFaults, HandFault (what is sensed)   ├─> Recording ─> judge ─> Finding
-//!                     └─> elf's injector (pins, registers, memory)  ┘
+//! [[fault]] ─> Fault ─┬─> Way      (bytes between the boards)          ┐
+//!                     ├─> GaugeFaults, EncoderFaults (what is sensed) ├─> Recording ─> judge ─> Finding
+//!                     └─> elf's injector (pins, registers, memory)      ┘
 //! ```
 //!
 //! The kinds and what is expected of each are data: [`catalogue::rows`]. `hil-sim faults` prints them, and

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use hil_sim_core::judge::outcome::Outcome;
 use hil_sim_core::native;
 use hil_sim_core::scene::fault::{Fault, Kind};
-use hil_sim_core::scene::{Gauges, Kinematic, Scene};
+use hil_sim_core::scene::{ArmDrive, Follows, Gauges, Kinematic, Motion, Scene};
 
 /// All but the `estimation` scenes, which have a test of their own.
 fn scenes() -> Vec<PathBuf> {
@@ -126,4 +126,57 @@ fn after_a_flood_each_estimate_is_matched_with_what_arrived_of_it() {
     assert!(arrived.iter().filter(made_later).count() >= due.count());
     // Those of the flood were nobody's.
     assert!(recording.arrived.len() > arrived.len() + 100);
+}
+
+/// A hand that swings over 3.3 mm, with noise and a fault of the arm's encoder at 1.7 s.
+fn with_arm_encoder(fault: Kind, follows: Follows) -> Outcome {
+    let scene = Scene {
+        motion: Motion::Sinusoid {
+            amplitude_mm_s: 70.0,
+            frequency_hz: 0.83,
+        },
+        arm: ArmDrive {
+            follows,
+            lag_ms: 10.0,
+            ..ArmDrive::default()
+        },
+        gauges: Gauges::Kinematic(Kinematic {
+            snr_db: Some(15.0),
+            ..Kinematic::default()
+        }),
+        faults: vec![Fault::new(fault, 1.7)],
+        duration_s: 5.0,
+        ..Scene::constant(3.3, 50.0)
+    };
+    let recording = native::run(&scene).unwrap();
+    Outcome::new(scene, recording)
+}
+
+#[test]
+fn an_arm_whose_encoder_breaks_does_not_run_away() {
+    // As far as full speed brings it in 50 ms, and what it was behind.
+    for (fault, most_mm) in [(Kind::ArmEncoderJump, 1.0), (Kind::ArmEncoderDead, 12.0)] {
+        let outcome = with_arm_encoder(fault, Follows::Link);
+        let scans = &outcome.recording.scans;
+        let broken = scans.iter().position(|scan| scan.at_ns >= 1_700_000_000);
+        let broken_mm = scans[broken.unwrap()].position_mm;
+        let away_mm = scans[broken.unwrap()..]
+            .iter()
+            .map(|scan| (scan.position_mm - broken_mm).abs())
+            .fold(0.0, f64::max);
+        assert!(away_mm < most_mm, "{fault:?}: {away_mm} mm");
+        assert_eq!(outcome.unmet, [""; 0]);
+    }
+}
+
+#[test]
+fn no_wrong_wave_is_felt_where_the_arms_encoder_breaks_and_the_arm_goes_on() {
+    for fault in [Kind::ArmEncoderDead, Kind::ArmEncoderJump] {
+        let outcome = with_arm_encoder(fault, Follows::Motion);
+        assert_eq!(outcome.unmet, [""; 0]);
+        assert_eq!(outcome.findings[0].unjudged, [""; 0]);
+        let summary = &outcome.verdict.summary;
+        assert_eq!(summary.wrong_share, Some(0.0), "{fault:?}");
+        assert!(summary.valid_share.unwrap() > 0.7, "{fault:?}: {summary:?}");
+    }
 }

@@ -141,6 +141,7 @@ fn faults_are_judged_alike() {
         Kind::EstimateJumping,
         Kind::StopFromPeer,
         Kind::GaugeOpen,
+        Kind::ArmEncoderDead,
     ] {
         let scene = Scene {
             faults: vec![Fault::new(kind, 1.113), Fault::new(Kind::LinkDown, 2.9)],

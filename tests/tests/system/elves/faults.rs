@@ -15,7 +15,7 @@ use tests::elves;
 const INSTRUCTION_NS: u64 = 9;
 
 /// One of each sort; `hil-sim campaign` tries them all, and at many instants.
-const KINDS: [Kind; 16] = [
+const KINDS: [Kind; 18] = [
     Kind::Nothing,
     Kind::LinkGarbage,
     Kind::EstimateNan,
@@ -32,6 +32,8 @@ const KINDS: [Kind; 16] = [
     Kind::MemoryChanged,
     Kind::BrownOut,
     Kind::SensorHang,
+    Kind::ArmEncoderDead,
+    Kind::ArmEncoderJump,
 ];
 
 #[test]

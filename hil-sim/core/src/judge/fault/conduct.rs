@@ -95,10 +95,11 @@ pub(super) struct Conduct {
 }
 
 impl Conduct {
-    /// Judges until `until_ns`; a display that has `stopped` for good before need not drive, nor one whose hand's encoder
+    /// Judges until `until_ns`, and whether it drives `again_within_ms` of the fault's end; a display that has `stopped` for good before need not drive, nor one whose hand's encoder
     /// stands still by another fault, `blind_ns`. Messages take up to `way_ns`.
     pub fn new(
         fault: &Fault,
+        again_within_ms: Option<f64>,
         until_ns: u64,
         configuration: &DisplayConfiguration,
         stopped: Stopped,
@@ -118,13 +119,13 @@ impl Conduct {
         Self {
             judged_ns: from_ns..until_ns,
             excused_ns,
-            again_ns: match row.again_within_ms {
+            again_ns: match again_within_ms {
                 Some(ms) => over_ns..over_ns + nanoseconds(ms * 1e-3) + way_ns,
                 None => over_ns..over_ns,
             },
             blind_ns,
             stopped,
-            spoils_estimates: row.signs.contains(&Sign::NoValidEstimate),
+            spoils_estimates: fault.kind.is_of_arm() || row.signs.contains(&Sign::NoValidEstimate),
             max_age_ms: configuration.max_age_ms,
             fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
             trust: Trust::new(configuration.max_age_ms),

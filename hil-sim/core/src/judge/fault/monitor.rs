@@ -33,6 +33,17 @@ const TOLD_MM_S: f64 = 12.0;
 /// and a tenth of a second for what is said of it.
 const CONTRADICTS_MM_S: f64 = 10.0;
 const CONTRADICTED_S: f64 = 3.1;
+/// What an arm is told that its encoder says stands still (docs' safety page): the hand's velocity, and so much for each
+/// mm to the hand, in 1/s. Less than this part of full speed is not counted. Told is told once that adds up to a fifth
+/// more than what full speed makes in this time.
+const POSITION_GAIN_PER_S: f64 = 10.0;
+const WEAK_PART: f64 = 0.05;
+const STALLED_S: f64 = 0.05 * 1.2;
+/// In so many ms an arm's encoder is looked at, and what a link may take for it not to matter.
+const SAMPLE_MS: f64 = 1.0;
+const PROMPT_MS: f64 = 20.0;
+/// An arm's encoder need not be called jumping below this, in mm (docs' safety page).
+const LEAST_JUMP_MM: f64 = 1.0;
 /// Share of the bytes from which on a corrupt frame is certain: one in ten frames.
 const CORRUPT_SHARE: f64 = 1e-3;
 
@@ -63,6 +74,8 @@ pub(super) struct FaultMonitor {
     has_looked: bool,
     /// Whether the hand is too slow for it to show in time.
     is_slow: bool,
+    /// See [`rests`].
+    rests: bool,
     outputs: Outputs,
     conduct: Conduct,
     /// If it is to keep in step.
@@ -152,6 +165,10 @@ fn must_show(fault: &Fault, scene: &Scene) -> bool {
                 value * MM_PER_COUNT > 2.0 * FASTEST_HAND_MM_S * tick_s
             }
             Kind::HandEncoderDead => scene.arm.follows == Follows::Motion,
+            // And what an arm goes meanwhile, which is less than once more as far.
+            Kind::ArmEncoderJump => {
+                value * MM_PER_COUNT > LEAST_JUMP_MM + 2.0 * FASTEST_HAND_MM_S * SAMPLE_MS * 1e-3
+            }
             Kind::LinkCorrupt => value >= CORRUPT_SHARE,
             _ => true,
         }
@@ -174,6 +191,46 @@ fn is_slow(fault: &Fault, scene: &Scene) -> bool {
         Kind::AdcStuck | Kind::GaugeOpen | Kind::GaugeShort => is_slow,
         _ => false,
     }
+}
+
+/// Whether the arm may rest when its encoder breaks, or is told too little for that to show in time.
+fn rests(fault: &Fault, scene: &Scene) -> bool {
+    let from_ns = fault.begins_ns();
+    let is_before = |other: &&Fault| *other != fault && other.begins_ns() <= from_ns;
+    let before = || scene.faults.iter().filter(is_before);
+    let power = before().filter(|other| other.cuts_power(Role::Sensor));
+    let power_ns = power.map(Fault::begins_ns).max();
+    let stops = |other: &Fault| {
+        other.kind.is_of_arm() || matches!(other.kind, Kind::StopFromPeer | Kind::StopFromConsole)
+    };
+    let is_stopped = before()
+        .filter(|other| power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns))
+        .any(stops);
+    let may_rest = before()
+        .any(|other| other.ends_ns().unwrap_or(other.begins_ns()) + LINGERS_NS > from_ns)
+        && power_ns.is_none_or(|power_ns| power_ns + LINGERS_NS < from_ns);
+    is_stopped
+        || may_rest
+        || scene.link.delay_ms + scene.link.jitter_ms > PROMPT_MS
+        || fault.kind == Kind::ArmEncoderDead && !is_told(fault, scene)
+}
+
+/// Whether an arm whose encoder stands still from `fault` on is told to move so far in time that it has to be missed.
+fn is_told(fault: &Fault, scene: &Scene) -> bool {
+    const PARTS: u32 = 1_000;
+    let part_s = fault.kind.row().seen_within_ms.unwrap_or(0.0) * 1e-3 / f64::from(PARTS);
+    let full_mm_s = f64::from(scene.sensor_configuration().arm_full_scale_um_s) * 1e-3;
+    let stands_mm = scene.motion.position_mm(fault.at_s);
+    let mut told_mm: f64 = 0.0;
+    (0..PARTS).any(|part| {
+        let t_s = fault.at_s + part_s * f64::from(part);
+        let ahead_mm = scene.motion.position_mm(t_s) - stands_mm;
+        let command_mm_s = scene.motion.velocity_mm_s(t_s) + POSITION_GAIN_PER_S * ahead_mm;
+        if command_mm_s.abs() > WEAK_PART * full_mm_s {
+            told_mm += command_mm_s.clamp(-full_mm_s, full_mm_s) * part_s;
+        }
+        told_mm.abs() > STALLED_S * full_mm_s
+    })
 }
 
 impl FaultMonitor {
@@ -235,7 +292,11 @@ impl FaultMonitor {
         let silenced = lingering().flat_map(|other| other.kind.row().silences);
         let silenced = silenced.chain(row.silences).copied().collect();
         let mut of_others: Vec<Sign> = others()
-            .filter(|other| stops(other) || lingers(other))
+            .filter(|other| {
+                // The sensor says it again whenever it starts.
+                let says_again = other.kind.is_of_arm() && other.begins_ns() <= from_ns;
+                stops(other) || lingers(other) || says_again
+            })
             .flat_map(|other| [other.kind.row().signs, other.kind.row().also])
             .flatten()
             .copied()
@@ -269,6 +330,9 @@ impl FaultMonitor {
             // When it has been driven for too long is not followed here.
             conduct: Conduct::new(
                 &fault,
+                // An arm that is driven stands still from then on.
+                row.again_within_ms
+                    .filter(|_| !fault.kind.is_of_arm() || scene.arm.follows == Follows::Motion),
                 alone_ns.end,
                 &configuration,
                 if tires { Stopped::Yes } else { stopped },
@@ -289,6 +353,7 @@ impl FaultMonitor {
             until_ns,
             has_looked: false,
             is_slow: is_slow(&fault, scene),
+            rests: fault.kind.is_of_arm() && rests(&fault, scene),
             resets: 0,
             display: Voice::new(Role::Display),
             sensor: Voice::new(Role::Sensor),
@@ -326,6 +391,9 @@ impl FaultMonitor {
         }
         if self.is_slow {
             return Some("the hand moves too slowly");
+        }
+        if self.rests {
+            return Some("the arm may be at rest, or is told too little");
         }
         let hides = |sign: &Sign| self.weather.contains(sign);
         // Of these two, what else shows is chance.

@@ -1,7 +1,7 @@
 //! What a board's messages tell of a fault.
 
 use protocol::{
-    DisplayState, Estimate, GaugeHealth, Message, PortCounters, Role, RoleCounters, Status,
+    DisplayState, Estimate, GaugeHealth, Message, PortCounters, Role, RoleCounters, Status, Trip,
 };
 
 use crate::run::decoder::TimedMessage;
@@ -42,11 +42,13 @@ impl Voice {
                 let last = self.before.filter(|last| last.uptime_us < status.uptime_us);
                 self.before = Some(*status);
                 let mut signs = counted(role, fault, status, last);
-                if let RoleCounters::Display(counters) = status.role {
-                    signs.extend(state_sign(counters.state));
+                match status.role {
+                    RoleCounters::Display(counters) => signs.extend(state_sign(counters.state)),
+                    RoleCounters::Sensor(counters) => signs.extend(arm_sign(counters.stopped)),
                 }
                 signs
             }
+            Message::Arm(arm) => one(arm_sign(arm.state.trip())),
             Message::Estimate(estimate) if role == Role::Sensor => {
                 one(estimate_sign(fault, estimate))
             }
@@ -67,6 +69,12 @@ fn state_sign(state: DisplayState) -> Option<(Sign, String)> {
         DisplayState::Stopped(trip) => Some((Sign::Stopped(trip), format!("stopped, {trip:?}"))),
         DisplayState::Boot | DisplayState::Ready | DisplayState::Driving => None,
     }
+}
+
+/// An arm that somebody has stopped is no sign of a fault.
+fn arm_sign(trip: Option<Trip>) -> Option<(Sign, String)> {
+    let trip = trip.filter(|trip| matches!(trip, Trip::ArmEncoder | Trip::ArmStall))?;
+    Some((Sign::ArmStopped(trip), format!("arm stopped, {trip:?}")))
 }
 
 /// A gauge that is broken shows in its health, a converter in what is valid; else estimates tell

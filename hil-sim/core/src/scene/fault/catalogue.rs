@@ -205,6 +205,8 @@ pub enum Sign {
     GaugeNotGood,
     /// The sensor stands by no estimate.
     NoValidEstimate,
+    /// The sensor says that it has stopped the arm, and why.
+    ArmStopped(Trip),
 }
 
 impl TryFrom<String> for Sign {
@@ -212,15 +214,17 @@ impl TryFrom<String> for Sign {
 
     /// As `catalogue.toml` has it.
     fn try_from(text: String) -> Result<Self, String> {
+        let trip = |why: &str| {
+            let mut all = Trip::ALL.into_iter();
+            all.find(|trip| format!("{trip:?}") == why)
+        };
         let known = match text.split(' ').collect::<Vec<_>>()[..] {
             ["fading", why] => Hold::ALL
                 .into_iter()
                 .find(|hold| format!("{hold:?}") == why)
                 .map(Self::Fading),
-            ["stopped", why] => Trip::ALL
-                .into_iter()
-                .find(|trip| format!("{trip:?}") == why)
-                .map(Self::Stopped),
+            ["stopped", why] => trip(why).map(Self::Stopped),
+            ["arm-stopped", why] => trip(why).map(Self::ArmStopped),
             ["clear-fell"] => Some(Self::ClearFell),
             ["refuses"] => Some(Self::Refuses),
             ["gauge-not-good"] => Some(Self::GaugeNotGood),

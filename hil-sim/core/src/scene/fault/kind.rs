@@ -58,6 +58,8 @@ pub enum Kind {
     GaugeShort,
     AdcStuck,
     AdcStopped,
+    ArmEncoderDead,
+    ArmEncoderJump,
     UartOverrun,
     ClockDrift,
 }
@@ -66,6 +68,11 @@ impl Kind {
     /// Whether nothing that is said towards the display arrives while it lasts.
     pub fn cuts_wire(self) -> bool {
         matches!(self, Self::LinkDown | Self::WireStuckLow)
+    }
+
+    /// Whether it is of the arm's encoder, for which the sensor stops the arm for good.
+    pub fn is_of_arm(self) -> bool {
+        matches!(self, Self::ArmEncoderDead | Self::ArmEncoderJump)
     }
 
     /// All of them, in the order of the catalogue.

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use protocol::Estimate;
+use protocol::{Arm, ArmState, Estimate};
 
 use super::*;
-use crate::scene::Motion;
+use crate::scene::{Link, Motion};
 
 /// A scene of some faults with a hand at 50 mm/s over 2 mm.
 fn several(duration_s: f64, faults: &[(Kind, f64)]) -> Scene {
@@ -370,4 +370,95 @@ fn a_display_that_is_held_already_need_not_give_another_reason() {
     };
     assert!(!unmet(450..500).contains(&"no sign of it".to_owned()));
     assert!(unmet(0..0).contains(&"no sign of it".to_owned()));
+}
+
+#[test]
+fn an_arm_whose_encoder_breaks_has_to_be_stopped_unless_it_may_be_at_rest() {
+    let of = |kind| [(kind, 2.0)];
+    let judged = |scene: &Scene| {
+        let recording = silent(4.0, 0..0);
+        let finding = finding(scene, scene.faults.len() - 1, 4_000 * MS, &recording);
+        let is_missed = finding.unmet().contains(&"no sign of it".to_owned());
+        let rests = finding
+            .unjudged
+            .iter()
+            .any(|line| line.ends_with(": the arm may be at rest, or is told too little"));
+        (is_missed, rests)
+    };
+    for kind in [Kind::ArmEncoderDead, Kind::ArmEncoderJump] {
+        assert_eq!(judged(&several(4.0, &of(kind))), (true, false), "{kind:?}");
+        // It was stopped before, and has not lost its power since.
+        for before in [Kind::StopFromConsole, Kind::ArmEncoderJump] {
+            let stopped = several(4.0, &[&[(before, 0.5)], &of(kind)[..]].concat());
+            assert_eq!(judged(&stopped), (false, true), "{kind:?} after {before:?}");
+        }
+        let again = several(
+            4.0,
+            &[
+                &[(Kind::ArmEncoderJump, 0.5), (Kind::PowerCycle, 0.8)],
+                &of(kind)[..],
+            ]
+            .concat(),
+        );
+        assert_eq!(judged(&again), (true, false), "{kind:?}");
+        // No motion comes, or late.
+        let cut = several(4.0, &[&[(Kind::LinkDown, 1.5)], &of(kind)[..]].concat());
+        assert_eq!(judged(&cut), (false, true), "{kind:?}");
+        let late = Scene {
+            link: Link {
+                delay_ms: 30.0,
+                ..Link::default()
+            },
+            ..several(4.0, &of(kind))
+        };
+        assert_eq!(judged(&late), (false, true), "{kind:?}");
+    }
+    // To and fro over 2 mm: it is not told to go 10 mm in half a second.
+    let trembling = |frequency_hz| Scene {
+        motion: Motion::Sinusoid {
+            amplitude_mm_s: 70.0,
+            frequency_hz,
+        },
+        ..several(4.0, &of(Kind::ArmEncoderDead))
+    };
+    assert_eq!(judged(&trembling(10.0)), (false, true));
+    assert_eq!(judged(&trembling(0.5)), (true, false));
+    let mut small = several(4.0, &of(Kind::ArmEncoderJump));
+    small.faults[0].values[0] = 500.0;
+    assert_eq!(judged(&small), (false, false));
+}
+
+#[test]
+fn an_arm_that_is_stopped_for_no_reason_is_not_as_it_should_be() {
+    let stopped = |trip, faults: &[(Kind, f64)]| {
+        let mut recording = silent(4.0, 0..0);
+        recording.signs.sensor.push(TimedMessage {
+            at_ns: 2_100 * MS,
+            message: Message::Arm(Arm {
+                instant_us: 2_100_000,
+                state: ArmState::Stopped(trip),
+            }),
+        });
+        let unmet = finding(
+            &several(4.0, faults),
+            faults.len() - 1,
+            4_000 * MS,
+            &recording,
+        )
+        .unmet();
+        unmet.into_iter().find(|line| line.contains("arm stopped"))
+    };
+    let nothing = (Kind::Nothing, 2.0);
+    let says = stopped(Trip::ArmStall, &[nothing]);
+    assert_eq!(
+        says.as_deref(),
+        Some("not to be expected: sensor: arm stopped, ArmStall, at 100.00 ms")
+    );
+    // Somebody's Stop is none of the sensor's; and what it was stopped for before, it says again when it starts.
+    assert_eq!(stopped(Trip::Operator, &[nothing]), None);
+    assert_eq!(
+        stopped(Trip::ArmStall, &[(Kind::ArmEncoderDead, 0.2), nothing]),
+        None
+    );
+    assert!(stopped(Trip::ArmStall, &[(Kind::ArmEncoderJump, 0.2), nothing]).is_some());
 }
