@@ -14,14 +14,18 @@ const WEAK_PART: u32 = 20;
 /// An arm that has not left its place by more than this while it was told to go as far as full speed brings it in
 /// [`STALLED_MS`] has stalled, in µm: two counts, which an encoder may tremble by.
 const TREMBLE_UM: u64 = 2 * MICROMETRES_PER_COUNT as u64;
-/// See [`TREMBLE_UM`]. From rest, a drive with a lag as long as the controller can bear, 100 ms, takes 3 ms to leave them.
+/// See [`TREMBLE_UM`]. From rest, a drive with a lag as long as the controller can bear, 100 ms, takes 3 ms to leave them
+/// at 200 mm/s.
 const STALLED_MS: i64 = 50;
+/// The same as a way, in nm, where full speed is slow: that drive takes 45 ms at 1 mm/s, and a coarse encoder has to show.
+const STALLED_NM: i64 = 1_000_000;
 /// Errors of position are taken for no larger than this, in µm: any such error asks for full speed, and
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
 
-/// What a hand, or an arm, may be away from where its last motion would have it, in µm a µs since then and in µm: it turns from no
-/// more than 2 m/s. A hand that is further away is another one, with a zero of its own; an arm's encoder has jumped.
+/// What a hand may be away from where its last motion would have it, in µm a µs since then and in µm: it turns from no
+/// more than 2 m/s. What is further away is another hand, with a zero of its own. An arm that goes further has an encoder
+/// that has jumped.
 const MOST_TURN_M_S: u64 = 2;
 /// See [`MOST_TURN_M_S`].
 const LEAST_TURN_UM: u64 = 1_000;
@@ -184,7 +188,8 @@ impl Watch {
             self.stood_um = arm_um;
             self.told_nm = 0;
         }
-        let has_stalled = self.told_nm.abs() > i64::from(full_scale_um_s) * STALLED_MS;
+        let most_nm = (i64::from(full_scale_um_s) * STALLED_MS).max(STALLED_NM);
+        let has_stalled = self.told_nm.abs() > most_nm;
         has_stalled.then_some(Trip::ArmStall)
     }
 
@@ -407,6 +412,7 @@ mod tests {
     /// `encoder` makes of the ms and where the arm is what is read. Where the arm was when it stopped, in µm, when, and
     /// why, within a second.
     fn led(
+        full_scale_um_s: u32,
         lag_ms: f64,
         speed_um_s: i32,
         encoder: impl Fn(u32, f64) -> f64,
@@ -417,12 +423,13 @@ mod tests {
             let read_um = 5 * (encoder(ms, arm_um) / 5.0).floor() as i64;
             let hand_um = i64::from(speed_um_s) * i64::from(ms) / 1_000;
             arm.on_motion(&motion(ms, hand_um, speed_um_s), read_um);
-            let drive = arm.step(u64::from(ms) * 1_000, read_um, FULL_SCALE_UM_S);
+            let drive = arm.step(u64::from(ms) * 1_000, read_um, full_scale_um_s);
             if let Some(trip) = arm.state().trip() {
                 assert_eq!(drive, Drive::default());
                 return Some((arm_um, ms, trip));
             }
-            velocity_um_s += (command_um_s(drive) - velocity_um_s) / (1.0 + lag_ms);
+            let scale = f64::from(full_scale_um_s) / f64::from(FULL_SCALE_UM_S);
+            velocity_um_s += (scale * command_um_s(drive) - velocity_um_s) / (1.0 + lag_ms);
             arm_um += velocity_um_s / 1_000.0;
         }
         None
@@ -434,7 +441,8 @@ mod tests {
             for lag_ms in [0.0, 20.0] {
                 let died_um = f64::from(speed_um_s) * 0.3;
                 let dead = |ms, arm_um: f64| if ms < 300 { arm_um } else { died_um };
-                let (arm_um, ms, trip) = led(lag_ms, speed_um_s, dead).expect("it is noticed");
+                let (arm_um, ms, trip) =
+                    led(FULL_SCALE_UM_S, lag_ms, speed_um_s, dead).expect("it is noticed");
                 assert_eq!(trip, Trip::ArmStall);
                 // As far as full speed brings it in 50 ms, and what it is behind its command.
                 let astray_um = (arm_um - died_um).abs();
@@ -448,7 +456,7 @@ mod tests {
     fn an_arm_that_can_t_move_is_stopped() {
         for tremble_um in [0.0, 10.0] {
             let blocked = |ms, _| if ms % 2 == 0 { 0.0 } else { tremble_um };
-            let (_, ms, trip) = led(20.0, 50_000, blocked).expect("it is noticed");
+            let (_, ms, trip) = led(FULL_SCALE_UM_S, 20.0, 50_000, blocked).expect("it is noticed");
             assert_eq!(trip, Trip::ArmStall);
             assert!(ms < 150, "{ms} ms");
         }
@@ -458,7 +466,7 @@ mod tests {
     fn an_encoder_that_jumps_further_than_an_arm_moves_stops_it_at_once() {
         for (jump_um, trip) in [(3_100.0, Some(Trip::ArmEncoder)), (1_000.0, None)] {
             let jumps = |ms, arm_um| if ms < 300 { arm_um } else { arm_um + jump_um };
-            let stopped = led(20.0, 70_000, jumps);
+            let stopped = led(FULL_SCALE_UM_S, 20.0, 70_000, jumps);
             assert_eq!(stopped.map(|(.., trip)| trip), trip);
             assert!(stopped.is_none_or(|(_, ms, _)| ms == 300));
         }
@@ -466,8 +474,13 @@ mod tests {
 
     #[test]
     fn a_slow_drive_a_weak_one_and_lost_samples_are_no_stall() {
-        // As slow as the controller can bear.
-        assert_eq!(led(100.0, 150_000, |_, arm_um| arm_um), None);
+        // As slow as the controller can bear, also where full speed is the slowest that can be configured.
+        for full_scale_um_s in [1_000, 10_000, FULL_SCALE_UM_S] {
+            assert_eq!(
+                led(full_scale_um_s, 100.0, 150_000, |_, arm_um| arm_um),
+                None
+            );
+        }
         // One that does not obey the last of a millimetre.
         let mut arm = Arm::default();
         for ms in 0..10_000 {

@@ -75,6 +75,8 @@ pub struct Sensor {
     streaming: u32,
     /// Samples that are still to pass before the estimators begin.
     settling: u32,
+    /// No gauge is to be believed, or the encoder stands still as one that is dead does.
+    is_blind: bool,
     /// Samples after which what is known of the surface is forgotten; 0: it is not to be.
     lost: u32,
     samples: u32,
@@ -109,6 +111,7 @@ impl Sensor {
             block: Block::default(),
             streaming: 0,
             settling: SETTLING_SAMPLES,
+            is_blind: false,
             lost: 0,
             samples: 0,
             estimates: 0,
@@ -200,6 +203,9 @@ impl Sensor {
         self.noise.push(&raw);
         self.health.push(scans, &raw);
         let usable = self.health.believed() & self.configuration.gauges;
+        let stands = started.travel.velocity_mm_s(0) == 0.0;
+        let is_blind = usable == 0 || stands && self.arm.state().trip() == Some(Trip::ArmStall);
+        let sees_again = core::mem::replace(&mut self.is_blind, is_blind) && !is_blind;
         let mut gauges = raw;
         self.hum.remove(&mut gauges);
 
@@ -301,8 +307,9 @@ impl Sensor {
         } else {
             self.block.clear();
         }
-        if is_lost {
-            // Where it is, and so what is under it, nobody knows.
+        // Where an arm is that was stopped, and so what is under it, nobody knows. Nor does what was felt before a time
+        // without a gauge, or without an encoder, go on behind it.
+        if is_lost || sees_again {
             self.lost = LOST_SAMPLES;
         }
         if self.lost > 0 {

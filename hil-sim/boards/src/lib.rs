@@ -41,7 +41,7 @@ pub use terminal::{Terminal, Terminals};
 use display::DisplayRecords;
 use hil_sim_core::run::decoder::{MessageDecoder, TimedMessage};
 use hil_sim_core::run::digest::Digest;
-use hil_sim_core::run::fault_evidence::FaultEvidence;
+use hil_sim_core::run::fault_evidence::{FaultEvidence, Reset};
 use hil_sim_core::run::recording::{Arrival, Engine, EstimateRecord, Recording, ScanRecord};
 use hil_sim_core::scene::{Scene, SceneError};
 use pair::Finished;
@@ -169,8 +169,7 @@ fn record(
     digest.link(&sensor.witness.sent);
 
     // What the sensor said, and what of it reached the display.
-    let mut said = MessageDecoder::default();
-    said.hear(&sensor.witness.sent);
+    let said = read(&sensor.witness.sent, &sensor.resets);
     let mut heard = MessageDecoder::default();
     let mut display_said = MessageDecoder::default();
     let mut log: Vec<(u64, &'static str, String)> = Vec::new();
@@ -187,15 +186,8 @@ fn record(
         let witness = &display.witness;
         digest.link(&witness.sent);
         digest.outputs(&display.records.outputs);
-        let mut rest = &witness.heard[..];
-        for reset in &display.resets {
-            let before = rest.partition_point(|&(at_ns, _)| at_ns < reset.at_ns);
-            heard.hear(&rest[..before]);
-            heard.restart();
-            rest = &rest[before..];
-        }
-        heard.hear(rest);
-        display_said.hear(&witness.sent);
+        heard = read(&witness.heard, &display.resets);
+        display_said = read(&witness.sent, &display.resets);
         log_of("display", witness);
         resets.extend(display.resets);
         records = display.records;
@@ -247,6 +239,20 @@ fn record(
     };
     recording.match_arrivals();
     recording
+}
+
+/// What was said on a wire. The board whose resets these are has lost what it was at, and begins anew.
+fn read(mut bytes: &[(u64, u8)], resets: &[Reset]) -> MessageDecoder {
+    let mut decoder = MessageDecoder::default();
+    for reset in resets {
+        let (before, after) =
+            bytes.split_at(bytes.partition_point(|&(at_ns, _)| at_ns < reset.at_ns));
+        decoder.hear(before);
+        decoder.restart();
+        bytes = after;
+    }
+    decoder.hear(bytes);
+    decoder
 }
 
 /// What the sensor's clock is ahead of the scene's, from the first estimate and the scan that it ends with.

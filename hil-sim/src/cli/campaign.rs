@@ -75,7 +75,7 @@ impl Campaign {
             virtual_s / wall_s
         );
         for trial in &trials {
-            let unmet = trial.finding.unmet();
+            let unmet = trial.unmet();
             if !unmet.is_empty() {
                 let fault = &trial.finding.fault;
                 say!(
@@ -166,6 +166,7 @@ fn csv_of(trials: &[Trial]) -> String {
             motion,
             mode,
             finding,
+            stray: _,
         } = trial;
         text += &format!(
             "{},{scene},{motion},{mode},{:.6},{},{},{},\"{}\",{},{},{},{},\"{}\"\n",
@@ -179,7 +180,7 @@ fn csv_of(trials: &[Trial]) -> String {
             finding.stuck,
             finding.resets,
             finding.drives_again,
-            finding.unmet().join("; ")
+            trial.unmet().join("; ")
         );
     }
     text

@@ -13,13 +13,14 @@ mod tally;
 
 pub use tally::{Tally, unmet};
 
-use protocol::{DisplayConfiguration, Mode, Rendering};
+use protocol::{DisplayConfiguration, Message, Mode, Rendering};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use hil_sim_boards;
 use hil_sim_boards::{ElfError, Firmwares};
 use hil_sim_core::judge::fault::{Finding, finding};
+use hil_sim_core::run::decoder::TimedMessage;
 use hil_sim_core::scene::fault::catalogue::{Class, Lasts};
 use hil_sim_core::scene::fault::{Fault, Kind, nanoseconds};
 use hil_sim_core::scene::{Display, Motion, Scene, Specimen, Surface};
@@ -50,6 +51,9 @@ const SWINGING: Motion = Motion::Sinusoid {
     frequency_hz: 0.83,
 };
 const STEADY: Motion = Motion::Constant { speed_mm_s: 50.0 };
+
+/// From here on a λ is another one.
+const OFF: f64 = 0.1;
 
 /// What is to be tried.
 #[derive(Clone, Debug)]
@@ -84,6 +88,55 @@ pub struct Trial {
     pub scene: String,
     /// What became of it.
     pub finding: Finding,
+    /// The first λ that the sensor stood by and no specimen has, if there is one.
+    pub stray: Option<Stray>,
+}
+
+/// A λ that no specimen has. The campaign's scenes have no noise and no friction: without a fault there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stray {
+    /// After the fault began, in ms.
+    pub after_ms: f64,
+    /// λ̂.
+    pub wavelength_mm: f64,
+}
+
+impl Trial {
+    /// What was not as it should be.
+    pub fn unmet(&self) -> Vec<String> {
+        let stray = self.stray.map(|stray| {
+            format!(
+                "stands by {:.2} mm, which no specimen has, at {:.2} ms",
+                stray.wavelength_mm, stray.after_ms
+            )
+        });
+        self.finding.unmet().into_iter().chain(stray).collect()
+    }
+}
+
+/// The first one that is told from a fault on until `until_ns`, 10 % off all specimens or more.
+fn stray(scene: &Scene, fault: &Fault, until_ns: u64, said: &[TimedMessage]) -> Option<Stray> {
+    let from_ns = fault.begins_ns();
+    let at_hand = said
+        .iter()
+        .filter(|said| (from_ns..until_ns).contains(&said.at_ns));
+    let stood_by = at_hand.filter_map(|said| match said.message {
+        Message::Estimate(estimate) if estimate.valid => {
+            Some((said.at_ns, f64::from(estimate.wavelength_mm?)))
+        }
+        _ => None,
+    });
+    let specimens = &scene.surface.specimens;
+    let is_stray = |mm: f64| {
+        let is_its = |specimen: &Specimen| (mm / specimen.wavelength_mm - 1.0).abs() < OFF;
+        !specimens.iter().any(is_its)
+    };
+    stood_by
+        .map(|(at_ns, wavelength_mm)| Stray {
+            after_ms: (at_ns - from_ns) as f64 * 1e-6,
+            wavelength_mm,
+        })
+        .find(|stray| is_stray(stray.wavelength_mm))
 }
 
 impl Plan {
@@ -224,12 +277,16 @@ impl Shift {
     /// Runs it.
     pub fn run(&self, firmwares: &Firmwares) -> Result<Vec<Trial>, ElfError> {
         let (recording, _) = hil_sim_boards::run(&self.scene, firmwares)?;
-        let tried = self
-            .tried
-            .iter()
-            .map(|&(index, until_s)| finding(&self.scene, index, nanoseconds(until_s), &recording));
+        let tried = self.tried.iter().map(|&(index, until_s)| {
+            let until_ns = nanoseconds(until_s);
+            let fault = &self.scene.faults[index];
+            (
+                finding(&self.scene, index, until_ns, &recording),
+                stray(&self.scene, fault, until_ns, &recording.signs.sensor),
+            )
+        });
         Ok(tried
-            .map(|finding| Trial {
+            .map(|(finding, stray)| Trial {
                 motion: match self.scene.motion {
                     Motion::Constant { .. } => "constant",
                     _ => "sinusoid",
@@ -237,6 +294,7 @@ impl Shift {
                 mode: self.scene.display.configuration.mode.name(),
                 scene: self.scene.name.clone(),
                 finding,
+                stray,
             })
             .collect())
     }
@@ -245,6 +303,9 @@ impl Shift {
 #[cfg(test)]
 mod tests {
     use std::collections::HashMap;
+
+    use hil_sim_core::native;
+    use protocol::Estimate;
 
     use super::*;
 
@@ -289,6 +350,44 @@ mod tests {
                 assert!(due_s <= until_s + 1e-9, "{}", fault.kind.name());
             }
         }
+    }
+
+    #[test]
+    fn the_first_wave_that_no_specimen_has_is_told() {
+        let scene = Scene {
+            surface: surface(VARIED),
+            ..Scene::constant(2.0, 50.0)
+        };
+        let plain = native::run(&Scene::constant(2.0, 50.0)).unwrap().estimates[0];
+        let stood_by = |wavelengths_mm: &[f32], valid| {
+            let said = wavelengths_mm.iter().zip(0..).map(|(&mm, number)| {
+                let mut estimate: Estimate = plain.estimate;
+                estimate.wavelength_mm = Some(mm);
+                estimate.valid = valid;
+                TimedMessage {
+                    at_ns: 900_000_000 + 100_000_000 * number,
+                    message: Message::Estimate(estimate),
+                }
+            });
+            let said: Vec<_> = said.collect();
+            stray(
+                &scene,
+                &Fault::new(Kind::AdcStuck, 1.0),
+                1_200_000_000,
+                &said,
+            )
+        };
+        // Before the fault, and behind its window.
+        assert_eq!(stood_by(&[1.5, 2.1, 2.8, 1.5], true), None);
+        let told = stood_by(&[2.0, 2.1, 2.5, 1.5], true);
+        assert_eq!(
+            told,
+            Some(Stray {
+                after_ms: 100.0,
+                wavelength_mm: 2.5
+            })
+        );
+        assert_eq!(stood_by(&[2.0, 2.1, 2.5, 1.5], false), None);
     }
 
     #[test]

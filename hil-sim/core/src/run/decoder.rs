@@ -34,7 +34,7 @@ impl MessageDecoder {
         }
     }
 
-    /// Whoever listened has started again, and knows nothing of the frames before.
+    /// Who listened, or spoke, has started again: the frames before have nothing to do with those that come.
     pub fn restart(&mut self) {
         self.receiver = Receiver::default();
     }
@@ -80,11 +80,12 @@ mod tests {
     }
 
     #[test]
-    fn a_listener_that_has_started_again_reads_frames_of_any_number() {
+    fn after_a_restart_frames_of_any_number_are_read_whatever_was_cut_off() {
         let read = |restarts: bool| {
             let mut decoder = MessageDecoder::default();
             decoder.hear(&said(1, 50));
             assert_eq!(decoder.take().len(), 51);
+            decoder.hear(&said(1, 0)[..9]);
             if restarts {
                 decoder.restart();
             }
@@ -93,6 +94,6 @@ mod tests {
             decoder.take().len()
         };
         assert_eq!(read(true), 6);
-        assert_eq!(read(false), 1);
+        assert_eq!(read(false), 0);
     }
 }

@@ -128,8 +128,8 @@ fn after_a_flood_each_estimate_is_matched_with_what_arrived_of_it() {
     assert!(recording.arrived.len() > arrived.len() + 100);
 }
 
-/// A hand that swings over 3.3 mm, with noise and a fault of the arm's encoder at 1.7 s.
-fn with_arm_encoder(fault: Kind, follows: Follows) -> Outcome {
+/// A hand that swings over 3.3 mm, and a fault at 1.7 s.
+fn broken(fault: Kind, follows: Follows, snr_db: Option<f64>) -> Outcome {
     let scene = Scene {
         motion: Motion::Sinusoid {
             amplitude_mm_s: 70.0,
@@ -141,7 +141,7 @@ fn with_arm_encoder(fault: Kind, follows: Follows) -> Outcome {
             ..ArmDrive::default()
         },
         gauges: Gauges::Kinematic(Kinematic {
-            snr_db: Some(15.0),
+            snr_db,
             ..Kinematic::default()
         }),
         faults: vec![Fault::new(fault, 1.7)],
@@ -156,7 +156,7 @@ fn with_arm_encoder(fault: Kind, follows: Follows) -> Outcome {
 fn an_arm_whose_encoder_breaks_does_not_run_away() {
     // As far as full speed brings it in 50 ms, and what it was behind.
     for (fault, most_mm) in [(Kind::ArmEncoderJump, 1.0), (Kind::ArmEncoderDead, 12.0)] {
-        let outcome = with_arm_encoder(fault, Follows::Link);
+        let outcome = broken(fault, Follows::Link, Some(15.0));
         let scans = &outcome.recording.scans;
         let broken = scans.iter().position(|scan| scan.at_ns >= 1_700_000_000);
         let broken_mm = scans[broken.unwrap()].position_mm;
@@ -170,9 +170,13 @@ fn an_arm_whose_encoder_breaks_does_not_run_away() {
 }
 
 #[test]
-fn no_wrong_wave_is_felt_where_the_arms_encoder_breaks_and_the_arm_goes_on() {
-    for fault in [Kind::ArmEncoderDead, Kind::ArmEncoderJump] {
-        let outcome = with_arm_encoder(fault, Follows::Motion);
+fn no_wrong_wave_is_felt_where_encoder_or_converter_break_and_the_arm_goes_on() {
+    let kinds = [Kind::ArmEncoderDead, Kind::ArmEncoderJump, Kind::AdcStuck];
+    for (fault, snr_db) in kinds
+        .into_iter()
+        .flat_map(|kind| [(kind, None), (kind, Some(15.0))])
+    {
+        let outcome = broken(fault, Follows::Motion, snr_db);
         assert_eq!(outcome.unmet, [""; 0]);
         assert_eq!(outcome.findings[0].unjudged, [""; 0]);
         let summary = &outcome.verdict.summary;

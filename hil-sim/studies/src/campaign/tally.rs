@@ -75,8 +75,9 @@ impl Tally {
             restarts: findings()
                 .filter(|finding| finding.is_restart_against_the_table())
                 .count(),
-            unmet: findings()
-                .filter(|finding| !finding.unmet().is_empty())
+            unmet: trials
+                .iter()
+                .filter(|trial| trial.finding.fault.kind == kind && !trial.unmet().is_empty())
                 .count(),
         }
     }

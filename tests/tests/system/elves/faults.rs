@@ -66,8 +66,8 @@ fn faults_of_every_sort_come_out_as_the_table_says() {
         .collect();
     let details: Vec<String> = trials
         .iter()
-        .filter(|trial| !trial.finding.unmet().is_empty())
-        .map(|trial| format!("{:?}: {:?}", trial.finding, trial.finding.unmet()))
+        .filter(|trial| !trial.unmet().is_empty())
+        .map(|trial| format!("{:?}: {:?}", trial.finding, trial.unmet()))
         .collect();
     assert!(
         unmet(&tallies).is_empty() && details.is_empty(),
