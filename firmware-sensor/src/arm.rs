@@ -16,9 +16,9 @@ const WEAK_PART: u32 = 20;
 const TREMBLE_UM: u64 = 2 * MICROMETRES_PER_COUNT as u64;
 /// See [`TREMBLE_UM`]. From rest, a drive with a lag as long as the controller can bear, 100 ms, takes 3 ms to leave them
 /// at 200 mm/s.
-const STALLED_MS: i64 = 50;
+const STALLED_MS: u32 = 50;
 /// The same as a way, in nm, where full speed is slow: that drive takes 45 ms at 1 mm/s, and a coarse encoder has to show.
-const STALLED_NM: i64 = 1_000_000;
+const STALLED_NM: u32 = 1_000_000;
 /// Errors of position are taken for no larger than this, in µm: any such error asks for full speed, and
 /// whatever number a frame carries, nothing overflows.
 const MAX_ERROR_UM: i64 = 1_000_000;
@@ -78,7 +78,7 @@ struct Watch {
     /// Where it was when it was last seen to move.
     stood_um: i64,
     /// How far its drive was told to go since then, in nm.
-    told_nm: i64,
+    told_nm: i32,
 }
 
 impl Arm {
@@ -133,6 +133,11 @@ impl Arm {
         }
     }
 
+    /// What stopped it, if it is stopped.
+    pub fn trip(&self) -> Option<Trip> {
+        self.stopped
+    }
+
     /// The drive for the next millisecond, with the arm at `arm_um` at `instant_us`: the hand's velocity plus kp
     /// times the distance to the hand, which is taken to move on with its last velocity. Within
     /// ±`full_scale_um_s`; 0 after 100 ms without a motion, and for good once the arm [has stalled](Trip::ArmStall) or
@@ -159,7 +164,7 @@ impl Arm {
         let full_scale = i64::from(full_scale_um_s);
         let command_um_s =
             (velocity_um_s + POSITION_GAIN_PER_S * error_um).clamp(-full_scale, full_scale);
-        f.watch.tell(command_um_s, full_scale_um_s);
+        f.watch.tell(command_um_s as i32, full_scale_um_s);
         drive(command_um_s, full_scale_um_s)
     }
 }
@@ -176,10 +181,9 @@ impl Watch {
     /// Takes where the arm is. What is wrong with it, if something is.
     fn look(&mut self, instant_us: u64, arm_um: i64, full_scale_um_s: u32) -> Option<Trip> {
         if let Some((before_us, before_um)) = self.seen.replace((instant_us, arm_um)) {
-            let us = instant_us.saturating_sub(before_us);
-            let most_um = MOST_TURN_M_S
-                .saturating_mul(us)
-                .saturating_add(LEAST_TURN_UM);
+            // A pause longer than a second would not be followed across.
+            let us = instant_us.saturating_sub(before_us).min(1_000_000);
+            let most_um = MOST_TURN_M_S * us + LEAST_TURN_UM;
             if before_um.abs_diff(arm_um) > most_um {
                 return Some(Trip::ArmEncoder);
             }
@@ -188,16 +192,16 @@ impl Watch {
             self.stood_um = arm_um;
             self.told_nm = 0;
         }
-        let most_nm = (i64::from(full_scale_um_s) * STALLED_MS).max(STALLED_NM);
-        let has_stalled = self.told_nm.abs() > most_nm;
+        let most_nm = full_scale_um_s.saturating_mul(STALLED_MS).max(STALLED_NM);
+        let has_stalled = self.told_nm.unsigned_abs() > most_nm;
         has_stalled.then_some(Trip::ArmStall)
     }
 
     /// Takes what the drive is told for the next millisecond.
-    fn tell(&mut self, command_um_s: i64, full_scale_um_s: u32) {
-        if command_um_s.abs() >= i64::from(full_scale_um_s / WEAK_PART) {
+    fn tell(&mut self, command_um_s: i32, full_scale_um_s: u32) {
+        if command_um_s.unsigned_abs() >= full_scale_um_s / WEAK_PART {
             // µm/s for a ms are nm.
-            self.told_nm += command_um_s;
+            self.told_nm = self.told_nm.saturating_add(command_um_s);
         }
     }
 }

@@ -115,9 +115,7 @@ impl Health {
             let code = scan[self.next];
             history.changed |= code != history.last;
             history.last = code;
-            // One comparison for both ends.
-            let from_low = code.wrapping_sub(RAIL_CODES);
-            history.ends += u16::from(from_low > HIGHEST_CODE - 2 * RAIL_CODES);
+            history.ends += u16::from(is_at_end(code));
         }
         history.looks += 1;
         self.next = if self.next + 1 == GAUGES {
@@ -203,12 +201,19 @@ impl Health {
 
     /// Bit g set: gauge g can be believed. None while no gauge feels anything.
     pub fn believed(&self) -> u8 {
-        if self.still_mm > ALL_STILL_MM {
-            0
-        } else {
-            self.good()
-        }
+        if self.stands_still() { 0 } else { self.good() }
     }
+
+    /// Whether no gauge feels anything: no code has changed for a while.
+    pub fn stands_still(&self) -> bool {
+        self.still_mm > ALL_STILL_MM
+    }
+}
+
+/// Whether a code is at an end of the converter's range.
+pub fn is_at_end(code: u16) -> bool {
+    // One comparison for both.
+    code.wrapping_sub(RAIL_CODES) > HIGHEST_CODE - 2 * RAIL_CODES
 }
 
 /// What a gauge is measured by: the allowed ones that are neither at an end of the range nor stuck.

@@ -12,7 +12,7 @@ use crate::block::{Block, Place};
 use crate::counting::{Counted, PAPERS_WINDOW_MS};
 use crate::decimate::{self, AntiAlias, History};
 use crate::estimator::{Estimator, Finding, Touch};
-use crate::health::{Health, Signs};
+use crate::health::{Health, Signs, is_at_end};
 use crate::hum::Hum;
 use crate::method::Running;
 use crate::noise::Noise;
@@ -32,8 +32,9 @@ const MOVING_MM_S: f32 = 2.0;
 const SAMPLES_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ / ESTIMATE_RATE_HZ;
 const SAMPLES_PER_TEXTURE: u32 = SAMPLE_RATE_HZ / TEXTURE_RATE_HZ;
 const _: () = assert!(SAMPLES_PER_TEXTURE.is_multiple_of(SAMPLES_PER_ESTIMATE));
-/// Samples from a jump of the encoder on until no place and no velocity that the estimators take has to do with it.
-const LOST_SAMPLES: u32 = travel::SPAN_MS as u32 + 1;
+/// Estimates from a jump of the encoder, or of all gauges, on until no place, velocity or sample that the estimators take
+/// has to do with it.
+const LOST_ESTIMATES: u8 = travel::SPAN_MS.div_ceil(SAMPLES_PER_ESTIMATE as usize) as u8;
 const _: () = assert!(travel::SPAN_MS > decimate::DELAY_MS);
 /// Samples after an estimate in which there is little to do.
 const QUIET_SAMPLES: u32 = 3;
@@ -75,10 +76,12 @@ pub struct Sensor {
     streaming: u32,
     /// Samples that are still to pass before the estimators begin.
     settling: u32,
-    /// No gauge is to be believed, or the encoder stands still as one that is dead does.
+    /// No gauge feels anything, or the encoder stands still as one that is dead does.
     is_blind: bool,
-    /// Samples after which what is known of the surface is forgotten; 0: it is not to be.
-    lost: u32,
+    /// What had stopped the arm at the last estimate.
+    trip: Option<Trip>,
+    /// Estimates after which what is known of the surface is forgotten once more; 0: it is not to be.
+    lost: u8,
     samples: u32,
     estimates: u32,
 }
@@ -112,6 +115,7 @@ impl Sensor {
             streaming: 0,
             settling: SETTLING_SAMPLES,
             is_blind: false,
+            trip: None,
             lost: 0,
             samples: 0,
             estimates: 0,
@@ -131,6 +135,28 @@ impl Sensor {
         self.configuration = configuration;
         self.slip = Slip::new(&configuration);
         self.start_over();
+    }
+
+    /// Looks before every estimate whether what was felt before goes on: it does not where the arm is stopped for its encoder,
+    /// and so nobody knows where it is, nor behind a time without a gauge or an encoder.
+    #[inline(never)]
+    fn look(&mut self) {
+        let rests = |started: &Started| started.travel.velocity_mm_s(0) == 0.0;
+        let is_at_rest = self.started.as_ref().is_some_and(rests);
+        let trip = self.arm.trip();
+        let is_lost = core::mem::replace(&mut self.trip, trip) != trip;
+        let is_blind = self.health.stands_still() || is_at_rest && trip == Some(Trip::ArmStall);
+        let sees_again = core::mem::replace(&mut self.is_blind, is_blind) && !is_blind;
+        // Gauges that are left out as well took part in nothing meanwhile, and do not now.
+        if is_lost || sees_again && self.health.good() != 0 {
+            self.start_over();
+            self.lost = LOST_ESTIMATES;
+        } else if self.lost > 0 {
+            self.lost -= 1;
+            if self.lost == 0 {
+                self.start_over();
+            }
+        }
     }
 
     /// What is known of the surface is forgotten. Not a part of what calls it: new estimators need much of the stack.
@@ -193,6 +219,11 @@ impl Sensor {
         scans: &[Scan; SCANS_PER_SAMPLE],
         encoder: u16,
     ) -> Output {
+        let since_estimate = self.samples % SAMPLES_PER_ESTIMATE;
+        let estimates = since_estimate == SAMPLES_PER_ESTIMATE - 1;
+        if estimates {
+            self.look();
+        }
         let started = self
             .started
             .get_or_insert_with(|| Started::new(&scans[0], encoder));
@@ -203,20 +234,19 @@ impl Sensor {
         self.noise.push(&raw);
         self.health.push(scans, &raw);
         let usable = self.health.believed() & self.configuration.gauges;
-        let stands = started.travel.velocity_mm_s(0) == 0.0;
-        let is_blind = usable == 0 || stands && self.arm.state().trip() == Some(Trip::ArmStall);
-        let sees_again = core::mem::replace(&mut self.is_blind, is_blind) && !is_blind;
         let mut gauges = raw;
         self.hum.remove(&mut gauges);
 
         let arm = started.travel.place(decimate::DELAY_MS);
-        let lag = self.slip.push(arm, sample[GAUGES]);
+        let lag = self.slip.push(arm, sample[GAUGES], || {
+            scans.iter().any(|scan| is_at_end(scan[GAUGES]))
+        });
         let counted_gauge = usize::from(self.configuration.counted_gauge).min(GAUGES - 1);
         let counted = started.band_pass(&self.band_pass, raw[counted_gauge]);
         let touch = Touch {
             gauges,
             place: arm.wrapping_sub(lag),
-            deflection_known: self.slip.lag_um().is_some(),
+            deflection_known: self.slip.tells_slips(),
             counted,
             noise: self.noise.variances(),
             pickup: self.hum.pickup(),
@@ -231,30 +261,28 @@ impl Sensor {
         self.settling = self.settling.saturating_sub(1);
         self.surface.push(&touch, self.slip.force_n(sample[GAUGES]));
         // The estimator begins its work later.
-        if self.samples % SAMPLES_PER_ESTIMATE < QUIET_SAMPLES {
+        if since_estimate < QUIET_SAMPLES {
             self.surface.work();
         }
 
         let arm_um = started.travel.position_um(0);
         let number = self.samples;
         self.samples = self.samples.wrapping_add(1);
-        let estimate = if self.samples.is_multiple_of(SAMPLES_PER_ESTIMATE) {
+        let estimate = if estimates {
             let finding = self.estimator.find(&started.travel);
+            let speed_mm_s = started.travel.velocity_mm_s(0).abs();
             let contact = contact(&self.slip, &started.travel, &finding);
             self.surface.hear(&finding);
             // Gauges that may not take part are witnesses nevertheless.
             let witnesses = self.health.good();
-            self.hum.renew(
-                witnesses,
-                started.travel.velocity_mm_s(0).abs(),
-                frequency_hz(&started.travel, &finding),
-            );
+            self.hum
+                .renew(witnesses, speed_mm_s, frequency_hz(speed_mm_s, &finding));
             self.health.judge(&Signs {
                 noise: touch.noise,
                 hum: self.hum.own_powers(),
                 misfits: finding.misfits,
                 agreed: finding.valid || finding.misfits != 0,
-                travel_mm: started.travel.velocity_mm_s(0).abs() / ESTIMATE_RATE_HZ as f32,
+                travel_mm: speed_mm_s / ESTIMATE_RATE_HZ as f32,
                 allowed: self.configuration.gauges,
             });
             let count = self.counted.over(PAPERS_WINDOW_MS, &started.travel);
@@ -278,19 +306,17 @@ impl Sensor {
         } else {
             None
         };
-        let moves = started.travel.velocity_mm_s(0).abs() >= MOVING_MM_S;
         // Halfway between two estimates, so that neither waits for the other on the line.
         let due = self.samples % SAMPLES_PER_TEXTURE == SAMPLES_PER_ESTIMATE / 2;
-        let texture = (due && moves && self.estimates > 0).then(|| {
+        let moves = || started.travel.velocity_mm_s(0).abs() >= MOVING_MM_S;
+        let texture = (due && self.estimates > 0 && moves()).then(|| {
             let contact = self.slip.contact(&started.travel, decimate::DELAY_MS);
             let sequence = self.estimates.wrapping_sub(1);
             self.surface
                 .say(sequence, instant_us, contact == Contact::Slip)
         });
-        let before = self.arm.state();
         let full_scale_um_s = self.configuration.arm_full_scale_um_s;
         let drive = self.arm.step(instant_us, arm_um, full_scale_um_s);
-        let is_lost = before == ArmState::Following && self.arm.state().trip().is_some();
         let mut output = Output {
             estimate,
             texture,
@@ -306,17 +332,6 @@ impl Sensor {
             }
         } else {
             self.block.clear();
-        }
-        // Where an arm is that was stopped, and so what is under it, nobody knows. Nor does what was felt before a time
-        // without a gauge, or without an encoder, go on behind it.
-        if is_lost || sees_again {
-            self.lost = LOST_SAMPLES;
-        }
-        if self.lost > 0 {
-            self.lost -= 1;
-            if self.lost == 0 {
-                self.start_over();
-            }
         }
         output
     }
@@ -350,9 +365,9 @@ impl Started {
 }
 
 /// v/λ̂ in Hz where λ̂ is stood by.
-fn frequency_hz(travel: &Travel, finding: &Finding) -> Option<f32> {
+fn frequency_hz(speed_mm_s: f32, finding: &Finding) -> Option<f32> {
     let wavelength_mm = finding.wavelength_mm.filter(|_| finding.valid)?;
-    Some(travel.velocity_mm_s(0).abs() / wavelength_mm)
+    Some(speed_mm_s / wavelength_mm)
 }
 
 /// The arm's mean velocity over the last estimate's period, in µm/s.

@@ -9,8 +9,8 @@
 
 use protocol::{Contact, SensorConfiguration};
 
-use crate::travel::Travel;
-use crate::travel::{PLACES_PER_UM, Place};
+use crate::decimate;
+use crate::travel::{PLACES_PER_UM, Place, Travel};
 
 /// Volts of an ADC step.
 const VOLTS_PER_LSB: f32 = 3.3 / 4_096.0;
@@ -34,6 +34,12 @@ const BELIEVED_N_PER_M: core::ops::RangeInclusive<f32> = 100.0..=60_000.0;
 const COMPARED_MS: usize = 8;
 /// The contact sticks if it moves less than this share of the arm's movement.
 const STUCK: f32 = 0.25;
+/// Lags that swing by this have to do with slips: a tenth of the shortest wave. What slips by less spoils none.
+const SWINGS: Place = 60 * PLACES_PER_UM;
+/// What is left of a swing after a millisecond is less by one part in so many, and by a place.
+const SWING_MS: Place = 512;
+/// So long does a scan at an end of the range take part in samples, behind the anti-aliasing filter.
+const FILTER_MS: Place = 2 * decimate::DELAY_MS as Place + 1;
 /// The arm moves, in mm/s.
 const MOVING_MM_S: f32 = 2.0;
 
@@ -64,6 +70,10 @@ pub struct Slip {
     /// Lags of the last [`COMPARED_MS`] without that, in places.
     lags: [Place; COMPARED_MS],
     next: usize,
+    /// Between which the lag has swung lately, in places.
+    swing: [Place; 2],
+    /// Samples until it is taken to tell the force again, after one at an end of its range.
+    untold: Place,
     present: bool,
 }
 
@@ -81,26 +91,45 @@ impl Slip {
             known_later: 0,
             lags: [0; COMPARED_MS],
             next: 0,
+            swing: [0; 2],
+            untold: 0,
             present: configuration.force_channel,
         }
     }
 
     /// Takes the arm's place and the force channel's sample of the same instant, in ADC steps from
-    /// mid-rail; returns how far the contact lags behind the arm, in places: but for what is constant, so that the contact
+    /// mid-rail, and whether one of the scans since the last one is at an end of the range, where it tells no force; returns
+    /// how far the contact lags behind the arm, in places: but for what is constant, so that the contact
     /// jumps nowhere when k becomes known.
-    pub fn push(&mut self, arm: Place, force_lsb: f32) -> Place {
+    pub fn push(&mut self, arm: Place, force_lsb: f32, ends: impl FnOnce() -> bool) -> Place {
         if !self.present {
             return 0;
         }
         let force_n = force_lsb * self.newtons_per_lsb;
-        if self.find_stiffness {
+        self.untold = if ends() {
+            SWING_MS
+        } else {
+            (self.untold - 1).max(0)
+        };
+        let tells = self.untold <= SWING_MS - FILTER_MS;
+        if self.find_stiffness && tells {
             let before = self.deflection(force_n);
             self.learn(arm, force_n);
             self.known_later = self
                 .known_later
                 .wrapping_add(self.deflection(force_n).wrapping_sub(before));
         }
-        let lag = self.deflection(force_n).wrapping_sub(self.known_later);
+        let lag = if tells {
+            self.deflection(force_n).wrapping_sub(self.known_later)
+        } else {
+            self.newest()
+        };
+        let [low, high] = self.swing;
+        let less = high.wrapping_sub(low) / SWING_MS + 1;
+        self.swing = [
+            lag.min(low.wrapping_add(less)),
+            lag.max(high.wrapping_sub(less)),
+        ];
         self.lags[self.next] = lag;
         self.next = (self.next + 1) % COMPARED_MS;
         lag
@@ -168,6 +197,13 @@ impl Slip {
         self.stiffness_n_per_m
             .filter(|_| self.present)
             .map(|_| self.newest().wrapping_add(self.known_later) / PLACES_PER_UM)
+    }
+
+    /// Whether the lag swings as slips make it. One that does not knows of none: the fingertip slides along, or the channel
+    /// is dead, or at an end of its range.
+    pub fn tells_slips(&self) -> bool {
+        let [low, high] = self.swing;
+        self.present && self.untold == 0 && high.wrapping_sub(low) > SWINGS
     }
 
     /// Stick or slip, from how contact and arm moved over the last 8 ms; unknown at rest and without a
@@ -259,7 +295,9 @@ mod tests {
             let counts = libm::floor(arm_um / f64::from(MICROMETRES_PER_COUNT)) as i64;
             self.travel.push(counts as u16);
             self.slip
-                .push(self.travel.place(0), libm::round(force_lsb) as f32)
+                .push(self.travel.place(0), libm::round(force_lsb) as f32, || {
+                    false
+                })
         }
 
         fn contact(&self) -> Contact {
@@ -296,7 +334,7 @@ mod tests {
                     let force_n =
                         f64::from(force_lsb) * 3.3 / 4_096.0 * f64::from(force_mn_per_v) * 1e-3;
                     let want_um = force_n / f64::from(stiffness_n_per_m) * 1e6;
-                    let lag = f64::from(slip.push(1_000_000, force_lsb)) / 4.0;
+                    let lag = f64::from(slip.push(1_000_000, force_lsb, || false)) / 4.0;
                     // Cut to a quarter of a µm, after six roundings of f32.
                     let bound = 0.25 + 6.0 * 2f64.powi(-24) * want_um.abs();
                     assert!((lag - want_um).abs() <= bound, "{lag} not {want_um} µm");
@@ -484,10 +522,66 @@ mod tests {
             for ms in 0..100 {
                 let arm_um = 40 * ms;
                 let force_lsb = 400e-6 * f64::from(arm_um) * 4_096.0 / 3.3;
-                slip.push(start.wrapping_add(arm_um * PLACES_PER_UM), force_lsb as f32);
+                slip.push(
+                    start.wrapping_add(arm_um * PLACES_PER_UM),
+                    force_lsb as f32,
+                    || false,
+                );
             }
             *found = slip.stiffness_n_per_m.unwrap();
         }
         assert_eq!(found[0], found[1]);
+    }
+
+    /// An arm at 50 mm/s under a fingertip that sticks up to 0.6 N and slips down to 0.3; `heard` makes of the force in ADC
+    /// steps what the channel says, and whether it is at an end. Whether slips are told, each millisecond.
+    fn tells(heard: impl Fn(u32, f64) -> (f64, bool)) -> [bool; 4_000] {
+        let mut slip = Slip::new(&configuration(400));
+        let mut fingertip = Fingertip {
+            contact_um: 0.0,
+            sticks_up_to_n: 0.6,
+            slips_down_to_n: 0.3,
+        };
+        core::array::from_fn(|ms| {
+            let ms = ms as u32;
+            let arm_um = 50.0 * f64::from(ms);
+            let (force_lsb, ends) = heard(ms, fingertip.force_n(arm_um) * 4_096.0 / 3.3);
+            slip.push(arm_um as Place * PLACES_PER_UM, force_lsb as f32, || ends);
+            slip.tells_slips()
+        })
+    }
+
+    #[test]
+    fn a_channel_that_is_dead_or_at_an_end_tells_of_no_slips_and_a_sound_one_does() {
+        let all =
+            |told: [bool; 4_000], which: bool| told[1_000..].iter().all(|&told| told == which);
+        assert!(all(tells(|_, lsb| (lsb, false)), true));
+        // Dead, but for its noise; clipped at half of the force; at the end of the range.
+        let noise = |ms: u32| f64::from(ms * 7_919 % 7) - 3.0;
+        assert!(all(tells(|ms, _| (noise(ms), false)), false));
+        assert!(all(tells(|_, lsb| (lsb.min(500.0), lsb > 500.0)), false));
+        assert!(all(tells(|_, _| (2_047.0, true)), false));
+        // A wire that breaks for half a second.
+        let broken = tells(|ms, lsb| match ms {
+            2_000..2_500 => (2_047.0, true),
+            _ => (lsb, false),
+        });
+        assert!(broken[1_000..2_000].iter().all(|&told| told));
+        assert!(broken[2_000..3_011].iter().all(|&told| !told));
+        assert!(broken[3_050..].iter().all(|&told| told));
+    }
+
+    #[test]
+    fn while_the_channel_is_at_an_end_the_lag_is_the_one_before() {
+        let mut slip = Slip::new(&configuration(400));
+        let before = slip.push(0, 300.0, || false);
+        for ms in 0..20 {
+            // The scan at the end takes part in samples for as long as the filter is.
+            assert_eq!(
+                slip.push(ms, 700.0, || ms == 0) == before,
+                ms < FILTER_MS,
+                "{ms} ms"
+            );
+        }
     }
 }
