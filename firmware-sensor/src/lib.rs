@@ -46,6 +46,7 @@ pub mod spectrum;
 pub mod stroke;
 pub mod texture;
 pub mod travel;
+mod vibration;
 
 pub use arm::Drive;
 pub use sensor::{Output, Sensor};
