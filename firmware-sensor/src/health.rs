@@ -78,7 +78,9 @@ struct History {
     at_rails: f32,
     mean: f32,
     power: f32,
-    /// Power over the time since the judgement before, about the mean of that time.
+    /// Power over the time since the judgement before, about the mean of the last 0.3 s.
+    latest: f32,
+    /// The same, about the mean of that time.
     now: f32,
     /// Estimates, and travel in mm, since it last fitted.
     misfits: u8,
@@ -173,7 +175,12 @@ impl Health {
             } else if signs.hum[gauge] > TOO_MUCH_HUM * measure.typical {
                 GaugeHealth::Hum
             } else if history.misfits >= MISFIT_ESTIMATES && history.misfit_mm > MISFIT_MM {
-                GaugeHealth::Noisy
+                // The average has not forgotten yet what was felt before.
+                if history.latest < measure.silent {
+                    GaugeHealth::Dead
+                } else {
+                    GaugeHealth::Noisy
+                }
             } else {
                 GaugeHealth::Good
             };
@@ -216,9 +223,10 @@ pub fn is_at_end(code: u16) -> bool {
     code.wrapping_sub(RAIL_CODES) > HIGHEST_CODE - 2 * RAIL_CODES
 }
 
-/// What a gauge is measured by: the allowed ones that are neither at an end of the range nor stuck.
+/// What a gauge is measured by: the allowed ones that are neither at an end of the range nor stuck, and of these the ones
+/// that speak. Where none does, as at rest, all of them.
 struct Measure {
-    /// Their median power, in ADC steps², and no less than [`LEAST_TYPICAL`].
+    /// Their median power, in ADC steps², and no less than [`LEAST_TYPICAL`]; infinite if there are none.
     typical: f32,
     /// Power below which a gauge is silent while others speak; 0 if they do not.
     silent: f32,
@@ -228,30 +236,57 @@ struct Measure {
 
 impl Measure {
     fn of(gauges: &[History; GAUGES], signs: &Signs) -> Self {
-        let mut powers = [0.0; GAUGES];
-        let (mut count, mut speaking, mut speaks_now) = (0, 0, false);
+        let (mut all, mut speaking) = (Powers::default(), Powers::default());
+        let mut speaks_now = false;
         for (gauge, history) in gauges.iter().enumerate() {
             let allowed = signs.allowed >> gauge & 1 == 1;
             if allowed && history.at_rails <= AT_RAILS && history.still < STILL_ESTIMATES {
-                powers[count] = history.power;
-                count += 1;
-                let speaks = SPEAKING + SPEAKING_PER_NOISE * signs.noise[gauge];
-                speaking += u8::from(history.power > speaks);
+                all.push(history.power);
+                // What is noise, or hum of its own, it does not feel.
+                let speaks = SPEAKING + SPEAKING_PER_NOISE * signs.noise[gauge] + signs.hum[gauge];
+                if history.power > speaks {
+                    speaking.push(history.power);
+                }
                 speaks_now |= history.health == GaugeHealth::Good && history.now > speaks;
             }
         }
-        let powers = &mut powers[..count];
-        powers.sort_unstable_by(f32::total_cmp);
-        let typical = powers.get(count / 2).copied().unwrap_or(0.0);
-        let second = match powers {
-            [.., second, _] => *second,
+        let others_speak = speaking.count >= 2;
+        let mut measure = if speaking.count > 0 { speaking } else { all };
+        let powers = measure.sorted();
+        // Nothing is too much where there is nothing to measure by: all codes stand still, or are at an end.
+        let typical = powers
+            .get(powers.len() / 2)
+            .copied()
+            .unwrap_or(f32::INFINITY);
+        let silent = match powers {
+            [.., second, _] if others_speak => SILENT * second,
             _ => 0.0,
         };
         Self {
             typical: typical.max(LEAST_TYPICAL),
-            silent: if speaking >= 2 { SILENT * second } else { 0.0 },
+            silent,
             speaks_now,
         }
+    }
+}
+
+/// Some gauges' powers.
+#[derive(Default)]
+struct Powers {
+    powers: [f32; GAUGES],
+    count: usize,
+}
+
+impl Powers {
+    fn push(&mut self, power: f32) {
+        self.powers[self.count] = power;
+        self.count += 1;
+    }
+
+    fn sorted(&mut self) -> &[f32] {
+        let powers = &mut self.powers[..self.count];
+        powers.sort_unstable_by(f32::total_cmp);
+        powers
     }
 }
 
@@ -275,7 +310,8 @@ impl History {
         self.mean += follow * (mean - self.mean);
         // About the mean of the last 0.3 s: a slow texture's swing over 10 ms counts too.
         let power = square - 2.0 * mean * self.mean + self.mean * self.mean;
-        self.power += follow * (larger(power, 0.0) - self.power);
+        self.latest = larger(power, 0.0);
+        self.power += follow * (self.latest - self.power);
         self.now = square - mean * mean;
     }
 }
@@ -602,6 +638,50 @@ mod tests {
         assert_eq!(ward.health.good(), 0b10111);
         ward.signs.agreed = true;
         assert_eq!(ward.until(3, GaugeHealth::Good, texture), 51);
+    }
+
+    #[test]
+    fn silent_gauges_are_no_measure_of_what_noise_is_too_much_for_the_others() {
+        // All but two, and all but one, fall silent but for a step of their amplifier's noise.
+        for last in [1, 2] {
+            let mut ward = Ward::new();
+            ward.estimates(200, texture);
+            for _ in 0..1_000 {
+                let verdicts = ward.estimate(&|gauge, t_s, noise| {
+                    if gauge < GAUGES - last {
+                        noise * libm::sqrt(3.0)
+                    } else {
+                        texture(gauge, t_s, noise)
+                    }
+                });
+                assert_eq!(verdicts[GAUGES - last..], GOOD[..last]);
+            }
+        }
+    }
+
+    #[test]
+    fn gauges_that_feel_nothing_for_noise_are_told_by_those_that_do_even_if_these_are_fewer() {
+        let mut ward = Ward::new();
+        let verdicts = ward.estimates(500, |gauge, t_s, noise| {
+            if gauge < 3 {
+                1_900.0 * noise
+            } else {
+                texture(gauge, t_s, noise)
+            }
+        });
+        let [noisy, good] = [GaugeHealth::Noisy, GaugeHealth::Good];
+        assert_eq!(verdicts, [noisy, noisy, noisy, good, good]);
+    }
+
+    #[test]
+    fn a_gauge_that_does_not_fit_because_it_is_silent_is_called_dead() {
+        let mut ward = Ward::new();
+        ward.signs.agreed = true;
+        ward.estimates(200, texture);
+        ward.signs.misfits = 0b00100;
+        // Its mean over 0.3 s is at mid-rail before it does not fit for 0.3 s.
+        let dead = but(2, |_, noise| noise * libm::sqrt(3.0));
+        assert_eq!(ward.until(2, GaugeHealth::Dead, dead), 30);
     }
 
     #[test]
