@@ -8,7 +8,7 @@
 use protocol::{GAUGES, GaugeHealth};
 
 use crate::float::larger;
-use crate::{SCANS_PER_SAMPLE, Scan};
+use crate::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan};
 
 /// Codes so near the converter's ends are at an end: amplifiers do not reach the rails.
 const RAIL_CODES: u16 = 8;
@@ -17,6 +17,14 @@ const HIGHEST_CODE: u16 = 4_095;
 const FOLLOWED_ESTIMATES: f32 = 30.0;
 /// Share of scans at an end that makes a gauge saturated; white noise at −6 dB clips less.
 const AT_RAILS: f32 = 0.1;
+/// Scans at an end between two estimates, of the eight that are looked at, from which on a gauge is off at once if what it
+/// feels does not reach there. A contact that bounces is off for a millisecond and longer; spikes, and the crests of a
+/// texture that grows, are at an end for less.
+const OFF_SCANS: u16 = SCANS_PER_SAMPLE as u16;
+/// How far a texture reaches, relative to its RMS: farther than any wave does.
+const CREST: f32 = 4.0;
+/// Estimates, as bits, in which most gauges are off if what they share is, as a connector or a blow: then all are.
+const TOGETHER: u8 = 0b111;
 /// Estimates without a change of the code after which a gauge is stuck, if another speaks.
 const STILL_ESTIMATES: u32 = 20;
 /// Travel without a change of any gauge's code, in mm, from which on nothing is felt: the converter says the same for ever, or
@@ -47,6 +55,8 @@ const MISFIT_ESTIMATES: u8 = 30;
 const MISFIT_MM: f32 = 10.0;
 /// Estimates without a fault before a gauge is taken back.
 const SOUND_ESTIMATES: u8 = 50;
+/// The same where all were off: what was felt before is forgotten then, and need not fade.
+const SOUND_TOGETHER_ESTIMATES: u8 = 10;
 
 /// The gauges' case histories.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,6 +86,8 @@ struct History {
     squares: f32,
     still: u32,
     at_rails: f32,
+    /// Bit n set: n estimates ago it was at an end that what it had felt until then does not reach.
+    off: u8,
     mean: f32,
     power: f32,
     /// Power over the time since the judgement before, about the mean of the last 0.3 s.
@@ -140,11 +152,17 @@ impl Health {
         }
         self.judgements = self.judgements.saturating_add(1);
         let follow = 1.0 / f32::from(self.judgements).min(FOLLOWED_ESTIMATES);
-        for history in &mut self.gauges {
-            history.follow(samples, follow);
-        }
         // Powers of a few samples are anything.
         let settled = f32::from(self.judgements) >= FOLLOWED_ESTIMATES;
+        let mut off = 0;
+        for (gauge, history) in self.gauges.iter_mut().enumerate() {
+            history.follow(samples, follow);
+            if !settled {
+                history.off = 0;
+            }
+            off |= u8::from(history.off & TOGETHER != 0) << gauge;
+        }
+        let all_off = 2 * (off & signs.allowed).count_ones() > signs.allowed.count_ones();
         let measure = Measure::of(&self.gauges, signs);
         self.left_out = 0;
         self.still_mm += signs.travel_mm;
@@ -160,7 +178,7 @@ impl Health {
                 history.misfits = 0;
                 history.misfit_mm = 0.0;
             }
-            let fault = if history.at_rails > AT_RAILS {
+            let fault = if history.at_rails > AT_RAILS || history.off & 1 == 1 || all_off {
                 GaugeHealth::Saturated
             } else if history.still >= STILL_ESTIMATES && measure.speaks_now {
                 if MID_RAIL.contains(&history.last) {
@@ -186,7 +204,11 @@ impl Health {
             };
             if fault != GaugeHealth::Good {
                 history.health = fault;
-                history.sentence = SOUND_ESTIMATES;
+                history.sentence = if all_off && history.at_rails <= AT_RAILS {
+                    SOUND_TOGETHER_ESTIMATES
+                } else {
+                    SOUND_ESTIMATES
+                };
             } else if history.sentence > 0 {
                 history.sentence -= 1;
             } else {
@@ -301,8 +323,11 @@ impl History {
             } else {
                 self.still.saturating_add(1)
             };
-            let ends = f32::from(core::mem::take(&mut self.ends));
-            let ends = ends / (f32::from(looks) * SCANS_PER_SAMPLE as f32);
+            let ends = core::mem::take(&mut self.ends);
+            let room = larger(f32::from(MID_RAIL_CODE) - self.mean.abs(), 0.0);
+            let is_off = ends >= OFF_SCANS && CREST * CREST * self.power < room * room;
+            self.off = self.off << 1 | u8::from(is_off);
+            let ends = f32::from(ends) / (f32::from(looks) * SCANS_PER_SAMPLE as f32);
             self.at_rails += follow * (ends - self.at_rails);
         }
         let mean = core::mem::take(&mut self.sum) / count;
@@ -682,6 +707,49 @@ mod tests {
         // Its mean over 0.3 s is at mid-rail before it does not fit for 0.3 s.
         let dead = but(2, |_, noise| noise * libm::sqrt(3.0));
         assert_eq!(ward.until(2, GaugeHealth::Dead, dead), 30);
+    }
+
+    #[test]
+    fn a_texture_whose_crests_come_to_touch_the_ends_is_not_taken_for_a_contact_that_bounces() {
+        let pressed = |by: f64| {
+            move |gauge: usize, t_s: f64, noise: f64| {
+                let offset = 100.0 * (gauge as f64 - 2.0);
+                by * (texture(gauge, t_s, noise) - offset) + offset
+            }
+        };
+        let mut touched = false;
+        let mut ward = Ward::new();
+        for _ in 0..5 {
+            assert_eq!(ward.estimates(100, pressed(1.0)), GOOD);
+            assert_eq!(ward.estimates(100, pressed(9.0)), GOOD);
+            touched |= ward.health.gauges[2].at_rails > 0.01;
+        }
+        assert!(touched);
+        assert_eq!(ward.changes, 0);
+    }
+
+    #[test]
+    fn where_most_gauges_jump_to_an_end_all_are_off_until_a_tenth_of_a_second_after_it() {
+        let mut ward = Ward::new();
+        ward.estimates(200, texture);
+        ward.estimates(1, |gauge, t_s, noise| {
+            if gauge < 3 {
+                2_040.0
+            } else {
+                texture(gauge, t_s, noise)
+            }
+        });
+        assert_eq!(ward.health.believed(), 0);
+        ward.estimates(13, texture);
+        assert_eq!(ward.health.believed(), ALL);
+        // A minority is off alone, and for longer.
+        ward.estimates(100, texture);
+        ward.estimates(1, but(2, |_, _| 2_040.0));
+        assert_eq!(ward.health.believed(), 0b11011);
+        ward.estimates(50, texture);
+        assert_eq!(ward.health.believed(), 0b11011);
+        ward.estimates(1, texture);
+        assert_eq!(ward.health.believed(), ALL);
     }
 
     #[test]

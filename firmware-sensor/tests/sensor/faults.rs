@@ -162,6 +162,47 @@ fn codes_that_do_not_change_for_four_millimetres_are_stood_by_no_longer() {
 }
 
 #[test]
+fn a_connector_that_bounces_is_left_out_at_once_and_leaves_nothing_wrong_behind() {
+    // Between the signal and an end of the range, anew every 2 ms. One gauge is looked at a millisecond, and so may be seen
+    // at the end late, or not at all if it is short; of five some are seen at once.
+    let bounces = [
+        (0b00100_u8, 0.05, 1.0),
+        (0b00010, 0.05, -1.0),
+        (0b11111, 0.02, 1.0),
+        (0b11111, 0.05, 1.0),
+        (0b11111, 0.05, -1.0),
+    ];
+    for (bouncing, for_s, end) in bounces {
+        for later_ms in (0..50).step_by(7) {
+            let mut bench = Bench::new(DEFAULT);
+            bench.rub(2_000 + later_ms, |_| 50.0, texture(2.0));
+            let from_s = bench.t_s();
+            let felt = |gauge: usize, x_mm: f64, t_s: f64| {
+                let since_s = t_s - from_s;
+                // As if by chance.
+                let number = (since_s / 0.002).floor();
+                let is_off = (number * number * 0.618 + 0.3).fract() < 0.5;
+                if bouncing >> gauge & 1 == 1 && since_s < for_s && is_off {
+                    2_500.0 * end
+                } else {
+                    texture(2.0)(gauge, x_mm, t_s)
+                }
+            };
+            let estimates = bench.rub(2_000, |_| 50.0, felt);
+            let what = format!("{bouncing:05b} for {for_s} s, {later_ms} ms later");
+            let (_, worst) = valid_and_worst(&estimates, 2.0);
+            assert!(worst < 0.05, "{what}: {worst}");
+            let valid = estimates.iter().filter(|e| e.valid).count();
+            if bouncing.count_ones() == 1 {
+                assert!(valid >= 190, "{what}: {valid}");
+            } else {
+                assert!(estimates[50..].iter().all(|e| e.valid), "{what}: {valid}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_gauge_that_breaks_off_is_not_taken_for_stick_and_slip() {
     for speed_mm_s in [6.0, 20.0, 50.0] {
         let mut bench = Bench::new(DEFAULT);
