@@ -145,6 +145,7 @@ impl Health {
     }
 
     /// Judges every gauge anew, once an estimate.
+    #[inline(never)]
     pub fn judge(&mut self, signs: &Signs) {
         let samples = core::mem::take(&mut self.samples);
         if samples == 0 {
