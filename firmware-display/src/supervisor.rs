@@ -134,7 +134,7 @@ mod tests {
                 answers += 1;
             }
         }
-        assert_eq!(answers, (3 + 6 + 12) * (4 + 6 + 12));
+        assert_eq!(answers, (3 + 6 + 14) * (4 + 6 + 14));
     }
 
     /// SplitMix64 (Steele et al. 2014).

@@ -147,7 +147,8 @@ impl Sensor {
         let rests = |started: &Started| started.travel.velocity_mm_s(0) == 0.0;
         let is_at_rest = self.started.as_ref().is_some_and(rests);
         let trip = self.arm.trip();
-        let is_lost = core::mem::replace(&mut self.trip, trip) != trip;
+        let changes = core::mem::replace(&mut self.trip, trip) != trip;
+        let is_lost = changes && matches!(trip, Some(Trip::ArmEncoder | Trip::ArmStall));
         let is_blind = self.health.stands_still() || is_at_rest && trip == Some(Trip::ArmStall);
         let sees_again = core::mem::replace(&mut self.is_blind, is_blind) && !is_blind;
         // Gauges that are left out as well took part in nothing meanwhile, and do not now.

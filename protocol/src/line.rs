@@ -238,7 +238,7 @@ mod tests {
         let hello = Hello::new(Role::Display, "test", [0, 1, 0]);
         assert_eq!(
             banner(&hello, "display", &status),
-            "ridgelink display 0.1.0, protocol 6, started by watchdog, watchdog 3: ? for help"
+            "ridgelink display 0.1.0, protocol 7, started by watchdog, watchdog 3: ? for help"
         );
         let status = Status {
             reset: ResetCause::Pin,
@@ -247,7 +247,7 @@ mod tests {
         };
         assert_eq!(
             banner(&hello, "display", &status),
-            "ridgelink display 0.1.0, protocol 6, started by reset pin: ? for help"
+            "ridgelink display 0.1.0, protocol 7, started by reset pin: ? for help"
         );
     }
 }

@@ -226,7 +226,7 @@ impl Shift {
         let from_s = scene.duration_s
             + match before {
                 None => STARTS_S,
-                // An arm that was stopped is nobody's that its encoder could be missed by.
+                // The encoder of an arm that was stopped before is not missed.
                 Some(_) if kind.is_of_arm() => {
                     scene
                         .faults

@@ -95,7 +95,8 @@ pub(super) struct Conduct {
 }
 
 impl Conduct {
-    /// Judges until `until_ns`, and whether it drives `again_within_ms` of the fault's end; a display that has `stopped` for good before need not drive, nor one whose hand's encoder
+    /// Judges until `until_ns`, and whether it drives `again_within_ms` of the fault's end. A display that has `stopped` for
+    /// good before need not drive, nor one whose hand's encoder
     /// stands still by another fault, `blind_ns`. Messages take up to `way_ns`.
     pub fn new(
         fault: &Fault,

@@ -34,8 +34,8 @@ const TOLD_MM_S: f64 = 12.0;
 const CONTRADICTS_MM_S: f64 = 10.0;
 const CONTRADICTED_S: f64 = 3.1;
 /// What an arm is told that its encoder says stands still (docs' safety page): the hand's velocity, and so much for each
-/// mm to the hand, in 1/s. Less than this part of full speed is not counted. Told is told once that adds up to a fifth
-/// more than what full speed makes in this time.
+/// mm to the hand, in 1/s. Less than this part of full speed is not counted. That it does not move has to be told once it
+/// adds up to a fifth more than what full speed makes in this time.
 const POSITION_GAIN_PER_S: f64 = 10.0;
 const WEAK_PART: f64 = 0.05;
 const STALLED_S: f64 = 0.05 * 1.2;
