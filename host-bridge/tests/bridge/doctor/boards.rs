@@ -28,7 +28,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
         &found,
         "foreign",
         &format!(
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 6, this program speaks 6 too, \
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 7, this program speaks 7 too, \
              but of schema 0000000000000007, not {ours}"
         ),
         "flash the firmware of this build: `host-bridge flash`",
@@ -47,7 +47,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
         [
             format!(
                 "the boards do not understand each other: sensor protocol 9 schema {ours}, \
-                 display protocol 6 schema {ours}"
+                 display protocol 7 schema {ours}"
             ),
             "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 6"
                 .to_owned(),
@@ -72,8 +72,8 @@ fn a_firmware_that_is_not_the_benchs_is_told_from_one_that_cant_be_read() {
         }),
         "elf-differs",
         &format!(
-            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 6 schema {ours}, but firmware-sensor \
-             is sensor 0.2.0 on stm32f429zi with protocol 6 schema {ours}"
+            "sensor: runs sensor 0.1.0 on stm32f429zi with protocol 7 schema {ours}, but firmware-sensor \
+             is sensor 0.2.0 on stm32f429zi with protocol 7 schema {ours}"
         ),
         "flash what the bench names: `host-bridge flash sensor`",
     );

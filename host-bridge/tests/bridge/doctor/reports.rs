@@ -25,7 +25,7 @@ fn the_report_for_people_reads_well_in_eighty_columns() {
     let findings = findings::of(&bench);
     let expected = format!(
         "\
-host-bridge 0.1.0, protocol 6, schema {:016x}
+host-bridge 0.1.0, protocol 7, schema {:016x}
 
 attached
   ST-LINK 066C: /dev/tty-sensor
