@@ -49,7 +49,7 @@ fn boards_of_another_version_are_named_by_what_differs() {
                 "the boards do not understand each other: sensor protocol 9 schema {ours}, \
                  display protocol 7 schema {ours}"
             ),
-            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 6"
+            "sensor: /dev/ttyACM0: sensor 0.1.0 on stm32f429zi of protocol 9, this program speaks 7"
                 .to_owned(),
         ]
     );
