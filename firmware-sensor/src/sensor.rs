@@ -136,14 +136,19 @@ impl Sensor {
             }
         }
         self.configuration = configuration;
+        self.counted = Counted::new(&configuration);
         self.slip = Slip::new(&configuration);
         self.start_over();
     }
 
     /// Looks before every estimate whether what was felt before goes on: it does not where the arm is stopped for its encoder,
-    /// and so nobody knows where it is, nor behind a time without a gauge or an encoder.
+    /// and so nobody knows where it is, nor behind a time without a gauge or an encoder. The other methods remember nothing for
+    /// longer than their window.
     #[inline(never)]
     fn look(&mut self) {
+        if self.estimator.spectrum().is_none() {
+            return;
+        }
         let rests = |started: &Started| started.travel.velocity_mm_s(0) == 0.0;
         let is_at_rest = self.started.as_ref().is_some_and(rests);
         let trip = self.arm.trip();
@@ -166,7 +171,6 @@ impl Sensor {
     /// What is known of the surface is forgotten. Not a part of what calls it: new estimators need much of the stack.
     #[inline(never)]
     fn start_over(&mut self) {
-        self.counted = Counted::new(&self.configuration);
         self.estimator = Running::new(&self.configuration);
         self.vibration = Vibration::default();
         self.surface = Surface::new();
