@@ -36,7 +36,8 @@ const COMPARED_MS: usize = 8;
 const STUCK: f32 = 0.25;
 /// Lags that swing by this have to do with slips: a tenth of the shortest wave. What slips by less spoils none.
 const SWINGS: Place = 60 * PLACES_PER_UM;
-/// What is left of a swing after a millisecond is less by one part in so many, and by a place.
+/// What is left of a swing after a millisecond is less by one part in so many, and by a place. As long does the channel not
+/// count as telling slips after a scan at an end of its range: longer than the jerk remembers them.
 const SWING_MS: Place = 512;
 /// So long does a scan at an end of the range take part in samples, behind the anti-aliasing filter.
 const FILTER_MS: Place = 2 * decimate::DELAY_MS as Place + 1;
