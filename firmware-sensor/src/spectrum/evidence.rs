@@ -19,7 +19,7 @@ pub struct LineEvidence {
     /// Travel for which the line has been where it is, in wavelengths.
     pub held_waves: f32,
     /// Share of the energy that the wave explains over the latest two, three and eight waves, or as many of these as are
-    /// configured: so for all that is said of eight.
+    /// configured: so for all that is said of eight. Over two it is 0 where that fit found another wave.
     pub shares: [f32; 3],
     /// How far the fits over three and eight waves are from the line, RMS over the average's memory.
     pub wander: [f32; 2],

@@ -95,6 +95,7 @@ impl Spectrum {
             self.refused = REFUSED_ESTIMATES;
         }
         let share_over = |n: usize| found[n].map_or(0.0, |fitted| fitted.share());
+        // What a fit explains speaks for the wave that it found, which on a short path may be another.
         let share = near(1, 0.2).map_or(0.0, share_over);
         let of_strong = (share > STRONG)
             .then(|| longest_that_agrees(&found))
@@ -133,7 +134,7 @@ impl Spectrum {
             maturity: self.survey.maturity,
             travelled_waves: self.travelled_mm / line_mm,
             held_waves: self.line.held_waves,
-            shares: [share_over(1), share_over(three), share_over(longest)],
+            shares: [share, share_over(three), share_over(longest)],
             wander: self.line.squares.map(sqrt),
             agreement: self.line.agreement,
             distance: off(wavelength_mm, here_mm),

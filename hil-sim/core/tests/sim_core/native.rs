@@ -132,6 +132,11 @@ fn after_a_flood_each_estimate_is_matched_with_what_arrived_of_it() {
 
 /// A hand that swings over 3.3 mm, and a fault at 1.7 s.
 fn broken(fault: Kind, follows: Follows, snr_db: Option<f64>) -> Outcome {
+    swinging(3.3, Fault::new(fault, 1.7), follows, snr_db)
+}
+
+/// A hand that swings over `wavelength_mm`; it turns every 0.602 s.
+fn swinging(wavelength_mm: f64, fault: Fault, follows: Follows, snr_db: Option<f64>) -> Outcome {
     let scene = Scene {
         motion: Motion::Sinusoid {
             amplitude_mm_s: 70.0,
@@ -146,9 +151,9 @@ fn broken(fault: Kind, follows: Follows, snr_db: Option<f64>) -> Outcome {
             snr_db,
             ..Kinematic::default()
         }),
-        faults: vec![Fault::new(fault, 1.7)],
+        faults: vec![fault],
         duration_s: 5.0,
-        ..Scene::constant(3.3, 50.0)
+        ..Scene::constant(wavelength_mm, 50.0)
     };
     let recording = native::run(&scene).unwrap();
     Outcome::new(scene, recording)
@@ -187,6 +192,19 @@ fn no_wrong_wave_is_felt_where_encoder_or_converter_break_and_the_arm_goes_on() 
             summary.valid_share.unwrap() > 0.65,
             "{fault:?}: {summary:?}"
         );
+    }
+}
+
+#[test]
+fn an_estimator_that_begins_shortly_before_a_turn_stands_by_no_other_wave() {
+    // The clearest peak of so short a path is somewhere else than the wave.
+    for before_turn_ms in (90..130).step_by(2) {
+        let at_s = 2.0 / 0.83 - 1e-3 * f64::from(before_turn_ms);
+        let begins = Fault::new(Kind::ArmEncoderJump, at_s);
+        let outcome = swinging(2.0, begins, Follows::Motion, None);
+        let summary = &outcome.verdict.summary;
+        assert_eq!(summary.wrong_share, Some(0.0), "{before_turn_ms} ms");
+        assert!(summary.valid_share.unwrap() > 0.8, "{summary:?}");
     }
 }
 
