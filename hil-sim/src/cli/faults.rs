@@ -42,6 +42,9 @@ fn entry(row: &Row) -> String {
     };
     let again = match (row.class.may_drive_again(), row.again_within_ms) {
         (false, _) => "never drives again until its power goes".to_owned(),
+        (true, Some(ms)) if row.kind.is_of_arm() => format!(
+            "an arm that its drive moves rests for good; one that the scene moves: drives again within {ms} ms of its end"
+        ),
         (true, Some(ms)) => format!("drives again within {ms} ms of its end"),
         (true, None) => "drives on".to_owned(),
     };

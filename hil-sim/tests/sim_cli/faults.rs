@@ -155,6 +155,12 @@ fn the_list_tells_of_every_kind_and_every_key() {
         let entry = entry.split("\n\n").next().unwrap();
         assert!(entry.contains(row.meaning) && entry.contains(row.injected));
         assert!(entry.contains(row.expected));
+        // Such an arm brings no ground on which the display could drive again.
+        assert_eq!(
+            entry.contains("an arm that its drive moves rests for good"),
+            kind.is_of_arm(),
+            "{entry}"
+        );
         for key in row.keys {
             assert!(
                 entry.contains(&format!("(default {})", key.default)),
