@@ -7,7 +7,7 @@
 
 use protocol::{GAUGES, GaugeHealth};
 
-use crate::float::larger;
+use crate::float::{larger, smaller};
 use crate::{MID_RAIL_CODE, SCANS_PER_SAMPLE, Scan};
 
 /// Codes so near the converter's ends are at an end: amplifiers do not reach the rails.
@@ -152,7 +152,7 @@ impl Health {
             return;
         }
         self.judgements = self.judgements.saturating_add(1);
-        let follow = 1.0 / f32::from(self.judgements).min(FOLLOWED_ESTIMATES);
+        let follow = 1.0 / smaller(f32::from(self.judgements), FOLLOWED_ESTIMATES);
         // Powers of a few samples are anything.
         let settled = f32::from(self.judgements) >= FOLLOWED_ESTIMATES;
         let mut off = 0;

@@ -56,7 +56,7 @@ impl Pickup {
     pub fn hides(&self, amplitude_lsb: f32, frequency_hz: f32) -> bool {
         let away_hz = (frequency_hz - self.mains_hz).abs();
         let held = if away_hz > ELSEWHERE_HZ {
-            1.0 / (core::f32::consts::PI * away_hz * self.heard_s.max(f32::MIN_POSITIVE))
+            1.0 / (core::f32::consts::PI * away_hz * larger(self.heard_s, f32::MIN_POSITIVE))
         } else {
             0.0
         };

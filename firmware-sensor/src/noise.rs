@@ -96,7 +96,7 @@ impl Noise {
         if self.looked < LOOKS {
             return;
         }
-        self.followed = (self.followed + 1.0).min(FOLLOWED_LOOKS);
+        self.followed = smaller(self.followed + 1.0, FOLLOWED_LOOKS);
         let follow = 1.0 / self.followed;
         for (variance, looks) in self.variances.iter_mut().zip(&self.looks) {
             const SCALE: f32 = 1.0 / (IN_LOOK as f32 * DIFFERENCE_GAIN * SECOND_OF_MEAN);

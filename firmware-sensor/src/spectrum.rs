@@ -23,7 +23,7 @@ use protocol::{GAUGES, SensorConfiguration};
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
-use crate::float::sqrt;
+use crate::float::{larger, sqrt};
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Travel};
 
 use evidence::{LineEvidence, WaveEvidence};
@@ -388,7 +388,7 @@ impl Estimator for Spectrum {
         self.slot = 0;
         let landed = core::mem::take(&mut self.landed);
         let speed_mm_s = travel.velocity_mm_s(0).abs();
-        self.speed_mm_s = speed_mm_s.max(self.speed_mm_s * SPEED_KEPT);
+        self.speed_mm_s = larger(speed_mm_s, self.speed_mm_s * SPEED_KEPT);
         self.weighed = Weighed::default();
         let line = self.weigh_line();
         let wave = self.weigh_wave().filter(|_| !self.line_goes_on());

@@ -345,7 +345,8 @@ impl Follower {
     /// Follows whatever there is.
     fn find(&mut self, block: &Amplitudes, usable: u8, memory: &Memory) {
         let first = self.blocks < memory.first;
-        self.blocks = (self.blocks + if first { 1.0 } else { memory.more }).min(memory.most);
+        let more = if first { 1.0 } else { memory.more };
+        self.blocks = smaller(self.blocks + more, memory.most);
         let (follow, turn) = if first {
             (1.0 / self.blocks, 0.0)
         } else {
@@ -362,7 +363,7 @@ impl Follower {
             z[0] += follow * error[0];
             z[1] += follow * error[1];
         }
-        self.scatter += (scatter - self.scatter) / self.blocks.min(SCATTER_BLOCKS);
+        self.scatter += (scatter - self.scatter) / smaller(self.blocks, SCATTER_BLOCKS);
         if weight > 0.0 {
             self.turn(turn, (ahead / weight).clamp(-1.0, 1.0));
         }
@@ -389,7 +390,8 @@ impl Follower {
         self.blocks = (self.blocks + IN_MOTION.more).clamp(least, KNOWN_BLOCKS);
         let mut n = self.blocks;
         if let Some(hz) = moment.texture_hz.filter(|_| self.rested) {
-            n = n.max(KNOWN_BLOCKS * CLEAR_HZ / self.away_hz(hz).max(NEAREST_HZ));
+            let away_hz = larger(self.away_hz(hz), NEAREST_HZ);
+            n = larger(n, KNOWN_BLOCKS * CLEAR_HZ / away_hz);
         }
         let (follow, turn) = gains(n);
         // Texture that passes may be many times the hum: no block counts for more than the hum itself.

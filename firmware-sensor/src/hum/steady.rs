@@ -111,7 +111,7 @@ impl Steady {
 
     /// For how long that has been heard, in s.
     pub fn heard_s(&self) -> f32 {
-        f32::from(self.heard).min(SLOW) / ESTIMATE_RATE_HZ as f32
+        smaller(f32::from(self.heard), SLOW) / ESTIMATE_RATE_HZ as f32
     }
 }
 

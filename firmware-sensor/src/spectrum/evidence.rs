@@ -78,7 +78,8 @@ impl LineEvidence {
     /// On scales on which the regression is nearly linear, with squares and products for what is not.
     pub fn clues(&self) -> [f32; LINE_CLUES] {
         let travelled = libm::logf(1.0 + smaller(self.travelled_waves, 30.0));
-        let held = libm::logf(1.0 + smaller(self.held_waves, 30.0));
+        let held_waves = 1.0 + smaller(self.held_waves, 30.0);
+        let held = libm::logf(held_waves);
         let strength = odds(self.shares[0]);
         let long_strength = odds(self.shares[2]);
         let steadiness = -libm::logf(self.wander[1] + 0.005);
@@ -103,7 +104,7 @@ impl LineEvidence {
             odds(self.kept_shares[0]),
             odds(self.kept_shares[1]),
             self.drop() * self.drop(),
-            strength * libm::expf(-held),
+            strength / held_waves,
             strength * sharp,
             agreement * sharp,
             held * sharp,

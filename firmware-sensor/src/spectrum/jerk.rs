@@ -4,7 +4,7 @@ use protocol::GAUGES;
 
 use crate::SAMPLE_RATE_HZ;
 use crate::estimator::Touch;
-use crate::float::{larger, sqrt};
+use crate::float::{larger, smaller, sqrt};
 use crate::phasor::phasor;
 use crate::travel::PLACES_PER_UM;
 
@@ -86,8 +86,9 @@ impl Power {
     /// gauges: a fingertip that sticks and slips is quiet in between, noise and a rough surface are not.
     fn steady(&self, gauges: u32) -> f32 {
         let gauges = (gauges as usize).clamp(1, GAUGES);
-        let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * self.by_speed.max(f32::MIN_POSITIVE));
-        (STEADY_DOUBT * share * self.mean).min(STEADY_DOUBT * self.mean)
+        let by_speed = larger(self.by_speed, f32::MIN_POSITIVE);
+        let share = self.quiet / (QUIET_OF_MEAN[gauges - 1] * by_speed);
+        STEADY_DOUBT * self.mean * smaller(share, 1.0)
     }
 }
 
@@ -161,7 +162,7 @@ impl Jerk {
             (wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04))
                 / let_through(1.0 / wavelength_mm)
         };
-        let beyond_noise = |n: usize| (self.powers[n].mean - NOISE_GAINS[n] * noise).max(0.0);
+        let beyond_noise = |n: usize| larger(self.powers[n].mean - NOISE_GAINS[n] * noise, 0.0);
         let (first, second) = (beyond_noise(0), beyond_noise(1));
         // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
         let sine = if second < 4.0 * first {
@@ -170,12 +171,12 @@ impl Jerk {
             1.0
         };
         let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
-        let per_mm = slip_hz * PLACES_PER_UM as f32 / self.mean_speed.max(f32::MIN_POSITIVE);
+        let per_mm = slip_hz * PLACES_PER_UM as f32 / larger(self.mean_speed, f32::MIN_POSITIVE);
         let stands_out = |n: usize| {
             let power = &self.powers[n];
             let known = NOISE_GAINS[n] * noise;
-            let left = power.mean - power.steady(gauges).max(known) - NOISE_DOUBT * known;
-            let least = explained * let_through(per_mm).max(LEAST_JERKS[n]);
+            let left = power.mean - larger(power.steady(gauges), known) - NOISE_DOUBT * known;
+            let least = explained * larger(let_through(per_mm), LEAST_JERKS[n]);
             left > least && left > explained * edges(n as i32 + 1) + least
         };
         let is_slow = self.mean_speed < SLOW_PLACES;
@@ -186,12 +187,12 @@ impl Jerk {
 /// Share of a wave's power that a contact lets through, by its wavenumber in cycles per mm.
 fn let_through(per_mm: f32) -> f32 {
     let radians = 2.0 * core::f32::consts::PI * CONTACT_SIGMA_MM * per_mm;
-    libm::expf(-(radians * radians).min(40.0))
+    libm::expf(-smaller(radians * radians, 40.0))
 }
 
 /// Power gain of the first or second difference at 1 kHz, (2 sin(πf/fs))² or its square, up to half the sample rate.
 fn difference_gain(frequency_hz: f32, order: i32) -> f32 {
-    let half_turns = (frequency_hz / SAMPLE_RATE_HZ as f32).min(0.5);
+    let half_turns = smaller(frequency_hz / SAMPLE_RATE_HZ as f32, 0.5);
     let [_, sin] = phasor((half_turns * 2_147_483_648.0) as u32);
     let square = 4.0 * sin * sin;
     if order == 1 { square } else { square * square }

@@ -102,7 +102,8 @@ impl Spectrum {
             .flatten();
         let chosen = of_strong.or_else(|| (1..LENGTH_COUNT).rev().find_map(|n| near(n, NEAR)));
         let fitted = chosen.and_then(|n| found[n]);
-        let wavelength_mm = self.weighed_mm(&found, here_mm, of_strong);
+        let ln_here = libm::logf(here_mm);
+        let wavelength_mm = self.weighed_mm(&found, ln_here, of_strong);
         self.line.fitted_mm = chosen.map_or(0.0, |n| middles[n]);
         self.line.share = if fitted.is_some() { share } else { 0.0 };
         let wander = |n: usize| {
@@ -115,7 +116,7 @@ impl Spectrum {
         let three = longest.min(2);
         let seen = Seen {
             fresh_mm: self.survey.fresh_mm,
-            ln_here: libm::logf(here_mm),
+            ln_here,
             drift,
             agrees: self.survey.agree,
             wander: [wander(three), wander(longest)],
@@ -153,7 +154,8 @@ impl Spectrum {
             .or(found[1])
             .is_none_or(|fitted| is_common(&fitted, self.touch.usable));
         let probability = if common {
-            (self.line.there * self.line.there * evidence.probability()).max(inherited)
+            let there = self.line.there;
+            larger(there * there * evidence.probability(), inherited)
         } else {
             0.0
         };
@@ -183,7 +185,7 @@ impl Spectrum {
     fn weighed_mm(
         &self,
         found: &[Option<Fitted>; LENGTH_COUNT],
-        here_mm: f32,
+        ln_here: f32,
         of_strong: Option<usize>,
     ) -> f32 {
         let strong_mm = of_strong
@@ -197,7 +199,7 @@ impl Spectrum {
         let course = self.trend.course().map(|course| course.here);
         // The peak of an average that is not full yet is still what it was begun with.
         let agreed = agreed(&[
-            (Some(libm::logf(here_mm)), self.survey.maturity),
+            (Some(ln_here), self.survey.maturity),
             (course, 1.0),
             (three, 1.0),
             (five, 1.0),
@@ -238,7 +240,7 @@ impl Spectrum {
                     .is_some_and(|course| (libm::logf(fit_mm) - course.here).abs() < ON_THE_TREND)
         };
         let of_three = found[2].filter(plausible);
-        if let Some(short) = of_three.or(found[1].filter(plausible)) {
+        if let Some(short) = of_three.or_else(|| found[1].filter(plausible)) {
             // A fit's variance goes with the third power of its length.
             let weight = if of_three.is_some() { 1.0 } else { 0.3 };
             self.trend
