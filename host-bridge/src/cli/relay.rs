@@ -13,7 +13,7 @@ use crate::hand::Hand;
 use crate::link::OPERATOR_STOP;
 use crate::relay::credentials::Credentials;
 use crate::relay::endpoint::{Endpoint, Reach};
-use crate::relay::name::Name;
+use crate::relay::name::{Name, common_name, common_name_of_router};
 use crate::relay::network::{Ends, Network};
 use crate::relay::operator::{self, Progress};
 use crate::relay::refused;
@@ -114,8 +114,8 @@ struct EitherEnd {
 struct Router {
     #[command(flatten)]
     proofs: Proofs,
-    /// The benches that it carries, by what their sites call them; several may be given. Without certificates it
-    /// carries all
+    /// The bench that it carries, by what its sites call it: the one that its certificate is for. Without certificates
+    /// it carries all
     #[arg(long = "name", value_name = "NAME", default_value = "bench")]
     names: Vec<Name>,
     /// Listens beyond this computer without TLS: whoever reaches it may move the arm
@@ -203,12 +203,11 @@ impl Bridge {
             Ends::Listening(self.ends.listen)
         };
         let names = vec![self.meeting.name.clone()];
-        let network = Network::new(
-            ends,
-            self.meeting.proofs.credentials(),
-            names,
-            self.insecure,
-        )?;
+        let credentials = self.meeting.proofs.credentials();
+        let network = Network::new(ends, credentials.clone(), names, self.insecure)?;
+        if let Some(credentials) = credentials {
+            credentials.check_owner(&common_name(&self.meeting.name, role))?;
+        }
         let words = in_words(network.ends());
         warn_of(network.ends(), self.insecure);
         // Leaving a network that is stuck may take a while.
@@ -260,7 +259,13 @@ impl Bridge {
 impl Router {
     fn execute(self) -> anyhow::Result<ExitCode> {
         let ends = Ends::Listening(self.listen);
-        let network = Network::new(ends, self.proofs.credentials(), self.names, self.insecure)?;
+        let credentials = self.proofs.credentials();
+        let network = Network::new(ends, credentials.clone(), self.names.clone(), self.insecure)?;
+        if let Some(credentials) = credentials {
+            for name in &self.names {
+                credentials.check_owner(&common_name_of_router(name))?;
+            }
+        }
         let words = in_words(network.ends());
         warn_of(network.ends(), self.insecure);
         let wait_for_end = signals::wait_for(&signals::USUAL)?;
@@ -314,6 +319,11 @@ impl Stopping {
             if nobody_can_be_told {
                 return Err(refusal.into());
             }
+            say(&refusal.to_string());
+        }
+        // Tried all the same: a Stop is not kept back for what is only known here.
+        let operator = common_name(&name, Role::Host);
+        if let Some(Err(refusal)) = credentials.map(|own| own.check_owner(&operator)) {
             say(&refusal.to_string());
         }
         let mut progress = Progress::Unheard;

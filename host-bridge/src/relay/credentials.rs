@@ -12,6 +12,8 @@ use rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
 use rustls::server::WebPkiClientVerifier;
 use rustls::server::danger::ClientCertVerifier;
 use rustls::{CertificateError, ClientConfig, Error, RootCertStore, ServerConfig, version::TLS13};
+use x509_parser::parse_x509_certificate;
+use x509_parser::prelude::X509Certificate;
 
 /// Three PEM files. With them, both ends of every connection have to prove who they are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +48,14 @@ pub enum CredentialsError {
         "{0}: the certificate is not meant for connecting: it wants extendedKeyUsage = serverAuth, clientAuth"
     )]
     Purpose(PathBuf),
+    #[error(
+        "{certificate}: it is the certificate of {owner}, who may not speak here: give {wanted}'s, or another --name"
+    )]
+    Owner {
+        certificate: PathBuf,
+        owner: String,
+        wanted: String,
+    },
     #[error("{0}: can't be used: {1}")]
     Unusable(PathBuf, Error),
 }
@@ -83,6 +93,24 @@ impl Credentials {
                 .with_client_cert_verifier(verifier)
                 .with_single_cert(chain, key)
                 .map_err(refused)?,
+        })
+    }
+
+    /// Whether one's own certificate is that of `wanted`, a common name. Others throw away what its owner may not say,
+    /// and only they would tell so.
+    pub fn check_owner(&self, wanted: &str) -> Result<(), CredentialsError> {
+        let chain = certificates(&self.certificate)?;
+        let own = chain
+            .first()
+            .and_then(|own| parse_x509_certificate(own).ok());
+        let owner = own.and_then(|(_, own)| common_name(&own));
+        if owner.as_deref() == Some(wanted) {
+            return Ok(());
+        }
+        Err(CredentialsError::Owner {
+            certificate: self.certificate.clone(),
+            owner: owner.unwrap_or_else(|| "nobody (it wants one common name)".to_owned()),
+            wanted: wanted.to_owned(),
         })
     }
 
@@ -131,6 +159,15 @@ impl Credentials {
             Err(reason) => Err(CredentialsError::Unusable(path, reason)),
         }
     }
+}
+
+/// Whose a certificate is. None if it has not exactly one common name.
+pub fn common_name(certificate: &X509Certificate<'_>) -> Option<String> {
+    let mut names = certificate.subject().iter_common_name();
+    let (Some(name), None) = (names.next(), names.next()) else {
+        return None;
+    };
+    name.as_str().ok().map(str::to_owned)
 }
 
 fn roots(path: &Path) -> Result<RootCertStore, CredentialsError> {

@@ -118,6 +118,11 @@ pub fn common_name(name: &Name, role: Role) -> String {
     format!("{name}.{role}")
 }
 
+/// The common name of the certificate of a router for the bench called `name`.
+pub fn common_name_of_router(name: &Name) -> String {
+    format!("{name}.{ROUTER}")
+}
+
 /// The keys on which the owner of a certificate with this common name may send datagrams: what is fleeting of the board,
 /// or the operator, of one of the benches `names`. Empty if it is none of theirs.
 pub fn keys_of_datagrams(names: &[Name], common: &str) -> Vec<String> {
@@ -152,7 +157,7 @@ pub fn rules(names: &[Name], is_connecting: bool) -> Value {
             (common_name(name, Role::Sensor), of_board(Role::Sensor)),
             (common_name(name, Role::Display), of_board(Role::Display)),
             (common_name(name, Role::Host), name.keys(Role::Host)),
-            (format!("{name}.{ROUTER}"), name.all_keys()),
+            (common_name_of_router(name), name.all_keys()),
         ];
         for (speaker, keys) in speakers {
             // What it says.

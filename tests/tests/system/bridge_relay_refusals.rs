@@ -427,6 +427,50 @@ fn whoever_starts_it_wrongly_is_told_what_and_where_and_what_to_do() {
 }
 
 #[test]
+fn a_certificate_for_something_else_is_named_where_it_is_given() {
+    let ours = authority("owners");
+    let tls = format!("tls/localhost:{}", free_port());
+    let [sensor, router] = ["sensor", "router"].map(|role| ours.proofs(role, Kind::Good, &ours));
+    let other = ours.proofs("other-display", Kind::OfAnotherBench, &ours);
+    for (arguments, proofs, words) in [
+        (
+            &["display", "--connect", &tls][..],
+            &sensor,
+            ["sensor.pem", "of bench.sensor", "give bench.display's"],
+        ),
+        (
+            &["display", "--connect", &tls],
+            &other,
+            ["of other.display", "give bench.display's", "--name"],
+        ),
+        (
+            &["router", "--listen", &tls],
+            &sensor,
+            ["of bench.sensor", "give bench.router's", "--name"],
+        ),
+        (
+            &[
+                "router", "--listen", &tls, "--name", "bench", "--name", "lab",
+            ],
+            &router,
+            ["router.pem", "of bench.router", "give lab.router's"],
+        ),
+    ] {
+        let mut arguments = arguments.to_vec();
+        arguments.extend(proofs.iter().map(String::as_str));
+        assert_refused(&arguments, &words);
+    }
+    // A Stop is tried all the same.
+    let mut stop = vec!["stop", "--connect", &tls, "--within", "1"];
+    stop.extend(sensor.iter().map(String::as_str));
+    let (status, _, words) = Relay::start(stop).wait(LIMIT);
+    assert_eq!(status.code(), Some(1), "{words}");
+    for said in ["of bench.sensor", "give bench.operator's", "NOT STOPPED"] {
+        assert!(words.contains(said), "{said}: {words}");
+    }
+}
+
+#[test]
 fn credentials_that_cannot_be_used_are_named() {
     let ours = authority("credentials");
     let tls = format!("tls/localhost:{}", free_port());

@@ -24,7 +24,7 @@ use tokio::task::spawn_blocking;
 use tokio::time::{sleep, timeout};
 
 use crate::lock::locked;
-use crate::relay::credentials::Loaded;
+use crate::relay::credentials::{Loaded, common_name};
 use crate::relay::datagrams::{self, PEERS, Shared};
 use crate::relay::endpoint::Endpoint;
 use crate::relay::name::{self, Name};
@@ -295,14 +295,10 @@ fn identify(connection: &Connection) -> Option<(String, Duration)> {
     let identity = connection.peer_identity()?;
     let chain = identity.downcast::<Vec<CertificateDer<'_>>>().ok()?;
     let (_, certificate) = x509_parser::parse_x509_certificate(chain.first()?).ok()?;
-    let mut names = certificate.subject().iter_common_name();
-    let (Some(common_name), None) = (names.next(), names.next()) else {
-        return None;
-    };
     let end_s = u64::try_from(certificate.validity().not_after.timestamp()).ok()?;
     let end = UNIX_EPOCH + Duration::from_secs(end_s);
     let valid = end.duration_since(SystemTime::now()).ok()?;
-    Some((common_name.as_str().ok()?.to_owned(), valid))
+    Some((common_name(&certificate)?, valid))
 }
 
 /// A congestion window that no loss narrows.
