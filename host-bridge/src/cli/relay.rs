@@ -39,11 +39,14 @@ const CLOSES: Duration = Duration::from_millis(500);
 
 /// How the parts play together.
 pub const EXAMPLES: &str = "\
-At one site:    host-bridge relay sensor --listen tcp/0.0.0.0:7447
-At the other:   host-bridge relay display --connect tcp/ADDRESS:7447
+At one site:    host-bridge relay sensor --listen tls/0.0.0.0:7447 --ca FILE --certificate FILE --key FILE
+At the other:   host-bridge relay display --connect tls/ADDRESS:7447 --ca FILE --certificate FILE --key FILE
 
 With a router in between, both connect to it:
-                host-bridge relay router --listen tcp/0.0.0.0:7447
+                host-bridge relay router --listen tls/0.0.0.0:7447 --ca FILE --certificate FILE --key FILE
+
+Where the network itself lets nobody in:
+                host-bridge relay sensor --listen tcp/0.0.0.0:7447 --insecure
 
 udp/ in place of tcp/, and quic/ in place of tls/, sends estimates and motions as datagrams, at the same port: on a \
 network that loses, nothing waits for what is lost.
