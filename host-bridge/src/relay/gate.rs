@@ -88,6 +88,7 @@ impl Gate {
         self.arrivals.received += 1;
         if !self.is_holder(session) {
             self.arrivals.superseded += 1;
+            self.note_rival(session, counter);
             return Order::Rival;
         }
         match self.place(counter) {
@@ -172,6 +173,20 @@ impl Gate {
         self.waiting = None;
         let known = self.past.iter().find(|(past, _)| *past == next.session);
         self.stream = known.and_then(|(_, stream)| *stream).unwrap_or_default();
+    }
+
+    /// What a bridge says after it has held the stream is not lost, should it hold it again.
+    fn note_rival(&mut self, session: u64, counter: u64) {
+        let known = self.past.iter_mut().find(|(past, _)| *past == session);
+        if let Some((_, Some(stream))) = known
+            && stream.newest.is_some_and(|newest| counter > newest)
+        {
+            *stream = Stream {
+                newest: Some(counter),
+                last: stream.last,
+                ..Stream::default()
+            };
+        }
     }
 
     fn remember(&mut self, session: u64, stream: Option<Stream>) {
@@ -354,6 +369,23 @@ mod tests {
         assert!(gate.is_holder(2), "who waits longest has it");
         assert!(!gate.ask(1, 5), "it waits now");
         assert!(!gate.hand_over(2, 5 + LEASE_US), "who waited is silent");
+    }
+
+    #[test]
+    fn what_a_bridge_says_while_another_holds_the_stream_is_not_lost_once_it_holds_it_again() {
+        let mut gate = held(1);
+        assert_eq!(gate.judge(1, 9, said(9)), Order::Newer);
+        assert!(!gate.ask(2, 1));
+        assert!(gate.hand_over(1, 2));
+        for counter in 10..1_000 {
+            assert_eq!(gate.judge(1, counter, said(counter)), Order::Rival);
+        }
+        assert!(gate.ask(1, 1 + LEASE_US), "the second one is silent");
+        assert_eq!(gate.judge(1, 999, said(999)), Order::Duplicate);
+        // Two are lost on the way.
+        assert_eq!(gate.judge(1, 1_002, said(1_002)), Order::Newer);
+        let arrivals = gate.arrivals();
+        assert_eq!((arrivals.superseded, arrivals.lost), (990, 2));
     }
 
     #[test]
