@@ -335,7 +335,9 @@ impl Reader {
                         |(topic, at_s)| format!("{topic} at {at_s:.3} s"),
                     ),
                     advice: match error {
-                        McapError::BadDataCrc { .. } => "some of it may be missing".to_owned(),
+                        McapError::BadDataCrc { .. } => {
+                            format!("some of it may be missing: {}", self.advice())
+                        }
                         _ => self.advice(),
                     },
                     reason: words(error),

@@ -167,18 +167,7 @@ fn a_scene_is_made_of_what_lies_before_damage() {
     let last = summary.chunk_indexes.last().expect("there are some");
     bytes[(last.chunk_start_offset + last.chunk_length / 2) as usize] ^= 0x55;
     fs::write(&path, &bytes).expect("the file can be written");
-    let made_to = |to_s: f64| {
-        let settings = scene::Settings {
-            path: folder.join("before.toml"),
-            from_s: 1.0,
-            to_s: Some(to_s),
-            wavelength_mm: Some(2.0),
-            expect: false,
-            force: true,
-        };
-        let recording = Reader::open(&path).expect("its beginning is whole");
-        scene::write(recording, &settings)
-    };
+    let made_to = |to_s: f64| scene_until(&path, to_s);
     // The damage lies between 4.13 s and the end.
     let made = made_to(3.0).unwrap_or_else(|error| panic!("{error}"));
     let scene = Scene::load(&made.path).unwrap_or_else(|error| panic!("{error}"));
@@ -191,10 +180,48 @@ fn a_scene_is_made_of_what_lies_before_damage() {
         "{words}"
     );
     // What it advises works.
-    let advised = words.split("can be had with --to-time ").nth(1);
-    let until_s: f64 = advised.and_then(|time| time.parse().ok()).expect("a time");
+    let until_s = advised_s(&words);
     assert!(until_s > 4.0, "{words}");
     made_to(until_s).unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn damage_beside_the_messages_is_told_with_how_to_have_them() {
+    let path = folder("beside-messages").join("damaged.mcap");
+    let mut bytes = fs::read(readers::golden("format-2-protocol-4.mcap")).expect("it is there");
+    let summary = Summary::read(&bytes)
+        .expect("well-formed")
+        .expect("there is one");
+    let first = summary.chunk_indexes.first().expect("there are some");
+    // A time in the index behind a chunk, which who reads from the beginning needs not.
+    bytes[(first.chunk_start_offset + first.chunk_length) as usize + 17] ^= 0x55;
+    fs::write(&path, &bytes).expect("the file can be written");
+    let words = entries(&path).expect_err("its sum is wrong").to_string();
+    assert!(words.contains("some of it may be missing"), "{words}");
+    let until_s = advised_s(&words);
+    assert!(until_s > 4.1, "{words}");
+    scene_until(&path, until_s).unwrap_or_else(|error| panic!("{error}"));
+}
+
+/// What a complaint advises to give as --to-time, in s.
+fn advised_s(words: &str) -> f64 {
+    let advised = words.split("can be had with --to-time ").nth(1);
+    let until_s = advised.and_then(|time| time.parse().ok());
+    until_s.unwrap_or_else(|| panic!("{words}"))
+}
+
+/// Makes a scene of a recording until then, in s, beside it.
+fn scene_until(path: &Path, to_s: f64) -> Result<scene::Made, scene::SceneError> {
+    let settings = scene::Settings {
+        path: path.with_file_name("before.toml"),
+        from_s: 1.0,
+        to_s: Some(to_s),
+        wavelength_mm: Some(2.0),
+        expect: false,
+        force: true,
+    };
+    let recording = Reader::open(path).expect("its beginning is whole");
+    scene::write(recording, &settings)
 }
 
 #[test]
