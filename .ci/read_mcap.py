@@ -15,6 +15,8 @@ COUNTED = {
     "/sensor/estimate": ("sequence", 1),
     "/display/motion": ("sequence", 1),
 }
+# EVENT_RESTARTED of a board's link.
+RESTARTED = 1
 
 
 def values(message):
@@ -73,13 +75,15 @@ def by_rosbags(path):
 
 def look(messages, digests):
     """Yields what is wrong with a file's messages; counts them, what is missing, and what they hold."""
-    last = {}
+    last, backwards, starts = {}, {}, Counter()
     for topic, time, message in messages:
         digests[topic, "messages"] += 1
         # Whatever the order between channels, it is the same sum.
         digests[topic, "values"] = (
             digests[topic, "values"] + hash((time, *values(message)))
         ) % (1 << 61)
+        if topic.endswith("/link") and message.event == RESTARTED:
+            starts[topic.removesuffix("link")] += 1
         if topic not in COUNTED:
             continue
         field, step = COUNTED[topic]
@@ -89,10 +93,13 @@ def look(messages, digests):
         if before is None:
             continue
         if number < before + step:
-            yield f"{topic}: {field} {number} after {before}"
+            backwards.setdefault(topic, []).append(f"{topic}: {field} {number} after {before}")
         elif number > before + step:
             digests[topic, "gaps"] += 1
             digests[topic, "missing"] += number - before - step
+    # A board that has started anew counts anew, and its link says that it has.
+    for topic, steps in backwards.items():
+        yield from steps[starts[topic[: topic.rindex("/") + 1]] :]
 
 
 def main(paths):

@@ -120,21 +120,58 @@ fn the_readers_of_others_find_every_message_once_and_the_same_values() {
     recorder.on_log(Role::Sensor, Some("error"), "λ is gone".to_owned());
     recorder.on_counters(Role::Sensor, PortCounters::new());
     recorder.stop().expect("a whole file");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.ci/read-mcap");
-    let read = Command::new(script)
-        .arg(&path)
-        .args([golden("format-2-protocol-4.mcap")])
-        .output()
-        .expect("the script can be started");
-    let said = String::from_utf8_lossy(&read.stderr);
-    if read.status.code() == Some(3) {
-        eprintln!("{said}");
+    let Some((status, found, said)) = read_by_others(&[&path, &golden("format-2-protocol-4.mcap")])
+    else {
         return;
-    }
-    assert!(read.status.success(), "{said}");
-    let found = String::from_utf8_lossy(&read.stdout);
+    };
+    assert_eq!(status, Some(0), "{said}");
     let line = format!("{}: /sensor/gauges: 40 messages\n", path.display());
     assert!(found.contains(&line), "{found}");
+}
+
+/// The script's exit status, and what it says on both outputs. None where Python or a package index is not within reach.
+fn read_by_others(paths: &[&Path]) -> Option<(Option<i32>, String, String)> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.ci/read-mcap");
+    let read = Command::new(script)
+        .args(paths)
+        .output()
+        .expect("the script can be started");
+    let [found, said] =
+        [read.stdout, read.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());
+    if read.status.code() == Some(3) {
+        eprintln!("{said}");
+        return None;
+    }
+    Some((read.status.code(), found, said))
+}
+
+#[test]
+fn to_the_readers_of_others_a_recording_is_whole_whose_board_is_said_to_have_started_anew() {
+    let folder = folder("others-read-anew");
+    for (is_said, status) in [(true, 0), (false, 1)] {
+        let path = folder.join(format!("{is_said}.mcap"));
+        let recorder = recorder(&path);
+        let mut speaker = Speaker::new(23);
+        let mut say = || {
+            for block in 0..4 {
+                recorder.on_event(
+                    Role::Sensor,
+                    &heard(speaker.gauges(block * GAUGE_BLOCK as u32)),
+                );
+            }
+        };
+        say();
+        if is_said {
+            recorder.on_event(Role::Sensor, &Event::Restarted);
+        }
+        say();
+        recorder.stop().expect("a whole file");
+        let Some((ended, found, said)) = read_by_others(&[&path]) else {
+            return;
+        };
+        assert_eq!(ended, Some(status), "{said}");
+        assert!(found.contains("/sensor/gauges: 8 messages"), "{found}");
+    }
 }
 
 /// A recording that is kept with the tests: see the README beside them.
