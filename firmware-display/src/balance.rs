@@ -1,17 +1,20 @@
 //! No channel keeps a standing voltage, in which an ionic polymer gel would electrolyse.
 //!
 //! A sine has no mean over its cycles, but a hand that trembles about one place of the surface plays a
-//! part of a cycle to and fro. So each channel's charge q = ∫ y dt, of what goes out, is kept, and what is
-//! too much of it is worked off:
+//! part of a cycle to and fro. So each channel's charge q = ∫ a y dt, of what goes out with an amplitude of a
+//! times 5 V, is kept, and what is too much of it is worked off:
 //!
 //! y = s − m, m = e/τ, where e is by how much q is beyond the room it is given, and |m| ≤ 1.
+//!
+//! q counts volts, so that what a strong part of a surface leaves is not taken for made good by as much of a weak
+//! one. A weak one works it off more slowly, with τ/a.
 //!
 //! A sine of ω goes through 2/ω of charge, wherever in the wave it begins. So a wave that gets on, by a turn
 //! in the time of one of [`SLOWEST_HZ`] at least, is given a room of ± [`MARGIN`] · 2/ω, and is let alone. Any
 //! other is none that is felt: a hand that trembles, or creeps, or turns back. Then, and when a charge is
 //! beyond its room, as after a slower wave, none is given for [`WORKING_S`]. What remains is a first-order
 //! high-pass, which brings the charge back to the middle, from where a wave does not come near its room.
-//! The charge of a channel is never beyond ± [`MOST_S`] times its amplitude, so that whatever repeats has no
+//! The charge of a channel is never beyond ± [`MOST_S`] times 5 V, so that whatever repeats has no
 //! mean at all; and what is too much is forgotten with [`TIME_CONSTANT_S`].
 
 use core::f64::consts::PI;
@@ -23,20 +26,20 @@ use crate::sine::ONE;
 
 /// τ in ticks is 2 to this at 2 kHz.
 const SHIFT: u32 = 9;
-/// τ, at either rate.
+/// τ at 5 V, at either rate.
 pub const TIME_CONSTANT_S: f64 = (1 << SHIFT) as f64 / UpdateRate::Hz2000.hz() as f64;
 /// How much more room a wave is given than it needs, and how much less it may get on: the encoder's counts
 /// make it uneven.
 pub const MARGIN: f64 = 1.25;
 /// The slowest sine that is let alone, in Hz.
 pub const SLOWEST_HZ: f64 = 5.0;
-/// The most of any channel's charge, in amplitudes times seconds: τ, and what the room adds that is given
+/// The most of any channel's charge, in 5 V times seconds: τ, and what the room adds that is given
 /// until the next look and taken away again.
 pub const MOST_S: f64 = 1.1 * TIME_CONSTANT_S;
 
 const _: () = assert!(UpdateRate::Hz4000.hz() == 2 * UpdateRate::Hz2000.hz());
 
-/// An amplitude for [`TIME_CONSTANT_S`], in a charge's scale.
+/// 5 V for [`TIME_CONSTANT_S`], in a charge's scale.
 const CHARGE: f64 = (1 << 30) as f64;
 /// The room of a wave of [`SLOWEST_HZ`].
 const MOST_ROOM: f32 = (CHARGE * MARGIN / (PI * SLOWEST_HZ) / TIME_CONSTANT_S) as f32;
@@ -52,10 +55,10 @@ const LOOK_TICKS: u32 = 16;
 /// How long a charge beyond its room is worked off, in s: four time constants leave a 50th of it.
 pub const WORKING_S: f32 = 1.024;
 
-/// Each channel's charge, as a part of its amplitude.
+/// Each channel's charge.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Balance {
-    /// q: 2³⁰ is the amplitude for τ; of all channels the first one's while they share a lane.
+    /// q: 2³⁰ is 5 V for τ; of all channels the first one's while they share a lane.
     charges: [i32; ACTUATORS],
     /// What a charge may be, on its way to what it should.
     room: i32,
@@ -95,7 +98,7 @@ impl Balance {
     }
 
     /// Takes what works off too much charge off each of `lanes` (Q28, within ± [`ONE`]), to within
-    /// ± [`ONE`] again. `gain` (Q30, 0 to 2³⁰) is what they are going to be multiplied with, `turn` by how
+    /// ± [`ONE`] again. `gain` (Q30, 0 to 2³⁰, which is 5 V) is what they are going to be multiplied with, `turn` by how
     /// much the wave turns in a tick, in turns / 2³². A single lane stands for all channels, and only may
     /// while [`Balance::is_shared`].
     pub fn remove(&mut self, lanes: &mut [i32], gain: u32, turn: i32, rate: UpdateRate) {

@@ -141,6 +141,15 @@ impl Level {
         self.value
     }
 
+    /// What a gain in Q30 leaves of [`FULL`] at this amplitude, in Q30: all of the gain at the whole amplitude.
+    pub const fn part_of_full(&self, gain: u32) -> u32 {
+        // FULL is less than 2³¹ by a 2¹⁵th.
+        const { assert!(FULL == (1 << 31) - (1 << 16)) };
+        let missing = FULL - self.value;
+        let missing = missing + (missing >> 15);
+        gain - ((missing as u64 * gain as u64) >> 31) as u32
+    }
+
     /// The wave's turn a tick, averaged over 4 ms, in turns / 2³².
     pub const fn turn(&self) -> i32 {
         self.turn

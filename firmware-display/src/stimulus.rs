@@ -190,8 +190,9 @@ impl Stimulus {
             self.skin
                 .play(&self.wave, &self.pattern, turns, self.place_um, lanes);
         }
+        let amplitude = self.level.part_of_full(gain);
         self.balance
-            .remove(lanes, gain, self.level.turn(), self.rate);
+            .remove(lanes, amplitude, self.level.turn(), self.rate);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
         let lane_of = self.skin.lane_of();
         let changed = self

@@ -6,9 +6,12 @@
 use std::f64::consts::{PI, TAU};
 
 use firmware_display::balance::{MARGIN, MOST_S};
-use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use protocol::actuators::DEFAULT_ACTUATORS;
+use protocol::{DisplayConfiguration, Friction, Mode, UpdateRate};
 
-use crate::stimulus::rig::{MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, largest, means, trimmed};
+use crate::stimulus::rig::{
+    MODES, OFF_V, RATES, Rig, VOLT_PER_STEP, largest, means, trimmed, wavelength,
+};
 
 /// The most that may stand.
 const MOST_V: f64 = 0.005;
@@ -60,6 +63,65 @@ fn in_the_papers_strokes_none_over_whole_strokes() {
         }
     }
     println!("strokes: {:.2} mV at most", worst * 1e3);
+}
+
+/// Of two surfaces under one stroke the second is played weaker: by its own amplitude, or by how it rubs.
+#[test]
+fn where_a_part_of_the_stroke_is_weaker_none_over_whole_strokes() {
+    let weaken: [fn(&mut Rig, bool, f64); 2] = [
+        |rig, is_weak, mm| {
+            let amplitude_lsb = if is_weak { 20.0 } else { 100.0 };
+            rig.stimulus.follow(wavelength(mm), amplitude_lsb);
+        },
+        |rig, is_weak, _| {
+            let fluctuation_mn = if is_weak { 0 } else { 100 };
+            rig.stimulus.rub(Some(Friction {
+                mean_mn: 500,
+                fluctuation_mn,
+            }));
+        },
+    ];
+    let mut worst: f64 = 0.0;
+    for (rate, mode) in RATES
+        .into_iter()
+        .flat_map(|rate| MODES.map(|mode| (rate, mode)))
+    {
+        for (stroke_hz, half_mm) in [(0.8, 13.4), (0.8, 5.0), (2.0, 3.0)] {
+            for wavelength_mm in [2.0, 3.0, 5.0] {
+                for weaken in weaken {
+                    let configuration = DisplayConfiguration {
+                        mode,
+                        update_rate: rate,
+                        reference_lsb: 100,
+                        reference_mn: 100,
+                        ..DisplayConfiguration::DEFAULT
+                    };
+                    let mut rig = Rig::with(configuration, DEFAULT_ACTUATORS);
+                    rig.follow(wavelength_mm);
+                    let [stroke, estimate] = [1.0 / stroke_hz, 0.01].map(|s| rig.ticks(s));
+                    let mut volts = Vec::new();
+                    for tick in 0..12 * stroke {
+                        let turns = (tick % stroke) as f64 / stroke as f64;
+                        if tick % estimate == 0 {
+                            // Over the boundary 30 ms ago.
+                            let place_mm = -half_mm * (TAU * (turns - 0.03 * stroke_hz)).cos();
+                            weaken(&mut rig, place_mm > 0.0, wavelength_mm);
+                        }
+                        let target_mm = half_mm * (1.0 - (TAU * turns).cos());
+                        let counts = ((target_mm - rig.position_mm()) / 0.005).round();
+                        volts.push(rig.tick(counts as i16));
+                    }
+                    let mean = largest(&means(&volts[volts.len() - stroke..]));
+                    worst = worst.max(mean);
+                    assert!(
+                        mean <= MOST_V,
+                        "{rate:?} {mode:?} {stroke_hz} Hz ± {half_mm} mm on {wavelength_mm} mm: {mean} V"
+                    );
+                }
+            }
+        }
+    }
+    println!("weaker: {:.2} mV at most", worst * 1e3);
 }
 
 #[test]
