@@ -7,10 +7,7 @@ use protocol::{
 };
 
 use crate::pattern::Pattern;
-use crate::skin::any_is_modelled;
-
-/// Different places along the scan and phases that a wave, as opposed to a sine, is worked out for in time.
-pub const MOST_PLACES: usize = 16;
+use crate::skin::{Skin, any_is_modelled};
 
 /// What is in force, and the description of the actuators that is being sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -125,24 +122,46 @@ impl Settings {
     }
 }
 
+/// What there is time for, and what of it a place takes. A lane, a different place, phase or resonance, takes one: 0.5 µs by
+/// the lower of two estimates (`hil-sim budget`). With so much the emulated board is never late.
+const fn effort(rendering: Rendering, is_modelled: bool) -> (usize, usize) {
+    match (rendering, is_modelled) {
+        (Rendering::Texture, true) => (70, 6),
+        (Rendering::Texture, false) => (64, 4),
+        (Rendering::Fundamental | Rendering::Shape, _) => (64, 3),
+    }
+}
+
 /// Checks that the words can be worked out in time.
 ///
 /// # Errors
-/// If more than the sine is asked for, of actuators at more than [`MOST_PLACES`] different places and phases. In uniform
-/// mode all places are one.
+/// If more than the sine is asked for, of actuators with too many different places and phases, or with too many different
+/// resonances at these. In uniform mode all places are one.
 pub fn check_effort(
     configuration: &DisplayConfiguration,
     actuators: &[Actuator; ACTUATORS],
 ) -> Result<(), Refusal> {
-    let is_sine = configuration.rendering == Rendering::Fundamental && !any_is_modelled(actuators);
-    if is_sine || Pattern::new(configuration.mode, actuators).places() <= MOST_PLACES {
+    let is_modelled = any_is_modelled(actuators);
+    if configuration.rendering == Rendering::Fundamental && !is_modelled {
+        return Ok(());
+    }
+    let pattern = Pattern::new(configuration.mode, actuators);
+    let lanes = Skin::new(configuration.rendering, actuators, &pattern).lanes();
+    let (most, of_place) = effort(configuration.rendering, is_modelled);
+    let most_places = most / (of_place + 1);
+    let most_lanes = if pattern.places() > most_places {
+        most_places
+    } else {
+        most - of_place * pattern.places()
+    };
+    if lanes <= most_lanes {
         return Ok(());
     }
     Err(Refusal {
         setting: Setting::Rendering,
         index: 0,
         low: 1,
-        high: MOST_PLACES as i64,
+        high: most_lanes as i64,
     })
 }
 
@@ -286,39 +305,96 @@ mod tests {
         assert_eq!(settings.configuration().amplitude_mv, 4_000);
     }
 
-    #[test]
-    fn more_than_a_sine_is_refused_for_too_many_places() {
-        let mut scattered = DEFAULT_ACTUATORS;
-        for (actuator, index) in scattered.iter_mut().zip(0..) {
-            actuator.x_um = 10 * index.min(16);
-        }
-        let take = |mode, rendering, actuators: &[Actuator; ACTUATORS]| {
-            let configuration = DisplayConfiguration {
-                mode,
-                rendering,
-                actuators: actuators::hash(actuators),
-                ..DisplayConfiguration::DEFAULT
-            };
-            Settings::new(configuration, actuators).map(|_| ())
+    fn take(
+        mode: Mode,
+        rendering: Rendering,
+        actuators: &[Actuator; ACTUATORS],
+    ) -> Result<(), Refusal> {
+        let configuration = DisplayConfiguration {
+            mode,
+            rendering,
+            actuators: actuators::hash(actuators),
+            ..DisplayConfiguration::DEFAULT
         };
-        let refusal = Err(Refusal {
+        Settings::new(configuration, actuators).map(|_| ())
+    }
+
+    const fn too_many(most: i64) -> Result<(), Refusal> {
+        Err(Refusal {
             setting: Setting::Rendering,
             index: 0,
             low: 1,
-            high: 16,
-        });
-        for rendering in [Rendering::Fundamental, Rendering::Shape, Rendering::Texture] {
-            let is_sine = rendering == Rendering::Fundamental;
-            let expected = if is_sine { Ok(()) } else { refusal };
-            assert_eq!(take(Mode::Travelling, rendering, &scattered), expected);
-            assert_eq!(take(Mode::Uniform, rendering, &scattered), Ok(()));
-            let mut modelled = scattered;
-            modelled[0].resonance_dhz = 500;
-            assert_eq!(take(Mode::Travelling, rendering, &modelled), refusal);
-            assert_eq!(take(Mode::Uniform, rendering, &modelled), Ok(()));
-            let mut sixteen = scattered;
-            sixteen[16..].fill(scattered[0]);
-            assert_eq!(take(Mode::Travelling, rendering, &sixteen), Ok(()));
+            high: most,
+        })
+    }
+
+    /// So many places, in turn.
+    fn at_places(places: i16) -> [Actuator; ACTUATORS] {
+        let mut actuators = DEFAULT_ACTUATORS;
+        for (actuator, index) in actuators.iter_mut().zip(0..) {
+            actuator.x_um = 10 * (index % places);
+        }
+        actuators
+    }
+
+    #[test]
+    fn more_than_a_sine_is_refused_for_too_many_places() {
+        for (rendering, most, most_modelled) in [
+            (Rendering::Fundamental, 50, 16),
+            (Rendering::Shape, 16, 16),
+            (Rendering::Texture, 12, 10),
+        ] {
+            for (resonance_dhz, most) in [(0, most), (500, most_modelled)] {
+                for places in [most, 50.min(most + 1)] {
+                    let mut actuators = at_places(places);
+                    for actuator in &mut actuators {
+                        actuator.resonance_dhz = resonance_dhz;
+                    }
+                    let expected = if places <= most {
+                        Ok(())
+                    } else {
+                        too_many(most.into())
+                    };
+                    let taken = take(Mode::Travelling, rendering, &actuators);
+                    assert_eq!(taken, expected, "{rendering:?} {places}");
+                    assert_eq!(take(Mode::Uniform, rendering, &actuators), Ok(()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn too_many_resonances_at_too_many_places_are_refused_and_fifty_at_one_are_not() {
+        for (rendering, places, most) in [
+            (Rendering::Fundamental, 10, 34),
+            (Rendering::Shape, 10, 34),
+            (Rendering::Texture, 5, 40),
+            (Rendering::Texture, 10, 10),
+        ] {
+            for resonances in [most, most + 1] {
+                let mut actuators = at_places(places);
+                for (actuator, index) in actuators.iter_mut().zip(0..) {
+                    // Of the first ones each has its own, the others have that of one at their place.
+                    actuator.resonance_dhz = 500
+                        + if index < resonances {
+                            index
+                        } else {
+                            index % places as u16
+                        };
+                }
+                let expected = if resonances == most {
+                    Ok(())
+                } else {
+                    too_many(most.into())
+                };
+                let taken = take(Mode::Travelling, rendering, &actuators);
+                assert_eq!(taken, expected, "{rendering:?} {places} {resonances}");
+            }
+            let mut actuators = at_places(places);
+            for (actuator, index) in actuators.iter_mut().zip(0..) {
+                actuator.resonance_dhz = 500 + index;
+            }
+            assert_eq!(take(Mode::Uniform, rendering, &actuators), Ok(()));
         }
     }
 

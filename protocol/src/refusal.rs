@@ -53,7 +53,7 @@ impl core::fmt::Display for Refusal {
             Setting::Rendering => write!(
                 f,
                 "Rendering is too much with these actuators: more than the fundamental, or a resonance, is worked out \
-                 for at most {high} different places and phases"
+                 for at most {high} of them with different places, phases or resonances"
             ),
             _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
         }
@@ -114,7 +114,7 @@ pub enum Setting {
     /// [`crate::Configure::replaces`]: another configuration is in force.
     Replaces,
     /// [`crate::DisplayConfiguration::rendering`]: more than the fundamental, or a resonance of an actuator, is asked for
-    /// of actuators at more different places and phases than are worked out in time.
+    /// of actuators with more different places, phases and resonances than are worked out in time.
     Rendering,
 }
 

@@ -58,11 +58,11 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
         let pitch_um = table.whole("pitch_um", 100, 4_000)?;
         actuators::grid(pitch_um.map_or(actuators::DEFAULT_PITCH_UM, |um| um as u16))
     };
-    if firmware_display::settings::check_effort(&configuration, &described).is_err() {
+    if let Err(refusal) = firmware_display::settings::check_effort(&configuration, &described) {
         let message = format!(
             "is too much with these actuators: more than the fundamental, or a resonance, is worked out for at most \
-             {} different places and phases",
-            firmware_display::settings::MOST_PLACES
+             {} of them with different places, phases or resonances",
+            refusal.high
         );
         return Err(table.refuse("rendering", message));
     }
