@@ -374,6 +374,19 @@ mod tests {
             assert_eq!(step(&mut arm, 0), Drive::default());
         }
         assert_eq!(arm.state(), ArmState::Stopped(Trip::Operator));
+        assert_eq!(arm.trip(), Some(Trip::Operator));
+    }
+
+    #[test]
+    fn a_hand_that_is_not_heard_for_a_moment_is_taken_to_move_on() {
+        let mut arm = Arm::default();
+        arm.on_motion(&motion(0, 0, 50_000), 0);
+        for ms in 0..40 {
+            // 50 µm further each time, and ten times that in µm/s.
+            let command = command_um_s(step(&mut arm, 0));
+            let wanted = f64::from(50_000 + 500 * ms);
+            assert!((command - wanted).abs() <= 24.0, "{command} at {ms} ms");
+        }
     }
 
     #[test]
