@@ -16,7 +16,12 @@ const LOG_LINES: usize = 200;
 /// A number with so many decimals and its unit, or a dash.
 fn number(value: Option<f64>, decimals: usize, unit: &str) -> String {
     value.map_or("–".into(), |value| {
-        format!("{value:.decimals$}{unit}").replace('-', "−")
+        let text = format!("{value:.decimals$}");
+        // What is rounded to nothing has no sign.
+        let rest = text.strip_prefix('-');
+        let nothing = rest.filter(|rest| rest.trim_matches(['0', '.']).is_empty());
+        let text = nothing.unwrap_or(&text).replace('-', "−");
+        format!("{text}{unit}")
     })
 }
 
@@ -258,8 +263,23 @@ fn fields(counters: &impl Serialize) -> Vec<(String, String)> {
     let Ok(Value::Object(fields)) = serde_json::to_value(counters) else {
         return Vec::new();
     };
-    let field = |(name, value): (String, Value)| (name.replace('_', " "), value.to_string());
+    let field = |(name, value): (String, Value)| (name.replace('_', " "), words(&value));
     fields.into_iter().map(field).collect()
+}
+
+/// A field's value: a dash for none, and what a word says more closely behind it.
+fn words(value: &Value) -> String {
+    match value {
+        Value::Null => "–".to_owned(),
+        Value::String(word) => word.clone(),
+        Value::Object(fields) => {
+            let told = fields
+                .iter()
+                .map(|(name, value)| format!("{name}: {}", words(value)));
+            told.collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    }
 }
 
 pub fn faults(findings: &[Finding]) -> String {
@@ -323,4 +343,40 @@ pub fn log(chapter: &Chapter) -> String {
         "<details><summary>Log, {shown_count} of {} lines</summary><pre>{shown}</pre></details>\n",
         lines.len()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{DisplayCounters, DisplayState, SensorCounters, Trip};
+
+    use super::*;
+
+    #[test]
+    fn a_boards_state_is_told_in_words_and_what_is_none_by_a_dash() {
+        let told = |counters: &[(String, String)], name: &str| {
+            let found = counters.iter().find(|(counter, _)| counter == name);
+            found.map(|(_, value)| value.clone()).expect(name)
+        };
+        for (state, words) in [
+            (DisplayState::Driving, "Driving"),
+            (
+                DisplayState::Stopped(Trip::HandEncoder),
+                "Stopped: HandEncoder",
+            ),
+        ] {
+            let counters = DisplayCounters {
+                state,
+                ..DisplayCounters::ZERO
+            };
+            assert_eq!(told(&fields(&counters), "state"), words);
+            assert_eq!(told(&fields(&counters), "deadline misses"), "0");
+        }
+        assert_eq!(told(&fields(&SensorCounters::default()), "stopped"), "–");
+    }
+
+    #[test]
+    fn what_is_rounded_to_nothing_has_no_sign() {
+        assert_eq!(number(Some(-0.004), 2, " mV"), "0.00 mV");
+        assert_eq!(number(Some(-0.006), 2, " mV"), "−0.01 mV");
+    }
 }
