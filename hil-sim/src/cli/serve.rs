@@ -22,6 +22,8 @@ use screen::Screen;
 const TOLD: Duration = Duration::from_secs(1);
 /// How often is looked whether the bench still stands.
 const LOOKS: Duration = Duration::from_millis(50);
+/// Where the relays meet that it advises to try.
+const MEETING: &str = "tcp/127.0.0.1:7447";
 
 const COMMANDS: &str = "\
 On a terminal, keys:
@@ -201,7 +203,7 @@ fn greet(bench: &Bench, scene: &str, has_keys: bool) {
     );
     if bench.is_plugged(PortName::SensorLink) {
         text += &format!(
-            "  host-bridge relay sensor --sensor {}\n  host-bridge relay display --display {}\n",
+            "  host-bridge relay sensor --sensor {} --listen {MEETING}\n  host-bridge relay display --display {} --connect {MEETING}\n",
             bench.path(PortName::SensorLink).display(),
             bench.path(PortName::DisplayLink).display()
         );

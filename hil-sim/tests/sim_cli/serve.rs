@@ -5,7 +5,7 @@
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -56,6 +56,7 @@ fn serve_with(folder: &Path, sensor: &Path, display: &Path) -> Command {
 /// A bench that stands: its ports are there.
 struct Standing {
     child: Child,
+    out: BufReader<ChildStdout>,
     greeting: String,
 }
 
@@ -68,7 +69,17 @@ impl Standing {
             let read = out.read_line(&mut greeting).unwrap();
             assert!(read > 0, "{greeting:?} is all it says");
         }
-        Self { child, greeting }
+        Self {
+            child,
+            out,
+            greeting,
+        }
+    }
+
+    fn next_line(&mut self) -> String {
+        let mut line = String::new();
+        self.out.read_line(&mut line).unwrap();
+        line
     }
 
     fn say(&mut self, lines: &str) {
@@ -151,8 +162,17 @@ fn a_signal_takes_everything_away_and_a_second_bench_in_the_folder_is_refused() 
     let _turn = turn();
     for signal in [Signal::TERM, Signal::INT] {
         let folder = folder("serve-cli/signal");
-        let bench = Standing::new(serve(&folder).arg("--apart"));
+        let mut bench = Standing::new(serve(&folder).arg("--apart"));
         assert!(folder.join("sensor-link").exists());
+        // As they stand, on this computer.
+        for (role, end) in [("sensor", "--listen"), ("display", "--connect")] {
+            let link = folder.join(format!("{role}-link"));
+            let advice = format!(
+                "  host-bridge relay {role} --{role} {} {end} tcp/127.0.0.1:7447\n",
+                link.display()
+            );
+            assert_eq!(bench.next_line(), advice);
+        }
         let second = serve(&folder).output().unwrap();
         let complaint = String::from_utf8(second.stderr).unwrap();
         assert_eq!(second.status.code(), Some(2), "{complaint}");
