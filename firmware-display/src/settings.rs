@@ -126,7 +126,7 @@ impl Settings {
 /// the lower of two estimates (`hil-sim budget`). With so much the emulated board is never late.
 const fn effort(rendering: Rendering, is_modelled: bool) -> (usize, usize) {
     match (rendering, is_modelled) {
-        (Rendering::Texture, true) => (70, 6),
+        (Rendering::Texture, true) => (72, 6),
         (Rendering::Texture, false) => (64, 4),
         (Rendering::Fundamental | Rendering::Shape, _) => (64, 3),
     }
@@ -368,8 +368,8 @@ mod tests {
         for (rendering, places, most) in [
             (Rendering::Fundamental, 10, 34),
             (Rendering::Shape, 10, 34),
-            (Rendering::Texture, 5, 40),
-            (Rendering::Texture, 10, 10),
+            (Rendering::Texture, 5, 42),
+            (Rendering::Texture, 10, 12),
         ] {
             for resonances in [most, most + 1] {
                 let mut actuators = at_places(places);

@@ -481,7 +481,7 @@ mod tests {
 
     #[test]
     fn an_encoder_that_jumps_further_than_an_arm_moves_stops_it_at_once() {
-        for (jump_um, trip) in [(3_100.0, Some(Trip::ArmEncoder)), (1_000.0, None)] {
+        for (jump_um, trip) in [(3_100.0, Some(Trip::ArmEncoder)), (2_900.0, None)] {
             let jumps = |ms, arm_um| if ms < 300 { arm_um } else { arm_um + jump_um };
             let stopped = led(FULL_SCALE_UM_S, 20.0, 70_000, jumps);
             assert_eq!(stopped.map(|(.., trip)| trip), trip);
