@@ -542,7 +542,7 @@ fn covers_travel(
         return Ok(());
     }
     let message = format!(
-        "the profile lies from {first} to {last} mm, the gauges come from {low:.3} to {high:.3} mm: give a longer profile or a shorter travel"
+        "the profile lies from {first:.3} to {last:.3} mm, the gauges come from {low:.3} to {high:.3} mm: give a longer profile or a shorter travel"
     );
     Err(root.refuse("surface", message))
 }

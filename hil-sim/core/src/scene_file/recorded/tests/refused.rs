@@ -177,6 +177,11 @@ fn a_profile_is_no_longer_and_no_higher_than_a_surface_and_its_scale_does_not_ma
         ),
         (
             profile,
+            "x_mm,height\n-0.30000000000000004,0\n2.1,1\n",
+            "x.toml: surface: the profile lies from -0.300 to 2.100 mm, the gauges come from",
+        ),
+        (
+            profile,
             "x_mm,height\n0,0\n40,1e307\n",
             "p.csv:3: column 2 (height): \"1e307\" is no height",
         ),
