@@ -296,6 +296,25 @@ mod tests {
     }
 
     #[test]
+    fn a_speed_is_rounded_to_the_nearest_step_of_the_duty() {
+        // A step is 47.6 µm/s.
+        for (command_um_s, duty, forward) in [
+            (0, 0, false),
+            (23, 0, true),
+            (24, 1, true),
+            (-71, 1, false),
+            (-72, 2, false),
+        ] {
+            let wanted = Drive { duty, forward };
+            assert_eq!(
+                drive(command_um_s, FULL_SCALE_UM_S),
+                wanted,
+                "{command_um_s}"
+            );
+        }
+    }
+
+    #[test]
     fn refuses_an_older_or_repeated_sequence_also_where_it_wraps() {
         let mut arm = Arm::default();
         assert!(arm.on_motion(&motion(u32::MAX - 1, 0, 1_000), 0));
@@ -346,7 +365,7 @@ mod tests {
         assert!(arm.on_motion(&at(10, 10_000, 0), 700));
         step(&mut arm, 700);
         // A tenth of a second later by its clock, and a millisecond later here.
-        assert!(arm.on_motion(&at(60, 110_000, 80_000), 700));
+        assert!(arm.on_motion(&at(60, 110_000, 150_000), 700));
         assert_eq!(step(&mut arm, 700).duty, Drive::FULL);
     }
 

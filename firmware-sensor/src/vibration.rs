@@ -66,14 +66,17 @@ impl Vibration {
 mod tests {
     use super::*;
 
-    /// Whether it is taken for one at the end of a second of a hand that swings at 70 mm/s and 0.83 Hz, where its λ̂ in mm is
-    /// made of the speed some 60 ms ago and the time in s.
-    fn is_one(wavelength_mm: impl Fn(f32, f32) -> f32) -> bool {
-        let speed = |t_s: f32| 70.0 * libm::fabsf(libm::sinf(core::f32::consts::TAU * 0.83 * t_s));
+    /// Whether it is taken for one at the end of so many seconds of a hand of that speed in mm/s, where its λ̂ in mm is made
+    /// of the speed some 60 ms ago and the time in s. Below 15 mm/s nothing is probable.
+    fn is_one_at(
+        speed: impl Fn(f32) -> f32,
+        wavelength_mm: impl Fn(f32, f32) -> f32,
+        end_s: f32,
+    ) -> bool {
         let mut vibration = Vibration::default();
         let mut is_one = false;
-        for estimate in 10..110_u16 {
-            let t_s = f32::from(estimate) * 0.01;
+        let mut t_s = 0.1;
+        while t_s < end_s {
             let then = speed(t_s - 0.06);
             let mut finding = Finding {
                 wavelength_mm: Some(wavelength_mm(then, t_s)),
@@ -83,8 +86,49 @@ mod tests {
             };
             vibration.withhold(&mut finding, speed(t_s), 0.6);
             is_one = then >= 15.0 && !finding.valid;
+            t_s += 0.01;
         }
         is_one
+    }
+
+    /// At 70 mm/s and 0.83 Hz.
+    fn swing(t_s: f32) -> f32 {
+        70.0 * libm::fabsf(libm::sinf(core::f32::consts::TAU * 0.83 * t_s))
+    }
+
+    /// The same at the end of a second of a hand that swings.
+    fn is_one(wavelength_mm: impl Fn(f32, f32) -> f32) -> bool {
+        is_one_at(swing, wavelength_mm, 1.1)
+    }
+
+    #[test]
+    fn a_vibration_that_has_gone_is_forgotten() {
+        let swings_and_goes_on = |t_s: f32| if t_s < 1.0 { swing(t_s) } else { 60.0 };
+        let surface_follows = |speed, t_s| if t_s < 1.0 { speed / 30.0 } else { 2.0 };
+        assert!(is_one_at(swings_and_goes_on, surface_follows, 1.02));
+        assert!(!is_one_at(swings_and_goes_on, surface_follows, 4.0));
+    }
+
+    #[test]
+    fn one_step_of_the_speed_is_no_vibration_whatever_is_felt() {
+        let step = |t_s| if t_s < 0.7 { 50.0 } else { 56.0 };
+        for end_s in [0.78, 0.82, 1.0] {
+            assert!(!is_one_at(step, |speed, _| speed / 25.0, end_s), "{end_s}");
+        }
+    }
+
+    #[test]
+    fn what_was_felt_before_a_turn_is_not_compared_with_what_is_felt_after_it() {
+        // 1 mm at 20 mm/s and 2 mm at 40 mm/s, in turn: 20 Hz each.
+        let stroke = |t_s: f32| (t_s / 0.5) as u32 % 2;
+        let speed = |t_s: f32| {
+            let turns = t_s % 0.5 < 0.2;
+            [[20.0, 40.0], [10.0, 10.0]][usize::from(turns)][stroke(t_s) as usize]
+        };
+        let surface = |_, t_s| [1.0, 2.0][stroke(t_s) as usize];
+        for end_s in [2.42, 2.92, 3.42] {
+            assert!(!is_one_at(speed, surface, end_s), "{end_s}");
+        }
     }
 
     #[test]

@@ -178,7 +178,7 @@ fn a_profile_is_no_longer_and_no_higher_than_a_surface_and_its_scale_does_not_ma
         (
             profile,
             "x_mm,height\n-0.30000000000000004,0\n2.1,1\n",
-            "x.toml: surface: the profile lies from -0.300 to 2.100 mm, the gauges come from",
+            "x.toml:2: surface: the profile lies from -0.300 to 2.100 mm, the gauges come from",
         ),
         (
             profile,
