@@ -119,13 +119,13 @@ mod tests {
 
     #[test]
     fn what_was_felt_before_a_turn_is_not_compared_with_what_is_felt_after_it() {
-        // 1 mm at 20 mm/s and 2 mm at 40 mm/s, in turn: 20 Hz each.
+        // 1 mm at 20 mm/s and 4 mm at 80 mm/s, in turn: 20 Hz each.
         let stroke = |t_s: f32| (t_s / 0.5) as u32 % 2;
         let speed = |t_s: f32| {
             let turns = t_s % 0.5 < 0.2;
-            [[20.0, 40.0], [10.0, 10.0]][usize::from(turns)][stroke(t_s) as usize]
+            [[20.0, 80.0], [10.0, 10.0]][usize::from(turns)][stroke(t_s) as usize]
         };
-        let surface = |_, t_s| [1.0, 2.0][stroke(t_s) as usize];
+        let surface = |speed, _| if speed > 50.0 { 4.0 } else { 1.0 };
         for end_s in [2.42, 2.92, 3.42] {
             assert!(!is_one_at(speed, surface, end_s), "{end_s}");
         }
