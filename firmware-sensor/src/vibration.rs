@@ -104,9 +104,9 @@ mod tests {
     #[test]
     fn a_vibration_that_has_gone_is_forgotten() {
         let swings_and_goes_on = |t_s: f32| if t_s < 1.0 { swing(t_s) } else { 60.0 };
-        let surface_follows = |speed, t_s| if t_s < 1.0 { speed / 30.0 } else { 2.0 };
-        assert!(is_one_at(swings_and_goes_on, surface_follows, 1.02));
-        assert!(!is_one_at(swings_and_goes_on, surface_follows, 4.0));
+        let vibration_then_surface = |speed, t_s| if t_s < 1.0 { speed / 30.0 } else { 2.0 };
+        assert!(is_one_at(swings_and_goes_on, vibration_then_surface, 1.02));
+        assert!(!is_one_at(swings_and_goes_on, vibration_then_surface, 4.0));
     }
 
     #[test]

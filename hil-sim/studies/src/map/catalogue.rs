@@ -141,11 +141,11 @@ fn wavelength(eighths: RangeInclusive<i32>) -> Axis {
     Axis::log("wavelength λ in mm", Knob::WAVELENGTH, first, last, count)
 }
 
-/// Four frictions for each of three wavelengths, without and with the force channel.
+/// Four frictions for each of six wavelengths, half an octave apart, without and with the force channel.
 fn friction() -> Axis {
     let mut axis = Axis::named("friction");
     for (tangential, channel) in [("false", "no force"), ("true", "force")] {
-        for wavelength_mm in [1.0, 2.0, 4.0] {
+        for wavelength_mm in [0.7, 1.0, 1.4, 2.0, 2.8, 4.0] {
             let steps = ["none", "mild", "strong", "severe"].map(|friction| {
                 let settings = vec![
                     Knob::WAVELENGTH.at(wavelength_mm),
