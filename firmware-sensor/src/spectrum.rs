@@ -44,6 +44,7 @@ mod knots;
 mod line;
 mod periodogram;
 mod play;
+mod sidebands;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -232,9 +233,10 @@ impl Spectrum {
         self.jerk = Jerk::default();
     }
 
-    /// What was fitted on another surface says nothing of this one.
+    /// What was found on another surface says nothing of this one.
     fn forget_fits(&mut self) {
         self.refused = 0;
+        self.survey.sideband = (0, 0);
         self.longer_fits = Default::default();
         self.trend = Trend::default();
     }

@@ -139,7 +139,7 @@ impl Pass {
         self.base = base;
         self.sums = Sums::default();
         self.found = [None; LENGTH_COUNT];
-        self.under_way = true;
+        self.under_way = self.next < self.lengths;
     }
 
     /// Forgets what it has found.
@@ -186,7 +186,7 @@ impl Pass {
         self.sums.places += away as f32;
         self.sums.add(waves, phasor, angle, knot, &self.base);
         // A length ends with the knot that is nearest to its end.
-        while self.next < self.lengths && self.sums.waves + 0.5 * waves >= LENGTHS[self.next] {
+        while self.under_way && self.sums.waves + 0.5 * waves >= LENGTHS[self.next] {
             self.sums.normal.take_in();
             let mean = self.sums.places / f32::from(self.sums.knots);
             self.found[self.next] = self
@@ -197,8 +197,8 @@ impl Pass {
                     ..fitted
                 });
             self.next += 1;
+            self.under_way = self.next < self.lengths;
         }
-        self.under_way = self.next < self.lengths;
     }
 }
 

@@ -162,6 +162,17 @@ impl Jerk {
             (wave(1.0, 1.0) + wave(2.0, 0.1) + wave(3.0, 1.0 / 9.0) + wave(5.0, 0.04))
                 / let_through(1.0 / wavelength_mm)
         };
+        let left = |n: usize| {
+            let known = NOISE_GAINS[n] * noise;
+            let power = &self.powers[n];
+            power.mean - larger(power.steady(gauges), known) - NOISE_DOUBT * known
+        };
+        let may_be = |n: usize| left(n) > explained * LEAST_JERKS[n];
+        let is_slow = self.mean_speed < SLOW_PLACES;
+        // Mostly there is no need to ask further.
+        if !may_be(1) && !(is_slow && may_be(0)) {
+            return false;
+        }
         let beyond_noise = |n: usize| larger(self.powers[n].mean - NOISE_GAINS[n] * noise, 0.0);
         let (first, second) = (beyond_noise(0), beyond_noise(1));
         // Of a single frequency the differences' powers are (2 sin(πf/fs))² apart.
@@ -173,13 +184,9 @@ impl Jerk {
         let slip_hz = SAMPLE_RATE_HZ as f32 / core::f32::consts::PI * libm::asinf(sine);
         let per_mm = slip_hz * PLACES_PER_UM as f32 / larger(self.mean_speed, f32::MIN_POSITIVE);
         let stands_out = |n: usize| {
-            let power = &self.powers[n];
-            let known = NOISE_GAINS[n] * noise;
-            let left = power.mean - larger(power.steady(gauges), known) - NOISE_DOUBT * known;
             let least = explained * larger(let_through(per_mm), LEAST_JERKS[n]);
-            left > least && left > explained * edges(n as i32 + 1) + least
+            left(n) > least && left(n) > explained * edges(n as i32 + 1) + least
         };
-        let is_slow = self.mean_speed < SLOW_PLACES;
         slip_hz < SLIPS_BELOW_HZ && (stands_out(1) || is_slow && stands_out(0))
     }
 }

@@ -59,8 +59,8 @@ struct Candidate {
     /// Travel constants of its poles in a mm.
     poles_per_mm: f32,
     /// Re and Im of each gauge behind the first pole, and behind both.
-    first: [[f32; 2]; GAUGES],
-    second: [[f32; 2]; GAUGES],
+    first: Phasors,
+    second: Phasors,
     first_weight: f32,
     second_weight: f32,
     /// The average, and the weight that it has.
@@ -70,6 +70,9 @@ struct Candidate {
 
 /// All candidates' energies, in one way or another.
 pub(super) type Spectrum = [f32; CANDIDATES];
+
+/// Re and Im of each gauge in a candidate.
+pub(super) type Phasors = [[f32; 2]; GAUGES];
 
 /// The energies of a moment, in ADC steps².
 #[derive(Clone, Copy, Debug)]
@@ -237,6 +240,11 @@ impl Periodogram {
         })
     }
 
+    /// Of candidate `number` behind both poles, in an unknown scale.
+    pub fn phasors(&self, number: usize) -> &Phasors {
+        &self.candidates[number].second
+    }
+
     /// How full the average of candidate `number` is, 0 to 1.
     pub fn maturity(&self, number: usize) -> f32 {
         self.candidates[number].mean_weight
@@ -264,7 +272,7 @@ impl Candidate {
 }
 
 /// Each gauge's energy in a candidate.
-fn powers(sums: &[[f32; 2]; GAUGES], weight: f32) -> [f32; GAUGES] {
+fn powers(sums: &Phasors, weight: f32) -> [f32; GAUGES] {
     if weight < LEAST_WEIGHT {
         return [0.0; GAUGES];
     }

@@ -5,10 +5,11 @@ use super::periodogram::{
     CANDIDATES, Spectrum as Energies, clearest_peak, highest_peak, is_peak, rise, sharpness,
     vertex_mm, wavelength_mm,
 };
-use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off};
+use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off, sidebands};
 use crate::float::{larger, smaller};
 
-/// One estimate of so many fits the line over the longer lengths, too; those after it take its fits over.
+/// One estimate of so many asks what a peak is a sideband of, and fits the line over the longer lengths, too; those after it
+/// take over what it found.
 const LONGER_EVERY: u8 = 5;
 /// How much higher than the peak an end of the spectrum is where the wave lies beyond it. A random part alone lifts the
 /// long end.
@@ -57,6 +58,8 @@ pub(super) struct Survey {
     pub(super) agree: bool,
     /// The line is twice or three times as long as the clearest peak.
     pub(super) longer: bool,
+    /// The last peak that was asked about, and the wave that it is a sideband of, or itself.
+    pub(super) sideband: (usize, usize),
     pub(super) line_pass: Pass,
     pub(super) wave_pass: Pass,
 }
@@ -95,14 +98,26 @@ impl Spectrum {
         } else {
             clearest
         };
-        let (number, line_mm) = self
-            .longer_period(&averaged, &energies, kept)
-            .unwrap_or((kept, vertex_mm(&averaged, kept, true)));
+        let longer = self.longer_period(&averaged, &energies, kept);
+        let found = longer.map_or(kept, |(period, _)| period);
+        self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
+        if self.shorter_so_far == 0 {
+            let wave = if self.touch.deflection_known {
+                found
+            } else {
+                sidebands::wave_of(&self.periodogram, &averaged, found, usable)
+            };
+            self.survey.sideband = (found, wave);
+        }
+        let (sideband, wave) = self.survey.sideband;
+        let number = if found == sideband { wave } else { found };
+        let longer = longer.filter(|_| number == found);
+        let line_mm = longer.map_or_else(|| vertex_mm(&averaged, number, true), |(_, mm)| mm);
         let momentary = fundamental_of(&energies, momentary, number, line_mm);
         let momentary_mm = vertex_mm(&energies, momentary, true);
         let survey = &mut self.survey;
         survey.line_mm = Some(line_mm);
-        survey.longer = number != kept;
+        survey.longer = longer.is_some();
         survey.sharpness = sharpness(&averaged, number);
         survey.maturity = self.periodogram.maturity(number);
         let total: f32 = energies.iter().sum();
@@ -122,7 +137,6 @@ impl Spectrum {
         } else {
             here_mm
         };
-        self.shorter_so_far = (self.shorter_so_far + 1) % LONGER_EVERY;
         let lengths = if self.shorter_so_far == 0 {
             self.lengths
         } else {

@@ -13,6 +13,7 @@ use super::knots::{Knot, Knots, SPACINGS_MM, spacing_for};
 use super::periodogram::{
     CANDIDATES, Periodogram, clearest_peak, highest_peak, sharpness, vertex_mm, wavelength_mm,
 };
+use super::sidebands::wave_of;
 use super::trend::Trend;
 use crate::estimator::{Estimator, Finding, Touch};
 use crate::travel::{PLACES_PER_MM, Travel};
@@ -257,6 +258,82 @@ fn a_slope_lifts_no_long_wave() {
 
 /// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind and off by `noise`, and of an average that
 /// is not.
+/// The averaged spectrum of what is felt on a straight path, and the bank behind it.
+fn averaged(felt: impl FnMut(f32, usize) -> f32) -> (Periodogram, [f32; CANDIDATES]) {
+    let (_, mut periodogram) = path(3_000, 0.05, 3_000, felt);
+    periodogram.average(&periodogram.energies(ALL), 100.0);
+    let averaged = periodogram.averaged();
+    (periodogram, averaged)
+}
+
+/// Where each gauge lies, in mm.
+const LIE_MM: [f32; GAUGES] = [-1.9, -0.8, 0.0, 1.3, 2.2];
+
+/// The candidate nearest to a line.
+fn nearest(per_mm: f32) -> usize {
+    let away = |number: usize| (wavelength_mm(number) * per_mm.abs() - 1.0).abs();
+    (0..CANDIDATES)
+        .min_by(|&one, &other| away(one).total_cmp(&away(other)))
+        .unwrap()
+}
+
+/// A wave that a fingertip feels whose place hops to and fro, so many times a mm, by so many rad of the wave's phase.
+fn hopping(
+    wave_per_mm: f32,
+    hops_per_mm: f32,
+    depth: f32,
+    lie_mm: [f32; GAUGES],
+) -> impl Fn(f32, usize) -> f32 {
+    move |mm, gauge| {
+        let hop = depth * libm::sinf(TAU * hops_per_mm * mm);
+        300.0 * libm::sinf(TAU * wave_per_mm * (mm + lie_mm[gauge]) + hop)
+    }
+}
+
+#[test]
+fn the_wave_is_found_among_the_sidebands_of_a_hopping_fingertip() {
+    // Hops of 1.6 rad make sidebands at 0.714 ± 0.5 per mm that are half as strong again as the wave.
+    let (wave, lower, upper) = (nearest(0.714), nearest(0.214), nearest(1.214));
+    let (periodogram, spectrum) = averaged(hopping(0.714, 0.5, 1.6, LIE_MM));
+    assert!(spectrum[lower] > spectrum[wave] && spectrum[upper] > spectrum[wave]);
+    for line in [lower, wave, upper] {
+        assert_eq!(wave_of(&periodogram, &spectrum, line, ALL), wave, "{line}");
+    }
+    // Where all gauges lie at the same place, or there is one alone, another wave would look alike.
+    for line in [lower, upper] {
+        assert_eq!(wave_of(&periodogram, &spectrum, line, 1), line);
+    }
+    let (periodogram, spectrum) = averaged(hopping(0.714, 0.5, 1.6, [0.0; GAUGES]));
+    for line in [lower, upper] {
+        assert_eq!(wave_of(&periodogram, &spectrum, line, ALL), line);
+    }
+}
+
+#[test]
+fn other_waves_of_a_surface_are_no_sidebands() {
+    let lines = [(0.214, 1.2), (0.714, 1.0), (1.214, 1.2)];
+    let (periodogram, spectrum) = averaged(|mm, gauge| {
+        lines
+            .iter()
+            .map(|&(per_mm, share)| share * hopping(per_mm, 0.0, 0.0, LIE_MM)(mm, gauge))
+            .sum()
+    });
+    for (per_mm, _) in lines {
+        let line = nearest(per_mm);
+        assert_eq!(wave_of(&periodogram, &spectrum, line, ALL), line);
+    }
+}
+
+#[test]
+fn a_sideband_that_is_too_long_to_be_seen_is_missed_from_the_centre() {
+    // At 0.36 ± 0.4 per mm: the lower one is 23 mm long.
+    let (wave, upper) = (nearest(0.357), nearest(0.757));
+    let (periodogram, spectrum) = averaged(hopping(0.357, 0.4, 1.3, LIE_MM));
+    for line in [wave, upper] {
+        assert_eq!(wave_of(&periodogram, &spectrum, line, ALL), wave, "{line}");
+    }
+}
+
 fn trend(ln_mm: impl Fn(f32) -> f32, mut noise: impl FnMut() -> f32) -> (Trend, f32) {
     let (mut trend, mut mm) = (Trend::default(), 0.0);
     for step in 0..300 {

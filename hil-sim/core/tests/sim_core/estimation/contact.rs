@@ -138,3 +138,38 @@ fn a_stiffness_that_has_to_be_found_does_nearly_as_well() {
         assert!(share < 0.35, "{name}: {share}");
     }
 }
+
+/// Where the fingertip hops some 48 times a second a sideband is the strongest line of it.
+#[test]
+fn a_sideband_of_a_hopping_fingertip_is_not_taken_for_the_wave() {
+    // λ in mm, friction, speed in mm/s, and the share that is valid and right at least: at 90 mm/s nothing is.
+    let hops = [
+        (1.4, "mild", 35, 0.9),
+        (1.4, "mild", 75, 0.8),
+        (1.4, "mild", 90, 0.0),
+        (2.8, "mild", 90, 0.9),
+        (2.8, "strong", 55, 0.9),
+        (2.8, "strong", 70, 0.9),
+    ];
+    of_each(&hops, |&(wavelength_mm, friction, mm_s, least)| {
+        let text = format!(
+            "duration_s = 4
+            [surface]
+            specimens = [{{ wavelength_mm = {wavelength_mm} }}]
+            [motion]
+            speed_mm_s = {mm_s}
+            [contact]
+            model = \"stick-slip\"
+            friction = \"{friction}\"
+            [gauges]
+            snr_db = 20"
+        );
+        let name = format!("{wavelength_mm} mm, {friction}, {mm_s} mm/s");
+        let scene = Scene::parse(Path::new(&name), &text).unwrap();
+        let summary = run(scene).verdict.summary;
+        let wrong = summary.wrong_share.unwrap();
+        assert!(wrong < 0.001, "{name}: {wrong} wrong");
+        let valid = summary.valid_share.unwrap();
+        assert!(valid - wrong >= least, "{name}: {valid} valid");
+    });
+}
