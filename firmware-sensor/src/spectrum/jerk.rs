@@ -170,7 +170,7 @@ impl Jerk {
         let may_be = |n: usize| left(n) > explained * LEAST_JERKS[n];
         let is_slow = self.mean_speed < SLOW_PLACES;
         // Mostly there is no need to ask further.
-        if !may_be(1) && !(is_slow && may_be(0)) {
+        if !(may_be(1) || is_slow && may_be(0)) {
             return false;
         }
         let beyond_noise = |n: usize| larger(self.powers[n].mean - NOISE_GAINS[n] * noise, 0.0);
