@@ -12,8 +12,8 @@
 use super::periodogram::{CANDIDATES, Periodogram, Phasors, Spectrum, is_peak, wavelength_mm};
 use crate::float::{larger, smaller};
 
-/// A line beside which another one is so strong may be a sideband.
-const STRONG: f32 = 0.6;
+/// A line beside which another one has this share of its energy may be a sideband.
+const RIVAL: f32 = 0.6;
 /// Lines so much lower than this one move the centre too little to count.
 const LEAST: f32 = 0.1;
 /// Likeness from which on two lines are one wave's, and up to which their phases tell forwards from backwards: gauges at
@@ -50,7 +50,7 @@ pub(super) fn wave_of(
             .filter(move |&other| averaged[other] > share * own)
             .filter(move |&other| other.abs_diff(number) > FLANK && is_peak(averaged, other))
     };
-    if others(STRONG).next().is_none() {
+    if others(RIVAL).next().is_none() {
         return number;
     }
     let line = |number: usize, sign: f32| Line {

@@ -256,8 +256,6 @@ fn a_slope_lifts_no_long_wave() {
     assert!(long < 0.02 * energies[peak], "{long} {}", energies[peak]);
 }
 
-/// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind and off by `noise`, and of an average that
-/// is not.
 /// The averaged spectrum of what is felt on a straight path, and the bank behind it.
 fn averaged(felt: impl FnMut(f32, usize) -> f32) -> (Periodogram, [f32; CANDIDATES]) {
     let (_, mut periodogram) = path(3_000, 0.05, 3_000, felt);
@@ -334,6 +332,8 @@ fn a_sideband_that_is_too_long_to_be_seen_is_missed_from_the_centre() {
     }
 }
 
+/// A trend along strokes of 20 mm, of fits that are about a place 5 mm behind and off by `noise`, and of an average that
+/// is not.
 fn trend(ln_mm: impl Fn(f32) -> f32, mut noise: impl FnMut() -> f32) -> (Trend, f32) {
     let (mut trend, mut mm) = (Trend::default(), 0.0);
     for step in 0..300 {
