@@ -6,6 +6,17 @@ use crate::level::FULL;
 use crate::sine::ONE;
 use crate::{ACTUATORS, ZERO_VOLT};
 
+/// Each actuator plays a lane of its own.
+pub const EACH: [u8; ACTUATORS] = {
+    let mut each = [0; ACTUATORS];
+    let mut actuator = 0;
+    while actuator < ACTUATORS {
+        each[actuator] = actuator as u8;
+        actuator += 1;
+    }
+    each
+};
+
 /// The gains, negative for the opposite voltage.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
@@ -22,6 +33,11 @@ impl Array {
             gains_q30,
             alike: gains_q30.iter().all(|gain| *gain == gains_q30[0]),
         }
+    }
+
+    /// The gains in Q30, negative for the opposite voltage.
+    pub const fn gains_q30(&self) -> &[i32; ACTUATORS] {
+        &self.gains_q30
     }
 
     /// Whether gain and polarity of one actuator, of those there are, follow from its description.
@@ -147,17 +163,6 @@ mod tests {
 
     const QUARTER: u32 = 1 << 30;
     const NO_LIMIT: i32 = 65_536;
-    /// Each actuator plays a lane of its own.
-    const EACH: [u8; ACTUATORS] = {
-        let mut each = [0; ACTUATORS];
-        let mut actuator = 0;
-        while actuator < ACTUATORS {
-            each[actuator] = actuator as u8;
-            actuator += 1;
-        }
-        each
-    };
-
     fn offsets(array: &Array, level: u32, lanes: &[i32]) -> [i32; ACTUATORS] {
         let mut words = [ZERO_VOLT; ACTUATORS];
         array.draw(level, lanes, &EACH, NO_LIMIT, &mut words);

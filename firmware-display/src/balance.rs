@@ -15,7 +15,11 @@
 //! beyond its room, as after a slower wave, none is given for [`WORKING_S`]. What remains is a first-order
 //! high-pass, which brings the charge back to the middle, from where a wave does not come near its room.
 //! The charge of a channel is never beyond ± [`MOST_S`] times 5 V, so that whatever repeats has no
-//! mean at all; and what is too much is forgotten with [`TIME_CONSTANT_S`].
+//! mean at all; and what is too much is worked off with [`TIME_CONSTANT_S`].
+//!
+//! Channels that play the same lane have the same q, the lane's, since it counts before gains. A new description of the
+//! actuators takes each channel's charge along ([`Balance::carry`]). Where channels of different charges come to share
+//! a lane, each is balanced by itself from then on ([`Sharing::Each`]).
 
 use core::f64::consts::PI;
 
@@ -55,11 +59,37 @@ const LOOK_TICKS: u32 = 16;
 /// How long a charge beyond its room is worked off, in s: four time constants leave a 50th of it.
 pub const WORKING_S: f32 = 1.024;
 
+/// The most that a weaker gain makes of a charge, in its scale: so much that no room is left for more.
+const MOST_CARRIED: f32 = 1.5 * CHARGE as f32;
+
+/// Which channels have the same charge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// All: a single lane may stand for them.
+    All,
+    /// Those of a lane.
+    Lanes,
+    /// None, or none that helps.
+    Each,
+}
+
+/// How the channels get what they play.
+#[derive(Clone, Copy, Debug)]
+pub struct Channels<'a> {
+    /// Which lane each plays; the lanes are in the order of the first channels that play them.
+    pub lane_of: &'a [u8; ACTUATORS],
+    /// The gains in Q30, negative for the opposite voltage.
+    pub gains_q30: &'a [i32; ACTUATORS],
+}
+
 /// Each channel's charge.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Balance {
-    /// q: 2³⁰ is 5 V for τ; of all channels the first one's while they share a lane.
+    /// q, before gains: 2³⁰ is 5 V for τ. Of all channels, of each lane or of each channel, as they are shared.
     charges: [i32; ACTUATORS],
+    /// What each channel has besides, behind its gain: more than it can work off with that.
+    owed: [i32; ACTUATORS],
+    sharing: Sharing,
     /// What a charge may be, on its way to what it should.
     room: i32,
     /// Ticks for which no room is given, to bring charges back to the middle.
@@ -69,42 +99,83 @@ pub struct Balance {
     ticks: u32,
     /// 1 or −1, and 0 at first.
     direction: i32,
-    shared: bool,
 }
 
 impl Default for Balance {
     fn default() -> Self {
         Self {
             charges: [0; ACTUATORS],
+            owed: [0; ACTUATORS],
+            sharing: Sharing::All,
             room: MOST_ROOM as i32,
             working: 0,
             way: 0,
             ticks: 0,
             direction: 0,
-            shared: true,
         }
     }
 }
 
 impl Balance {
-    /// Forgets all charge.
-    pub fn clear(&mut self) {
-        *self = Self::default();
+    /// Which channels have the same charge.
+    pub const fn sharing(&self) -> Sharing {
+        self.sharing
     }
 
-    /// Whether one lane has stood for all channels since the balance was last cleared.
-    pub const fn is_shared(&self) -> bool {
-        self.shared
+    /// Takes each channel's charge along from how it was played to how it is going to be. While nothing is played.
+    pub fn carry(&mut self, before: Channels<'_>, after: Channels<'_>) {
+        let mut charges = [0; ACTUATORS];
+        for (channel, new) in charges.iter_mut().enumerate() {
+            let place = match self.sharing {
+                Sharing::All => 0,
+                Sharing::Lanes => usize::from(before.lane_of[channel]),
+                Sharing::Each => channel,
+            };
+            let charge = self.charges.get(place).copied().unwrap_or(0);
+            let [gain, next] = [before, after].map(|channels| channels.gains_q30[channel]);
+            if gain == next {
+                *new = charge;
+                continue;
+            }
+            let owed = &mut self.owed[channel];
+            *owed += behind(gain, charge);
+            if next != 0 {
+                let wanted = *owed as f32 / next as f32 * CHARGE as f32;
+                *new = wanted.clamp(-MOST_CARRIED, MOST_CARRIED) as i32;
+            }
+            *owed -= behind(next, *new);
+        }
+        self.share(charges, after.lane_of);
+    }
+
+    /// Takes charges of each channel, shared as far as they are alike.
+    fn share(&mut self, charges: [i32; ACTUATORS], lane_of: &[u8; ACTUATORS]) {
+        self.sharing = Sharing::Lanes;
+        let mut lanes = 0;
+        for (charge, lane) in charges.iter().zip(lane_of) {
+            let lane = usize::from(*lane);
+            if lane == lanes {
+                self.charges[lane] = *charge;
+                lanes += 1;
+            } else if self.charges.get(lane) != Some(charge) {
+                self.sharing = Sharing::Each;
+            }
+        }
+        if self.sharing == Sharing::Each {
+            self.charges = charges;
+        } else if charges.iter().all(|charge| *charge == charges[0]) {
+            self.sharing = Sharing::All;
+        }
     }
 
     /// Takes what works off too much charge off each of `lanes` (Q28, within ± [`ONE`]), to within
     /// ± [`ONE`] again. `gain` (Q30, 0 to 2³⁰, which is 5 V) is what they are going to be multiplied with, `turn` by how
-    /// much the wave turns in a tick, in turns / 2³². A single lane stands for all channels, and only may
-    /// while [`Balance::is_shared`].
+    /// much the wave turns in a tick, in turns / 2³². There are as many lanes as [`Balance::sharing`] says: a single one
+    /// stands for all channels; more than that while all are shared part them into lanes.
     pub fn remove(&mut self, lanes: &mut [i32], gain: u32, turn: i32, rate: UpdateRate) {
-        if self.shared && lanes.len() > 1 {
+        if self.sharing == Sharing::All && lanes.len() > 1 {
             self.charges = [self.charges[0]; ACTUATORS];
-            self.shared = false;
+            self.sharing = Sharing::Lanes;
         }
         let (shift, room_and_turn) = match rate {
             UpdateRate::Hz2000 => (SHIFT, ROOM_AND_TURN),
@@ -161,6 +232,11 @@ impl Balance {
     fn work_off(&mut self, rate: UpdateRate) {
         self.working = (WORKING_S * rate.hz() as f32) as u32;
     }
+}
+
+/// A charge behind a gain.
+fn behind(gain_q30: i32, charge: i32) -> i32 {
+    ((i64::from(gain_q30) * i64::from(charge)) >> 30) as i32
 }
 
 #[cfg(test)]
@@ -326,9 +402,76 @@ mod tests {
         let mut balance = Balance::default();
         (0..600).for_each(|_| balance.remove(&mut [ONE / 2], OPEN, 0, UpdateRate::Hz2000));
         let mut lanes = [ONE / 2; ACTUATORS];
-        assert!(balance.is_shared());
+        assert_eq!(balance.sharing(), Sharing::All);
         balance.remove(&mut lanes, OPEN, 0, UpdateRate::Hz2000);
-        assert!(!balance.is_shared());
+        assert_eq!(balance.sharing(), Sharing::Lanes);
         assert!(lanes.iter().all(|&lane| lane == lanes[0] && lane < ONE / 2));
+    }
+
+    /// Lanes of two channels each; gains of 1, but `gain` of the first two.
+    fn channels(gain: i32) -> ([u8; ACTUATORS], [i32; ACTUATORS]) {
+        let mut gains = [1 << 30; ACTUATORS];
+        gains[..2].fill(gain);
+        (core::array::from_fn(|channel| channel as u8 / 2), gains)
+    }
+
+    #[test]
+    fn a_charge_goes_along_through_other_gains_and_back() {
+        for gain in [1 << 29, 1 << 20, 1 << 15, 0, -1 << 30, -1 << 15] {
+            let mut balance = Balance::default();
+            let lane = |lane: i32| ONE / 30 * (lane - 12);
+            for _ in 0..400 {
+                let mut lanes: [i32; ACTUATORS / 2] = core::array::from_fn(|n| lane(n as i32));
+                balance.remove(&mut lanes, OPEN, 0, UpdateRate::Hz2000);
+            }
+            let [(lane_of, whole), (_, other)] = [1 << 30, gain].map(channels);
+            let [first, second] = [&whole, &other].map(|gains_q30| Channels {
+                lane_of: &lane_of,
+                gains_q30,
+            });
+            let before = balance.clone();
+            assert!(before.charges[0] < -(1 << 28));
+            balance.carry(first, second);
+            assert_eq!(balance.sharing(), Sharing::Lanes);
+            assert_eq!(balance.charges[1..25], before.charges[1..25]);
+            // All of it is there, and of the right sign; no more than can be worked off is with the lane.
+            let carried = i64::from(behind(gain, balance.charges[0])) + i64::from(balance.owed[0]);
+            assert!(
+                (carried - i64::from(before.charges[0])).abs() <= 2,
+                "{gain}"
+            );
+            assert!(i64::from(balance.charges[0]) * i64::from(gain) <= 0);
+            assert!(balance.charges[0].abs() <= MOST_CARRIED as i32);
+            balance.carry(second, first);
+            assert!(
+                balance.charges[0].abs_diff(before.charges[0]) <= 64,
+                "{gain}"
+            );
+            assert!(balance.owed[0].abs() <= 64);
+        }
+    }
+
+    #[test]
+    fn channels_share_a_lane_only_while_their_charges_are_alike() {
+        let (pairs, gains) = channels(1 << 30);
+        let mut halves = [0; ACTUATORS];
+        halves[25..].fill(1);
+        let of = |lane_of| Channels {
+            lane_of,
+            gains_q30: &gains,
+        };
+        let mut balance = Balance::default();
+        balance.carry(of(&pairs), of(&halves));
+        assert_eq!(balance.sharing(), Sharing::All);
+        balance.remove(&mut [ONE, -ONE], OPEN, 0, UpdateRate::Hz2000);
+        let [up, down, ..] = balance.charges;
+        // The middle pair has a channel of either half.
+        balance.carry(of(&halves), of(&pairs));
+        assert_eq!(balance.sharing(), Sharing::Each);
+        assert!(balance.charges[..25].iter().all(|charge| *charge == up));
+        assert!(balance.charges[25..].iter().all(|charge| *charge == down));
+        balance.carry(of(&pairs), of(&halves));
+        assert_eq!(balance.sharing(), Sharing::Lanes);
+        assert_eq!(balance.charges[..2], [up, down]);
     }
 }

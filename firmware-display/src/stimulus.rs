@@ -17,8 +17,8 @@
 use protocol::actuators::Actuator;
 use protocol::{DisplayConfiguration, Friction, Mode, Rendering, Texture, UpdateRate};
 
-use crate::array::Array;
-use crate::balance::Balance;
+use crate::array::{Array, EACH};
+use crate::balance::{Balance, Channels, Sharing};
 use crate::gate::Gate;
 use crate::level::Level;
 use crate::pattern::Pattern;
@@ -179,10 +179,13 @@ impl Stimulus {
         self.pattern.glide();
         // In phase they play the same sine, wherever they are.
         let one = self.skin.lanes() == 1 || (is_sine && self.pattern.is_flat());
-        let shared = one && self.balance.is_shared();
         let most = self.most_steps();
-        let count = if shared { 1 } else { self.skin.lanes() };
-        let lanes = self.lanes.get_mut(..count).unwrap_or_default();
+        let sharing = self.balance.sharing();
+        let count = match sharing {
+            Sharing::All if one => 1,
+            _ => self.skin.lanes(),
+        };
+        let mut lanes = self.lanes.get_mut(..count).unwrap_or_default();
         let turns = self.phase.turns();
         if is_sine {
             self.pattern.sines(turns, lanes);
@@ -190,11 +193,16 @@ impl Stimulus {
             self.skin
                 .play(&self.wave, &self.pattern, turns, self.place_um, lanes);
         }
+        let mut lane_of = self.skin.lane_of();
+        if sharing == Sharing::Each {
+            part(&mut self.lanes, lane_of);
+            lanes = &mut self.lanes;
+            lane_of = &EACH;
+        }
         let amplitude = self.level.part_of_full(gain);
         self.balance
             .remove(lanes, amplitude, self.level.turn(), self.rate);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
-        let lane_of = self.skin.lane_of();
         let changed = self
             .array
             .draw(level as u32, lanes, lane_of, most, &mut self.words);
@@ -226,6 +234,7 @@ impl Stimulus {
     /// Ends what is under way, while nobody feels it.
     fn settle(&mut self) {
         if let Some(description) = self.waiting.take() {
+            let (array, lane_of) = (self.array.clone(), *self.skin.lane_of());
             self.array = Array::new(&description.actuators);
             self.pattern = Pattern::new(description.mode, &description.actuators);
             self.skin = Skin::new(description.rendering, &description.actuators, &self.pattern);
@@ -233,7 +242,15 @@ impl Stimulus {
             if let Some(wavelength) = self.wavelength {
                 self.pattern.aim(wavelength.phase_per_micrometre(), 1);
             }
-            self.balance.clear();
+            let before = Channels {
+                lane_of: &lane_of,
+                gains_q30: array.gains_q30(),
+            };
+            let after = Channels {
+                lane_of: self.skin.lane_of(),
+                gains_q30: self.array.gains_q30(),
+            };
+            self.balance.carry(before, after);
             self.description = description;
         }
         self.phase.settle();
@@ -277,8 +294,15 @@ impl Stimulus {
     pub fn silence(&mut self) {
         self.words = [ZERO_VOLT; ACTUATORS];
         self.gate.shut();
-        self.balance.clear();
         self.silent = true;
+    }
+}
+
+/// Gives each actuator its lane.
+fn part(lanes: &mut [i32; ACTUATORS], lane_of: &[u8; ACTUATORS]) {
+    // From the last on: no lane is later than its first actuator.
+    for (actuator, lane) in lane_of.iter().enumerate().rev() {
+        lanes[actuator] = lanes.get(usize::from(*lane)).copied().unwrap_or(0);
     }
 }
 

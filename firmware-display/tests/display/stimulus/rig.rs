@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use firmware_display::phase::Wavelength;
 use firmware_display::{ACTUATORS, Stimulus};
 use protocol::actuators::{Actuator, DEFAULT_ACTUATORS};
-use protocol::{DisplayConfiguration, Mode, UpdateRate};
+use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
 pub const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
 pub const MODES: [Mode; 2] = [Mode::Uniform, Mode::Travelling];
@@ -65,6 +65,27 @@ impl Rig {
     pub fn configure(&mut self, configuration: DisplayConfiguration) {
         self.configuration = configuration;
         self.stimulus.configure(&configuration, &self.actuators);
+    }
+
+    /// Another mode and rendering, and other actuators; `draw` is below its argument.
+    pub fn describe(&mut self, draw: &mut impl FnMut(u32) -> u32) {
+        let mut configuration = self.configuration;
+        configuration.mode = MODES[draw(2) as usize];
+        configuration.rendering =
+            [Rendering::Fundamental, Rendering::Shape, Rendering::Texture][draw(3) as usize];
+        let [alike, modelled] = [draw(2), draw(2)].map(|drawn| drawn == 0);
+        self.actuators = DEFAULT_ACTUATORS;
+        for actuator in &mut self.actuators {
+            if !alike {
+                actuator.gain_q15 = [0, 1, 330, 16_384, 32_768][draw(5) as usize];
+                actuator.inverted = draw(2) == 0;
+                actuator.phase = 8_192 * draw(8) as u16;
+            }
+            if modelled {
+                actuator.resonance_dhz = 1_800 + 100 * draw(4) as u16;
+            }
+        }
+        self.configure(configuration);
     }
 
     pub fn tick(&mut self, counts: i16) -> Volts {

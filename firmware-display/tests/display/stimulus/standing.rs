@@ -264,6 +264,53 @@ fn however_the_hand_moves_the_integral_stays_bounded() {
     }
 }
 
+/// The same while the actuators' mode, rendering, gains, polarities and models change each second, and CLR takes all to
+/// 0 V now and then: no charge is forgotten.
+#[test]
+fn whatever_is_described_meanwhile_the_integral_stays_bounded() {
+    let mut worst = 0.0_f64;
+    for rate in RATES {
+        for hand in [Hand::Bursts, Hand::Wobble] {
+            let mut rig = Rig::new(Mode::Uniform, rate);
+            rig.follow(2.0);
+            let mut integrals = [0.0; firmware_display::ACTUATORS];
+            let mut random = 12_345_u32;
+            let mut draw = move |count: u32| {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (random >> 8) % count
+            };
+            let second = rig.ticks(1.0);
+            for tick in 0..60 * second {
+                if tick % second == 0 {
+                    rig.describe(&mut draw);
+                } else if tick % (7 * second) == 100 {
+                    rig.stimulus.silence();
+                }
+                let counts = match hand {
+                    Hand::Bursts if tick / 200 % 2 == 0 => draw(15) as i16 - 7,
+                    Hand::Bursts => 0,
+                    Hand::Wobble => {
+                        let target_mm = 0.5 + 0.15 * (TAU * 5.0 * tick as f64 / rig.hz()).sin();
+                        ((target_mm - rig.position_mm()) / 0.005).round() as i16
+                    }
+                };
+                for (integral, volt) in integrals.iter_mut().zip(rig.tick(counts)) {
+                    *integral += volt / rig.hz();
+                    worst = worst.max(integral.abs());
+                }
+            }
+        }
+    }
+    println!("described anew: {worst:.3} V s at most");
+    let rounding = VOLT_PER_STEP / 2.0 * 60.0;
+    assert!(worst <= 5.0 * MOST_S + rounding, "{worst} V s");
+}
+
+enum Hand {
+    Bursts,
+    Wobble,
+}
+
 #[test]
 fn the_stimulus_is_in_step_with_the_motion() {
     for rate in RATES {
