@@ -17,9 +17,12 @@
 //! The charge of a channel is never beyond ± [`MOST_S`] times 5 V, so that whatever repeats has no
 //! mean at all; and what is too much is worked off with [`TIME_CONSTANT_S`].
 //!
+//! What is beyond a tick's limit of steepness is cut off here, before it is counted: a charge is that of what goes out.
+//!
 //! Channels that play the same lane have the same q, the lane's, since it counts before gains. A new description of the
 //! actuators takes each channel's charge along ([`Balance::carry`]). Where channels of different charges come to share
-//! a lane, each is balanced by itself from then on ([`Sharing::Each`]).
+//! a lane, each is balanced by itself until at a rest their charges are alike ([`Sharing::Each`], [`Balance::meet`]). So
+//! that they get alike, none is given room for [`MEETING_S`].
 
 use core::f64::consts::PI;
 
@@ -62,6 +65,11 @@ pub const WORKING_S: f32 = 1.024;
 /// The most that a weaker gain makes of a charge, in its scale: so much that no room is left for more.
 const MOST_CARRIED: f32 = 1.5 * CHARGE as f32;
 
+/// Charges that differ by no more, by 0.16 mV·s, are alike.
+const ALIKE: u32 = 1 << 17;
+/// After so long at full amplitude, in s, the most different charges are alike: τ ln(2 · 1.5 · 2³⁰ / 2¹⁷).
+pub const MEETING_S: f32 = 10.2 * TIME_CONSTANT_S as f32;
+
 /// Which channels have the same charge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sharing {
@@ -71,6 +79,19 @@ pub enum Sharing {
     Lanes,
     /// None, or none that helps.
     Each,
+}
+
+/// What becomes of the lanes in a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Drive {
+    /// What they are going to be multiplied with, in Q30: 0 to 2³⁰, which is 5 V.
+    pub gain: u32,
+    /// By how much the wave turns, in turns / 2³².
+    pub turn: i32,
+    /// The most that a channel's voltage changes by, in steps of its DAC: 1 to 65 536, which are 10 V.
+    pub most_steps: i32,
+    /// So many ticks there are.
+    pub rate: UpdateRate,
 }
 
 /// How the channels get what they play.
@@ -89,6 +110,8 @@ pub struct Balance {
     charges: [i32; ACTUATORS],
     /// What each channel has besides, behind its gain: more than it can work off with that.
     owed: [i32; ACTUATORS],
+    /// What went out in the tick before, for each of `charges`: 2²⁹ is 5 V.
+    voltages: [i32; ACTUATORS],
     sharing: Sharing,
     /// What a charge may be, on its way to what it should.
     room: i32,
@@ -106,6 +129,7 @@ impl Default for Balance {
         Self {
             charges: [0; ACTUATORS],
             owed: [0; ACTUATORS],
+            voltages: [0; ACTUATORS],
             sharing: Sharing::All,
             room: MOST_ROOM as i32,
             working: 0,
@@ -122,8 +146,13 @@ impl Balance {
         self.sharing
     }
 
-    /// Takes each channel's charge along from how it was played to how it is going to be. While nothing is played.
-    pub fn carry(&mut self, before: Channels<'_>, after: Channels<'_>) {
+    /// All outputs have gone to 0 V.
+    pub const fn silence(&mut self) {
+        self.voltages = [0; ACTUATORS];
+    }
+
+    /// Takes each channel's charge along from how it was played to how it is going to be, while nothing is played.
+    pub fn carry(&mut self, before: Channels<'_>, after: Channels<'_>, rate: UpdateRate) {
         let mut charges = [0; ACTUATORS];
         for (channel, new) in charges.iter_mut().enumerate() {
             let place = match self.sharing {
@@ -133,11 +162,11 @@ impl Balance {
             };
             let charge = self.charges.get(place).copied().unwrap_or(0);
             let [gain, next] = [before, after].map(|channels| channels.gains_q30[channel]);
-            if gain == next {
+            let owed = &mut self.owed[channel];
+            if gain == next && *owed == 0 {
                 *new = charge;
                 continue;
             }
-            let owed = &mut self.owed[channel];
             *owed += behind(gain, charge);
             if next != 0 {
                 let wanted = *owed as f32 / next as f32 * CHARGE as f32;
@@ -145,36 +174,61 @@ impl Balance {
             }
             *owed -= behind(next, *new);
         }
-        self.share(charges, after.lane_of);
+        self.share(charges, after, rate);
+        self.silence();
+    }
+
+    /// Lets channels share their lanes if by now they have charges alike; while nothing is played.
+    pub fn meet(&mut self, channels: Channels<'_>, rate: UpdateRate) {
+        if self.sharing == Sharing::Each {
+            self.share(self.charges, channels, rate);
+        }
     }
 
     /// Takes charges of each channel, shared as far as they are alike.
-    fn share(&mut self, charges: [i32; ACTUATORS], lane_of: &[u8; ACTUATORS]) {
-        self.sharing = Sharing::Lanes;
-        let mut lanes = 0;
-        for (charge, lane) in charges.iter().zip(lane_of) {
-            let lane = usize::from(*lane);
-            if lane == lanes {
-                self.charges[lane] = *charge;
-                lanes += 1;
-            } else if self.charges.get(lane) != Some(charge) {
-                self.sharing = Sharing::Each;
+    fn share(&mut self, charges: [i32; ACTUATORS], channels: Channels<'_>, rate: UpdateRate) {
+        let mut ranges: [Option<(i32, i32)>; ACTUATORS] = [None; ACTUATORS];
+        for (&charge, &lane) in charges.iter().zip(channels.lane_of) {
+            if let Some(range) = ranges.get_mut(usize::from(lane)) {
+                let (low, high) = range.unwrap_or((charge, charge));
+                *range = Some((low.min(charge), high.max(charge)));
             }
         }
-        if self.sharing == Sharing::Each {
+        let widest = ranges
+            .iter()
+            .flatten()
+            .map(|(low, high)| high.abs_diff(*low));
+        if widest.max() > Some(ALIKE) {
+            self.sharing = Sharing::Each;
             self.charges = charges;
-        } else if charges.iter().all(|charge| *charge == charges[0]) {
-            self.sharing = Sharing::All;
+            self.work_off(MEETING_S, rate);
+            return;
+        }
+        self.charges = ranges.map(|range| range.map_or(0, |(low, high)| low.midpoint(high)));
+        let first = self.charges[0];
+        let mut lanes = ranges.iter().zip(&self.charges);
+        let all = lanes.all(|(range, charge)| range.is_none() || *charge == first);
+        self.sharing = if all { Sharing::All } else { Sharing::Lanes };
+        for (channel, owed) in self.owed.iter_mut().enumerate() {
+            let of_lane = self.charges.get(usize::from(channels.lane_of[channel]));
+            let differs = charges[channel] - of_lane.copied().unwrap_or(0);
+            *owed += behind(channels.gains_q30[channel], differs);
         }
     }
 
-    /// Takes what works off too much charge off each of `lanes` (Q28, within ± [`ONE`]), to within
-    /// ± [`ONE`] again. `gain` (Q30, 0 to 2³⁰, which is 5 V) is what they are going to be multiplied with, `turn` by how
-    /// much the wave turns in a tick, in turns / 2³². There are as many lanes as [`Balance::sharing`] says: a single one
+    /// Takes what works off too much charge off each of `lanes` (Q28, within ± [`ONE`]), and what is too steep, to within
+    /// ± [`ONE`] again. There are as many lanes as [`Balance::sharing`] says: a single one
     /// stands for all channels; more than that while all are shared part them into lanes.
-    pub fn remove(&mut self, lanes: &mut [i32], gain: u32, turn: i32, rate: UpdateRate) {
+    pub fn remove(&mut self, lanes: &mut [i32], drive: Drive) {
+        let Drive {
+            gain,
+            turn,
+            most_steps,
+            rate,
+        } = drive;
         if self.sharing == Sharing::All && lanes.len() > 1 {
             self.charges = [self.charges[0]; ACTUATORS];
+            self.voltages = [self.voltages[0]; ACTUATORS];
             self.sharing = Sharing::Lanes;
         }
         let (shift, room_and_turn) = match rate {
@@ -192,19 +246,28 @@ impl Balance {
         let room = self.room;
         // gain/τ in Q34.
         let part = i64::from(gain >> (shift - 4));
-        for (lane, charge) in lanes.iter_mut().zip(&mut self.charges) {
+        let most = most_steps << VOLTAGE_BITS_OF_A_STEP;
+        let charges = self.charges.iter_mut().zip(&mut self.voltages);
+        for (lane, (charge, before)) in lanes.iter_mut().zip(charges) {
             let beyond = *charge - (*charge).clamp(-room, room);
             // What is beyond may ask for more than there is.
-            let rest = (*lane - (beyond >> 2)).clamp(-ONE, ONE - 1);
-            // Rounded to the nearest, so that no charge comes of rounding.
-            *charge += ((i64::from(rest) * part + (1 << 31)) >> 32) as i32;
+            let mut rest = (*lane - (beyond >> 2)).clamp(-ONE, ONE - 1);
+            let mut added = added_by(rest, part);
+            let voltage = added << (shift - 1);
+            if (voltage - *before).abs() > most {
+                let steepest = *before + (voltage - *before).clamp(-most, most);
+                rest = lane_of(steepest, gain);
+                added = added_by(rest, part);
+            }
+            *charge += added;
+            *before = added << (shift - 1);
             *lane = rest;
         }
         if self.ticks.is_multiple_of(LOOK_TICKS) && self.working == 0 {
             // Not beyond the room as it is: that may still be growing.
             let charges = &self.charges[..lanes.len()];
             if charges.iter().any(|charge| charge.abs() > needed) {
-                self.work_off(rate);
+                self.work_off(WORKING_S, rate);
             }
         }
     }
@@ -212,7 +275,7 @@ impl Balance {
     /// Looks whether the wave gets on, once in a period of the slowest, and does not turn back.
     fn watch(&mut self, turn: i32, rate: UpdateRate) {
         if turn.signum() * self.direction < 0 {
-            self.work_off(rate);
+            self.work_off(WORKING_S, rate);
         }
         if turn != 0 {
             self.direction = turn.signum();
@@ -221,7 +284,7 @@ impl Balance {
         self.ticks += 1;
         if self.ticks >= rate.hz() / SLOWEST_HZ as u32 {
             if self.way.unsigned_abs() < ENOUGH {
-                self.work_off(rate);
+                self.work_off(WORKING_S, rate);
             }
             self.way = 0;
             self.ticks = 0;
@@ -229,9 +292,26 @@ impl Balance {
     }
 
     /// No room is given for a while.
-    fn work_off(&mut self, rate: UpdateRate) {
-        self.working = (WORKING_S * rate.hz() as f32) as u32;
+    fn work_off(&mut self, seconds: f32, rate: UpdateRate) {
+        self.working = self.working.max((seconds * rate.hz() as f32) as u32);
     }
+}
+
+/// Steps of the DAC in [`Balance::voltages`] are shifted by so many bits: 2¹⁵ are 5 V.
+const VOLTAGE_BITS_OF_A_STEP: u32 = 29 - 15;
+
+/// What a lane adds to a charge in a tick, `part` of it. Rounded to the nearest, so that no charge comes of rounding.
+#[inline]
+fn added_by(lane: i32, part: i64) -> i32 {
+    ((i64::from(lane) * part + (1 << 31)) >> 32) as i32
+}
+
+/// The lane that gives a voltage of [`Balance::voltages`], or what is nearest to it.
+#[cold]
+fn lane_of(voltage: i32, gain: u32) -> i32 {
+    // Without a gain none is given.
+    let lane = voltage as f32 / gain.max(1) as f32 * (1 << 29) as f32;
+    (lane as i32).clamp(-ONE, ONE - 1)
 }
 
 /// A charge behind a gain.
@@ -246,6 +326,16 @@ mod tests {
 
     use super::*;
     use crate::gate::OPEN;
+
+    /// As steep as can be.
+    const fn drive(gain: u32, turn: i32, rate: UpdateRate) -> Drive {
+        Drive {
+            gain,
+            turn,
+            most_steps: 65_536,
+            rate,
+        }
+    }
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
 
@@ -265,12 +355,8 @@ mod tests {
                 let mut lane = [((TAU * turns(t)).sin() * f64::from(ONE)) as i32];
                 let turn = (turns(t) - turns(t - 1.0 / hz)) * crate::phase::TURN;
                 let gain = gain(t);
-                balance.remove(
-                    &mut lane,
-                    (gain * f64::from(OPEN)) as u32,
-                    turn as i32,
-                    rate,
-                );
+                let gain_q30 = (gain * f64::from(OPEN)) as u32;
+                balance.remove(&mut lane, drive(gain_q30, turn as i32, rate));
                 gain * f64::from(lane[0]) / f64::from(ONE)
             })
             .collect()
@@ -346,7 +432,7 @@ mod tests {
             for tick in 0..8 * rate.hz() {
                 let crest = tick / (4 * rate.hz()) == 0;
                 let mut lane = [if crest { ONE - 1 } else { -ONE }];
-                balance.remove(&mut lane, OPEN, turn, rate);
+                balance.remove(&mut lane, drive(OPEN, turn, rate));
                 charge_s += f64::from(lane[0]) / f64::from(ONE) / f64::from(rate.hz());
                 most_s = most_s.max(charge_s.abs());
             }
@@ -365,7 +451,7 @@ mod tests {
             for turn in [1 << 29, 0, 1 << 29] {
                 for _ in 0..2 * rate.hz() {
                     let before = balance.room;
-                    balance.remove(&mut [0], OPEN, turn, rate);
+                    balance.remove(&mut [0], drive(OPEN, turn, rate));
                     let most = f64::from(MOST_ROOM) / ticks + 2.0;
                     assert!(f64::from((before - balance.room).abs()) <= most);
                 }
@@ -400,10 +486,10 @@ mod tests {
     #[test]
     fn lanes_that_were_shared_part_from_where_they_were() {
         let mut balance = Balance::default();
-        (0..600).for_each(|_| balance.remove(&mut [ONE / 2], OPEN, 0, UpdateRate::Hz2000));
+        (0..600).for_each(|_| balance.remove(&mut [ONE / 2], drive(OPEN, 0, UpdateRate::Hz2000)));
         let mut lanes = [ONE / 2; ACTUATORS];
         assert_eq!(balance.sharing(), Sharing::All);
-        balance.remove(&mut lanes, OPEN, 0, UpdateRate::Hz2000);
+        balance.remove(&mut lanes, drive(OPEN, 0, UpdateRate::Hz2000));
         assert_eq!(balance.sharing(), Sharing::Lanes);
         assert!(lanes.iter().all(|&lane| lane == lanes[0] && lane < ONE / 2));
     }
@@ -422,7 +508,7 @@ mod tests {
             let lane = |lane: i32| ONE / 30 * (lane - 12);
             for _ in 0..400 {
                 let mut lanes: [i32; ACTUATORS / 2] = core::array::from_fn(|n| lane(n as i32));
-                balance.remove(&mut lanes, OPEN, 0, UpdateRate::Hz2000);
+                balance.remove(&mut lanes, drive(OPEN, 0, UpdateRate::Hz2000));
             }
             let [(lane_of, whole), (_, other)] = [1 << 30, gain].map(channels);
             let [first, second] = [&whole, &other].map(|gains_q30| Channels {
@@ -431,7 +517,7 @@ mod tests {
             });
             let before = balance.clone();
             assert!(before.charges[0] < -(1 << 28));
-            balance.carry(first, second);
+            balance.carry(first, second, UpdateRate::Hz2000);
             assert_eq!(balance.sharing(), Sharing::Lanes);
             assert_eq!(balance.charges[1..25], before.charges[1..25]);
             // All of it is there, and of the right sign; no more than can be worked off is with the lane.
@@ -442,7 +528,7 @@ mod tests {
             );
             assert!(i64::from(balance.charges[0]) * i64::from(gain) <= 0);
             assert!(balance.charges[0].abs() <= MOST_CARRIED as i32);
-            balance.carry(second, first);
+            balance.carry(second, first, UpdateRate::Hz2000);
             assert!(
                 balance.charges[0].abs_diff(before.charges[0]) <= 64,
                 "{gain}"
@@ -461,17 +547,31 @@ mod tests {
             gains_q30: &gains,
         };
         let mut balance = Balance::default();
-        balance.carry(of(&pairs), of(&halves));
+        balance.carry(of(&pairs), of(&halves), UpdateRate::Hz2000);
         assert_eq!(balance.sharing(), Sharing::All);
-        balance.remove(&mut [ONE, -ONE], OPEN, 0, UpdateRate::Hz2000);
+        balance.remove(&mut [ONE, -ONE], drive(OPEN, 0, UpdateRate::Hz2000));
         let [up, down, ..] = balance.charges;
         // The middle pair has a channel of either half.
-        balance.carry(of(&halves), of(&pairs));
+        balance.carry(of(&halves), of(&pairs), UpdateRate::Hz2000);
         assert_eq!(balance.sharing(), Sharing::Each);
         assert!(balance.charges[..25].iter().all(|charge| *charge == up));
         assert!(balance.charges[25..].iter().all(|charge| *charge == down));
-        balance.carry(of(&pairs), of(&halves));
+        balance.carry(of(&pairs), of(&halves), UpdateRate::Hz2000);
         assert_eq!(balance.sharing(), Sharing::Lanes);
         assert_eq!(balance.charges[..2], [up, down]);
+        // And alike they become, when they have been played for a while.
+        balance.carry(of(&halves), of(&pairs), UpdateRate::Hz2000);
+        for second in 0..3 {
+            balance.meet(of(&pairs), UpdateRate::Hz2000);
+            assert_eq!(balance.sharing(), Sharing::Each, "{second} s");
+            for tick in 0..2_000 {
+                let turns = tick << 28;
+                let mut lanes = [crate::sine::sine(turns); ACTUATORS];
+                balance.remove(&mut lanes, drive(OPEN, 1 << 28, UpdateRate::Hz2000));
+            }
+        }
+        balance.meet(of(&pairs), UpdateRate::Hz2000);
+        assert_eq!(balance.sharing(), Sharing::All);
+        assert!(balance.charges[0].unsigned_abs() < ALIKE);
     }
 }

@@ -198,7 +198,7 @@ mod tests {
     use core::f64::consts::TAU;
 
     use super::*;
-    use crate::balance::{Balance, MOST_S};
+    use crate::balance::{Balance, Drive, MOST_S};
     use crate::sine::ONE;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
@@ -253,7 +253,13 @@ mod tests {
             for tick in 0..20 * rate.hz() {
                 let crest = tick / (2 * rate.hz()) % 2 == 0;
                 let mut lane = [if crest { ONE - 1 } else { -ONE }];
-                balance.remove(&mut lane, 1 << 30, 0, rate);
+                let drive = Drive {
+                    gain: 1 << 30,
+                    turn: 0,
+                    most_steps: 65_536,
+                    rate,
+                };
+                balance.remove(&mut lane, drive);
                 let y = 5.0 * f64::from(lane[0]) / f64::from(ONE);
                 let words = [word(y); ACTUATORS];
                 // The steps of s are no hand's.

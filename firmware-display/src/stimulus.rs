@@ -18,7 +18,7 @@ use protocol::actuators::Actuator;
 use protocol::{DisplayConfiguration, Friction, Mode, Rendering, Texture, UpdateRate};
 
 use crate::array::{Array, EACH};
-use crate::balance::{Balance, Channels, Sharing};
+use crate::balance::{Balance, Channels, Drive, Sharing};
 use crate::gate::Gate;
 use crate::level::Level;
 use crate::pattern::Pattern;
@@ -177,13 +177,18 @@ impl Stimulus {
             return false;
         }
         self.pattern.glide();
+        let (lanes, mut lane_of) = if is_sine {
+            (self.pattern.places(), self.pattern.place_of())
+        } else {
+            (self.skin.lanes(), self.skin.lane_of())
+        };
         // In phase they play the same sine, wherever they are.
-        let one = self.skin.lanes() == 1 || (is_sine && self.pattern.is_flat());
+        let one = lanes == 1 || (is_sine && self.pattern.is_flat());
         let most = self.most_steps();
         let sharing = self.balance.sharing();
         let count = match sharing {
             Sharing::All if one => 1,
-            _ => self.skin.lanes(),
+            _ => lanes,
         };
         let mut lanes = self.lanes.get_mut(..count).unwrap_or_default();
         let turns = self.phase.turns();
@@ -193,15 +198,19 @@ impl Stimulus {
             self.skin
                 .play(&self.wave, &self.pattern, turns, self.place_um, lanes);
         }
-        let mut lane_of = self.skin.lane_of();
         if sharing == Sharing::Each {
             part(&mut self.lanes, lane_of);
             lanes = &mut self.lanes;
             lane_of = &EACH;
         }
-        let amplitude = self.level.part_of_full(gain);
-        self.balance
-            .remove(lanes, amplitude, self.level.turn(), self.rate);
+        let drive = Drive {
+            gain: self.level.part_of_full(gain),
+            turn: self.level.turn(),
+            // The words' own limit is for nothing but a fault of memory.
+            most_steps: most - 2,
+            rate: self.rate,
+        };
+        self.balance.remove(lanes, drive);
         let level = (u64::from(self.level.amplitude()) * u64::from(gain)) >> 30;
         let changed = self
             .array
@@ -210,9 +219,13 @@ impl Stimulus {
         changed
     }
 
-    /// Whether the words are the sine itself, and no wave has to be worked out.
+    /// Whether the words are the sine itself, and no wave has to be worked out. Where more is asked for at several places
+    /// there is no time to balance each channel by itself: as long as that is needed there is the sine alone.
     fn is_sine(&self) -> bool {
-        self.description.rendering == Rendering::Fundamental && self.skin.is_bare()
+        let is_asked_for =
+            self.description.rendering == Rendering::Fundamental && self.skin.is_bare();
+        let has_no_time = self.balance.sharing() == Sharing::Each && self.pattern.places() > 1;
+        is_asked_for || has_no_time
     }
 
     /// What all lanes are multiplied with in this tick, in Q30.
@@ -250,8 +263,14 @@ impl Stimulus {
                 lane_of: self.skin.lane_of(),
                 gains_q30: self.array.gains_q30(),
             };
-            self.balance.carry(before, after);
+            self.balance.carry(before, after, self.rate);
             self.description = description;
+        } else {
+            let channels = Channels {
+                lane_of: self.skin.lane_of(),
+                gains_q30: self.array.gains_q30(),
+            };
+            self.balance.meet(channels, self.rate);
         }
         self.phase.settle();
         self.level.settle();
@@ -294,6 +313,7 @@ impl Stimulus {
     pub fn silence(&mut self) {
         self.words = [ZERO_VOLT; ACTUATORS];
         self.gate.shut();
+        self.balance.silence();
         self.silent = true;
     }
 }

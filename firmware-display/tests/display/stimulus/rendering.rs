@@ -111,6 +111,51 @@ fn the_partials_lie_on_the_surface_as_they_were_told_whichever_way_the_hand_goes
     }
 }
 
+/// How strong the second partial is, of the first, over whole waves of 400 counts.
+fn second_partial(volts: &[Volts]) -> f64 {
+    let part = |n: f64| {
+        let turn = |tick: usize| TAU * n * tick as f64 * 7.0 / 400.0;
+        let sum = |f: fn(f64) -> f64| {
+            let parts = volts
+                .iter()
+                .enumerate()
+                .map(|(tick, volt)| volt[0] * f(turn(tick)));
+            parts.sum::<f64>()
+        };
+        sum(f64::sin).hypot(sum(f64::cos))
+    };
+    part(2.0) / part(1.0)
+}
+
+/// Where channels of different charges come to share a place there is no time for more than the sine, until they have
+/// charges alike and the hand rests.
+#[test]
+fn the_sine_alone_is_played_while_channels_of_a_place_have_different_charges() {
+    for rate in RATES {
+        let mut rig = rig(Rendering::Fundamental, Mode::Travelling, rate);
+        rig.actuators = trimmed();
+        rig = Rig::with(rig.configuration, rig.actuators);
+        rig.follow(2.0);
+        // A hand that trembles leaves charges.
+        rig.stroke(rig.ticks(1.0), |t| 0.15 * (TAU * 5.0 * t).sin());
+        rig.actuators = DEFAULT_ACTUATORS;
+        rig.configure(DisplayConfiguration {
+            rendering: Rendering::Shape,
+            ..rig.configuration
+        });
+        rig.rub(rig.ticks(0.05), 7);
+        rig.stimulus
+            .wear(&texture([(500, 0.0), (0, 0.0)], [0; BANDS]));
+        for (seconds, played) in [(0.5, 0.0), (2.8, 0.5)] {
+            rig.rub(rig.ticks(seconds), 7);
+            rig.rub(rig.ticks(0.1), 0);
+            rig.rub(rig.ticks(0.1), 7);
+            let told = second_partial(&rig.rub(2_000, 7));
+            assert!((told - played).abs() <= 0.01, "{rate:?}: {told}");
+        }
+    }
+}
+
 /// All of these with each texture.
 fn itertools(told: &[Texture]) -> impl Iterator<Item = (&Texture, UpdateRate, Mode, i16)> {
     told.iter().flat_map(|texture| {

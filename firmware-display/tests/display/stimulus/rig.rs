@@ -73,10 +73,10 @@ impl Rig {
         configuration.mode = MODES[draw(2) as usize];
         configuration.rendering =
             [Rendering::Fundamental, Rendering::Shape, Rendering::Texture][draw(3) as usize];
-        let [alike, modelled] = [draw(2), draw(2)].map(|drawn| drawn == 0);
+        let [differ, modelled] = [draw(2), draw(2)].map(|drawn| drawn == 0);
         self.actuators = DEFAULT_ACTUATORS;
         for actuator in &mut self.actuators {
-            if !alike {
+            if differ {
                 actuator.gain_q15 = [0, 1, 330, 16_384, 32_768][draw(5) as usize];
                 actuator.inverted = draw(2) == 0;
                 actuator.phase = 8_192 * draw(8) as u16;
