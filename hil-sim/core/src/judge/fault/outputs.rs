@@ -10,6 +10,9 @@ use crate::scene::fault::{Class, Fault};
 const STANDING_NS: u64 = 20_000_000;
 /// The same at the end of a channel's range: there a crest is cut flat while a charge is worked off under it.
 const CREST_NS: u64 = 100_000_000;
+/// An output that turns by itself is at its last step for up to so many times as long as at the step before: 4.8 times
+/// where it goes as the square of the time, as at a crest or where the hand turns back, and 10.6 where it does both.
+const TURNS_IN: u64 = 12;
 /// Rounding, and a range that ends a step earlier above 0 V, take no more off a crest, in steps of the DAC.
 const CREST_WORDS: u16 = 2;
 /// How long before a fault an output has to have been driven for the stimulus to be called on: half a
@@ -39,6 +42,8 @@ pub(super) struct Outputs {
     words: Option<[u16; ACTUATORS]>,
     /// Since when each is at one voltage, in ns.
     since_ns: [u64; ACTUATORS],
+    /// For how long it was at the voltage before, in ns; 0 if it came from there by more than [`CREST_WORDS`].
+    before_ns: [u64; ACTUATORS],
     /// Which were not at 0 V when they had to be.
     late: [bool; ACTUATORS],
     /// Which stood at another voltage.
@@ -121,6 +126,7 @@ impl Outputs {
             safe_ns: Some(from_ns),
             words: None,
             since_ns: [from_ns; ACTUATORS],
+            before_ns: [0; ACTUATORS],
             late: [false; ACTUATORS],
             stands: [false; ACTUATORS],
             silent_ns: None,
@@ -146,7 +152,10 @@ impl Outputs {
             let is_held = at_ns <= self.from_ns.saturating_sub(DRIVEN_NS);
             self.was_driving = !is_silent || (self.was_driving && !is_held);
         }
-        self.words = Some(output.words);
+        match self.words.replace(output.words) {
+            Some(before) => self.step(at_ns, &before, &output.words),
+            None => self.since_ns = [at_ns; ACTUATORS],
+        }
         self.last_ns = at_ns;
         self.safe_ns = is_silent.then_some(self.from_ns);
         self.silent_ns = self.safe_ns;
@@ -186,17 +195,34 @@ impl Outputs {
             }
             if before[actuator] != words[actuator] {
                 self.stand(actuator, before[actuator], at_ns);
-                self.since_ns[actuator] = at_ns;
+            }
+        }
+        self.step(at_ns, &before, words);
+    }
+
+    /// Each output that has another word now has it from now on.
+    fn step(&mut self, at_ns: u64, before: &[u16; ACTUATORS], words: &[u16; ACTUATORS]) {
+        for actuator in 0..ACTUATORS {
+            let steps = before[actuator].abs_diff(words[actuator]);
+            if steps > 0 {
+                let since_ns = std::mem::replace(&mut self.since_ns[actuator], at_ns);
+                let is_step = steps <= CREST_WORDS;
+                self.before_ns[actuator] = if is_step { at_ns - since_ns } else { 0 };
             }
         }
     }
 
     /// An output has been at this word until now.
     fn stand(&mut self, actuator: usize, word: u16, until_ns: u64) {
-        let stood_ns = until_ns.saturating_sub(self.since_ns[actuator]);
+        let since_ns = self.since_ns[actuator].max(self.from_ns);
+        let stood_ns = until_ns.saturating_sub(since_ns);
         let from_crest = word.abs_diff(ZERO_VOLT).abs_diff(self.crests[actuator]);
         let is_cut = from_crest <= CREST_WORDS;
-        let most_ns = if is_cut { CREST_NS } else { STANDING_NS };
+        let most_ns = if is_cut {
+            CREST_NS
+        } else {
+            (TURNS_IN * self.before_ns[actuator]).clamp(STANDING_NS, CREST_NS)
+        };
         self.stands[actuator] |= word != ZERO_VOLT && stood_ns > most_ns;
     }
 

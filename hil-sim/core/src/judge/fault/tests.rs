@@ -132,6 +132,29 @@ fn outputs_that_stand_at_a_voltage_are_stuck_and_not_at_zero() {
     assert_eq!(finding.safe_ns, None);
 }
 
+/// A wave of few steps, or one that the hand turns back in, takes long for its last step and longer until it is back.
+#[test]
+fn what_turns_slowly_does_not_stand_and_what_stops_does() {
+    let standing = |amplitude: f64, hz: f64, held_ms: u64| {
+        let mut recording = Run::steady(50.0, 2.0).record();
+        for output in &mut recording.outputs {
+            let held_ns = output.at_ns.saturating_sub(700 * MS).min(held_ms * MS);
+            let turns = (output.at_ns - held_ns) as f64 * 1e-9 * hz;
+            let word = (amplitude * (std::f64::consts::TAU * turns).sin()).round();
+            output.words = [(f64::from(ZERO_VOLT) + word) as u16; ACTUATORS];
+        }
+        let scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, 0.5)]);
+        finding(&scene, 0, 2_000 * MS, &recording).standing
+    };
+    for (amplitude, hz) in [(20.0, 1.0), (7.0, 2.5), (60.0, 1.0), (20.0, 3.0)] {
+        assert_eq!(standing(amplitude, hz, 0), 0, "{amplitude} {hz}");
+        assert_eq!(standing(amplitude, hz, 120), ACTUATORS, "{amplitude} {hz}");
+    }
+    // At 35 Hz each tick has another word.
+    assert_eq!(standing(32_000.0, 35.0, 19), 0);
+    assert_eq!(standing(32_000.0, 35.0, 22), ACTUATORS);
+}
+
 #[test]
 fn a_crest_that_is_cut_flat_at_its_channels_gain_does_not_stand() {
     const CHANNEL: usize = 17;
