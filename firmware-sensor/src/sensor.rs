@@ -20,7 +20,6 @@ use crate::slip::Slip;
 use crate::spectrum::Spectrum;
 use crate::texture::{Surface, TEXTURE_RATE_HZ};
 use crate::travel::{self, Travel};
-use crate::vibration::Vibration;
 use crate::{ESTIMATE_RATE_HZ, SAMPLE_RATE_HZ, SCANS_PER_SAMPLE, Scan};
 
 /// Time after the start, in samples, until the estimators begin: three time constants of the
@@ -70,7 +69,6 @@ pub struct Sensor {
     health: Health,
     slip: Slip,
     estimator: Running,
-    vibration: Vibration,
     surface: Surface,
     arm: Arm,
     block: Block,
@@ -111,7 +109,6 @@ impl Sensor {
             health: Health::default(),
             slip: Slip::new(&configuration),
             estimator: Running::new(&configuration),
-            vibration: Vibration::default(),
             surface: Surface::new(),
             arm: Arm::default(),
             block: Block::default(),
@@ -172,7 +169,6 @@ impl Sensor {
     #[inline(never)]
     fn start_over(&mut self) {
         self.estimator = Running::new(&self.configuration);
-        self.vibration = Vibration::default();
         self.surface = Surface::new();
     }
 
@@ -278,12 +274,8 @@ impl Sensor {
         let number = self.samples;
         self.samples = self.samples.wrapping_add(1);
         let estimate = if estimates {
-            let mut finding = self.estimator.find(&started.travel);
+            let finding = self.estimator.find(&started.travel);
             let speed_mm_s = started.travel.velocity_mm_s(0).abs();
-            if self.estimator.spectrum().is_some() {
-                let level = f32::from(self.configuration.valid_percent) / 100.0;
-                self.vibration.withhold(&mut finding, speed_mm_s, level);
-            }
             let contact = contact(&self.slip, &started.travel, &finding);
             self.surface.hear(&finding);
             // Gauges that may not take part are witnesses nevertheless.

@@ -25,6 +25,7 @@ use crate::SAMPLE_RATE_HZ;
 use crate::estimator::{Estimator, Finding, MIN_AMPLITUDE_LSB, Touch};
 use crate::float::{larger, sqrt};
 use crate::travel::{PLACES_PER_MM, PLACES_PER_UM, Travel};
+use crate::vibration::{self, Vibration};
 
 use evidence::{LineEvidence, WaveEvidence};
 use fit::{Fitted, LENGTH_COUNT, LENGTHS};
@@ -114,6 +115,7 @@ pub struct Spectrum {
     knots: Knots,
     periodogram: Periodogram,
     jerk: Jerk,
+    vibration: Vibration,
     touch: Touch,
     rested: u32,
     /// See [`Finding::landed`].
@@ -179,6 +181,7 @@ impl Spectrum {
             knots: Knots::new(),
             periodogram: Periodogram::new(),
             jerk: Jerk::default(),
+            vibration: Vibration::default(),
             touch: Touch::default(),
             rested: 0,
             landed: false,
@@ -358,9 +361,17 @@ impl Estimator for Spectrum {
         if touch.usable != self.touch.usable {
             self.jerk.restart();
         }
-        self.touch = *touch;
+        if matches!(self.slot, SURVEY_SLOT | LAST_SLOT) {
+            // What is worked out in these is about it.
+            self.touch = *touch;
+        } else {
+            self.touch.usable = touch.usable;
+        }
         let travel = self.play.follow(touch.place);
         self.jerk.push(touch, travel);
+        if u32::from(self.slot) % vibration::PERIOD_MS == 0 {
+            self.vibration.push(touch);
+        }
         if travel == 0 {
             self.rested = self.rested.saturating_add(1);
         } else {
@@ -414,6 +425,8 @@ impl Estimator for Spectrum {
             self.sure_times = 0;
             Finding::default()
         };
-        Finding { landed, ..finding }
+        let mut finding = Finding { landed, ..finding };
+        self.vibration.withhold(&mut finding, speed_mm_s);
+        finding
     }
 }
