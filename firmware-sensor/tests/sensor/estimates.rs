@@ -490,3 +490,21 @@ fn a_fingertip_that_is_lifted_from_a_stroke_soon_feels_no_other_wave() {
         }
     }
 }
+
+#[test]
+fn what_shakes_the_sensor_is_no_surface_where_the_arm_swings() {
+    let swing = |t_s: f64| 70.0 * (TAU * 0.83 * t_s).sin();
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.rub(2_000, swing, texture(2.0));
+    let (valid, worst) = valid_and_worst(&bench.rub(3_000, swing, texture(2.0)), 2.0);
+    assert!(valid > 0.8 && worst < 0.05, "{valid} valid, {worst} off");
+    for hz in [12.0, 17.0, 30.0, 65.0] {
+        let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+        bench.noise_lsb = 1.0;
+        let shakes = |gauge: usize, _: f64, t_s: f64| CODES * GAINS[gauge] * (TAU * hz * t_s).sin();
+        bench.rub(2_000, swing, shakes);
+        let estimates = bench.rub(3_000, swing, shakes);
+        let valid = estimates.iter().filter(|estimate| estimate.valid).count();
+        assert_eq!(valid, 0, "{hz} Hz");
+    }
+}
