@@ -11,7 +11,7 @@ use embassy_stm32::pac::timer::regs::CcmrOutputGp16;
 use embassy_stm32::pac::timer::vals::Ocm;
 use embassy_stm32::peripherals::PC6;
 
-/// From the tick to the edge. The slowest tick, `texture` in travelling mode at 4 kHz, has its words out 96 µs after the
+/// From the tick to the edge. The slowest tick, `texture` in travelling mode at 4 kHz, has its words out 97 µs after the
 /// tick by the higher of two estimates (`hil-sim budget --rendering texture`); arming takes up to 4 µs more.
 pub const OFFSET_US: u32 = 102;
 
