@@ -163,6 +163,7 @@ mod tests {
 
     const QUARTER: u32 = 1 << 30;
     const NO_LIMIT: i32 = 65_536;
+
     fn offsets(array: &Array, level: u32, lanes: &[i32]) -> [i32; ACTUATORS] {
         let mut words = [ZERO_VOLT; ACTUATORS];
         array.draw(level, lanes, &EACH, NO_LIMIT, &mut words);

@@ -218,6 +218,13 @@ mod tests {
     }
 
     #[test]
+    fn it_shows_within_the_second_stroke() {
+        for hz in [17.0, 30.0, 57.0] {
+            assert!(is_one_at(swing, |t_s, _| hz * t_s, 1.1), "{hz} Hz");
+        }
+    }
+
+    #[test]
     fn a_vibration_that_has_gone_is_forgotten() {
         let swings_and_goes_on = |t_s: f32| if t_s < 2.0 { swing(t_s) } else { 60.0 };
         let vibration_then_surface = |t_s, x_mm| if t_s < 2.0 { 30.0 * t_s } else { x_mm / 2.0 };
@@ -263,6 +270,19 @@ mod tests {
         let speed = |t_s: f32| if there(t_s) { 20.0 } else { -80.0 };
         let surface = |t_s: f32, x_mm: f32| if there(t_s) { x_mm } else { x_mm / 4.0 };
         for end_s in [2.4, 2.49, 3.6, 3.74, 5.0] {
+            assert!(!is_one_at(speed, surface, end_s), "{end_s}");
+        }
+        // The same where it goes on the same way, and slowly for a fifth of a second between the two.
+        let stroke = |t_s: f32| (t_s / 0.5) as usize % 2;
+        let speed = |t_s: f32| {
+            if t_s % 0.5 < 0.2 {
+                10.0
+            } else {
+                [20.0, 80.0][stroke(t_s)]
+            }
+        };
+        let surface = |t_s: f32, x_mm: f32| x_mm / [1.0, 4.0][stroke(t_s)];
+        for end_s in [2.42, 2.92, 3.42] {
             assert!(!is_one_at(speed, surface, end_s), "{end_s}");
         }
     }
