@@ -23,7 +23,7 @@ use crate::grain::STEEPEST;
 use crate::level::FALLS_FROM_HZ;
 use crate::pattern::Pattern;
 use crate::sine::ONE;
-use crate::wave::Wave;
+use crate::wave::{CALM_PEAK, Wave};
 
 /// What lies between the wave and each actuator's lane.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +39,8 @@ pub struct Skin {
     bare: bool,
     /// What all lanes are multiplied with.
     scale: f32,
+    /// The amplitude of [`Skin::play_sine`], in Q30.
+    sine_q30: i32,
 }
 
 /// How far the voltage is ahead of the displacement: 2ζ/f₀ in s and 1/f₀² in s².
@@ -90,6 +92,17 @@ fn most(actuator: &Actuator, rendering: Rendering) -> f32 {
         .max(first + 2.0 * zeta * w * second + w * w * third)
 }
 
+/// How much further than with a standing voltage an actuator moves with a sine of the same size, at most: 1/(2ζ √(1 − ζ²))
+/// where ζ² < ½, at its resonance. The root is that of its chord, no more than 1.5 % less.
+fn resonance(actuator: &Actuator) -> f32 {
+    let zeta = damping(actuator);
+    if actuator.resonance_dhz == 0 || zeta * zeta >= 0.5 {
+        return 1.0;
+    }
+    let root = 1.0 - (2.0 - core::f32::consts::SQRT_2) * zeta * zeta;
+    0.5 / (zeta * root)
+}
+
 /// Whether an actuator of these has a model.
 pub fn any_is_modelled(actuators: &[Actuator; ACTUATORS]) -> bool {
     actuators.iter().any(|actuator| actuator.resonance_dhz != 0)
@@ -105,6 +118,7 @@ impl Skin {
             models: [Model::default(); ACTUATORS],
             bare: !any_is_modelled(actuators),
             scale: 1.0,
+            sine_q30: 1 << 30,
         };
         if skin.bare {
             return skin;
@@ -119,6 +133,8 @@ impl Skin {
             .map(|actuator| most(actuator, rendering))
             .fold(1.0, f32::max);
         skin.scale = 1.0 / most;
+        let highest = actuators.iter().map(resonance).fold(1.0, f32::max);
+        skin.sine_q30 = (CALM_PEAK * skin.scale / highest * (1_u32 << 30) as f32) as i32;
         skin
     }
 
@@ -162,6 +178,17 @@ impl Skin {
         lane < self.lanes
             && self.place_of.get(lane) == Some(&place)
             && self.models.get(lane) == Some(&Model::of(actuator))
+    }
+
+    /// The sine alone at each place, in Q28, without models: as large as it can be so that no actuator moves further than
+    /// [`Skin::play`] lets it.
+    pub fn play_sine(&self, pattern: &Pattern, turns: u32, places: &mut [i32]) {
+        pattern.sines(turns, places);
+        if !self.bare {
+            for place in places {
+                *place = ((i64::from(*place) * i64::from(self.sine_q30)) >> 30) as i32;
+            }
+        }
     }
 
     /// The lanes in Q28, within ± [`ONE`], with `turns` / 2³² and `place_um` in the fingertip's middle.

@@ -193,7 +193,7 @@ impl Stimulus {
         let mut lanes = self.lanes.get_mut(..count).unwrap_or_default();
         let turns = self.phase.turns();
         if is_sine {
-            self.pattern.sines(turns, lanes);
+            self.skin.play_sine(&self.pattern, turns, lanes);
         } else {
             self.skin
                 .play(&self.wave, &self.pattern, turns, self.place_um, lanes);
@@ -246,8 +246,12 @@ impl Stimulus {
 
     /// Ends what is under way, while nobody feels it.
     fn settle(&mut self) {
+        let (lane_of, gains_q30) = (*self.skin.lane_of(), *self.array.gains_q30());
+        let before = Channels {
+            lane_of: &lane_of,
+            gains_q30: &gains_q30,
+        };
         if let Some(description) = self.waiting.take() {
-            let (array, lane_of) = (self.array.clone(), *self.skin.lane_of());
             self.array = Array::new(&description.actuators);
             self.pattern = Pattern::new(description.mode, &description.actuators);
             self.skin = Skin::new(description.rendering, &description.actuators, &self.pattern);
@@ -255,10 +259,6 @@ impl Stimulus {
             if let Some(wavelength) = self.wavelength {
                 self.pattern.aim(wavelength.phase_per_micrometre(), 1);
             }
-            let before = Channels {
-                lane_of: &lane_of,
-                gains_q30: array.gains_q30(),
-            };
             let after = Channels {
                 lane_of: self.skin.lane_of(),
                 gains_q30: self.array.gains_q30(),
@@ -266,11 +266,7 @@ impl Stimulus {
             self.balance.carry(before, after, self.rate);
             self.description = description;
         } else {
-            let channels = Channels {
-                lane_of: self.skin.lane_of(),
-                gains_q30: self.array.gains_q30(),
-            };
-            self.balance.meet(channels, self.rate);
+            self.balance.meet(before, self.rate);
         }
         self.phase.settle();
         self.level.settle();

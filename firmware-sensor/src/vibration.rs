@@ -147,7 +147,9 @@ impl Vibration {
     fn judge(&mut self) {
         let [duration, length] = self.squares;
         if self.taken < LEAST_CYCLES {
-        } else if duration < STEADY && length > DIFFER && length > TIMES * duration {
+            return;
+        }
+        if duration < STEADY && length > DIFFER && length > TIMES * duration {
             self.holds = HOLDS;
         } else if duration > DIFFER && duration > TIMES * length {
             self.holds = 0;

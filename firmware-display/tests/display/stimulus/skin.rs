@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use protocol::actuators::{Actuator, DEFAULT_ACTUATORS};
 use protocol::{DisplayConfiguration, Mode, Partial, Rendering, Texture};
 
-use crate::stimulus::rig::{RATES, Rig};
+use crate::stimulus::rig::{RATES, Rig, Volts, trimmed};
 
 /// Steps of the simulation in a tick.
 const FINE: usize = 10;
@@ -167,6 +167,46 @@ fn at_a_steady_speed_the_skin_is_in_step_and_as_strong_at_every_frequency() {
                         "{model:?} {counts} {hz} Hz: {rest} {lines}"
                     );
                 }
+            }
+        }
+    }
+}
+
+/// Where channels of different charges come to share a place the sine alone is played for a while, without models.
+#[test]
+fn an_actuator_without_its_model_for_a_while_moves_no_further_than_with_it() {
+    for rate in RATES {
+        for (f0_hz, zeta) in MODELS.into_iter().chain([(60.0, 0.1)]) {
+            for (hz, part) in [(0.2, 0.01), (0.9, 0.19), (1.0, 0.19), (1.5, 0.01)] {
+                let hz = f64::min(hz * f0_hz, 200.0);
+                let mut rig = rig(rate, Rendering::Fundamental, trimmed());
+                rig.configuration.mode = Mode::Travelling;
+                rig = Rig::with(rig.configuration, rig.actuators);
+                rig.follow(2.0);
+                // A hand that trembles leaves charges.
+                rig.stroke(rig.ticks(1.0), |t| 0.15 * (TAU * 5.0 * t).sin());
+                rig.actuators = modelled(f0_hz, zeta);
+                rig.configure(rig.configuration);
+                rig.follow(7.0 * 0.005 * rig.hz() / hz);
+                let (ticks, tick_s) = (rig.ticks(4.0), 1.0 / rig.hz());
+                let mut skin = Simulated::new(f0_hz, zeta);
+                let mut swing = |volts: Vec<Volts>| {
+                    let places = volts.iter().map(|volts| {
+                        skin.hold(volts[0], tick_s);
+                        skin.place
+                    });
+                    let last = places.skip(ticks - ticks / 16).collect::<Vec<_>>();
+                    (last.iter().copied().fold(f64::MIN, f64::max)
+                        - last.iter().copied().fold(f64::MAX, f64::min))
+                        / 2.0
+                };
+                let plain = swing(rig.rub(ticks, 7));
+                // It is over when the hand rests again.
+                rig.rub(rig.ticks(0.1), 0);
+                let heeded = swing(rig.rub(ticks, 7));
+                let case = format!("{rate:?} {f0_hz} Hz {zeta} at {hz} Hz: {plain} {heeded}");
+                assert!(plain <= 1.01 * heeded, "{case}");
+                assert!(plain >= part * heeded, "{case}");
             }
         }
     }
