@@ -11,7 +11,7 @@
 use crate::estimator::{Finding, Touch};
 use crate::travel::{PLACES_PER_UM, Place};
 
-/// Share of a cycle in the means.
+/// Share of a cycle in the means, after as many.
 const SHARE: f32 = 1.0 / 8.0;
 /// Cycles from which on they tell anything, half of them up to up.
 const LEAST_CYCLES: u8 = 12;
@@ -21,6 +21,8 @@ const LEFT_OUT: u8 = 4;
 const LEAST_SPEED: f32 = 10.0 * PLACES_PER_UM as f32;
 /// Mean square from which on lengths or durations differ, (14 %)².
 const DIFFER: f32 = 0.02;
+/// The most that one cycle adds to a mean square: three that share a moment of a standing encoder are not enough to differ.
+const MOST: f32 = 0.06;
 /// Mean square up to which durations are a vibration's, (10 %)²: those of noise differ by more.
 const STEADY: f32 = 0.01;
 /// How many times as much the others have to differ.
@@ -53,9 +55,9 @@ pub struct Vibration {
     is_up: bool,
     /// When and where the last crossings down and up were.
     last: [(u32, Place); 2],
-    /// Cycles that have been taken, and those that are left out before the next one.
+    /// Cycles that have been taken, and those since the arm set out or turned.
     taken: u8,
-    left_out: u8,
+    met: u8,
     /// Means of duration in ms and length in places, and mean squares of the relative differences from them.
     means: [f32; 2],
     squares: [f32; 2],
@@ -102,7 +104,7 @@ impl Vibration {
             self.listens = self.listens.saturating_sub(1);
         }
         if self.listens == 0 {
-            self.left_out = 0;
+            self.met = 0;
         }
         self.speed_mm_s += SPEED_SHARE * change_mm_s;
         if self.holds > 0 {
@@ -126,20 +128,20 @@ impl Vibration {
         let half = half_way.wrapping_sub(from);
         let is_straight = half ^ length >= 0 && half.unsigned_abs() <= length.unsigned_abs();
         if !is_straight || cycle[1] < LEAST_SPEED * cycle[0] {
-            self.left_out = 0;
+            self.met = 0;
             return;
         }
-        if self.left_out < LEFT_OUT {
-            self.left_out += 1;
+        self.met = self.met.saturating_add(1);
+        if self.met <= LEFT_OUT {
             self.means = cycle;
             return;
         }
         self.taken = self.taken.saturating_add(1).min(LEAST_CYCLES);
-        let share = (1.0 / f32::from(self.taken)).max(SHARE);
+        let [share, of_mean] = [self.taken, self.met - LEFT_OUT].map(share_of);
         for ((mean, square), x) in self.means.iter_mut().zip(&mut self.squares).zip(cycle) {
             let differs = (x - *mean) / *mean;
-            *square += share * (differs * differs - *square);
-            *mean += SHARE * (x - *mean);
+            *square += share * ((differs * differs).min(MOST) - *square);
+            *mean += of_mean * (x - *mean);
         }
         self.judge();
     }
@@ -155,6 +157,11 @@ impl Vibration {
             self.holds = 0;
         }
     }
+}
+
+/// Share of the last of so many in their mean, [`SHARE`] at least.
+fn share_of(cycles: u8) -> f32 {
+    (1.0 / f32::from(cycles)).max(SHARE)
 }
 
 #[cfg(test)]
@@ -253,6 +260,22 @@ mod tests {
         assert!(!is_one(|_, x_mm| two(x_mm, 1.0, 4.0)));
         assert!(!is_one(|_, x_mm| two(x_mm, 4.0, 1.0)));
         assert!(!is_one(|_, x_mm| 40.0 * libm::logf(2.0 + x_mm / 40.0)));
+    }
+
+    #[test]
+    fn a_surface_is_none_where_the_encoder_stands_still_for_a_moment() {
+        let mut told = 0;
+        for (speed_mm_s, mm) in [(105.0, 1.478), (60.0, 2.0), (40.0, 4.0), (30.0, 0.7)] {
+            for for_ms in 1..60_u8 {
+                let for_s = f32::from(for_ms) * 1e-3;
+                let stands = |t_s| (1.0..1.0 + for_s).contains(&t_s);
+                let speed = |t_s| if stands(t_s) { 0.0 } else { speed_mm_s };
+                if is_one_at(speed, |t_s, _| speed_mm_s * t_s / mm, 1.5) {
+                    told += 1;
+                }
+            }
+        }
+        assert_eq!(told, 0);
     }
 
     #[test]

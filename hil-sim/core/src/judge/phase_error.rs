@@ -17,6 +17,8 @@ const LEAST_FULL: f64 = 0.5;
 const WHOLE: f64 = 0.05;
 /// Points that a window needs for its two unknowns to be worth anything.
 const ENOUGH_POINTS: usize = 5;
+/// Windows that hold so much of a cycle together hold one: a point stands for a part of it.
+const ONE_CYCLE: f64 = 0.9;
 
 /// The stimulus' phase errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,12 +61,14 @@ struct Window {
 
 /// A window's phase error, and what decides whether it counts.
 #[derive(Clone, Copy, Debug)]
-struct Demodulated {
-    error_cycles: f64,
+pub struct Demodulated {
+    /// How far the stimulus is ahead, in cycles.
+    pub error_cycles: f64,
+    /// How much of a cycle the window holds: about 1, less where it was cut off. A mean of the voltage cancels in a whole
+    /// cycle only, so that less than one tells less.
+    pub cycles: f64,
     /// Of the squared voltage, in V²·cycles.
     square: f64,
-    /// Of the weights, in cycles.
-    whole: f64,
 }
 
 impl Demodulator {
@@ -90,40 +94,46 @@ impl Demodulator {
     pub fn finish(self, peak_v: f64) -> Option<PhaseError> {
         let errors = self.errors(peak_v);
         Some(PhaseError {
-            rms_cycles: mean(errors.iter().map(|error| error * error))?.sqrt(),
-            mean_cycles: mean(errors.iter().copied())?,
+            rms_cycles: mean(errors.iter().map(|window| window.error_cycles.powi(2)))?.sqrt(),
+            mean_cycles: mean(errors.iter().map(|window| window.error_cycles))?,
         })
     }
 
     /// The errors' mean on the circle, so that it tells what stands anywhere, with `peak_v` as in
-    /// [`Demodulator::finish`]; none if there is none.
+    /// [`Demodulator::finish`] and each as long as it is; none if there is none.
     pub fn standing(self, peak_v: f64) -> Option<f64> {
         let (mut s, mut c) = (0.0, 0.0);
-        for error in self.errors(peak_v) {
-            s += (TAU * error).sin();
-            c += (TAU * error).cos();
+        for window in self.errors(peak_v) {
+            let angle = TAU * window.error_cycles;
+            s += window.cycles * angle.sin();
+            c += window.cycles * angle.cos();
         }
         (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
     }
 
     /// The errors' median on the circle: the one that the others are nearest to, with `peak_v` as in
-    /// [`Demodulator::finish`]. A window in which the stimulus has only just begun does not move it.
+    /// [`Demodulator::finish`]. A window in which the stimulus has only just begun does not move it. None if all together
+    /// are no whole cycle.
     pub fn middle(self, peak_v: f64) -> Option<f64> {
-        let errors = self.errors(peak_v);
+        let windows = self.errors(peak_v);
+        if !holds_a_cycle(&windows) {
+            return None;
+        }
+        let errors: Vec<f64> = windows.iter().map(|window| window.error_cycles).collect();
         let apart = |one: f64, other: f64| (one - other - (one - other).round()).abs();
         let from_others = |one: f64| errors.iter().map(|&other| apart(one, other)).sum::<f64>();
         let nearer = |one: &f64, other: &f64| from_others(*one).total_cmp(&from_others(*other));
         errors.iter().copied().min_by(nearer)
     }
 
-    /// The errors of the windows at full amplitude, in cycles, with `peak_v` as in [`Demodulator::finish`].
-    pub fn errors(mut self, peak_v: f64) -> Vec<f64> {
+    /// The windows at full amplitude, with `peak_v` as in [`Demodulator::finish`].
+    pub fn errors(mut self, peak_v: f64) -> Vec<Demodulated> {
         if let Some((last, _)) = self.last {
             self.weigh(last.travelled_cycles);
         }
         self.demodulated
             .extend(self.window.demodulated(self.takes_parts));
-        let mean_square = |window: &Demodulated| window.square / window.whole;
+        let mean_square = |window: &Demodulated| window.square / window.cycles;
         let loudest = self.demodulated.iter().map(mean_square).fold(0.0, f64::max);
         // A wave that is no sine has another mean square at the same peak: its loudest cycle is a full one.
         let is_rendered = loudest >= 0.5 * LEAST_FULL * LEAST_FULL * peak_v * peak_v;
@@ -133,9 +143,9 @@ impl Demodulator {
             peak_v
         };
         let full_v = FULL * peak_v;
-        let full = |window: &&Demodulated| mean_square(window) >= full_v * full_v;
-        let windows = self.demodulated.iter().filter(full);
-        windows.map(|window| window.error_cycles).collect()
+        self.demodulated
+            .retain(|window| mean_square(window) >= full_v * full_v);
+        self.demodulated
     }
 
     /// How many windows are held.
@@ -162,6 +172,11 @@ impl Demodulator {
         self.window.add(due.cycles, volts, weight);
         self.before_cycles = due.travelled_cycles;
     }
+}
+
+/// Whether these hold a cycle together.
+pub fn holds_a_cycle(windows: &[Demodulated]) -> bool {
+    windows.iter().map(|window| window.cycles).sum::<f64>() >= ONE_CYCLE
 }
 
 impl Window {
@@ -194,8 +209,8 @@ impl Window {
         let b = (self.cv * self.ss - self.sv * self.sc) / determinant;
         Some(Demodulated {
             error_cycles: b.atan2(a) / TAU,
+            cycles: whole,
             square: self.vv,
-            whole,
         })
     }
 }

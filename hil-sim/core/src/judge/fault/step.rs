@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use protocol::{Rendering, Role};
 
-use crate::judge::phase_error::Demodulator;
+use crate::judge::phase_error::{Demodulated, Demodulator, holds_a_cycle};
+use crate::judge::seconds;
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::truth::Truth;
 use crate::judge::voltage::Edge;
-use crate::judge::{mean, seconds};
 use crate::run::observer::{RunEvent, RunObserver};
 use crate::run::recording::volts;
 
@@ -36,8 +36,8 @@ pub(super) struct Step {
     /// Where it stood before the fault, in cycles.
     standing: Option<f64>,
     since: Demodulator,
-    /// Errors up to the last silence, in cycles.
-    errors: Vec<f64>,
+    /// The windows up to the last silence.
+    errors: Vec<Demodulated>,
     /// Whether where it goes on is unknown: there was a silence since the fault, or no whole cycle before it.
     is_unplaced: bool,
     quiet_since_s: Option<f64>,
@@ -82,13 +82,18 @@ impl Step {
         }
     }
 
-    /// Root mean square of what it is off since the fault, in cycles; none if too little was driven.
+    /// Root mean square of what it is off since the fault, in cycles, each window as long as it is; none if no cycle was
+    /// driven.
     pub fn finish(mut self) -> Option<f64> {
         self.stimulus.end();
         self.follow();
         self.end_stretch();
-        let squares = self.errors.iter().map(|error| error * error);
-        Some(mean(squares)?.sqrt())
+        if !holds_a_cycle(&self.errors) {
+            return None;
+        }
+        let cycles: f64 = self.errors.iter().map(|window| window.cycles).sum();
+        let square = |window: &Demodulated| window.cycles * window.error_cycles.powi(2);
+        Some((self.errors.iter().map(square).sum::<f64>() / cycles).sqrt())
     }
 
     fn end_stretch(&mut self) {
@@ -98,10 +103,11 @@ impl Step {
         } else {
             0.0
         };
-        let errors = since.errors(self.peak_v).into_iter();
-        self.errors.extend(errors.map(|error| {
-            let off = error - standing;
-            off - off.round()
+        let windows = since.errors(self.peak_v).into_iter();
+        self.errors.extend(windows.map(|mut window| {
+            window.error_cycles -= standing;
+            window.error_cycles -= window.error_cycles.round();
+            window
         }));
     }
 

@@ -399,6 +399,26 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
 }
 
 #[test]
+fn a_part_of_a_cycle_beside_a_passing_mean_tells_no_phase() {
+    // What a turn of the hand may leave for a while: 1.4 V. Of 25 cycles a second, the scene leaves parts of one.
+    for (begun, part) in (0..10).flat_map(|begun| (1..10).map(move |part| (begun, part))) {
+        let at_ms = 500 + 4 * begun;
+        let until_ms = at_ms + 4 * part;
+        let mut recording = Run::steady(50.0, 2.0).record();
+        for output in &mut recording.outputs {
+            let mean_v = if output.at_ns < at_ms * MS { 0.0 } else { 1.4 };
+            output.words = output.words.map(|word| word_of(0.7 * volts(word) + mean_v));
+        }
+        let scene = with_faults(
+            until_ms as f64 * 1e-3,
+            vec![Fault::new(Kind::Nothing, at_ms as f64 * 1e-3)],
+        );
+        let unmet = finding(&scene, 0, until_ms * MS, &recording).unmet();
+        assert_eq!(unmet, [""; 0], "{part} tenths from {begun} on");
+    }
+}
+
+#[test]
 fn what_fades_in_after_a_silence_tells_no_phase_until_it_is_all_there() {
     // 5 cycles a second, of which the scene leaves two or three after the silence.
     let judged = |drives_from_s: f64, until_ms: u64, ahead_cycles: f64| {
