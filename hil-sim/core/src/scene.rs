@@ -79,6 +79,21 @@ pub struct Surface {
     pub irregularity: Irregularity,
 }
 
+impl Surface {
+    /// The true wavelength at `x_mm`, in mm.
+    pub fn wavelength_mm(&self, x_mm: f64) -> f64 {
+        let mut end_mm = self.start_mm;
+        let mut specimens = self.specimens.iter();
+        let here = specimens.find(|specimen| {
+            end_mm += specimen.length_mm;
+            x_mm < end_mm
+        });
+        let last = self.specimens.last();
+        here.or(last)
+            .map_or(f64::NAN, |specimen| specimen.wavelength_mm)
+    }
+}
+
 /// `[surface]`: what real surfaces have and gratings have not. "Relative" is to the amplitude of the
 /// fundamental, as the gauges feel it. The truth stays the specimens' λ: no second wave is stronger.
 #[derive(Clone, Copy, Debug, PartialEq)]

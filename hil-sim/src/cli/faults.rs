@@ -40,12 +40,16 @@ fn entry(row: &Row) -> String {
         0 => "no reset of the display",
         _ => "one reset of the display at most",
     };
+    let anew = match row.forgets {
+        true => " and of three waves felt anew",
+        false => "",
+    };
     let again = match (row.class.may_drive_again(), row.again_within_ms) {
         (false, _) => "never drives again until its power goes".to_owned(),
         (true, Some(ms)) if row.kind.is_of_arm() => format!(
-            "an arm that its drive moves rests for good; one that the scene moves: drives again within {ms} ms of its end"
+            "an arm that its drive moves rests for good; one that the scene moves: drives again within {ms} ms of its end{anew}"
         ),
-        (true, Some(ms)) => format!("drives again within {ms} ms of its end"),
+        (true, Some(ms)) => format!("drives again within {ms} ms of its end{anew}"),
         (true, None) => "drives on".to_owned(),
     };
     format!(

@@ -48,7 +48,7 @@ pub(super) struct Misconduct {
     pub silent_ns: Option<u64>,
     /// A reason to hold came up while it drove: the first.
     pub held: Option<(Hold, u64)>,
-    /// All that came up, also while the hand rested.
+    /// All that came up until the next fault, also before this one and while the hand rested.
     pub reasons: Vec<(Hold, u64)>,
     /// They were driven for the first time after the fault was over.
     pub again_ns: Option<u64>,
@@ -199,7 +199,7 @@ impl Conduct {
                 let goes_on = |(before, _): &(Hold, u64)| *before == hold || *before != Hold::Stale;
                 if !self.held_since.as_ref().is_some_and(goes_on) {
                     self.held_since = Some((hold, at_ns));
-                    if self.judged_ns.contains(&at_ns) {
+                    if at_ns < self.judged_ns.end {
                         self.seen.reasons.push((hold, at_ns));
                     }
                 }

@@ -39,6 +39,10 @@ const CONTRADICTED_S: f64 = 3.1;
 const POSITION_GAIN_PER_S: f64 = 10.0;
 const WEAK_PART: f64 = 0.05;
 const STALLED_S: f64 = 0.05 * 1.2;
+/// Waves that have to pass for a sound sensor to stand by a λ (docs' estimation page), and for a gauge that says nothing to
+/// be missed.
+const KNOWN_WAVES: f64 = 3.0;
+const MISSED_WAVES: f64 = 1.0;
 /// In so many ms an arm's encoder is looked at, and what a link may take for it not to matter.
 const SAMPLE_MS: f64 = 1.0;
 const PROMPT_MS: f64 = 20.0;
@@ -188,9 +192,30 @@ fn is_slow(fault: &Fault, scene: &Scene) -> bool {
     };
     match fault.kind {
         Kind::HandEncoderDead => is_slow || contradicts_s() < CONTRADICTED_S,
-        Kind::AdcStuck | Kind::GaugeOpen | Kind::GaugeShort => is_slow,
+        Kind::AdcStuck => is_slow,
+        Kind::GaugeOpen | Kind::GaugeShort => {
+            let missed_s = felt_anew_s(scene, fault.at_s, MISSED_WAVES);
+            is_slow || missed_s.is_none_or(|missed_s| missed_s > within_s)
+        }
         _ => false,
     }
+}
+
+/// How long after `from_s` so many waves have passed, in s, of ground that was not gone over since then; none if the scene
+/// ends before.
+fn felt_anew_s(scene: &Scene, from_s: f64, waves: f64) -> Option<f64> {
+    const STEP_S: f64 = 1e-3;
+    let place_mm = |step: u32| scene.motion.position_mm(from_s + STEP_S * f64::from(step));
+    let (mut low_mm, mut high_mm, mut felt) = (place_mm(0), place_mm(0), 0.0);
+    let steps = ((scene.duration_s - from_s) / STEP_S) as u32;
+    let step = (1..=steps).find(|&step| {
+        let x_mm = place_mm(step);
+        let anew_mm = (x_mm - high_mm).max(low_mm - x_mm).max(0.0);
+        felt += anew_mm / scene.surface.wavelength_mm(x_mm);
+        (low_mm, high_mm) = (low_mm.min(x_mm), high_mm.max(x_mm));
+        felt >= waves
+    })?;
+    Some(STEP_S * f64::from(step))
 }
 
 /// Whether the arm may rest when its encoder breaks, or is told too little for that to show in time.
@@ -314,6 +339,13 @@ impl FaultMonitor {
         if tires {
             of_others.push(Sign::Fading(Hold::FullDrive));
         }
+        // What the scene leaves no time for is due after its end.
+        let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, KNOWN_WAVES);
+        let anew_ms = anew_s.unwrap_or(scene.duration_s) * 1e3;
+        let again_within_ms = row.again_within_ms.map(|ms| match row.forgets {
+            true => ms.max(anew_ms),
+            false => ms,
+        });
         // Of a flood, which estimates find room is chance.
         let keeps_step = row.class != Class::Stops
             && row.safe_within_ms.is_none()
@@ -331,7 +363,7 @@ impl FaultMonitor {
             conduct: Conduct::new(
                 &fault,
                 // An arm that is driven stands still from then on.
-                row.again_within_ms
+                again_within_ms
                     .filter(|_| !fault.kind.is_of_arm() || scene.arm.follows == Follows::Motion),
                 alone_ns.end,
                 &configuration,
@@ -532,16 +564,21 @@ impl FaultMonitor {
                 ms(due_ns)
             ));
         }
-        // What is due is counted as well, at the next second.
-        let fades_are_due = seen
-            .iter()
-            .any(|&(sign, at_ns, _)| matches!(sign, Sign::Fading(hold) if is_due(hold, at_ns)));
+        // What is due is counted as well, at the next second, and so is what was due before.
+        let says_due = |(sign, at_ns, _): &(Sign, u64, String)| matches!(sign, Sign::Fading(hold) if is_due(*hold, *at_ns));
+        let fades_are_due = seen.iter().any(says_due);
+        let faded_before = |counted_ns: u64| {
+            let before =
+                |&(_, due_ns): &(Hold, u64)| due_ns < from_ns && counted_ns < due_ns + LINGERS_NS;
+            conduct.reasons.iter().any(before)
+        };
         for (sign, at_ns, words) in &seen {
             let may = row.signs.contains(sign)
                 || row.also.contains(sign)
                 || of_others.contains(sign)
                 || matches!(sign, Sign::Fading(hold) if is_due(*hold, *at_ns))
-                || fades_are_due && matches!(sign, Sign::Counted(_, "fades"));
+                || matches!(sign, Sign::Counted(_, "fades"))
+                    && (fades_are_due || faded_before(*at_ns));
             if alone_ns.contains(at_ns) && !may {
                 otherwise.push(format!(
                     "not to be expected: {words}, at {:.2} ms",

@@ -128,6 +128,9 @@ pub struct Row {
     /// In which time in ms after its end the display drives again while the hand moves; none if it must not, or
     /// never ceases to.
     pub again_within_ms: Option<f64>,
+    /// Whether the sensor forgets what it has felt: then the arm has to go over three waves anew as well.
+    #[serde(default)]
+    pub forgets: bool,
     /// Boards that it keeps from talking. The others go on: the sensor with estimates, the display with motions.
     #[serde(default, deserialize_with = "boards")]
     pub silences: &'static [Role],

@@ -304,6 +304,88 @@ fn that_a_display_need_not_drive_again_is_said() {
 }
 
 #[test]
+fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
+    let unmet = |wavelength_mm: f64, silent_ms| {
+        let mut fault = Fault::new(Kind::AdcStuck, 0.5);
+        fault.for_s = Some(0.6);
+        let scene = Scene {
+            duration_s: 4.0,
+            faults: vec![fault],
+            ..Scene::constant(wavelength_mm, 20.0)
+        };
+        let run = Run {
+            duration_s: 4.0,
+            ..Run::steady(20.0, wavelength_mm)
+        };
+        let mut recording = run.record();
+        silence(&mut recording, silent_ms);
+        let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
+        let again = |line: &String| line.starts_with("does not drive again");
+        unmet.into_iter().find(again)
+    };
+    // 24 mm at 20 mm/s, from 1.1 s on.
+    assert_eq!(unmet(8.0, 1_050..2_200), None);
+    assert_eq!(
+        unmet(8.0, 1_050..2_400).as_deref(),
+        Some("does not drive again within 1200 ms of its end")
+    );
+    assert_eq!(unmet(2.0, 1_050..1_650), None);
+    assert_eq!(
+        unmet(2.0, 1_050..2_200).as_deref(),
+        Some("does not drive again within 600 ms of its end")
+    );
+}
+
+#[test]
+fn a_gauge_that_says_nothing_is_missed_once_a_wave_has_passed() {
+    let unmet = |wavelength_mm: f64| {
+        let scene = Scene {
+            duration_s: 1.5,
+            faults: vec![Fault::new(Kind::GaugeShort, 0.5)],
+            ..Scene::constant(wavelength_mm, 15.0)
+        };
+        let recording = Run::steady(15.0, wavelength_mm).record();
+        finding(&scene, 0, 1_500 * MS, &recording).unmet()
+    };
+    // 4.5 mm in the 300 ms that it may take.
+    assert_eq!(unmet(5.0), [""; 0]);
+    assert_eq!(unmet(4.0), ["no sign of it"]);
+}
+
+#[test]
+fn a_fade_from_before_is_counted_after_the_fault_has_begun() {
+    let unmet = |heard_not_ms: Range<u64>| {
+        let mut recording = silent(3.0, 0..0);
+        let is_heard =
+            |at_ns: u64| !(heard_not_ms.start * MS..heard_not_ms.end * MS).contains(&at_ns);
+        recording.arrived.retain(|arrival| is_heard(arrival.at_ns));
+        silence(
+            &mut recording,
+            heard_not_ms.start + 540..heard_not_ms.end + 10,
+        );
+        let mut counted = counted(2_400, 0, 0);
+        if let Message::Status(status) = &mut counted.message {
+            status.role = RoleCounters::Display(DisplayCounters {
+                fades: 1,
+                ..DisplayCounters::default()
+            });
+        }
+        recording.signs.display = vec![counted];
+        finding(
+            &several(3.0, &[(Kind::Nothing, 2.0)]),
+            0,
+            3_000 * MS,
+            &recording,
+        )
+        .unmet()
+    };
+    // Of 500 ms without an estimate.
+    assert_eq!(unmet(1_000..1_600), [""; 0]);
+    let too_early = ["not to be expected: display: fades 1, at 400.00 ms"];
+    assert_eq!(unmet(600..1_300), too_early);
+}
+
+#[test]
 fn under_an_encoder_that_stands_still_by_another_fault_nothing_has_to_be_driven() {
     let unmet = |dead_s: f64| {
         let mut scene = several(
