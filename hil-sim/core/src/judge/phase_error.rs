@@ -17,6 +17,8 @@ const LEAST_FULL: f64 = 0.5;
 const WHOLE: f64 = 0.05;
 /// Points that a window needs for its two unknowns to be worth anything.
 const ENOUGH_POINTS: usize = 5;
+/// Windows with less of a cycle tell too little of it beside a mean of the voltage.
+const LEAST_PART: f64 = 0.5;
 /// Windows that hold so much of a cycle together hold one: a point stands for a part of it.
 const ONE_CYCLE: f64 = 0.9;
 
@@ -92,7 +94,7 @@ impl Demodulator {
     /// The errors of the windows at full amplitude, of a voltage of which `peak_v` is the highest; none if the
     /// stimulus never was at full amplitude for a cycle.
     pub fn finish(self, peak_v: f64) -> Option<PhaseError> {
-        let errors = self.errors(peak_v);
+        let errors = self.windows(peak_v);
         Some(PhaseError {
             rms_cycles: mean(errors.iter().map(|window| window.error_cycles.powi(2)))?.sqrt(),
             mean_cycles: mean(errors.iter().map(|window| window.error_cycles))?,
@@ -126,8 +128,14 @@ impl Demodulator {
         errors.iter().copied().min_by(nearer)
     }
 
-    /// The windows at full amplitude, with `peak_v` as in [`Demodulator::finish`].
-    pub fn errors(mut self, peak_v: f64) -> Vec<Demodulated> {
+    /// The windows at full amplitude that hold half a cycle at least, with `peak_v` as in [`Demodulator::finish`].
+    pub fn errors(self, peak_v: f64) -> Vec<Demodulated> {
+        let mut windows = self.windows(peak_v);
+        windows.retain(|window| window.cycles >= LEAST_PART);
+        windows
+    }
+
+    fn windows(mut self, peak_v: f64) -> Vec<Demodulated> {
         if let Some((last, _)) = self.last {
             self.weigh(last.travelled_cycles);
         }

@@ -78,8 +78,9 @@ pub(super) struct FaultMonitor {
     has_looked: bool,
     /// Whether the hand is too slow for it to show in time.
     is_slow: bool,
-    /// See [`rests`].
+    /// See [`rests`] and [`hidden`].
     rests: bool,
+    hidden: Option<&'static str>,
     outputs: Outputs,
     conduct: Conduct,
     /// If it is to keep in step.
@@ -154,6 +155,32 @@ fn is_unheard(fault: &Fault, scene: &Scene) -> bool {
     fault.kind == Kind::StopFromPeer && scene.faults.iter().any(cuts)
 }
 
+/// Why another fault may hide what shows it.
+fn hidden(fault: &Fault, scene: &Scene) -> Option<&'static str> {
+    let within_ms = fault.kind.row().seen_within_ms.unwrap_or(0.0);
+    let from_ns = fault.begins_ns();
+    let shows_ns = from_ns + nanoseconds(within_ms * 1e-3);
+    let beside = |is_one: fn(Kind) -> bool| {
+        let mut others = scene.faults.iter().filter(|other| *other != fault);
+        others.any(|other| {
+            is_one(other.kind)
+                && other.begins_ns() < shows_ns
+                && other.ends_ns().is_none_or(|end_ns| end_ns > from_ns)
+        })
+    };
+    let is_of_gauge = matches!(fault.kind, Kind::GaugeOpen | Kind::GaugeShort);
+    let is_felt = is_of_gauge || fault.kind == Kind::AdcStuck;
+    if fault.kind.is_on_link() && beside(Kind::cuts_wire) {
+        Some("nothing arrives there then")
+    } else if is_of_gauge && beside(|kind| matches!(kind, Kind::AdcStuck | Kind::AdcStopped)) {
+        Some("the converter tells nothing new then")
+    } else if is_felt && scene.arm.follows == Follows::Link && may_be_at_rest(fault, scene) {
+        Some("the arm may be at rest")
+    } else {
+        None
+    }
+}
+
 /// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
 /// a sound board.
 fn must_show(fault: &Fault, scene: &Scene) -> bool {
@@ -201,6 +228,24 @@ fn is_slow(fault: &Fault, scene: &Scene) -> bool {
     }
 }
 
+/// When the display has to drive again after a fault alone, in ns; none if it must not, or never ceases to. What the scene
+/// leaves no time for is due after its end.
+fn again_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
+    let row = fault.kind.row();
+    // An arm that is driven stands still from then on.
+    let stands = fault.kind.is_of_arm() && scene.arm.follows == Follows::Link;
+    let ms = row.again_within_ms.filter(|_| !stands)?;
+    let over_ns = fault.ends_ns().unwrap_or(fault.begins_ns());
+    let anew_ms = match row.forgets {
+        true => {
+            let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, KNOWN_WAVES);
+            anew_s.unwrap_or(scene.duration_s) * 1e3
+        }
+        false => 0.0,
+    };
+    Some(over_ns + nanoseconds(ms.max(anew_ms) * 1e-3))
+}
+
 /// How long after `from_s` so many waves have passed, in s, of ground that was not gone over since then; none if the scene
 /// ends before.
 fn felt_anew_s(scene: &Scene, from_s: f64, waves: f64) -> Option<f64> {
@@ -220,6 +265,13 @@ fn felt_anew_s(scene: &Scene, from_s: f64, waves: f64) -> Option<f64> {
 
 /// Whether the arm may rest when its encoder breaks, or is told too little for that to show in time.
 fn rests(fault: &Fault, scene: &Scene) -> bool {
+    may_be_at_rest(fault, scene)
+        || scene.link.delay_ms + scene.link.jitter_ms > PROMPT_MS
+        || fault.kind == Kind::ArmEncoderDead && !is_told(fault, scene)
+}
+
+/// Whether what was before may have stopped an arm that its drive moves.
+fn may_be_at_rest(fault: &Fault, scene: &Scene) -> bool {
     let from_ns = fault.begins_ns();
     let is_before = |other: &&Fault| *other != fault && other.begins_ns() <= from_ns;
     let before = || scene.faults.iter().filter(is_before);
@@ -234,10 +286,7 @@ fn rests(fault: &Fault, scene: &Scene) -> bool {
     let may_rest = before()
         .any(|other| other.ends_ns().unwrap_or(other.begins_ns()) + LINGERS_NS > from_ns)
         && power_ns.is_none_or(|power_ns| power_ns + LINGERS_NS < from_ns);
-    is_stopped
-        || may_rest
-        || scene.link.delay_ms + scene.link.jitter_ms > PROMPT_MS
-        || fault.kind == Kind::ArmEncoderDead && !is_told(fault, scene)
+    is_stopped || may_rest
 }
 
 /// Whether an arm whose encoder stands still from `fault` on is told to move so far in time that it has to be missed.
@@ -339,18 +388,28 @@ impl FaultMonitor {
         if tires {
             of_others.push(Sign::Fading(Hold::FullDrive));
         }
-        // What the scene leaves no time for is due after its end.
-        let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, KNOWN_WAVES);
-        let anew_ms = anew_s.unwrap_or(scene.duration_s) * 1e3;
-        let again_within_ms = row.again_within_ms.map(|ms| match row.forgets {
-            true => ms.max(anew_ms),
-            false => ms,
+        let again_within_ms = again_ns(&fault, scene).map(|own_ns| {
+            // Not before it is to drive again after what was there already.
+            let before = others().filter(|other| other.begins_ns() <= from_ns);
+            let due_ns = before.filter_map(|other| again_ns(other, scene)).max();
+            (own_ns.max(due_ns.unwrap_or(0)) - over_ns) as f64 * 1e-6
         });
+        // Since when the hand's counts are those of its place.
+        let shifts = others().filter(|other| {
+            matches!(other.kind, Kind::HandEncoderDead | Kind::HandEncoderJump)
+                && other.begins_ns() <= from_ns
+        });
+        let shifted_ns = shifts.map(|other| match other.kind.row().lasts {
+            Lasts::Once => other.begins_ns(),
+            Lasts::For(_) | Lasts::ForGood => other.ends_ns().unwrap_or(u64::MAX),
+        });
+        let shifted_ns = shifted_ns.max().unwrap_or(0);
         // Of a flood, which estimates find room is chance.
         let keeps_step = row.class != Class::Stops
             && row.safe_within_ms.is_none()
             && fault.kind != Kind::LinkFlood
-            && stopped != Stopped::Yes;
+            && stopped != Stopped::Yes
+            && shifted_ns <= from_ns;
         let truth = Truth {
             display: configuration,
             actuators: *scene.display.actuators,
@@ -362,16 +421,14 @@ impl FaultMonitor {
             // When it has been driven for too long is not followed here.
             conduct: Conduct::new(
                 &fault,
-                // An arm that is driven stands still from then on.
-                again_within_ms
-                    .filter(|_| !fault.kind.is_of_arm() || scene.arm.follows == Follows::Motion),
+                again_within_ms,
                 alone_ns.end,
                 &configuration,
                 if tires { Stopped::Yes } else { stopped },
                 blind_ns.collect(),
                 nanoseconds((scene.link.delay_ms + scene.link.jitter_ms) * 1e-3),
             ),
-            step: keeps_step.then(|| Step::new(&truth, alone_ns.clone())),
+            step: keeps_step.then(|| Step::new(&truth, alone_ns.clone(), shifted_ns)),
             due_ns,
             alone_ns,
             of_others,
@@ -386,6 +443,7 @@ impl FaultMonitor {
             has_looked: false,
             is_slow: is_slow(&fault, scene),
             rests: fault.kind.is_of_arm() && rests(&fault, scene),
+            hidden: hidden(&fault, scene),
             resets: 0,
             display: Voice::new(Role::Display),
             sensor: Voice::new(Role::Sensor),
@@ -426,6 +484,9 @@ impl FaultMonitor {
         }
         if self.rests {
             return Some("the arm may be at rest, or is told too little");
+        }
+        if self.hidden.is_some() {
+            return self.hidden;
         }
         let hides = |sign: &Sign| self.weather.contains(sign);
         // Of these two, what else shows is chance.

@@ -54,13 +54,14 @@ pub(super) struct Step {
 }
 
 impl Step {
-    pub fn new(truth: &Truth, judged_ns: Range<u64>) -> Self {
+    /// Until then, in ns, the hand's counts were not those of its place.
+    pub fn new(truth: &Truth, judged_ns: Range<u64>, shifted_ns: u64) -> Self {
         Self {
             judged_ns,
             stimulus: Stimulus::new(truth),
             reference: truth.reference_actuator,
             before: Demodulator::new(truth.display.rendering),
-            restarted_s: 0.0,
+            restarted_s: seconds(shifted_ns),
             standing: None,
             since: Demodulator::new(truth.display.rendering),
             errors: Vec::new(),
@@ -77,7 +78,7 @@ impl Step {
 
     fn restart(&mut self, at_ns: u64) {
         if at_ns < self.judged_ns.start {
-            self.restarted_s = seconds(at_ns);
+            self.restarted_s = self.restarted_s.max(seconds(at_ns));
             self.before = Demodulator::new(self.rendering);
         }
     }
@@ -111,21 +112,25 @@ impl Step {
         }));
     }
 
-    /// Ends a stretch where a silence is over.
-    fn notice_silence(&mut self, edge: &Edge) {
+    /// Whether a point since the fault is one of a silence. Where one is over a stretch ends.
+    fn is_silent(&mut self, edge: &Edge) -> bool {
         let loudest = edge.words.iter().map(|&word| volts(word).abs());
         let loudest_v = loudest.fold(0.0, f64::max);
+        let least_s = self.least_silence_s;
+        let lasts = |since_s: f64| edge.t_s - since_s >= least_s;
         if loudest_v <= QUIET * self.peak_v {
-            self.quiet_since_s.get_or_insert(edge.t_s);
             self.was_zero |= loudest_v == 0.0;
-        } else if let Some(since_s) = self.quiet_since_s.take()
-            && mem::take(&mut self.was_zero)
-            && edge.t_s - since_s >= self.least_silence_s
-        {
+            let since_s = *self.quiet_since_s.get_or_insert(edge.t_s);
+            return self.was_zero && lasts(since_s);
+        }
+        let was_zero = mem::take(&mut self.was_zero);
+        if was_zero && self.quiet_since_s.is_some_and(lasts) {
             self.end_stretch();
             self.is_unplaced = true;
             self.full_from_s = edge.t_s + self.fade_in_s;
         }
+        self.quiet_since_s = None;
+        false
     }
 
     /// Where it stood before the fault. If there was no whole cycle before it, nobody knows, as after a silence.
@@ -143,9 +148,7 @@ impl Step {
                 continue;
             };
             let volts = volts(edge.words[self.reference]);
-            if edge.t_s >= from_s {
-                self.notice_silence(&edge);
-            }
+            let is_silent = edge.t_s >= from_s && self.is_silent(&edge);
             if (before_s..from_s).contains(&edge.t_s) {
                 self.before.add(due, volts);
             } else if (from_s..to_s).contains(&edge.t_s) {
@@ -154,7 +157,7 @@ impl Step {
                     None => self.stand(),
                 };
                 due.cycles += standing;
-                if edge.t_s >= self.full_from_s {
+                if edge.t_s >= self.full_from_s && !is_silent {
                     self.since.add(due, volts);
                 }
             }

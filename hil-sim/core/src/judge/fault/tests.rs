@@ -456,6 +456,34 @@ fn what_fades_in_after_a_silence_tells_no_phase_until_it_is_all_there() {
 }
 
 #[test]
+fn a_silence_that_tells_nothing_is_no_part_of_a_cycle() {
+    // Silent for one of 12.5 cycles a second, of which the converters are told nothing, and 10 mV first.
+    for falls_ms in (508..552).step_by(4) {
+        let rises_ms = falls_ms + 80;
+        let mut recording = Run::steady(25.0, 2.0).record();
+        for output in &mut recording.outputs {
+            let at_ms = output.at_ns / MS;
+            let gain = match at_ms {
+                _ if at_ms < falls_ms => 1.0,
+                _ if at_ms < rises_ms => 0.0,
+                _ if at_ms < rises_ms + 2 => 2e-3,
+                _ => 1.0,
+            };
+            output.words = output.words.map(|word| word_of(gain * volts(word)));
+        }
+        recording.outputs.dedup_by_key(|output| output.words);
+        let scene = Scene {
+            duration_s: 0.75,
+            faults: vec![Fault::new(Kind::Nothing, 0.5)],
+            ..Scene::constant(2.0, 25.0)
+        };
+        let unmet = finding(&scene, 0, 750 * MS, &recording).unmet();
+        let steps = |line: &&String| line.starts_with("out of step");
+        assert_eq!(unmet.iter().find(steps), None, "{falls_ms}");
+    }
+}
+
+#[test]
 fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
     let spoiled = |amplitude_mv: u16, words: &[u16]| {
         let run = Run {

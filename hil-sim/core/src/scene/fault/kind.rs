@@ -70,6 +70,22 @@ impl Kind {
         matches!(self, Self::LinkDown | Self::WireStuckLow)
     }
 
+    /// Whether it is of what the link brings, and shows by what arrives.
+    pub fn is_on_link(self) -> bool {
+        matches!(
+            self,
+            Self::LinkGarbage
+                | Self::LinkCorrupt
+                | Self::LinkFlood
+                | Self::LinkReplay
+                | Self::LinkLate
+                | Self::EstimateOutOfRange
+                | Self::EstimateNan
+                | Self::EstimateJumping
+                | Self::EstimateContradictory
+        )
+    }
+
     /// Whether it is of the arm's encoder, for which the sensor stops the arm for good.
     pub fn is_of_arm(self) -> bool {
         matches!(self, Self::ArmEncoderDead | Self::ArmEncoderJump)

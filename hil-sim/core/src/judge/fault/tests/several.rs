@@ -5,7 +5,7 @@ use std::ops::Range;
 use protocol::{Arm, ArmState, Estimate};
 
 use super::*;
-use crate::scene::{Link, Motion};
+use crate::scene::{Follows, Link, Motion};
 
 /// A scene of some faults with a hand at 50 mm/s over 2 mm.
 fn several(duration_s: f64, faults: &[(Kind, f64)]) -> Scene {
@@ -383,6 +383,73 @@ fn a_fade_from_before_is_counted_after_the_fault_has_begun() {
     assert_eq!(unmet(1_000..1_600), [""; 0]);
     let too_early = ["not to be expected: display: fades 1, at 400.00 ms"];
     assert_eq!(unmet(600..1_300), too_early);
+}
+
+#[test]
+fn what_another_fault_keeps_from_driving_has_to_drive_again_after_that() {
+    let unmet = |silent_ms| {
+        let mut scene = several(3.0, &[(Kind::SensorSilent, 0.5), (Kind::WireStuckLow, 0.6)]);
+        scene.faults[1].for_s = Some(0.1);
+        let mut recording = silent(3.0, silent_ms);
+        let is_heard = |at_ns: u64| !(500 * MS..1_200 * MS).contains(&at_ns);
+        recording.arrived.retain(|arrival| is_heard(arrival.at_ns));
+        let unmet = finding(&scene, 1, 3_000 * MS, &recording).unmet();
+        let again = |line: &String| line.starts_with("does not drive again");
+        unmet.into_iter().find(again)
+    };
+    // The sensor is silent until 1.2 s, and the wire is well again at 0.7 s.
+    assert_eq!(unmet(1_040..1_450), None);
+    assert_eq!(
+        unmet(1_040..1_550).as_deref(),
+        Some("does not drive again within 800 ms of its end")
+    );
+}
+
+#[test]
+fn what_another_fault_hides_need_not_show() {
+    let judged = |scene: &Scene| {
+        let finding = finding(scene, 1, 4_000 * MS, &silent(4.0, 0..0));
+        let mut unjudged = finding.unjudged.iter();
+        let why = unjudged.find_map(|line| line.strip_prefix("whether it shows within "));
+        let is_missed = finding.unmet().iter().any(|line| line == "no sign of it");
+        (is_missed, why.map(str::to_owned))
+    };
+    let hidden = |why: &str| (false, Some(why.to_owned()));
+    let missed = (true, None);
+
+    let converter = |at_s| several(4.0, &[(Kind::AdcStuck, at_s), (Kind::GaugeShort, 2.0)]);
+    let still = hidden("300 ms: the converter tells nothing new then");
+    assert_eq!(judged(&converter(1.5)), still);
+    assert_eq!(judged(&converter(0.5)), missed);
+
+    let wire = |at_s| several(4.0, &[(Kind::LinkDown, at_s), (Kind::LinkCorrupt, 2.0)]);
+    let cut = hidden("1020 ms: nothing arrives there then");
+    assert_eq!(judged(&wire(1.5)), cut);
+    assert_eq!(judged(&wire(1.0)), missed);
+
+    let mut arm = several(4.0, &[(Kind::ArmEncoderJump, 0.5), (Kind::GaugeShort, 2.0)]);
+    assert_eq!(judged(&arm), missed);
+    arm.arm.follows = Follows::Link;
+    assert_eq!(judged(&arm), hidden("300 ms: the arm may be at rest"));
+}
+
+#[test]
+fn a_hand_whose_counts_another_fault_has_lost_goes_on_from_another_place() {
+    // 19 ms without counts from 0.3 s on are 0.475 of a wave.
+    let is_lost = |kind: Kind, dead_s: f64, at_s: f64| {
+        let run = Run {
+            ahead_cycles: Box::new(|t_s| if t_s < 0.32 { 0.0 } else { -0.475 }),
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut scene = several(2.0, &[(kind, 0.301), (Kind::Nothing, at_s)]);
+        scene.faults[0].for_s = Some(dead_s);
+        let unmet = finding(&scene, 1, 2_000 * MS, &run.record()).unmet();
+        unmet.iter().any(|line| line.starts_with("out of step"))
+    };
+    assert!(!is_lost(Kind::HandEncoderDead, 0.019, 0.45));
+    // It is not known yet how many.
+    assert!(!is_lost(Kind::HandEncoderDead, 0.2, 0.31));
+    assert!(is_lost(Kind::SensorSilent, 0.019, 0.35));
 }
 
 #[test]
