@@ -279,6 +279,23 @@ mod tests {
     }
 
     #[test]
+    fn a_surface_is_none_where_the_encoder_jumps() {
+        let mut told = 0;
+        for (speed_mm_s, mm) in [(21.9, 0.688), (60.0, 2.0), (40.0, 4.0), (105.0, 1.478)] {
+            for jump_mm in [1.0, -1.0, 3.3, -3.3, 10.0, 27.1, -27.1] {
+                let jumps = |t_s| (1.0..1.001).contains(&t_s) || (2.4005..2.4015).contains(&t_s);
+                let speed = |t_s| speed_mm_s + if jumps(t_s) { jump_mm * 1e3 } else { 0.0 };
+                for end_s in [1.1, 1.3, 1.5, 2.5, 2.7, 2.9] {
+                    if is_one_at(speed, |t_s, _| speed_mm_s * t_s / mm, end_s) {
+                        told += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(told, 0);
+    }
+
+    #[test]
     fn at_constant_speed_and_where_it_makes_one_step_nothing_is_a_vibration() {
         for end_s in [0.5, 0.78, 0.82, 1.0, 2.0] {
             let turns = |t_s, _| 25.0 * t_s;

@@ -232,8 +232,9 @@ fn is_slow(fault: &Fault, scene: &Scene) -> bool {
 /// leaves no time for is due after its end.
 fn again_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
     let row = fault.kind.row();
-    // An arm that is driven stands still from then on.
-    let stands = fault.kind.is_of_arm() && scene.arm.follows == Follows::Link;
+    // An arm that is driven stands still from then on, and of one that is stopped the encoder is not looked at any more.
+    let (is_of_arm, follows) = (fault.kind.is_of_arm(), scene.arm.follows == Follows::Link);
+    let stands = is_of_arm && follows || (is_of_arm || follows) && arm_was_stopped(fault, scene);
     let ms = row.again_within_ms.filter(|_| !stands)?;
     let over_ns = fault.ends_ns().unwrap_or(fault.begins_ns());
     let anew_ms = match row.forgets {
@@ -270,23 +271,38 @@ fn rests(fault: &Fault, scene: &Scene) -> bool {
         || fault.kind == Kind::ArmEncoderDead && !is_told(fault, scene)
 }
 
-/// Whether what was before may have stopped an arm that its drive moves.
+/// Whether what was before may have stopped an arm that its drive moves, for good or for now.
 fn may_be_at_rest(fault: &Fault, scene: &Scene) -> bool {
-    let from_ns = fault.begins_ns();
-    let is_before = |other: &&Fault| *other != fault && other.begins_ns() <= from_ns;
-    let before = || scene.faults.iter().filter(is_before);
-    let power = before().filter(|other| other.cuts_power(Role::Sensor));
-    let power_ns = power.map(Fault::begins_ns).max();
-    let stops = |other: &Fault| {
-        other.kind.is_of_arm() || matches!(other.kind, Kind::StopFromPeer | Kind::StopFromConsole)
-    };
-    let is_stopped = before()
+    let power_ns = last_power_ns(fault, scene);
+    let mut before = earlier(fault, scene);
+    let may_rest = before
+        .any(|other| other.ends_ns().unwrap_or(other.begins_ns()) + LINGERS_NS > fault.begins_ns())
+        && power_ns.is_none_or(|power_ns| power_ns + LINGERS_NS < fault.begins_ns());
+    arm_was_stopped(fault, scene) || may_rest
+}
+
+/// Whether what was before has stopped the arm for good.
+fn arm_was_stopped(fault: &Fault, scene: &Scene) -> bool {
+    let power_ns = last_power_ns(fault, scene);
+    earlier(fault, scene)
         .filter(|other| power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns))
-        .any(stops);
-    let may_rest = before()
-        .any(|other| other.ends_ns().unwrap_or(other.begins_ns()) + LINGERS_NS > from_ns)
-        && power_ns.is_none_or(|power_ns| power_ns + LINGERS_NS < from_ns);
-    is_stopped || may_rest
+        .any(|other| {
+            other.kind.is_of_arm()
+                || matches!(other.kind, Kind::StopFromPeer | Kind::StopFromConsole)
+        })
+}
+
+/// When the sensor's power went last before a fault, in ns.
+fn last_power_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
+    let power = earlier(fault, scene).filter(|other| other.cuts_power(Role::Sensor));
+    power.map(Fault::begins_ns).max()
+}
+
+/// The others that have begun by then.
+fn earlier<'a>(fault: &'a Fault, scene: &'a Scene) -> impl Iterator<Item = &'a Fault> {
+    let is_earlier =
+        move |other: &&Fault| *other != fault && other.begins_ns() <= fault.begins_ns();
+    scene.faults.iter().filter(is_earlier)
 }
 
 /// Whether an arm whose encoder stands still from `fault` on is told to move so far in time that it has to be missed.

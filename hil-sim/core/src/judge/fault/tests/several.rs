@@ -406,6 +406,34 @@ fn what_another_fault_keeps_from_driving_has_to_drive_again_after_that() {
 }
 
 #[test]
+fn an_arm_that_was_stopped_need_not_let_anything_be_driven_again() {
+    let is_asked = |follows, faults: &[(Kind, f64)]| {
+        let mut scene = several(4.0, faults);
+        scene.arm.follows = follows;
+        let last = faults.len() - 1;
+        let mut recording = silent(4.0, 2_540..4_000);
+        recording
+            .arrived
+            .retain(|arrival| arrival.at_ns < 2_000 * MS);
+        let unmet = finding(&scene, last, 4_000 * MS, &recording).unmet();
+        unmet
+            .iter()
+            .any(|line| line.starts_with("does not drive again"))
+    };
+    let jump = (Kind::ArmEncoderJump, 0.5);
+    for follows in [Follows::Motion, Follows::Link] {
+        assert!(is_asked(follows, &[(Kind::AdcStuck, 2.0)]), "{follows:?}");
+        assert_eq!(
+            is_asked(follows, &[jump, (Kind::AdcStuck, 2.0)]),
+            follows == Follows::Motion
+        );
+        assert!(!is_asked(follows, &[jump, (Kind::ArmEncoderJump, 2.0)]));
+    }
+    assert!(is_asked(Follows::Motion, &[(Kind::ArmEncoderJump, 2.0)]));
+    assert!(!is_asked(Follows::Link, &[(Kind::ArmEncoderJump, 2.0)]));
+}
+
+#[test]
 fn what_another_fault_hides_need_not_show() {
     let judged = |scene: &Scene| {
         let finding = finding(scene, 1, 4_000 * MS, &silent(4.0, 0..0));
