@@ -178,6 +178,11 @@ impl Trust {
     }
 
     fn distrust(&mut self, at_ns: u64) {
+        // Half a second has passed without, if only just.
+        self.distrusts &= self
+            .untrue_ns
+            .back()
+            .is_some_and(|&last_ns| at_ns < last_ns + DISTRUST_NS);
         self.untrue_ns.push_back(at_ns);
         if self.untrue_ns.len() > DISTRUSTED {
             self.untrue_ns.pop_front();
@@ -246,6 +251,17 @@ mod tests {
         followed(&mut trust, 6, &[2.0; 20]);
         assert_eq!(holds(&mut trust, 550), [Hold::Distrust]);
         assert_eq!(holds(&mut trust, 551), []);
+    }
+
+    #[test]
+    fn one_that_cannot_be_true_prolongs_distrust_within_half_a_second_and_not_after_it() {
+        for (next, prolongs) in [(54, true), (55, false)] {
+            let mut trust = Trust::new(2_000);
+            followed(&mut trust, 0, &[2.0, 0.05, 0.05, f32::NAN, 2_000.0, 0.0]);
+            followed(&mut trust, next, &[0.0]);
+            let held = holds(&mut trust, 600).contains(&Hold::Distrust);
+            assert_eq!(held, prolongs, "{next}");
+        }
     }
 
     #[test]

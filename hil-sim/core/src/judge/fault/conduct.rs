@@ -25,6 +25,8 @@ const MOVES_NS: u64 = 40_000_000;
 const PLAYED_HZ: f64 = 250.0;
 /// A display that has lost its power starts again within so long.
 const STARTS_S: f64 = 0.3;
+/// So long before a fault tells whether anything was known of the surface.
+const BEFORE_NS: u64 = 1_000_000_000;
 const MS: u64 = 1_000_000;
 
 /// Whether the display has stopped for good before.
@@ -55,6 +57,9 @@ pub(super) struct Misconduct {
     /// Of the time in which they have to be, for how long the hand moved, in ns; and of that, with nothing to hold them.
     pub moved_ns: u64,
     pub free_ns: u64,
+    /// The same of the last second before the fault.
+    pub moved_before_ns: u64,
+    pub free_before_ns: u64,
 }
 
 /// Looks on from the scene's start, and judges while the fault is the only one.
@@ -88,6 +93,8 @@ pub(super) struct Conduct {
     /// All were at 0 V for longer than a wave that passes it, while the hand moved, since the fault began.
     has_fallen_silent: bool,
     held_since: Option<(Hold, u64)>,
+    /// All reasons to hold that there are, and since when.
+    reasons: Vec<(Hold, u64)>,
     /// When it said while it was held that it drives.
     said_driving_ns: Option<u64>,
     free_since_ns: u64,
@@ -187,7 +194,14 @@ impl Conduct {
     pub fn tick(&mut self, tick: &TickRecord) {
         let at_ns = tick.at_ns;
         self.follow_hand(tick);
-        match self.trust.holds(at_ns).next() {
+        let holds: Vec<Hold> = self.trust.holds(at_ns).collect();
+        self.reasons.retain(|(reason, _)| holds.contains(reason));
+        for &hold in &holds {
+            if !self.reasons.iter().any(|&(reason, _)| reason == hold) {
+                self.reasons.push((hold, at_ns));
+            }
+        }
+        match holds.first().copied() {
             None => {
                 self.said_driving_ns = None;
                 if self.held_since.take().is_some() {
@@ -195,10 +209,17 @@ impl Conduct {
                 }
             }
             Some(hold) => {
-                // A reason that comes on top of age hastens it.
-                let goes_on = |(before, _): &(Hold, u64)| *before == hold || *before != Hold::Stale;
+                // A reason that comes on top of age hastens it. Where one is over when another comes up, it may have
+                // driven in between.
+                let goes_on = |(before, _): &(Hold, u64)| {
+                    *before == hold || *before != Hold::Stale && holds.contains(before)
+                };
                 if !self.held_since.as_ref().is_some_and(goes_on) {
-                    self.held_since = Some((hold, at_ns));
+                    self.held_since = self
+                        .reasons
+                        .iter()
+                        .find(|&&(reason, _)| reason == hold)
+                        .copied();
                     if at_ns < self.judged_ns.end {
                         self.seen.reasons.push((hold, at_ns));
                     }
@@ -227,9 +248,17 @@ impl Conduct {
         let is_blind = self.blind_ns.iter().any(|of| of.contains(&tick.at_ns));
         if !is_blind && speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
             self.moves_since_ns.get_or_insert(before_ns);
+            let is_free = self.held_since.is_none();
+            let begins_ns = self.judged_ns.start;
+            if (begins_ns.saturating_sub(BEFORE_NS)..begins_ns).contains(&tick.at_ns) {
+                self.seen.moved_before_ns += step_ns;
+                if is_free {
+                    self.seen.free_before_ns += step_ns;
+                }
+            }
             if self.again_ns.contains(&tick.at_ns) {
                 self.seen.moved_ns += step_ns;
-                if self.held_since.is_none() {
+                if is_free {
                     self.seen.free_ns += step_ns;
                 }
             }
@@ -309,10 +338,13 @@ impl Conduct {
         self.was_held == Some(true)
     }
 
-    /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or
-    /// estimates come by which nothing is to be followed, only the time counts in which something is.
+    /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or for
+    /// less than half of a second, or estimates come by which nothing is to be followed, only the time counts in which
+    /// something is.
     pub fn shows_again(&self) -> bool {
-        let knows_nothing = self.was_held() || self.unfollowed && !self.spoils_estimates;
+        let knew_little = 2 * self.seen.free_before_ns < self.seen.moved_before_ns;
+        let knows_nothing =
+            self.was_held() || knew_little || self.unfollowed && !self.spoils_estimates;
         let counted_ns = if knows_nothing {
             self.seen.free_ns
         } else {

@@ -434,6 +434,67 @@ fn an_arm_that_was_stopped_need_not_let_anything_be_driven_again() {
 }
 
 #[test]
+fn where_little_was_known_before_nothing_has_to_be_driven_again() {
+    // Without an estimate for so long; what is known then counts for half a second.
+    let is_asked = |unknown_ms: Range<u64>| {
+        let mut recording = silent(4.0, 2_540..4_000);
+        let is_heard = |at_ns: u64| {
+            !(unknown_ms.start * MS..unknown_ms.end * MS).contains(&at_ns) && at_ns < 2_000 * MS
+        };
+        recording.arrived.retain(|arrival| is_heard(arrival.at_ns));
+        let scene = several(4.0, &[(Kind::AdcStuck, 2.0)]);
+        let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
+        unmet
+            .iter()
+            .any(|line| line.starts_with("does not drive again"))
+    };
+    assert!(is_asked(600..1_400));
+    assert!(!is_asked(400..1_600));
+}
+
+#[test]
+fn between_two_reasons_to_hold_a_display_may_drive_for_a_tick() {
+    // Five that can't be true come with a sound one at 0.641 s, and both count for half a second. That which says that it
+    // is over just then is behind by a tick, if age is not a reason already.
+    let unmet = |last_ms: u64| {
+        let mut recording = silent(2.0, 650..2_000);
+        for output in &mut recording.outputs {
+            if (1_141..1_142).contains(&(output.at_ns / MS)) {
+                output.words = [ZERO_VOLT + 100; ACTUATORS];
+            }
+        }
+        recording.arrived.retain(|arrival| arrival.at_ns < 650 * MS);
+        let mut forged = *recording.arrived.last().expect("some have arrived");
+        recording
+            .arrived
+            .retain(|arrival| arrival.at_ns < last_ms * MS);
+        for _ in 0..5 {
+            forged.estimate.sequence += 1;
+            forged.estimate.wavelength_mm = Some(0.0);
+            recording.arrived.push(forged);
+        }
+        let says = [
+            (642, DisplayState::Fading(Hold::Distrust)),
+            (1_142, DisplayState::Driving),
+        ];
+        recording.signs.display = says.map(|(at_ms, state)| said(at_ms, state)).into();
+        finding(
+            &several(2.0, &[(Kind::EstimateNan, 0.6)]),
+            0,
+            2_000 * MS,
+            &recording,
+        )
+        .unmet()
+    };
+    assert_eq!(unmet(650), [""; 0]);
+    let was_too_old = unmet(500);
+    assert!(
+        was_too_old[0].starts_with("says that it drives at 542.00 ms"),
+        "{was_too_old:?}"
+    );
+}
+
+#[test]
 fn what_another_fault_hides_need_not_show() {
     let judged = |scene: &Scene| {
         let finding = finding(scene, 1, 4_000 * MS, &silent(4.0, 0..0));
