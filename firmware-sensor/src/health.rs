@@ -253,7 +253,7 @@ struct Measure {
     typical: f32,
     /// Power below which a gauge is silent while others speak; 0 if they do not.
     silent: f32,
-    /// One of them at least speaks now: codes stand still at rest, too.
+    /// One of them at least speaks now, or most have noise that none is without: codes stand still at rest, too.
     speaks_now: bool,
 }
 
@@ -261,6 +261,7 @@ impl Measure {
     fn of(gauges: &[History; GAUGES], signs: &Signs) -> Self {
         let (mut all, mut speaking) = (Powers::default(), Powers::default());
         let mut speaks_now = false;
+        let mut noisy = 0;
         for (gauge, history) in gauges.iter().enumerate() {
             let allowed = signs.allowed >> gauge & 1 == 1;
             if allowed && history.at_rails <= AT_RAILS && history.still < STILL_ESTIMATES {
@@ -270,7 +271,10 @@ impl Measure {
                 if history.power > speaks {
                     speaking.push(history.power);
                 }
-                speaks_now |= history.health == GaugeHealth::Good && history.now > speaks;
+                if history.health == GaugeHealth::Good {
+                    speaks_now |= history.now > speaks;
+                    noisy += u32::from(signs.noise[gauge] > SPEAKING);
+                }
             }
         }
         let others_speak = speaking.count >= 2;
@@ -288,7 +292,7 @@ impl Measure {
         Self {
             typical: typical.max(LEAST_TYPICAL),
             silent,
-            speaks_now,
+            speaks_now: speaks_now || 2 * noisy > signs.allowed.count_ones(),
         }
     }
 }
@@ -537,6 +541,26 @@ mod tests {
         // The power falls to 1e-4 of the second strongest's, all but 1e-5 in noise: 30 ln(1e4) estimates.
         let estimates = ward.until(1, GaugeHealth::Dead, but(1, |_, noise| noise));
         assert!(estimates <= 290, "{estimates}");
+    }
+
+    #[test]
+    fn a_code_that_stands_still_beside_others_noise_is_dead_however_slow_the_wave() {
+        for gauge in 0..GAUGES {
+            let mut ward = Ward::new();
+            let wave = |at: usize, t_s: f64, noise: f64| {
+                150.0 * libm::sin(2.0 * PI * 3.0 * t_s + at as f64) + 120.0 * noise
+            };
+            assert_eq!(ward.estimates(200, wave), GOOD);
+            let one_is_still = |at, t_s, noise| {
+                if at == gauge {
+                    0.0
+                } else {
+                    wave(at, t_s, noise)
+                }
+            };
+            let estimates = ward.until(gauge, GaugeHealth::Dead, one_is_still);
+            assert!(estimates <= 30, "{estimates}");
+        }
     }
 
     #[test]

@@ -25,8 +25,8 @@ const MOVES_NS: u64 = 40_000_000;
 const PLAYED_HZ: f64 = 250.0;
 /// A display that has lost its power starts again within so long.
 const STARTS_S: f64 = 0.3;
-/// So long before a fault tells whether anything was known of the surface.
-const BEFORE_NS: u64 = 1_000_000_000;
+/// So long before a fault tells how much was known of the surface.
+const BEFORE_NS: u64 = 500_000_000;
 const MS: u64 = 1_000_000;
 
 /// Whether the display has stopped for good before.
@@ -57,9 +57,9 @@ pub(super) struct Misconduct {
     /// Of the time in which they have to be, for how long the hand moved, in ns; and of that, with nothing to hold them.
     pub moved_ns: u64,
     pub free_ns: u64,
-    /// The same of the last second before the fault.
-    pub moved_before_ns: u64,
-    pub free_before_ns: u64,
+    /// Estimates that were heard in half a second before the fault, and those of them that are stood by.
+    pub heard_before: usize,
+    pub valid_before: usize,
 }
 
 /// Looks on from the scene's start, and judges while the fault is the only one.
@@ -163,6 +163,11 @@ impl Conduct {
             .arrived
             .pop_front_if(|arrival| arrival.at_ns <= heard_ns)
         {
+            let begins_ns = self.judged_ns.start;
+            if (begins_ns.saturating_sub(BEFORE_NS)..begins_ns).contains(&heard_ns) {
+                self.seen.heard_before += 1;
+                self.seen.valid_before += usize::from(arrival.estimate.valid);
+            }
             match self.trust.hear(heard_ns, &arrival.estimate) {
                 Some(mm) => self.wavelength_mm = mm,
                 None => self.unfollowed |= self.again_ns.contains(&arrival.at_ns),
@@ -220,6 +225,10 @@ impl Conduct {
                         .iter()
                         .find(|&&(reason, _)| reason == hold)
                         .copied();
+                    // What it said before a reason that has just come up was about none.
+                    let is_just_up = |(_, since_ns): (Hold, u64)| since_ns == at_ns;
+                    self.said_driving_ns
+                        .take_if(|_| self.held_since.is_some_and(is_just_up));
                     if at_ns < self.judged_ns.end {
                         self.seen.reasons.push((hold, at_ns));
                     }
@@ -248,17 +257,9 @@ impl Conduct {
         let is_blind = self.blind_ns.iter().any(|of| of.contains(&tick.at_ns));
         if !is_blind && speed_mm_s >= MOVES_MM_S && speed_mm_s <= PLAYED_HZ * self.wavelength_mm {
             self.moves_since_ns.get_or_insert(before_ns);
-            let is_free = self.held_since.is_none();
-            let begins_ns = self.judged_ns.start;
-            if (begins_ns.saturating_sub(BEFORE_NS)..begins_ns).contains(&tick.at_ns) {
-                self.seen.moved_before_ns += step_ns;
-                if is_free {
-                    self.seen.free_before_ns += step_ns;
-                }
-            }
             if self.again_ns.contains(&tick.at_ns) {
                 self.seen.moved_ns += step_ns;
-                if is_free {
+                if self.held_since.is_none() {
                     self.seen.free_ns += step_ns;
                 }
             }
@@ -338,11 +339,11 @@ impl Conduct {
         self.was_held == Some(true)
     }
 
-    /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or for
-    /// less than half of a second, or estimates come by which nothing is to be followed, only the time counts in which
-    /// something is.
+    /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or
+    /// less than half of the estimates were stood by, or some come by which nothing is to be followed, only the time counts
+    /// in which something is.
     pub fn shows_again(&self) -> bool {
-        let knew_little = 2 * self.seen.free_before_ns < self.seen.moved_before_ns;
+        let knew_little = 2 * self.seen.valid_before < self.seen.heard_before;
         let knows_nothing =
             self.was_held() || knew_little || self.unfollowed && !self.spoils_estimates;
         let counted_ns = if knows_nothing {

@@ -14,7 +14,7 @@ use crate::plant::motion::MM_PER_COUNT;
 use crate::run::decoder::TimedMessage;
 use crate::run::observer::{RunEvent, RunObserver};
 use crate::scene::fault::{Class, Fault, Kind, Lasts, Sign, nanoseconds};
-use crate::scene::{Follows, Link, Scene};
+use crate::scene::{Follows, Gauges, Kinematic, Link, Profile, Scene};
 
 /// How far the stimulus may be from its due phase, in cycles rms, while something is broken that must not reach it.
 const IN_STEP_CYCLES: f64 = 0.05;
@@ -39,10 +39,13 @@ const CONTRADICTED_S: f64 = 3.1;
 const POSITION_GAIN_PER_S: f64 = 10.0;
 const WEAK_PART: f64 = 0.05;
 const STALLED_S: f64 = 0.05 * 1.2;
-/// Waves that have to pass for a sound sensor to stand by a λ (docs' estimation page), and for a gauge that says nothing to
-/// be missed.
+/// Waves that have to pass for a sound sensor to stand by a λ (docs' estimation page): on a plain surface, and on one where
+/// that takes as many as a fit has at most. And for a gauge that says nothing to be missed.
 const KNOWN_WAVES: f64 = 3.0;
+const MOST_WAVES: f64 = 8.0;
 const MISSED_WAVES: f64 = 1.0;
+/// Power of a plain surface over its noise, in dB.
+const PLAIN_DB: f64 = 20.0;
 /// In so many ms an arm's encoder is looked at, and what a link may take for it not to matter.
 const SAMPLE_MS: f64 = 1.0;
 const PROMPT_MS: f64 = 20.0;
@@ -239,12 +242,35 @@ fn again_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
     let over_ns = fault.ends_ns().unwrap_or(fault.begins_ns());
     let anew_ms = match row.forgets {
         true => {
-            let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, KNOWN_WAVES);
+            let waves = if is_plain(scene) {
+                KNOWN_WAVES
+            } else {
+                MOST_WAVES
+            };
+            let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, waves);
             anew_s.unwrap_or(scene.duration_s) * 1e3
         }
         false => 0.0,
     };
     Some(over_ns + nanoseconds(ms.max(anew_ms) * 1e-3))
+}
+
+/// Whether there is nothing on the surface, or in what is felt of it, that may make a sensor hesitate.
+fn is_plain(scene: &Scene) -> bool {
+    let Gauges::Kinematic(kinematic) = &scene.gauges else {
+        return false;
+    };
+    let besides_noise = Kinematic {
+        snr_db: None,
+        offset: 0.0,
+        ..*kinematic
+    };
+    let irregularity = &scene.surface.irregularity;
+    besides_noise == Kinematic::default()
+        && kinematic.snr_db.is_none_or(|db| db >= PLAIN_DB)
+        && irregularity.random + irregularity.second_wave + irregularity.worn == 0.0
+        && matches!(scene.surface.profile, Profile::Sine | Profile::Trapezoid)
+        && scene.contact.friction.is_none()
 }
 
 /// How long after `from_s` so many waves have passed, in s, of ground that was not gone over since then; none if the scene

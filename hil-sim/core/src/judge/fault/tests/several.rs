@@ -305,14 +305,15 @@ fn that_a_display_need_not_drive_again_is_said() {
 
 #[test]
 fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
-    let unmet = |wavelength_mm: f64, silent_ms| {
+    let unmet_on = |wavelength_mm: f64, worn: f64, silent_ms| {
         let mut fault = Fault::new(Kind::AdcStuck, 0.5);
         fault.for_s = Some(0.6);
-        let scene = Scene {
+        let mut scene = Scene {
             duration_s: 4.0,
             faults: vec![fault],
             ..Scene::constant(wavelength_mm, 20.0)
         };
+        scene.surface.irregularity.worn = worn;
         let run = Run {
             duration_s: 4.0,
             ..Run::steady(20.0, wavelength_mm)
@@ -323,6 +324,7 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
         let again = |line: &String| line.starts_with("does not drive again");
         unmet.into_iter().find(again)
     };
+    let unmet = |wavelength_mm, silent_ms| unmet_on(wavelength_mm, 0.0, silent_ms);
     // 24 mm at 20 mm/s, from 1.1 s on.
     assert_eq!(unmet(8.0, 1_050..2_200), None);
     assert_eq!(
@@ -333,6 +335,12 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
     assert_eq!(
         unmet(2.0, 1_050..2_200).as_deref(),
         Some("does not drive again within 600 ms of its end")
+    );
+    // 40 mm.
+    assert_eq!(unmet_on(5.0, 0.1, 1_050..3_000), None);
+    assert_eq!(
+        unmet_on(5.0, 0.1, 1_050..3_200).as_deref(),
+        Some("does not drive again within 2000 ms of its end")
     );
 }
 
@@ -435,21 +443,23 @@ fn an_arm_that_was_stopped_need_not_let_anything_be_driven_again() {
 
 #[test]
 fn where_little_was_known_before_nothing_has_to_be_driven_again() {
-    // Without an estimate for so long; what is known then counts for half a second.
     let is_asked = |unknown_ms: Range<u64>| {
         let mut recording = silent(4.0, 2_540..4_000);
-        let is_heard = |at_ns: u64| {
-            !(unknown_ms.start * MS..unknown_ms.end * MS).contains(&at_ns) && at_ns < 2_000 * MS
-        };
-        recording.arrived.retain(|arrival| is_heard(arrival.at_ns));
+        recording
+            .arrived
+            .retain(|arrival| arrival.at_ns < 2_000 * MS);
+        for arrival in &mut recording.arrived {
+            arrival.estimate.valid = !unknown_ms.contains(&(arrival.at_ns / MS));
+        }
         let scene = several(4.0, &[(Kind::AdcStuck, 2.0)]);
         let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
         unmet
             .iter()
             .any(|line| line.starts_with("does not drive again"))
     };
-    assert!(is_asked(600..1_400));
-    assert!(!is_asked(400..1_600));
+    // Of the half second before.
+    assert!(is_asked(1_500..1_740));
+    assert!(!is_asked(1_500..1_760));
 }
 
 #[test]
@@ -475,7 +485,7 @@ fn between_two_reasons_to_hold_a_display_may_drive_for_a_tick() {
         }
         let says = [
             (642, DisplayState::Fading(Hold::Distrust)),
-            (1_142, DisplayState::Driving),
+            (1_141, DisplayState::Driving),
         ];
         recording.signs.display = says.map(|(at_ms, state)| said(at_ms, state)).into();
         finding(
@@ -489,7 +499,7 @@ fn between_two_reasons_to_hold_a_display_may_drive_for_a_tick() {
     assert_eq!(unmet(650), [""; 0]);
     let was_too_old = unmet(500);
     assert!(
-        was_too_old[0].starts_with("says that it drives at 542.00 ms"),
+        was_too_old[0].starts_with("says that it drives at 541.00 ms"),
         "{was_too_old:?}"
     );
 }
