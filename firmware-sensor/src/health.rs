@@ -120,6 +120,17 @@ pub struct Signs {
     pub allowed: u8,
 }
 
+impl Signs {
+    /// Whether most gauges have noise beside which no code stands still, also at rest. Those of `others` do not count.
+    #[cold]
+    fn most_are_noisy(&self, others: u8) -> bool {
+        let counts = self.allowed & !others;
+        let noises = self.noise.iter().enumerate();
+        let noisy = noises.filter(|(gauge, noise)| counts >> gauge & 1 == 1 && **noise > SPEAKING);
+        2 * noisy.count() > self.allowed.count_ones() as usize
+    }
+}
+
 impl Health {
     /// Takes a millisecond's scans and what the anti-aliasing filter makes of them.
     pub fn push(&mut self, scans: &[Scan; SCANS_PER_SAMPLE], sample: &[f32; GAUGES]) {
@@ -165,7 +176,7 @@ impl Health {
         }
         let all_off = 2 * (off & signs.allowed).count_ones() > signs.allowed.count_ones();
         let measure = Measure::of(&self.gauges, signs);
-        self.left_out = 0;
+        let left_out = core::mem::take(&mut self.left_out);
         self.still_mm += signs.travel_mm;
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             if history.still == 0 {
@@ -181,7 +192,9 @@ impl Health {
             }
             let fault = if history.at_rails > AT_RAILS || history.off & 1 == 1 || all_off {
                 GaugeHealth::Saturated
-            } else if history.still >= STILL_ESTIMATES && measure.speaks_now {
+            } else if history.still >= STILL_ESTIMATES
+                && (measure.speaks_now || signs.most_are_noisy(left_out | measure.silent_ones))
+            {
                 if MID_RAIL.contains(&history.last) {
                     GaugeHealth::Dead
                 } else {
@@ -253,15 +266,17 @@ struct Measure {
     typical: f32,
     /// Power below which a gauge is silent while others speak; 0 if they do not.
     silent: f32,
-    /// One of them at least speaks now, or most have noise that none is without: codes stand still at rest, too.
+    /// One of them at least speaks now: codes stand still at rest, too.
     speaks_now: bool,
+    /// Bit g set: gauge g is none of them.
+    silent_ones: u8,
 }
 
 impl Measure {
     fn of(gauges: &[History; GAUGES], signs: &Signs) -> Self {
         let (mut all, mut speaking) = (Powers::default(), Powers::default());
         let mut speaks_now = false;
-        let mut noisy = 0;
+        let mut silent_ones = 0;
         for (gauge, history) in gauges.iter().enumerate() {
             let allowed = signs.allowed >> gauge & 1 == 1;
             if allowed && history.at_rails <= AT_RAILS && history.still < STILL_ESTIMATES {
@@ -271,10 +286,9 @@ impl Measure {
                 if history.power > speaks {
                     speaking.push(history.power);
                 }
-                if history.health == GaugeHealth::Good {
-                    speaks_now |= history.now > speaks;
-                    noisy += u32::from(signs.noise[gauge] > SPEAKING);
-                }
+                speaks_now |= history.health == GaugeHealth::Good && history.now > speaks;
+            } else {
+                silent_ones |= 1 << gauge;
             }
         }
         let others_speak = speaking.count >= 2;
@@ -292,7 +306,8 @@ impl Measure {
         Self {
             typical: typical.max(LEAST_TYPICAL),
             silent,
-            speaks_now: speaks_now || 2 * noisy > signs.allowed.count_ones(),
+            speaks_now,
+            silent_ones,
         }
     }
 }
