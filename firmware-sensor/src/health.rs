@@ -69,6 +69,8 @@ pub struct Health {
     judgements: u16,
     /// Bit g set: gauge g is left out.
     left_out: u8,
+    /// See [`Measure::silent_ones`], of the judgement before.
+    silent_ones: u8,
     /// Travel since a gauge's code last changed, in mm.
     still_mm: f32,
 }
@@ -176,7 +178,9 @@ impl Health {
         }
         let all_off = 2 * (off & signs.allowed).count_ones() > signs.allowed.count_ones();
         let measure = Measure::of(&self.gauges, signs);
-        let left_out = core::mem::take(&mut self.left_out);
+        // Where all have stood still, one of them changes first, and one has stood still for an estimate longer.
+        let silent_before = core::mem::replace(&mut self.silent_ones, measure.silent_ones);
+        let others = core::mem::take(&mut self.left_out) | measure.silent_ones | silent_before;
         self.still_mm += signs.travel_mm;
         for (gauge, history) in self.gauges.iter_mut().enumerate() {
             if history.still == 0 {
@@ -193,7 +197,8 @@ impl Health {
             let fault = if history.at_rails > AT_RAILS || history.off & 1 == 1 || all_off {
                 GaugeHealth::Saturated
             } else if history.still >= STILL_ESTIMATES
-                && (measure.speaks_now || signs.most_are_noisy(left_out | measure.silent_ones))
+                && (measure.speaks_now
+                    || history.still > STILL_ESTIMATES + 1 && signs.most_are_noisy(others))
             {
                 if MID_RAIL.contains(&history.last) {
                     GaugeHealth::Dead
@@ -575,6 +580,25 @@ mod tests {
             };
             let estimates = ward.until(gauge, GaugeHealth::Dead, one_is_still);
             assert!(estimates <= 30, "{estimates}");
+        }
+    }
+
+    #[test]
+    fn where_all_codes_stood_still_together_none_is_blamed_when_they_go_on() {
+        for (from_ms, still_ms) in (0..10).flat_map(|from| (190..240).map(move |for_| (from, for_)))
+        {
+            let mut ward = Ward::new();
+            let from_s = 1.0 + f64::from(from_ms) * 1e-3;
+            let goes_on_s = from_s + f64::from(still_ms) * 1e-3;
+            let signal = |at: usize, t_s: f64, noise: f64| {
+                if (from_s..goes_on_s).contains(&t_s) {
+                    0.0
+                } else {
+                    15.0 * libm::sin(2.0 * PI * 3.0 * t_s + at as f64) + 120.0 * noise
+                }
+            };
+            assert_eq!(ward.estimates(150, signal), GOOD, "{still_ms}");
+            assert_eq!(ward.changes, 0, "{from_ms} {still_ms}");
         }
     }
 
