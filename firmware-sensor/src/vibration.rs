@@ -263,6 +263,32 @@ mod tests {
     }
 
     #[test]
+    fn slower_than_ten_millimetres_a_second_nothing_is_told() {
+        for (most_mm_s, told) in [(9.0, false), (40.0, true)] {
+            let swings = |t_s: f32| most_mm_s * libm::sinf(TAU * 0.83 * t_s);
+            assert_eq!(
+                is_one_at(swings, |t_s, _| 30.0 * t_s, 2.0),
+                told,
+                "{most_mm_s}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_surface_is_none_to_a_hand_that_trembles_on_it() {
+        for half_mm in [0.4, 0.7, 1.0, 1.6, 2.5] {
+            for hz in [2.0, 3.5, 5.0, 8.0] {
+                let most_mm_s = TAU * hz * half_mm;
+                let trembles = |t_s: f32| most_mm_s * libm::sinf(TAU * hz * t_s);
+                assert!(
+                    !is_one_at(trembles, |_, x_mm| x_mm / 2.0, 3.0),
+                    "{half_mm} mm {hz} Hz"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn a_surface_is_none_where_the_encoder_stands_still_for_a_moment() {
         let mut told = 0;
         for (speed_mm_s, mm) in [(105.0, 1.478), (60.0, 2.0), (40.0, 4.0), (30.0, 0.7)] {
