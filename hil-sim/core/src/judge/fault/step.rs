@@ -112,8 +112,8 @@ impl Step {
         }));
     }
 
-    /// Whether a point since the fault is one of a silence. Where one is over a stretch ends.
-    fn is_silent(&mut self, edge: &Edge) -> bool {
+    /// Takes a point since the fault, and ends a stretch where a silence is over. Whether the point is one of a silence.
+    fn notice_silence(&mut self, edge: &Edge) -> bool {
         let loudest = edge.words.iter().map(|&word| volts(word).abs());
         let loudest_v = loudest.fold(0.0, f64::max);
         let least_s = self.least_silence_s;
@@ -148,7 +148,7 @@ impl Step {
                 continue;
             };
             let volts = volts(edge.words[self.reference]);
-            let is_silent = edge.t_s >= from_s && self.is_silent(&edge);
+            let is_silent = edge.t_s >= from_s && self.notice_silence(&edge);
             if (before_s..from_s).contains(&edge.t_s) {
                 self.before.add(due, volts);
             } else if (from_s..to_s).contains(&edge.t_s) {
