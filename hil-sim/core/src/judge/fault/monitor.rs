@@ -431,8 +431,8 @@ impl FaultMonitor {
             of_others.push(Sign::Fading(Hold::FullDrive));
         }
         let again_within_ms = again_ns(&fault, scene).map(|own_ns| {
-            // Not before it is to drive again after what was there already.
-            let before = others().filter(|other| other.begins_ns() <= from_ns);
+            // Not before it is to drive again after what was there just before.
+            let before = lingering().filter(|other| other.begins_ns() <= from_ns);
             let due_ns = before.filter_map(|other| again_ns(other, scene)).max();
             (own_ns.max(due_ns.unwrap_or(0)) - over_ns) as f64 * 1e-6
         });
