@@ -8,7 +8,7 @@ use crate::scene::fault::{Class, Fault};
 /// Longest time in ns that an output may stand at one voltage that is not 0: as long as any fault's
 /// outputs have to be at 0 V.
 const STANDING_NS: u64 = 20_000_000;
-/// The same at the end of a channel's range: there a crest is cut flat while a charge is worked off under it.
+/// The same at a channel's amplitude: there a crest is cut flat while a charge is worked off under it.
 const CREST_NS: u64 = 100_000_000;
 /// An output that turns by itself is at its last step for up to so many times as long as at the step before: 4.8 times
 /// where it goes as the square of the time, as at a crest or where the hand turns back, and 10.6 where it does both.
@@ -57,6 +57,8 @@ pub(super) struct Outputs {
     limits: Limits,
     /// How far from 0 V each channel's crest is cut, in steps of the DAC.
     crests: [u16; ACTUATORS],
+    /// Whether that may be anywhere below: the amplitude follows the surface, its force or an actuator's model.
+    may_be_weaker: bool,
     last_ns: u64,
     /// When one went beyond the amplitude, or faster than any may, in ns since the scene's start.
     pub beyond_ns: Option<u64>,
@@ -134,6 +136,9 @@ impl Outputs {
             drives_again: false,
             limits: Limits::of(configuration),
             crests: actuators.map(|actuator| crest(configuration, &actuator)),
+            may_be_weaker: configuration.reference_lsb > 0
+                || configuration.reference_mn > 0
+                || actuators.iter().any(|actuator| actuator.resonance_dhz > 0),
             last_ns: 0,
             beyond_ns: None,
         }
@@ -216,8 +221,12 @@ impl Outputs {
     fn stand(&mut self, actuator: usize, word: u16, until_ns: u64) {
         let since_ns = self.since_ns[actuator].max(self.from_ns);
         let stood_ns = until_ns.saturating_sub(since_ns);
-        let from_crest = word.abs_diff(ZERO_VOLT).abs_diff(self.crests[actuator]);
-        let is_cut = from_crest <= CREST_WORDS;
+        let from_zero = word.abs_diff(ZERO_VOLT);
+        let is_cut = if self.may_be_weaker {
+            from_zero <= self.crests[actuator] + CREST_WORDS
+        } else {
+            from_zero.abs_diff(self.crests[actuator]) <= CREST_WORDS
+        };
         let most_ns = if is_cut {
             CREST_NS
         } else {
