@@ -123,6 +123,11 @@ impl Display {
         self.configuration
     }
 
+    /// Who sends estimates asks for a greeting: it may have started again.
+    pub const fn on_greeting(&mut self) {
+        self.plausibility.on_greeting();
+    }
+
     /// Takes what the sensor says, if it is to be trusted: see [`crate::plausibility`].
     pub fn on_estimate(&mut self, estimate: &Estimate) {
         let counters = &mut self.counters;
@@ -153,7 +158,8 @@ impl Display {
     /// Takes what the sensor says of the surface besides λ: see [`crate::relief`].
     pub fn on_texture(&mut self, texture: &Texture) {
         let counters = &mut self.counters;
-        match self.relief.judge(texture) {
+        let may_begin = self.plausibility.may_begin();
+        match self.relief.judge(texture, may_begin) {
             relief::Verdict::Taken => {
                 if texture.valid {
                     self.stimulus.wear(texture);

@@ -30,14 +30,15 @@ pub const SENSORS: Astray = Astray {
     reordered_at_most: 32,
 };
 
-/// Where `sequence` stands to the `last` one seen.
-pub fn order(last: Option<u32>, sequence: u32, astray: &Astray) -> Order {
+/// Where `sequence` stands to the `last` one seen, of a sensor that `may_begin`: it has asked for a greeting since then.
+pub fn order(last: Option<u32>, sequence: u32, may_begin: bool, astray: &Astray) -> Order {
     let Some(last) = last else {
         return Order::Later;
     };
     // A later one is behind by almost 2³².
     let behind = last.wrapping_sub(sequence);
-    let begins_anew = sequence <= astray.beginning && behind > astray.reordered_at_most;
+    let is_first = may_begin || sequence <= astray.beginning;
+    let begins_anew = is_first && behind > astray.reordered_at_most;
     if behind <= astray.late_at_most && !begins_anew {
         Order::Late
     } else if behind <= i32::MAX as u32 {
@@ -73,9 +74,22 @@ mod tests {
             (Some(10), 2, Order::Late),
         ] {
             assert_eq!(
-                order(last, sequence, &ASTRAY),
+                order(last, sequence, false, &ASTRAY),
                 expected,
                 "{last:?} {sequence}"
+            );
+        }
+        for (last, sequence, expected) in [
+            (None, 7, Order::Later),
+            (Some(7), 8, Order::Later),
+            (Some(100), 92, Order::Late),
+            (Some(100), 91, Order::Anew),
+            (Some(300), 100, Order::Anew),
+        ] {
+            assert_eq!(
+                order(last, sequence, true, &ASTRAY),
+                expected,
+                "{last:?} {sequence}, greeted"
             );
         }
     }

@@ -68,6 +68,8 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plausibility {
     last_sequence: Option<u32>,
+    /// How many more estimates in order may come before one of a sensor that asked for a greeting is no new beginning.
+    greeted: u32,
     /// See [`Plausibility::take_beginning`].
     began_anew: bool,
     held: Option<Wavelength>,
@@ -90,6 +92,7 @@ impl Plausibility {
     pub const fn new() -> Self {
         Self {
             last_sequence: None,
+            greeted: 0,
             began_anew: false,
             held: None,
             surprise: None,
@@ -103,17 +106,25 @@ impl Plausibility {
         }
     }
 
+    /// Who sends estimates asks for a greeting, as a sensor does that has started again. On a slow link the first that
+    /// come after it are no longer its first.
+    pub const fn on_greeting(&mut self) {
+        self.greeted = SENSORS.reordered_at_most;
+    }
+
     /// An estimate has come, while the last trusted λ counts for `max_age_ms`.
     pub fn judge(&mut self, estimate: &Estimate, max_age_ms: u16) -> Verdict {
         if !self.flood.take() {
             return Verdict::Flooding;
         }
-        match order(self.last_sequence, estimate.sequence, &SENSORS) {
+        let may_begin = self.may_begin();
+        match order(self.last_sequence, estimate.sequence, may_begin, &SENSORS) {
             Order::Late => return Verdict::Late,
-            Order::Later => {}
+            Order::Later => self.greeted = self.greeted.saturating_sub(1),
             // Another surface, for all that is known.
             Order::Anew => {
                 self.began_anew = true;
+                self.greeted = 0;
                 self.forget();
             }
         }
@@ -179,6 +190,11 @@ impl Plausibility {
     /// The surprises that were not confirmed since the last call.
     pub const fn take_unconfirmed(&mut self) -> u32 {
         core::mem::replace(&mut self.unconfirmed, 0)
+    }
+
+    /// Whether what comes next may be of a sensor that has started again.
+    pub const fn may_begin(&self) -> bool {
+        self.greeted > 0
     }
 
     /// Whether the sensor has started again since this was asked last.

@@ -55,12 +55,12 @@ impl Relief {
         self.last_sequence = None;
     }
 
-    /// A texture has come.
-    pub fn judge(&mut self, texture: &Texture) -> Verdict {
+    /// A texture has come, of a sensor that may have started again or not.
+    pub fn judge(&mut self, texture: &Texture, may_begin: bool) -> Verdict {
         if !self.flood.take() {
             return Verdict::Flooding;
         }
-        if order(self.last_sequence, texture.sequence, &SENSORS) == Order::Late {
+        if order(self.last_sequence, texture.sequence, may_begin, &SENSORS) == Order::Late {
             return Verdict::Late;
         }
         self.last_sequence = Some(texture.sequence);
@@ -135,7 +135,18 @@ mod tests {
             (texture(3), Verdict::Late),
             (texture(4), Verdict::Taken),
         ] {
-            assert_eq!(relief.judge(&texture), expected);
+            assert_eq!(relief.judge(&texture, false), expected);
+            relief.elapse(quarters(50));
+        }
+        // Of a sensor that may have started again.
+        for (sequence, may_begin, expected) in [
+            (400, false, Verdict::Taken),
+            (60, false, Verdict::Late),
+            (368, true, Verdict::Late),
+            (60, true, Verdict::Taken),
+            (65, false, Verdict::Taken),
+        ] {
+            assert_eq!(relief.judge(&texture(sequence), may_begin), expected);
             relief.elapse(quarters(50));
         }
     }
@@ -144,21 +155,21 @@ mod tests {
     fn only_what_a_texture_stands_by_is_young_again() {
         let mut relief = Relief::new();
         assert!(!relief.wave_is_fresh(5_000) && !relief.friction_is_fresh(5_000));
-        relief.judge(&texture(1));
+        relief.judge(&texture(1), false);
         relief.elapse(quarters(400));
         assert!(relief.wave_is_fresh(400) && relief.friction_is_fresh(400));
         let rubs = Texture {
             valid: false,
             ..texture(2)
         };
-        relief.judge(&rubs);
+        relief.judge(&rubs, false);
         relief.elapse(quarters(200));
         assert!(!relief.wave_is_fresh(500) && relief.friction_is_fresh(500));
         let slides = Texture {
             friction: None,
             ..texture(3)
         };
-        relief.judge(&slides);
+        relief.judge(&slides, false);
         relief.elapse(quarters(400));
         assert!(relief.wave_is_fresh(500) && !relief.friction_is_fresh(500));
     }
@@ -168,7 +179,7 @@ mod tests {
         for (every_ms, floods) in [(50, false), (13, false), (10, true), (1, true)] {
             let mut relief = Relief::new();
             let flooded = (0..1_000).any(|sequence| {
-                let verdict = relief.judge(&texture(sequence));
+                let verdict = relief.judge(&texture(sequence), false);
                 relief.elapse(quarters(every_ms));
                 verdict == Verdict::Flooding
             });

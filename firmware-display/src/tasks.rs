@@ -36,6 +36,8 @@ use crate::ticks::Ticks;
 static ESTIMATES: Channel<CriticalSectionRawMutex, Estimate, 8> = Channel::new();
 /// The same for textures, which are fewer.
 static TEXTURES: Channel<CriticalSectionRawMutex, Texture, 2> = Channel::new();
+/// Who may send estimates has asked for a greeting.
+static GREETED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static STOP: Signal<CriticalSectionRawMutex, Stop> = Signal::new();
 static CONFIGURE: Signal<CriticalSectionRawMutex, Settings> = Signal::new();
 /// What is in force, whichever port it came from.
@@ -140,6 +142,9 @@ async fn drive(
             ticks.set_rate(settings.configuration().update_rate);
             display.configure(&settings);
         }
+        if GREETED.try_take().is_some() {
+            display.on_greeting();
+        }
         while let Ok(estimate) = ESTIMATES.try_receive() {
             display.on_estimate(&estimate);
         }
@@ -200,6 +205,7 @@ impl Announced {
 async fn listen(ports: &'static Ports, side: Side, uart: Receiver) {
     ports
         .listen(side, uart, |message| match message {
+            Message::Hello(_) => GREETED.signal(()),
             Message::Estimate(estimate) => {
                 // Full only in a flood, of which those that fit tell enough.
                 let _ = ESTIMATES.try_send(estimate);

@@ -19,6 +19,8 @@ pub struct Port {
     sender: Sender,
     receiver: Receiver,
     queue: Deque<u8, QUEUE_BYTES>,
+    /// See [`Port::take_asked`].
+    asked: bool,
     /// When bytes came last, whatever they were.
     stirred_us: u64,
     /// When a good frame came last.
@@ -44,6 +46,7 @@ impl Port {
             sender,
             receiver: Receiver::new(),
             queue: Deque::new(),
+            asked: false,
             stirred_us: 0,
             heard_us: 0,
             dropped: 0,
@@ -116,6 +119,7 @@ impl Port {
         let Self {
             sender,
             receiver,
+            asked,
             heard_us,
             ..
         } = self;
@@ -138,7 +142,10 @@ impl Port {
                             message => handle(message),
                         }
                     }
-                    Event::Greeted(hello) => sender.on_greeting(hello.asks != 0),
+                    Event::Greeted(hello) => {
+                        sender.on_greeting(hello.asks != 0);
+                        *asked |= hello.asks != 0;
+                    }
                     Event::Unheralded => sender.on_unheralded(),
                     Event::Foreign(_) => sender.on_foreign(),
                     Event::Text => return sender.on_text(),
@@ -155,6 +162,11 @@ impl Port {
             }));
         }
         self.poll(now_us);
+    }
+
+    /// Whether the peer has asked for a greeting since this was asked last, as one does that has started again.
+    pub const fn take_asked(&mut self) -> bool {
+        core::mem::replace(&mut self.asked, false)
     }
 
     /// Moves bytes to send into `out`; returns how many.

@@ -153,6 +153,50 @@ fn a_sensor_that_restarts_is_followed_at_once_on_whatever_surface() {
 }
 
 #[test]
+fn a_sensor_that_asks_for_a_greeting_is_followed_whatever_it_begins_with() {
+    // Of a slow link, the estimates until the answer came are missing.
+    let told = |before: u32, in_order: u32, next: u32| {
+        let mut plausibility = Plausibility::new();
+        plausibility.judge(&sound(before, 2.0), MAX_AGE_MS);
+        plausibility.on_greeting();
+        for on_its_way in 1..=in_order {
+            plausibility.elapse(quarters(10), false);
+            plausibility.judge(&sound(before + on_its_way, 2.0), MAX_AGE_MS);
+        }
+        plausibility.judge(&sound(next, 9.0), MAX_AGE_MS)
+    };
+    for (before, in_order, next) in [(371, 0, 20), (371, 31, 20), (371, 31, 369), (500, 10, 300)] {
+        let verdict = told(before, in_order, next);
+        assert_eq!(verdict, trusted(9.0), "{next} after {before} + {in_order}");
+    }
+    // One that a network has put out of order is late all the same, and so are all once the sensor has gone on.
+    for (before, in_order, next) in [(371, 0, 339), (371, 32, 371), (371, 32, 20)] {
+        let verdict = told(before, in_order, next);
+        assert_eq!(verdict, Verdict::Late, "{next} after {before} + {in_order}");
+    }
+}
+
+#[test]
+fn a_sensor_that_begins_anew_does_so_once_a_greeting() {
+    let mut plausibility = Plausibility::new();
+    let mut judge = |sequence: u32, asks: bool| {
+        if asks {
+            plausibility.on_greeting();
+        }
+        plausibility.judge(&sound(sequence, 2.0), MAX_AGE_MS)
+    };
+    let told = [
+        (371, false),
+        (20, true),
+        (21, false),
+        (300, false),
+        (100, false),
+    ];
+    let told = told.map(|(sequence, asks)| judge(sequence, asks) == Verdict::Late);
+    assert_eq!(told, [false, false, false, false, true]);
+}
+
+#[test]
 fn a_boundary_between_specimens_costs_one_estimate() {
     for (before_mm, after_mm) in [(1.0, 4.0), (4.0, 1.0), (1.0, 2.2), (3.0, 1.4)] {
         let told = on_wavelengths([before_mm, before_mm, after_mm, after_mm, after_mm]);

@@ -264,6 +264,7 @@ struct ScriptedSensor<W> {
     heard: MessageDecoder,
     estimates: Vec<EstimateRecord>,
     arrived: Vec<Arrival>,
+    has_asked: bool,
     statuses: Vec<(u64, Status)>,
     safety: Vec<Safety>,
     motions: u64,
@@ -289,6 +290,7 @@ impl<W> ScriptedSensor<W> {
             heard: MessageDecoder::default(),
             estimates: Vec::new(),
             arrived: Vec::new(),
+            has_asked: false,
             statuses: Vec::new(),
             safety: Vec::new(),
             motions: 0,
@@ -414,11 +416,14 @@ impl<W> ScriptedSensor<W> {
         }
         self.heard.hear(&arrived);
         for said in self.heard.take() {
-            if let Message::Estimate(estimate) = said.message {
-                self.arrived.push(Arrival {
+            match said.message {
+                Message::Hello(hello) => self.has_asked |= hello.asks != 0,
+                Message::Estimate(estimate) => self.arrived.push(Arrival {
                     at_ns: said.at_ns,
                     estimate,
-                });
+                    has_asked: mem::take(&mut self.has_asked),
+                }),
+                _ => {}
             }
         }
     }

@@ -207,11 +207,17 @@ fn record(
             });
         }
     }
+    let mut has_asked = false;
     let arrived = heard.messages().filter_map(|heard| match heard.message {
         Message::Estimate(estimate) => Some(Arrival {
             at_ns: heard.at_ns,
             estimate,
+            has_asked: std::mem::take(&mut has_asked),
         }),
+        Message::Hello(hello) => {
+            has_asked |= hello.asks != 0;
+            None
+        }
         _ => None,
     });
     let sensor_status = last_status(&said);

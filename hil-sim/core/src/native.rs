@@ -118,6 +118,8 @@ struct Pair<'o, O> {
     steps_per_tick: u64,
     sensor_end: End,
     display_end: End,
+    /// See [`Arrival::has_asked`].
+    has_asked: bool,
     /// The sensor board's.
     clock: Clock,
     scan_count: u64,
@@ -147,6 +149,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             display: display_of(scene)?,
             sensor_end: end(Role::Sensor, b'S', Role::Display),
             display_end: end(Role::Display, b'D', Role::Sensor),
+            has_asked: false,
             clock: Clock::new(&scene.faults),
             scan_count: 0,
             gauges: GaugeFaults::new(&scene.faults),
@@ -212,6 +215,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
             display,
             sensor_end,
             display_end,
+            has_asked,
             onlooker,
             ..
         } = self;
@@ -223,6 +227,7 @@ impl<'o, O: RunObserver> Pair<'o, O> {
                     onlooker.see(RunEvent::Received(&Arrival {
                         at_ns: due_ns,
                         estimate,
+                        has_asked: std::mem::take(has_asked),
                     }));
                     display.on_estimate(&estimate);
                 }
@@ -231,6 +236,10 @@ impl<'o, O: RunObserver> Pair<'o, O> {
                 _ => {}
             },
         );
+        if display_end.port.take_asked() {
+            *has_asked = true;
+            display.on_greeting();
+        }
     }
 
     /// An ADC scan and, with every fourth, the sensor's millisecond.

@@ -153,8 +153,8 @@ impl Ports {
         self.with(side, |port, _| port.counters())
     }
 
-    /// Receives for ever: hands each message that is not the link's own to `handle`, which runs while
-    /// the port is borrowed and so must not post, only pass on. No deadline: the
+    /// Receives for ever: hands each message that is not the link's own to `handle`, and the Hello of who asks for a
+    /// greeting. That runs while the port is borrowed and so must not post, only pass on. No deadline: the
     /// ring behind the port holds some milliseconds, and what is lost when it overruns is counted.
     pub async fn listen(
         &self,
@@ -172,7 +172,12 @@ impl Ports {
                             latest.heard(now_us, &message);
                             stop::on(side, &message);
                             handle(message);
-                        })
+                        });
+                        if port.take_asked()
+                            && let Peer::Known(hello) = port.peer()
+                        {
+                            handle(Message::Hello(hello));
+                        }
                     });
                 }
                 Err(Error::Overrun) => self.with(side, |port, _| port.on_overrun()),

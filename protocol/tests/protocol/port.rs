@@ -48,6 +48,22 @@ fn two_ports_know_each_other_after_one_exchange() {
 }
 
 #[test]
+fn a_port_tells_once_that_its_peer_has_asked_for_a_greeting() {
+    let (mut sensor, mut host) = (port(Role::Sensor), port(Role::Host));
+    // At its start, and when it has started again.
+    for _ in 0..2 {
+        sensor.poll(0);
+        carry(&mut sensor, &mut host, 0);
+        assert!(host.take_asked());
+        carry(&mut host, &mut sensor, 0);
+        sensor.post(&WORD);
+        assert_eq!(carry(&mut sensor, &mut host, 0), [WORD]);
+        assert!(!host.take_asked() && !sensor.take_asked());
+        sensor = port(Role::Sensor);
+    }
+}
+
+#[test]
 fn the_exchange_of_greetings_ends() {
     let (mut sensor, mut host) = acquainted();
     for _ in 0..4 {

@@ -6,6 +6,7 @@
 //! seen; it must do no harm. Nor is judged what the scene's end leaves no time for: [`Finding::unjudged`] says so.
 
 mod conduct;
+mod due;
 mod finding;
 mod monitor;
 mod outputs;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use protocol::{DisplayConfiguration, Estimate, Role};
+use protocol::{DisplayConfiguration, Role};
 
 use crate::judge::seconds;
 use crate::judge::trust::Trust;
@@ -162,8 +162,7 @@ impl DuePhase {
     fn received(&mut self, arrival: &Arrival) {
         match self.last_tick_ns {
             Some(tick_ns) if arrival.at_ns <= tick_ns => {
-                self.followed
-                    .hear(tick_ns, &arrival.estimate, self.is_silent());
+                self.followed.hear(tick_ns, arrival, self.is_silent());
             }
             _ => self.arrived.push_back(*arrival),
         }
@@ -210,7 +209,7 @@ impl DuePhase {
             .pop_front_if(|arrival| arrival.at_ns <= tick.at_ns)
         {
             let silent = self.is_silent();
-            self.followed.hear(tick.at_ns, &arrival.estimate, silent);
+            self.followed.hear(tick.at_ns, &arrival, silent);
         }
     }
 }
@@ -246,13 +245,16 @@ impl Followed {
     }
 
     /// An estimate is heard at a tick, while all was `silent` or not.
-    fn hear(&mut self, tick_ns: u64, estimate: &Estimate, silent: bool) {
+    fn hear(&mut self, tick_ns: u64, arrival: &Arrival, silent: bool) {
         let DisplayConfiguration {
             glide_ms,
             update_rate,
             ..
         } = self.configuration;
-        if let Some(wavelength_mm) = self.trust.hear(tick_ns, estimate) {
+        if arrival.has_asked {
+            self.trust.greet();
+        }
+        if let Some(wavelength_mm) = self.trust.hear(tick_ns, &arrival.estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
             if target_per_mm != self.target_per_mm {
                 self.target_per_mm = target_per_mm;

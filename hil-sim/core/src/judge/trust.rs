@@ -38,6 +38,8 @@ const FASTEST_ARM_UM_S: u32 = 20_000_000;
 pub struct Trust {
     max_age_ns: u64,
     sequence: Option<u32>,
+    /// How many more may come in order before one that is behind is no first one of a sensor that has asked for a greeting.
+    asked: u32,
     held_mm: Option<f32>,
     surprise_mm: Option<f32>,
     trusted_ns: Option<u64>,
@@ -60,6 +62,11 @@ impl Trust {
             max_age_ns: u64::from(max_age_ms) * 1_000_000,
             ..Self::default()
         }
+    }
+
+    /// Who sends estimates has asked for a greeting, as a sensor does that has started again.
+    pub fn greet(&mut self) {
+        self.asked = REORDERED;
     }
 
     /// An estimate is heard: the λ to be followed from now on, in mm, if it is one to follow.
@@ -153,10 +160,13 @@ impl Trust {
         };
         let behind = last.wrapping_sub(sequence);
         if behind > i32::MAX as u32 {
+            self.asked = self.asked.saturating_sub(1);
             return true;
         }
-        let begins = behind > OLD || (sequence <= FIRST && behind > REORDERED);
+        let is_first = sequence <= FIRST || self.asked > 0;
+        let begins = behind > OLD || (is_first && behind > REORDERED);
         if begins {
+            self.asked = 0;
             self.held_mm = None;
             if self.surprise_mm.take().is_some() {
                 self.distrust(self.bucket.1);
@@ -271,7 +281,8 @@ mod tests {
         followed(&mut trust, 5, &[2.0; 20]);
         assert_eq!(holds(&mut trust, 240 + 500), []);
         assert_eq!(holds(&mut trust, 240 + 501), [Hold::Stale]);
-        // What was sent before it, or is sent again, changes nothing; a sensor's first does.
+        // What was sent before it, or is sent again, changes nothing; a sensor's first does, and so does what comes once
+        // a sensor has asked for a greeting.
         let mut late = Run::steady(50.0, 2.0).record().estimates[0].estimate;
         late.sequence = 24;
         assert_eq!(trust.hear(750 * MS, &late), None);
@@ -280,6 +291,14 @@ mod tests {
         assert_eq!(followed(&mut trust, 100, &[2.0]), [Some(2.0)]);
         late.sequence = 0;
         assert_eq!(trust.hear(1_001 * MS, &late), Some(2.0));
+        followed(&mut trust, 300, &[2.0]);
+        late.sequence = 200;
+        assert_eq!(trust.hear(3_001 * MS, &late), None);
+        for (in_order, expected) in [(31, Some(2.0)), (32, None)] {
+            trust.greet();
+            followed(&mut trust, 301, &vec![2.0; in_order]);
+            assert_eq!(trust.hear(3_400 * MS, &late), expected, "{in_order}");
+        }
     }
 
     #[test]

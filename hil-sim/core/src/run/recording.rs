@@ -79,6 +79,8 @@ pub struct Arrival {
     pub at_ns: u64,
     /// The estimate, as the display hears it.
     pub estimate: Estimate,
+    /// Whether who sends estimates has asked for a greeting since the one before.
+    pub has_asked: bool,
 }
 
 impl Arrival {
@@ -90,6 +92,7 @@ impl Arrival {
                 Some(Self {
                     at_ns: record.received_ns?,
                     estimate: record.estimate,
+                    has_asked: false,
                 })
             })
             .collect();

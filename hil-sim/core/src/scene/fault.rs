@@ -12,7 +12,7 @@
 pub mod catalogue;
 mod kind;
 
-pub use catalogue::{Class, Key, Lasts, Row, Sign};
+pub use catalogue::{Class, Key, Lasts, Row, Shows, Sign};
 pub use kind::Kind;
 
 use protocol::Role;
@@ -57,6 +57,16 @@ impl Fault {
     /// When it ends, in ns since the scene's start; none if it never does, or has no length.
     pub fn ends_ns(&self) -> Option<u64> {
         self.for_s.map(|for_s| nanoseconds(self.at_s + for_s))
+    }
+
+    /// In which time in ms it has to show; none if that depends on what arrives. See [`Row::seen_within_ms`].
+    pub fn seen_within_ms(&self) -> Option<f64> {
+        let row = self.kind.row();
+        let longer_s = match (row.shows, self.for_s, row.lasts.default_s()) {
+            (Shows::WhenOver, Some(for_s), Some(default_s)) => (for_s - default_s).max(0.0),
+            _ => 0.0,
+        };
+        row.seen_within_ms.map(|ms| ms + longer_s * 1e3)
     }
 
     /// Whether it is there at `at_ns`, for kinds that last.

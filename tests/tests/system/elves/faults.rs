@@ -152,6 +152,23 @@ fn a_dma_that_stalls_in_the_middle_of_an_update_is_named() {
     assert!(findings.iter().all(|(_, finding)| finding.was_driving));
 }
 
+/// The first of its estimates never leave it: they are not said before the display has answered its greeting.
+#[test]
+fn a_sensor_that_starts_again_behind_a_slow_link_is_followed_again() {
+    for delay_ms in [60.0, 200.0] {
+        let mut scene = Scene {
+            duration_s: 4.0,
+            faults: vec![Fault::new(Kind::SensorPanic, 2.5)],
+            ..Scene::constant(2.0, 50.0)
+        };
+        scene.link.delay_ms = delay_ms;
+        let (recording, _) = hil_sim_boards::run(&scene, elves::both()).unwrap();
+        let finding = judge::fault::judge(&scene, &recording).remove(0);
+        assert_eq!(finding.unmet(), Vec::<String>::new(), "{delay_ms}");
+        assert!(finding.drives_again, "{delay_ms}: {finding:?}");
+    }
+}
+
 /// While the hand rests no words are sent, and the next look into a converter is what meets it.
 #[test]
 fn an_spi_that_stalls_while_the_hand_rests_is_no_converters_fault() {

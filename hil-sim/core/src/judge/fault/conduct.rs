@@ -168,6 +168,9 @@ impl Conduct {
                 self.seen.heard_before += 1;
                 self.seen.valid_before += usize::from(arrival.estimate.valid);
             }
+            if arrival.has_asked {
+                self.trust.greet();
+            }
             match self.trust.hear(heard_ns, &arrival.estimate) {
                 Some(mm) => self.wavelength_mm = mm,
                 None => self.unfollowed |= self.again_ns.contains(&arrival.at_ns),

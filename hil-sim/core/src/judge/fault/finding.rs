@@ -31,6 +31,8 @@ pub struct Finding {
     pub unjudged: Vec<String>,
     /// Whether it is one that has to be seen and answered: long enough, and great enough.
     pub(super) must_show: bool,
+    /// Whether the display has said that it has stopped, for a reason that the kind has.
+    pub(super) has_stopped: bool,
     /// It is a Stop that the display never hears: what the outputs do has other reasons.
     pub(super) is_unheard: bool,
     /// Why it need not be seen in time all the same.
@@ -61,9 +63,8 @@ impl Finding {
         if stuck > 0 {
             unmet.push(format!("{stuck} outputs stuck"));
         }
-        // What nobody has seen is over without a stop.
-        let is_answered =
-            self.must_show || self.detected_ns.is_some() || self.resets > self.resets_of_others;
+        // What nobody has seen is over without a stop, and so is what CLR alone has answered.
+        let is_answered = self.must_show || self.has_stopped || self.resets > self.resets_of_others;
         if is_answered && self.is_restart_against_the_table() {
             let again = if self.drives_again {
                 ", drives again"
@@ -81,7 +82,7 @@ impl Finding {
 
     /// Whether it was seen, and the outputs were at 0 V, in time.
     fn must_be_answered(&self, row: &Row, unmet: &mut Vec<String>) {
-        if let Some(within_ms) = row.seen_within_ms
+        if let Some(within_ms) = self.fault.seen_within_ms()
             && self.unseen.is_none()
         {
             match self.detected_ms() {

@@ -1,7 +1,7 @@
 //! Recordings of displays that answer a fault well, or badly.
 
 use protocol::{
-    DisplayCounters, DisplayState, Hold, Message, PortCounters, Rendering, ResetCause, Role,
+    DisplayCounters, DisplayState, Hello, Hold, Message, PortCounters, Rendering, ResetCause, Role,
     RoleCounters, Safety, Status, Trip, UNITY_GAIN,
 };
 
@@ -575,6 +575,91 @@ fn what_need_not_be_seen_must_do_no_harm() {
     assert_eq!(short(pauses, FaultEvidence::default()), [""; 0]);
 }
 
+#[test]
+fn ticks_that_stop_for_less_than_a_watchdog_waits_are_answered_by_clr_alone() {
+    let mut stops = Fault::new(Kind::TickStopped, AT_MS as f64 * 1e-3);
+    stops.for_s = Some(0.025);
+    let mut outputs = driven(0, AT_MS + 2, ZERO_VOLT);
+    outputs.extend(driven(AT_MS + 30, END_MS, ZERO_VOLT));
+    let signs = |display: Vec<TimedMessage>| FaultEvidence {
+        display,
+        clears_ns: vec![(AT_MS + 2) * MS],
+        ..FaultEvidence::default()
+    };
+    let unmet = |display| judged_for(stops, outputs.clone(), signs(display)).unmet();
+    assert_eq!(unmet(Vec::new()), [""; 0]);
+    let bitten = vec![said(AT_MS + 500, DisplayState::Stopped(Trip::Watchdog))];
+    assert_eq!(
+        unmet(bitten),
+        ["restarted against the table: 0 resets, drives again"]
+    );
+}
+
+#[test]
+fn a_transfer_that_fails_while_no_words_go_out_need_not_show() {
+    let silent = |kind: Kind| {
+        let outputs = driven(0, 20, ZERO_VOLT);
+        judged(kind, outputs, FaultEvidence::default())
+    };
+    for kind in [Kind::DmaStall, Kind::LdacStuck, Kind::ClearStuckLow] {
+        let finding = silent(kind);
+        assert_eq!(finding.unmet(), [""; 0], "{kind:?}");
+        let why = ["whether it shows: the display does not drive"];
+        assert_eq!(finding.unjudged, why, "{kind:?}");
+        let driven = judged(kind, driven(0, END_MS, ZERO_VOLT), FaultEvidence::default());
+        assert_eq!(driven.unmet()[0], "no sign of it", "{kind:?}");
+    }
+    assert_eq!(silent(Kind::SpiStall).unmet()[0], "no sign of it");
+}
+
+#[test]
+fn what_shows_once_it_is_over_is_waited_for() {
+    let dips = |for_s: f64, greets_ms: u64| {
+        let mut fault = Fault::new(Kind::SensorBrownOut, 0.5);
+        fault.for_s = Some(for_s);
+        let scene = with_faults(4.0, vec![fault]);
+        let mut recording = Run::steady(50.0, 4.0).record();
+        recording.signs.sensor.push(TimedMessage {
+            at_ns: greets_ms * MS,
+            message: Message::Hello(Hello::new(Role::Sensor, "chip", [0, 1, 0]).asking(true)),
+        });
+        let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
+        let late = |line: &String| line.starts_with("sensor: greets anew after");
+        unmet.into_iter().filter(late).collect::<Vec<_>>()
+    };
+    assert_eq!(dips(0.02, 999), [""; 0]);
+    assert_eq!(
+        dips(0.02, 1_001),
+        ["sensor: greets anew after 501.00 ms of 500"]
+    );
+    assert_eq!(dips(1.02, 1_999), [""; 0]);
+    assert_eq!(
+        dips(1.02, 2_001),
+        ["sensor: greets anew after 1501.00 ms of 1500"]
+    );
+}
+
+#[test]
+fn a_greeting_is_a_false_alarm_unless_the_link_may_have_lost_those_before() {
+    let greets = |loss: f64, at_s: f64| {
+        let mut scene = with_faults(4.0, vec![Fault::new(Kind::Nothing, at_s)]);
+        scene.link.loss = loss;
+        let mut recording = Run::steady(50.0, 4.0).record();
+        recording.signs.sensor.push(TimedMessage {
+            at_ns: 3_500 * MS,
+            message: Message::Hello(Hello::new(Role::Sensor, "chip", [0, 1, 0]).asking(true)),
+        });
+        let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
+        unmet
+            .iter()
+            .any(|line| line.contains("sensor: greets anew"))
+    };
+    assert!(greets(0.0, 0.5));
+    // Of one in five, a greeting and its answer: 36 % of the tries fail.
+    assert!(!greets(0.2, 0.5) && !greets(0.2, 3.2));
+    assert!(!greets(0.02, 0.5) && greets(0.02, 2.2));
+}
+
 /// What a display has counted.
 fn counted(at_ms: u64, corrupt: u32, late: u32) -> TimedMessage {
     let status = Status {
@@ -594,6 +679,33 @@ fn counted(at_ms: u64, corrupt: u32, late: u32) -> TimedMessage {
         at_ns: at_ms * MS,
         message: Message::Status(status),
     }
+}
+
+#[test]
+fn a_wavelength_that_jumps_is_a_false_alarm_on_a_plain_surface_alone() {
+    let jumps = |random: f64| {
+        let mut scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, 0.5)]);
+        scene.surface.irregularity.random = random;
+        let mut recording = Run::steady(50.0, 2.0).record();
+        recording.signs.display = [(400, 0), (1_400, 1)]
+            .map(|(at_ms, implausible)| {
+                let mut said = counted(at_ms, 0, 0);
+                if let Message::Status(status) = &mut said.message {
+                    status.role = RoleCounters::Display(DisplayCounters {
+                        implausible,
+                        ..DisplayCounters::default()
+                    });
+                }
+                said
+            })
+            .to_vec();
+        finding(&scene, 0, 2_000 * MS, &recording).unmet()
+    };
+    assert_eq!(
+        jumps(0.0),
+        ["not to be expected: display: implausible 1, at 900.00 ms"]
+    );
+    assert_eq!(jumps(0.4), [""; 0]);
 }
 
 /// A hand that moves all the time over what `spoil` makes of a sound recording, with a fault at 0.5 s.

@@ -117,6 +117,9 @@ pub struct Row {
     pub signs: &'static [Sign],
     /// In which time in ms; none if that depends on what arrives: then when that is a reason to hold.
     pub seen_within_ms: Option<f64>,
+    /// When it shows.
+    #[serde(default)]
+    pub shows: Shows,
     /// From which time in ms on no estimate is stood by until it ends; none if what the sensor says is not affected.
     pub nothing_valid_after_ms: Option<f64>,
     /// What else may show. Anything else must not.
@@ -168,6 +171,19 @@ pub enum Needs {
     /// On emulated boards.
     #[default]
     Boards,
+}
+
+/// When a fault shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shows {
+    /// From its beginning on.
+    #[default]
+    Meanwhile,
+    /// Once it is over: nobody is there to say so before.
+    WhenOver,
+    /// While the display drives: else no words go out, and CLR is low.
+    WhileDriving,
 }
 
 /// What the display is to do.
