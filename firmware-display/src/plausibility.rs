@@ -68,7 +68,7 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plausibility {
     last_sequence: Option<u32>,
-    /// How many more estimates in order may come before one of a sensor that asked for a greeting is no new beginning.
+    /// How many more estimates in order have to come until a greeting was asked for without a new beginning.
     greeted: u32,
     /// See [`Plausibility::take_beginning`].
     began_anew: bool,

@@ -38,7 +38,7 @@ const FASTEST_ARM_UM_S: u32 = 20_000_000;
 pub struct Trust {
     max_age_ns: u64,
     sequence: Option<u32>,
-    /// How many more may come in order before one that is behind is no first one of a sensor that has asked for a greeting.
+    /// How many more estimates in order have to come until a greeting was asked for by a sensor that has not started again.
     asked: u32,
     held_mm: Option<f32>,
     surprise_mm: Option<f32>,
