@@ -164,7 +164,8 @@ impl Display {
                 if texture.valid {
                     self.stimulus.wear(texture);
                 }
-                if texture.friction.is_some() {
+                let max_age_ms = self.configuration.max_age_ms;
+                if texture.friction.is_some() || !self.relief.friction_is_fresh(max_age_ms) {
                     self.stimulus.rub(texture.friction);
                 }
             }
@@ -275,19 +276,13 @@ impl Display {
         );
     }
 
-    /// Time passes, and what is known of the surface besides λ may become too old.
+    /// Time passes, and what is known of the surface's wave besides λ may become too old.
     fn forget(&mut self, quarters: u32) {
         let max_age_ms = self.configuration.max_age_ms;
-        let was_fresh = (
-            self.relief.wave_is_fresh(max_age_ms),
-            self.relief.friction_is_fresh(max_age_ms),
-        );
+        let was_fresh = self.relief.wave_is_fresh(max_age_ms);
         self.relief.elapse(quarters);
-        if was_fresh.0 && !self.relief.wave_is_fresh(max_age_ms) {
+        if was_fresh && !self.relief.wave_is_fresh(max_age_ms) {
             self.stimulus.wear_off();
-        }
-        if was_fresh.1 && !self.relief.friction_is_fresh(max_age_ms) {
-            self.stimulus.rub(None);
         }
     }
 

@@ -7,14 +7,18 @@
 //! | unsound | a number is out of its range ([`Texture::is_sound`]) | not used |
 //! | taken | none of these | its wave is played if it is valid, its friction if there is one |
 //!
-//! None of them is a hold: what a texture asks for is within all limits whatever it says. What was taken counts for
-//! [`max_age_ms`](protocol::DisplayConfiguration::max_age_ms), as λ does.
+//! None of them is a hold: what a texture asks for is within all limits whatever it says. A wave that was taken counts for
+//! [`max_age_ms`](protocol::DisplayConfiguration::max_age_ms), as λ does. Friction does until the textures of so long have
+//! told of none: while there are none, as where an arm rests or a link fails, a weak stimulus is not to burst out.
 
 use protocol::Texture;
 
 use crate::flood::Flood;
 use crate::order::{Order, SENSORS, order};
 use crate::pace::quarters;
+
+/// From one texture of a sensor's to the next.
+const PERIOD_MS: u32 = 50;
 
 /// What is to be done with a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +38,9 @@ pub enum Verdict {
 pub struct Relief {
     last_sequence: Option<u32>,
     flood: Flood,
-    /// Time since the last wave and since the last friction were taken, in quarters of a millisecond.
+    /// Time since the last wave was taken, in quarters of a millisecond.
     wave_age: u32,
+    /// What the textures since the last one that told of friction stand for, in quarters of a millisecond.
     friction_age: u32,
 }
 
@@ -70,16 +75,16 @@ impl Relief {
         if texture.valid {
             self.wave_age = 0;
         }
-        if texture.friction.is_some() {
-            self.friction_age = 0;
-        }
+        self.friction_age = match texture.friction {
+            Some(_) => 0,
+            None => self.friction_age.saturating_add(quarters(PERIOD_MS)),
+        };
         Verdict::Taken
     }
 
     /// A tick of `quarters` of a millisecond has passed.
     pub fn elapse(&mut self, quarters: u32) {
         self.wave_age = self.wave_age.saturating_add(quarters);
-        self.friction_age = self.friction_age.saturating_add(quarters);
         self.flood.elapse(quarters);
     }
 
@@ -88,7 +93,7 @@ impl Relief {
         self.wave_age <= quarters(max_age_ms as u32)
     }
 
-    /// Whether the last friction taken is no older than this.
+    /// Whether the textures since the last friction that was taken stand for no longer than this.
     pub const fn friction_is_fresh(&self, max_age_ms: u16) -> bool {
         self.friction_age <= quarters(max_age_ms as u32)
     }
@@ -165,13 +170,18 @@ mod tests {
         relief.judge(&rubs, false);
         relief.elapse(quarters(200));
         assert!(!relief.wave_is_fresh(500) && relief.friction_is_fresh(500));
-        let slides = Texture {
-            friction: None,
-            ..texture(3)
-        };
-        relief.judge(&slides, false);
-        relief.elapse(quarters(400));
-        assert!(relief.wave_is_fresh(500) && !relief.friction_is_fresh(500));
+        // Time alone makes no friction old, but textures that tell of none.
+        relief.elapse(quarters(10_000));
+        for sequence in 3..13 {
+            assert!(relief.friction_is_fresh(499), "{sequence}");
+            let slides = Texture {
+                friction: None,
+                ..texture(sequence)
+            };
+            relief.judge(&slides, false);
+            relief.elapse(quarters(50));
+        }
+        assert!(relief.wave_is_fresh(500) && !relief.friction_is_fresh(499));
     }
 
     #[test]

@@ -91,9 +91,9 @@ fn what_a_lower_age_makes_too_old_is_played_no_longer() {
         ..texture(1)
     });
     settle(&mut rig, 2.0);
-    rig.rub(300, 2.0);
+    tell_of_none(&mut rig, 2..11);
     assert!(peak(&mut rig, 2.0) < 8_192, "flattened and weak");
-    // Neither the wave nor the force is as young as that.
+    // Neither the wave is as young as that, nor what was told of the force in the last 450 ms of textures.
     rig.configure(&DisplayConfiguration {
         max_age_ms: 400,
         reference_mn: 200,
@@ -173,21 +173,60 @@ fn in_the_fundamental_no_texture_changes_a_word() {
     }
 }
 
+const WEIGHED: DisplayConfiguration = DisplayConfiguration {
+    reference_mn: 200,
+    ..DisplayConfiguration::DEFAULT
+};
+
+/// The sensor goes on, and tells of no friction for so long.
+fn tell_of_none(rig: &mut Rig, sequences: std::ops::Range<u32>) {
+    for sequence in sequences {
+        rig.rub(50, 2.0);
+        rig.display.on_texture(&Texture {
+            sequence,
+            ..Texture::default()
+        });
+    }
+}
+
 #[test]
-fn what_rubs_little_is_played_weakly_as_long_as_it_is_told() {
-    let mut rig = Rig::driving(&DisplayConfiguration {
-        reference_mn: 200,
-        ..DisplayConfiguration::DEFAULT
-    });
+fn what_rubs_little_is_played_weakly_until_the_sensor_has_told_of_none_for_long() {
+    let mut rig = Rig::driving(&WEIGHED);
     assert!(is_sine(&mut rig, 2.0));
     // Friction counts though the wave is not stood by.
     rig.display.on_texture(&weak(1));
     settle(&mut rig, 2.0);
     let peak_then = peak(&mut rig, 2.0);
     assert!((8_170..=8_192).contains(&peak_then), "{peak_then}");
-    // 260 ms, then beyond 500.
-    rig.rub(280, 2.0);
+    // 500 ms, then one more.
+    tell_of_none(&mut rig, 2..12);
+    let peak_then = peak(&mut rig, 2.0);
+    assert!((8_170..=8_192).contains(&peak_then), "{peak_then}");
+    tell_of_none(&mut rig, 12..13);
+    settle(&mut rig, 2.0);
     assert!(is_sine(&mut rig, 2.0));
+}
+
+#[test]
+fn what_rubs_little_does_not_burst_out_where_a_link_fails_or_a_hand_has_rested() {
+    let mut rig = Rig::driving(&WEIGHED);
+    rig.display.on_texture(&weak(1));
+    settle(&mut rig, 2.0);
+    // Neither estimates nor textures, until all is at 0 V, and then estimates alone.
+    let mut loudest = 0;
+    for _ in 0..rig.ticks(1_500) {
+        rig.move_on();
+        loudest = loudest.max(rig.display.words()[0].abs_diff(ZERO_VOLT));
+    }
+    assert!(rig.is_silent());
+    loudest = loudest.max(peak(&mut rig, 2.0));
+    // A sensor tells of no texture while its arm rests.
+    for _ in 0..rig.ticks(2_000) {
+        rig.tick(0);
+        loudest = loudest.max(rig.display.words()[0].abs_diff(ZERO_VOLT));
+    }
+    loudest = loudest.max(peak(&mut rig, 2.0));
+    assert!((8_170..=8_192).contains(&loudest), "{loudest}");
 }
 
 #[test]
