@@ -179,16 +179,21 @@ impl Injector {
         }
     }
 
+    /// False if the ELF does not show where the task is.
     fn lead(&self, task: &str, trap: Trap, host: &mut dyn Host) -> bool {
-        self.traps
-            .as_ref()
-            .is_some_and(|traps| traps.lead(task, trap, host))
+        let known = self.traps.as_ref().filter(|traps| traps.know(task));
+        if let Some(traps) = known {
+            traps.lead(task, trap, host);
+        }
+        known.is_some()
     }
 
     /// Turns a bit of a setting where the output task holds them: their 16-bit numbers lie in the order of
-    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them.
+    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them. A board without
+    /// power has none. False if the ELF does not show where.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
-        let Some(traps) = &self.traps else {
+        let known = self.traps.as_ref().filter(|traps| traps.know(OUTPUT_TASK));
+        let Some(traps) = known else {
             return false;
         };
         let set = &self.settings;
@@ -211,7 +216,7 @@ impl Injector {
                 .and_then(|word| host.write(address, Width::W16, word ^ 1 << bit))
                 .is_ok()
         };
-        !places.is_empty() && places.iter().all(|place| turn(place, host))
+        places.iter().all(|place| turn(place, host))
     }
 }
 
