@@ -7,6 +7,7 @@ use protocol::{DisplayConfiguration, Role};
 use crate::judge::seconds;
 use crate::judge::trust::Trust;
 use crate::judge::truth::Truth;
+use crate::plant::motion::MM_PER_COUNT;
 use crate::run::observer::{RunEvent, RunObserver};
 use crate::run::recording::{Arrival, TickRecord, WORD_V, ZERO_VOLT};
 
@@ -214,6 +215,13 @@ impl DuePhase {
     }
 }
 
+/// A wavenumber in steps of the board's phase, 2⁻³² turns a count: what is the same to a step is no other one, and no
+/// reason to begin a glide anew.
+fn steps(per_mm: f64) -> f64 {
+    const STEPS: f64 = (1u64 << 32) as f64;
+    (STEPS * MM_PER_COUNT * per_mm).round()
+}
+
 /// The wavenumber that a display follows.
 #[derive(Clone, Debug)]
 struct Followed {
@@ -256,7 +264,7 @@ impl Followed {
         }
         if let Some(wavelength_mm) = self.trust.hear(tick_ns, &arrival.estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
-            if target_per_mm != self.target_per_mm {
+            if steps(target_per_mm) != steps(self.target_per_mm) {
                 self.target_per_mm = target_per_mm;
                 let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
                 self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
@@ -342,6 +350,23 @@ mod tests {
         let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
         assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
         assert!((shortest_mm - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_the_same_wavelength_to_a_step_of_the_phase_begins_no_glide_anew() {
+        // Two neighbours among the numbers of 32 bits, in turn from 1 s on, or one of them alone.
+        let due = |other_mm: f32| {
+            let run = Run {
+                estimate: Box::new(move |t_s| {
+                    let later = [3.006_825, other_mm][(t_s * 100.0).round() as usize % 2];
+                    (if t_s < 0.9999 { 2.0 } else { later }, true)
+                }),
+                ..Run::steady(50.0, 2.0)
+            };
+            due_at(1.9, &run.record()).0.cycles
+        };
+        assert!((due(3.006_824_7) - due(3.006_825)).abs() < 1e-5);
+        assert!((due(3.007) - due(3.006_825)).abs() > 0.01);
     }
 
     #[test]

@@ -4,8 +4,9 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use protocol::{DisplayConfiguration, Hold, Role};
+use protocol::{DisplayConfiguration, Friction, Hold, Role};
 
+use super::due::STARTS_S;
 use super::outputs::SILENCE_NS;
 use crate::judge::trust::Trust;
 use crate::run::recording::{Arrival, OutputRecord, TickRecord, ZERO_VOLT};
@@ -21,10 +22,11 @@ const QUICKLY_NS: u64 = 8_000_000;
 /// hand without a count for 19 ms for one at rest.
 const MOVES_MM_S: f64 = 10.0;
 const MOVES_NS: u64 = 40_000_000;
+/// An amplitude in mV, two steps of the DAC, that shows by nothing; and for how long in ns after it was due.
+const FAINT_MV: f64 = 0.3;
+const FAINT_NS: u64 = 100_000_000;
 /// Up to which a wave is played in full.
 const PLAYED_HZ: f64 = 250.0;
-/// A display that has lost its power starts again within so long.
-const STARTS_S: f64 = 0.3;
 /// So long before a fault tells how much was known of the surface.
 const BEFORE_NS: u64 = 500_000_000;
 const MS: u64 = 1_000_000;
@@ -62,6 +64,30 @@ pub(super) struct Misconduct {
     pub valid_before: usize,
 }
 
+/// How strong the stimulus is to be by what the sensor has told of the surface.
+#[derive(Clone, Debug, Default)]
+struct Level {
+    amplitude_mv: f64,
+    /// What is played at full; 0 if the amplitude does not follow it.
+    reference_lsb: f64,
+    reference_mn: f64,
+    /// As last told.
+    surface_lsb: Option<f64>,
+    fluctuation_mn: Option<f64>,
+}
+
+impl Level {
+    /// In mV; in full as far as nothing was told.
+    fn mv(&self) -> f64 {
+        let part = |told: Option<f64>, reference: f64| match told {
+            Some(told) if reference > 0.0 => (told / reference).min(1.0),
+            _ => 1.0,
+        };
+        let surface = part(self.surface_lsb, self.reference_lsb);
+        self.amplitude_mv * surface * part(self.fluctuation_mn, self.reference_mn)
+    }
+}
+
 /// Looks on from the scene's start, and judges while the fault is the only one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Conduct {
@@ -78,6 +104,10 @@ pub(super) struct Conduct {
     spoils_estimates: bool,
     /// It was held already when the fault began.
     was_held: Option<bool>,
+    level: Level,
+    /// When that was last too low to show.
+    faint_ns: Option<u64>,
+    way_ns: u64,
     /// Estimates came that are not to be followed, when it has to drive again.
     unfollowed: bool,
     max_age_ms: u16,
@@ -134,6 +164,13 @@ impl Conduct {
             blind_ns,
             stopped,
             spoils_estimates: fault.kind.is_of_arm() || row.signs.contains(&Sign::NoValidEstimate),
+            level: Level {
+                amplitude_mv: configuration.amplitude_mv.into(),
+                reference_lsb: configuration.reference_lsb.into(),
+                reference_mn: configuration.reference_mn.into(),
+                ..Level::default()
+            },
+            way_ns,
             max_age_ms: configuration.max_age_ms,
             fade_out_ns: u64::from(configuration.fade_out_ms) * MS,
             trust: Trust::new(configuration.max_age_ms),
@@ -172,7 +209,10 @@ impl Conduct {
                 self.trust.greet();
             }
             match self.trust.hear(heard_ns, &arrival.estimate) {
-                Some(mm) => self.wavelength_mm = mm,
+                Some(mm) => {
+                    self.wavelength_mm = mm;
+                    self.level.surface_lsb = Some(arrival.estimate.amplitude_lsb.into());
+                }
                 None => self.unfollowed |= self.again_ns.contains(&arrival.at_ns),
             }
         }
@@ -190,6 +230,11 @@ impl Conduct {
         }
     }
 
+    /// The sensor has told how the surface rubs.
+    pub fn rubs(&mut self, friction: Friction) {
+        self.level.fluctuation_mn = Some(friction.fluctuation_mn.into());
+    }
+
     /// The display has said that it drives.
     pub fn says_driving(&mut self, at_ns: u64) {
         let is_held = |(_, since_ns): (Hold, u64)| at_ns > since_ns + SAID_NS;
@@ -202,6 +247,9 @@ impl Conduct {
     pub fn tick(&mut self, tick: &TickRecord) {
         let at_ns = tick.at_ns;
         self.follow_hand(tick);
+        if self.level.mv() <= FAINT_MV && at_ns < self.judged_ns.end {
+            self.faint_ns = Some(at_ns);
+        }
         let holds: Vec<Hold> = self.trust.holds(at_ns).collect();
         self.reasons.retain(|(reason, _)| holds.contains(reason));
         for &hold in &holds {
@@ -297,7 +345,9 @@ impl Conduct {
             }
         }
         // It has to have been driving once: what it waits for at first is not known here.
+        let is_faint = |faint_ns| at_ns <= faint_ns + self.way_ns + FAINT_NS;
         let may_rest = self.stopped != Stopped::No
+            || self.faint_ns.is_some_and(is_faint)
             || self.held_since.is_some()
             || self.excused_ns.contains(&at_ns)
             || self.seen.again_ns.is_none() && self.excused_ns.end > self.judged_ns.start;
@@ -340,6 +390,12 @@ impl Conduct {
     /// Whether there was a reason to hold when the fault began.
     pub fn was_held(&self) -> bool {
         self.was_held == Some(true)
+    }
+
+    /// Whether the stimulus was too faint to show at any time from the fault on.
+    pub fn was_faint(&self) -> bool {
+        let is_since = |faint_ns| faint_ns + self.way_ns + FAINT_NS >= self.judged_ns.start;
+        self.faint_ns.is_some_and(is_since)
     }
 
     /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or

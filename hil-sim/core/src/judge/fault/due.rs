@@ -3,7 +3,8 @@
 use protocol::{HELLO_LENGTH, Role};
 
 use crate::plant::motion::MM_PER_COUNT;
-use crate::scene::fault::{Fault, Kind, Sign, nanoseconds};
+use crate::scene::fault::catalogue::Needs;
+use crate::scene::fault::{Class, Fault, Kind, Sign, nanoseconds};
 use crate::scene::{Follows, Gauges, Kinematic, Link, Profile, Scene};
 
 /// What a fault leaves shows so much later still: counters are told once a second.
@@ -27,8 +28,13 @@ const STALLED_S: f64 = 0.05 * 1.2;
 const KNOWN_WAVES: f64 = 3.0;
 const MOST_WAVES: f64 = 8.0;
 const MISSED_WAVES: f64 = 1.0;
+/// What is at the mains' frequency may be hum for so long, in s (docs' page on limits).
+const HUM_S: f64 = 0.5;
 /// Power of a plain surface over its noise, in dB.
 const PLAIN_DB: f64 = 20.0;
+/// A watchdog bites within so long, and a board that has been reset runs within so long, in s (docs' safety page).
+const BITES_S: f64 = 0.52;
+pub(super) const STARTS_S: f64 = 0.3;
 /// In so many ms an arm's encoder is looked at, and what a link may take for it not to matter.
 const SAMPLE_MS: f64 = 1.0;
 const PROMPT_MS: f64 = 20.0;
@@ -66,6 +72,29 @@ pub(super) fn is_unheard(fault: &Fault, scene: &Scene) -> bool {
     fault.kind == Kind::StopFromPeer && scene.faults.iter().any(cuts)
 }
 
+/// Whether the board that it breaks has no power when it begins, has just got it, or starts again after a crash: nothing is
+/// there to be broken, or to say so.
+pub(super) fn is_away(fault: &Fault, scene: &Scene) -> bool {
+    let row = fault.kind.row();
+    let role = match row.class {
+        Class::Sensor => Role::Sensor,
+        _ => Role::Display,
+    };
+    let needs_it = row.needs == Needs::Boards || row.class == Class::Stops;
+    let is_away = |other: &Fault| {
+        let bites_s = match other.kind {
+            Kind::SensorHang | Kind::SensorPanic | Kind::AdcStopped if role == Role::Sensor => {
+                BITES_S
+            }
+            _ if other.cuts_power(role) => 0.0,
+            _ => return false,
+        };
+        let over_s = other.at_s + bites_s + other.for_s.unwrap_or(0.0);
+        fault.at_s < over_s + STARTS_S
+    };
+    needs_it && !fault.cuts_power(role) && earlier(fault, scene).any(is_away)
+}
+
 /// Why another fault may hide what shows it.
 pub(super) fn hidden(fault: &Fault, scene: &Scene) -> Option<&'static str> {
     let within_ms = fault.seen_within_ms().unwrap_or(0.0);
@@ -92,20 +121,18 @@ pub(super) fn hidden(fault: &Fault, scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
-/// a sound board.
+/// Whether a fault is one that has to be seen: as long as its kind usually is, no less than what can be told from
+/// a sound board, and on a board that runs.
 pub(super) fn must_show(fault: &Fault, scene: &Scene) -> bool {
     let row = fault.kind.row();
     let usual_s = row.lasts.default_s().unwrap_or(row.watch_s);
     let is_long = fault.for_s.is_none_or(|for_s| for_s >= usual_s);
     let value = fault.values[0];
     is_long
+        && !is_away(fault, scene)
         && match fault.kind {
             // Two ticks' travel of the fastest hand that is taken for one.
-            Kind::HandEncoderJump => {
-                let tick_s = 1.0 / f64::from(scene.display_configuration().update_rate.hz());
-                value * MM_PER_COUNT > 2.0 * FASTEST_HAND_MM_S * tick_s
-            }
+            Kind::HandEncoderJump => value * MM_PER_COUNT > 2.0 * farthest_mm(scene),
             Kind::HandEncoderDead => scene.arm.follows == Follows::Motion,
             // And what an arm goes meanwhile, which is less than once more as far.
             Kind::ArmEncoderJump => {
@@ -114,6 +141,18 @@ pub(super) fn must_show(fault: &Fault, scene: &Scene) -> bool {
             Kind::LinkCorrupt => value >= CORRUPT_SHARE,
             _ => true,
         }
+}
+
+/// How far the fastest hand goes in a tick, in mm.
+fn farthest_mm(scene: &Scene) -> f64 {
+    FASTEST_HAND_MM_S / f64::from(scene.display_configuration().update_rate.hz())
+}
+
+/// Whether the hand goes further while the ticks stand than any does within one: its encoder seems to jump.
+pub(super) fn goes_far(fault: &Fault, scene: &Scene) -> bool {
+    let [from_mm, to_mm] = [0.0, fault.for_s.unwrap_or(0.0)]
+        .map(|after_s| scene.motion.position_mm(fault.at_s + after_s));
+    (to_mm - from_mm).abs() > farthest_mm(scene)
 }
 
 /// Whether the hand is too slow for an encoder, a converter or a gauge that stands still to show in time: by its mean
@@ -156,7 +195,8 @@ pub(super) fn again_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
                 MOST_WAVES
             };
             let anew_s = felt_anew_s(scene, over_ns as f64 * 1e-9, waves);
-            anew_s.unwrap_or(scene.duration_s) * 1e3
+            let hum_s = if has_hum(scene) { HUM_S } else { 0.0 };
+            (anew_s.unwrap_or(scene.duration_s) + hum_s) * 1e3
         }
         false => 0.0,
     };
@@ -179,6 +219,14 @@ pub(super) fn is_plain(scene: &Scene) -> bool {
         && irregularity.random + irregularity.second_wave + irregularity.worn == 0.0
         && matches!(scene.surface.profile, Profile::Sine | Profile::Trapezoid)
         && scene.contact.friction.is_none()
+}
+
+/// Whether there is hum, to be found anew before a wave can be stood by.
+fn has_hum(scene: &Scene) -> bool {
+    match &scene.gauges {
+        Gauges::Kinematic(gauges) => gauges.hum_50_hz + gauges.hum_60_hz > 0.0,
+        Gauges::Recorded(_) => false,
+    }
 }
 
 /// How long after `from_s` so many waves have passed, in s, of ground that was not gone over since then; none if the scene

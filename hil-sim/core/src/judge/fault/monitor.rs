@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use protocol::{DisplayState, Hold, Message, Role};
+use protocol::{DisplayState, Hold, Message, Role, Trip};
 
 use super::conduct::{Conduct, SAID_NS, Stopped};
 use super::due::{
-    LINGERS_NS, again_ns, hidden, is_plain, is_slow, is_unheard, may_still_greet, must_show, rests,
-    weather_signs,
+    LINGERS_NS, again_ns, goes_far, hidden, is_away, is_plain, is_slow, is_unheard,
+    may_still_greet, must_show, rests, weather_signs,
 };
 use super::finding::Finding;
 use super::outputs::Outputs;
@@ -39,8 +39,9 @@ pub(super) struct FaultMonitor {
     of_others: Vec<Sign>,
     /// What the scene's own link shows, with and without the fault: no sign of it.
     weather: Vec<Sign>,
-    /// See [`is_unheard`].
+    /// See [`is_unheard`] and [`is_away`].
     is_unheard: bool,
+    is_away: bool,
     stopped: Stopped,
     /// Resets of the display that other faults still may bring, and since when those count.
     resets_of_others: usize,
@@ -50,6 +51,7 @@ pub(super) struct FaultMonitor {
     must_show: bool,
     /// When nobody looks on any more.
     until_ns: u64,
+    fade_out_ns: u64,
     /// Whether the display had a tick before the fault.
     has_looked: bool,
     /// Whether the hand is too slow for it to show in time.
@@ -181,12 +183,28 @@ impl FaultMonitor {
             .flatten()
             .copied()
             .collect();
-        if fault.kind == Kind::HandEncoderDead && scene.arm.follows == Follows::Link {
+        match (fault.kind, scene.arm.follows) {
             // The arm stands still too, and nothing is sensed.
-            of_others.push(Sign::Fading(Hold::Stale));
+            (Kind::HandEncoderDead, Follows::Link) => of_others.push(Sign::Fading(Hold::Stale)),
+            // The arm goes on with the hand. It is told to come back, and where the hand turns it stands.
+            (Kind::HandEncoderDead, Follows::Motion) => {
+                of_others.push(Sign::ArmStopped(Trip::ArmStall));
+            }
+            // The next tick sees all that the hand went meanwhile.
+            (Kind::TickStopped, _) if goes_far(&fault, scene) => {
+                of_others.push(Sign::Stopped(Trip::HandEncoder));
+            }
+            _ => {}
         }
         let weather = weather_signs(&scene.link);
         of_others.extend(&weather);
+        // Of a frame that comes late, a flood or a board's first life may have had the number.
+        let numbers_anew =
+            |other: &Fault| other.kind == Kind::LinkFlood || !other.kind.row().silences.is_empty();
+        if scene.link.reorder > 0.0 && scene.faults.iter().any(numbers_anew) {
+            let counts = |role| Sign::Counted(role, "duplicated");
+            of_others.extend([Role::Sensor, Role::Display].map(counts));
+        }
         if may_still_greet(&scene.link, fault.at_s) {
             of_others.extend([Role::Sensor, Role::Display].map(Sign::Greets));
         }
@@ -247,12 +265,14 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard: is_unheard(&fault, scene),
+            is_away: is_away(&fault, scene),
             stopped,
             resets_of_others,
             others_from_ns,
             silenced,
             must_show: must_show(&fault, scene),
             until_ns,
+            fade_out_ns: 1_000_000 * u64::from(configuration.fade_out_ms),
             has_looked: false,
             is_slow: is_slow(&fault, scene),
             rests: fault.kind.is_of_arm() && rests(&fault, scene),
@@ -333,12 +353,14 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard,
+            is_away,
             stopped,
             resets_of_others,
             silenced,
             must_show,
             has_looked,
             until_ns,
+            fade_out_ns,
             seen,
             ..
         } = self;
@@ -356,6 +378,9 @@ impl FaultMonitor {
             Stopped::Yes => true,
         };
         let mut unjudged = Vec::new();
+        if is_away {
+            unjudged.push("whether it shows: its board does not run then".to_owned());
+        }
         // At rest there is nothing that a gauge or an encoder could be missed by.
         // Nor where no words go out anything that they could be missed by.
         let is_mute = row.shows == Shows::WhileDriving && !outputs.was_driving;
@@ -370,6 +395,7 @@ impl FaultMonitor {
             && (fault.kind != Kind::HandEncoderJump || has_looked);
         let due_again_ns = self.conduct.due_again_ns();
         let need_not_drive = self.conduct.has_stopped();
+        let was_faint = self.conduct.was_faint();
         let shows_again = self.conduct.shows_again();
         let conduct = self.conduct.finish();
         let leaves_ms = |ms: f64| left_ns >= nanoseconds(ms * 1e-3);
@@ -425,10 +451,11 @@ impl FaultMonitor {
         }
         // A reason to hold that arrived has to be said.
         let is_due = |hold: Hold, at_ns: u64| {
-            let said = conduct
-                .reasons
-                .iter()
-                .any(|&(due, due_ns)| due == hold && (due_ns..=due_ns + SAID_NS).contains(&at_ns));
+            let said = conduct.reasons.iter().any(|&(due, due_ns)| {
+                // What was on its way to 0 V before says so again with its counters.
+                let again_ns = if due_ns < from_ns { fade_out_ns } else { 0 };
+                due == hold && (due_ns..=due_ns + again_ns + SAID_NS).contains(&at_ns)
+            });
             said || row.signs.contains(&Sign::Fading(hold))
                 || row.also.contains(&Sign::Fading(hold))
         };
@@ -495,6 +522,10 @@ impl FaultMonitor {
                     _ => "the display has stopped before",
                 };
                 unjudged.push(format!("whether it drives {within}: {why}"));
+            } else if was_faint {
+                unjudged.push(format!(
+                    "whether it drives {within}: the stimulus is too faint to show"
+                ));
             } else if !outputs.drove {
                 unjudged.push(format!("whether it drives {within}: it never drove before"));
             } else if due_ns > alone_ns.end {
@@ -577,6 +608,11 @@ impl FaultMonitor {
                         .is_some_and(is_against_it)
                 {
                     self.stood_by_ns.get_or_insert(said.at_ns);
+                }
+            }
+            Message::Texture(texture) if role == Role::Sensor => {
+                if let Some(friction) = texture.friction {
+                    self.conduct.rubs(friction);
                 }
             }
             Message::Motion(_) if role == Role::Display => {

@@ -24,6 +24,10 @@ const SILENT_TICKS: f64 = 1.8;
 /// Of the highest voltage.
 const QUIET: f64 = 0.03;
 
+/// What does not repeat of a texture moves the phase of a single cycle, by a tenth on a rough surface: over so many cycles it
+/// averages out.
+const TEXTURE_CYCLES: usize = 10;
+
 /// The phase of the stimulus against the one due, before the fault and since.
 #[derive(Clone, Debug)]
 pub(super) struct Step {
@@ -92,6 +96,11 @@ impl Step {
         if !holds_a_cycle(&self.errors) {
             return None;
         }
+        if self.rendering == Rendering::Texture {
+            let groups = (self.errors.len() / TEXTURE_CYCLES).max(1);
+            let length = self.errors.len().div_ceil(groups);
+            self.errors = self.errors.chunks(length).map(together).collect();
+        }
         let cycles: f64 = self.errors.iter().map(|window| window.cycles).sum();
         let square = |window: &Demodulated| window.cycles * window.error_cycles.powi(2);
         Some((self.errors.iter().map(square).sum::<f64>() / cycles).sqrt())
@@ -133,9 +142,15 @@ impl Step {
         false
     }
 
-    /// Where it stood before the fault. If there was no whole cycle before it, nobody knows, as after a silence.
+    /// Where it stood before the fault. If there was no whole cycle before it, or too few of a texture, nobody knows, as after
+    /// a silence.
     fn stand(&mut self) -> f64 {
-        let known = self.before.clone().middle(self.peak_v);
+        let before = self.before.clone();
+        let known = match self.rendering {
+            Rendering::Texture if before.held() < TEXTURE_CYCLES => None,
+            Rendering::Texture => before.standing(self.peak_v),
+            Rendering::Fundamental | Rendering::Shape => before.middle(self.peak_v),
+        };
         self.is_unplaced |= known.is_none();
         *self.standing.insert(known.unwrap_or(0.0))
     }
@@ -163,6 +178,15 @@ impl Step {
             }
         }
     }
+}
+
+/// Some windows as one.
+fn together(windows: &[Demodulated]) -> Demodulated {
+    let mut one = windows[0];
+    one.cycles = windows.iter().map(|window| window.cycles).sum();
+    let errors = windows.iter().map(|one| one.cycles * one.error_cycles);
+    one.error_cycles = errors.sum::<f64>() / one.cycles;
+    one
 }
 
 impl RunObserver for Step {

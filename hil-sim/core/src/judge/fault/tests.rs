@@ -418,6 +418,33 @@ fn a_display_that_follows_what_it_must_not_is_out_of_step() {
 }
 
 #[test]
+fn what_does_not_repeat_of_a_texture_moves_single_cycles_and_not_ten_of_them() {
+    let judged = |rendering, standing: f64| {
+        // To and fro by 0.11 cycles within a sixth of a second, four waves.
+        let sways = move |t_s: f64| {
+            let since = if t_s < 0.6 { 0.0 } else { standing };
+            since + 0.11 * (std::f64::consts::TAU * 6.25 * t_s).sin()
+        };
+        let run = Run {
+            ahead_cycles: Box::new(sways),
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut scene = with_faults(2.0, vec![Fault::new(Kind::Nothing, 0.5)]);
+        scene.display.configuration.rendering = rendering;
+        finding(&scene, 0, 2_000 * MS, &run.record()).unmet()
+    };
+    assert_eq!(judged(Rendering::Texture, 0.0), [""; 0]);
+    for (rendering, standing) in [
+        (Rendering::Fundamental, 0.0),
+        (Rendering::Shape, 0.0),
+        (Rendering::Texture, 0.08),
+    ] {
+        let lost = judged(rendering, standing);
+        assert!(lost[0].starts_with("out of step by 0.0"), "{lost:?}");
+    }
+}
+
+#[test]
 fn a_part_of_a_cycle_beside_a_passing_mean_tells_no_phase() {
     // What a turn of the hand may leave for a while: 1.4 V. Of 25 cycles a second, the scene leaves parts of one.
     for (begun, part) in (0..10).flat_map(|begun| (1..10).map(move |part| (begun, part))) {
@@ -596,6 +623,35 @@ fn ticks_that_stop_for_less_than_a_watchdog_waits_are_answered_by_clr_alone() {
 }
 
 #[test]
+fn a_hand_that_goes_far_while_the_ticks_stand_looks_like_a_jump() {
+    let unmet = |speed_mm_s: f64| {
+        let mut stops = Fault::new(Kind::TickStopped, AT_MS as f64 * 1e-3);
+        stops.for_s = Some(0.02);
+        let recording = Recording {
+            outputs: driven(0, AT_MS + 2, ZERO_VOLT),
+            signs: FaultEvidence {
+                clears_ns: vec![(AT_MS + 2) * MS],
+                display: vec![said(AT_MS + 21, DisplayState::Stopped(Trip::HandEncoder))],
+                ..FaultEvidence::default()
+            },
+            ..Run::steady(speed_mm_s, 2.0).record()
+        };
+        let scene = Scene {
+            duration_s: END_MS as f64 * 1e-3,
+            faults: vec![stops],
+            ..Scene::constant(2.0, speed_mm_s)
+        };
+        finding(&scene, 0, END_MS * MS, &recording).unmet()
+    };
+    // 2 m/s are 1 mm in a tick of 0.5 ms: 51 mm/s in 20 ms go further, 49 do not.
+    assert_eq!(unmet(51.0), [""; 0]);
+    assert_eq!(
+        unmet(49.0),
+        ["not to be expected: display: stopped, HandEncoder, at 21.00 ms"]
+    );
+}
+
+#[test]
 fn a_transfer_that_fails_while_no_words_go_out_need_not_show() {
     let silent = |kind: Kind| {
         let outputs = driven(0, 20, ZERO_VOLT);
@@ -745,6 +801,28 @@ fn what_the_scenes_link_shows_by_itself_is_neither_a_sign_nor_a_false_alarm() {
             .any(|line| line.ends_with("the scene's link shows the same without it")),
         "{unjudged:?}"
     );
+}
+
+#[test]
+fn a_flood_or_a_restart_takes_the_numbers_of_frames_that_a_link_brings_late() {
+    let judged = |kind, reorder: f64| {
+        let mut scene = Scene::constant(2.0, 50.0);
+        scene.link.reorder = reorder;
+        let (unmet, _) = spoiled(kind, scene, |recording| {
+            let mut said = counted(1_400, 0, 0);
+            if let Message::Status(status) = &mut said.message {
+                status.peer.duplicated = 6;
+            }
+            recording.signs.display = vec![counted(400, 0, 0), said];
+        });
+        let mut unmet = unmet.into_iter();
+        unmet.find(|line| line.contains("duplicated"))
+    };
+    let alarm = "not to be expected: display: duplicated 6, at 900.00 ms";
+    assert_eq!(judged(Kind::LinkFlood, 0.0).as_deref(), Some(alarm));
+    assert_eq!(judged(Kind::Nothing, 0.2).as_deref(), Some(alarm));
+    assert_eq!(judged(Kind::LinkFlood, 0.2), None);
+    assert_eq!(judged(Kind::SensorPanic, 0.2), None);
 }
 
 /// The last tick of a scene of 2 s.

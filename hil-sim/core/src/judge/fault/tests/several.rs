@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use protocol::{Arm, ArmState, Estimate};
+use protocol::{Arm, ArmState, Estimate, Friction, Texture};
 
 use super::*;
-use crate::scene::{Follows, Link, Motion};
+use crate::scene::{Follows, Gauges, Link, Motion};
 
 /// A scene of some faults with a hand at 50 mm/s over 2 mm.
 fn several(duration_s: f64, faults: &[(Kind, f64)]) -> Scene {
@@ -305,7 +305,7 @@ fn that_a_display_need_not_drive_again_is_said() {
 
 #[test]
 fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
-    let unmet_on = |wavelength_mm: f64, worn: f64, silent_ms| {
+    let unmet_in = |wavelength_mm: f64, worn: f64, hum_60_hz: f64, silent_ms| {
         let mut fault = Fault::new(Kind::AdcStuck, 0.5);
         fault.for_s = Some(0.6);
         let mut scene = Scene {
@@ -314,6 +314,9 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
             ..Scene::constant(wavelength_mm, 20.0)
         };
         scene.surface.irregularity.worn = worn;
+        if let Gauges::Kinematic(gauges) = &mut scene.gauges {
+            gauges.hum_60_hz = hum_60_hz;
+        }
         let run = Run {
             duration_s: 4.0,
             ..Run::steady(20.0, wavelength_mm)
@@ -324,6 +327,7 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
         let again = |line: &String| line.starts_with("does not drive again");
         unmet.into_iter().find(again)
     };
+    let unmet_on = |wavelength_mm, worn, silent_ms| unmet_in(wavelength_mm, worn, 0.0, silent_ms);
     let unmet = |wavelength_mm, silent_ms| unmet_on(wavelength_mm, 0.0, silent_ms);
     // 24 mm at 20 mm/s, from 1.1 s on.
     assert_eq!(unmet(8.0, 1_050..2_200), None);
@@ -342,6 +346,46 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
         unmet_on(5.0, 0.1, 1_050..3_200).as_deref(),
         Some("does not drive again within 2000 ms of its end")
     );
+    // And half a second in which it might be hum.
+    assert_eq!(unmet_in(5.0, 0.0, 0.5, 1_050..3_500), None);
+    assert_eq!(
+        unmet_in(5.0, 0.0, 0.5, 1_050..3_700).as_deref(),
+        Some("does not drive again within 2500 ms of its end")
+    );
+}
+
+#[test]
+fn what_is_too_faint_to_show_may_be_at_zero() {
+    let judged = |reference_mn, fluctuation_mn, reference_lsb| {
+        let mut recording = silent(3.0, 1_545..3_000);
+        recording
+            .arrived
+            .retain(|arrival| !(1_000 * MS..1_700 * MS).contains(&arrival.at_ns));
+        recording.signs.sensor.push(TimedMessage {
+            at_ns: 500 * MS,
+            message: Message::Texture(Texture {
+                friction: Some(Friction {
+                    mean_mn: 900,
+                    fluctuation_mn,
+                }),
+                ..Texture::default()
+            }),
+        });
+        let mut scene = several(3.0, &[(Kind::LinkDown, 1.0)]);
+        scene.display.configuration.reference_mn = reference_mn;
+        scene.display.configuration.reference_lsb = reference_lsb;
+        let finding = finding(&scene, 0, 3_000 * MS, &recording);
+        let is_silence =
+            |line: &&String| line.contains("silent from") || line.contains("drive again");
+        let missed = finding.unmet().iter().filter(is_silence).count();
+        let again = |line: &String| line.ends_with("the stimulus is too faint to show");
+        (missed, finding.unjudged.iter().any(again))
+    };
+    assert_eq!(judged(200, 0, 0), (0, true));
+    // 25 mV, nothing that follows the force, and 400 of 2000 steps of the surface.
+    assert_eq!(judged(200, 1, 0), (2, false));
+    assert_eq!(judged(0, 0, 0), (2, false));
+    assert_eq!(judged(0, 0, 2_000), (2, false));
 }
 
 #[test]
@@ -709,4 +753,84 @@ fn an_arm_that_is_stopped_for_no_reason_is_not_as_it_should_be() {
         None
     );
     assert!(stopped(Trip::ArmStall, &[(Kind::ArmEncoderJump, 0.2), nothing]).is_some());
+}
+
+#[test]
+fn an_arm_that_goes_on_without_a_hand_may_look_as_if_it_stood() {
+    let stopped = |kind, trip, follows| {
+        let mut recording = silent(4.0, 0..0);
+        recording.signs.sensor.push(TimedMessage {
+            at_ns: 1_700 * MS,
+            message: Message::Arm(Arm {
+                instant_us: 1_700_000,
+                state: ArmState::Stopped(trip),
+            }),
+        });
+        let mut scene = several(4.0, &[(kind, 0.2)]);
+        scene.arm.follows = follows;
+        let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
+        unmet.into_iter().any(|line| line.contains("arm stopped"))
+    };
+    let (dead, stall) = (Kind::HandEncoderDead, Trip::ArmStall);
+    assert!(!stopped(dead, stall, Follows::Motion));
+    // Its own encoder did not jump, an arm that its drive moves stands where it is told to, and of no fault none is stopped.
+    assert!(stopped(dead, Trip::ArmEncoder, Follows::Motion));
+    assert!(stopped(dead, stall, Follows::Link));
+    assert!(stopped(Kind::Nothing, stall, Follows::Motion));
+}
+
+#[test]
+fn a_display_that_was_fading_before_says_so_again_with_its_counters() {
+    let alarm = |again_ms: u64, fade_out_ms: u16| {
+        let mut recording = silent(3.0, 0..0);
+        let cut_ns = 1_450 * MS;
+        recording
+            .arrived
+            .retain(|arrival| !(cut_ns..2_600 * MS).contains(&arrival.at_ns));
+        recording.signs.display = vec![
+            said(1_945, DisplayState::Fading(Hold::Stale)),
+            said(again_ms, DisplayState::Fading(Hold::Stale)),
+        ];
+        let mut scene = several(3.0, &[(Kind::Nothing, 2.0)]);
+        scene.display.configuration.fade_out_ms = fade_out_ms;
+        let unmet = finding(&scene, 0, 3_000 * MS, &recording).unmet();
+        unmet.into_iter().any(|line| line.contains("fading"))
+    };
+    // Too old at 1.942 s.
+    assert!(!alarm(2_020, 200));
+    assert!(alarm(2_020, 50) && alarm(2_200, 200));
+}
+
+#[test]
+fn what_is_asked_of_a_board_that_does_not_run_need_not_show() {
+    let judged = |before: Kind, kind: Kind, at_s: f64| {
+        let scene = several(4.0, &[(before, 0.5), (kind, at_s)]);
+        let finding = finding(&scene, 1, 4_000 * MS, &silent(4.0, 0..0));
+        let away = "whether it shows: its board does not run then";
+        let is_missed = finding.unmet().iter().any(|line| line == "no sign of it");
+        (is_missed, finding.unjudged.iter().any(|line| line == away))
+    };
+    // Power is back after 20 ms, and the board runs 0.3 s later; a watchdog takes half a second more.
+    assert_eq!(
+        judged(Kind::BrownOut, Kind::EmergencyStop, 0.81),
+        (false, true)
+    );
+    assert_eq!(
+        judged(Kind::BrownOut, Kind::EmergencyStop, 0.83),
+        (true, false)
+    );
+    assert_eq!(
+        judged(Kind::SensorPanic, Kind::SensorHang, 1.31),
+        (false, true)
+    );
+    assert_eq!(
+        judged(Kind::SensorPanic, Kind::SensorHang, 1.33),
+        (true, false)
+    );
+    // The other board's is none of its business, and power that goes again shows.
+    assert_eq!(
+        judged(Kind::SensorBrownOut, Kind::EmergencyStop, 0.6),
+        (true, false)
+    );
+    assert!(!judged(Kind::BrownOut, Kind::BrownOut, 0.6).1);
 }
