@@ -21,6 +21,7 @@ mod cost;
 mod demo;
 mod faults;
 mod files;
+mod fuzz;
 mod goals;
 mod golden;
 mod init;
@@ -82,6 +83,9 @@ enum Command {
     /// Tries every kind of fault at random instants on the ELFs and prints what came of it: exit status
     /// 1 if a goal is missed
     Campaign(campaign::Campaign),
+    /// Draws scenes at random over nearly all keys, with faults at random instants, runs them and keeps those
+    /// that are not as the table of faults says: exit status 1 if there is one
+    Fuzz(fuzz::Fuzz),
     /// Draws what the estimators give against what they cost, what the display does, and what the contact
     /// models are worth
     #[command(subcommand)]
@@ -188,6 +192,7 @@ impl Arguments {
             Command::Goals(goals) => goals.execute(),
             Command::Faults => Ok(faults::execute()),
             Command::Campaign(campaign) => campaign.execute(),
+            Command::Fuzz(fuzz) => fuzz.execute(),
             Command::Chart(chart) => chart.execute(),
             Command::Timing(timing) => timing.timing(),
             #[cfg(target_os = "linux")]

@@ -10,7 +10,7 @@
 //! [`folder`] holds whoever's recordings.
 
 pub mod counts;
-mod dice;
+pub(crate) mod dice;
 pub mod evidence;
 pub mod folder;
 pub mod ground;

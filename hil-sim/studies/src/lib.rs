@@ -5,6 +5,7 @@ pub mod campaign;
 pub mod contact;
 pub mod display;
 pub mod estimators;
+pub mod fuzz;
 pub mod jury;
 pub mod map;
 pub mod output;

@@ -10,7 +10,7 @@ use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::catalogue::{Class, Needs};
 use hil_sim_core::scene::fault::{Fault, Kind};
 
-use crate::{errors, hil_sim_anywhere, text};
+use crate::{errors, folder, hil_sim, hil_sim_anywhere, text};
 
 /// The estimator is sure by then.
 const AT_S: f64 = 1.0;
@@ -184,6 +184,21 @@ fn a_campaign_that_would_try_nothing_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     let errors = errors(&output);
     assert!(errors.contains("a whole number of 1 or more"), "{errors}");
+}
+
+#[test]
+fn scenes_that_nobody_thought_of_come_out_as_the_table_says() {
+    let folder = folder("fuzz");
+    let output = hil_sim(
+        &folder,
+        &["fuzz", "--seed", "1", "--scenes", "40", "-j", "2"],
+    );
+    let told = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    assert!(told.starts_with("40 scenes with "), "{told}");
+    let output = hil_sim(&folder, &["fuzz", "--scenes", "0"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(errors(&output).contains("a whole number of 1 or more"));
 }
 
 /// What is not as expected of a scene in which nothing is at fault but what the scene breaks, and what is not judged.

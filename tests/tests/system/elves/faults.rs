@@ -234,3 +234,34 @@ fn what_a_display_heard_before_its_line_broke_is_not_heard_again() {
     assert!(port.line_errors > 100, "{port:?}");
     assert_eq!((port.late, port.duplicated), (0, 0), "{port:?}");
 }
+
+#[test]
+fn what_breaks_a_board_that_does_not_run_is_no_refusal_and_not_missed() {
+    let at = |kind, at_s, for_s| Fault {
+        for_s,
+        ..Fault::new(kind, at_s)
+    };
+    let unjudged = |faults: &[Fault]| {
+        let scene = Scene {
+            duration_s: 2.6,
+            faults: faults.to_vec(),
+            ..Scene::constant(2.0, 50.0)
+        };
+        let (recording, _) = hil_sim_boards::run(&scene, elves::both()).unwrap();
+        let findings = judge::fault::judge(&scene, &recording);
+        let unmet: Vec<_> = findings.iter().flat_map(Finding::unmet).collect();
+        assert_eq!(unmet, [""; 0]);
+        findings[1].unjudged.clone()
+    };
+    let away = "whether it shows: its board does not run then".to_owned();
+    for kind in [Kind::Panic, Kind::MemoryChanged, Kind::EmergencyStop] {
+        let brown_out = at(Kind::BrownOut, 0.8, Some(0.5));
+        let told = unjudged(&[brown_out, Fault::new(kind, 1.0)]);
+        assert!(told.contains(&away), "{kind:?}: {told:?}");
+    }
+    let hangs_on = [
+        Fault::new(Kind::SensorPanic, 0.8),
+        Fault::new(Kind::SensorHang, 0.808),
+    ];
+    assert!(unjudged(&hangs_on).contains(&away));
+}
