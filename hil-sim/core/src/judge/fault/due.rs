@@ -72,16 +72,24 @@ pub(super) fn is_unheard(fault: &Fault, scene: &Scene) -> bool {
     fault.kind == Kind::StopFromPeer && scene.faults.iter().any(cuts)
 }
 
-/// Whether the board that it breaks has no power when it begins, has just got it, or starts again after a crash: nothing is
-/// there to be broken, or to say so.
-pub(super) fn is_away(fault: &Fault, scene: &Scene) -> bool {
-    let row = fault.kind.row();
-    let role = match row.class {
+/// Whose board a fault breaks.
+pub(super) fn board_of(fault: &Fault) -> Role {
+    match fault.kind.row().class {
         Class::Sensor => Role::Sensor,
         _ => Role::Display,
-    };
+    }
+}
+
+/// Since when, in ns, the board that it breaks may have no power when it begins, may just have got it, or may start again
+/// after a crash: nothing is there to be broken, or to say so.
+pub(super) fn away_since_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
+    let row = fault.kind.row();
+    let role = board_of(fault);
     let needs_it = row.needs == Needs::Boards || row.class == Class::Stops;
-    let is_away = |other: &Fault| {
+    if !needs_it || fault.cuts_power(role) {
+        return None;
+    }
+    let is_away = |other: &&Fault| {
         let bites_s = match other.kind {
             Kind::SensorHang | Kind::SensorPanic | Kind::AdcStopped if role == Role::Sensor => {
                 BITES_S
@@ -92,7 +100,8 @@ pub(super) fn is_away(fault: &Fault, scene: &Scene) -> bool {
         let over_s = other.at_s + bites_s + other.for_s.unwrap_or(0.0);
         fault.at_s < over_s + STARTS_S
     };
-    needs_it && !fault.cuts_power(role) && earlier(fault, scene).any(is_away)
+    let others = earlier(fault, scene).filter(is_away);
+    others.map(Fault::begins_ns).max()
 }
 
 /// Why another fault may hide what shows it.
@@ -121,15 +130,14 @@ pub(super) fn hidden(fault: &Fault, scene: &Scene) -> Option<&'static str> {
     }
 }
 
-/// Whether a fault is one that has to be seen: as long as its kind usually is, no less than what can be told from
-/// a sound board, and on a board that runs.
+/// Whether a fault is one that has to be seen: as long as its kind usually is, and no less than what can be told from
+/// a sound board.
 pub(super) fn must_show(fault: &Fault, scene: &Scene) -> bool {
     let row = fault.kind.row();
     let usual_s = row.lasts.default_s().unwrap_or(row.watch_s);
     let is_long = fault.for_s.is_none_or(|for_s| for_s >= usual_s);
     let value = fault.values[0];
     is_long
-        && !is_away(fault, scene)
         && match fault.kind {
             // Two ticks' travel of the fastest hand that is taken for one.
             Kind::HandEncoderJump => value * MM_PER_COUNT > 2.0 * farthest_mm(scene),

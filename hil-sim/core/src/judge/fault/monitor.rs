@@ -6,7 +6,7 @@ use protocol::{DisplayState, Hold, Message, Role, Trip};
 
 use super::conduct::{Conduct, SAID_NS, Stopped};
 use super::due::{
-    LINGERS_NS, again_ns, goes_far, hidden, is_away, is_plain, is_slow, is_unheard,
+    LINGERS_NS, again_ns, away_since_ns, board_of, goes_far, hidden, is_plain, is_slow, is_unheard,
     may_still_greet, must_show, rests, weather_signs,
 };
 use super::finding::Finding;
@@ -39,9 +39,11 @@ pub(super) struct FaultMonitor {
     of_others: Vec<Sign>,
     /// What the scene's own link shows, with and without the fault: no sign of it.
     weather: Vec<Sign>,
-    /// See [`is_unheard`] and [`is_away`].
+    /// See [`is_unheard`] and [`away_since_ns`].
     is_unheard: bool,
-    is_away: bool,
+    away_since_ns: Option<u64>,
+    /// When the board that it breaks last said that it runs, before the fault.
+    ran_ns: Option<u64>,
     stopped: Stopped,
     /// Resets of the display that other faults still may bring, and since when those count.
     resets_of_others: usize,
@@ -150,12 +152,11 @@ impl FaultMonitor {
                 && last_power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns)
                 && !ends_with_it(other)
         };
-        let stopped = match others()
-            .filter(stops)
-            .max_by_key(|other| must_show(other, scene))
-        {
+        let is_sure =
+            |other: &Fault| must_show(other, scene) && away_since_ns(other, scene).is_none();
+        let stopped = match others().filter(stops).max_by_key(|other| is_sure(other)) {
             None => Stopped::No,
-            Some(other) if must_show(other, scene) => Stopped::Yes,
+            Some(other) if is_sure(other) => Stopped::Yes,
             Some(_) => Stopped::IfSilent,
         };
         let lingers = |other: &&Fault| {
@@ -190,20 +191,26 @@ impl FaultMonitor {
             (Kind::HandEncoderDead, Follows::Motion) => {
                 of_others.push(Sign::ArmStopped(Trip::ArmStall));
             }
-            // The next tick sees all that the hand went meanwhile.
-            (Kind::TickStopped, _) if goes_far(&fault, scene) => {
-                of_others.push(Sign::Stopped(Trip::HandEncoder));
-            }
             _ => {}
         }
         let weather = weather_signs(&scene.link);
         of_others.extend(&weather);
-        // Of a frame that comes late, a flood or a board's first life may have had the number.
+        // The tick after a stop of the ticks sees all that the hand went meanwhile.
+        let goes_far = |other: &Fault| other.kind == Kind::TickStopped && goes_far(other, scene);
+        if scene.faults.iter().any(goes_far) {
+            of_others.extend([
+                Sign::Stopped(Trip::HandEncoder),
+                Sign::Counted(Role::Display, "encoder_jumps"),
+            ]);
+        }
+        // Of a frame that comes late, a flood, a Stop, or a board before it started again may have had the number.
         let numbers_anew =
             |other: &Fault| other.kind == Kind::LinkFlood || !other.kind.row().silences.is_empty();
         if scene.link.reorder > 0.0 && scene.faults.iter().any(numbers_anew) {
-            let counts = |role| Sign::Counted(role, "duplicated");
-            of_others.extend([Role::Sensor, Role::Display].map(counts));
+            // And a greeting may be overtaken by what it heralds, so that another is asked for.
+            for role in [Role::Sensor, Role::Display] {
+                of_others.extend([Sign::Counted(role, "duplicated"), Sign::Greets(role)]);
+            }
         }
         if may_still_greet(&scene.link, fault.at_s) {
             of_others.extend([Role::Sensor, Role::Display].map(Sign::Greets));
@@ -265,7 +272,8 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard: is_unheard(&fault, scene),
-            is_away: is_away(&fault, scene),
+            away_since_ns: away_since_ns(&fault, scene),
+            ran_ns: None,
             stopped,
             resets_of_others,
             others_from_ns,
@@ -353,7 +361,8 @@ impl FaultMonitor {
             of_others,
             weather,
             is_unheard,
-            is_away,
+            away_since_ns,
+            ran_ns,
             stopped,
             resets_of_others,
             silenced,
@@ -378,6 +387,9 @@ impl FaultMonitor {
             Stopped::Yes => true,
         };
         let mut unjudged = Vec::new();
+        // A frame that was on its way is no sign of life.
+        let is_away = away_since_ns
+            .is_some_and(|since_ns| ran_ns.is_none_or(|ran_ns| ran_ns < since_ns + SAID_NS));
         if is_away {
             unjudged.push("whether it shows: its board does not run then".to_owned());
         }
@@ -389,6 +401,7 @@ impl FaultMonitor {
         }
         let must_show = must_show
             && !is_unheard
+            && !is_away
             && !is_mute
             && (row.class == Class::Stops || outputs.was_driving)
             // A count from which nobody has counted yet is no jump.
@@ -591,6 +604,10 @@ impl FaultMonitor {
     }
 
     fn said(&mut self, role: Role, said: &TimedMessage) {
+        let goes_on = matches!(said.message, Message::Estimate(_) | Message::Motion(_));
+        if goes_on && role == board_of(&self.fault) && said.at_ns < self.due_ns.start {
+            self.ran_ns = Some(said.at_ns);
+        }
         match said.message {
             Message::Estimate(estimate) if role == Role::Sensor => {
                 self.estimates.heard(said.at_ns, &self.alone_ns);

@@ -827,6 +827,16 @@ fn what_is_asked_of_a_board_that_does_not_run_need_not_show() {
         judged(Kind::SensorPanic, Kind::SensorHang, 1.33),
         (true, false)
     );
+    // What has said anything since then runs.
+    let mut running = silent(4.0, 0..0);
+    let estimate = running.estimates[0].estimate;
+    running.signs.sensor.push(TimedMessage {
+        at_ns: 1_305 * MS,
+        message: Message::Estimate(estimate),
+    });
+    let scene = several(4.0, &[(Kind::SensorPanic, 0.5), (Kind::SensorHang, 1.31)]);
+    let found = finding(&scene, 1, 4_000 * MS, &running);
+    assert!(found.unmet().contains(&"no sign of it".to_owned()));
     // The other board's is none of its business, and power that goes again shows.
     assert_eq!(
         judged(Kind::SensorBrownOut, Kind::EmergencyStop, 0.6),
