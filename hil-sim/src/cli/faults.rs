@@ -3,12 +3,22 @@
 use std::process::ExitCode;
 
 use super::say::say;
+use hil_sim_core::scene::fault::Shows;
 use hil_sim_core::scene::fault::catalogue::{Lasts, Needs, Row, rows};
 
 pub(super) fn execute() -> ExitCode {
     let list: Vec<String> = rows().iter().map(entry).collect();
     say!("{}", list.join("\n"));
     ExitCode::SUCCESS
+}
+
+/// From when on it shows, in words.
+const fn when(shows: Shows) -> &'static str {
+    match shows {
+        Shows::Meanwhile => "",
+        Shows::WhenOver => ", later where it lasts longer than usual",
+        Shows::WhileDriving => " while the display drives",
+    }
 }
 
 fn entry(row: &Row) -> String {
@@ -29,7 +39,7 @@ fn entry(row: &Row) -> String {
     };
     let sign = match (row.signs, row.seen_within_ms) {
         ([], _) => "no sign of it".to_owned(),
-        (_, Some(ms)) => format!("seen within {ms} ms"),
+        (_, Some(ms)) => format!("seen within {ms} ms{}", when(row.shows)),
         (_, None) => "seen when what arrives is a reason to hold".to_owned(),
     };
     let safe = match row.safe_within_ms {

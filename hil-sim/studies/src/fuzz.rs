@@ -16,6 +16,8 @@ use crate::jury::dice::Dice;
 
 /// Both boards have greeted, and the stimulus can be on.
 const STARTED_S: f64 = 0.6;
+
+/// Draws what a section has.
 type Filler = fn(&mut Section<'_>);
 
 /// The sections of a scene, and what draws each.

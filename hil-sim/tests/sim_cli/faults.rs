@@ -8,7 +8,7 @@ use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::native;
 use hil_sim_core::scene::Scene;
 use hil_sim_core::scene::fault::catalogue::{Class, Needs};
-use hil_sim_core::scene::fault::{Fault, Kind};
+use hil_sim_core::scene::fault::{Fault, Kind, Shows};
 
 use crate::{errors, folder, hil_sim, hil_sim_anywhere, text};
 
@@ -159,6 +159,18 @@ fn the_list_tells_of_every_kind_and_every_key() {
         assert_eq!(
             entry.contains("an arm that its drive moves rests for good"),
             kind.is_of_arm(),
+            "{entry}"
+        );
+        let may_show_later = row.shows == Shows::WhenOver;
+        assert_eq!(
+            entry.contains("later where it lasts"),
+            may_show_later,
+            "{entry}"
+        );
+        let drives = row.shows == Shows::WhileDriving;
+        assert_eq!(
+            entry.contains("while the display drives"),
+            drives,
             "{entry}"
         );
         for key in row.keys {
