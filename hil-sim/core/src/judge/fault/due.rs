@@ -32,7 +32,7 @@ const MISSED_WAVES: f64 = 1.0;
 const HUM_S: f64 = 0.5;
 /// Power of a plain surface over its noise, in dB.
 const PLAIN_DB: f64 = 20.0;
-/// A watchdog bites within so long, and a board that has been reset runs within so long, in s (docs' safety page).
+/// A watchdog bites within so long (the table's `sensor-crash`), and a board that was reset runs within so long, in s.
 const BITES_S: f64 = 0.52;
 pub(super) const STARTS_S: f64 = 0.3;
 /// In so many ms an arm's encoder is looked at, and what a link may take for it not to matter.

@@ -204,8 +204,10 @@ impl FaultMonitor {
             ]);
         }
         // Of a frame that comes late, a flood, a Stop, or a board before it started again may have had the number.
-        let numbers_anew =
-            |other: &Fault| other.kind == Kind::LinkFlood || !other.kind.row().silences.is_empty();
+        let numbers_anew = |other: &Fault| {
+            matches!(other.kind, Kind::LinkFlood | Kind::StopFromPeer)
+                || !other.kind.row().silences.is_empty()
+        };
         if scene.link.reorder > 0.0 && scene.faults.iter().any(numbers_anew) {
             // And a greeting may be overtaken by what it heralds, so that another is asked for.
             for role in [Role::Sensor, Role::Display] {

@@ -804,7 +804,7 @@ fn what_the_scenes_link_shows_by_itself_is_neither_a_sign_nor_a_false_alarm() {
 }
 
 #[test]
-fn a_flood_or_a_restart_takes_the_numbers_of_frames_that_a_link_brings_late() {
+fn a_flood_a_stop_or_a_restart_takes_the_numbers_of_frames_that_a_link_brings_late() {
     let judged = |kind, reorder: f64| {
         let mut scene = Scene::constant(2.0, 50.0);
         scene.link.reorder = reorder;
@@ -823,6 +823,7 @@ fn a_flood_or_a_restart_takes_the_numbers_of_frames_that_a_link_brings_late() {
     assert_eq!(judged(Kind::Nothing, 0.2).as_deref(), Some(alarm));
     assert_eq!(judged(Kind::LinkFlood, 0.2), None);
     assert_eq!(judged(Kind::SensorPanic, 0.2), None);
+    assert_eq!(judged(Kind::StopFromPeer, 0.2), None);
 }
 
 /// The last tick of a scene of 2 s.
