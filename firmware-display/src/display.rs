@@ -109,7 +109,7 @@ impl Display {
         self.stimulus.configure(&configuration, actuators);
         self.limits
             .set(configuration.update_rate, configuration.amplitude_mv);
-        // A lower age makes too old at once what no tick will see to become so.
+        // A lower age makes too old at once what no tick, and no texture, will see to become so.
         if !self.relief.wave_is_fresh(configuration.max_age_ms) {
             self.stimulus.wear_off();
         }
@@ -164,14 +164,16 @@ impl Display {
                 if texture.valid {
                     self.stimulus.wear(texture);
                 }
-                let max_age_ms = self.configuration.max_age_ms;
-                if texture.friction.is_some() || !self.relief.friction_is_fresh(max_age_ms) {
+                if texture.friction.is_some() {
                     self.stimulus.rub(texture.friction);
                 }
             }
             relief::Verdict::Late => count(&mut counters.refused_estimates, true),
             relief::Verdict::Unsound => count(&mut counters.implausible, true),
             relief::Verdict::Flooding => count(&mut counters.flooded, true),
+        }
+        if !self.relief.friction_is_fresh(self.configuration.max_age_ms) {
+            self.stimulus.rub(None);
         }
     }
 

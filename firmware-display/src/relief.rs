@@ -9,7 +9,8 @@
 //!
 //! None of them is a hold: what a texture asks for is within all limits whatever it says. A wave that was taken counts for
 //! [`max_age_ms`](protocol::DisplayConfiguration::max_age_ms), as λ does. Friction does until the textures of so long have
-//! told of none: while there are none, as where an arm rests or a link fails, a weak stimulus is not to burst out.
+//! told of none, or were late or unsound: while there are none, as where an arm rests or a link fails, a weak stimulus is not to burst
+//! out.
 
 use protocol::Texture;
 
@@ -65,6 +66,8 @@ impl Relief {
         if !self.flood.take() {
             return Verdict::Flooding;
         }
+        // It tells of none until it has been looked at.
+        self.friction_age = self.friction_age.saturating_add(quarters(PERIOD_MS));
         if order(self.last_sequence, texture.sequence, may_begin, &SENSORS) == Order::Late {
             return Verdict::Late;
         }
@@ -75,10 +78,9 @@ impl Relief {
         if texture.valid {
             self.wave_age = 0;
         }
-        self.friction_age = match texture.friction {
-            Some(_) => 0,
-            None => self.friction_age.saturating_add(quarters(PERIOD_MS)),
-        };
+        if texture.friction.is_some() {
+            self.friction_age = 0;
+        }
         Verdict::Taken
     }
 
@@ -182,6 +184,14 @@ mod tests {
             relief.elapse(quarters(50));
         }
         assert!(relief.wave_is_fresh(500) && !relief.friction_is_fresh(499));
+        // Nor do those that are late tell of any.
+        relief.judge(&texture(13), false);
+        for _ in 0..10 {
+            assert!(relief.friction_is_fresh(499));
+            assert_eq!(relief.judge(&texture(12), false), Verdict::Late);
+            relief.elapse(quarters(50));
+        }
+        assert!(!relief.friction_is_fresh(499));
     }
 
     #[test]

@@ -181,19 +181,20 @@ impl Injector {
 
     /// False if the ELF does not show where the task is.
     fn lead(&self, task: &str, trap: Trap, host: &mut dyn Host) -> bool {
-        let known = self.traps.as_ref().filter(|traps| traps.know(task));
-        if let Some(traps) = known {
-            traps.lead(task, trap, host);
-        }
-        known.is_some()
+        self.traps
+            .as_ref()
+            .is_some_and(|traps| traps.lead(task, trap, host) || self.was_broken())
+    }
+
+    /// Whether it was broken before the fault that is due: it may have no power, be starting, or have been led astray.
+    const fn was_broken(&self) -> bool {
+        self.next > 1
     }
 
     /// Turns a bit of a setting where the output task holds them: their 16-bit numbers lie in the order of
-    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them. A board without
-    /// power has none. False if the ELF does not show where.
+    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them. False if the ELF does not show where.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
-        let known = self.traps.as_ref().filter(|traps| traps.know(OUTPUT_TASK));
-        let Some(traps) = known else {
+        let Some(traps) = &self.traps else {
             return false;
         };
         let set = &self.settings;
@@ -216,7 +217,7 @@ impl Injector {
                 .and_then(|word| host.write(address, Width::W16, word ^ 1 << bit))
                 .is_ok()
         };
-        places.iter().all(|place| turn(place, host))
+        (!places.is_empty() || self.was_broken()) && places.iter().all(|place| turn(place, host))
     }
 }
 

@@ -101,14 +101,9 @@ impl Traps {
         Image::new(Path::new("traps"), bytes, Some(BASE)).ok()
     }
 
-    /// Whether the firmware has a task whose storage's name contains `task`.
-    pub fn know(&self, task: &str) -> bool {
-        !self.polls.is_empty() && self.statics.iter().any(|(name, ..)| name.contains(task))
-    }
-
-    /// Leads the task whose storage's name contains `task` into `trap`. A board that has no power, is starting, or was led
-    /// astray before has no such task, and stays as it is.
-    pub fn lead(&self, task: &str, trap: Trap, host: &mut dyn Host) {
+    /// Leads the task whose storage's name contains `task` into `trap`; false if it is not to be found.
+    pub fn lead(&self, task: &str, trap: Trap, host: &mut dyn Host) -> bool {
+        let mut led = false;
         for &(_, address, size) in self.statics.iter().filter(|(name, ..)| name.contains(task)) {
             for place in (address..address + size).step_by(4) {
                 let is_entry = host
@@ -116,11 +111,11 @@ impl Traps {
                     .is_ok_and(|word| self.polls.contains(&word));
                 if is_entry {
                     let astray = BASE + trap.offset() + THUMB;
-                    // What was read there can be written there.
-                    let _ = host.write(place, Width::W32, astray);
+                    led |= host.write(place, Width::W32, astray).is_ok();
                 }
             }
         }
+        led
     }
 
     /// Every place of `pattern` in the statics whose names contain one of `names`, in order.

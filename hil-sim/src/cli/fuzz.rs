@@ -4,14 +4,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use hil_sim_core::run::batch;
 use hil_sim_studies::fuzz::{Draw, Trial};
 
 use super::files::{create_folder, write_all};
-use super::run_options::RunOptions;
 use super::say::say;
-use super::{at_least_one, status, under_bar};
+use super::{Elves, EngineName, at_least_one, status, threads};
 
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Seed, engine and --faults decide a scene. Each that fails is written as fuzz-SEED.toml and told of at once.")]
 pub(super) struct Fuzz {
     /// The first scene's seed; each next scene has the next one
     #[arg(long, default_value_t = 1)]
@@ -19,47 +21,54 @@ pub(super) struct Fuzz {
     /// How many scenes, 1 or more
     #[arg(long, default_value_t = 100, value_parser = at_least_one)]
     scenes: usize,
-    /// The most faults of a scene
-    #[arg(long, default_value_t = 2)]
-    faults: usize,
+    /// The most faults of a scene, 0 to 20
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=20))]
+    faults: u8,
     /// Where to write the scenes that fail
     #[arg(long, value_name = "DIR", default_value = "target/fuzz")]
     out: PathBuf,
+    /// What runs the firmware
+    #[arg(long, value_enum, default_value_t = EngineName::Native)]
+    engine: EngineName,
+    /// Scenes to run at a time; 0: one per core. The results and their order are the same
+    #[arg(short, long, value_name = "N", default_value_t = 1)]
+    jobs: usize,
     #[command(flatten)]
-    way: RunOptions,
+    elves: Elves,
 }
 
 impl Fuzz {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let draw = Draw {
-            engine: self.way.engine(),
-            most_faults: self.faults,
+            engine: self.engine.engine(),
+            most_faults: self.faults.into(),
         };
-        let bench = self.way.ready()?;
+        let bench = self.engine.bench(&self.elves)?;
         create_folder(&self.out)?;
-        let seeds: Vec<u64> = (self.seed..).take(self.scenes).collect();
-        let started = Instant::now();
+        let seeds = (0..self.scenes).map(|number| self.seed.wrapping_add(number as u64));
+        let seeds: Vec<u64> = seeds.collect();
         let name = |seed: u64| format!("fuzz-{seed}");
+        let started = Instant::now();
         let work = |&seed: &u64| anyhow::Ok(Trial::run(&name(seed), draw.text(seed), &bench));
-        let trials = under_bar(&seeds, self.way.threads(), "scenes", work)?;
-        let mut failed = 0;
-        for (&seed, trial) in seeds.iter().zip(&trials) {
+        let (mut faults, mut unjudged, mut failed) = (0, 0, 0);
+        batch::in_order(&seeds, threads(self.jobs), work, |number, trial| {
+            let trial = trial?;
+            faults += trial.faults;
+            unjudged += trial.unjudged;
             if trial.unmet.is_empty() {
-                continue;
+                return Ok(());
             }
             failed += 1;
-            let file = name(seed) + ".toml";
+            let file = name(seeds[number]) + ".toml";
             say!("{}", self.out.join(&file).display());
             for line in &trial.unmet {
                 say!("  not as expected: {line}");
             }
-            write_all(&self.out, [(file.as_str(), trial.text.clone())])?;
-        }
-        let faults: usize = trials.iter().map(|trial| trial.faults).sum();
-        let unjudged: usize = trials.iter().map(|trial| trial.unjudged).sum();
+            write_all(&self.out, [(file.as_str(), trial.text)])
+        })?;
         say!(
             "{} scenes with {faults} faults in {:.0} s: {failed} not as expected; {unjudged} times something was not judged",
-            trials.len(),
+            seeds.len(),
             started.elapsed().as_secs_f64()
         );
         Ok(status(failed == 0))

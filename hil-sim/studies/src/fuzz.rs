@@ -3,8 +3,11 @@
 //!
 //! A scene is drawn as the text of its file, so that the reader is tried as well and a failing one can be kept.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use toml::{Table, Value};
 
+use hil_sim_core::judge::fault::Finding;
 use hil_sim_core::judge::outcome::{Judgement, Outcome};
 use hil_sim_core::run::recording::Engine;
 use hil_sim_core::scene::Scene;
@@ -46,7 +49,7 @@ pub struct Draw {
 pub struct Trial {
     /// Its file's text.
     pub text: String,
-    /// How many faults it has.
+    /// How many faults it has beside a `nothing`.
     pub faults: usize,
     /// How many things could not be judged.
     pub unjudged: usize,
@@ -60,25 +63,38 @@ impl Trial {
     pub fn run(name: &str, text: String, bench: &Bench) -> Self {
         let file = format!("{name}.toml");
         let judged = match Scene::parse(file.as_ref(), &text) {
-            Ok(scene) => judged(scene, bench).map_err(|error| error.to_string()),
+            // One that panics must not take the others with it.
+            Ok(scene) => catch_unwind(AssertUnwindSafe(|| judged(scene, bench)))
+                .unwrap_or(Err(Unjudged::Panicked))
+                .map_err(|error| error.to_string()),
             Err(refusal) => Err(refusal.to_string()),
         };
         let (findings, unmet) = match judged {
             Ok(judgement) => (judgement.findings, judgement.unmet),
             Err(reason) => (Vec::new(), vec![reason]),
         };
+        let breaks = |finding: &&Finding| finding.fault.kind != Kind::Nothing;
         Self {
             text,
-            faults: findings.len(),
+            faults: findings.iter().filter(breaks).count(),
             unjudged: findings.iter().map(|one| one.unjudged.len()).sum(),
             unmet,
         }
     }
 }
 
-fn judged(scene: Scene, bench: &Bench) -> Result<Judgement, BenchError> {
+/// Why a scene that was read was not judged.
+#[derive(Debug, thiserror::Error)]
+enum Unjudged {
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    #[error("the simulator panicked")]
+    Panicked,
+}
+
+fn judged(scene: Scene, bench: &Bench) -> Result<Judgement, Unjudged> {
     Ok(match bench {
-        Bench::Native => Judgement::of(&scene, false)?,
+        Bench::Native => Judgement::of(&scene, false).map_err(BenchError::from)?,
         Bench::Elf(_) => {
             let recording = bench.run(&scene)?;
             Outcome::new(scene, recording).judgement(false)
@@ -112,13 +128,23 @@ impl Draw {
                 table.insert(name.to_owned(), Value::Table(section.table));
             }
         }
-        // It takes the force channel to estimate it.
+        // What takes the force channel.
+        let mut dice = dice();
         let gauges = table.get("gauges").and_then(Value::as_table);
-        if gauges.is_some_and(|gauges| gauges.contains_key("tangential")) && dice().chance(0.2) {
-            let estimator = table.entry("estimator");
-            let estimator = estimator.or_insert_with(|| Value::Table(Table::new()));
-            let estimator = estimator.as_table_mut().expect("it is a section");
-            estimator.insert("stiffness".to_owned(), "estimated".into());
+        if gauges.is_some_and(|gauges| gauges.contains_key("tangential")) {
+            let mut put = |section: &str, key: &str, value: Value| {
+                let section = table.entry(section);
+                let section = section.or_insert_with(|| Value::Table(Table::new()));
+                let section = section.as_table_mut().expect("it is a section");
+                section.insert(key.to_owned(), value);
+            };
+            if dice.chance(0.2) {
+                put("estimator", "stiffness", "estimated".into());
+            }
+            if dice.chance(0.4) {
+                let reference_mn = dice.log_between(1.0, 2000.0).round() as i64;
+                put("display", "reference_mn", reference_mn.into());
+            }
         }
         toml::to_string(&table).expect("tables of numbers, words and lists")
     }
@@ -158,7 +184,7 @@ fn one_fault(kind: Kind, duration_s: f64, dice: &mut Dice) -> Value {
         ..
     } in row.keys
     {
-        // What a campaign draws can be told from a sound board, most of the time.
+        // Most of the time what a campaign draws, which is large enough to have to show.
         let (low, high) = match drawn {
             Some(drawn) if section.dice.chance(0.7) => *drawn,
             _ => (*low, *high),
@@ -166,7 +192,7 @@ fn one_fault(kind: Kind, duration_s: f64, dice: &mut Dice) -> Value {
         if section.dice.chance(0.6) {
             match whole {
                 true => section.whole(name, low, high),
-                // Wide ones reach over many powers of ten.
+                // Wide ones reach over many powers of ten; those from 0 on, not so far beyond the default.
                 false if low > 0.0 && high > 20.0 * low => section.log(name, low, high),
                 false => section.number(name, low, high.min(20.0 * default.abs().max(0.05))),
             };
@@ -229,11 +255,11 @@ fn contact(to: &mut Section<'_>) {
     match to.dice.uniform() {
         ..0.65 => {}
         ..0.8 => {
-            to.maybe_word(1.0, "model", &["kinematic", "rigid", "viscoelastic"]);
+            to.one_of("model", &["kinematic", "rigid", "viscoelastic"]);
         }
         _ => {
             to.maybe_word(0.5, "model", &["auto", "stick-slip"]);
-            to.maybe_word(1.0, "friction", &["mild", "strong", "severe"]);
+            to.one_of("friction", &["mild", "strong", "severe"]);
         }
     }
 }
@@ -304,7 +330,6 @@ fn display(to: &mut Section<'_>) {
     for (probability, name, low, high) in [
         (0.2, "amplitude_mv", 500.0, 5000.0),
         (0.1, "reference_lsb", 1.0, 1500.0),
-        (0.1, "reference_mn", 1.0, 2000.0),
         (0.15, "glide_ms", 0.0, 300.0),
         (0.15, "fade_in_ms", 1.0, 300.0),
         (0.15, "fade_out_ms", 1.0, 300.0),
@@ -365,10 +390,14 @@ impl<'a> Section<'a> {
         self.table.insert(key.to_owned(), word.into());
     }
 
+    fn one_of(&mut self, key: &str, words: &[&str]) {
+        let word = words[self.dice.below(words.len())];
+        self.word(key, word);
+    }
+
     fn maybe_word(&mut self, probability: f64, key: &str, words: &[&str]) {
         if self.dice.chance(probability) {
-            let word = words[self.dice.below(words.len())];
-            self.word(key, word);
+            self.one_of(key, words);
         }
     }
 }
@@ -445,7 +474,7 @@ mod tests {
             "{refused:?}"
         );
         let sound = "duration_s = 1.5\nsurface.specimens = [{ wavelength_mm = 2.0 }]\n[[fault]]\nkind = \"nothing\"\nat_s = 0.6\n";
-        assert_eq!(run(sound), (1, Vec::new()));
+        assert_eq!(run(sound), (0, Vec::new()));
         let (_, failed) = run(&format!("{sound}[expect]\nmean_mm = 3.0\n"));
         assert_eq!(failed.len(), 1, "{failed:?}");
         let (_, unfit) = run(&sound.replace("nothing", "panic"));

@@ -17,7 +17,7 @@ const HEARD_NS: u64 = 3_000_000;
 /// From a reason to hold until the display says so: its next tick, and the message's way.
 pub(super) const SAID_NS: u64 = 5_000_000;
 /// In which every reason to hold but age brings the outputs to 0 V.
-const QUICKLY_NS: u64 = 8_000_000;
+pub(super) const QUICKLY_NS: u64 = 8_000_000;
 /// From which speed on a hand moves, in mm/s, and for how long it has to until the display must drive: it takes a
 /// hand without a count for 19 ms for one at rest.
 const MOVES_MM_S: f64 = 10.0;
@@ -185,6 +185,7 @@ impl Conduct {
         self.trust = Trust::new(self.max_age_ms);
         self.wavelength_mm = f64::INFINITY;
         self.arrived.clear();
+        (self.level.surface_lsb, self.level.fluctuation_mn) = (None, None);
     }
 
     /// An estimate has arrived at the display.
@@ -230,7 +231,7 @@ impl Conduct {
         }
     }
 
-    /// The sensor has told how the surface rubs.
+    /// The sensor has told how the surface rubs, up to [`FAINT_NS`] before the display hears it.
     pub fn rubs(&mut self, friction: Friction) {
         self.level.fluctuation_mn = Some(friction.fluctuation_mn.into());
     }
@@ -392,10 +393,11 @@ impl Conduct {
         self.was_held == Some(true)
     }
 
-    /// Whether the stimulus was too faint to show at any time from the fault on.
-    pub fn was_faint(&self) -> bool {
-        let is_since = |faint_ns| faint_ns + self.way_ns + FAINT_NS >= self.judged_ns.start;
-        self.faint_ns.is_some_and(is_since)
+    /// Whether the stimulus was too faint to show when the display had to drive again, or when the next fault began.
+    pub fn is_faint_when_due(&self) -> bool {
+        let due_ns = self.again_ns.end.min(self.judged_ns.end);
+        let is_then = |faint_ns| faint_ns + self.way_ns + FAINT_NS >= due_ns;
+        self.faint_ns.is_some_and(is_then)
     }
 
     /// Whether that can be seen: the hand moves for half of the time. Where nothing was known of the surface before, or

@@ -28,7 +28,7 @@ const STALLED_S: f64 = 0.05 * 1.2;
 const KNOWN_WAVES: f64 = 3.0;
 const MOST_WAVES: f64 = 8.0;
 const MISSED_WAVES: f64 = 1.0;
-/// What is at the mains' frequency may be hum for so long, in s (docs' page on limits).
+/// What is at the mains' frequency may be hum for so long, in s (docs' page on limits). Weak hum may take longer.
 const HUM_S: f64 = 0.5;
 /// Power of a plain surface over its noise, in dB.
 const PLAIN_DB: f64 = 20.0;
@@ -85,20 +85,19 @@ pub(super) fn board_of(fault: &Fault) -> Role {
 pub(super) fn away_since_ns(fault: &Fault, scene: &Scene) -> Option<u64> {
     let row = fault.kind.row();
     let role = board_of(fault);
-    let needs_it = row.needs == Needs::Boards || row.class == Class::Stops;
+    let needs_it = row.needs == Needs::Boards || matches!(row.class, Class::Stops | Class::Sensor);
     if !needs_it || fault.cuts_power(role) {
         return None;
     }
     let is_away = |other: &&Fault| {
-        let bites_s = match other.kind {
+        let away_s = match other.kind {
             Kind::SensorHang | Kind::SensorPanic | Kind::AdcStopped if role == Role::Sensor => {
                 BITES_S
             }
-            _ if other.cuts_power(role) => 0.0,
+            _ if other.cuts_power(role) => other.for_s.unwrap_or(0.0),
             _ => return false,
         };
-        let over_s = other.at_s + bites_s + other.for_s.unwrap_or(0.0);
-        fault.at_s < over_s + STARTS_S
+        fault.at_s < other.at_s + away_s + STARTS_S
     };
     let others = earlier(fault, scene).filter(is_away);
     others.map(Fault::begins_ns).max()
@@ -156,11 +155,23 @@ fn farthest_mm(scene: &Scene) -> f64 {
     FASTEST_HAND_MM_S / f64::from(scene.display_configuration().update_rate.hz())
 }
 
-/// Whether the hand goes further while the ticks stand than any does within one: its encoder seems to jump.
+/// Whether ticks stand for so long that the hand goes further from the one before to the one after than any does within
+/// one, to a count: its encoder seems to jump. A watchdog's reset begins to count anew.
 pub(super) fn goes_far(fault: &Fault, scene: &Scene) -> bool {
-    let [from_mm, to_mm] = [0.0, fault.for_s.unwrap_or(0.0)]
-        .map(|after_s| scene.motion.position_mm(fault.at_s + after_s));
-    (to_mm - from_mm).abs() > farthest_mm(scene)
+    let tick_s = 1.0 / f64::from(scene.display_configuration().update_rate.hz());
+    let stands_s = fault.for_s.filter(|&for_s| for_s < BITES_S);
+    let goes_mm = |stands_s: f64| {
+        let [from_mm, to_mm] =
+            [-tick_s, stands_s].map(|after_s| scene.motion.position_mm(fault.at_s + after_s));
+        (to_mm - from_mm).abs()
+    };
+    fault.kind == Kind::TickStopped
+        && stands_s.is_some_and(|s| goes_mm(s) + MM_PER_COUNT > farthest_mm(scene))
+}
+
+/// Whether the hand's encoder stands still while the arm, which its drive does not move, goes on.
+pub(super) fn arm_goes_on(fault: &Fault, scene: &Scene) -> bool {
+    fault.kind == Kind::HandEncoderDead && scene.arm.follows == Follows::Motion
 }
 
 /// Whether the hand is too slow for an encoder, a converter or a gauge that stands still to show in time: by its mean
@@ -271,13 +282,14 @@ fn may_be_at_rest(fault: &Fault, scene: &Scene) -> bool {
     arm_was_stopped(fault, scene) || may_rest
 }
 
-/// Whether what was before has stopped the arm for good.
+/// Whether what was before has stopped the arm for good, or may have.
 fn arm_was_stopped(fault: &Fault, scene: &Scene) -> bool {
     let power_ns = last_power_ns(fault, scene);
     earlier(fault, scene)
         .filter(|other| power_ns.is_none_or(|power_ns| other.begins_ns() > power_ns))
         .any(|other| {
             other.kind.is_of_arm()
+                || arm_goes_on(other, scene)
                 || matches!(other.kind, Kind::StopFromPeer | Kind::StopFromConsole)
         })
 }

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use protocol::{DisplayState, Hold, Message, Role, Trip};
 
-use super::conduct::{Conduct, SAID_NS, Stopped};
+use super::conduct::{Conduct, QUICKLY_NS, SAID_NS, Stopped};
 use super::due::{
-    LINGERS_NS, again_ns, away_since_ns, board_of, goes_far, hidden, is_plain, is_slow, is_unheard,
-    may_still_greet, must_show, rests, weather_signs,
+    LINGERS_NS, again_ns, arm_goes_on, away_since_ns, board_of, goes_far, hidden, is_plain,
+    is_slow, is_unheard, may_still_greet, must_show, rests, weather_signs,
 };
 use super::finding::Finding;
 use super::outputs::Outputs;
@@ -184,20 +184,22 @@ impl FaultMonitor {
             .flatten()
             .copied()
             .collect();
-        match (fault.kind, scene.arm.follows) {
+        if fault.kind == Kind::HandEncoderDead && scene.arm.follows == Follows::Link {
             // The arm stands still too, and nothing is sensed.
-            (Kind::HandEncoderDead, Follows::Link) => of_others.push(Sign::Fading(Hold::Stale)),
-            // The arm goes on with the hand. It is told to come back, and where the hand turns it stands.
-            (Kind::HandEncoderDead, Follows::Motion) => {
-                of_others.push(Sign::ArmStopped(Trip::ArmStall));
-            }
-            _ => {}
+            of_others.push(Sign::Fading(Hold::Stale));
         }
         let weather = weather_signs(&scene.link);
         of_others.extend(&weather);
+        let begun = || {
+            let faults = scene.faults.iter();
+            faults.filter(|other| other.begins_ns() < alone_ns.end)
+        };
+        // The arm goes on with the hand. It is told to come back, and where the hand turns it stands.
+        if begun().any(|other| arm_goes_on(other, scene)) {
+            of_others.push(Sign::ArmStopped(Trip::ArmStall));
+        }
         // The tick after a stop of the ticks sees all that the hand went meanwhile.
-        let goes_far = |other: &Fault| other.kind == Kind::TickStopped && goes_far(other, scene);
-        if scene.faults.iter().any(goes_far) {
+        if begun().any(|other| goes_far(other, scene)) {
             of_others.extend([
                 Sign::Stopped(Trip::HandEncoder),
                 Sign::Counted(Role::Display, "encoder_jumps"),
@@ -208,7 +210,7 @@ impl FaultMonitor {
             matches!(other.kind, Kind::LinkFlood | Kind::StopFromPeer)
                 || !other.kind.row().silences.is_empty()
         };
-        if scene.link.reorder > 0.0 && scene.faults.iter().any(numbers_anew) {
+        if scene.link.reorder > 0.0 && begun().any(numbers_anew) {
             // And a greeting may be overtaken by what it heralds, so that another is asked for.
             for role in [Role::Sensor, Role::Display] {
                 of_others.extend([Sign::Counted(role, "duplicated"), Sign::Greets(role)]);
@@ -392,7 +394,7 @@ impl FaultMonitor {
         // A frame that was on its way is no sign of life.
         let is_away = away_since_ns
             .is_some_and(|since_ns| ran_ns.is_none_or(|ran_ns| ran_ns < since_ns + SAID_NS));
-        if is_away {
+        if is_away && must_show && first.is_none() {
             unjudged.push("whether it shows: its board does not run then".to_owned());
         }
         // At rest there is nothing that a gauge or an encoder could be missed by.
@@ -410,7 +412,7 @@ impl FaultMonitor {
             && (fault.kind != Kind::HandEncoderJump || has_looked);
         let due_again_ns = self.conduct.due_again_ns();
         let need_not_drive = self.conduct.has_stopped();
-        let was_faint = self.conduct.was_faint();
+        let is_faint = self.conduct.is_faint_when_due();
         let shows_again = self.conduct.shows_again();
         let conduct = self.conduct.finish();
         let leaves_ms = |ms: f64| left_ns >= nanoseconds(ms * 1e-3);
@@ -468,7 +470,11 @@ impl FaultMonitor {
         let is_due = |hold: Hold, at_ns: u64| {
             let said = conduct.reasons.iter().any(|&(due, due_ns)| {
                 // What was on its way to 0 V before says so again with its counters.
-                let again_ns = if due_ns < from_ns { fade_out_ns } else { 0 };
+                let fades_ns = match hold {
+                    Hold::Stale => fade_out_ns,
+                    _ => QUICKLY_NS,
+                };
+                let again_ns = if due_ns < from_ns { fades_ns } else { 0 };
                 due == hold && (due_ns..=due_ns + again_ns + SAID_NS).contains(&at_ns)
             });
             said || row.signs.contains(&Sign::Fading(hold))
@@ -537,7 +543,7 @@ impl FaultMonitor {
                     _ => "the display has stopped before",
                 };
                 unjudged.push(format!("whether it drives {within}: {why}"));
-            } else if was_faint {
+            } else if is_faint {
                 unjudged.push(format!(
                     "whether it drives {within}: the stimulus is too faint to show"
                 ));

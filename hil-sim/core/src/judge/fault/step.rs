@@ -1,5 +1,6 @@
 //! Whether the stimulus stays in step with the hand while something is broken.
 
+use std::f64::consts::TAU;
 use std::mem;
 use std::ops::Range;
 
@@ -88,7 +89,7 @@ impl Step {
     }
 
     /// Root mean square of what it is off since the fault, in cycles, each window as long as it is; none if no cycle was
-    /// driven.
+    /// driven, or less than ten of a texture.
     pub fn finish(mut self) -> Option<f64> {
         self.stimulus.end();
         self.follow();
@@ -97,6 +98,9 @@ impl Step {
             return None;
         }
         if self.rendering == Rendering::Texture {
+            if self.errors.len() < TEXTURE_CYCLES {
+                return None;
+            }
             let groups = (self.errors.len() / TEXTURE_CYCLES).max(1);
             let length = self.errors.len().div_ceil(groups);
             self.errors = self.errors.chunks(length).map(together).collect();
@@ -108,6 +112,11 @@ impl Step {
 
     fn end_stretch(&mut self) {
         let since = mem::replace(&mut self.since, Demodulator::new(self.rendering));
+        // The mean of less than two groups would take away all that a group could tell.
+        let is_short = || since.clone().errors(self.peak_v).len() < 2 * TEXTURE_CYCLES;
+        if self.is_unplaced && self.rendering == Rendering::Texture && is_short() {
+            return;
+        }
         let standing = if self.is_unplaced {
             since.clone().standing(self.peak_v).unwrap_or(0.0)
         } else {
@@ -146,8 +155,9 @@ impl Step {
     /// a silence.
     fn stand(&mut self) -> f64 {
         let before = self.before.clone();
+        let cycles = || before.clone().errors(self.peak_v).len();
         let known = match self.rendering {
-            Rendering::Texture if before.held() < TEXTURE_CYCLES => None,
+            Rendering::Texture if cycles() < TEXTURE_CYCLES => None,
             Rendering::Texture => before.standing(self.peak_v),
             Rendering::Fundamental | Rendering::Shape => before.middle(self.peak_v),
         };
@@ -184,8 +194,14 @@ impl Step {
 fn together(windows: &[Demodulated]) -> Demodulated {
     let mut one = windows[0];
     one.cycles = windows.iter().map(|window| window.cycles).sum();
-    let errors = windows.iter().map(|one| one.cycles * one.error_cycles);
-    one.error_cycles = errors.sum::<f64>() / one.cycles;
+    // On the circle: half a cycle ahead is half a cycle behind.
+    let (mut s, mut c) = (0.0, 0.0);
+    for window in windows {
+        let angle = TAU * window.error_cycles;
+        s += window.cycles * angle.sin();
+        c += window.cycles * angle.cos();
+    }
+    one.error_cycles = s.atan2(c) / TAU;
     one
 }
 

@@ -771,6 +771,21 @@ fn an_arm_that_goes_on_without_a_hand_may_look_as_if_it_stood() {
         let unmet = finding(&scene, 0, 4_000 * MS, &recording).unmet();
         unmet.into_iter().any(|line| line.contains("arm stopped"))
     };
+    // It goes on saying so.
+    let mut recording = silent(4.0, 0..0);
+    recording.signs.sensor.push(TimedMessage {
+        at_ns: 3_700 * MS,
+        message: Message::Arm(Arm {
+            instant_us: 3_700_000,
+            state: ArmState::Stopped(Trip::ArmStall),
+        }),
+    });
+    let scene = several(4.0, &[(Kind::HandEncoderDead, 0.0), (Kind::Nothing, 3.6)]);
+    let later = finding(&scene, 1, 4_000 * MS, &recording).unmet();
+    assert!(
+        !later.iter().any(|line| line.contains("arm stopped")),
+        "{later:?}"
+    );
     let (dead, stall) = (Kind::HandEncoderDead, Trip::ArmStall);
     assert!(!stopped(dead, stall, Follows::Motion));
     // Its own encoder did not jump, an arm that its drive moves stands where it is told to, and of no fault none is stopped.
@@ -837,6 +852,7 @@ fn what_is_asked_of_a_board_that_does_not_run_need_not_show() {
     let scene = several(4.0, &[(Kind::SensorPanic, 0.5), (Kind::SensorHang, 1.31)]);
     let found = finding(&scene, 1, 4_000 * MS, &running);
     assert!(found.unmet().contains(&"no sign of it".to_owned()));
+    assert!(judged(Kind::SensorPanic, Kind::GaugeOpen, 0.6).1);
     // The other board's is none of its business, and power that goes again shows.
     assert_eq!(
         judged(Kind::SensorBrownOut, Kind::EmergencyStop, 0.6),
