@@ -263,5 +263,6 @@ fn what_breaks_a_board_that_does_not_run_is_no_refusal_and_not_missed() {
         Fault::new(Kind::SensorPanic, 0.8),
         Fault::new(Kind::SensorHang, 0.808),
     ];
-    assert!(unjudged(&hangs_on).contains(&away));
+    // The restart after the first shows for both.
+    assert!(!unjudged(&hangs_on).contains(&away));
 }
