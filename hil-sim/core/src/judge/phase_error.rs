@@ -104,13 +104,7 @@ impl Demodulator {
     /// The errors' mean on the circle, so that it tells what stands anywhere, with `peak_v` as in
     /// [`Demodulator::finish`] and each as long as it is; none if there is none.
     pub fn standing(self, peak_v: f64) -> Option<f64> {
-        let (mut s, mut c) = (0.0, 0.0);
-        for window in self.errors(peak_v) {
-            let angle = TAU * window.error_cycles;
-            s += window.cycles * angle.sin();
-            c += window.cycles * angle.cos();
-        }
-        (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
+        mean_on_circle(&self.errors(peak_v))
     }
 
     /// The errors' median on the circle: the one that the others are nearest to, with `peak_v` as in
@@ -180,6 +174,18 @@ impl Demodulator {
         self.window.add(due.cycles, volts, weight);
         self.before_cycles = due.travelled_cycles;
     }
+}
+
+/// The errors' mean on the circle, in cycles, each as long as it is: half a cycle ahead is half a cycle behind. None if there
+/// is none.
+pub fn mean_on_circle(windows: &[Demodulated]) -> Option<f64> {
+    let (mut s, mut c) = (0.0, 0.0);
+    for window in windows {
+        let angle = TAU * window.error_cycles;
+        s += window.cycles * angle.sin();
+        c += window.cycles * angle.cos();
+    }
+    (s != 0.0 || c != 0.0).then(|| s.atan2(c) / TAU)
 }
 
 /// Whether these hold a cycle together.

@@ -1,12 +1,11 @@
 //! Whether the stimulus stays in step with the hand while something is broken.
 
-use std::f64::consts::TAU;
 use std::mem;
 use std::ops::Range;
 
 use protocol::{Rendering, Role};
 
-use crate::judge::phase_error::{Demodulated, Demodulator, holds_a_cycle};
+use crate::judge::phase_error::{Demodulated, Demodulator, holds_a_cycle, mean_on_circle};
 use crate::judge::seconds;
 use crate::judge::stimulus::{Stimulus, Told};
 use crate::judge::truth::Truth;
@@ -103,7 +102,7 @@ impl Step {
             }
             let groups = (self.errors.len() / TEXTURE_CYCLES).max(1);
             let length = self.errors.len().div_ceil(groups);
-            self.errors = self.errors.chunks(length).map(together).collect();
+            self.errors = self.errors.chunks(length).filter_map(together).collect();
         }
         let cycles: f64 = self.errors.iter().map(|window| window.cycles).sum();
         let square = |window: &Demodulated| window.cycles * window.error_cycles.powi(2);
@@ -190,19 +189,12 @@ impl Step {
     }
 }
 
-/// Some windows as one.
-fn together(windows: &[Demodulated]) -> Demodulated {
-    let mut one = windows[0];
+/// Some windows as one; none of none.
+fn together(windows: &[Demodulated]) -> Option<Demodulated> {
+    let mut one = *windows.first()?;
+    one.error_cycles = mean_on_circle(windows)?;
     one.cycles = windows.iter().map(|window| window.cycles).sum();
-    // On the circle: half a cycle ahead is half a cycle behind.
-    let (mut s, mut c) = (0.0, 0.0);
-    for window in windows {
-        let angle = TAU * window.error_cycles;
-        s += window.cycles * angle.sin();
-        c += window.cycles * angle.cos();
-    }
-    one.error_cycles = s.atan2(c) / TAU;
-    one
+    Some(one)
 }
 
 impl RunObserver for Step {
