@@ -9,8 +9,8 @@
 //!
 //! None of them is a hold: what a texture asks for is within all limits whatever it says. A wave that was taken counts for
 //! [`max_age_ms`](protocol::DisplayConfiguration::max_age_ms), as λ does. Friction does until the textures of so long have
-//! told of none, or were late or unsound: while there are none, as where an arm rests or a link fails, a weak stimulus is not to burst
-//! out.
+//! told of none, or were late or unsound: while there are none, as where an arm rests or a link fails, a weak stimulus is
+//! not to burst out.
 
 use protocol::Texture;
 

@@ -192,7 +192,8 @@ impl Injector {
     }
 
     /// Turns a bit of a setting where the output task holds them: their 16-bit numbers lie in the order of
-    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them. False if the ELF does not show where.
+    /// their declaration. Copies that the task's start has left, which nothing reads, are turned with them.
+    /// False if the ELF does not show where.
     fn turn_bit(&self, fault: &Fault, host: &mut dyn Host) -> bool {
         let Some(traps) = &self.traps else {
             return false;

@@ -22,7 +22,7 @@ pub(super) const QUICKLY_NS: u64 = 8_000_000;
 /// hand without a count for 19 ms for one at rest.
 const MOVES_MM_S: f64 = 10.0;
 const MOVES_NS: u64 = 40_000_000;
-/// An amplitude in mV, two steps of the DAC, that shows by nothing; and for how long in ns after it was due.
+/// An amplitude in mV, two steps of the DAC, that shows by nothing. So long after, in ns, it may still be so faint.
 const FAINT_MV: f64 = 0.3;
 const FAINT_NS: u64 = 100_000_000;
 /// Up to which a wave is played in full.
