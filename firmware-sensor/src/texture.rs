@@ -9,7 +9,7 @@
 //! fitted to each gauge at λ̂. The places where a wave begins under each gauge are of no interest, so each gauge's
 //! partials are taken relative to its own fundamental: of Zₙ = Aₙ e^(iαₙ) counts Zₙ (Z̄₁/|Z₁|)ⁿ, which no shift of place
 //! changes. An error of λ̂ shifts all of a block alike, and drops out too. Weighed by the fundamental's amplitude and
-//! averaged over gauges and blocks that is unbiased.
+//! averaged over gauges and blocks that is unbiased. A gauge that feels the wave upside down is turned over first.
 //!
 //! What is left of one gauge after the fit has a spectrum over wavenumber; the noise of the gauge is white in time, so
 //! of a known density in wavenumber at a known speed, and is taken off.
@@ -165,12 +165,12 @@ impl Surface {
         let Some(fits) = self.block.fits() else {
             return;
         };
-        let mut usable = [0.0; GAUGES];
+        let mut usable = [false; GAUGES];
         let mut loudest = (0.0, 0);
         for (gauge, fit) in fits.iter().enumerate() {
             let power = fit.power(1);
             if self.usable >> gauge & 1 == 1 && power > MIN_AMPLITUDE_LSB * MIN_AMPLITUDE_LSB {
-                usable[gauge] = 1.0;
+                usable[gauge] = true;
                 if power > loudest.0 {
                     loudest = (power, gauge);
                 }
@@ -186,17 +186,15 @@ impl Surface {
         averages.blocks += 1.0;
         for (n, sum) in (2..).zip(&mut averages.partials) {
             if n as f32 * hz <= HIGHEST_HZ {
-                let of_block = fits
-                    .iter()
-                    .zip(usable)
-                    .fold(PartialSum::default(), |sum, (fit, usable)| {
-                        sum.plus(&fit.relative(n), usable)
-                    });
+                let mut of_block = PartialSum::default();
+                for (gauge, fit) in fits.iter().enumerate().filter(|&(gauge, _)| usable[gauge]) {
+                    of_block.add(gauge, fit.relative(n), fit.power(1), fit.variance);
+                }
                 sum.follow(&of_block);
             }
         }
         let gauge = core::mem::replace(&mut self.block.loudest, loudest.1);
-        if usable[gauge] == 0.0 {
+        if !usable[gauge] {
             return;
         }
         let speed_mm_s = hz * self.wavelength_mm;

@@ -3,7 +3,6 @@
 use protocol::GAUGES;
 use protocol::texture::PARTIALS;
 
-use super::partial::PartialSum;
 use super::{Complex, times};
 use crate::float::sqrt;
 use crate::normal_equations::{NormalEquations, eliminate, eliminate_right};
@@ -183,7 +182,7 @@ impl Block {
 pub(super) struct Fit {
     pub coefficients: [f32; TERMS],
     /// Variance of a coefficient by what is left.
-    variance: f32,
+    pub variance: f32,
 }
 
 impl Fit {
@@ -198,18 +197,13 @@ impl Fit {
         re * re + im * im
     }
 
-    /// What the gauge adds to the average of the nth partial.
-    pub fn relative(&self, n: usize) -> PartialSum {
+    /// Zₙ (Z̄₁/|Z₁|)ⁿ |Z₁|: the nth partial relative to the fundamental's phase, times its amplitude.
+    pub fn relative(&self, n: usize) -> Complex {
         let first = self.partial(1);
         let power = self.power(1);
         let scale = 1.0 / sqrt(power).max(f32::MIN_POSITIVE);
         let back = [first[0] * scale, -first[1] * scale];
         let relative = (0..n).fold(self.partial(n), |z, _| times(z, back));
-        PartialSum {
-            relative: relative.map(|part| part * power * scale),
-            fundamental: power,
-            variance: power * self.variance,
-            blocks: 1.0,
-        }
+        relative.map(|part| part * power * scale)
     }
 }

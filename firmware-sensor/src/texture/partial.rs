@@ -1,44 +1,95 @@
 //! A partial relative to its fundamental: of a gauge, over gauges, over blocks.
 
-use protocol::Partial;
 use protocol::texture::{LARGEST_RATIO, UNITY};
+use protocol::{GAUGES, Partial};
 
-use super::Complex;
+use super::{Complex, times};
 use crate::float::sqrt;
 
 /// Blocks over which is averaged.
 pub(super) const MEMORY_BLOCKS: f32 = 8.0;
 
+/// How many times what chance adds to a partial's power gauges have to gain by being turned over, to be.
+const TURNS_OVER: f32 = 4.0;
+/// Share of the gauges' power that has to lie along one axis for any to be turned over: cos 2φ of some 18°. Five that
+/// feel what does not repeat point anywhere, and come so near to an axis once in 25 times.
+const ON_AN_AXIS: f32 = 0.8;
+
 /// Sums of a partial over gauges, or its average over blocks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PartialSum {
-    pub relative: Complex,
-    pub fundamental: f32,
-    pub variance: f32,
-    pub blocks: f32,
+    /// What each gauge adds.
+    gauges: [Complex; GAUGES],
+    /// Their sum, all the same way up.
+    relative: Complex,
+    fundamental: f32,
+    variance: f32,
+    blocks: f32,
 }
 
 impl PartialSum {
-    pub fn plus(self, other: &Self, share: f32) -> Self {
-        Self {
-            relative: [
-                self.relative[0] + share * other.relative[0],
-                self.relative[1] + share * other.relative[1],
-            ],
-            fundamental: self.fundamental + share * other.fundamental,
-            variance: self.variance + share * other.variance,
-            blocks: 1.0,
-        }
+    /// Takes a gauge's: the partial relative to the fundamental's phase and times its amplitude, the fundamental's power,
+    /// and the variance of each part of the partial.
+    pub fn add(&mut self, gauge: usize, relative: Complex, power: f32, variance: f32) {
+        self.gauges[gauge] = relative;
+        self.fundamental += power;
+        self.variance += power * variance;
     }
 
+    /// Takes a block's.
     pub fn follow(&mut self, now: &Self) {
         self.blocks = (self.blocks + 1.0).min(MEMORY_BLOCKS);
         let share = 1.0 / self.blocks;
-        for (sum, now) in self.relative.iter_mut().zip(now.relative) {
+        let sums = self.gauges.as_flattened_mut().iter_mut();
+        for (sum, now) in sums.zip(now.gauges.as_flattened()) {
             *sum += share * (now - *sum);
         }
         self.fundamental += share * (now.fundamental - self.fundamental);
         self.variance += share * (now.variance - self.variance);
+        self.relative = self.upright();
+    }
+
+    /// What chance adds to the partial's power: both parts have that variance, an average over n blocks a share of it.
+    fn chance(&self) -> f32 {
+        2.0 * self.variance / self.blocks
+    }
+
+    /// The gauges' sum. One that feels the wave upside down, as before and behind a fingertip's middle, has its even
+    /// partials opposite to the others', and is turned over where that shows. The majority is upright; where there is
+    /// none, what was so before.
+    fn upright(&self) -> Complex {
+        let sum = |sign: &dyn Fn(&Complex) -> f32| {
+            self.gauges.iter().fold([0.0; 2], |sum, z| {
+                [sum[0] + sign(z) * z[0], sum[1] + sign(z) * z[1]]
+            })
+        };
+        let plain = sum(&|_| 1.0);
+        // Their axis: squares do not tell up from down.
+        let [re, im] = self.gauges.iter().fold([0.0; 2], |sum, z| {
+            let square = times(*z, *z);
+            [sum[0] + square[0], sum[1] + square[1]]
+        });
+        let size = sqrt(re * re + im * im);
+        let axis = [
+            sqrt((size + re).max(0.0)),
+            if im < 0.0 { -1.0 } else { 1.0 } * sqrt((size - re).max(0.0)),
+        ];
+        let along = |[re, im]: &Complex| re * axis[0] + im * axis[1];
+        let all: f32 = self.gauges.iter().map(|z| power(*z)).sum();
+        let turned = sum(&|z| if along(z) < 0.0 { -1.0 } else { 1.0 });
+        let gained = power(turned) - power(plain);
+        if size < ON_AN_AXIS * all || gained <= TURNS_OVER * self.chance() {
+            return plain;
+        }
+        let (mut upright, before) = (along(&plain), along(&self.relative));
+        if before != 0.0 && 2.0 * upright.abs() <= along(&turned) {
+            upright = before;
+        }
+        if upright < 0.0 {
+            turned.map(|part| -part)
+        } else {
+            turned
+        }
     }
 
     /// The partial, less what chance adds to its power.
@@ -47,15 +98,17 @@ impl PartialSum {
         if self.fundamental <= 0.0 {
             return Partial::default();
         }
-        // Both parts have that variance; an average over n blocks a share of it.
-        let chance = 2.0 * self.variance / self.blocks;
-        let power = (re * re + im * im - chance).max(0.0);
+        let power = (power(self.relative) - self.chance()).max(0.0);
         let turns = libm::atan2f(im, re) * (0.5 / core::f32::consts::PI);
         Partial {
             ratio: in_units(sqrt(power) / self.fundamental),
             phase: (turns * 65_536.0) as i32 as u16,
         }
     }
+}
+
+fn power([re, im]: Complex) -> f32 {
+    re * re + im * im
 }
 
 /// A ratio in 1 / [`UNITY`].
@@ -67,31 +120,40 @@ pub(super) fn in_units(ratio: f32) -> u16 {
 mod tests {
     use super::*;
 
+    /// A block of which one gauge tells.
     const ONE: PartialSum = PartialSum {
+        gauges: [[3.0, 4.0], [0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]],
         relative: [3.0, 4.0],
         fundamental: 10.0,
         variance: 2.0,
         blocks: 1.0,
     };
 
+    /// An average over one block of what gauges add.
+    fn of(gauges: [Complex; GAUGES], variance: f32) -> PartialSum {
+        let mut block = PartialSum::default();
+        for (gauge, relative) in gauges.into_iter().enumerate() {
+            block.add(gauge, relative, 2.0, variance);
+        }
+        let mut average = PartialSum::default();
+        average.follow(&block);
+        average
+    }
+
     #[test]
-    fn gauges_count_by_their_share() {
-        let sum = PartialSum::default().plus(&ONE, 1.0).plus(&ONE, 0.5);
-        assert_eq!(sum.relative, [4.5, 6.0]);
-        assert_eq!(
-            (sum.fundamental, sum.variance, sum.blocks),
-            (15.0, 3.0, 1.0)
+    fn gauges_add_up() {
+        let sum = of(
+            [[3.0, 4.0], [1.0, 0.0], [0.0, 2.0], [0.0; 2], [0.0; 2]],
+            0.3,
         );
+        assert_eq!(sum.relative, [4.0, 6.0]);
+        assert!((sum.fundamental - 10.0).abs() < 1e-6 && (sum.variance - 3.0).abs() < 1e-6);
+        assert_eq!(sum.blocks, 1.0);
     }
 
     #[test]
     fn the_first_blocks_count_alike_and_later_ones_an_eighth() {
-        let other = PartialSum {
-            relative: [0.0; 2],
-            fundamental: 0.0,
-            variance: 0.0,
-            blocks: 1.0,
-        };
+        let other = PartialSum::default();
         let mut average = PartialSum::default();
         for block in 0..8 {
             average.follow(if block % 2 == 0 { &ONE } else { &other });
@@ -101,6 +163,63 @@ mod tests {
         average.follow(&ONE);
         assert_eq!(average.fundamental, 5.0 + 5.0 / 8.0);
         assert_eq!(average.blocks, MEMORY_BLOCKS);
+    }
+
+    #[test]
+    fn a_gauge_is_turned_over_where_more_than_chance_asks_for_it() {
+        let [up, down] = [[3.0, 4.0], [-3.0, -4.0]];
+        let about = |sum: PartialSum, want: Complex| {
+            let off = sum.relative.iter().zip(want);
+            assert!(
+                off.into_iter().all(|(x, y)| (x - y).abs() < 1e-3),
+                "{sum:?}"
+            );
+        };
+        about(of([up, down, up, up, up], 1.0), [15.0, 20.0]);
+        about(of([up, down, down, up, down], 1.0), [-15.0, -20.0]);
+        // Turned over they have 25 times the power of one, and not one of them 24 times: 600 in all. Chance adds 2 · 10
+        // times the variance to it.
+        about(of([up, down, up, down, up], 7.0), [15.0, 20.0]);
+        about(of([up, down, up, down, up], 8.0), [3.0, 4.0]);
+        // On either side of the negative real axis, where squares turn once more.
+        about(
+            of(
+                [[-4.0, 0.1], [4.0, 0.1], [-4.0, 0.0], [0.0; 2], [0.0; 2]],
+                0.1,
+            ),
+            [-12.0, 0.0],
+        );
+        about(
+            of(
+                [[0.1, 4.0], [-0.1, -4.0], [0.0, 4.0], [0.0; 2], [0.0; 2]],
+                0.1,
+            ),
+            [0.2, 12.0],
+        );
+    }
+
+    #[test]
+    fn where_half_are_upside_down_it_stays_as_it_was() {
+        let block = |first: f32| {
+            let mut block = PartialSum::default();
+            for (gauge, height) in [first, -3.0, 3.0, -3.0, 0.0].into_iter().enumerate() {
+                block.add(gauge, [0.0, height], 2.0, 0.01);
+            }
+            block
+        };
+        for (begins, goes_on) in [(9.0, 2.9), (0.5, 3.1)] {
+            let mut average = PartialSum::default();
+            (0..8).for_each(|_| average.follow(&block(begins)));
+            let side = average.relative[1].signum();
+            for _ in 0..40 {
+                average.follow(&block(goes_on));
+                assert_eq!(average.relative[1].signum(), side, "{average:?}");
+            }
+            assert!(
+                (average.relative[1].abs() - 9.0 - goes_on).abs() < 0.2,
+                "{average:?}"
+            );
+        }
     }
 
     #[test]

@@ -124,6 +124,69 @@ fn partials_are_within_a_db_and_five_degrees_at_20_db_and_three_db_at_0_db() {
     }
 }
 
+/// What is told at `snr_db` by gauges that feel the wave so many times as high as the others, negative upside down.
+fn told_by(polarity: [f64; 5], ground: Ground, snr_db: f64) -> Vec<Texture> {
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
+    bench.rub(
+        8_000,
+        |t_s| if t_s.fract() < 0.5 { 70.0 } else { -70.0 },
+        |gauge, x_mm, _| polarity[gauge] * ground.felt(gauge, x_mm),
+    );
+    let valid: Vec<_> = bench
+        .textures
+        .into_iter()
+        .filter(|told| told.valid)
+        .collect();
+    assert!(valid.len() >= 100, "{} valid", valid.len());
+    valid
+}
+
+#[test]
+fn gauges_that_feel_the_wave_upside_down_tell_of_the_same_partials() {
+    let ground = Ground {
+        wavelength_mm: 2.0,
+        shape: [(0.4, 0.1), (0.25, 0.7)],
+        random: None,
+    };
+    // Upside down, the even partials are half a turn further from the fundamental.
+    let upside_down = [(0.4, 0.6), (0.25, 0.7)];
+    for (polarity, shape) in [
+        ([1.0, -1.0, 1.0, 1.0, 1.0], ground.shape),
+        ([1.0, -1.0, 1.0, 1.0, -1.0], ground.shape),
+        ([-1.0, 1.0, -1.0, -1.0, -1.0], upside_down),
+        ([-1.0; 5], upside_down),
+    ] {
+        for texture in told_by(polarity, ground, 20.0) {
+            let (db, degrees) = off(&texture, shape);
+            assert!(
+                db <= 1.0 && degrees <= 5.0,
+                "{polarity:?}, {db} dB, {degrees}°: {texture:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn gauges_of_which_half_feel_the_wave_upside_down_do_not_change_their_mind() {
+    let ground = Ground {
+        wavelength_mm: 2.0,
+        shape: [(0.4, 0.1), (0.25, 0.7)],
+        random: None,
+    };
+    let told = told_by([1.0, -1.0, 1.0, -1.0, 0.0], ground, 0.0);
+    for pair in told[20..].windows(2) {
+        let [before, now] = [&pair[0].partials[0], &pair[1].partials[0]];
+        let turned = now
+            .phase
+            .wrapping_sub(before.phase)
+            .cast_signed()
+            .unsigned_abs();
+        assert!(turned < 1 << 14, "from {before:?} to {now:?}");
+        assert!((250..550).contains(&now.ratio), "{now:?}");
+    }
+}
+
 #[test]
 fn what_does_not_repeat_is_told_in_its_band_whatever_the_speed() {
     let told_db = |told: u16| 20.0 * (f64::from(told).max(1.0) / 300.0).log10();

@@ -37,8 +37,8 @@ Seeds:
   10000 – 19999  to report from: nothing is changed for what one of them does
 Each seed is a surface, a hand and a fingertip; CONTRIBUTING.md says more.
 
-right:  valid and within 5 % of the truth
-wrong:  valid and more than 10 % off, or valid where there is no period
+right:  valid and within 5 % of the truth; of a shape, within a limen of 2.2 dB, whichever way up
+wrong:  valid and more than 10 % off, or valid where there is no period; of a shape, more than two limens off
 silent: not valid
 felt:   the same of the λ that the display drives at, with its hold and fade
 All of them are shares of the time in motion (above 5 mm/s, v/λ within 2.5–150 Hz), from 3 λ of travel on after
@@ -55,7 +55,7 @@ pub(super) struct Jury {
     #[arg(long, value_name = "COUNT", default_value_t = 200)]
     surfaces: u64,
     /// Judge the scenes of this folder instead, which has an index.json with their truths
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits", "shapes"])]
     folder: Option<PathBuf>,
     /// What runs a folder's scenes
     #[arg(long, value_enum, default_value_t = EngineName::Native)]
@@ -72,8 +72,11 @@ pub(super) struct Jury {
     /// Print the table by what makes surfaces hard, too
     #[arg(long)]
     traits: bool,
+    /// Print what textures tell of the wave's shape, too
+    #[arg(long)]
+    shapes: bool,
     /// Print the weights of the default estimator's evidence that these surfaces ask for, and judge nothing
-    #[arg(long, conflicts_with_all = ["folder", "method", "valid_percent", "max_age_ms", "traits", "json"])]
+    #[arg(long, conflicts_with_all = ["folder", "method", "valid_percent", "max_age_ms", "traits", "shapes", "json"])]
     weights: bool,
     /// Where to write everything as JSON, surface by surface
     #[arg(long, value_name = "FILE")]
@@ -109,6 +112,7 @@ struct Strangers {
     intervals: &'static str,
     classes: Vec<Row>,
     traits: Vec<Row>,
+    shapes: Vec<Row>,
     trials: Vec<Judged>,
 }
 
@@ -120,6 +124,7 @@ struct Judged {
     traits: Vec<&'static str>,
     said: Counts,
     felt: Counts,
+    shaped: Counts,
     #[serde(skip)]
     trial: Trial,
 }
@@ -223,13 +228,14 @@ impl Jury {
 
         let trials = self.of_surfaces(|&seed| {
             let trial = Trial::draw(seed);
-            let Played { said, felt } = play(&trial.record(), sensor, &settings);
+            let Played { said, felt, shaped } = play(&trial.record(), sensor, &settings);
             Ok(Judged {
                 seed,
                 class: trial.class.name(),
                 traits: trial.traits(),
                 said,
                 felt,
+                shaped,
                 trial,
             })
         });
@@ -249,6 +255,11 @@ impl Jury {
             say!("\nof the surfaces with a period, those with");
             say!("{}", table::text("trait", "surfaces", &traits));
         }
+        let shapes = by_shape(&trials);
+        if self.shapes {
+            say!("\nof one wave alone, its shape by what textures tell");
+            say!("{}", table::text("class", "surfaces", &shapes));
+        }
         say_worst(&trials);
         write(
             json,
@@ -262,6 +273,7 @@ impl Jury {
                 intervals: table::INTERVALS,
                 classes,
                 traits,
+                shapes,
                 trials,
             },
         )
@@ -341,26 +353,35 @@ fn judge_scene(bench: &Bench, entry: &Entry, scene: &Scene) -> anyhow::Result<Ju
 
 /// Each class that came up, then those with a period together, and those without.
 fn by_class(trials: &[Judged]) -> Vec<Row> {
-    let rows = |name: &str, is_in: &dyn Fn(Class) -> bool| {
-        let those = || trials.iter().filter(|judged| is_in(judged.trial.class));
+    rows(trials, |judged| judged.said, |judged| judged.felt)
+}
+
+/// The same of the shape of what has one wave alone.
+fn by_shape(trials: &[Judged]) -> Vec<Row> {
+    rows(trials, |judged| judged.shaped, |_| Counts::default())
+}
+
+fn rows(
+    trials: &[Judged],
+    said: impl Fn(&Judged) -> Counts,
+    felt: impl Fn(&Judged) -> Counts,
+) -> Vec<Row> {
+    let row = |name: &str, is_in: &dyn Fn(Class) -> bool| {
         let weighed = |counts: &dyn Fn(&Judged) -> Counts| -> Vec<Weighed> {
-            those()
+            let those = trials.iter().filter(|judged| is_in(judged.trial.class));
+            those
                 .filter_map(|judged| Weighed::by_time(&counts(judged)))
                 .collect()
         };
-        Row::of(
-            name,
-            &weighed(&|judged| judged.said),
-            &weighed(&|judged| judged.felt),
-        )
+        Row::of(name, &weighed(&said), &weighed(&felt))
     };
     Class::PERIODIC
         .iter()
         .chain(&Class::PLAIN)
-        .map(|&class| rows(class.name(), &|other| other == class))
+        .map(|&class| row(class.name(), &|other| other == class))
         .chain([
-            rows("with a period", &Class::has_a_period),
-            rows("without a period", &|class| !class.has_a_period()),
+            row("with a period", &Class::has_a_period),
+            row("without a period", &|class| !class.has_a_period()),
         ])
         .filter(|row| row.surfaces > 0)
         .collect()

@@ -1,11 +1,20 @@
 //! What came of one surface, in counts.
 
+use realfft::num_complex::Complex64;
 use serde::Serialize;
 
 /// An estimate this close to the truth, relative to it, is right.
 pub const RIGHT: f64 = 0.05;
 /// One further off than this is wrong. Between the two it is neither.
 pub const WRONG: f64 = 0.1;
+
+/// A wave's shape this close to the true one is right: what differs has so much of its RMS as a limen of 2.2 dB makes.
+pub const SHAPE_RIGHT: f64 = 0.288;
+/// One that is further off than twice that is wrong.
+pub const SHAPE_WRONG: f64 = 2.0 * SHAPE_RIGHT;
+
+/// The second and third partial of a wave, relative to its fundamental.
+pub type Partials = [Complex64; 2];
 
 /// What an estimate is worth, or what is played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +43,21 @@ impl Worth {
             Self::Near
         } else {
             Self::Wrong
+        }
+    }
+
+    /// Of the shape of a wave of which `felt` partials can be felt. Which way up a gauge feels it nobody can know: upside
+    /// down, the second partial is half a turn further.
+    pub fn of_shape(told: Partials, truth: Partials, felt: usize) -> Self {
+        let power = |partials: &[Complex64]| partials.iter().map(Complex64::norm_sqr).sum::<f64>();
+        let off = |way_up: f64| {
+            let off = [way_up * told[0] - truth[0], told[1] - truth[1]];
+            (power(&off[..felt]) / (1.0 + power(&truth[..felt]))).sqrt()
+        };
+        match off(1.0).min(off(-1.0)) {
+            off if off <= SHAPE_RIGHT => Self::Right,
+            off if off <= SHAPE_WRONG => Self::Near,
+            _ => Self::Wrong,
         }
     }
 }
@@ -86,6 +110,33 @@ mod tests {
                 Worth::of(said_mm, truth_mm),
                 worth,
                 "{said_mm:?} {truth_mm}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_shape_is_worth_what_its_partials_are_either_way_up() {
+        let shape = |second: f64, third: f64| [second, third].map(|x| Complex64::new(x, 0.0));
+        for (told, truth, felt, worth) in [
+            (shape(0.5, 0.2), shape(0.5, 0.2), 2, Worth::Right),
+            (shape(-0.5, 0.2), shape(0.5, 0.2), 2, Worth::Right),
+            (shape(0.5, -0.2), shape(0.5, 0.2), 2, Worth::Near),
+            // A sine that is told as such, and not: 0.28 and 0.29, 0.57 and 0.58.
+            (shape(0.28, 0.0), shape(0.0, 0.0), 2, Worth::Right),
+            (shape(0.29, 0.0), shape(0.0, 0.0), 2, Worth::Near),
+            (shape(0.0, 0.57), shape(0.0, 0.0), 2, Worth::Near),
+            (shape(0.0, 0.58), shape(0.0, 0.0), 2, Worth::Wrong),
+            // What can't be felt does not count.
+            (shape(0.0, 0.58), shape(0.0, 0.0), 1, Worth::Right),
+            (shape(0.9, 0.9), shape(0.0, 0.0), 0, Worth::Right),
+            // Of a sharper wave as much is less.
+            (shape(0.6, 1.0), shape(1.0, 1.0), 2, Worth::Right),
+            (shape(f64::NAN, 0.0), shape(0.0, 0.0), 2, Worth::Wrong),
+        ] {
+            assert_eq!(
+                Worth::of_shape(told, truth, felt),
+                worth,
+                "{told:?} {truth:?} {felt}"
             );
         }
     }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use super::counts::Partials;
 use super::dice::Dice;
 
 mod plain;
@@ -123,11 +124,25 @@ impl Ground {
         bend * first.max(second)
     }
 
+    /// The partials of its wave, if it has one and no other, as the contact lets them through.
+    pub fn partials(&self) -> Option<Partials> {
+        match &self.first {
+            Specimen::Ridged(ridges) if self.second.is_none() => {
+                ridges.partials(self.contact_sigma_mm())
+            }
+            _ => None,
+        }
+    }
+
+    fn contact_sigma_mm(&self) -> f64 {
+        self.contact_mm / libm::sqrt(8.0 * std::f64::consts::LN_2)
+    }
+
     /// Lays the ground from one place to another, in mm, for as many gauges. Heights have the RMS 1 of the
     /// first specimen's own signal, a random part comes on top.
     pub fn lay(&self, from_mm: f64, to_mm: f64, gauges: usize, dice: &mut Dice) -> Profile {
         let points = libm::ceil((to_mm - from_mm) / GRID_MM) as usize + 2;
-        let sigma_mm = self.contact_mm / libm::sqrt(8.0 * std::f64::consts::LN_2);
+        let sigma_mm = self.contact_sigma_mm();
         let (across_mm, cosines) = self.across(points);
         let (mut signal, mut waves) = match &self.first {
             Specimen::Ridged(ridges) => ridges.lay(&across_mm, sigma_mm, dice),

@@ -1,8 +1,12 @@
 //! A stranger's record, played to the firmware's own libraries.
 
+use std::f64::consts::TAU;
+
 use firmware_display::{Display, Senses, Settings, TICK_RATE_HZ};
 use firmware_sensor::Sensor;
-use protocol::{DisplayState, SensorConfiguration};
+use protocol::texture::UNITY;
+use protocol::{DisplayState, SensorConfiguration, Texture};
+use realfft::num_complex::Complex64;
 
 use super::counts::{Counts, Worth};
 use super::stranger::Record;
@@ -12,6 +16,8 @@ pub(super) const MOVING_MM_S: f32 = 5.0;
 /// v/λ that the sensor promises to follow, in Hz.
 const LOWEST_HZ: f32 = 2.5;
 const HIGHEST_HZ: f32 = 150.0;
+/// The highest frequency in Hz at which a partial is measured.
+const HIGHEST_PARTIAL_HZ: f32 = firmware_sensor::texture::HIGHEST_HZ;
 /// Waves of travel after the start, and after a boundary, from which on it counts.
 const WAVES_TO_SETTLE: f32 = 3.0;
 const TICKS_PER_MS: u16 = (TICK_RATE_HZ / 1_000) as u16;
@@ -24,6 +30,8 @@ pub struct Played {
     pub said: Counts,
     /// That time itself, in ms, by what the operator's finger gets.
     pub felt: Counts,
+    /// The textures in that time, by the shape of the wave that they tell of, where the surface has one wave alone.
+    pub shaped: Counts,
 }
 
 /// Plays a record to a sensor board, and its estimates at once to a display board whose hand moves as the
@@ -42,7 +50,14 @@ pub fn play(record: &Record, sensor: SensorConfiguration, display: &Settings) ->
         let counts = record.counts(ms);
         let truth_mm = f64::from(record.truth_mm[ms]);
         let instant_us = 1_000 * (ms as u64 + 1);
-        if let Some(estimate) = sensor.step(instant_us, scans, encoder).estimate {
+        let heard = sensor.step(instant_us, scans, encoder);
+        if let Some(texture) = heard.texture.filter(|_| counts) {
+            let worth = record.worth_of_shape(ms, &texture);
+            worth
+                .into_iter()
+                .for_each(|worth| played.shaped.count(worth));
+        }
+        if let Some(estimate) = heard.estimate {
             let said_mm = estimate.wavelength_mm.filter(|_| estimate.valid);
             if counts {
                 played
@@ -75,6 +90,21 @@ pub fn play(record: &Record, sensor: SensorConfiguration, display: &Settings) ->
 }
 
 impl Record {
+    /// What a texture that was told at a ms is worth by its partials; none where the surface has not one wave alone.
+    fn worth_of_shape(&self, ms: usize, texture: &Texture) -> Option<Worth> {
+        let truth = self.partials?;
+        if !texture.valid {
+            return Some(Worth::Silent);
+        }
+        let told = texture.partials.map(|partial| {
+            let ratio = f64::from(partial.ratio) / f64::from(UNITY);
+            Complex64::from_polar(ratio, TAU * f64::from(partial.phase) / 65_536.0)
+        });
+        let hz = self.speed_mm_s[ms].abs() / self.truth_mm[ms];
+        let felt = [2.0, 3.0].iter().filter(|&n| n * hz <= HIGHEST_PARTIAL_HZ);
+        Some(Worth::of_shape(told, truth, felt.count()))
+    }
+
     /// Whether a ms counts: the arm moves; and where there is a period, v/λ is in the band, and the
     /// fingertip has come 3 λ far on this specimen.
     pub fn counts(&self, ms: usize) -> bool {

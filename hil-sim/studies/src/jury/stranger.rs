@@ -48,6 +48,7 @@
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Scan};
 
+use super::counts::Partials;
 use super::dice::Dice;
 use super::ground::{
     Bend, Ground, POLES, Plain, Ridges, Second, Specimen, Texture, Waveform, greatest_angle,
@@ -173,6 +174,8 @@ pub struct Record {
     pub travelled_mm: Vec<f32>,
     /// RMS of the surface's signal at unit gain, in ADC steps.
     pub signal_rms: f64,
+    /// The partials of its wave, if there is one and no other.
+    pub partials: Option<Partials>,
 }
 
 impl Trial {
@@ -260,6 +263,7 @@ impl Trial {
             speed_mm_s,
             travelled_mm: travels_mm,
             signal_rms,
+            partials: self.ground.partials(),
         }
     }
 

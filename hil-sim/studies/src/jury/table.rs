@@ -36,6 +36,9 @@ pub struct Row {
     pub felt_wrong: Option<Share>,
 }
 
+/// The headings of a row's shares.
+const COLUMNS: [&str; 5] = ["right", "wrong", "silent", "felt right", "felt wrong"];
+
 /// What came of one surface, and how much it counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighed {
@@ -83,6 +86,16 @@ impl Row {
             felt_wrong: share(felt, |surface| surface.wrong),
         }
     }
+
+    const fn shares(&self) -> [Option<Share>; COLUMNS.len()] {
+        [
+            self.right,
+            self.wrong,
+            self.silent,
+            self.felt_right,
+            self.felt_wrong,
+        ]
+    }
 }
 
 /// The weighted mean of the surfaces' shares; none without any.
@@ -104,7 +117,7 @@ pub fn share(surfaces: &[Weighed], which: impl Fn(&Weighed) -> f64) -> Option<Sh
     })
 }
 
-/// Rows as a table for people: a share and its interval in a column each; none is a dash.
+/// Rows as a table for people: a share and its interval in a column each; none is a dash. A column of dashes is left out.
 pub fn text(first_column: &str, things: &str, rows: &[Row]) -> String {
     let width = rows
         .iter()
@@ -112,30 +125,23 @@ pub fn text(first_column: &str, things: &str, rows: &[Row]) -> String {
         .chain([first_column.chars().count()])
         .max()
         .unwrap_or(0);
-    let mut text = format!(
-        "{first_column:<width$} {things:>10}  {:<22}{:<22}{:<22}{:<22}{:<22}",
-        "right", "wrong", "silent", "felt right", "felt wrong"
-    );
-    text.truncate(text.trim_end().len());
-    for row in rows {
-        let cells = [
-            row.right,
-            row.wrong,
-            row.silent,
-            row.felt_right,
-            row.felt_wrong,
-        ]
-        .map(|share| format!("{:<22}", share.map_or("–".to_owned(), cell)));
-        let line = format!(
-            "{:<width$} {:>10}  {}",
-            row.name,
-            row.surfaces,
-            cells.concat()
-        );
-        text += "\n";
-        text += line.trim_end();
-    }
-    text
+    let shown: Vec<usize> = (0..COLUMNS.len())
+        .filter(|&column| rows.iter().any(|row| row.shares()[column].is_some()))
+        .collect();
+    let line = |name: &str, count: &str, cells: &dyn Fn(usize) -> String| {
+        let cells = shown.iter().map(|&column| format!("{:<22}", cells(column)));
+        let line = format!("{name:<width$} {count:>10}  {}", cells.collect::<String>());
+        line.trim_end().to_owned()
+    };
+    let mut lines = vec![line(first_column, things, &|column| {
+        COLUMNS[column].to_owned()
+    })];
+    lines.extend(rows.iter().map(|row| {
+        line(&row.name, &row.surfaces.to_string(), &|column| {
+            row.shares()[column].map_or("–".to_owned(), cell)
+        })
+    }));
+    lines.join("\n")
 }
 
 fn cell(share: Share) -> String {
@@ -191,11 +197,21 @@ mod tests {
         let shares = [row.right, row.wrong, row.silent].map(|share| share.unwrap().share);
         assert_eq!(shares, [0.5, 0.1, 0.3]);
         assert_eq!((row.felt_right, row.felt_wrong), (None, None));
-        let text = text("class", "surfaces", &[row.clone(), row]);
-        let lines: Vec<&str> = text.lines().collect();
+        let only_said = text("class", "surfaces", &[row.clone(), row.clone()]);
+        let lines: Vec<&str> = only_said.lines().collect();
         assert_eq!(lines.len(), 3);
-        assert!(lines[0].starts_with("class   surfaces  right"));
+        assert!(lines[0].starts_with("class   surfaces  right") && lines[0].ends_with("silent"));
         assert!(lines[1].starts_with("sine           1  0.5000 (0."));
-        assert!(lines[1].ends_with('–'));
+        let felt = Row::of("sine", &[said], &[said]);
+        let both = text("class", "surfaces", &[row, felt]);
+        let lines: Vec<&str> = both.lines().collect();
+        assert!(
+            lines[0].ends_with("felt right            felt wrong"),
+            "{both}"
+        );
+        assert!(
+            lines[1].ends_with('–') && !lines[2].ends_with('–'),
+            "{both}"
+        );
     }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use firmware_display::Settings;
 use protocol::SensorConfiguration;
+use realfft::num_complex::Complex64;
 
 use super::counts::Counts;
 use super::dice::Dice;
@@ -111,17 +112,21 @@ fn power(codes: &[f64]) -> f64 {
     codes.iter().map(|code| code * code).sum::<f64>() / codes.len() as f64
 }
 
-/// Amplitude of a frequency, from a sum over a Hann window.
+/// Amplitude of a frequency.
 fn amplitude(codes: &[f64], hz: f64) -> f64 {
-    let (mut re, mut im, mut weights) = (0.0, 0.0, 0.0);
+    phasor(codes, hz).norm()
+}
+
+/// Z of |Z| sin(ωt + arg Z), from a sum over a Hann window.
+fn phasor(codes: &[f64], hz: f64) -> Complex64 {
+    let (mut sum, mut weights) = (Complex64::ZERO, 0.0);
     for (scan, code) in codes.iter().enumerate() {
         let weight = 1.0 - (TAU * scan as f64 / codes.len() as f64).cos();
         let turn = TAU * hz * scan as f64 / SCANS_PER_S as f64;
-        re += weight * code * turn.cos();
-        im += weight * code * turn.sin();
+        sum += Complex64::from_polar(weight * code, -turn);
         weights += weight;
     }
-    2.0 * (re * re + im * im).sqrt() / weights
+    2.0 * Complex64::I * sum / weights
 }
 
 /// The frequency with the largest amplitude of those from `low_hz` on, `step_hz` apart.
@@ -219,6 +224,43 @@ fn the_period_of_every_waveform_is_the_truth() {
             );
         }
     }
+}
+
+#[test]
+fn the_partials_of_a_wave_are_the_truth() {
+    let harmonics = Waveform::Harmonics {
+        shares: [0.6, 0.4],
+        phases: [1.0, 2.5],
+    };
+    let trapezoid = Waveform::Trapezoid {
+        duty: 0.3,
+        flank: 0.1,
+    };
+    for waveform in [harmonics, trapezoid, Waveform::Smooth { sharpness: 3.0 }] {
+        let record = clean_ridges(4.0, Class::Harmonics, waveform).record();
+        let codes = gauge(&record, 2);
+        let of = |n: f64| phasor(steady(&codes), n * SPEED_MM_S / 4.0);
+        let back = of(1.0).conj() / of(1.0).norm();
+        let truth = record.partials.expect("it has one wave");
+        for (n, truth) in [2, 3].into_iter().zip(truth) {
+            let felt = of(f64::from(n)) * back.powi(n) / of(1.0).norm();
+            assert!(
+                (felt - truth).norm() < 0.02,
+                "{waveform:?} {n}: {felt} {truth}"
+            );
+        }
+    }
+    let two = Waveform::TwoWaves {
+        ratio: 1.3,
+        share: 0.5,
+        phase: 0.0,
+    };
+    assert_eq!(
+        clean_ridges(2.0, Class::TwoWaves, two).record().partials,
+        None
+    );
+    let flat = clean(Class::Flat, Specimen::Plain(Plain::Flat));
+    assert_eq!(flat.record().partials, None);
 }
 
 #[test]
@@ -512,7 +554,16 @@ fn a_clean_surface_is_right_and_felt_right_and_a_flat_one_is_silent() {
             "{right} {wrong} of {all}"
         );
     }
+    // Twenty a second, none before the first two blocks of ground.
+    let Counts {
+        all, right, silent, ..
+    } = clean_sine.shaped;
+    assert!(
+        all > 80 && silent < 10 && right + silent == all,
+        "{right} {silent} of {all}"
+    );
     let flat = played(&clean(Class::Flat, Specimen::Plain(Plain::Flat)));
+    assert_eq!(flat.shaped, Counts::default());
     assert_eq!(
         (flat.said.silent, flat.felt.silent),
         (flat.said.all, flat.felt.all)
@@ -529,6 +580,7 @@ fn time_counts_in_motion_in_the_band_and_after_three_waves() {
         speed_mm_s: vec![speed_mm_s],
         travelled_mm: vec![travelled_mm],
         signal_rms: 1.0,
+        partials: None,
     };
     for (speed_mm_s, truth_mm, travelled_mm, counts) in [
         (50.0, 2.0, 6.0, true),

@@ -2,6 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use realfft::num_complex::Complex64;
+
+use super::super::counts::Partials;
 use super::super::dice::Dice;
 use super::{LONGEST_MM, SHORTEST_MM};
 
@@ -126,6 +129,29 @@ impl Ridges {
             0.0
         };
         self.wavelength_mm * (1.0 + swing)
+    }
+
+    /// The partials of a whole ridge, Zₙ (Z̄₁/|Z₁|)ⁿ / |Z₁| where the wave is Σ |Zₙ| sin(nθ + arg Zₙ), under a contact
+    /// of that deviation in mm. None of two waves.
+    pub(super) fn partials(&self, contact_sigma_mm: f64) -> Option<Partials> {
+        const POINTS: u32 = 512;
+        if matches!(self.waveform, Waveform::TwoWaves { .. }) {
+            return None;
+        }
+        let partial = |n: f64| {
+            let sum: Complex64 = (0..POINTS)
+                .map(|point| {
+                    let share = f64::from(point) / f64::from(POINTS);
+                    let height = self.height(share, share, contact_sigma_mm);
+                    Complex64::from_polar(height, -TAU * n * share)
+                })
+                .sum();
+            let radian = TAU * n * contact_sigma_mm / self.wavelength_mm;
+            sum * Complex64::I * libm::exp(-0.5 * radian * radian)
+        };
+        let first = partial(1.0);
+        let back = first.conj() / first.norm();
+        Some([2, 3].map(|n| partial(f64::from(n)) * back.powi(n) / first.norm()))
     }
 
     /// Heights and local λ at each point of the way; `across_mm` is the way across the ridges there.
