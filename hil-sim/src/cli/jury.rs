@@ -55,7 +55,7 @@ pub(super) struct Jury {
     #[arg(long, value_name = "COUNT", default_value_t = 200)]
     surfaces: u64,
     /// Judge the scenes of this folder instead, which has an index.json with their truths
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "traits", "shapes"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "force_channel", "traits", "shapes"])]
     folder: Option<PathBuf>,
     /// What runs a folder's scenes
     #[arg(long, value_enum, default_value_t = EngineName::Native)]
@@ -72,11 +72,14 @@ pub(super) struct Jury {
     /// Print the table by what makes surfaces hard, too
     #[arg(long)]
     traits: bool,
+    /// Give the fingertips a tangential force channel, of which the sensor is told
+    #[arg(long)]
+    force_channel: bool,
     /// Print what textures tell of the wave's shape, too
     #[arg(long)]
     shapes: bool,
     /// Print the weights of the default estimator's evidence that these surfaces ask for, and judge nothing
-    #[arg(long, conflicts_with_all = ["folder", "method", "valid_percent", "max_age_ms", "traits", "shapes", "json"])]
+    #[arg(long, conflicts_with_all = ["folder", "method", "valid_percent", "max_age_ms", "force_channel", "traits", "shapes", "json"])]
     weights: bool,
     /// Where to write everything as JSON, surface by surface
     #[arg(long, value_name = "FILE")]
@@ -107,6 +110,7 @@ struct Strangers {
     surfaces: u64,
     purpose: &'static str,
     method: &'static str,
+    force_channel: bool,
     valid_percent: u8,
     max_age_ms: u16,
     intervals: &'static str,
@@ -227,7 +231,11 @@ impl Jury {
         let method = sensor.method.name();
 
         let trials = self.of_surfaces(|&seed| {
-            let trial = Trial::draw(seed);
+            let mut trial = Trial::draw(seed);
+            if self.force_channel {
+                trial = trial.with_force_channel();
+            }
+            let sensor = trial.force.map_or(sensor, |force| force.told(sensor));
             let Played { said, felt, shaped } = play(&trial.record(), sensor, &settings);
             Ok(Judged {
                 seed,
@@ -242,8 +250,9 @@ impl Jury {
 
         let last = self.seed.saturating_add(self.surfaces - 1);
         say!(
-            "seeds {}–{last} ({purpose}), method {method}, valid from {} %, display holds {} ms; intervals: {}",
+            "seeds {}–{last} ({purpose}), method {method}{}, valid from {} %, display holds {} ms; intervals: {}",
             self.seed,
+            if self.force_channel { ", force channel" } else { "" },
             sensor.valid_percent,
             display.max_age_ms,
             table::INTERVALS
@@ -268,6 +277,7 @@ impl Jury {
                 surfaces: self.surfaces,
                 purpose,
                 method,
+                force_channel: self.force_channel,
                 valid_percent: sensor.valid_percent,
                 max_age_ms: display.max_age_ms,
                 intervals: table::INTERVALS,

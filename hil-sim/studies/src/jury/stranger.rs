@@ -44,12 +44,13 @@
 //!
 //! Flat surfaces have neither random part nor form.
 //!
-//! The hand's distributions are [`Hand`]'s, the gauges' are [`Pickup`]'s.
+//! The hand's distributions are [`Hand`]'s, the gauges' are [`Pickup`]'s, those of a force channel [`Force`]'s.
 
 use firmware_sensor::{SCANS_PER_SAMPLE, Scan};
 
 use super::counts::Partials;
 use super::dice::Dice;
+use super::force::Force;
 use super::ground::{
     Bend, Ground, POLES, Plain, Ridges, Second, Specimen, Texture, Waveform, greatest_angle,
 };
@@ -65,6 +66,7 @@ const STREAM_OF_MOTION: u64 = 2;
 const STREAM_OF_GROUND: u64 = 3;
 const STREAM_OF_GAUGES: u64 = 4;
 const STREAM_OF_FORM: u64 = 5;
+const STREAM_OF_FORCE: u64 = 6;
 
 /// What kind of surface a trial has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -156,12 +158,14 @@ pub struct Trial {
     pub hand: Hand,
     /// What is felt of it.
     pub pickup: Pickup,
+    /// Its force channel, if it has one.
+    pub force: Option<Force>,
 }
 
 /// What a sensor board is given in a trial, and the truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// ADC codes of each ms, 4 kHz; the force channel rests at mid-rail.
+    /// ADC codes of each ms, 4 kHz; without a force channel it rests at mid-rail.
     pub scans: Vec<[Scan; SCANS_PER_SAMPLE]>,
     /// Counts of 5 µm at the end of each ms, wrapping.
     pub encoder: Vec<u16>,
@@ -223,6 +227,16 @@ impl Trial {
             ground,
             hand,
             pickup,
+            force: None,
+        }
+    }
+
+    /// The same with a force channel.
+    pub fn with_force_channel(self) -> Self {
+        let dice = &mut Dice::new(self.seed, STREAM_OF_FORCE);
+        Self {
+            force: Some(Force::draw(self.hand.slider.as_ref(), dice)),
+            ..self
         }
     }
 
@@ -233,7 +247,10 @@ impl Trial {
         let encoder = self.hand.encoder.counts(&path.arm_mm, motion);
         let profile = self.profile(&path);
         let gauges = &mut Dice::new(self.seed, STREAM_OF_GAUGES);
-        let (scans, signal_rms) = self.pickup.scans(&profile, &path, gauges);
+        let (mut scans, signal_rms) = self.pickup.scans(&profile, &path, gauges);
+        if let Some(force) = &self.force {
+            force.read(&mut scans, &path, &profile, gauges);
+        }
         let ends = || (SCANS_PER_SAMPLE - 1..path.foot_mm.len()).step_by(SCANS_PER_SAMPLE);
         let places = self.pickup.gauges.map(|gauge| gauge.place_mm);
         let (rear_mm, front_mm) = (
@@ -317,6 +334,15 @@ impl Trial {
             (self.hand.encoder.missed > 0.0, "missed counts"),
         ];
         traits.extend(drawn.iter().filter(|drawn| drawn.0).map(|drawn| drawn.1));
+        if let Some(force) = &self.force {
+            let drawn = [
+                (force.told_n_per_m == 0, "stiffness not told"),
+                (force.told_n_per_m > 0, "stiffness told"),
+                (force.noise_n > 0.004, "force's noise above 4 mN"),
+                (force.crosstalk_n > 0.0, "force's cross-talk"),
+            ];
+            traits.extend(drawn.iter().filter(|drawn| drawn.0).map(|drawn| drawn.1));
+        }
         traits
     }
 

@@ -77,6 +77,7 @@ fn clean(class: Class, first: Specimen) -> Trial {
             tilt: 0.0,
             friction: 0.0,
         },
+        force: None,
     }
 }
 
