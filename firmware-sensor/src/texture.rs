@@ -22,7 +22,7 @@ mod friction;
 mod partial;
 mod rest;
 
-use protocol::texture::UNITY;
+use protocol::texture::{PARTIALS, UNITY};
 use protocol::{GAUGES, Texture};
 
 use crate::SAMPLE_RATE_HZ;
@@ -182,15 +182,17 @@ impl Surface {
         // Waves a ms, and so Hz.
         let waves_per_ms = self.block.travel_mm / self.wavelength_mm / self.block.touches.max(1.0);
         let hz = waves_per_ms * SAMPLE_RATE_HZ as f32;
+        let mut of_block = [PartialSum::default(); PARTIALS];
+        for (gauge, fit) in fits.iter().enumerate().filter(|&(gauge, _)| usable[gauge]) {
+            for (sum, relative) in of_block.iter_mut().zip(fit.relative()) {
+                sum.add(gauge, relative, fit.power(1), fit.variance);
+            }
+        }
         let averages = &mut self.averages;
         averages.blocks += 1.0;
-        for (n, sum) in (2..).zip(&mut averages.partials) {
+        for ((n, sum), of_block) in (2..).zip(&mut averages.partials).zip(&of_block) {
             if n as f32 * hz <= HIGHEST_HZ {
-                let mut of_block = PartialSum::default();
-                for (gauge, fit) in fits.iter().enumerate().filter(|&(gauge, _)| usable[gauge]) {
-                    of_block.add(gauge, fit.relative(n), fit.power(1), fit.variance);
-                }
-                sum.follow(&of_block);
+                sum.follow(of_block);
             }
         }
         let gauge = core::mem::replace(&mut self.block.loudest, loudest.1);

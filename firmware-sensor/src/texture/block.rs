@@ -10,6 +10,8 @@ use crate::phasor::phasor;
 
 /// Knots in a block.
 pub(super) const KNOTS: usize = 48;
+/// Share of a block that is a knot.
+const KNOT: f32 = 1.0 / KNOTS as f32;
 /// Partials with the fundamental.
 pub(super) const WAVES: usize = 1 + PARTIALS;
 /// Unknowns of a gauge: constant, slope, cosine and sine of three partials.
@@ -46,6 +48,8 @@ struct Knot {
 #[derive(Clone, Debug)]
 pub(super) struct Block {
     length_mm: f32,
+    /// Travel in mm at which the knot is due.
+    due_mm: f32,
     /// Travel in mm, touches and number of the complete knots.
     pub travel_mm: f32,
     /// See `travel_mm`.
@@ -73,6 +77,7 @@ impl Block {
     pub fn new(length_mm: f32) -> Self {
         Self {
             length_mm,
+            due_mm: length_mm * KNOT,
             travel_mm: 0.0,
             touches: 0.0,
             knots: 0,
@@ -90,6 +95,7 @@ impl Block {
     /// The ground may stay: it is written before it is read.
     pub fn restart(&mut self, length_mm: f32) {
         self.length_mm = length_mm;
+        self.due_mm = length_mm * KNOT;
         self.travel_mm = 0.0;
         self.touches = 0.0;
         self.knots = 0;
@@ -123,9 +129,7 @@ impl Block {
         knot.touches += 1.0;
         knot.travel_mm += travel_mm;
         // Ends as near to its length as touches allow, and makes up for what the last one had too much.
-        let spacing = self.length_mm * (1.0 / KNOTS as f32);
-        let due = spacing * (self.knots + 1) as f32;
-        if self.travel_mm + knot.travel_mm + 0.5 * travel_mm >= due {
+        if self.travel_mm + knot.travel_mm + 0.5 * travel_mm >= self.due_mm {
             let half = phase.wrapping_sub(knot.first_phase).cast_signed() / 2;
             let middle = knot.first_phase.wrapping_add_signed(half);
             self.take(middle);
@@ -145,6 +149,7 @@ impl Block {
             self.ground.felt[self.knots] = gauges[self.loudest];
         }
         self.knots += 1;
+        self.due_mm = self.length_mm * KNOT * (self.knots + 1) as f32;
         self.touches += knot.touches;
         self.travel_mm += knot.travel_mm;
     }
@@ -197,13 +202,16 @@ impl Fit {
         re * re + im * im
     }
 
-    /// Zₙ (Z̄₁/|Z₁|)ⁿ |Z₁|: the nth partial relative to the fundamental's phase, times its amplitude.
-    pub fn relative(&self, n: usize) -> Complex {
+    /// Zₙ (Z̄₁/|Z₁|)ⁿ |Z₁|: the second and third partial relative to the fundamental's phase, times its amplitude.
+    pub fn relative(&self) -> [Complex; PARTIALS] {
         let first = self.partial(1);
         let power = self.power(1);
         let scale = 1.0 / sqrt(power).max(f32::MIN_POSITIVE);
         let back = [first[0] * scale, -first[1] * scale];
-        let relative = (0..n).fold(self.partial(n), |z, _| times(z, back));
-        relative.map(|part| part * power * scale)
+        core::array::from_fn(|at| {
+            let n = at + 2;
+            let relative = (0..n).fold(self.partial(n), |z, _| times(z, back));
+            relative.map(|part| part * power * scale)
+        })
     }
 }

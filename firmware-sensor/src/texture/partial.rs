@@ -58,31 +58,34 @@ impl PartialSum {
     /// partials opposite to the others', and is turned over where that shows. The majority is upright; where there is
     /// none, what was so before.
     fn upright(&self) -> Complex {
-        let sum = |sign: &dyn Fn(&Complex) -> f32| {
-            self.gauges.iter().fold([0.0; 2], |sum, z| {
-                [sum[0] + sign(z) * z[0], sum[1] + sign(z) * z[1]]
-            })
-        };
-        let plain = sum(&|_| 1.0);
+        let (mut plain, mut squares, mut all) = ([0.0; 2], [0.0; 2], 0.0);
+        for z in &self.gauges {
+            plain = plus(plain, *z);
+            squares = plus(squares, times(*z, *z));
+            all += power(*z);
+        }
         // Their axis: squares do not tell up from down.
-        let [re, im] = self.gauges.iter().fold([0.0; 2], |sum, z| {
-            let square = times(*z, *z);
-            [sum[0] + square[0], sum[1] + square[1]]
-        });
-        let size = sqrt(re * re + im * im);
-        let axis = [
-            sqrt((size + re).max(0.0)),
-            if im < 0.0 { -1.0 } else { 1.0 } * sqrt((size - re).max(0.0)),
-        ];
-        let along = |[re, im]: &Complex| re * axis[0] + im * axis[1];
-        let all: f32 = self.gauges.iter().map(|z| power(*z)).sum();
-        let turned = sum(&|z| if along(z) < 0.0 { -1.0 } else { 1.0 });
-        let gained = power(turned) - power(plain);
-        if size < ON_AN_AXIS * all || gained <= TURNS_OVER * self.chance() {
+        let size = sqrt(power(squares));
+        if size < ON_AN_AXIS * all {
             return plain;
         }
-        let (mut upright, before) = (along(&plain), along(&self.relative));
-        if before != 0.0 && 2.0 * upright.abs() <= along(&turned) {
+        let [re, im] = squares;
+        let across = sqrt((size - re).max(0.0));
+        let axis = [
+            sqrt((size + re).max(0.0)),
+            if im < 0.0 { -across } else { across },
+        ];
+        let along = |[re, im]: Complex| re * axis[0] + im * axis[1];
+        let mut turned = [0.0; 2];
+        for z in &self.gauges {
+            let is_down = along(*z) < 0.0;
+            turned = plus(turned, if is_down { z.map(|part| -part) } else { *z });
+        }
+        if power(turned) - power(plain) <= TURNS_OVER * self.chance() {
+            return plain;
+        }
+        let (mut upright, before) = (along(plain), along(self.relative));
+        if before != 0.0 && 2.0 * upright.abs() <= along(turned) {
             upright = before;
         }
         if upright < 0.0 {
@@ -109,6 +112,10 @@ impl PartialSum {
 
 fn power([re, im]: Complex) -> f32 {
     re * re + im * im
+}
+
+fn plus([a, b]: Complex, [c, d]: Complex) -> Complex {
+    [a + c, b + d]
 }
 
 /// A ratio in 1 / [`UNITY`].

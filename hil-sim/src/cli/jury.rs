@@ -252,7 +252,11 @@ impl Jury {
         say!(
             "seeds {}–{last} ({purpose}), method {method}{}, valid from {} %, display holds {} ms; intervals: {}",
             self.seed,
-            if self.force_channel { ", force channel" } else { "" },
+            if self.force_channel {
+                ", force channel"
+            } else {
+                ""
+            },
             sensor.valid_percent,
             display.max_age_ms,
             table::INTERVALS
