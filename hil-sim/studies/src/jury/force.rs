@@ -5,18 +5,19 @@ use protocol::SensorConfiguration;
 
 use super::dice::Dice;
 use super::ground::Profile;
-use super::hand::{Path, Slider};
+use super::hand::{Path, SCANS_PER_S, Slider};
 use super::pickup::GAUGES;
 
 /// The channel's scale, in N/V. The furthest slider pulls with 1.1 N, of the 1.65 V either way.
 const N_PER_V: f64 = 1.0;
 const N_PER_CODE: f64 = 3.3 / 4_096.0 * N_PER_V;
 
-/// A channel that feels the spring between arm and fingertip.
+/// A channel that feels what spring and damper between arm and fingertip pull with.
 ///
 /// | what | how often | range |
 /// | --- | --- | --- |
 /// | stiffness | always | the slider's, else 250–600 N/m |
+/// | damping | always | the slider's, else none |
 /// | what is said of it | 0.5 | 0.9–1.1 of it; else it is left to the sensor |
 /// | gain | always | 0.95–1.05 of what is said |
 /// | rest | always | ± 50 mN |
@@ -26,6 +27,8 @@ const N_PER_CODE: f64 = 3.3 / 4_096.0 * N_PER_V;
 pub struct Force {
     /// In N/m.
     pub stiffness_n_per_m: f64,
+    /// In N s/m.
+    pub damping_n_s_per_m: f64,
     /// What is said of it, in N/m; 0 if nothing is.
     pub told_n_per_m: u16,
     /// Over what is said.
@@ -46,6 +49,7 @@ impl Force {
         let told = stiffness_n_per_m * dice.between(0.9, 1.1);
         Self {
             stiffness_n_per_m,
+            damping_n_s_per_m: slider.map_or(0.0, |slider| slider.damping_n_s_per_m),
             told_n_per_m: if dice.chance(0.5) { told as u16 } else { 0 },
             gain: dice.between(0.95, 1.05),
             rest_n: dice.between(-0.05, 0.05),
@@ -63,8 +67,12 @@ impl Force {
         dice: &mut Dice,
     ) {
         let feet = path.arm_mm.iter().zip(&path.foot_mm);
+        let mut before_m = 0.0;
         for (scan, (arm_mm, foot_mm)) in scans.iter_mut().flatten().zip(feet) {
-            let pull_n = self.stiffness_n_per_m * 1e-3 * (arm_mm - foot_mm);
+            let lag_m = 1e-3 * (arm_mm - foot_mm);
+            let rate_m_s = (lag_m - before_m) * SCANS_PER_S as f64;
+            before_m = lag_m;
+            let pull_n = self.stiffness_n_per_m * lag_m + self.damping_n_s_per_m * rate_m_s;
             let felt_n = self.gain * pull_n
                 + self.rest_n
                 + self.crosstalk_n * f64::from(profile.height(0, *foot_mm))
@@ -82,5 +90,49 @@ impl Force {
             stiffness_n_per_m: self.told_n_per_m,
             ..sensor
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jury::stranger::Trial;
+
+    #[test]
+    fn it_reads_what_spring_and_damper_pull_with() {
+        let force = Force {
+            stiffness_n_per_m: 400.0,
+            damping_n_s_per_m: 0.2,
+            told_n_per_m: 0,
+            gain: 1.0,
+            rest_n: 0.05,
+            noise_n: 0.0,
+            crosstalk_n: 0.0,
+        };
+        // At rest, then pulled 0.5 mm out at 20 mm/s, and held.
+        let arm_mm: Vec<f64> = (0..200_i32)
+            .map(|scan| (0.005 * f64::from(scan - 50)).clamp(0.0, 0.5))
+            .collect();
+        let path = Path {
+            foot_mm: vec![0.0; arm_mm.len()],
+            drag: vec![0.0; arm_mm.len()],
+            arm_mm,
+        };
+        let trial = Trial::draw(1);
+        let dice = &mut Dice::new(1, 1);
+        let profile = trial.ground.lay(-1.0, 1.0, GAUGES, dice);
+        let mut scans = [[[7; GAUGES + 1]; SCANS_PER_SAMPLE]; 50];
+        force.read(&mut scans, &path, &profile, dice);
+        let scans: Vec<Scan> = scans.into_iter().flatten().collect();
+        let read_n = |scan: usize| (f64::from(scans[scan][GAUGES]) - 2_048.0) * N_PER_CODE;
+        // Half way out 0.1 N of the spring and 4 mN of the damper.
+        for (scan, pulled_n) in [(10, 0.0), (100, 0.104), (190, 0.2)] {
+            let off_n = read_n(scan) - 0.05 - pulled_n;
+            assert!(
+                off_n.abs() <= 0.5 * N_PER_CODE + 1e-9,
+                "{off_n} N at {scan}"
+            );
+        }
+        assert!(scans.iter().all(|scan| scan[..GAUGES] == [7; GAUGES]));
     }
 }
