@@ -9,7 +9,8 @@
 //! fitted to each gauge at λ̂. The places where a wave begins under each gauge are of no interest, so each gauge's
 //! partials are taken relative to its own fundamental: of Zₙ = Aₙ e^(iαₙ) counts Zₙ (Z̄₁/|Z₁|)ⁿ, which no shift of place
 //! changes. An error of λ̂ shifts all of a block alike, and drops out too. Weighed by the fundamental's amplitude and
-//! averaged over gauges and blocks that is unbiased. A gauge that feels the wave upside down is turned over first.
+//! averaged over blocks and gauges that is unbiased. Before gauges are summed, one that feels the wave upside down is turned over,
+//! if that shows by more than chance.
 //!
 //! What is left of one gauge after the fit has a spectrum over wavenumber; the noise of the gauge is white in time, so
 //! of a known density in wavenumber at a known speed, and is taken off.
@@ -49,7 +50,8 @@ const BLOCK_MM: f32 = 6.0;
 const ENOUGH_BLOCKS: f32 = 2.0;
 /// λ̂ that differs by more than this share is another surface.
 const ANOTHER: f32 = 0.05;
-/// A movement back of more than this ends a block: two counts of the encoder, and the force channel's noise.
+/// A movement back of more than this ends a block: two counts of the encoder, and a force channel's noise of 5 mN over 400
+/// N/m. More noise than that ends blocks too early.
 const BACK: Place = 15 * PLACES_PER_UM;
 
 /// A complex number.
@@ -192,7 +194,7 @@ impl Surface {
         averages.blocks += 1.0;
         for ((n, sum), of_block) in (2..).zip(&mut averages.partials).zip(&of_block) {
             if n as f32 * hz <= HIGHEST_HZ {
-                sum.follow(of_block);
+                sum.follow(of_block, n % 2 == 0);
             }
         }
         let gauge = core::mem::replace(&mut self.block.loudest, loudest.1);

@@ -20,7 +20,8 @@ pub const LARGEST_RATIO: u16 = 10 * UNITY;
 pub struct Partial {
     /// rₙ in 1 / [`UNITY`], 0 to [`LARGEST_RATIO`].
     pub ratio: u16,
-    /// φₙ in turns / 2¹⁶. It belongs to the place, so it is the same whichever way the finger moves.
+    /// φₙ in turns / 2¹⁶. It belongs to the place, so it is the same whichever way the finger moves. Gauges of which half feel
+    /// the wave upside down can't tell which way up it is: the second may then be half a turn off.
     pub phase: u16,
 }
 

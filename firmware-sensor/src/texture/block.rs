@@ -30,7 +30,7 @@ pub(super) fn waves(phase: u32) -> [f32; 2 * WAVES] {
 /// What is fitted at a knot: a constant, a slope that is -½ to ½ over the block, so that the two have little in common,
 /// and the waves.
 pub(super) fn terms(knot: usize, [c1, s1, c2, s2, c3, s3]: [f32; 2 * WAVES]) -> [f32; TERMS] {
-    let tau = (knot as f32 + 0.5) * (1.0 / KNOTS as f32) - 0.5;
+    let tau = (knot as f32 + 0.5) * KNOT - 0.5;
     [1.0, tau, c1, s1, c2, s2, c3, s3]
 }
 

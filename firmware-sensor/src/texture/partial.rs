@@ -11,9 +11,9 @@ pub(super) const MEMORY_BLOCKS: f32 = 8.0;
 
 /// How many times what chance adds to a partial's power gauges have to gain by being turned over, to be.
 const TURNS_OVER: f32 = 4.0;
-/// Share of the gauges' power that has to lie along one axis for any to be turned over: cos 2φ of some 18°. Five that
-/// feel what does not repeat point anywhere, and come so near to an axis once in 25 times.
-const ON_AN_AXIS: f32 = 0.8;
+/// By how much more of the gauges' power has to lie along an axis than across it for any to be turned over: three quarters
+/// and one quarter. Gauges that feel what does not repeat point anywhere.
+const ON_AN_AXIS: f32 = 0.5;
 
 /// Sums of a partial over gauges, or its average over blocks.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,8 +36,8 @@ impl PartialSum {
         self.variance += power * variance;
     }
 
-    /// Takes a block's.
-    pub fn follow(&mut self, now: &Self) {
+    /// Takes a block's, of an even partial or an odd one: that of a wave upside down is the same.
+    pub fn follow(&mut self, now: &Self, is_even: bool) {
         self.blocks = (self.blocks + 1.0).min(MEMORY_BLOCKS);
         let share = 1.0 / self.blocks;
         let sums = self.gauges.as_flattened_mut().iter_mut();
@@ -46,7 +46,7 @@ impl PartialSum {
         }
         self.fundamental += share * (now.fundamental - self.fundamental);
         self.variance += share * (now.variance - self.variance);
-        self.relative = self.upright();
+        self.relative = if is_even { self.upright() } else { self.sum() };
     }
 
     /// What chance adds to the partial's power: both parts have that variance, an average over n blocks a share of it.
@@ -54,13 +54,16 @@ impl PartialSum {
         2.0 * self.variance / self.blocks
     }
 
+    fn sum(&self) -> Complex {
+        self.gauges.iter().fold([0.0; 2], |sum, z| plus(sum, *z))
+    }
+
     /// The gauges' sum. One that feels the wave upside down, as before and behind a fingertip's middle, has its even
-    /// partials opposite to the others', and is turned over where that shows. The majority is upright; where there is
-    /// none, what was so before.
+    /// partials opposite to the others', and is turned over where that shows. The majority is upright, of
+    /// three quarters by size; where there is none, what was so before.
     fn upright(&self) -> Complex {
-        let (mut plain, mut squares, mut all) = ([0.0; 2], [0.0; 2], 0.0);
+        let (plain, mut squares, mut all) = (self.sum(), [0.0; 2], 0.0);
         for z in &self.gauges {
-            plain = plus(plain, *z);
             squares = plus(squares, times(*z, *z));
             all += power(*z);
         }
@@ -143,7 +146,7 @@ mod tests {
             block.add(gauge, relative, 2.0, variance);
         }
         let mut average = PartialSum::default();
-        average.follow(&block);
+        average.follow(&block, true);
         average
     }
 
@@ -163,11 +166,11 @@ mod tests {
         let other = PartialSum::default();
         let mut average = PartialSum::default();
         for block in 0..8 {
-            average.follow(if block % 2 == 0 { &ONE } else { &other });
+            average.follow(if block % 2 == 0 { &ONE } else { &other }, true);
         }
         assert_eq!(average.relative, [1.5, 2.0]);
         assert_eq!((average.fundamental, average.variance), (5.0, 1.0));
-        average.follow(&ONE);
+        average.follow(&ONE, false);
         assert_eq!(average.fundamental, 5.0 + 5.0 / 8.0);
         assert_eq!(average.blocks, MEMORY_BLOCKS);
     }
@@ -184,8 +187,7 @@ mod tests {
         };
         about(of([up, down, up, up, up], 1.0), [15.0, 20.0]);
         about(of([up, down, down, up, down], 1.0), [-15.0, -20.0]);
-        // Turned over they have 25 times the power of one, and not one of them 24 times: 600 in all. Chance adds 2 · 10
-        // times the variance to it.
+        // Turned over their power is 625, else 25: 600 more. Chance adds 20 times the variance, and four times that is asked for.
         about(of([up, down, up, down, up], 7.0), [15.0, 20.0]);
         about(of([up, down, up, down, up], 8.0), [3.0, 4.0]);
         // On either side of the negative real axis, where squares turn once more.
@@ -203,6 +205,42 @@ mod tests {
             ),
             [0.2, 12.0],
         );
+        // Below the real axis.
+        about(
+            of(
+                [[3.0, -4.0], [-3.0, 4.0], [3.0, -4.0], [0.0; 2], [0.0; 2]],
+                0.1,
+            ),
+            [9.0, -12.0],
+        );
+        // On no axis: as much across as along, and a little less.
+        let about_an_axis = |across: f32| {
+            [
+                [4.0, 0.0],
+                [-4.0, 0.0],
+                [0.0, across],
+                [0.0, -across],
+                [4.0, 0.0],
+            ]
+        };
+        about(of(about_an_axis(4.0), 0.1), [4.0, 0.0]);
+        about(of(about_an_axis(2.0), 0.1), [12.0, 0.0]);
+    }
+
+    #[test]
+    fn an_odd_partial_is_the_same_upside_down() {
+        let mut block = PartialSum::default();
+        for (gauge, relative) in [[3.0, 4.0], [-3.0, -4.0], [3.0, 4.0]]
+            .into_iter()
+            .enumerate()
+        {
+            block.add(gauge, relative, 2.0, 0.1);
+        }
+        let mut average = PartialSum::default();
+        average.follow(&block, false);
+        assert_eq!(average.relative, [3.0, 4.0]);
+        average.follow(&block, true);
+        assert_eq!(average.relative, [9.0, 12.0]);
     }
 
     #[test]
@@ -216,10 +254,10 @@ mod tests {
         };
         for (begins, goes_on) in [(9.0, 2.9), (0.5, 3.1)] {
             let mut average = PartialSum::default();
-            (0..8).for_each(|_| average.follow(&block(begins)));
+            (0..8).for_each(|_| average.follow(&block(begins), true));
             let side = average.relative[1].signum();
             for _ in 0..40 {
-                average.follow(&block(goes_on));
+                average.follow(&block(goes_on), true);
                 assert_eq!(average.relative[1].signum(), side, "{average:?}");
             }
             assert!(

@@ -40,6 +40,7 @@ Each seed is a surface, a hand and a fingertip; CONTRIBUTING.md says more.
 right:  valid and within 5 % of the truth; of a shape, within a limen of 2.2 dB, whichever way up
 wrong:  valid and more than 10 % off, or valid where there is no period; of a shape, more than two limens off
 silent: not valid
+shape:  of the textures that are told where a surface has one wave alone
 felt:   the same of the λ that the display drives at, with its hold and fade
 All of them are shares of the time in motion (above 5 mm/s, v/λ within 2.5–150 Hz), from 3 λ of travel on after
 the start and after each boundary; in a folder, of all estimates from 1 s on, as a mean over its scenes.

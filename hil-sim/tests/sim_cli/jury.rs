@@ -174,6 +174,8 @@ fn strangers_are_judged_class_by_class_and_the_same_whatever_the_threads() {
             "30",
             "--surfaces",
             "12",
+            "--shapes",
+            "--force-channel",
             "-j",
             jobs,
             "--json",
@@ -185,6 +187,11 @@ fn strangers_are_judged_class_by_class_and_the_same_whatever_the_threads() {
     };
     let text = judged("1", "one.json");
     assert!(text.starts_with("seeds 30–41 (tuning), method "), "{text}");
+    let heard = [
+        "spectrum, force channel, valid",
+        "of one wave alone, its shape",
+    ];
+    assert!(heard.iter().all(|heard| text.contains(heard)), "{text}");
     assert_eq!(text, judged("3", "three.json"));
     let told = json(&folder.join("one.json"));
     assert_eq!(told, json(&folder.join("three.json")));

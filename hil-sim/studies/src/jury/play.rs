@@ -52,10 +52,9 @@ pub fn play(record: &Record, sensor: SensorConfiguration, display: &Settings) ->
         let instant_us = 1_000 * (ms as u64 + 1);
         let heard = sensor.step(instant_us, scans, encoder);
         if let Some(texture) = heard.texture.filter(|_| counts) {
-            let worth = record.worth_of_shape(ms, &texture);
-            worth
-                .into_iter()
-                .for_each(|worth| played.shaped.count(worth));
+            if let Some(worth) = record.worth_of_shape(ms, &texture) {
+                played.shaped.count(worth);
+            }
         }
         if let Some(estimate) = heard.estimate {
             let said_mm = estimate.wavelength_mm.filter(|_| estimate.valid);
@@ -90,9 +89,16 @@ pub fn play(record: &Record, sensor: SensorConfiguration, display: &Settings) ->
 }
 
 impl Record {
-    /// What a texture that was told at a ms is worth by its partials; none where the surface has not one wave alone.
+    /// What a texture that was told at a ms is worth by its partials; none where the surface has not one wave alone, or is
+    /// rubbed too fast for any to be felt.
     fn worth_of_shape(&self, ms: usize, texture: &Texture) -> Option<Worth> {
         let truth = self.partials?;
+        let hz = self.speed_mm_s[ms].abs() / self.truth_mm[ms];
+        let felt = [2.0, 3.0].iter().filter(|&n| n * hz <= HIGHEST_PARTIAL_HZ);
+        let felt = felt.count();
+        if felt == 0 {
+            return None;
+        }
         if !texture.valid {
             return Some(Worth::Silent);
         }
@@ -100,9 +106,7 @@ impl Record {
             let ratio = f64::from(partial.ratio) / f64::from(UNITY);
             Complex64::from_polar(ratio, TAU * f64::from(partial.phase) / 65_536.0)
         });
-        let hz = self.speed_mm_s[ms].abs() / self.truth_mm[ms];
-        let felt = [2.0, 3.0].iter().filter(|&n| n * hz <= HIGHEST_PARTIAL_HZ);
-        Some(Worth::of_shape(told, truth, felt.count()))
+        Some(Worth::of_shape(told, truth, felt))
     }
 
     /// Whether a ms counts: the arm moves; and where there is a period, v/λ is in the band, and the

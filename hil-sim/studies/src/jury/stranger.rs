@@ -67,6 +67,7 @@ const STREAM_OF_GROUND: u64 = 3;
 const STREAM_OF_GAUGES: u64 = 4;
 const STREAM_OF_FORM: u64 = 5;
 const STREAM_OF_FORCE: u64 = 6;
+const STREAM_OF_FORCE_NOISE: u64 = 7;
 
 /// What kind of surface a trial has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -249,7 +250,8 @@ impl Trial {
         let gauges = &mut Dice::new(self.seed, STREAM_OF_GAUGES);
         let (mut scans, signal_rms) = self.pickup.scans(&profile, &path, gauges);
         if let Some(force) = &self.force {
-            force.read(&mut scans, &path, &profile, gauges);
+            let dice = &mut Dice::new(self.seed, STREAM_OF_FORCE_NOISE);
+            force.read(&mut scans, &path, &profile, dice);
         }
         let ends = || (SCANS_PER_SAMPLE - 1..path.foot_mm.len()).step_by(SCANS_PER_SAMPLE);
         let places = self.pickup.gauges.map(|gauge| gauge.place_mm);

@@ -555,6 +555,16 @@ fn a_clean_surface_is_right_and_felt_right_and_a_flat_one_is_silent() {
             "{right} {wrong} of {all}"
         );
     }
+    let harmonics = Waveform::Harmonics {
+        shares: [0.6, 0.4],
+        phases: [1.0, 2.5],
+    };
+    let harmonics = played(&clean_ridges(2.0, Class::Harmonics, harmonics)).shaped;
+    assert!(
+        harmonics.all > 80 && harmonics.right * 10 > harmonics.all * 8,
+        "{harmonics:?}"
+    );
+    assert_eq!(harmonics.wrong, 0, "{harmonics:?}");
     // Twenty a second, none before the first two blocks of ground.
     let Counts {
         all, right, silent, ..

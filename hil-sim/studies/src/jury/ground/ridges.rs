@@ -132,7 +132,7 @@ impl Ridges {
     }
 
     /// The partials of a whole ridge, Zₙ (Z̄₁/|Z₁|)ⁿ / |Z₁| where the wave is Σ |Zₙ| sin(nθ + arg Zₙ), under a contact
-    /// of that deviation in mm. None of two waves.
+    /// of that deviation in mm. At the mean λ. None of two waves.
     pub(super) fn partials(&self, contact_sigma_mm: f64) -> Option<Partials> {
         const POINTS: u32 = 512;
         if matches!(self.waveform, Waveform::TwoWaves { .. }) {
