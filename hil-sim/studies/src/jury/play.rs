@@ -51,10 +51,9 @@ pub fn play(record: &Record, sensor: SensorConfiguration, display: &Settings) ->
         let truth_mm = f64::from(record.truth_mm[ms]);
         let instant_us = 1_000 * (ms as u64 + 1);
         let heard = sensor.step(instant_us, scans, encoder);
-        if let Some(texture) = heard.texture.filter(|_| counts) {
-            if let Some(worth) = record.worth_of_shape(ms, &texture) {
-                played.shaped.count(worth);
-            }
+        let texture = heard.texture.filter(|_| counts);
+        if let Some(worth) = texture.and_then(|texture| record.worth_of_shape(ms, &texture)) {
+            played.shaped.count(worth);
         }
         if let Some(estimate) = heard.estimate {
             let said_mm = estimate.wavelength_mm.filter(|_| estimate.valid);
