@@ -9,8 +9,8 @@
 //! fitted to each gauge at λ̂. The places where a wave begins under each gauge are of no interest, so each gauge's
 //! partials are taken relative to its own fundamental: of Zₙ = Aₙ e^(iαₙ) counts Zₙ (Z̄₁/|Z₁|)ⁿ, which no shift of place
 //! changes. An error of λ̂ shifts all of a block alike, and drops out too. Weighed by the fundamental's amplitude and
-//! averaged over blocks and gauges that is unbiased. Before gauges are summed, one that feels the wave upside down is turned over,
-//! if that shows by more than chance.
+//! averaged over blocks and gauges that is unbiased. Before gauges are summed, one that feels the wave upside down is
+//! turned over, if that shows by more than chance.
 //!
 //! What is left of one gauge after the fit has a spectrum over wavenumber; the noise of the gauge is white in time, so
 //! of a known density in wavenumber at a known speed, and is taken off.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use protocol::texture::BANDS;
-use protocol::{Estimate, SensorConfiguration, Texture};
+use protocol::{Estimate, GAUGES, SensorConfiguration, Texture};
 
 use crate::felt::{Bench, CODES, GAINS, NOISE_20_DB, PHASES_RAD, PLACES_MM};
 
@@ -55,18 +55,28 @@ impl Ground {
 
 /// A bench that has made strokes of half a second over `ground` for `ms`, with noise of so many dB below it.
 fn rubbed(ground: Ground, snr_db: f64, speed_mm_s: f64, ms: u64) -> Bench {
-    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
-    bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
+    let mut bench = noisy(snr_db);
     rub(&mut bench, ground, speed_mm_s, ms);
     bench
 }
 
+fn noisy(snr_db: f64) -> Bench {
+    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
+    bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
+    bench
+}
+
 fn rub(bench: &mut Bench, ground: Ground, speed_mm_s: f64, ms: u64) {
+    rub_by([1.0; GAUGES], bench, ground, speed_mm_s, ms);
+}
+
+/// By gauges that feel the ground so many times as high, negative upside down.
+fn rub_by(polarity: [f64; GAUGES], bench: &mut Bench, ground: Ground, speed_mm_s: f64, ms: u64) {
     let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
     bench.rub(
         ms,
         |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
-        |gauge, x_mm, _| ground.felt(gauge, x_mm),
+        |gauge, x_mm, _| polarity[gauge] * ground.felt(gauge, x_mm),
     );
 }
 
@@ -124,15 +134,10 @@ fn partials_are_within_a_db_and_five_degrees_at_20_db_and_three_db_at_0_db() {
     }
 }
 
-/// What is told at `snr_db` by gauges that feel the wave so many times as high as the others, negative upside down.
-fn told_by(polarity: [f64; 5], ground: Ground, snr_db: f64) -> Vec<Texture> {
-    let mut bench = Bench::new(SensorConfiguration::DEFAULT);
-    bench.noise_lsb = NOISE_20_DB * 10_f64.powf((20.0 - snr_db) / 20.0);
-    bench.rub(
-        8_000,
-        |t_s| if t_s.fract() < 0.5 { 70.0 } else { -70.0 },
-        |gauge, x_mm, _| polarity[gauge] * ground.felt(gauge, x_mm),
-    );
+/// What is told at `snr_db` by gauges of that polarity.
+fn told_by(polarity: [f64; GAUGES], ground: Ground, snr_db: f64) -> Vec<Texture> {
+    let mut bench = noisy(snr_db);
+    rub_by(polarity, &mut bench, ground, 70.0, 8_000);
     let valid: Vec<_> = bench
         .textures
         .into_iter()

@@ -46,8 +46,8 @@ impl Worth {
         }
     }
 
-    /// Of the shape of a wave of which `felt` partials can be felt, 1 or 2. Which way up a gauge feels it nobody can know: upside
-    /// down, the second partial is half a turn further.
+    /// Of the shape of a wave of which `felt` partials can be felt, 1 or 2. Which way up a gauge feels it nobody can know:
+    /// upside down, the second partial is half a turn further.
     pub fn of_shape(told: Partials, truth: Partials, felt: usize) -> Self {
         let power = |partials: &[Complex64]| partials.iter().map(Complex64::norm_sqr).sum::<f64>();
         let off = |way_up: f64| {
