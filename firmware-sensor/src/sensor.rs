@@ -264,7 +264,8 @@ impl Sensor {
             self.estimator.push(&touch);
         }
         self.settling = self.settling.saturating_sub(1);
-        self.surface.push(&touch, self.slip.force_n(sample[GAUGES]));
+        self.surface
+            .push(&touch, arm, self.slip.force_n(sample[GAUGES]));
         // The estimator begins its work later.
         if since_estimate < QUIET_SAMPLES {
             self.surface.work();

@@ -50,9 +50,40 @@ const BLOCK_MM: f32 = 6.0;
 const ENOUGH_BLOCKS: f32 = 2.0;
 /// λ̂ that differs by more than this share is another surface.
 const ANOTHER: f32 = 0.05;
-/// A movement back of more than this ends a block: two counts of the encoder, and a force channel's noise of 5 mN over 400
-/// N/m. More noise than that ends blocks too early.
+/// Who has gone back by more than this has turned: two counts of the encoder.
 const BACK: Place = 15 * PLACES_PER_UM;
+
+/// The way that arm or contact go.
+#[derive(Clone, Copy, Debug, Default)]
+struct Course {
+    back: bool,
+    /// Furthest place that way.
+    furthest: Place,
+}
+
+impl Course {
+    /// How far `place` is ahead of all before.
+    fn ahead(&self, place: Place) -> Place {
+        let ahead = place.wrapping_sub(self.furthest);
+        if self.back { -ahead } else { ahead }
+    }
+
+    /// Takes where it is.
+    fn go(&mut self, place: Place) {
+        let ahead = self.ahead(place);
+        if ahead < -BACK {
+            self.turn(place);
+        } else if ahead > 0 {
+            self.furthest = place;
+        }
+    }
+
+    /// Turns at `place`.
+    const fn turn(&mut self, place: Place) {
+        self.back = !self.back;
+        self.furthest = place;
+    }
+}
 
 /// A complex number.
 type Complex = [f32; 2];
@@ -67,9 +98,8 @@ pub struct Surface {
     stood_by: bool,
     /// Where the last touch was, none before the first.
     last: Option<Place>,
-    /// Furthest place of this stroke, in its direction.
-    furthest: Place,
-    forwards: bool,
+    arm: Course,
+    contact: Course,
     /// Phase at the last touch, in 2⁻³² cycles of λ̂.
     phase: u32,
     block: Block,
@@ -95,8 +125,8 @@ impl Surface {
             increment: 0,
             stood_by: false,
             last: None,
-            furthest: 0,
-            forwards: true,
+            arm: Course::default(),
+            contact: Course::default(),
             phase: 0,
             block: Block::new(BLOCK_MM),
             rest: None,
@@ -107,25 +137,39 @@ impl Surface {
         }
     }
 
-    /// Takes a millisecond's touch, and the tangential force in N if there is a channel for it.
-    pub fn push(&mut self, touch: &Touch, force_n: Option<f32>) {
+    /// Takes a millisecond's touch, where the arm was then, and the tangential force in N if there is a channel for it.
+    pub fn push(&mut self, touch: &Touch, arm: Place, force_n: Option<f32>) {
         let Some(last) = self.last.replace(touch.place) else {
-            self.furthest = touch.place;
+            self.arm.furthest = arm;
+            self.contact.furthest = touch.place;
             return;
         };
         let moved = touch.place.wrapping_sub(last);
-        if self.turns(touch.place) {
-            self.rub.since_turn_mm = 0.0;
+        if moved == 0 {
+            return;
+        }
+        let mut ahead = self.contact.ahead(touch.place);
+        // Noise of a force channel moves the contact back too, but not the arm. Without one they are at the same place.
+        let arm_agrees = force_n.is_none() || {
+            self.arm.go(arm);
+            self.arm.back != self.contact.back
+        };
+        if ahead < -BACK && arm_agrees {
+            self.contact.turn(last);
+            ahead = self.contact.ahead(touch.place);
+            self.rub.turn();
             if !self.block.is_complete() {
                 self.begin_block();
             }
         }
-        if moved == 0 {
-            return;
-        }
-        let travel_mm = moved.unsigned_abs() as f32 * (1.0 / PLACES_PER_MM as f32);
-        if let Some(force_n) = force_n {
-            self.rub.push(force_n, self.forwards, travel_mm);
+        // New ground alone: noise goes to and fro.
+        let mut travel_mm = 0.0;
+        if ahead > 0 {
+            self.contact.furthest = touch.place;
+            travel_mm = ahead as f32 * (1.0 / PLACES_PER_MM as f32);
+            if let Some(force_n) = force_n {
+                self.rub.push(force_n, self.contact.back, travel_mm);
+            }
         }
         if self.wavelength_mm <= 0.0 {
             return;
@@ -140,21 +184,6 @@ impl Surface {
             self.usable = touch.usable;
             self.noise = touch.noise;
         }
-    }
-
-    /// Whether the stroke has turned.
-    fn turns(&mut self, place: Place) -> bool {
-        let ahead = place.wrapping_sub(self.furthest);
-        let ahead = if self.forwards { ahead } else { -ahead };
-        if ahead > 0 {
-            self.furthest = place;
-        }
-        let turned = ahead < -BACK;
-        if turned {
-            self.forwards = !self.forwards;
-            self.furthest = place;
-        }
-        turned
     }
 
     fn begin_block(&mut self) {

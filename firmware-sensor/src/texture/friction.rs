@@ -8,30 +8,60 @@ use crate::float::sqrt;
 const FRICTION_MM: f32 = 20.0;
 /// See [`FRICTION_MM`].
 const TURN_MM: f32 = 1.0;
+/// Strokes of less travel in mm tell nothing of the channel's zero.
+const STROKE_MM: f32 = 3.0;
+/// Turns over which the zero is averaged.
+const TURNS: f32 = 8.0;
 
 /// Averages of the tangential force against the movement.
+///
+/// What the channel reads at rest adds to it one way and takes from it the other: half the sum of two strokes' means is that
+/// zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rub {
-    pub since_turn_mm: f32,
+    since_turn_mm: f32,
     weight: f32,
     mean_n: f32,
     square_n2: f32,
+    zero_n: f32,
+    turns: f32,
+    /// The stroke's force times travel in N mm, and its mean in N in the stroke before.
+    stroke_n_mm: f32,
+    before_n: Option<f32>,
 }
 
 impl Rub {
     /// Takes the tangential force of a millisecond that travelled.
-    pub fn push(&mut self, force_n: f32, forwards: bool, travel_mm: f32) {
+    pub fn push(&mut self, force_n: f32, back: bool, travel_mm: f32) {
         self.since_turn_mm += travel_mm;
         if self.since_turn_mm < TURN_MM {
             return;
         }
-        let against_n = if forwards { force_n } else { -force_n };
+        self.stroke_n_mm += force_n * travel_mm;
+        let above_n = force_n - self.zero_n;
+        let against_n = if back { -above_n } else { above_n };
         let follow = travel_mm / (FRICTION_MM + travel_mm);
         self.weight += follow * (1.0 - self.weight);
         let share = follow / self.weight;
         let away_n = against_n - self.mean_n;
         self.mean_n += share * away_n;
         self.square_n2 = (1.0 - share) * (self.square_n2 + share * away_n * away_n);
+    }
+
+    /// The stroke has turned.
+    pub fn turn(&mut self) {
+        let counted_mm = self.since_turn_mm - TURN_MM;
+        let mean_n = self.stroke_n_mm / counted_mm;
+        self.since_turn_mm = 0.0;
+        self.stroke_n_mm = 0.0;
+        if counted_mm < STROKE_MM {
+            self.before_n = None;
+            return;
+        }
+        if let Some(before_n) = self.before_n.replace(mean_n) {
+            self.turns = (self.turns + 1.0).min(TURNS);
+            self.zero_n += (0.5 * (mean_n + before_n) - self.zero_n) / self.turns;
+        }
     }
 
     /// What is known, once it has travelled a good part of its average.
@@ -52,16 +82,16 @@ mod tests {
         let mut rub = Rub::default();
         // 2 N against the movement, half a newton more and less in turn; after each turn it does not count for 1 mm.
         for stroke in 0..20 {
-            let forwards = stroke % 2 == 0;
-            rub.since_turn_mm = 0.0;
+            let back = stroke % 2 == 1;
+            rub.turn();
             for step in 0..1_000 {
                 let against_n = match step {
                     ..90 => 50.0,
                     step if step % 2 == 0 => 2.5,
                     _ => 1.5,
                 };
-                let force_n = if forwards { against_n } else { -against_n };
-                rub.push(force_n, forwards, 0.01);
+                let force_n = if back { -against_n } else { against_n };
+                rub.push(force_n, back, 0.01);
             }
         }
         let friction = rub.friction().expect("200 mm are enough");
@@ -70,11 +100,39 @@ mod tests {
     }
 
     #[test]
+    fn what_the_channel_reads_at_rest_is_no_friction() {
+        let mut rub = Rub::default();
+        let mut stroke = |number: u32, mm: u32| {
+            let back = number % 2 == 1;
+            // 0.2 N against the movement, 0.05 N at rest.
+            for _ in 0..100 * mm {
+                rub.push(if back { -0.15 } else { 0.25 }, back, 0.01);
+            }
+            rub.turn();
+            rub.friction()
+        };
+        // One way alone nobody can know.
+        assert_eq!(stroke(0, 10).map(|told| told.mean_mn), Some(250));
+        for number in 1..10 {
+            stroke(number, 10);
+        }
+        let told = stroke(10, 10).expect("100 mm are enough");
+        assert!(told.mean_mn.abs_diff(200) <= 5, "{told:?}");
+        assert!(told.fluctuation_mn <= 15, "{told:?}");
+        // A stroke that is cut short tells nothing of it: those before and behind it go the same way.
+        for _ in 0..20 {
+            stroke(1, 2);
+            let told = stroke(0, 10).expect("more than enough");
+            assert!(told.mean_mn.abs_diff(200) <= 5, "{told:?}");
+        }
+    }
+
+    #[test]
     fn nothing_is_known_after_a_few_mm() {
         let mut rub = Rub::default();
         let mut travelled_mm = 0.0;
         while rub.friction().is_none() {
-            rub.push(1.0, true, 0.5);
+            rub.push(1.0, false, 0.5);
             travelled_mm += 0.5;
         }
         // 1 − e^(−x / 20) = 0.3, and the millimetre after the turn.

@@ -203,13 +203,13 @@ fn harmonics(wavelength_mm: f64) -> [f64; 4] {
 }
 
 /// Splitmix64 and the Box–Muller transform.
-struct Noise {
+pub struct Noise {
     state: u64,
     spare: Option<f64>,
 }
 
 impl Noise {
-    fn new(seed: u64) -> Self {
+    pub fn new(seed: u64) -> Self {
         Self {
             state: seed.wrapping_mul(0x9e37_79b9_7f4a_7c15),
             spare: None,
@@ -225,7 +225,7 @@ impl Noise {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 + f64::EPSILON
     }
 
-    fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
         }

@@ -1,11 +1,14 @@
 //! What the sensor says of a surface besides λ.
 
+use std::cell::{Cell, RefCell};
 use std::f64::consts::TAU;
+use std::rc::Rc;
 
 use protocol::texture::BANDS;
 use protocol::{Estimate, GAUGES, SensorConfiguration, Texture};
 
 use crate::felt::{Bench, CODES, GAINS, NOISE_20_DB, PHASES_RAD, PLACES_MM};
+use crate::rubbing::Noise;
 
 /// A wave's shape: of the second and third partial ratio and phase in turns.
 type Shape = [(f64, f64); 2];
@@ -373,6 +376,65 @@ fn the_force_is_told_by_its_mean_and_fluctuation_against_the_movement() {
         last_valid(&rubbed(ground, 20.0, 60.0, 3_000)).friction,
         None
     );
+}
+
+/// Textures of strokes by a fingertip that is a spring of 400 N/m and slides where it pulls with `slides_n`, told by a force
+/// channel with so much noise a scan.
+fn slid(ground: Ground, speed_mm_s: f64, slides_n: f64, noise_n: f64) -> Vec<Texture> {
+    const K_N_PER_MM: f64 = 0.4;
+    let mut bench = Bench::new(SensorConfiguration {
+        force_channel: true,
+        force_mn_per_v: 1_000,
+        stiffness_n_per_m: 400,
+        ..SensorConfiguration::DEFAULT
+    });
+    let contact_mm = Rc::new(Cell::new(0.0));
+    let (felt_mm, pulled_mm) = (contact_mm.clone(), contact_mm);
+    let noise = RefCell::new(Noise::new(1));
+    bench.force_mn = Some(Box::new(move |x_mm, _| {
+        let noise_n = noise_n * noise.borrow_mut().normal();
+        1e3 * (K_N_PER_MM * (x_mm - pulled_mm.get()) + noise_n)
+    }));
+    let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
+    bench.rub(
+        6_000,
+        |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
+        |gauge, x_mm, _| {
+            let lag_mm = x_mm - felt_mm.get();
+            let most_mm = slides_n / K_N_PER_MM;
+            felt_mm.set(x_mm - lag_mm.clamp(-most_mm, most_mm));
+            ground.felt(gauge, felt_mm.get())
+        },
+    );
+    bench.textures
+}
+
+#[test]
+fn noise_of_the_force_channel_costs_no_textures() {
+    let shape = [(0.4, 0.1), (0.25, 0.7)];
+    for (wavelength_mm, speed_mm_s) in [(2.0, 60.0), (4.0, 60.0), (2.0, 30.0), (1.0, 30.0)] {
+        let ground = Ground {
+            wavelength_mm,
+            shape,
+            random: None,
+        };
+        let told = [0.0, 0.02].map(|noise_n| {
+            let told = slid(ground, speed_mm_s, 0.5, noise_n);
+            let valid: Vec<_> = told.iter().filter(|told| told.valid).copied().collect();
+            (valid.len(), valid.last().copied())
+        });
+        let [(without, _), (with, texture)] = told;
+        let what =
+            format!("{wavelength_mm} mm, {speed_mm_s} mm/s: {with} of {without} {texture:?}");
+        assert!(without >= 100 && 100 * with >= 98 * without, "{what}");
+        let texture = texture.expect("some are valid");
+        let (db, degrees) = off(&texture, shape);
+        assert!(db <= 1.0 && degrees <= 5.0, "{db} dB, {degrees}°: {what}");
+        let friction = texture.friction.expect("it slides");
+        assert!(friction.mean_mn.abs_diff(500) <= 10, "{what}");
+        // Half the noise is left behind the filter. Turns do not count.
+        assert!(friction.fluctuation_mn <= 12, "{what}");
+    }
 }
 
 /// Travel on `ground` after which 3 λ of it in a row are stood by, within 5 %, in mm. The fingertip comes down on it after
