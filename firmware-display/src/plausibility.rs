@@ -46,6 +46,9 @@ const HELD_TIMES: u32 = 5;
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
 /// Confidence from which on a doubtful estimate is more likely right than wrong.
 const LIKELY: f32 = 0.5;
+/// Confidence from which on a doubtful estimate of another λ says more against the one held than that speaks for itself: half
+/// of what an estimator stands by.
+const POSSIBLE: f32 = 0.3;
 
 /// What is to be done with an estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +85,8 @@ pub struct Plausibility {
     since: u32,
     /// How much of that had passed at the last estimate that was trusted, or that is [`LIKELY`] and about the λ held.
     known: u32,
+    /// Since then, one that may be right was about another λ.
+    is_doubted: bool,
     flood: Flood,
     distrust: Distrust,
     contradiction: Contradiction,
@@ -100,6 +105,7 @@ impl Plausibility {
             age: u32::MAX,
             since: 0,
             known: 0,
+            is_doubted: false,
             flood: Flood::OF_ESTIMATES,
             distrust: Distrust::NONE,
             contradiction: Contradiction::NONE,
@@ -136,10 +142,8 @@ impl Plausibility {
         self.contradiction.hear(estimate.velocity_um_s);
         let wavelength = estimate.wavelength_mm.and_then(Wavelength::new);
         if !estimate.valid {
-            let says_the_same = |(one, held)| are_within(one, held, CONFIRMATION);
-            if estimate.confidence >= LIKELY && wavelength.zip(self.held).is_some_and(says_the_same)
-            {
-                self.known = self.since;
+            if let Some((guess, held)) = wavelength.zip(self.held) {
+                self.doubt(guess, held, estimate.confidence);
             }
             return Verdict::Idle;
         }
@@ -151,6 +155,16 @@ impl Plausibility {
             self.forget();
         }
         self.weigh(wavelength)
+    }
+
+    /// A λ that its estimator does not stand by speaks for the one held, or against it.
+    fn doubt(&mut self, guess: Wavelength, held: Wavelength, confidence: f32) {
+        if !are_within(guess, held, CONFIRMATION) {
+            self.is_doubted |= confidence >= POSSIBLE;
+        } else if confidence >= LIKELY {
+            self.known = self.since;
+            self.is_doubted = false;
+        }
     }
 
     /// A tick of `quarters` of a millisecond has passed, with the hand at rest or not.
@@ -169,7 +183,7 @@ impl Plausibility {
             .known
             .saturating_mul(HELD_TIMES)
             .max(LEAST_HELD_QUARTERS);
-        self.age <= quarters(max_age_ms.into()).min(earned)
+        !self.is_doubted && self.age <= quarters(max_age_ms.into()).min(earned)
     }
 
     /// Whether there are more estimates than a sensor sends.
@@ -228,6 +242,7 @@ impl Plausibility {
             self.since = 0;
         }
         self.known = self.since;
+        self.is_doubted = false;
         self.held = Some(wavelength);
         self.age = 0;
         Verdict::Trusted(wavelength)

@@ -437,7 +437,64 @@ fn doubtful_estimates_that_likely_say_the_same_make_a_surface_known() {
     // Known for 90 ms, so held until 450 ms after the first.
     assert_eq!(after(2.1, 0.5), 450 - 90);
     assert_eq!(after(2.1, 0.49), 150 - 90);
-    assert_eq!(after(2.3, 0.5), 150 - 90);
+    assert_eq!(after(2.3, 0.29), 150 - 90);
+}
+
+#[test]
+fn a_doubtful_estimate_that_may_be_right_about_another_surface_ends_the_hold() {
+    let doubtful = |sequence, mm: f32, confidence| Estimate {
+        valid: false,
+        confidence,
+        ..sound(sequence, mm)
+    };
+    for (other_mm, confidence, is_held) in [
+        (2.3, 0.3, false),
+        (1.75, 0.3, false),
+        (2.3, 0.29, true),
+        (2.1, 0.3, true),
+    ] {
+        let mut plausibility = Plausibility::new();
+        let mut judge = |estimate| {
+            plausibility.elapse(quarters(10), false);
+            plausibility.judge(&estimate, MAX_AGE_MS);
+            plausibility.is_fresh(MAX_AGE_MS)
+        };
+        for sequence in 0..20 {
+            assert!(judge(sound(sequence, 2.0)));
+        }
+        let what = format!("{other_mm} mm, {confidence}");
+        assert_eq!(judge(doubtful(20, other_mm, confidence)), is_held, "{what}");
+        // One that says nothing of any surface changes nothing, nor one of the same that is likely wrong.
+        let silent = Estimate {
+            wavelength_mm: None,
+            ..doubtful(21, 2.0, 0.5)
+        };
+        assert_eq!(judge(silent), is_held, "{what}");
+        assert_eq!(judge(doubtful(22, 2.0, 0.49)), is_held, "{what}");
+        // One that is likely right brings it back, as a trusted one does.
+        assert!(judge(doubtful(23, 2.0, 0.5)), "{what}");
+        judge(doubtful(24, other_mm, confidence));
+        assert!(judge(sound(25, 2.0)), "{what}");
+    }
+}
+
+#[test]
+fn a_surface_that_is_doubted_is_at_zero_volt_as_soon_as_it_has_faded_out() {
+    for rate in RATES {
+        let configuration = at(rate);
+        let mut rig = Rig::new(&configuration);
+        for _ in 0..50 {
+            rig.rub(3, 2.0);
+            rig.estimate(2.0);
+        }
+        rig.tell(Estimate {
+            valid: false,
+            confidence: 0.5,
+            ..sound(0, 3.0)
+        });
+        let ticks = rig.stays_silent_after(1_000).unwrap();
+        assert_eq!(ticks, rig.ticks(u32::from(configuration.fade_out_ms)));
+    }
 }
 
 #[test]

@@ -98,7 +98,7 @@ fn the_stimulus_rises_to_full_within_the_fade_in() {
 }
 
 #[test]
-fn the_last_trusted_wavelength_is_held_while_estimates_are_doubtful() {
+fn the_last_trusted_wavelength_is_held_while_estimates_say_little() {
     for rate in RATES {
         let (mut held, mut fed) = (Rig::driving(&at(rate)), Rig::driving(&at(rate)));
         // Less than the 500 ms to which a λ may age.
@@ -106,6 +106,7 @@ fn the_last_trusted_wavelength_is_held_while_estimates_are_doubtful() {
             if tick.is_multiple_of(held.ticks(10)) {
                 held.tell(Estimate {
                     valid: false,
+                    confidence: 0.29,
                     ..sound(0, 9.0)
                 });
                 fed.estimate(2.0);

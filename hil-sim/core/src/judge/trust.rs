@@ -9,6 +9,8 @@ use protocol::{Estimate, GAUGES, Hold};
 const EARNED: u64 = 5;
 /// Confidence of one that says so without being stood by.
 const LIKELY: f32 = 0.5;
+/// Confidence of one that is not stood by, and tells another λ, that ends the hold.
+const POSSIBLE: f32 = 0.3;
 const LEAST_AGE_NS: u64 = 150_000_000;
 /// λ that can be played, in mm.
 const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
@@ -47,6 +49,8 @@ pub struct Trust {
     since_ns: u64,
     /// When an estimate said about that λ last, whether it was to be followed or not.
     said_ns: u64,
+    /// Since then, one that may be right was about another λ.
+    is_doubted: bool,
     /// Estimates that have come and have not run out, and when.
     bucket: (f64, u64),
     floods: bool,
@@ -84,10 +88,14 @@ impl Trust {
         }
         let playable_mm = estimate.wavelength_mm.filter(|mm| PLAYABLE_MM.contains(mm));
         if !estimate.valid {
-            let says_the_same = |(mm, held_mm)| !differ(mm, held_mm, CONFIRMATION);
-            let is_likely = estimate.confidence >= LIKELY;
-            if is_likely && playable_mm.zip(self.held_mm).is_some_and(says_the_same) {
-                self.said_ns = at_ns;
+            if let Some((mm, held_mm)) = playable_mm.zip(self.held_mm) {
+                let is_another = differ(mm, held_mm, CONFIRMATION);
+                if is_another && estimate.confidence >= POSSIBLE {
+                    self.is_doubted = true;
+                } else if !is_another && estimate.confidence >= LIKELY {
+                    self.is_doubted = false;
+                    self.said_ns = at_ns;
+                }
             }
             return None;
         }
@@ -117,6 +125,7 @@ impl Trust {
         }
         self.held_mm = Some(mm);
         self.said_ns = at_ns;
+        self.is_doubted = false;
         self.trusted_ns = Some(at_ns);
         Some(f64::from(mm))
     }
@@ -145,7 +154,7 @@ impl Trust {
     fn is_stale(&self, at_ns: u64) -> bool {
         let known_ns = self.said_ns.saturating_sub(self.since_ns);
         let earned_ns = (EARNED * known_ns).max(LEAST_AGE_NS);
-        self.is_older(at_ns, self.max_age_ns.min(earned_ns))
+        self.is_doubted || self.is_older(at_ns, self.max_age_ns.min(earned_ns))
     }
 
     fn is_older(&self, at_ns: u64, age_ns: u64) -> bool {
@@ -314,7 +323,7 @@ mod tests {
         // What likely says the same makes it known, even if it is not to be followed.
         followed(&mut trust, 150, &[2.0]);
         let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
-        for (sequence, confidence, mm) in [(151, 0.5, 2.1), (152, 0.49, 2.0), (153, 0.9, 2.3)] {
+        for (sequence, confidence, mm) in [(151, 0.5, 2.1), (152, 0.49, 2.0), (153, 0.29, 2.3)] {
             let doubtful = Estimate {
                 sequence,
                 confidence,
@@ -331,6 +340,33 @@ mod tests {
         followed(&mut trust, 270, &[5.0, 5.0]);
         assert_eq!(holds(&mut trust, 2_710 + 150), []);
         assert_eq!(holds(&mut trust, 2_710 + 151), [Hold::Stale]);
+    }
+
+    #[test]
+    fn what_may_be_another_surface_ends_the_hold_of_the_one_before() {
+        let mut trust = Trust::new(500);
+        followed(&mut trust, 20, &[2.0; 20]);
+        let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        let stale = [Hold::Stale].as_slice();
+        for (sequence, confidence, valid, mm, expected) in [
+            (40, 0.3, false, 2.1, [].as_slice()),
+            (41, 0.29, false, 2.3, &[]),
+            (42, 0.3, false, 2.3, stale),
+            (43, 0.49, false, 2.0, stale),
+            (44, 0.5, false, 2.0, &[]),
+            (45, 0.3, false, 1.75, stale),
+            (46, 0.9, true, 2.0, &[]),
+        ] {
+            let said = Estimate {
+                sequence,
+                confidence,
+                valid,
+                wavelength_mm: Some(mm),
+                ..plain
+            };
+            trust.hear(410 * MS, &said);
+            assert_eq!(holds(&mut trust, 420), expected, "{sequence}");
+        }
     }
 
     #[test]
