@@ -6,7 +6,7 @@
 //! | late | its sequence is not after the last one's, and no new beginning | not used |
 //! | out of range | it is valid, and λ is missing, not finite or not a [`Wavelength`] | not used; counts as distrust |
 //! | implausible | it contradicts itself, see [`contradicts_itself`] | not used; counts as distrust |
-//! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held, see [`Plausibility::is_fresh`] |
+//! | doubtful | its estimator does not stand by it | not used; the last trusted λ is held, unless this may be right about another: see [`Plausibility::is_fresh`] |
 //! | surprising | λ differs from the one held by more than a factor of 2.1 | kept until the next valid one: if that is within a tenth of it, that one is trusted; if not, the surprise counts as distrust |
 //! | trusted | none of these | λ is followed |
 //!
@@ -46,8 +46,8 @@ const HELD_TIMES: u32 = 5;
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
 /// Confidence from which on a doubtful estimate is more likely right than wrong.
 const LIKELY: f32 = 0.5;
-/// Confidence from which on a doubtful estimate of another λ says more against the one held than that speaks for itself: half
-/// of what an estimator stands by.
+/// Confidence from which on a doubtful estimate of another λ ends the hold: half of what an estimator stands by. In the time
+/// that this takes the λ held was right a fifth of the time (`hil-sim jury --seed 1 --surfaces 6000`).
 const POSSIBLE: f32 = 0.3;
 
 /// What is to be done with an estimate.
@@ -177,7 +177,7 @@ impl Plausibility {
     }
 
     /// Whether the last trusted λ is no older than this, nor older than five times as long as this surface has been
-    /// known, or 150 ms if that is longer.
+    /// known, or 150 ms if that is longer; and nothing that may be right has been said of another since.
     pub fn is_fresh(&self, max_age_ms: u16) -> bool {
         let earned = self
             .known
