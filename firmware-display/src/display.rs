@@ -25,7 +25,8 @@ use crate::{ACTUATORS, ZERO_VOLT};
 /// 0 V at start and until the converters have started and a trusted estimate has come; then it fades in
 /// and follows the hand by the last trusted λ, whatever the link does. When that λ is older than
 /// [`max_age_ms`](DisplayConfiguration::max_age_ms), or than a surface that was met just now is held
-/// ([`crate::plausibility::Plausibility::is_fresh`]), or there is another reason not to drive, the stimulus fades out; it fades in again when the reason is gone. What no link and no hand can make good
+/// ([`crate::plausibility::Plausibility::is_fresh`]), or estimates speak against it, or there is another reason not to
+/// drive, the stimulus fades out; it fades in again when the reason is gone. What no link and no hand can make good
 /// stops it until the reset button or power: see [`crate::supervisor`] and `docs/src/explanation/safety.md`. Time is
 /// counted in ticks alone: the same calls give the same words.
 #[derive(Clone, Debug, PartialEq)]

@@ -46,8 +46,9 @@ const HELD_TIMES: u32 = 5;
 const LEAST_HELD_QUARTERS: u32 = quarters(150);
 /// Confidence from which on a doubtful estimate is more likely right than wrong.
 const LIKELY: f32 = 0.5;
-/// Confidence from which on a doubtful estimate of another λ ends the hold: half of what an estimator stands by. In the time
-/// that this takes the λ held was right a fifth of the time (`hil-sim jury --seed 1 --surfaces 6000`).
+/// Confidence from which on a doubtful estimate of another λ ends the hold: half of the default `valid_percent`; methods other
+/// than the spectrum never say so much. The λ held was right for a fifth of the time by which this shortens holds (`hil-sim jury
+/// --seed 1 --surfaces 6000`).
 const POSSIBLE: f32 = 0.3;
 
 /// What is to be done with an estimate.

@@ -50,7 +50,7 @@ const BLOCK_MM: f32 = 6.0;
 const ENOUGH_BLOCKS: f32 = 2.0;
 /// λ̂ that differs by more than this share is another surface.
 const ANOTHER: f32 = 0.05;
-/// Who has gone back by more than this has turned: two counts of the encoder.
+/// Who has gone back by more than this has turned: three counts of the encoder.
 const BACK: Place = 15 * PLACES_PER_UM;
 
 /// The way that arm or contact go.
@@ -168,7 +168,8 @@ impl Surface {
             self.contact.furthest = touch.place;
             travel_mm = ahead as f32 * (1.0 / PLACES_PER_MM as f32);
             if let Some(force_n) = force_n {
-                self.rub.push(force_n, self.contact.back, travel_mm);
+                self.rub
+                    .push(force_n, self.contact.back, travel_mm, self.stood_by);
             }
         }
         if self.wavelength_mm <= 0.0 {

@@ -28,7 +28,8 @@ pub struct Partial {
 /// How the surface rubs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Friction {
-    /// Mean of the tangential force against the movement, in mN.
+    /// Mean of the tangential force against the movement, less what the channel reads at rest as far as
+    /// that is known, in mN.
     pub mean_mn: u16,
     /// Standard deviation of the tangential force while it moves, in mN.
     pub fluctuation_mn: u16,

@@ -379,7 +379,7 @@ fn the_force_is_told_by_its_mean_and_fluctuation_against_the_movement() {
 }
 
 /// Textures of strokes by a fingertip that is a spring of 400 N/m and slides where it pulls with `slides_n`, told by a force
-/// channel with so much noise a scan.
+/// channel that reads 50 mN at rest, with so much noise a scan.
 fn slid(ground: Ground, speed_mm_s: f64, slides_n: f64, noise_n: f64) -> Vec<Texture> {
     const K_N_PER_MM: f64 = 0.4;
     let mut bench = Bench::new(SensorConfiguration {
@@ -393,7 +393,7 @@ fn slid(ground: Ground, speed_mm_s: f64, slides_n: f64, noise_n: f64) -> Vec<Tex
     let noise = RefCell::new(Noise::new(1));
     bench.force_mn = Some(Box::new(move |x_mm, _| {
         let noise_n = noise_n * noise.borrow_mut().normal();
-        1e3 * (K_N_PER_MM * (x_mm - pulled_mm.get()) + noise_n)
+        50.0 + 1e3 * (K_N_PER_MM * (x_mm - pulled_mm.get()) + noise_n)
     }));
     let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
     bench.rub(
