@@ -53,6 +53,9 @@ const ANOTHER: f32 = 0.05;
 /// Who has gone back by more than this has turned: three counts of the encoder.
 const BACK: Place = 15 * PLACES_PER_UM;
 
+/// A complex number.
+type Complex = [f32; 2];
+
 /// The way that arm or contact go.
 #[derive(Clone, Copy, Debug, Default)]
 struct Course {
@@ -84,9 +87,6 @@ impl Course {
         self.furthest = place;
     }
 }
-
-/// A complex number.
-type Complex = [f32; 2];
 
 /// What the sensor makes of the surface besides λ.
 #[derive(Clone, Debug)]

@@ -58,16 +58,13 @@ impl Rub {
     /// The stroke has turned. Not inlined for the same reason.
     #[inline(never)]
     pub fn turn(&mut self) {
-        let mean_n = self.stroke_n_mm / self.stroke_mm;
         let tells = self.stroke_mm >= STROKE_MM.max(0.5 * self.since_turn_mm);
+        let mean_n = tells.then(|| self.stroke_n_mm / self.stroke_mm);
         self.since_turn_mm = 0.0;
         self.stroke_mm = 0.0;
         self.stroke_n_mm = 0.0;
-        if !tells {
-            self.before_n = None;
-            return;
-        }
-        if let Some(before_n) = self.before_n.replace(mean_n) {
+        let before_n = core::mem::replace(&mut self.before_n, mean_n);
+        if let Some((mean_n, before_n)) = mean_n.zip(before_n) {
             self.turns = (self.turns + 1.0).min(TURNS);
             self.zero_n += (0.5 * (mean_n + before_n) - self.zero_n) / self.turns;
         }

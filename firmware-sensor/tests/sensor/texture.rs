@@ -73,14 +73,19 @@ fn rub(bench: &mut Bench, ground: Ground, speed_mm_s: f64, ms: u64) {
     rub_by([1.0; GAUGES], bench, ground, speed_mm_s, ms);
 }
 
+/// Half a second there, half a second back: the velocity in mm/s, of s since the start.
+fn strokes(speed_mm_s: f64) -> impl Fn(f64) -> f64 {
+    move |t_s| {
+        let there = ((2.0 * t_s) as u64).is_multiple_of(2);
+        if there { speed_mm_s } else { -speed_mm_s }
+    }
+}
+
 /// By gauges that feel the ground so many times as high, negative upside down.
 fn rub_by(polarity: [f64; GAUGES], bench: &mut Bench, ground: Ground, speed_mm_s: f64, ms: u64) {
-    let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
-    bench.rub(
-        ms,
-        |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
-        |gauge, x_mm, _| polarity[gauge] * ground.felt(gauge, x_mm),
-    );
+    bench.rub(ms, strokes(speed_mm_s), |gauge, x_mm, _| {
+        polarity[gauge] * ground.felt(gauge, x_mm)
+    });
 }
 
 /// By how much the partials that are told are off, at worst: in dB, and in degrees.
@@ -395,17 +400,12 @@ fn slid(ground: Ground, speed_mm_s: f64, slides_n: f64, noise_n: f64) -> Vec<Tex
         let noise_n = noise_n * noise.borrow_mut().normal();
         50.0 + 1e3 * (K_N_PER_MM * (x_mm - pulled_mm.get()) + noise_n)
     }));
-    let there = |t_s: f64| ((2.0 * t_s) as u64).is_multiple_of(2);
-    bench.rub(
-        6_000,
-        |t_s| if there(t_s) { speed_mm_s } else { -speed_mm_s },
-        |gauge, x_mm, _| {
-            let lag_mm = x_mm - felt_mm.get();
-            let most_mm = slides_n / K_N_PER_MM;
-            felt_mm.set(x_mm - lag_mm.clamp(-most_mm, most_mm));
-            ground.felt(gauge, felt_mm.get())
-        },
-    );
+    bench.rub(6_000, strokes(speed_mm_s), |gauge, x_mm, _| {
+        let lag_mm = x_mm - felt_mm.get();
+        let most_mm = slides_n / K_N_PER_MM;
+        felt_mm.set(x_mm - lag_mm.clamp(-most_mm, most_mm));
+        ground.felt(gauge, felt_mm.get())
+    });
     bench.textures
 }
 
