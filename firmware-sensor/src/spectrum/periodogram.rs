@@ -219,6 +219,14 @@ impl Periodogram {
         }
     }
 
+    /// What the average holds counts for so much of what it did, beside what is still to come.
+    pub fn forget(&mut self, share: f32) {
+        for candidate in &mut self.candidates {
+            candidate.mean *= share;
+            candidate.mean_weight *= share;
+        }
+    }
+
     /// Starts the average over with the energies of now, of that weight.
     pub fn restart(&mut self, energies: &Spectrum, weight: f32) {
         let total: f32 = larger(energies.iter().sum(), f32::MIN_POSITIVE);

@@ -5,7 +5,7 @@ use super::periodogram::{
     CANDIDATES, Spectrum as Energies, clearest_peak, highest_peak, is_peak, rise, sharpness,
     vertex_mm, wavelength_mm,
 };
-use super::{SAME, SHORTER_LENGTHS, STRONG, Spectrum, off, sidebands};
+use super::{MEMORY_WAVES, SAME, SHORTER_LENGTHS, STRONG, Spectrum, off, sidebands};
 use crate::float::{larger, smaller};
 
 /// One estimate of so many asks what a peak is a sideband of, and fits the line over the longer lengths, too; those after it
@@ -43,6 +43,16 @@ const SECOND: f32 = 0.25;
 /// Weight of the average from which on a line is told from the slope that it stands on: some seven waves from a start.
 /// Before, how high it is has to do: a strong wave is stood by sooner.
 pub(super) const MATURE: f32 = 0.25;
+
+/// A line that has been held for longer than its memory, and has less than this share of its usual energy, is missing. Once it
+/// has been for a wave it is gone: another surface has come. The average would hold on to it for ten waves and more, where
+/// the new wave is too weak to begin anew; so what it holds counts for less from then on. It goes on all the same if it comes
+/// back.
+const MISSING: f32 = 0.4;
+/// See [`MISSING`].
+const MISSING_WAVES: f32 = 1.0;
+/// See [`MISSING`].
+const KEPT: f32 = 0.3;
 
 /// The spectra's peaks, and what fits are under way.
 #[derive(Clone, Debug, Default)]
@@ -122,7 +132,9 @@ impl Spectrum {
         survey.maturity = self.periodogram.maturity(number);
         let total: f32 = energies.iter().sum();
         survey.presence = energies[number] / larger(total * averaged[number], f32::MIN_POSITIVE);
+        self.forget_what_is_gone(line_mm);
         let here_mm = self.trend.of_average(line_mm);
+        let survey = &mut self.survey;
         survey.agree = off(momentary_mm, here_mm) < 0.12;
 
         let base = self.periodogram.level();
@@ -167,6 +179,21 @@ impl Spectrum {
             };
             let lengths = 0..3.min(self.lengths);
             survey.wave_pass.begin(start_mm, lengths, usable, base);
+        }
+    }
+
+    /// See [`MISSING`].
+    #[inline(never)]
+    fn forget_what_is_gone(&mut self, line_mm: f32) {
+        let is_missing = self.line.held_waves > MEMORY_WAVES && self.survey.presence < MISSING;
+        if !is_missing {
+            self.line.missing_waves = 0.0;
+            return;
+        }
+        self.line.missing_waves += self.survey.fresh_mm / line_mm;
+        if self.line.missing_waves > MISSING_WAVES {
+            self.line.missing_waves = 0.0;
+            self.periodogram.forget(KEPT);
         }
     }
 

@@ -293,3 +293,30 @@ fn however_few_waves_are_fitted_a_clean_one_is_stood_by() {
         }
     }
 }
+
+#[test]
+fn a_weak_line_that_is_gone_is_forgotten_after_a_wave_or_two() {
+    const BOUNDARY_MM: f64 = 60.0;
+    /// The last gauge passes after the middle.
+    const BEHIND_MM: f64 = 3.0;
+    let (mut right, mut all) = (0, 0);
+    for (before_mm, behind_mm) in [(2.0, 3.2), (3.2, 2.0), (1.2, 1.7), (2.0, 1.5), (1.5, 4.0)] {
+        for seed in 1..=8 {
+            let mut rub = Rub::new(Motion::Constant(30.0), before_mm);
+            rub.specimens.push((behind_mm, BOUNDARY_MM));
+            (rub.duration_s, rub.snr_db, rub.seed) = (6.0, Some(-6.0), seed);
+            for estimate in rub.estimates(SensorConfiguration::DEFAULT) {
+                let arm_mm = rub.motion.position_mm(estimate.instant_us as f64 * 1e-6);
+                let waves = (arm_mm - BOUNDARY_MM - BEHIND_MM) / behind_mm;
+                if (3.0..13.0).contains(&waves) {
+                    let mm = estimate.wavelength_mm.filter(|_| estimate.valid);
+                    let off = |mm: f32| (f64::from(mm) / behind_mm - 1.0).abs();
+                    right += u32::from(mm.is_some_and(|mm| off(mm) < 0.05));
+                    all += 1;
+                }
+            }
+        }
+    }
+    // It was a third as long as the average held on to it.
+    assert!(5 * right > 4 * all, "{right} of {all}");
+}
