@@ -33,8 +33,6 @@ const REFUSED_ESTIMATES: u8 = 20;
 pub(super) struct Line {
     pub(super) mm: f32,
     pub(super) held_waves: f32,
-    /// Travel for which it has been missing, in wavelengths.
-    pub(super) missing_waves: f32,
     /// The last fit, in mm, and its share over two waves; 0 without one.
     pub(super) fitted_mm: f32,
     pub(super) share: f32,

@@ -49,8 +49,8 @@ pub(super) const MATURE: f32 = 0.25;
 /// the new wave is too weak to begin anew; so what it holds counts for less from then on. It goes on all the same if it comes
 /// back.
 const MISSING: f32 = 0.4;
-/// See [`MISSING`].
-const MISSING_WAVES: f32 = 1.0;
+/// Steps that a wave's travel is counted in: between estimates it is 2.4 of them at least, at the lowest frequency.
+pub(super) const STEPS_A_WAVE: u8 = 100;
 /// See [`MISSING`].
 const KEPT: f32 = 0.3;
 
@@ -187,12 +187,13 @@ impl Spectrum {
     fn forget_what_is_gone(&mut self, line_mm: f32) {
         let is_missing = self.line.held_waves > MEMORY_WAVES && self.survey.presence < MISSING;
         if !is_missing {
-            self.line.missing_waves = 0.0;
+            self.missing_steps = 0;
             return;
         }
-        self.line.missing_waves += self.survey.fresh_mm / line_mm;
-        if self.line.missing_waves > MISSING_WAVES {
-            self.line.missing_waves = 0.0;
+        let steps = f32::from(STEPS_A_WAVE) * self.survey.fresh_mm / line_mm + 0.5;
+        self.missing_steps = self.missing_steps.saturating_add(steps as u8);
+        if self.missing_steps > STEPS_A_WAVE {
+            self.missing_steps = 0;
             self.periodogram.forget(KEPT);
         }
     }
