@@ -317,6 +317,6 @@ fn a_weak_line_that_is_gone_is_forgotten_after_a_wave_or_two() {
             }
         }
     }
-    // It was a third as long as the average held on to it.
+    // While the average held on to the line before, a third were.
     assert!(5 * right > 4 * all, "{right} of {all}");
 }
