@@ -80,6 +80,11 @@ impl Phase {
         }
     }
 
+    /// Ticks until the wavenumber is that of the wavelength followed; 0 if it is.
+    pub const fn ticks_left(&self) -> u32 {
+        self.ticks_left
+    }
+
     /// Has the wavenumber of the wavelength followed at once: for when nobody feels it.
     pub const fn settle(&mut self) {
         self.per_count = self.target;

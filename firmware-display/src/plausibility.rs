@@ -160,7 +160,7 @@ impl Plausibility {
 
     /// A λ that its estimator does not stand by speaks for the one held, or against it.
     fn doubt(&mut self, guess: Wavelength, held: Wavelength, confidence: f32) {
-        if !are_within(guess, held, CONFIRMATION) {
+        if !are_about_the_same(guess, held) {
             self.is_doubted |= confidence >= POSSIBLE;
         } else if confidence >= LIKELY {
             self.known = self.since;
@@ -230,7 +230,7 @@ impl Plausibility {
         if is_new && self.held.is_some() {
             let confirmed = self
                 .surprise
-                .is_some_and(|surprise| are_within(wavelength, surprise, CONFIRMATION));
+                .is_some_and(|surprise| are_about_the_same(wavelength, surprise));
             if !confirmed {
                 self.dismiss_surprise();
                 self.surprise = Some(wavelength);
@@ -266,6 +266,11 @@ impl Default for Plausibility {
 /// Whether λ has changed by so much that it is no drift, but another surface, or an error.
 pub fn is_another_surface(before: Wavelength, now: Wavelength) -> bool {
     !are_within(now, before, SURPRISE)
+}
+
+/// Whether two estimates are about the same λ, but for what estimates are off by.
+pub fn are_about_the_same(one: Wavelength, other: Wavelength) -> bool {
+    are_within(one, other, CONFIRMATION)
 }
 
 /// Whether two wavelengths differ by no more than a factor.

@@ -23,7 +23,7 @@ use crate::gate::Gate;
 use crate::level::Level;
 use crate::pattern::Pattern;
 use crate::phase::{Phase, Wavelength};
-use crate::plausibility::is_another_surface;
+use crate::plausibility::{are_about_the_same, is_another_surface};
 use crate::rest::Rest;
 use crate::skin::Skin;
 use crate::wave::{Scale, Wave};
@@ -121,19 +121,22 @@ impl Stimulus {
         self.waiting = (asked != self.description).then_some(asked);
     }
 
-    /// Follows a surface of this λ and amplitude (in ADC steps) from here on, gliding.
+    /// Follows a surface of this λ and amplitude (in ADC steps) from here on, gliding. A glide of 1/λ that is under way
+    /// to about this λ ends when it would have, however often an estimate comes; that of the places begins anew.
     pub fn follow(&mut self, wavelength: Wavelength, amplitude_lsb: f32) {
         self.level.follow(amplitude_lsb, self.rate);
         if self.wavelength != Some(wavelength) {
-            if self
-                .wavelength
-                .is_some_and(|before| is_another_surface(before, wavelength))
-            {
+            let before = self.wavelength.replace(wavelength);
+            if before.is_some_and(|before| is_another_surface(before, wavelength)) {
                 self.wave.forget(self.rate);
             }
-            self.wavelength = Some(wavelength);
             let glide = ticks_at(self.rate, self.glide_ms);
-            self.phase.follow(wavelength, glide);
+            let left = self.phase.ticks_left();
+            let goes_on =
+                left > 0 && before.is_some_and(|before| are_about_the_same(before, wavelength));
+            self.phase
+                .follow(wavelength, if goes_on { left } else { glide });
+            // The places scatter with the estimates: glides of one length each keep that from a standing voltage.
             let glide = glide.max(ticks_at(self.rate, LEAST_GLIDE_MS));
             self.pattern.aim(wavelength.phase_per_micrometre(), glide);
         }
@@ -369,5 +372,35 @@ mod tests {
             }
         }
         assert!(!Stimulus::new(&configuration, &actuators).follows_from(ACTUATORS));
+    }
+
+    #[test]
+    fn a_glide_ends_in_its_time_however_often_an_estimate_of_that_surface_comes() {
+        let configuration = DisplayConfiguration {
+            mode: Mode::Travelling,
+            ..DisplayConfiguration::DEFAULT
+        };
+        let mut stimulus = Stimulus::new(&configuration, &DEFAULT_ACTUATORS);
+        let mut hear = |wavelength_mm, ms| {
+            let wavelength = Wavelength::new(wavelength_mm).unwrap();
+            stimulus.follow(wavelength, 100.0);
+            for _ in 0..ticks_at(configuration.update_rate, ms) {
+                stimulus.tick(9, 1 << 31);
+            }
+            let is_there = stimulus.phase.per_count() == wavelength.phase_per_count();
+            assert_eq!(is_there, stimulus.phase.ticks_left() == 0);
+            (is_there, stimulus.pattern.is_gliding())
+        };
+        assert_eq!(hear(1.0, 500), (true, false));
+        // The wavenumber is there in 20 ms, the places 20 ms after the last one that differs.
+        assert_eq!(hear(4.0, 5), (false, true));
+        assert_eq!(hear(4.02, 5), (false, true));
+        assert_eq!(hear(3.98, 5), (false, true));
+        assert_eq!(hear(4.01, 5), (true, true));
+        assert_eq!(hear(4.01, 15), (true, false));
+        // Another λ takes a whole glide, also from the middle of one.
+        assert_eq!(hear(3.0, 15), (false, true));
+        assert_eq!(hear(3.4, 15), (false, true));
+        assert_eq!(hear(3.4, 5), (true, false));
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use protocol::{DisplayConfiguration, Role};
 
 use crate::judge::seconds;
-use crate::judge::trust::Trust;
+use crate::judge::trust::{Trust, are_about_the_same};
 use crate::judge::truth::Truth;
 use crate::plant::motion::MM_PER_COUNT;
 use crate::run::observer::{RunEvent, RunObserver};
@@ -21,7 +21,9 @@ const SOFT_MS: u32 = 4;
 /// The phase due, as far as the run has come: ∫ v/λ̂ dt, in cycles: v is the true hand's, λ̂ the one in force,
 /// in which each estimate that is to be trusted ([`Trust`] says which) takes
 /// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
-/// heard: what is on its way when silence falls is in force at once. 0 until there is one.
+/// heard: what is on its way when silence falls is in force at once. An estimate of about the λ̂ that is on its way
+/// comes into force when that does; what an actuator is ahead by for its place glides anew with each. 0 until there is
+/// one.
 ///
 /// An estimate is followed from the second tick after its arrival on, for the whole travel since the
 /// first: the board hears what has come once a tick's words are on their way.
@@ -236,6 +238,7 @@ struct Followed {
     ahead_cycles: f64,
     target_cycles: f64,
     ticks_left: u32,
+    ahead_ticks_left: u32,
 }
 
 impl Followed {
@@ -249,6 +252,7 @@ impl Followed {
             ahead_cycles: 0.0,
             target_cycles: 0.0,
             ticks_left: 0,
+            ahead_ticks_left: 0,
         }
     }
 
@@ -265,11 +269,19 @@ impl Followed {
         if let Some(wavelength_mm) = self.trust.hear(tick_ns, &arrival.estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
             if steps(target_per_mm) != steps(self.target_per_mm) {
-                self.target_per_mm = target_per_mm;
+                let before_per_mm = core::mem::replace(&mut self.target_per_mm, target_per_mm);
                 let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
                 self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
                 let glide_ms = if silent { 0 } else { u32::from(glide_ms) };
-                self.ticks_left = glide_ms * (update_rate.hz() / 1_000);
+                let glide_ticks = glide_ms * (update_rate.hz() / 1_000);
+                self.ahead_ticks_left = glide_ticks;
+                let before_mm = (1.0 / before_per_mm) as f32;
+                let goes_on = !silent
+                    && self.ticks_left > 0
+                    && are_about_the_same(wavelength_mm as f32, before_mm);
+                if !goes_on {
+                    self.ticks_left = glide_ticks;
+                }
             }
         }
     }
@@ -279,16 +291,25 @@ impl Followed {
         self.per_mm = self.target_per_mm;
         self.ahead_cycles = self.target_cycles;
         self.ticks_left = 0;
+        self.ahead_ticks_left = 0;
     }
 
     /// The wavenumber of a tick's travel.
     fn tick(&mut self) -> f64 {
-        let left = f64::from(self.ticks_left.max(1));
-        self.per_mm += (self.target_per_mm - self.per_mm) / left;
-        self.ahead_cycles += (self.target_cycles - self.ahead_cycles) / left;
-        self.ticks_left = self.ticks_left.saturating_sub(1);
+        step(&mut self.per_mm, self.target_per_mm, &mut self.ticks_left);
+        step(
+            &mut self.ahead_cycles,
+            self.target_cycles,
+            &mut self.ahead_ticks_left,
+        );
         self.per_mm
     }
+}
+
+/// One tick on the straight way to a target.
+fn step(value: &mut f64, target: f64, ticks_left: &mut u32) {
+    *value += (target - *value) / f64::from((*ticks_left).max(1));
+    *ticks_left = ticks_left.saturating_sub(1);
 }
 
 #[cfg(test)]
@@ -353,8 +374,32 @@ mod tests {
     }
 
     #[test]
+    fn estimates_of_the_wavelength_glided_to_leave_the_glide_its_end() {
+        // Half a per cent more and less, in turn, every 10 ms of a glide of 100 ms.
+        let run = Run {
+            estimate: Box::new(|t_s| {
+                let noise = [1.0, 1.005][(t_s * 100.0).round() as usize % 2];
+                (if t_s < 0.9999 { 2.0 } else { 2.5 * noise }, true)
+            }),
+            ..Run::steady(50.0, 2.0)
+        };
+        let mut truth = Truth::new("", "", &|_| 2.0);
+        truth.display.glide_ms = 100;
+        let cycles = |t_s| due_of(&truth, t_s, &run.record()).0.cycles;
+        let hz = |from_s: f64, to_s: f64| (cycles(to_s) - cycles(from_s)) / (to_s - from_s);
+        // Half of the way on the average, and then between the two.
+        let (going_hz, there_hz) = (hz(1.001, 1.101), hz(1.101, 1.9));
+        assert!((going_hz - 22.5).abs() < 0.1, "{going_hz} Hz");
+        assert!((there_hz - 19.95).abs() < 0.05, "{there_hz} Hz");
+    }
+
+    #[test]
     fn what_is_the_same_wavelength_to_a_step_of_the_phase_begins_no_glide_anew() {
-        // Two neighbours among the numbers of 32 bits, in turn from 1 s on, or one of them alone.
+        // Two neighbours among the numbers of 32 bits, in turn from 1 s on, or one of them alone; at an actuator that is
+        // ahead, 30 ms later.
+        let mut truth = Truth::new("", "", &|_| 2.0);
+        truth.display.mode = Mode::Travelling;
+        truth.reference_actuator = 20;
         let due = |other_mm: f32| {
             let run = Run {
                 estimate: Box::new(move |t_s| {
@@ -363,7 +408,7 @@ mod tests {
                 }),
                 ..Run::steady(50.0, 2.0)
             };
-            due_at(1.9, &run.record()).0.cycles
+            due_of(&truth, 1.03, &run.record()).0.cycles
         };
         assert!((due(3.006_824_7) - due(3.006_825)).abs() < 1e-5);
         assert!((due(3.007) - due(3.006_825)).abs() > 0.01);

@@ -89,7 +89,7 @@ impl Trust {
         let playable_mm = estimate.wavelength_mm.filter(|mm| PLAYABLE_MM.contains(mm));
         if !estimate.valid {
             if let Some((mm, held_mm)) = playable_mm.zip(self.held_mm) {
-                let is_another = differ(mm, held_mm, CONFIRMATION);
+                let is_another = !are_about_the_same(mm, held_mm);
                 if is_another && estimate.confidence >= POSSIBLE {
                     self.is_doubted = true;
                 } else if !is_another && estimate.confidence >= LIKELY {
@@ -112,7 +112,7 @@ impl Trust {
         if is_new && self.held_mm.is_some() {
             let confirmed = self
                 .surprise_mm
-                .take_if(|surprise_mm| !differ(mm, *surprise_mm, CONFIRMATION));
+                .take_if(|surprise_mm| are_about_the_same(mm, *surprise_mm));
             if confirmed.is_none() {
                 self.dismiss(at_ns);
                 self.surprise_mm = Some(mm);
@@ -209,6 +209,11 @@ impl Trust {
         let oldest_ns = self.untrue_ns.front().copied().unwrap_or(at_ns);
         self.distrusts |= self.untrue_ns.len() == DISTRUSTED && at_ns <= oldest_ns + DISTRUST_NS;
     }
+}
+
+/// Whether two estimates are about the same λ, in mm.
+pub fn are_about_the_same(one_mm: f32, other_mm: f32) -> bool {
+    !differ(one_mm, other_mm, CONFIRMATION)
 }
 
 /// Whether one is more than a factor of the other.
