@@ -269,7 +269,7 @@ impl Followed {
         if let Some(wavelength_mm) = self.trust.hear(tick_ns, &arrival.estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
             if steps(target_per_mm) != steps(self.target_per_mm) {
-                let before_per_mm = core::mem::replace(&mut self.target_per_mm, target_per_mm);
+                let before_per_mm = std::mem::replace(&mut self.target_per_mm, target_per_mm);
                 let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
                 self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
                 let glide_ms = if silent { 0 } else { u32::from(glide_ms) };
