@@ -310,4 +310,35 @@ mod tests {
         assert_eq!(stretch(&[2, 2]), None);
         assert_eq!(stretch(&[]), None);
     }
+
+    #[test]
+    fn the_longest_stretch_is_of_cycles_at_full_amplitude() {
+        // A second each, of which the sixth is softer.
+        let stretch = |sixth_v: f64| {
+            let mut cycles = Cycles::default();
+            cycles.crossings.extend((0..=12).map(|number| Crossing {
+                t_s: f64::from(number),
+                travelled_cycles: f64::from(number),
+                amplitude_v: (number > 0).then_some(if number == 6 { sixth_v } else { 5.0 }),
+            }));
+            cycles.longest_stretch().map(|stretch| stretch.cycles)
+        };
+        assert_eq!(stretch(4.76), Some(10));
+        assert_eq!(stretch(4.74), Some(4));
+    }
+
+    #[test]
+    fn a_cycles_amplitude_is_the_waves_however_uneven_its_points() {
+        let mut open = Open {
+            begins_cycles: 3.0,
+            square: 0.0,
+            before: (3.0, 0.0),
+        };
+        assert_eq!(open.amplitude_v(), 0.0);
+        for point in 1..=400 {
+            let cycles = (f64::from(point) / 400.0).powi(2);
+            open.add(3.0 + cycles, 2.5 * (std::f64::consts::TAU * cycles).sin());
+        }
+        assert!((open.amplitude_v() - 2.5).abs() < 1e-3);
+    }
 }

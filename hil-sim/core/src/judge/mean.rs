@@ -85,8 +85,10 @@ mod tests {
     fn a_standing_voltage_is_found_with_its_sign() {
         let (edges, volts) = held(|t| (TAU * 50.0 * t).sin() - 0.125);
         let held = Held::new(&edges, &volts);
-        let mean = held.farthest_mean((0.0, 5.0), 1.0).unwrap();
-        assert!((mean + 0.125).abs() < 1e-9, "{mean}");
+        for window_s in [0.5, 1.0, 2.0] {
+            let mean = held.farthest_mean((0.0, 5.0), window_s).unwrap();
+            assert!((mean + 0.125).abs() < 1e-9, "{window_s} s: {mean}");
+        }
     }
 
     #[test]

@@ -358,19 +358,21 @@ mod tests {
 
     #[test]
     fn the_due_phase_is_travel_over_the_wavelength_in_force_to_which_it_glides() {
-        // 2 mm, then 2.5 mm from 1 s on, at 50 mm/s: 25 and 20 cycles a second.
-        let run = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
-            ..Run::steady(50.0, 2.0)
-        };
-        let (due, shortest_mm) = due_at(1.9, &run.record());
-        // The first estimate arrives at 11 ms, that of 1 s at 1.001 s: each is used for the travel after
-        // that tick. Half of the change comes on the way, for a
-        // glide of 40 ticks, of which the last has it in whole.
-        let glided_s = 1.001 + 0.5 * (0.020 - 0.0005);
-        let expected = (glided_s - 0.011) * 25.0 + (1.9 - glided_s) * 20.0;
-        assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
-        assert!((shortest_mm - 2.0).abs() < 1e-9);
+        // 2 mm, then 2.5 mm from 1 s on, at 50 mm/s: 25 and 20 cycles a second. Heard at a tick, or between two.
+        for (transit_s, heard_after_s) in [(0.001, 0.001), (0.001_25, 0.001_5)] {
+            let run = Run {
+                estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
+                transit_s,
+                ..Run::steady(50.0, 2.0)
+            };
+            let (due, shortest_mm) = due_at(1.9, &run.record());
+            // The estimates of 10 ms and of 1 s are used for the travel after the tick that hears them. Half of the
+            // change comes on the way, for a glide of 40 ticks, of which the last has it in whole.
+            let glided_s = 1.0 + heard_after_s + 0.5 * (0.020 - 0.0005);
+            let expected = (glided_s - 0.010 - heard_after_s) * 25.0 + (1.9 - glided_s) * 20.0;
+            assert!((due.cycles - expected).abs() < 1e-6, "{due:?} {expected}");
+            assert!((shortest_mm - 2.0).abs() < 1e-9);
+        }
     }
 
     #[test]
@@ -453,6 +455,21 @@ mod tests {
         // From 25 cycles a second down to 22.5 in half a glide, then at once to 20.
         let expected = (1.001 - 0.011) * 25.0 + 0.0102 * 23.75 + (1.9 - 1.0112) * 20.0;
         assert!((due.cycles - expected).abs() < 0.003, "{due:?} {expected}");
+    }
+
+    #[test]
+    fn a_loud_wave_that_crosses_zero_for_a_tick_is_no_silence() {
+        let mut recording = Run {
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
+            ..Run::steady(50.0, 2.0)
+        }
+        .record();
+        let glided = due_at(1.9, &recording).0;
+        // In the middle of the glide.
+        let crossing = recording.outputs.iter_mut();
+        let mut crossing = crossing.filter(|output| seconds(output.at_ns) > 1.0105);
+        crossing.next().expect("an output").words = [ZERO_VOLT; ACTUATORS];
+        assert_eq!(due_at(1.9, &recording).0, glided);
     }
 
     #[test]

@@ -385,4 +385,34 @@ mod tests {
         assert_eq!(holds(&mut trust, 112), [Hold::Flood]);
         assert_eq!(holds(&mut trust, 113), []);
     }
+
+    #[test]
+    fn what_no_sensor_can_have_said_is_told_field_by_field() {
+        let plain = Run::steady(50.0, 2.0).record().estimates[0].estimate;
+        let possible: [fn(&mut Estimate); 6] = [
+            |said| said.confidence = 0.0,
+            |said| said.confidence = 1.0,
+            |said| said.amplitude_lsb = LARGEST_AMPLITUDE_LSB,
+            |said| said.velocity_um_s = -20_000_000,
+            |said| said.gauges_used = 0b1_1111,
+            |said| (said.valid, said.gauges_used) = (false, 0),
+        ];
+        let absurd: [fn(&mut Estimate); 8] = [
+            |said| said.confidence = -0.01,
+            |said| said.confidence = f32::NAN,
+            |said| said.amplitude_lsb = -0.01,
+            |said| said.amplitude_lsb = 2_608.5,
+            |said| said.velocity_um_s = 20_000_001,
+            |said| said.velocity_um_s = i32::MIN,
+            |said| said.gauges_used = 0b10_0000,
+            |said| (said.valid, said.gauges_used) = (true, 0),
+        ];
+        let judged = |change: fn(&mut Estimate)| {
+            let mut said = plain;
+            change(&mut said);
+            is_absurd(&said)
+        };
+        assert_eq!(possible.map(judged), [false; 6]);
+        assert_eq!(absurd.map(judged), [true; 8]);
+    }
 }

@@ -74,3 +74,21 @@ impl<'a> Truth<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_without_a_wavelength_has_none() {
+        for wavelength_mm in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            let surface = |_| wavelength_mm;
+            let truth = Truth::new("", "", &surface);
+            assert_eq!(truth.wavelength_at(3.0), None, "{wavelength_mm}");
+        }
+        assert_eq!(
+            Truth::new("", "", &|x_mm| x_mm).wavelength_at(3.0),
+            Some(3.0)
+        );
+    }
+}

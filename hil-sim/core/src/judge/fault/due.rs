@@ -324,3 +324,24 @@ fn is_told(fault: &Fault, scene: &Scene) -> bool {
         told_mm.abs() > STALLED_S * full_mm_s
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arm_has_to_be_missed_where_it_is_told_to_go_far_enough_to_catch_up() {
+        let rests_at = |speed_mm_s: f64, delay_ms: f64| {
+            let fault = Fault::new(Kind::ArmEncoderDead, 0.5);
+            let mut scene = Scene::constant(2.0, speed_mm_s);
+            scene.faults = vec![fault];
+            scene.link.delay_ms = delay_ms;
+            rests(&fault, &scene)
+        };
+        // 12 mm in half a second. It is told 10 mm/s, and by then 60 mm/s, or 6 and 36, the weaker ones not counted.
+        assert!(!rests_at(10.0, 0.0) && !rests_at(-10.0, 0.0));
+        assert!(rests_at(6.0, 0.0));
+        // A link that tells it late.
+        assert!(!rests_at(10.0, 19.0) && rests_at(10.0, 21.0));
+    }
+}

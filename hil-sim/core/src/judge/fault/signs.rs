@@ -170,3 +170,144 @@ fn board(counters: &RoleCounters) -> Vec<(&'static str, u32)> {
         ],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use protocol::{
+        Arm, ArmState, DisplayCounters, Hello, Hold, ResetCause, Safety, SensorCounters,
+    };
+
+    use super::*;
+    use crate::judge::synthetic::Run;
+
+    fn status(uptime_us: u64, role: RoleCounters) -> Status {
+        Status {
+            uptime_us,
+            reset: ResetCause::Power,
+            watchdog_resets: 0,
+            peer: PortCounters::default(),
+            console: PortCounters::default(),
+            role,
+            stack_free_bytes: 0,
+        }
+    }
+
+    fn said(voice: &mut Voice, kind: Kind, message: Message) -> Vec<Sign> {
+        let signs = voice.signs(&Fault::new(kind, 0.5), &message);
+        signs.into_iter().map(|(sign, _)| sign).collect()
+    }
+
+    fn greeting(role: Role, asks: bool) -> Message {
+        Message::Hello(Hello::new(role, "chip", [0, 1, 0]).asking(asks))
+    }
+
+    #[test]
+    fn a_broken_gauge_shows_in_its_own_health_and_a_dead_converter_in_what_is_valid() {
+        let sound = Estimate {
+            health: [GaugeHealth::Good; protocol::GAUGES],
+            ..Run::steady(50.0, 2.0).record().estimates[0].estimate
+        };
+        let heard = |role, kind, gauge: u8, estimate| {
+            let mut fault = Fault::new(kind, 0.5);
+            fault.values[0] = gauge.into();
+            let signs = Voice::new(role).signs(&fault, &Message::Estimate(estimate));
+            signs.into_iter().map(|(sign, _)| sign).collect::<Vec<_>>()
+        };
+        let mut broken = sound;
+        broken.health[3] = GaugeHealth::Stuck;
+        for kind in [Kind::GaugeOpen, Kind::GaugeShort] {
+            assert_eq!(heard(Role::Sensor, kind, 3, broken), [Sign::GaugeNotGood]);
+            assert_eq!(heard(Role::Sensor, kind, 2, broken), []);
+            assert_eq!(heard(Role::Sensor, kind, 3, sound), []);
+            // A display only passes on what it heard.
+            assert_eq!(heard(Role::Display, kind, 3, broken), []);
+        }
+        let doubtful = Estimate {
+            valid: false,
+            ..sound
+        };
+        let silent = [Sign::NoValidEstimate];
+        assert_eq!(heard(Role::Sensor, Kind::AdcStuck, 0, doubtful), silent);
+        assert_eq!(heard(Role::Sensor, Kind::AdcStuck, 0, sound), []);
+        assert_eq!(heard(Role::Sensor, Kind::Nothing, 0, doubtful), []);
+    }
+
+    #[test]
+    fn states_greetings_and_an_arm_that_a_trip_has_stopped_are_signs() {
+        let mut voice = Voice::new(Role::Display);
+        let mut says = |message| said(&mut voice, Kind::Nothing, message);
+        let instant_us = 0;
+        let arm = |trip| {
+            Message::Arm(Arm {
+                instant_us,
+                state: ArmState::Stopped(trip),
+            })
+        };
+        for trip in [Trip::ArmEncoder, Trip::ArmStall] {
+            assert_eq!(says(arm(trip)), [Sign::ArmStopped(trip)]);
+        }
+        assert_eq!(says(arm(Trip::Host)), []);
+        let state = |state| Message::Safety(Safety { instant_us, state });
+        let stopped = DisplayState::Stopped(Trip::Converter);
+        let fading = DisplayState::Fading(Hold::Stale);
+        assert_eq!(says(state(stopped)), [Sign::Stopped(Trip::Converter)]);
+        assert_eq!(says(state(fading)), [Sign::Fading(Hold::Stale)]);
+        assert_eq!(says(state(DisplayState::Driving)), []);
+        for (asks, signs) in [(false, &[][..]), (true, &[Sign::Greets(Role::Display)])] {
+            assert_eq!(says(greeting(Role::Display, asks)), signs);
+        }
+    }
+
+    #[test]
+    fn counters_are_signs_where_they_have_gone_up_since_the_last_that_are_not_forgotten() {
+        let mut voice = Voice::new(Role::Display);
+        let mut says = |kind, status| said(&mut voice, kind, Message::Status(status));
+        let told = |uptime_us, fades| {
+            let counters = DisplayCounters {
+                fades,
+                ..DisplayCounters::default()
+            };
+            status(uptime_us, RoleCounters::Display(counters))
+        };
+        let faded = [Sign::Counted(Role::Display, "fades")];
+        assert_eq!(says(Kind::Nothing, told(1, 2)), faded);
+        assert_eq!(says(Kind::Nothing, told(2, 2)), []);
+        assert_eq!(says(Kind::Nothing, told(3, 3)), faded);
+        // A board that has started anew counts from 0.
+        assert_eq!(says(Kind::Nothing, told(1, 3)), faded);
+        assert_eq!(says(Kind::Nothing, told(2, 3)), []);
+        // Pings and gaps are signs of what makes them alone.
+        let mut heard = |kind, uptime_us, received, lost| {
+            let mut status = told(uptime_us, 3);
+            (status.console.received, status.peer.lost) = (received, lost);
+            says(kind, status)
+        };
+        let received = [Sign::Counted(Role::Display, "received")];
+        assert_eq!(heard(Kind::ConsoleFlood, 3, FLOOD, 1), []);
+        assert_eq!(heard(Kind::ConsoleFlood, 4, 2 * FLOOD + 1, 1), received);
+        let lost = [Sign::Counted(Role::Display, "lost")];
+        assert_eq!(heard(Kind::UartOverrun, 5, 4 * FLOOD, 2), lost);
+        assert_eq!(heard(Kind::UartOverrun, 6, 4 * FLOOD, 2), []);
+    }
+
+    #[test]
+    fn what_was_said_before_the_fault_is_what_counters_are_held_against() {
+        let counted = |uptime_us, adc_overruns| {
+            let counters = SensorCounters {
+                adc_overruns,
+                ..SensorCounters::ZERO
+            };
+            Message::Status(status(uptime_us, RoleCounters::Sensor(counters)))
+        };
+        let note = |voice: &mut Voice, message| voice.note(&TimedMessage { at_ns: 0, message });
+        let mut voice = Voice::new(Role::Sensor);
+        note(&mut voice, counted(7, 1));
+        assert_eq!(said(&mut voice, Kind::Nothing, counted(8, 1)), []);
+        // One that has greeted anew has forgotten what it had counted.
+        note(&mut voice, greeting(Role::Sensor, true));
+        assert_eq!(
+            said(&mut voice, Kind::Nothing, counted(8, 1)),
+            [Sign::Counted(Role::Sensor, "adc_overruns")]
+        );
+    }
+}

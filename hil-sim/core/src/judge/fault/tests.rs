@@ -570,14 +570,20 @@ fn what_is_too_short_or_too_small_need_not_be_seen() {
         let scene = with_faults(2.0, vec![fault]);
         finding(&scene, 0, 2_000 * MS, &Run::steady(50.0, 2.0).record()).unmet()
     };
-    let jump = |counts: f64| {
-        let mut jump = Fault::new(Kind::HandEncoderJump, 0.5);
-        jump.values[0] = counts;
-        judged(jump)
+    let large = |kind: Kind, value: f64| {
+        let mut large = Fault::new(kind, 0.5);
+        large.values[0] = value;
+        judged(large)
     };
-    // 2 m/s are 200 counts of 5 µm a tick.
-    assert_eq!(jump(400.0), [""; 0]);
-    assert_eq!(jump(401.0)[0], "no sign of it");
+    // 2 m/s are 200 counts of 5 µm a tick. An arm's jump is 1 mm at least, and what two look at it may make: 4 mm.
+    for (kind, small, seen) in [
+        (Kind::HandEncoderJump, 400.0, 401.0),
+        (Kind::ArmEncoderJump, 1_000.0, 1_001.0),
+        (Kind::LinkCorrupt, 0.000_99, 0.001),
+    ] {
+        assert_eq!(large(kind, small), [""; 0], "{kind:?}");
+        assert_eq!(large(kind, seen)[0], "no sign of it", "{kind:?}");
+    }
     let mut alarm = Fault::new(Kind::DacAlarm, 0.5);
     assert_eq!(judged(alarm)[0], "no sign of it");
     alarm.for_s = Some(0.001);

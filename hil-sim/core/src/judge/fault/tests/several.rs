@@ -168,22 +168,38 @@ fn who_another_fault_silences_is_not_missed() {
     assert!(!unmet(&[(Kind::SensorHang, 1.0), (Kind::Nothing, 1.01)]));
 }
 
+/// What is found of estimates of which only these numbers, one each 10 ms, have come, and nothing happens from 500 ms on.
+fn unmet_of_estimates(has_come: impl Fn(usize) -> bool) -> Vec<String> {
+    let mut recording = silent(2.0, 0..0);
+    let told = recording.estimates.iter().enumerate();
+    recording.signs.sensor = told
+        .filter(|&(number, _)| has_come(number))
+        .map(|(_, made)| TimedMessage {
+            at_ns: made.made_ns,
+            message: Message::Estimate(made.estimate),
+        })
+        .collect();
+    let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
+    finding(&scene, 0, 2_000 * MS, &recording).unmet()
+}
+
 #[test]
 fn estimates_at_half_their_rate_are_missed() {
-    let unmet = |every: usize| {
-        let mut recording = silent(2.0, 0..0);
-        let told = recording.estimates.iter().step_by(every);
-        recording.signs.sensor = told
-            .map(|made| TimedMessage {
-                at_ns: made.made_ns,
-                message: Message::Estimate(made.estimate),
-            })
-            .collect();
-        let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
-        finding(&scene, 0, 2_000 * MS, &recording).unmet()
-    };
-    assert_eq!(unmet(1), [""; 0]);
-    assert!(unmet(2)[0].starts_with("no estimates from"));
+    assert_eq!(unmet_of_estimates(|_| true), [""; 0]);
+    let unmet = unmet_of_estimates(|number| number % 2 == 0);
+    assert!(unmet[0].starts_with("no estimates from"));
+}
+
+#[test]
+fn estimates_are_missed_from_when_the_next_one_was_late() {
+    // 15 ms after the last one before a gap of 200 ms, at 800 ms; or after the beginning, if that was at 480 ms.
+    for (last, missed) in [
+        (79, "no estimates from 315.00 ms on"),
+        (47, "no estimates from 15.00 ms on"),
+    ] {
+        let unmet = unmet_of_estimates(|number| !(last + 1..last + 20).contains(&number));
+        assert_eq!(unmet, [missed], "{last}");
+    }
 }
 
 #[test]
@@ -356,21 +372,23 @@ fn a_sensor_that_has_forgotten_needs_three_waves_to_drive_again() {
 
 #[test]
 fn what_is_too_faint_to_show_may_be_at_zero() {
-    let judged = |reference_mn, fluctuation_mn, reference_lsb| {
+    let judged = |reference_mn, told: &[(u64, u16)], reference_lsb| {
         let mut recording = silent(3.0, 1_545..3_000);
         recording
             .arrived
             .retain(|arrival| !(1_000 * MS..1_700 * MS).contains(&arrival.at_ns));
-        recording.signs.sensor.push(TimedMessage {
-            at_ns: 500 * MS,
-            message: Message::Texture(Texture {
-                friction: Some(Friction {
-                    mean_mn: 900,
-                    fluctuation_mn,
+        for &(at_ms, fluctuation_mn) in told {
+            recording.signs.sensor.push(TimedMessage {
+                at_ns: at_ms * MS,
+                message: Message::Texture(Texture {
+                    friction: Some(Friction {
+                        mean_mn: 900,
+                        fluctuation_mn,
+                    }),
+                    ..Texture::default()
                 }),
-                ..Texture::default()
-            }),
-        });
+            });
+        }
         let mut scene = several(3.0, &[(Kind::LinkDown, 1.0)]);
         scene.display.configuration.reference_mn = reference_mn;
         scene.display.configuration.reference_lsb = reference_lsb;
@@ -381,11 +399,14 @@ fn what_is_too_faint_to_show_may_be_at_zero() {
         let again = |line: &String| line.ends_with("the stimulus is too faint to show");
         (missed, finding.unjudged.iter().any(again))
     };
-    assert_eq!(judged(200, 0, 0), (0, true));
+    let none = [(500, 0)];
+    assert_eq!(judged(200, &none, 0), (0, true));
     // 25 mV, nothing that follows the force, and 400 of 2000 steps of the surface.
-    assert_eq!(judged(200, 1, 0), (2, false));
-    assert_eq!(judged(0, 0, 0), (2, false));
-    assert_eq!(judged(0, 0, 2_000), (2, false));
+    assert_eq!(judged(200, &[(500, 1)], 0), (2, false));
+    assert_eq!(judged(0, &none, 0), (2, false));
+    assert_eq!(judged(0, &none, 2_000), (2, false));
+    // Long enough before that it was.
+    assert_eq!(judged(200, &[(500, 0), (1_200, 200)], 0), (2, false));
 }
 
 #[test]
