@@ -2,7 +2,7 @@
 
 use protocol::{
     DisplayCounters, DisplayState, Hello, Hold, Message, PortCounters, Rendering, ResetCause, Role,
-    RoleCounters, Safety, Status, Trip, UNITY_GAIN,
+    RoleCounters, Safety, Status, Trip, UNITY_GAIN, UpdateRate,
 };
 
 use super::*;
@@ -566,23 +566,26 @@ fn a_voltage_beyond_the_amplitude_or_the_slew_limit_is_found() {
 
 #[test]
 fn what_is_too_short_or_too_small_need_not_be_seen() {
-    let judged = |fault: Fault| {
-        let scene = with_faults(2.0, vec![fault]);
+    let judged_at = |update_rate, fault: Fault| {
+        let mut scene = with_faults(2.0, vec![fault]);
+        scene.display.configuration.update_rate = update_rate;
         finding(&scene, 0, 2_000 * MS, &Run::steady(50.0, 2.0).record()).unmet()
     };
-    let large = |kind: Kind, value: f64| {
-        let mut large = Fault::new(kind, 0.5);
-        large.values[0] = value;
-        judged(large)
-    };
+    let judged = |fault| judged_at(UpdateRate::Hz2000, fault);
     // 2 m/s are 200 counts of 5 µm a tick. An arm's jump is 1 mm at least, and what two look at it may make: 4 mm.
-    for (kind, small, seen) in [
-        (Kind::HandEncoderJump, 400.0, 401.0),
-        (Kind::ArmEncoderJump, 1_000.0, 1_001.0),
-        (Kind::LinkCorrupt, 0.000_99, 0.001),
+    for (kind, update_rate, small, seen) in [
+        (Kind::HandEncoderJump, UpdateRate::Hz2000, 400.0, 401.0),
+        (Kind::HandEncoderJump, UpdateRate::Hz4000, 200.0, 201.0),
+        (Kind::ArmEncoderJump, UpdateRate::Hz2000, 1_000.0, 1_001.0),
+        (Kind::LinkCorrupt, UpdateRate::Hz2000, 0.000_99, 0.001),
     ] {
-        assert_eq!(large(kind, small), [""; 0], "{kind:?}");
-        assert_eq!(large(kind, seen)[0], "no sign of it", "{kind:?}");
+        let unmet = |value: f64| {
+            let mut fault = Fault::new(kind, 0.5);
+            fault.values[0] = value;
+            judged_at(update_rate, fault)
+        };
+        assert_eq!(unmet(small), [""; 0], "{kind:?} {update_rate:?}");
+        assert_eq!(unmet(seen)[0], "no sign of it", "{kind:?} {update_rate:?}");
     }
     let mut alarm = Fault::new(Kind::DacAlarm, 0.5);
     assert_eq!(judged(alarm)[0], "no sign of it");

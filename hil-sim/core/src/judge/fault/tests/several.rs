@@ -40,6 +40,21 @@ fn what_was_too_small_to_stop_the_display_excuses_no_silence_later() {
 }
 
 #[test]
+fn a_silence_is_found_also_under_a_hand_that_began_late() {
+    let mut recording = Run {
+        position_mm: Box::new(|t_s| 50.0 * (t_s - 0.3).max(0.0)),
+        ..Run::steady(50.0, 2.0)
+    }
+    .record();
+    silence(&mut recording, 800..1_000);
+    let scene = several(2.0, &[(Kind::Nothing, 0.5)]);
+    assert_eq!(
+        finding(&scene, 0, 2_000 * MS, &recording).unmet(),
+        ["silent from 300.00 ms on, without a reason"]
+    );
+}
+
+#[test]
 fn a_fade_for_too_long_a_drive_is_no_false_alarm_where_the_scene_lasts_as_long() {
     let unmet = |full_drive_s: u16| {
         let mut scene = several(2.0, &[(Kind::Nothing, 0.5)]);
