@@ -22,7 +22,7 @@ use crate::phase::Wavelength;
 /// A λ that differs from the one held by more than this factor is a surprise. The paper's count is a
 /// whole number: from one estimate to the next it may go from 1 to 2 and back.
 const SURPRISE: f32 = 2.1;
-/// One that differs from the surprise before by no more than this factor confirms it.
+/// Estimates are about the same λ if they differ by no more than this factor: so does one that confirms a surprise.
 const CONFIRMATION: f32 = 1.1;
 /// So many that count as distrust, within [`DISTRUST_QUARTERS`], are too many.
 const DISTRUSTED: usize = 5;

@@ -133,7 +133,7 @@ fn the_fundamentals_words_are_those_that_they_have_always_been() {
                     };
                     let mut rig = Rig::with(configuration, actuators);
                     for tick in 0..8_000_i32 {
-                        // No glide is under way any more.
+                        // After 25 ms at least: no glide of 20 ms is under way any more.
                         if tick % 100 == 0 {
                             rig.follow(1.0 + f64::from(tick / 100 % 31) * 0.1);
                         }

@@ -15,6 +15,10 @@ use crate::run::recording::{Arrival, TickRecord, WORD_V, ZERO_VOLT};
 const TICKS_KEPT: usize = 8;
 /// Ticks at 0 V that are no wave's crossing.
 const CROSSING_TICKS: u32 = 3;
+/// The least time in ms in which an actuator's own phase glides.
+const LEAST_AHEAD_MS: u16 = 10;
+/// What its place is told in.
+const MM_PER_UM: f64 = 1e-3;
 /// Time in ms within a tenth of the amplitude after which 0 V is no crossing, but for waves slower than 4 Hz.
 const SOFT_MS: u32 = 4;
 
@@ -22,8 +26,8 @@ const SOFT_MS: u32 = 4;
 /// in which each estimate that is to be trusted ([`Trust`] says which) takes
 /// [`DisplayConfiguration::glide_ms`] to come into force, linearly in 1/λ̂, and none while nothing is
 /// heard: what is on its way when silence falls is in force at once. An estimate of about the λ̂ that is on its way
-/// comes into force when that does; what an actuator is ahead by for its place glides anew with each. 0 until there is
-/// one.
+/// comes into force when that does; what an actuator is ahead by for its place glides anew with each, for 10 ms at
+/// least. 0 until there is one.
 ///
 /// An estimate is followed from the second tick after its arrival on, for the whole travel since the
 /// first: the board hears what has come once a tick's words are on their way.
@@ -217,11 +221,12 @@ impl DuePhase {
     }
 }
 
-/// A wavenumber in steps of the board's phase, 2⁻³² turns a count: what is the same to a step is no other one, and no
-/// reason to begin a glide anew.
-fn steps(per_mm: f64) -> f64 {
+/// Whether two wavenumbers turn the board's phase, in 2⁻³² turns, by other numbers of steps over a way: what is the same
+/// to a step is no other one, and no reason to begin a glide anew.
+fn differ(one_per_mm: f64, other_per_mm: f64, way_mm: f64) -> bool {
     const STEPS: f64 = (1u64 << 32) as f64;
-    (STEPS * MM_PER_COUNT * per_mm).round()
+    let steps = |per_mm: f64| (STEPS * way_mm * per_mm).round();
+    steps(one_per_mm) != steps(other_per_mm)
 }
 
 /// The wavenumber that a display follows.
@@ -268,19 +273,23 @@ impl Followed {
         }
         if let Some(wavelength_mm) = self.trust.hear(tick_ns, &arrival.estimate) {
             let target_per_mm = 1.0 / wavelength_mm;
-            if steps(target_per_mm) != steps(self.target_per_mm) {
-                let before_per_mm = std::mem::replace(&mut self.target_per_mm, target_per_mm);
+            let ticks = |ms: u16| {
+                let ms = if silent { 0 } else { u32::from(ms) };
+                ms * (update_rate.hz() / 1_000)
+            };
+            if differ(target_per_mm, self.target_per_mm, MM_PER_UM) {
                 let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
                 self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
-                let glide_ms = if silent { 0 } else { u32::from(glide_ms) };
-                let glide_ticks = glide_ms * (update_rate.hz() / 1_000);
-                self.ahead_ticks_left = glide_ticks;
+                self.ahead_ticks_left = ticks(glide_ms.max(LEAST_AHEAD_MS));
+            }
+            if differ(target_per_mm, self.target_per_mm, MM_PER_COUNT) {
+                let before_per_mm = std::mem::replace(&mut self.target_per_mm, target_per_mm);
                 let before_mm = (1.0 / before_per_mm) as f32;
                 let goes_on = !silent
                     && self.ticks_left > 0
                     && are_about_the_same(wavelength_mm as f32, before_mm);
                 if !goes_on {
-                    self.ticks_left = glide_ticks;
+                    self.ticks_left = ticks(glide_ms);
                 }
             }
         }
@@ -434,6 +443,33 @@ mod tests {
         };
         let behind = travelled(Mode::Uniform) - travelled(Mode::Travelling);
         assert!((behind - 0.375).abs() < 1e-6, "{behind}");
+    }
+
+    #[test]
+    fn an_actuators_own_phase_takes_ten_milliseconds_at_least() {
+        // 2 mm, then 1 mm from 1 s on, which is heard at 1.001 s and in force at once.
+        let run = Run {
+            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 1.0 }, true)),
+            ..Run::steady(50.0, 2.0)
+        };
+        let recording = run.record();
+        let ahead = |t_s, glide_ms| {
+            let cycles = |mode| {
+                let mut truth = Truth::new("", "", &|_| 2.0);
+                (truth.display.mode, truth.display.glide_ms) = (mode, glide_ms);
+                truth.reference_actuator = 20;
+                due_of(&truth, t_s, &recording).0.cycles
+            };
+            cycles(Mode::Travelling) - cycles(Mode::Uniform)
+        };
+        // From 3.375 cycles behind by 0.375 more.
+        for (t_s, glide_ms, share) in [(1.006, 0, 0.5), (1.011, 0, 1.0), (1.011, 20, 0.5)] {
+            let gone = (ahead(1.0, glide_ms) - ahead(t_s, glide_ms)) / 0.375;
+            assert!(
+                (gone - share).abs() < 1e-6,
+                "{t_s} s, {glide_ms} ms: {gone}"
+            );
+        }
     }
 
     #[test]

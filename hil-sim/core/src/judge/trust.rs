@@ -16,7 +16,7 @@ const LEAST_AGE_NS: u64 = 150_000_000;
 const PLAYABLE_MM: std::ops::RangeInclusive<f32> = 0.1..=50.0;
 /// A λ that differs by more than this factor from the one held has to be confirmed by the next one.
 const SURPRISE: f32 = 2.1;
-/// It is if that differs from it by no more than this factor.
+/// It is if that is about the same λ: if they differ by no more than this factor.
 const CONFIRMATION: f32 = 1.1;
 /// So many that can't be true within [`DISTRUST_NS`] are a reason not to drive, until so long has passed without.
 const DISTRUSTED: usize = 5;
