@@ -376,31 +376,34 @@ mod tests {
 
     #[test]
     fn a_glide_ends_in_its_time_however_often_an_estimate_of_that_surface_comes() {
-        let configuration = DisplayConfiguration {
-            mode: Mode::Travelling,
-            ..DisplayConfiguration::DEFAULT
-        };
-        let mut stimulus = Stimulus::new(&configuration, &DEFAULT_ACTUATORS);
-        let mut hear = |wavelength_mm, ms| {
-            let wavelength = Wavelength::new(wavelength_mm).unwrap();
-            stimulus.follow(wavelength, 100.0);
-            for _ in 0..ticks_at(configuration.update_rate, ms) {
-                stimulus.tick(9, 1 << 31);
-            }
-            let is_there = stimulus.phase.per_count() == wavelength.phase_per_count();
-            assert_eq!(is_there, stimulus.phase.ticks_left() == 0);
-            (is_there, stimulus.pattern.is_gliding())
-        };
-        assert_eq!(hear(1.0, 500), (true, false));
-        // The wavenumber is there in 20 ms, the places 20 ms after the last one that differs.
-        assert_eq!(hear(4.0, 5), (false, true));
-        assert_eq!(hear(4.02, 5), (false, true));
-        assert_eq!(hear(3.98, 5), (false, true));
-        assert_eq!(hear(4.01, 5), (true, true));
-        assert_eq!(hear(4.01, 15), (true, false));
-        // Another λ takes a whole glide, also from the middle of one.
-        assert_eq!(hear(3.0, 15), (false, true));
-        assert_eq!(hear(3.4, 15), (false, true));
-        assert_eq!(hear(3.4, 5), (true, false));
+        for update_rate in [UpdateRate::Hz2000, UpdateRate::Hz4000] {
+            let configuration = DisplayConfiguration {
+                mode: Mode::Travelling,
+                update_rate,
+                ..DisplayConfiguration::DEFAULT
+            };
+            let mut stimulus = Stimulus::new(&configuration, &DEFAULT_ACTUATORS);
+            let mut hear = |wavelength_mm, ms| {
+                let wavelength = Wavelength::new(wavelength_mm).unwrap();
+                stimulus.follow(wavelength, 100.0);
+                for _ in 0..ticks_at(update_rate, ms) {
+                    stimulus.tick(9, 1 << 31);
+                }
+                let is_there = stimulus.phase.per_count() == wavelength.phase_per_count();
+                assert_eq!(is_there, stimulus.phase.ticks_left() == 0);
+                (is_there, stimulus.pattern.is_gliding())
+            };
+            assert_eq!(hear(1.0, 500), (true, false));
+            // The wavenumber is there in 20 ms, the places 20 ms after the last one that differs.
+            assert_eq!(hear(4.0, 5), (false, true));
+            assert_eq!(hear(4.02, 5), (false, true));
+            assert_eq!(hear(3.98, 5), (false, true));
+            assert_eq!(hear(4.01, 5), (true, true));
+            assert_eq!(hear(4.01, 15), (true, false));
+            // Another λ takes a whole glide, also from the middle of one.
+            assert_eq!(hear(3.0, 15), (false, true));
+            assert_eq!(hear(3.4, 15), (false, true));
+            assert_eq!(hear(3.4, 5), (true, false));
+        }
     }
 }

@@ -17,7 +17,7 @@ const TICKS_KEPT: usize = 8;
 const CROSSING_TICKS: u32 = 3;
 /// The least time in ms in which an actuator's own phase glides.
 const LEAST_AHEAD_MS: u16 = 10;
-/// What its place is told in.
+/// Places of actuators are whole µm.
 const MM_PER_UM: f64 = 1e-3;
 /// Time in ms within a tenth of the amplitude after which 0 V is no crossing, but for waves slower than 4 Hz.
 const SOFT_MS: u32 = 4;
@@ -223,7 +223,7 @@ impl DuePhase {
 
 /// Whether two wavenumbers turn the board's phase, in 2⁻³² turns, by other numbers of steps over a way: what is the same
 /// to a step is no other one, and no reason to begin a glide anew.
-fn differ(one_per_mm: f64, other_per_mm: f64, way_mm: f64) -> bool {
+fn differ_over(way_mm: f64, one_per_mm: f64, other_per_mm: f64) -> bool {
     const STEPS: f64 = (1u64 << 32) as f64;
     let steps = |per_mm: f64| (STEPS * way_mm * per_mm).round();
     steps(one_per_mm) != steps(other_per_mm)
@@ -277,12 +277,12 @@ impl Followed {
                 let ms = if silent { 0 } else { u32::from(ms) };
                 ms * (update_rate.hz() / 1_000)
             };
-            if differ(target_per_mm, self.target_per_mm, MM_PER_UM) {
+            if differ_over(MM_PER_UM, target_per_mm, self.target_per_mm) {
                 let way_cycles = self.place_mm * target_per_mm - self.ahead_cycles;
                 self.target_cycles = self.ahead_cycles + way_cycles - way_cycles.round();
                 self.ahead_ticks_left = ticks(glide_ms.max(LEAST_AHEAD_MS));
             }
-            if differ(target_per_mm, self.target_per_mm, MM_PER_COUNT) {
+            if differ_over(MM_PER_COUNT, target_per_mm, self.target_per_mm) {
                 let before_per_mm = std::mem::replace(&mut self.target_per_mm, target_per_mm);
                 let before_mm = (1.0 / before_per_mm) as f32;
                 let goes_on = !silent
@@ -349,6 +349,14 @@ mod tests {
         }
     }
 
+    /// A hand at 50 mm/s that hears of 2 mm, and of another λ from 1 s on.
+    fn changed_to(wavelength_mm: f32) -> Run {
+        Run {
+            estimate: Box::new(move |t_s| (if t_s < 0.9999 { 2.0 } else { wavelength_mm }, true)),
+            ..Run::steady(50.0, 2.0)
+        }
+    }
+
     /// The phase due at `t_s` over a surface of 2 mm, and the shortest λ̂ in force until the end.
     fn due_at(t_s: f64, recording: &Recording) -> (Due, f64) {
         due_of(&Truth::new("", "", &|_| 2.0), t_s, recording)
@@ -370,9 +378,8 @@ mod tests {
         // 2 mm, then 2.5 mm from 1 s on, at 50 mm/s: 25 and 20 cycles a second. Heard at a tick, or between two.
         for (transit_s, heard_after_s) in [(0.001, 0.001), (0.001_25, 0.001_5)] {
             let run = Run {
-                estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
                 transit_s,
-                ..Run::steady(50.0, 2.0)
+                ..changed_to(2.5)
             };
             let (due, shortest_mm) = due_at(1.9, &run.record());
             // The estimates of 10 ms and of 1 s are used for the travel after the tick that hears them. Half of the
@@ -428,10 +435,7 @@ mod tests {
     #[test]
     fn an_actuators_own_phase_glides_the_shorter_way() {
         // 2 mm, then 1 mm from 1 s on.
-        let run = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 1.0 }, true)),
-            ..Run::steady(50.0, 2.0)
-        };
+        let run = changed_to(1.0);
         let recording = run.record();
         let travelled = |mode| {
             let mut truth = Truth::new("", "", &|_| 2.0);
@@ -448,10 +452,7 @@ mod tests {
     #[test]
     fn an_actuators_own_phase_takes_ten_milliseconds_at_least() {
         // 2 mm, then 1 mm from 1 s on, which is heard at 1.001 s and in force at once.
-        let run = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 1.0 }, true)),
-            ..Run::steady(50.0, 2.0)
-        };
+        let run = changed_to(1.0);
         let recording = run.record();
         let ahead = |t_s, glide_ms| {
             let cycles = |mode| {
@@ -475,11 +476,7 @@ mod tests {
     #[test]
     fn where_silence_falls_the_wavelength_glided_to_is_in_force_at_once() {
         // As above, but soft for 6 ms and then silent for two ticks in the middle of the glide.
-        let mut recording = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
-            ..Run::steady(50.0, 2.0)
-        }
-        .record();
+        let mut recording = changed_to(2.5).record();
         for output in &mut recording.outputs {
             let t_s = seconds(output.at_ns);
             if (1.0052..1.0122).contains(&t_s) {
@@ -495,11 +492,7 @@ mod tests {
 
     #[test]
     fn a_loud_wave_that_crosses_zero_for_a_tick_is_no_silence() {
-        let mut recording = Run {
-            estimate: Box::new(|t_s| (if t_s < 0.9999 { 2.0 } else { 2.5 }, true)),
-            ..Run::steady(50.0, 2.0)
-        }
-        .record();
+        let mut recording = changed_to(2.5).record();
         let glided = due_at(1.9, &recording).0;
         // In the middle of the glide.
         let crossing = recording.outputs.iter_mut();

@@ -164,8 +164,8 @@ impl Run {
             .collect()
     }
 
-    /// A display as it should be: phase from the encoder's counts and the last valid λ̂ received, to
-    /// which 1/λ̂ glides.
+    /// A display as it should be, but for estimates that change while it glides: phase from the encoder's counts and the
+    /// last valid λ̂ received, to which 1/λ̂ glides.
     fn outputs(&self, ticks: &[TickRecord], estimates: &[EstimateRecord]) -> Vec<OutputRecord> {
         let mut outputs = Vec::new();
         let mut held = [0x8000; ACTUATORS];
