@@ -50,7 +50,7 @@ mod board {
     use crate::baselines::Rival;
     use crate::baselines::adapter::Entrant;
     use crate::baselines::registry::{Visitor, show_all};
-    use crate::baselines::spectrum::{LENGTH, LINES, Transform};
+    use crate::baselines::spectrum::LENGTH;
     use crate::parts::{FRONT, MILLISECONDS, RIVALS_FROM, SETTINGS_FROM, TRANSFORM};
     use crate::settings::SETTINGS;
 
@@ -124,7 +124,7 @@ mod board {
             signal,
             next: RIVALS_FROM,
         };
-        show_all::<MicroFft>(&mut field);
+        show_all(&mut field);
     }
 
     #[inline(never)]
@@ -186,18 +186,6 @@ mod board {
 
         fn age_half_ms(&self) -> usize {
             8
-        }
-    }
-
-    /// The crate `microfft`'s transform.
-    #[derive(Default)]
-    struct MicroFft;
-
-    impl Transform for MicroFft {
-        fn add_power(&mut self, samples: &mut [f32; LENGTH], power: &mut [f32; LINES]) {
-            for (power, line) in power.iter_mut().zip(microfft::real::rfft_512(samples)) {
-                *power += line.re * line.re + line.im * line.im;
-            }
         }
     }
 

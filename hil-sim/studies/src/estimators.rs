@@ -8,7 +8,6 @@ pub mod confidence;
 mod costs;
 pub mod efficiency;
 pub mod family;
-mod fourier;
 pub mod parts;
 mod picture;
 mod pitch;

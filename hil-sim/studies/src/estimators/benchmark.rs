@@ -16,7 +16,6 @@ use hil_sim_core::scene::{Scene, SceneError};
 use super::baselines::Rival;
 use super::baselines::adapter::{Answer, Entrant};
 use super::baselines::registry::{Visitor, show_all};
-use super::fourier::RealFft;
 use super::parts::{RIVALS_FROM, SETTINGS_FROM};
 use super::pitch::{mcleod, operations_of_mcleod, operations_of_yin, yin};
 use super::settings::{SETTINGS, Setting};
@@ -108,7 +107,7 @@ impl Contestant {
 pub fn contestants() -> Vec<Contestant> {
     let ours = (SETTINGS_FROM..).zip(SETTINGS);
     let mut field = Field(ours.map(|(part, of)| Contestant::ours(of, part)).collect());
-    show_all::<RealFft>(&mut field);
+    show_all(&mut field);
     let [yin_160, yin_320] = [operations_of_yin::<160>, operations_of_yin::<320>];
     let mcleod_160 = Work::Operations(operations_of_mcleod::<160, 256>);
     let mcleod_320 = Work::Operations(operations_of_mcleod::<320, 512>);
@@ -286,7 +285,7 @@ mod tests {
 
     #[test]
     fn each_rival_on_the_board_finds_a_clean_sine_within_its_resolution() {
-        show_all::<RealFft>(&mut Check);
+        show_all(&mut Check);
     }
 
     #[test]

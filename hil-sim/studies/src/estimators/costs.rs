@@ -7,8 +7,8 @@ use hil_sim_boards::ElfError;
 use hil_sim_boards::cost::{Taken, measure_example};
 
 use super::benchmark::Work;
-use super::fourier::operations_of_transform;
 use super::parts::{FRONT, TRANSFORM};
+use super::pitch::operations_of_transform;
 
 /// Milliseconds from one answer to the next.
 const MS_PER_ANSWER: f64 =

@@ -1,10 +1,13 @@
-//! YIN and McLeod's method, of the crate `pitch-detection`, on one gauge.
+//! YIN and McLeod's method, of the crate `pitch-detection`, on one gauge. They work with the number that counts,
+//! here as well as where their work is counted: each kind of number has the whole of a Fourier transform compiled.
 
 use pitch_detection::detector::PitchDetector;
 use pitch_detection::detector::mcleod::McLeodDetector;
 use pitch_detection::detector::yin::YINDetector;
 use protocol::GAUGES;
+use realfft::RealFftPlanner;
 
+use super::baselines::spectrum::LENGTH;
 use super::baselines::{HEARD, Rival, Window};
 use super::tally::{Tally, operations};
 
@@ -24,7 +27,7 @@ pub struct Pitch<const N: usize, D> {
 }
 
 /// YIN.
-pub fn yin<const N: usize>() -> Pitch<N, YINDetector<f32>> {
+pub fn yin<const N: usize>() -> Pitch<N, YINDetector<Tally>> {
     Pitch {
         window: Window::default(),
         detector: YINDetector::new(N, 0),
@@ -33,7 +36,7 @@ pub fn yin<const N: usize>() -> Pitch<N, YINDetector<f32>> {
 }
 
 /// McLeod's method, the window filled up with zeros to `LENGTH`.
-pub fn mcleod<const N: usize, const LENGTH: usize>() -> Pitch<N, McLeodDetector<f32>> {
+pub fn mcleod<const N: usize, const LENGTH: usize>() -> Pitch<N, McLeodDetector<Tally>> {
     Pitch {
         window: Window::default(),
         detector: McLeodDetector::new(N, LENGTH - N),
@@ -41,7 +44,7 @@ pub fn mcleod<const N: usize, const LENGTH: usize>() -> Pitch<N, McLeodDetector<
     }
 }
 
-impl<const N: usize, D: PitchDetector<f32>> Rival for Pitch<N, D> {
+impl<const N: usize, D: PitchDetector<Tally>> Rival for Pitch<N, D> {
     fn push(&mut self, sample: &[f32; GAUGES]) {
         self.window.push(sample);
     }
@@ -50,14 +53,15 @@ impl<const N: usize, D: PitchDetector<f32>> Rival for Pitch<N, D> {
         if !self.window.is_full() {
             return None;
         }
-        let signal = self.window.swing(HEARD);
+        let signal = self.window.swing(HEARD).map(Tally);
         let rate_hz = firmware_sensor::SAMPLE_RATE_HZ as usize;
         // Silence has no pitch.
-        let power = f32::MIN_POSITIVE;
+        let power = Tally(f32::MIN_POSITIVE);
         let pitch = self
             .detector
-            .get_pitch(&signal, rate_hz, power, self.clarity)?;
-        (pitch.frequency.is_finite() && pitch.frequency > 0.0).then_some(pitch.frequency)
+            .get_pitch(&signal, rate_hz, power, Tally(self.clarity))?;
+        let Tally(frequency_hz) = pitch.frequency;
+        (frequency_hz.is_finite() && frequency_hz > 0.0).then_some(frequency_hz)
     }
 
     fn age_half_ms(&self) -> usize {
@@ -82,5 +86,18 @@ fn operations_of<const N: usize>(mut detector: impl PitchDetector<Tally>, clarit
         let swing: Vec<Tally> = tone.iter().map(|x| *x - mean).collect();
         let rate_hz = firmware_sensor::SAMPLE_RATE_HZ as usize;
         detector.get_pitch(&swing, rate_hz, Tally(0.0), Tally(clarity));
+    })
+}
+
+/// Of `realfft`'s transform of [`LENGTH`] samples.
+pub fn operations_of_transform() -> u64 {
+    let transform = RealFftPlanner::<Tally>::new().plan_fft_forward(LENGTH);
+    let (mut samples, mut lines, mut scratch) = (
+        vec![Tally(1.0); LENGTH],
+        transform.make_output_vec(),
+        transform.make_scratch_vec(),
+    );
+    operations(|| {
+        let _ = transform.process_with_scratch(&mut samples, &mut lines, &mut scratch);
     })
 }

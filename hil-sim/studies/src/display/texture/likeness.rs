@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use rustfft::algorithm::Radix4;
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 
 /// Samples a second: the display's ticks.
 pub const TICKS_HZ: f64 = 2_000.0;
@@ -19,13 +20,13 @@ const HOP: usize = SEGMENT / 2;
 
 /// The spectra of half-overlapping segments under a Hann window.
 pub fn segments(signal: &[f64]) -> Vec<Vec<Complex<f64>>> {
-    let transform = RealFftPlanner::new().plan_fft_forward(SEGMENT);
+    // By name: what plans any transform brings all of them along.
+    let transform = Radix4::new(SEGMENT, FftDirection::Forward);
     let hann = |n: usize| 0.5 - 0.5 * (TAU * n as f64 / SEGMENT as f64).cos();
     let transformed = |segment: &[f64]| {
-        let windowed = segment.iter().enumerate().map(|(n, x)| x * hann(n));
-        let mut lines = transform.make_output_vec();
-        let done = transform.process(&mut windowed.collect::<Vec<_>>(), &mut lines);
-        debug_assert!(done.is_ok(), "the lengths agree");
+        let windowed = segment.iter().enumerate();
+        let mut lines: Vec<_> = windowed.map(|(n, x)| Complex::from(x * hann(n))).collect();
+        transform.process(&mut lines);
         lines
     };
     let segments = signal.windows(SEGMENT).step_by(HOP);

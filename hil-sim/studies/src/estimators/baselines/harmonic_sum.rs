@@ -8,7 +8,7 @@
 
 use protocol::GAUGES;
 
-use super::spectrum::{LENGTH, LINE_HZ, LINES, Transform};
+use super::spectrum::{LENGTH, LINE_HZ, LINES, add_power};
 use super::{HIGHEST_HZ, Rival, Window};
 
 /// Harmonics at most.
@@ -41,26 +41,25 @@ fn between_lines(power: &[f32; LINES]) -> [f32; PLACES] {
 
 /// Harmonic summation over `N` ms, at most [`LENGTH`].
 #[derive(Clone, Debug)]
-pub struct HarmonicSum<const N: usize, T> {
+pub struct HarmonicSum<const N: usize> {
     window: Window<N>,
     hann: [f32; N],
-    transform: T,
 }
 
-impl<const N: usize, T: Transform> HarmonicSum<N, T> {
-    /// The lowest fundamental, as a place.
-    const FIRST: usize = (2.0 * SAMPLE_RATE_HZ / N as f32 / PLACE_HZ) as usize + 1;
-
-    /// With this transform.
-    pub fn new(transform: T) -> Self {
+impl<const N: usize> Default for HarmonicSum<N> {
+    fn default() -> Self {
         const { assert!(N <= LENGTH) };
         let angle = 2.0 * core::f32::consts::PI / N as f32;
         Self {
             window: Window::default(),
             hann: core::array::from_fn(|n| 0.5 - 0.5 * libm::cosf(angle * (n as f32 + 0.5))),
-            transform,
         }
     }
+}
+
+impl<const N: usize> HarmonicSum<N> {
+    /// The lowest fundamental, as a place.
+    const FIRST: usize = (2.0 * SAMPLE_RATE_HZ / N as f32 / PLACE_HZ) as usize + 1;
 
     /// A gauge's samples without their mean, weighted. They are made anew each time: kept, they would fill
     /// the board's stack.
@@ -82,7 +81,7 @@ impl<const N: usize, T: Transform> HarmonicSum<N, T> {
                 *to = x * weight;
                 energy += x * x * weight;
             }
-            self.transform.add_power(&mut samples, &mut power);
+            add_power(&mut samples, &mut power);
         }
         if energy <= 0.0 {
             return None;
@@ -144,7 +143,7 @@ impl<const N: usize, T: Transform> HarmonicSum<N, T> {
     }
 }
 
-impl<const N: usize, T: Transform> Rival for HarmonicSum<N, T> {
+impl<const N: usize> Rival for HarmonicSum<N> {
     fn push(&mut self, sample: &[f32; GAUGES]) {
         self.window.push(sample);
     }

@@ -13,34 +13,32 @@ const FIRST_LINE: usize = (LOWEST_HZ / LINE_HZ) as usize;
 /// The line after the last one that is looked at.
 pub const LINES: usize = (HIGHEST_HZ / LINE_HZ) as usize + 1;
 
-/// A Fourier transform: a crate for the host, another for the board.
-pub trait Transform {
-    /// Adds the power of the first [`LINES`] lines of `samples`, which may be used up.
-    fn add_power(&mut self, samples: &mut [f32; LENGTH], power: &mut [f32; LINES]);
+/// Adds the power of the first [`LINES`] lines of `samples`, which are used up.
+pub fn add_power(samples: &mut [f32; LENGTH], power: &mut [f32; LINES]) {
+    for (power, line) in power.iter_mut().zip(microfft::real::rfft_512(samples)) {
+        *power += line.re * line.re + line.im * line.im;
+    }
 }
 
 /// The peak of the spectrum over `N` ms, at most [`LENGTH`].
 #[derive(Clone, Debug)]
-pub struct Spectrum<const N: usize, T> {
+pub struct Spectrum<const N: usize> {
     window: Window<N>,
     hann: [f32; N],
-    transform: T,
 }
 
-impl<const N: usize, T: Transform> Spectrum<N, T> {
-    /// With this transform.
-    pub fn new(transform: T) -> Self {
+impl<const N: usize> Default for Spectrum<N> {
+    fn default() -> Self {
         const { assert!(N <= LENGTH) };
         let angle = 2.0 * core::f32::consts::PI / N as f32;
         Self {
             window: Window::default(),
             hann: core::array::from_fn(|n| 0.5 - 0.5 * libm::cosf(angle * (n as f32 + 0.5))),
-            transform,
         }
     }
 }
 
-impl<const N: usize, T: Transform> Rival for Spectrum<N, T> {
+impl<const N: usize> Rival for Spectrum<N> {
     fn push(&mut self, sample: &[f32; GAUGES]) {
         self.window.push(sample);
     }
@@ -56,7 +54,7 @@ impl<const N: usize, T: Transform> Rival for Spectrum<N, T> {
             for ((to, x), weight) in samples.iter_mut().zip(&swing).zip(&self.hann) {
                 *to = x * weight;
             }
-            self.transform.add_power(&mut samples, &mut power);
+            add_power(&mut samples, &mut power);
         }
         Some((FIRST_LINE as f32 + peak(&power[FIRST_LINE..])?) * LINE_HZ)
     }
