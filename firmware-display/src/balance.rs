@@ -29,6 +29,7 @@ use core::f64::consts::PI;
 use protocol::UpdateRate;
 
 use crate::ACTUATORS;
+use crate::pace::RateChange;
 use crate::sine::ONE;
 
 /// τ in ticks is 2 to this at 2 kHz.
@@ -144,6 +145,12 @@ impl Balance {
     /// Which channels have the same charge.
     pub const fn sharing(&self) -> Sharing {
         self.sharing
+    }
+
+    /// Ticks last another time from now on.
+    pub const fn change_rate(&mut self, change: RateChange) {
+        self.working = change.ticks(self.working);
+        self.ticks = change.ticks(self.ticks);
     }
 
     /// All outputs have gone to 0 V.

@@ -14,6 +14,9 @@ use embassy_stm32::timer::low_level::Timer;
 /// CLR falls this long after it was held off last: four ticks at 2 kHz.
 const HOLD_OFF_US: u16 = 2_000;
 
+/// So long before its end a pulse is left to end: from looking at it to starting it anew it takes less.
+const FALLING_US: u16 = 2;
+
 /// What holds CLR off.
 pub struct ClearGuard {
     _timer: Timer<'static, TIM1>,
@@ -54,13 +57,17 @@ impl ClearGuard {
         !pac::TIM1.cr1().read().cen()
     }
 
-    /// CLR high, for [`HOLD_OFF_US`] from now.
+    /// CLR high, for [`HOLD_OFF_US`] from now. Not if it has fallen, or is about to, though in this tick it was not seen low
+    /// yet: it is left for the next tick to see.
     ///
     /// The counter is started before it is set: should software end between the two, it runs out and
     /// CLR falls. A counter that stood at 1 would keep CLR high: if the pulse before ended between the two, it is set
     /// back.
-    pub fn hold_off(&mut self) {
+    pub fn hold_off(&mut self, was_low: bool) {
         let r = pac::TIM1;
+        if !was_low && (self.is_low() || r.cnt().read().cnt() >= HOLD_OFF_US - FALLING_US) {
+            return;
+        }
         let mut running = Cr1Gp16(0);
         running.set_opm(true);
         running.set_cen(true);

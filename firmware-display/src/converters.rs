@@ -83,8 +83,9 @@ impl Converters {
         self.clear.is_low()
     }
 
-    /// Keeps CLR off for 2 ms from now.
-    pub fn hold_off(&mut self) {
-        self.clear.hold_off();
+    /// Keeps CLR off for 2 ms from now, unless it has fallen since it was looked at: `was_clear` is what
+    /// [`Converters::is_clear`] said in this tick.
+    pub fn hold_off(&mut self, was_clear: bool) {
+        self.clear.hold_off(was_clear);
     }
 }

@@ -2,7 +2,7 @@
 
 use protocol::{
     DisplayConfiguration, DisplayCounters, DisplayState, Estimate, Hold, Motion, StopReason,
-    Texture, Trip,
+    Texture, Trip, UpdateRate,
 };
 
 use crate::endurance::Endurance;
@@ -109,7 +109,7 @@ impl Display {
             .set_times(configuration.fade_in_ms, configuration.fade_out_ms);
         self.stimulus.configure(&configuration, actuators);
         self.limits
-            .set(configuration.update_rate, configuration.amplitude_mv);
+            .set(self.stimulus.rate(), configuration.amplitude_mv);
         // A lower age makes too old at once what no tick, and no texture, will see to become so.
         if !self.relief.wave_is_fresh(configuration.max_age_ms) {
             self.stimulus.wear_off();
@@ -199,7 +199,9 @@ impl Display {
             // The words that it sent last are 0 V.
             self.is_off = senses.is_clear || senses.transfer == Transfer::Done;
         }
-        let quarters = per_tick(self.configuration.update_rate);
+        let rate = self.stimulus.rate();
+        self.limits.pace(rate);
+        let quarters = per_tick(rate);
         let elapsed = quarters.saturating_mul(senses.missed_ticks.saturating_add(1));
         let travel = self.hand.read(encoder, elapsed);
         self.elapse(elapsed);
@@ -216,6 +218,11 @@ impl Display {
             send,
             release: supervisor::releases(self.state),
         }
+    }
+
+    /// How long the next tick is: another rate is in force from the one after it on.
+    pub const fn rate(&self) -> UpdateRate {
+        self.stimulus.rate()
     }
 
     /// The words of the last tick: [`ZERO_VOLT`] is 0 V, a step 10 V / 65 536.
@@ -273,7 +280,7 @@ impl Display {
         self.forget(quarters);
         self.endurance.elapse(
             quarters,
-            self.state == DisplayState::Driving,
+            matches!(self.state, DisplayState::Driving | DisplayState::Fading(_)),
             rests,
             self.configuration.full_drive_s,
         );

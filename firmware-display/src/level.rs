@@ -8,6 +8,7 @@
 use protocol::{DisplayConfiguration, Friction, UpdateRate};
 
 use crate::gate::OPEN;
+use crate::pace::RateChange;
 use crate::ticks_at;
 
 /// The level of 5 V: the largest word above and below 0 V, in DAC steps of Q16.
@@ -59,17 +60,18 @@ impl Level {
             ticks_left: 0,
             turn: 0,
         };
-        level.configure(configuration);
+        level.configure(configuration, configuration.update_rate);
         level.settle();
         level
     }
 
-    /// Takes amplitude and references of a checked configuration, to be reached in [`GLIDE_MS`].
-    pub fn configure(&mut self, configuration: &DisplayConfiguration) {
+    /// Takes amplitude and references of a checked configuration, to be reached in [`GLIDE_MS`] of ticks of `rate`, whatever
+    /// its own is.
+    pub fn configure(&mut self, configuration: &DisplayConfiguration, rate: UpdateRate) {
         self.amplitude_mv = u32::from(configuration.amplitude_mv).min(FULL_MV);
         self.reference_lsb = configuration.reference_lsb;
         self.reference_mn = configuration.reference_mn;
-        self.aim(configuration.update_rate);
+        self.aim(rate);
     }
 
     /// Takes the surface's amplitude in ADC steps; what is no amplitude counts as none.
@@ -116,6 +118,14 @@ impl Level {
     pub const fn settle(&mut self) {
         self.value = self.target;
         self.ticks_left = 0;
+    }
+
+    /// Ticks last another time from now on.
+    pub fn change_rate(&mut self, change: RateChange) {
+        self.ticks_left = change.ticks(self.ticks_left);
+        self.per_tick = change.a_tick(self.per_tick);
+        // As near to 0 as a tick's own.
+        self.turn = change.a_tick(self.turn).clamp(1 - (1 << 30), (1 << 30) - 1);
     }
 
     /// One tick in which the wave turned by `turn` / 2³² turns.
@@ -259,10 +269,11 @@ mod tests {
                 ..DisplayConfiguration::DEFAULT
             };
             let mut level = Level::new(&configuration);
-            level.configure(&DisplayConfiguration {
+            let quieter = DisplayConfiguration {
                 amplitude_mv: 1_000,
                 ..configuration
-            });
+            };
+            level.configure(&quieter, rate);
             let ticks = ticks_at(rate, GLIDE_MS);
             for tick in 1..=ticks {
                 let before = level.amplitude();

@@ -104,6 +104,11 @@ impl Limits {
         }
     }
 
+    /// Ticks last as long as at this rate from now on.
+    pub const fn pace(&mut self, rate: UpdateRate) {
+        self.quarters = per_tick(rate);
+    }
+
     /// Looks at the words of a tick.
     ///
     /// # Errors

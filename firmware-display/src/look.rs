@@ -172,10 +172,16 @@ pub struct Rounds {
 }
 
 impl Rounds {
-    /// A tick at `rate`, with chips that were given `words`: a look into one of them, if it is due.
-    pub fn tick(&mut self, rate: UpdateRate, words: &[u16; ACTUATORS]) -> Option<Look> {
-        self.waited += per_tick(rate);
-        if self.waited < quarters(PERIOD_MS) {
+    /// A tick at `rate`, with chips that were given `words`: a look into one of them, if it is due. In a tick that is not
+    /// `quiet` there can be none; it comes with the next one that is.
+    pub fn tick(
+        &mut self,
+        rate: UpdateRate,
+        quiet: bool,
+        words: &[u16; ACTUATORS],
+    ) -> Option<Look> {
+        self.waited = self.waited.saturating_add(per_tick(rate));
+        if self.waited < quarters(PERIOD_MS) || !quiet {
             return None;
         }
         self.waited = 0;
@@ -263,6 +269,19 @@ mod tests {
     }
 
     #[test]
+    fn a_look_that_is_due_while_there_is_no_quiet_comes_with_the_next_quiet_tick() {
+        let mut rounds = Rounds::default();
+        let mut chips = std::vec::Vec::new();
+        for tick in 1..=40 {
+            // Each that would be one after 2 ms.
+            let quiet = tick % 4 != 0;
+            let look = rounds.tick(UpdateRate::Hz2000, quiet, &WORDS);
+            chips.extend(look.map(|look| look.chip));
+        }
+        assert_eq!(chips, [0, 1, 2, 3, 0, 1, 2, 3, 0]);
+    }
+
+    #[test]
     fn a_look_comes_every_two_milliseconds_whatever_becomes_of_the_rate() {
         let mut rounds = Rounds::default();
         let rates = [UpdateRate::Hz2000, UpdateRate::Hz4000];
@@ -270,7 +289,7 @@ mod tests {
         for tick in 0..4_000 {
             let rate = rates[tick / 3 % 2];
             waited += per_tick(rate);
-            if rounds.tick(rate, &WORDS).is_some() {
+            if rounds.tick(rate, true, &WORDS).is_some() {
                 // A long tick may end it a quarter late.
                 assert!((8..=9).contains(&waited), "{tick}: {waited}");
                 (waited, looks) = (0, looks + 1);

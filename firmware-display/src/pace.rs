@@ -20,3 +20,26 @@ pub const fn quarters(ms: u32) -> u32 {
 pub const fn per_tick(rate: UpdateRate) -> u32 {
     FASTEST_HZ / rate.hz()
 }
+
+/// From one update rate to another: what is counted in ticks, or added a tick, goes on as it was in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RateChange {
+    /// The rate before.
+    pub from: UpdateRate,
+    /// The rate from now on.
+    pub to: UpdateRate,
+}
+
+impl RateChange {
+    /// Ticks that last as long as `ticks` did; none of none alone.
+    pub const fn ticks(self, ticks: u32) -> u32 {
+        ticks
+            .saturating_mul(per_tick(self.from))
+            .div_ceil(per_tick(self.to))
+    }
+
+    /// What has to be added a tick where `amount` was.
+    pub const fn a_tick(self, amount: i32) -> i32 {
+        amount.saturating_mul(per_tick(self.to) as i32) / per_tick(self.from) as i32
+    }
+}

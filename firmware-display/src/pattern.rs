@@ -10,6 +10,7 @@
 use protocol::actuators::Actuator;
 use protocol::{ACTUATORS, Mode};
 
+use crate::pace::RateChange;
 use crate::sine::sine;
 
 /// The phase of each place ahead of the middle, on its way to where it is to be. Actuators that are at the same place
@@ -130,6 +131,14 @@ impl Pattern {
     fn target(&self, place: usize, per_micrometre: u32) -> u32 {
         let way = (i32::from(self.places_um[place]) as u32).wrapping_mul(per_micrometre);
         way.wrapping_add(u32::from(self.trims[place]) << 16)
+    }
+
+    /// Ticks last another time from now on.
+    pub fn change_rate(&mut self, change: RateChange) {
+        self.ticks_left = change.ticks(self.ticks_left);
+        for step in &mut self.per_tick {
+            *step = change.a_tick(*step);
+        }
     }
 
     /// Is there at once: for when nobody feels it.

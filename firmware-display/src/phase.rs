@@ -8,6 +8,7 @@
 //! travel taken back takes the phase back to the same bit: a reversed stroke plays the wave back.
 
 use crate::MICROMETRES_PER_COUNT;
+use crate::pace::RateChange;
 
 /// The shortest wavelength followed, in mm: 20 counts of the encoder.
 pub const SHORTEST_WAVELENGTH_MM: f32 = 0.1;
@@ -83,6 +84,12 @@ impl Phase {
     /// Ticks until the wavenumber is that of the wavelength followed; 0 if it is.
     pub const fn ticks_left(&self) -> u32 {
         self.ticks_left
+    }
+
+    /// Ticks last another time from now on.
+    pub const fn change_rate(&mut self, change: RateChange) {
+        self.ticks_left = change.ticks(self.ticks_left);
+        self.per_tick = change.a_tick(self.per_tick);
     }
 
     /// Has the wavenumber of the wavelength followed at once: for when nobody feels it.

@@ -16,7 +16,7 @@
 use protocol::UpdateRate;
 
 use crate::gate::RAMP_MS;
-use crate::ticks_at;
+use crate::pace::{per_tick, quarters};
 
 /// A hand that has not left two neighbouring counts for so long rests.
 pub const REST_MS: u16 = 13;
@@ -30,8 +30,8 @@ const _: () = assert!(REST_MS + RAMP_MS <= 19);
 pub struct Rest {
     /// The hand's position above the lower count of the interval.
     above: i32,
-    /// Ticks since the interval was moved.
-    ticks: u32,
+    /// Quarters of a millisecond since the interval was moved.
+    passed: u32,
     resting: bool,
 }
 
@@ -39,7 +39,7 @@ impl Default for Rest {
     fn default() -> Self {
         Self {
             above: 0,
-            ticks: 0,
+            passed: 0,
             resting: true,
         }
     }
@@ -49,14 +49,14 @@ impl Rest {
     /// One tick in which the hand moved by `travel` counts.
     pub fn tick(&mut self, travel: i16, rate: UpdateRate) {
         self.above += i32::from(travel);
-        self.ticks += 1;
+        self.passed += per_tick(rate);
         // How far the hand may be outside of the interval.
         let room = if self.resting { SETTING_OUT - 1 } else { 0 };
         let outside = !(-room..=1 + room).contains(&self.above);
-        if outside || self.ticks >= ticks_at(rate, REST_MS) {
+        if outside || self.passed >= quarters(REST_MS as u32) {
             self.resting = !outside;
             self.above = self.above.clamp(0, 1);
-            self.ticks = 0;
+            self.passed = 0;
         }
     }
 
@@ -69,6 +69,7 @@ impl Rest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ticks_at;
 
     const RATES: [UpdateRate; 2] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
 

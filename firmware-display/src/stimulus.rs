@@ -21,6 +21,7 @@ use crate::array::{Array, EACH};
 use crate::balance::{Balance, Channels, Drive, Sharing};
 use crate::gate::Gate;
 use crate::level::Level;
+use crate::pace::RateChange;
 use crate::pattern::Pattern;
 use crate::phase::{Phase, Wavelength};
 use crate::plausibility::{are_about_the_same, is_another_surface};
@@ -39,7 +40,10 @@ const LEAST_GLIDE_MS: u16 = 10;
 /// Time is counted in ticks alone: the same calls give the same words.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stimulus {
+    /// Of the tick that comes next.
     rate: UpdateRate,
+    /// Of those after it.
+    next_rate: UpdateRate,
     glide_ms: u16,
     description: Description,
     /// A description that waits until the one in force is silent.
@@ -78,6 +82,7 @@ impl Stimulus {
         let skin = Skin::new(configuration.rendering, actuators, &pattern);
         Self {
             rate: configuration.update_rate,
+            next_rate: configuration.update_rate,
             glide_ms: configuration.glide_ms,
             description: Description {
                 mode: configuration.mode,
@@ -104,15 +109,16 @@ impl Stimulus {
 
     /// Takes a checked configuration. A new amplitude is reached in 20 ms; a new mode or rendering, and new actuators,
     /// come into force when the gate has closed, which takes 6 ms, and it opens again in 6 ms. If nothing
-    /// is to be heard all is in force with the next tick.
+    /// is to be heard all is in force with the next tick. Another rate is so after the next tick, since the period under way
+    /// keeps its length; the stimulus goes on through it.
     pub fn configure(
         &mut self,
         configuration: &DisplayConfiguration,
         actuators: &[Actuator; ACTUATORS],
     ) {
-        self.rate = configuration.update_rate;
+        self.next_rate = configuration.update_rate;
         self.glide_ms = configuration.glide_ms;
-        self.level.configure(configuration);
+        self.level.configure(configuration, self.rate);
         let asked = Description {
             mode: configuration.mode,
             rendering: configuration.rendering,
@@ -163,9 +169,37 @@ impl Stimulus {
         self.level.rub(friction, self.rate);
     }
 
+    /// How long the next tick is.
+    pub const fn rate(&self) -> UpdateRate {
+        self.rate
+    }
+
     /// One tick in which the hand moved by `travel` counts of 5 µm; `gain` is the supervisor's, in Q31,
     /// 0 to 2³¹. True if any of [`Stimulus::words`] changed.
     pub fn tick(&mut self, travel: i16, gain: u32) -> bool {
+        let changed = self.play(travel, gain);
+        if self.rate != self.next_rate {
+            self.change_rate();
+        }
+        changed
+    }
+
+    /// Not inlined, since it is seldom.
+    #[inline(never)]
+    fn change_rate(&mut self) {
+        let change = RateChange {
+            from: self.rate,
+            to: self.next_rate,
+        };
+        self.phase.change_rate(change);
+        self.pattern.change_rate(change);
+        self.wave.change_rate(change);
+        self.level.change_rate(change);
+        self.balance.change_rate(change);
+        self.rate = self.next_rate;
+    }
+
+    fn play(&mut self, travel: i16, gain: u32) -> bool {
         let turned = self.phase.advance(travel);
         self.place_um = self
             .place_um

@@ -122,13 +122,11 @@ async fn drive(
         let output = display.tick(encoder, &senses);
         // Outputs that can't be changed go to 0 V.
         if output.release && transfer == Transfer::Done {
-            converters.hold_off();
+            converters.hold_off(is_clear);
         }
         // What CLR took away is not looked for before it is there again.
         let quiet = transfer == Transfer::Done && !senses.clear_fell;
-        let rate = display.configuration().update_rate;
-        let look = rounds.tick(rate, display.words()).filter(|_| quiet);
-        match look {
+        match rounds.tick(display.rate(), quiet, display.words()) {
             look if output.send => converters.update(display.words(), look),
             Some(look) => converters.look(look),
             None => {}

@@ -18,6 +18,7 @@ use protocol::{Rendering, Texture, UpdateRate};
 
 use crate::grain;
 use crate::level::FALLS_FROM_HZ;
+use crate::pace::RateChange;
 use crate::phase::{TURN, Wavelength};
 use crate::sine::{ONE, sine};
 use crate::{MICROMETRES_PER_COUNT, ticks_at};
@@ -124,6 +125,17 @@ impl Wave {
         let plain = self.plain();
         if self.target != plain {
             self.aim(plain, rate);
+        }
+    }
+
+    /// Ticks last another time from now on.
+    pub fn change_rate(&mut self, change: RateChange) {
+        let before = self.ticks_left;
+        self.ticks_left = change.ticks(before);
+        self.travel = change.a_tick(self.travel);
+        if self.ticks_left > 0 {
+            let part = before as f32 / self.ticks_left as f32;
+            self.per_tick = self.per_tick.map(|step| step * part);
         }
     }
 

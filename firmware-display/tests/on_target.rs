@@ -124,7 +124,7 @@ mod tests {
         assert!(jig::first(0).is_none());
         for _ in 0..5 {
             jig::forget();
-            converters.hold_off();
+            converters.hold_off(true);
             assert!(!converters.is_clear());
             let Some(rise) = jig::first(100) else {
                 defmt::panic!("CLR does not rise on the wire from D6 to D36");
@@ -145,10 +145,10 @@ mod tests {
     fn clr_stays_high_for_as_long_as_it_is_held_off(bench: &mut Bench) {
         let converters = &mut bench.board.converters;
         jig::capture(Edges::Pulse);
-        converters.hold_off();
+        converters.hold_off(true);
         for _ in 0..100 {
             wait_us(500);
-            converters.hold_off();
+            converters.hold_off(false);
             assert!(!converters.is_clear());
         }
         assert!(jig::second(0).is_none());
@@ -156,6 +156,18 @@ mod tests {
         assert!(jig::second(HOLD_OFF_US + 100).is_some());
         let us = cycles().wrapping_sub(begun) / CYCLES_PER_US;
         assert!(us.abs_diff(HOLD_OFF_US) <= 5);
+    }
+
+    #[test]
+    fn clr_that_has_fallen_unseen_stays_low_until_it_was_seen(bench: &mut Bench) {
+        let converters = &mut bench.board.converters;
+        for late_us in [0, 10, 500] {
+            converters.hold_off(true);
+            wait_us(HOLD_OFF_US + late_us);
+            converters.hold_off(false);
+            assert!(converters.is_clear());
+            feed();
+        }
     }
 
     #[test]

@@ -52,6 +52,7 @@ impl Drive {
 #[derive(Clone, Debug, Default)]
 pub struct Arm {
     following: Option<Following>,
+    stand: Stand,
     /// What stopped it first, for good.
     stopped: Option<Trip>,
 }
@@ -67,14 +68,13 @@ struct Following {
     velocity_um_s: i32,
     /// Since the last motion came.
     age_ms: u32,
-    watch: Watch,
+    /// When the arm was where, if it has been seen since the first motion came.
+    seen: Option<(u64, i64)>,
 }
 
-/// Looks whether the arm does what its drive is told.
-#[derive(Clone, Copy, Debug)]
-struct Watch {
-    /// When it was where, if it has been seen.
-    seen: Option<(u64, i64)>,
+/// An arm that stands where it is, whatever it is told and whatever becomes of the hand meanwhile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stand {
     /// Where it was when it was last seen to move.
     stood_um: i64,
     /// How far its drive was told to go since then, in nm.
@@ -97,10 +97,7 @@ impl Arm {
             Some(f) if f.leads_to(motion) => f.offset_um,
             _ => motion.position_um.saturating_sub(arm_um),
         };
-        let watch = match &self.following {
-            Some(f) => f.watch,
-            None => Watch::new(arm_um),
-        };
+        let seen = self.following.as_ref().and_then(|f| f.seen);
         self.following = Some(Following {
             sequence: motion.sequence,
             instant_us: motion.instant_us,
@@ -108,7 +105,7 @@ impl Arm {
             hand_um: motion.position_um,
             velocity_um_s: motion.velocity_um_s,
             age_ms: 0,
-            watch,
+            seen,
         });
         true
     }
@@ -150,7 +147,9 @@ impl Arm {
             self.following = None;
             return Drive::default();
         }
-        if let Some(trip) = f.watch.look(instant_us, arm_um, full_scale_um_s) {
+        let jumped = f.look(instant_us, arm_um).then_some(Trip::ArmEncoder);
+        let stalled = self.stand.look(arm_um, full_scale_um_s);
+        if let Some(trip) = jumped.or(stalled.then_some(Trip::ArmStall)) {
             self.stop(trip);
             return Drive::default();
         }
@@ -164,37 +163,20 @@ impl Arm {
         let full_scale = i64::from(full_scale_um_s);
         let command_um_s =
             (velocity_um_s + POSITION_GAIN_PER_S * error_um).clamp(-full_scale, full_scale);
-        f.watch.tell(command_um_s as i32, full_scale_um_s);
+        self.stand.tell(command_um_s as i32, full_scale_um_s);
         drive(command_um_s, full_scale_um_s)
     }
 }
 
-impl Watch {
-    fn new(arm_um: i64) -> Self {
-        Self {
-            seen: None,
-            stood_um: arm_um,
-            told_nm: 0,
-        }
-    }
-
-    /// Takes where the arm is. What is wrong with it, if something is.
-    fn look(&mut self, instant_us: u64, arm_um: i64, full_scale_um_s: u32) -> Option<Trip> {
-        if let Some((before_us, before_um)) = self.seen.replace((instant_us, arm_um)) {
-            // A pause longer than a second would not be followed across.
-            let us = instant_us.saturating_sub(before_us).min(1_000_000);
-            let most_um = MOST_TURN_M_S * us + LEAST_TURN_UM;
-            if before_um.abs_diff(arm_um) > most_um {
-                return Some(Trip::ArmEncoder);
-            }
-        }
+impl Stand {
+    /// Takes where the arm is. Whether it has stalled.
+    fn look(&mut self, arm_um: i64, full_scale_um_s: u32) -> bool {
         if self.stood_um.abs_diff(arm_um) > TREMBLE_UM {
             self.stood_um = arm_um;
             self.told_nm = 0;
         }
         let most_nm = full_scale_um_s.saturating_mul(STALLED_MS).max(STALLED_NM);
-        let has_stalled = self.told_nm.unsigned_abs() > most_nm;
-        has_stalled.then_some(Trip::ArmStall)
+        self.told_nm.unsigned_abs() > most_nm
     }
 
     /// Takes what the drive is told for the next millisecond.
@@ -207,6 +189,16 @@ impl Watch {
 }
 
 impl Following {
+    /// Takes where the arm is. Whether it cannot have come there.
+    fn look(&mut self, instant_us: u64, arm_um: i64) -> bool {
+        let seen = self.seen.replace((instant_us, arm_um));
+        seen.is_some_and(|(before_us, before_um)| {
+            // A pause longer than a second would not be followed across.
+            let us = instant_us.saturating_sub(before_us).min(1_000_000);
+            before_um.abs_diff(arm_um) > MOST_TURN_M_S * us + LEAST_TURN_UM
+        })
+    }
+
     /// Where the hand is so many µs after its last motion, up to a second, if it goes on with its velocity.
     fn hand_after_um(&self, us: u64) -> i64 {
         let moved_um = i64::from(self.velocity_um_s) * us.cast_signed() / 1_000_000;
@@ -322,6 +314,24 @@ mod tests {
         assert!(!arm.on_motion(&motion(1, 0, 3_000), 0));
         assert!(!arm.on_motion(&motion(u32::MAX, 0, 4_000), 0));
         assert_eq!(step(&mut arm, 0).duty, Drive::FULL / 100);
+    }
+
+    #[test]
+    fn a_stall_is_found_also_if_each_motion_comes_after_a_silence() {
+        for gap_ms in [90, 101, 300] {
+            let mut arm = Arm::default();
+            let (mut ms, mut told_mm) = (0_u64, 0.0);
+            for sequence in 0..20 {
+                arm.on_motion(&motion(sequence, ms as i64 * 60, 60_000), 500);
+                for _ in 0..gap_ms {
+                    ms += 1;
+                    let drive = arm.step(ms * 1_000, 500, FULL_SCALE_UM_S);
+                    told_mm += command_um_s(drive) * 1e-6;
+                }
+            }
+            assert_eq!(arm.trip(), Some(Trip::ArmStall), "{gap_ms}");
+            assert!((9.0..11.0).contains(&told_mm), "{gap_ms}: {told_mm}");
+        }
     }
 
     #[test]

@@ -227,10 +227,6 @@ impl Watched {
         }
     }
 
-    fn quarters_per_tick(&self) -> u32 {
-        per_tick(self.display.configuration().update_rate)
-    }
-
     fn undergo(&mut self, event: &Event) -> Result<(), TestCaseError> {
         match event {
             Event::Estimate(estimate) => self.display.on_estimate(estimate),
@@ -271,6 +267,8 @@ impl Watched {
     fn tick(&mut self, senses: &Senses) -> Result<(), TestCaseError> {
         let before = self.display.state();
         let words_before = *self.display.words();
+        // Of the period that ends with this tick.
+        let passed = per_tick(self.display.rate());
         let output = self.display.tick(self.encoder, senses);
         self.ticks += 1;
         let state = self.display.state();
@@ -295,15 +293,11 @@ impl Watched {
 
         // A quick hold is through in time; it may begin anew only out of Driving.
         let quick = matches!(state, DisplayState::Fading(hold) if hold != Hold::Stale);
-        self.since_hold = if quick {
-            self.since_hold + self.quarters_per_tick()
-        } else {
-            0
-        };
+        self.since_hold = if quick { self.since_hold + passed } else { 0 };
         prop_assert!(self.since_hold < quarters(QUICK_MS));
 
         // No word is beyond the amplitude, and none changes without being sent.
-        self.since_change = self.since_change.saturating_add(self.quarters_per_tick());
+        self.since_change = self.since_change.saturating_add(passed);
         let now_mv = self.display.configuration().amplitude_mv;
         let under_way = self.since_change < quarters(AMPLITUDE_REACHED_MS);
         let most = allowed(if under_way {

@@ -156,6 +156,52 @@ fn words_that_did_not_arrive_are_sent_again_until_they_do() {
 }
 
 #[test]
+fn fading_counts_as_driving() {
+    let mut rig = Rig::new(&DisplayConfiguration {
+        full_drive_s: 10,
+        max_age_ms: 20,
+        fade_in_ms: 1,
+        fade_out_ms: 1_000,
+        ..DisplayConfiguration::DEFAULT
+    });
+    // A hand that never rests, and an estimate as soon as it is silent: nearly all of the time it fades.
+    let mut ticks = 0;
+    while rig.state() != DisplayState::Fading(Hold::FullDrive) {
+        if rig.state() == DisplayState::Ready {
+            rig.estimate(2.0);
+        }
+        rig.tick(7);
+        ticks += 1;
+        assert!(ticks < rig.ticks(11_000));
+    }
+    assert!(ticks >= rig.ticks(10_000));
+}
+
+#[test]
+fn no_sequence_of_rates_and_references_breaks_a_limit() {
+    let base = DisplayConfiguration {
+        reference_lsb: 1_000,
+        max_age_ms: 5_000,
+        ..DisplayConfiguration::DEFAULT
+    };
+    let mut rig = Rig::driving(&base);
+    for change in 0..1_400 {
+        let fast = change % 2 == 0;
+        rig.configure(&DisplayConfiguration {
+            amplitude_mv: 1_000,
+            reference_lsb: 1_000 + change / 2 % 2,
+            update_rate: RATES[usize::from(fast)],
+            ..base
+        });
+        if change % 40 == 0 {
+            rig.estimate(2.0);
+        }
+        rig.tick(if fast { 3 } else { 7 });
+        assert_eq!(rig.state(), DisplayState::Driving, "{change}");
+    }
+}
+
+#[test]
 fn too_long_a_drive_asks_for_a_rest_of_a_second() {
     for rate in RATES {
         let mut rig = Rig::new(&DisplayConfiguration {

@@ -278,6 +278,74 @@ fn another_rate_makes_none() {
     }
 }
 
+/// Counts of a hand of 80 mm/s in a tick.
+fn counts(rate: UpdateRate) -> i16 {
+    (80.0 / 0.005) as i16 / rate.hz() as i16
+}
+
+fn largest(volts: &[Volts]) -> f64 {
+    volts
+        .iter()
+        .flatten()
+        .fold(0.0, |most, v| v.abs().max(most))
+}
+
+#[test]
+fn another_rate_changes_no_amplitude() {
+    // 200 Hz are at full amplitude, 230 Hz on their way down, 470 Hz at its end.
+    for wavelength_mm in [0.4, 0.348, 0.17] {
+        for [from, to] in [RATES, [RATES[1], RATES[0]]] {
+            for offset in 0..20 {
+                let mut rig = Rig::new(Mode::Uniform, from);
+                rig.follow(wavelength_mm);
+                let before = rig.rub(2_000 + offset, counts(from)).split_off(1_800);
+                rig.configure(DisplayConfiguration {
+                    update_rate: to,
+                    ..rig.configuration
+                });
+                // The period under way keeps its length.
+                let mut after = vec![before[before.len() - 1]];
+                after.extend(rig.rub(1, counts(from)));
+                assert!(
+                    largest_step(&after) <= f64::from(MOST_V_PER_MS) * 1e3 / f64::from(from.hz())
+                );
+                after.extend(rig.rub(80, counts(to)));
+                let [before, after] = [largest(&before), largest(&after)];
+                assert!(
+                    (after - before).abs() <= 0.08 * before + 0.02,
+                    "{wavelength_mm} mm, from {from:?}: {before} V, {after} V"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn another_rate_puts_no_rest_off() {
+    for [from, to] in [RATES, [RATES[1], RATES[0]]] {
+        for still in 0..40 {
+            let mut rig = Rig::new(Mode::Uniform, from);
+            rig.follow(2.0);
+            rig.rub(2_017, counts(from));
+            rig.rub(still, 0);
+            rig.configure(DisplayConfiguration {
+                update_rate: to,
+                ..rig.configuration
+            });
+            rig.rub(1, 0);
+            let mut ms = (still + 1) as f64 * 1e3 / f64::from(from.hz());
+            while !rig.is_silent() {
+                rig.rub(1, 0);
+                ms += 1e3 / f64::from(to.hz());
+            }
+            assert!(
+                ms <= 19.0 || still as f64 * 1e3 / f64::from(from.hz()) >= 18.0,
+                "{still}: {ms} ms"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_surface_of_another_amplitude_makes_none_beyond_the_levels() {
     for update_rate in RATES {
