@@ -52,7 +52,7 @@ impl Drive {
 #[derive(Clone, Debug, Default)]
 pub struct Arm {
     following: Option<Following>,
-    stand: Stand,
+    watch: Watch,
     /// What stopped it first, for good.
     stopped: Option<Trip>,
 }
@@ -68,16 +68,16 @@ struct Following {
     velocity_um_s: i32,
     /// Since the last motion came.
     age_ms: u32,
-    /// When the arm was where, if it has been seen since the first motion came.
-    seen: Option<(u64, i64)>,
 }
 
-/// An arm that stands where it is, whatever it is told and whatever becomes of the hand meanwhile.
+/// Looks whether the arm does what its drive is told.
 #[derive(Clone, Copy, Debug, Default)]
-struct Stand {
+struct Watch {
+    /// When it was where, if it has been seen since the first motion came.
+    seen: Option<(u64, i64)>,
     /// Where it was when it was last seen to move.
     stood_um: i64,
-    /// How far its drive was told to go since then, in nm.
+    /// How far its drive was told to go since then, in nm, whatever became of the hand meanwhile.
     told_nm: i32,
 }
 
@@ -97,7 +97,9 @@ impl Arm {
             Some(f) if f.leads_to(motion) => f.offset_um,
             _ => motion.position_um.saturating_sub(arm_um),
         };
-        let seen = self.following.as_ref().and_then(|f| f.seen);
+        if self.following.is_none() {
+            self.watch.seen = None;
+        }
         self.following = Some(Following {
             sequence: motion.sequence,
             instant_us: motion.instant_us,
@@ -105,7 +107,6 @@ impl Arm {
             hand_um: motion.position_um,
             velocity_um_s: motion.velocity_um_s,
             age_ms: 0,
-            seen,
         });
         true
     }
@@ -147,9 +148,7 @@ impl Arm {
             self.following = None;
             return Drive::default();
         }
-        let jumped = f.look(instant_us, arm_um).then_some(Trip::ArmEncoder);
-        let stalled = self.stand.look(arm_um, full_scale_um_s);
-        if let Some(trip) = jumped.or(stalled.then_some(Trip::ArmStall)) {
+        if let Some(trip) = self.watch.look(instant_us, arm_um, full_scale_um_s) {
             self.stop(trip);
             return Drive::default();
         }
@@ -163,20 +162,29 @@ impl Arm {
         let full_scale = i64::from(full_scale_um_s);
         let command_um_s =
             (velocity_um_s + POSITION_GAIN_PER_S * error_um).clamp(-full_scale, full_scale);
-        self.stand.tell(command_um_s as i32, full_scale_um_s);
+        self.watch.tell(command_um_s as i32, full_scale_um_s);
         drive(command_um_s, full_scale_um_s)
     }
 }
 
-impl Stand {
-    /// Takes where the arm is. Whether it has stalled.
-    fn look(&mut self, arm_um: i64, full_scale_um_s: u32) -> bool {
+impl Watch {
+    /// Takes where the arm is. What is wrong with it, if something is.
+    fn look(&mut self, instant_us: u64, arm_um: i64, full_scale_um_s: u32) -> Option<Trip> {
+        if let Some((before_us, before_um)) = self.seen.replace((instant_us, arm_um)) {
+            // A pause longer than a second would not be followed across.
+            let us = instant_us.saturating_sub(before_us).min(1_000_000);
+            let most_um = MOST_TURN_M_S * us + LEAST_TURN_UM;
+            if before_um.abs_diff(arm_um) > most_um {
+                return Some(Trip::ArmEncoder);
+            }
+        }
         if self.stood_um.abs_diff(arm_um) > TREMBLE_UM {
             self.stood_um = arm_um;
             self.told_nm = 0;
         }
         let most_nm = full_scale_um_s.saturating_mul(STALLED_MS).max(STALLED_NM);
-        self.told_nm.unsigned_abs() > most_nm
+        let has_stalled = self.told_nm.unsigned_abs() > most_nm;
+        has_stalled.then_some(Trip::ArmStall)
     }
 
     /// Takes what the drive is told for the next millisecond.
@@ -189,16 +197,6 @@ impl Stand {
 }
 
 impl Following {
-    /// Takes where the arm is. Whether it cannot have come there.
-    fn look(&mut self, instant_us: u64, arm_um: i64) -> bool {
-        let seen = self.seen.replace((instant_us, arm_um));
-        seen.is_some_and(|(before_us, before_um)| {
-            // A pause longer than a second would not be followed across.
-            let us = instant_us.saturating_sub(before_us).min(1_000_000);
-            before_um.abs_diff(arm_um) > MOST_TURN_M_S * us + LEAST_TURN_UM
-        })
-    }
-
     /// Where the hand is so many µs after its last motion, up to a second, if it goes on with its velocity.
     fn hand_after_um(&self, us: u64) -> i64 {
         let moved_um = i64::from(self.velocity_um_s) * us.cast_signed() / 1_000_000;

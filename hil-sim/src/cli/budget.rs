@@ -11,9 +11,8 @@ use hil_sim_studies::display::{RICH_TEXTURE, rendering_of_word};
 use hil_sim_studies::study::{Record, Table};
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::chart::OfDisplay;
 use super::say::say;
-use super::status;
+use super::{DisplayElf, status};
 
 /// Of all instructions, the display may take this many at 2 kHz, in percent: of the sine, and of more than that.
 const GOAL_PERCENT: f64 = 15.0;
@@ -84,7 +83,10 @@ const CYCLES: [(&str, Estimated); 5] = [
 #[derive(Debug, clap::Args)]
 pub(super) struct Budget {
     #[command(flatten)]
-    measured: OfDisplay,
+    elf: DisplayElf,
+    /// A little of it only, to see that it works
+    #[arg(long)]
+    quick: bool,
     /// How much of the surface is played: fundamental, shape or texture; more than the fundamental may take 20 %
     #[arg(long, value_name = "RENDERING", default_value = "fundamental", value_parser = rendering_of_word)]
     rendering: Rendering,
@@ -95,7 +97,7 @@ pub(super) struct Budget {
 
 impl Budget {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
-        let firmware = self.measured.firmware()?;
+        let firmware = self.elf.read()?;
         let is_rich = self.rendering != Rendering::Fundamental;
         let (wavelength_mm, goal, words) = if is_rich {
             let word = self.rendering.name();
@@ -105,7 +107,7 @@ impl Budget {
         };
         let rates = [UpdateRate::Hz2000, UpdateRate::Hz4000];
         let mut columns: Vec<Column> = Vec::new();
-        for &update_rate in &rates[..if self.measured.quick { 1 } else { 2 }] {
+        for &update_rate in &rates[..if self.quick { 1 } else { 2 }] {
             for mode in [Mode::Uniform, Mode::Travelling] {
                 let motion = Motion::Constant {
                     speed_mm_s: SPEED_MM_S,

@@ -2,19 +2,21 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, BufWriter, ErrorKind, Read, Write};
+use std::io::{self, BufWriter, ErrorKind, Read, Seek, Write};
+#[cfg(unix)]
+use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::Context;
 #[cfg(target_os = "linux")]
 use signal_hook::{
-    consts::{SIGINT, SIGTERM},
+    consts::{SIGHUP, SIGINT, SIGTERM},
     iterator::Signals,
     low_level::emulate_default_handler,
 };
 
-use super::say::say;
+use super::say::{keep_standard_output, say};
 
 pub(super) fn create_folder(folder: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(folder).with_context(|| {
@@ -56,11 +58,15 @@ impl Format {
     }
 }
 
+/// Names that a program's own standard output has.
+#[cfg(unix)]
+const STANDARD_OUTPUTS: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+
 /// A file for results, opened before there are any: an hour is not to be lost for a folder that is not there.
 ///
 /// What is written goes to a draft beside it, named `FILE.part`, which takes the file's place at the end: until
 /// then an earlier result is there. A signal that ends the program takes the draft away. A device or a pipe is written
-/// to at once.
+/// to at once. So is standard output, and what else would be printed there goes to standard error.
 pub(super) struct Results<'a> {
     pub path: &'a Path,
     file: BufWriter<File>,
@@ -82,11 +88,26 @@ impl<'a> Results<'a> {
             "-: is no file's name here: give /dev/stdout for standard output, or ./- for a file"
         );
         let wrong = || format!("{here}: cannot be written: give a file in a folder that exists");
+        #[cfg(unix)]
+        if STANDARD_OUTPUTS.iter().any(|name| path == Path::new(name)) {
+            // As it is: opened by its name, a file that it leads to would be begun anew.
+            let out = io::stdout().as_fd().try_clone_to_owned();
+            keep_standard_output();
+            return Ok(Self {
+                path,
+                file: BufWriter::new(File::from(out.with_context(wrong)?)),
+                draft: None,
+            });
+        }
         let there = match fs::metadata(path) {
             Ok(there) => Some(there),
             Err(error) if error.kind() == ErrorKind::NotFound => None,
             Err(error) => return Err(error).with_context(wrong),
         };
+        anyhow::ensure!(
+            there.is_some() || !path.is_symlink(),
+            "{here}: is a link that leads nowhere: nothing was written; give another file, or take it away"
+        );
         if there.as_ref().is_some_and(|there| !there.is_file()) {
             let file = File::options().write(true).open(path).with_context(wrong)?;
             let file = BufWriter::new(file);
@@ -120,6 +141,7 @@ impl<'a> Results<'a> {
         #[cfg(target_os = "linux")]
         take_away_at_signals().with_context(wrong)?;
         let file = File::options()
+            .read(true)
             .write(true)
             .create(true)
             .truncate(false)
@@ -132,8 +154,19 @@ impl<'a> Results<'a> {
             ),
             Err(TryLockError::Error(error)) => return Err(error).with_context(wrong),
         }
+        let mut head = Vec::new();
+        (&file)
+            .take(256)
+            .read_to_end(&mut head)
+            .with_context(wrong)?;
+        anyhow::ensure!(
+            head.is_empty() || format.is_of(&String::from_utf8_lossy(&head)),
+            "{}: is there, and no draft of results: nothing was written; give another file, or take it away",
+            draft.display()
+        );
         drafts().insert(draft.clone());
         file.set_len(0).with_context(wrong)?;
+        (&file).rewind().with_context(wrong)?;
         Ok(Self {
             path,
             file: BufWriter::new(file),
@@ -223,7 +256,7 @@ fn take_away_at_signals() -> io::Result<()> {
     if *are_heard {
         return Ok(());
     }
-    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM])?;
     std::thread::spawn(move || {
         for signal in signals.forever() {
             // Held to the end: none takes its place any more.

@@ -9,7 +9,7 @@ use hil_sim_studies::fuzz::{Draw, Trial};
 
 use super::files::{create_folder, write_all};
 use super::say::say;
-use super::{Elves, EngineName, at_least_one, status, threads};
+use super::{Elves, EngineName, status, threads};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -18,9 +18,9 @@ pub(super) struct Fuzz {
     /// The first scene's seed; each next scene has the next one
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many scenes, 1 or more
-    #[arg(long, default_value_t = 100, value_parser = at_least_one)]
-    scenes: usize,
+    /// How many scenes, 1 to a million
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    scenes: u32,
     /// The most faults of a scene, 0 to 20
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=20))]
     faults: u8,
@@ -45,7 +45,7 @@ impl Fuzz {
         };
         let bench = self.engine.bench(&self.elves)?;
         create_folder(&self.out)?;
-        let seeds = (0..self.scenes).map(|number| self.seed.wrapping_add(number as u64));
+        let seeds = (0..self.scenes).map(|number| self.seed.wrapping_add(number.into()));
         let seeds: Vec<u64> = seeds.collect();
         let name = |seed: u64| format!("fuzz-{seed}");
         let started = Instant::now();

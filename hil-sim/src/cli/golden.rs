@@ -95,9 +95,11 @@ impl What {
     }
 
     fn renew(&self) -> anyhow::Result<ExitCode> {
-        let mut golden = Golden::open(&self.file)?;
+        Golden::open(&self.file)?;
         let scenes = self.load()?;
         let seen = self.run(&scenes, 1)?;
+        // Once more: another may have renewed other scenes meanwhile.
+        let mut golden = Golden::open(&self.file)?;
         let engine = self.way.engine();
         let mut same = 0;
         for (Loaded { path, .. }, seen) in scenes.iter().zip(&seen) {

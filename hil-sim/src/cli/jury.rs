@@ -53,7 +53,7 @@ pub(super) struct Jury {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// How many surfaces, a seed each
-    #[arg(long, value_name = "COUNT", default_value_t = 200)]
+    #[arg(long, value_name = "COUNT", default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=1_000_000))]
     surfaces: u64,
     /// Judge the scenes of this folder instead, which has an index.json with their truths
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seed", "surfaces", "force_channel", "traits", "shapes"])]

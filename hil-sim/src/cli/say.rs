@@ -3,6 +3,7 @@
 use std::fmt::Arguments;
 use std::io::{self, Write};
 use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Prints a line. A reader that has gone away (`| head`) has seen enough: the work goes on, and what it
 /// writes to files is whole.
@@ -25,9 +26,21 @@ macro_rules! tell {
 }
 pub(super) use tell;
 
+/// Whether results are written to standard output.
+static KEPT: AtomicBool = AtomicBool::new(false);
+
+/// Standard output is for results alone: what is said from now on goes to standard error.
+pub(super) fn keep_standard_output() {
+    KEPT.store(true, Ordering::Relaxed);
+}
+
 /// Prints `text` as it is. If it can't be written, for another reason than that nobody reads it, the
 /// program ends with a complaint and exit status 2.
 pub(super) fn text(text: Arguments<'_>) {
+    if KEPT.load(Ordering::Relaxed) {
+        let _ = io::stderr().write_fmt(text);
+        return;
+    }
     let mut out = io::stdout().lock();
     if let Err(error) = out.write_fmt(text).and_then(|()| out.flush())
         && error.kind() != io::ErrorKind::BrokenPipe

@@ -254,6 +254,104 @@ fn a_device_takes_results_as_a_file_does() {
     assert!(!Path::new("/dev/full.part").exists());
 }
 
+/// What a shell's commands print, with the program as `$0`.
+fn shell(folder: &Path, commands: &str) -> (Option<i32>, String) {
+    let output = Command::new("sh")
+        .args(["-c", commands])
+        .arg(command(folder, &[]).get_program())
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    (output.status.code(), printed)
+}
+
+#[test]
+fn standard_output_takes_results_alone_and_keeps_what_is_there() {
+    let folder = folder("standard-output");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    let (status, _) = shell(
+        &folder,
+        "{ echo first; \"$0\" run a.toml --json /dev/stdout; \"$0\" run a.toml --json /dev/stdout; echo last; } > log.txt",
+    );
+    assert_eq!(status, Some(0));
+    let log = fs::read_to_string(folder.join("log.txt")).unwrap();
+    assert!(
+        log.starts_with("first\n[") && log.ends_with("]\nlast\n"),
+        "{log}"
+    );
+    assert_eq!(log.matches("\"name\": \"a\"").count(), 2);
+    let (status, printed) = shell(&folder, "\"$0\" run a.toml --json /dev/stdout");
+    assert_eq!(status, Some(0));
+    let results: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(results[0]["name"], "a");
+}
+
+#[test]
+fn nothing_but_results_and_drafts_of_them_is_written_over() {
+    let folder = folder("over-nothing");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    fs::write(folder.join("o.json.part"), "my notes").unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "o.json"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        errors(&output).contains("o.json.part: is there, and no draft"),
+        "{}",
+        errors(&output)
+    );
+    let notes = fs::read_to_string(folder.join("o.json.part")).unwrap();
+    assert_eq!(notes, "my notes");
+    // What a run that was killed has left is one.
+    fs::write(folder.join("o.json.part"), "[{ \"name\"").unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "o.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    assert!(
+        serde_json::from_str::<serde_json::Value>(
+            &fs::read_to_string(folder.join("o.json")).unwrap()
+        )
+        .is_ok()
+    );
+    std::os::unix::fs::symlink("later.json", folder.join("link.json")).unwrap();
+    let output = hil_sim(&folder, &["run", "a.toml", "--json", "link.json"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        errors(&output).contains("leads nowhere"),
+        "{}",
+        errors(&output)
+    );
+}
+
+#[test]
+fn gauges_may_come_out_of_a_pipe() {
+    let folder = folder("pipe");
+    let rows = (0..8_000).map(|n| format!("{},1.6,1.7,1.65,1.6,1.7\n", f64::from(n) * 250e-6));
+    let table = format!("t_s,g0,g1,g2,g3,g4\n{}", rows.collect::<String>());
+    fs::write(folder.join("table.csv"), table).unwrap();
+    let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"pipe.csv\"\n";
+    fs::write(folder.join("a.toml"), format!("{SOUND}{gauges}")).unwrap();
+    let (status, printed) = shell(
+        &folder,
+        "mkfifo pipe.csv; cat table.csv > pipe.csv & \"$0\" run a.toml 2>&1",
+    );
+    assert_eq!(status, Some(0), "{printed}");
+}
+
+#[test]
+fn exactly_5_mm_s_is_no_motion() {
+    let folder = folder("no-motion");
+    let scene = "duration_s = 2\n[surface]\nspecimens = [{ wavelength_mm = 2.0 }]\n[motion]\nspeed_mm_s = 5\n";
+    fs::write(folder.join("a.toml"), scene).unwrap();
+    let (_, printed) = shell(&folder, "\"$0\" run a.toml --json /dev/stdout");
+    let results: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    for share in ["valid_share", "felt_right_share", "felt_wrong_share"] {
+        assert_eq!(
+            results[0].get(share),
+            Some(&serde_json::Value::Null),
+            "{share}"
+        );
+    }
+}
+
 #[test]
 fn results_that_find_no_room_leave_no_draft_and_the_earlier_ones_in_place() {
     let folder = folder("no-room");

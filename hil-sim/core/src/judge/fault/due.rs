@@ -55,8 +55,15 @@ pub(super) fn weather_signs(link: &Link) -> Vec<Sign> {
         .collect()
 }
 
-/// Whether boards that greet each other once a second may still do so by then, for all that the link lets through.
+/// Whether boards that greet each other once a second may still do so by then, for all that the link lets through. The
+/// first time is while they start.
 pub(super) fn may_still_greet(link: &Link, until_s: f64) -> bool {
+    /// A board greets within so long of its start, and has its answer a way there and back later.
+    const BEGINS_S: f64 = 0.02;
+    let answered_s = BEGINS_S + 2e-3 * (link.delay_ms + link.jitter_ms);
+    if until_s < answered_s {
+        return true;
+    }
     /// A Hello's frame, in bytes.
     const HELLO_BYTES: f64 = HELLO_LENGTH as f64 + 8.0;
     const PERIOD_S: f64 = 1.0;
@@ -328,6 +335,19 @@ fn is_told(fault: &Fault, scene: &Scene) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn boards_greet_while_they_start_and_no_more_where_all_arrives() {
+        let link = Link::default();
+        assert!(may_still_greet(&link, 0.0) && may_still_greet(&link, 0.012));
+        assert!(!may_still_greet(&link, 0.021));
+        let slow = Link {
+            delay_ms: 300.0,
+            ..link
+        };
+        assert!(may_still_greet(&slow, 0.61));
+        assert!(!may_still_greet(&slow, 0.63));
+    }
 
     #[test]
     fn an_arm_has_to_be_missed_where_it_is_told_to_go_far_enough_to_catch_up() {

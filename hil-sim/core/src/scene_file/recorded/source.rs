@@ -365,9 +365,12 @@ impl<'t> Source<'t> {
 fn format(table: &Table<'_>, path: &Path) -> Result<Format, SceneError> {
     let refuse_file = |error: std::io::Error| table.unreadable(path, &error);
     let mut first = Vec::new();
-    fs::File::open(path)
-        .and_then(|file| file.take(8).read_to_end(&mut first))
-        .map_err(refuse_file)?;
+    // What comes out of a pipe comes once, and is text.
+    if fs::metadata(path).map_err(refuse_file)?.is_file() {
+        fs::File::open(path)
+            .and_then(|file| file.take(8).read_to_end(&mut first))
+            .map_err(refuse_file)?;
+    }
     if first.starts_with(b"RIFF") {
         Wav::open(path).map(Format::Wav)
     } else if first.starts_with(b"\x89MCAP") {
