@@ -8,7 +8,7 @@
 //! | --- | --- |
 //! | voltage: the configured amplitude | each word is within it |
 //! | slew: [`MOST_SLEW_V_PER_MS`] | the stimulus never exceeds [`crate::stimulus::MOST_V_PER_MS`] |
-//! | energy: a mean of V² over about 1 s, [`MOST_ENERGY_V2`] | a full sine has 12.5 V²; a hand that swings to and fro over half a wavelength makes 17.6 V² of it |
+//! | energy: a mean of V² over about 1 s, [`MOST_ENERGY_V2`] | a full sine has 12.5 V²; a hand that swings to and fro over half a wavelength makes 16.3 V² of it, and the worst one, over ±0.3 λ, 17.5 V² |
 //! | standing voltage: a mean of V over about 1 s, [`MOST_STANDING_V`] | [`crate::balance`] takes a standing voltage away so that ∫V dt is within ±5 V · [`crate::balance::MOST_S`] |
 
 use protocol::UpdateRate;

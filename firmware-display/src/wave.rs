@@ -28,7 +28,7 @@ pub const GLIDE_MS: u16 = 50;
 /// From this frequency on a partial, or the upper end of a band, fades, to 0 at [`FALLS_FROM_HZ`].
 pub const FADES_FROM_HZ: u32 = 200;
 /// The peak that keeps the energy limit whatever the hand does: 0.84² · 25 V² are 17.6 V², as much as a sine makes under
-/// a hand that swings to and fro over half a wavelength.
+/// the worst hand, which swings to and fro over ±0.3 λ.
 pub const CALM_PEAK: f32 = 0.84;
 /// What such a hand makes of a sine: 5 V times this is the root of 17.5 V².
 const SWINGING_SINE: f32 = 0.836_7;

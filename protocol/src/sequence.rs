@@ -1,6 +1,6 @@
 //! Which frames came, which are missing, and which came too late or twice.
 
-/// How far back a late frame is told from a duplicate, in frames: about 0.4 s of a display's traffic.
+/// How far back a late frame is told from a duplicate, in frames: about 0.5 s of a display's traffic.
 pub(crate) const WINDOW: u16 = 256;
 /// Good frames in a row, all from beyond the window, after which the stream is taken to go on there:
 /// a peer that was cut off for half a turn of the counter must not be late for ever. The idea is
