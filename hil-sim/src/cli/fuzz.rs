@@ -9,7 +9,7 @@ use hil_sim_studies::fuzz::{Draw, Trial};
 
 use super::files::{create_folder, write_all};
 use super::say::say;
-use super::{Elves, EngineName, status, threads};
+use super::{Elves, EngineName, at_least_one, status, threads};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
@@ -19,8 +19,8 @@ pub(super) struct Fuzz {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// How many scenes, 1 to a million
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    scenes: u32,
+    #[arg(long, default_value_t = 100, value_parser = scenes)]
+    scenes: usize,
     /// The most faults of a scene, 0 to 20
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=20))]
     faults: u8,
@@ -37,6 +37,16 @@ pub(super) struct Fuzz {
     elves: Elves,
 }
 
+fn scenes(text: &str) -> Result<usize, String> {
+    const MOST: usize = 1_000_000;
+    match at_least_one(text)? {
+        count if count <= MOST => Ok(count),
+        _ => Err(format!(
+            "give {MOST} at most, and other seeds the next time"
+        )),
+    }
+}
+
 impl Fuzz {
     pub(super) fn execute(self) -> anyhow::Result<ExitCode> {
         let draw = Draw {
@@ -45,7 +55,7 @@ impl Fuzz {
         };
         let bench = self.engine.bench(&self.elves)?;
         create_folder(&self.out)?;
-        let seeds = (0..self.scenes).map(|number| self.seed.wrapping_add(number.into()));
+        let seeds = (0..self.scenes).map(|number| self.seed.wrapping_add(number as u64));
         let seeds: Vec<u64> = seeds.collect();
         let name = |seed: u64| format!("fuzz-{seed}");
         let started = Instant::now();
