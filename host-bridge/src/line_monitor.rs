@@ -28,6 +28,9 @@ pub struct LineMonitor {
     /// Frames of somebody who has not said Hello, so far.
     unheralded: u32,
     pinged_us: Option<u64>,
+    /// Whether anything was heard that only a board says: a frame that was understood, or a 0x00, which ends each of
+    /// its lines of text.
+    is_board: bool,
     /// Since when the other end has spoken text.
     text_us: Option<u64>,
     span_us: u64,
@@ -39,6 +42,8 @@ pub struct LineMonitor {
 #[derive(Clone, Copy, Default)]
 struct Sound {
     bytes: u64,
+    /// Bytes of 0x00: no text without others.
+    zeros: u64,
     /// Bytes that no text is made of.
     strange: u64,
     /// Frames of somebody who has not said Hello.
@@ -53,7 +58,7 @@ pub enum Verdict {
     /// Somebody of another protocol or schema.
     Foreign(Hello),
     Silent,
-    /// Text, or frames, from somebody who does not answer.
+    /// A board's text, or frames, from somebody who does not answer.
     Deaf,
     Garbage,
 }
@@ -70,10 +75,12 @@ impl LineMonitor {
             understood: 0,
             unheralded: 0,
             pinged_us: None,
+            is_board: false,
             text_us: None,
             span_us: opened_us,
             spans: [Sound {
                 bytes: 0,
+                zeros: 0,
                 strange: 0,
                 unheralded: 0,
             }; 2],
@@ -91,7 +98,10 @@ impl LineMonitor {
         }
         self.heard_us = Some(at_us);
         let strange = bytes.iter().filter(|&&byte| !is_text(byte)).count();
+        let zeros = bytes.iter().filter(|&&byte| byte == 0).count();
+        self.is_board |= zeros > 0;
         self.spans[0].bytes += bytes.len() as u64;
+        self.spans[0].zeros += zeros as u64;
         self.spans[0].strange += strange as u64;
     }
 
@@ -100,6 +110,7 @@ impl LineMonitor {
         if counters.received != self.understood {
             self.understood = counters.received;
             self.understood_us = Some(at_us);
+            self.is_board = true;
         }
         self.spans[0].unheralded += counters.unheralded.wrapping_sub(self.unheralded);
         self.unheralded = counters.unheralded;
@@ -155,12 +166,12 @@ impl LineMonitor {
     fn judge_sound(&self) -> Verdict {
         let [now, before] = self.spans;
         let bytes = now.bytes + before.bytes;
+        let marks = bytes - (now.zeros + before.zeros);
         let strange = now.strange + before.strange;
+        let is_text = marks > 0 && strange * TEXT_BYTES_A_STRANGE_ONE <= marks;
         if bytes == 0 {
             Verdict::Silent
-        } else if now.unheralded + before.unheralded > 0
-            || strange * TEXT_BYTES_A_STRANGE_ONE <= bytes
-        {
+        } else if now.unheralded + before.unheralded > 0 || is_text && self.is_board {
             Verdict::Deaf
         } else {
             Verdict::Garbage
@@ -246,6 +257,19 @@ mod tests {
         disturbed[..9].fill(0xff);
         assert_eq!(verdict(&mut heard(S, &disturbed), 2 * S), Verdict::Garbage);
         assert_eq!(verdict(&mut heard(S, b""), 2 * S), Verdict::Silent);
+    }
+
+    #[test]
+    fn text_without_a_boards_ends_of_lines_and_zeros_alone_are_no_board() {
+        let other = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M\r\n";
+        assert_eq!(verdict(&mut heard(S, other), 2 * S), Verdict::Garbage);
+        assert_eq!(verdict(&mut heard(S, &[0; 99]), 2 * S), Verdict::Garbage);
+        // The line that a board has just begun is its line.
+        let mut line_monitor = heard(S, b"a line of text\r\n\0");
+        for at_us in [3 * S, 5 * S] {
+            line_monitor.hear(at_us, b"and half of anoth");
+        }
+        assert_eq!(verdict(&mut line_monitor, 5 * S), Verdict::Deaf);
     }
 
     #[test]

@@ -90,16 +90,27 @@ pub fn play(
         played.events += 1;
         tell(role, event);
     }
-    if !events.begun && pace.from_s > events.last_s {
-        return Err(ReadError::Ended {
-            path: events.recording.path().to_owned(),
-            last_s: events.last_s,
-            from_s: pace.from_s,
-        });
-    }
+    events.refuse_ended(pace)?;
     played.cut = events.recording.is_cut();
     played.passed_over = events.recording.passed_over();
     Ok(played)
+}
+
+/// Whether a board of `role` is told anything by what is played at `pace`. Fails if the recording can't be read to
+/// there, or ends before `pace.from_s`.
+pub fn holds_for(recording: Reader, role: Role, pace: &Pace) -> Result<bool, ReadError> {
+    let mut events = Events::new(recording);
+    let mut peer = StandIn::new(role, pace.speed);
+    while let Some((at_s, from, event)) = events.next_from(pace.from_s)? {
+        if pace.to_s.is_some_and(|to_s| at_s > to_s) {
+            return Ok(false);
+        }
+        if peer.say(from, &event, 0).is_some() {
+            return Ok(true);
+        }
+    }
+    events.refuse_ended(pace)?;
+    Ok(false)
 }
 
 /// Waits; false if it is to end before.
@@ -172,6 +183,18 @@ impl Events {
                 self.due.push_back((at_s, role, event));
             }
         }
+    }
+
+    /// Fails if all has been read, and ends before what is to be played.
+    fn refuse_ended(&self, pace: &Pace) -> Result<(), ReadError> {
+        if self.begun || pace.from_s <= self.last_s {
+            return Ok(());
+        }
+        Err(ReadError::Ended {
+            path: self.recording.path().to_owned(),
+            last_s: self.last_s,
+            from_s: pace.from_s,
+        })
     }
 
     /// Keeps what a link or a configuration was last.

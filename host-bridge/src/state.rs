@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use protocol::{Hello, PROTOCOL_VERSION, Role};
 
+use crate::line::host_hello;
 use crate::place::is_far;
 
 /// How the way to one board stands.
@@ -26,7 +27,7 @@ pub enum State {
     Silent(PathBuf),
     /// A board that speaks, text or frames, and does not answer: nothing that is sent reaches it.
     Deaf(PathBuf),
-    /// What is heard is neither frames nor text.
+    /// What is heard is neither frames nor a board's text.
     Garbage(PathBuf),
     /// A board of another protocol or schema.
     Foreign(PathBuf, Hello),
@@ -47,6 +48,11 @@ impl State {
     /// Whether the board is there and understood.
     pub const fn is_known(&self) -> bool {
         matches!(self, Self::Known { .. })
+    }
+
+    /// Whether this program hears itself, or another of its kind.
+    pub fn is_echo(&self) -> bool {
+        matches!(self, Self::Stranger { hello, .. } if *hello == host_hello())
     }
 
     /// Whether the board of `role` is there, of whatever version.
@@ -136,6 +142,9 @@ impl State {
                 "see whether this is a Ridgelink board's console: 921600 baud, 8N1"
             }
             Self::Foreign { .. } => "flash the firmware of this build: `host-bridge flash`",
+            Self::Stranger { .. } if self.is_echo() => {
+                "see whether its TX is joined to its RX, or whether a computer is at its far end"
+            }
             Self::Stranger { .. } => "exchange --sensor and --display, or flash the other firmware",
         })
     }
@@ -176,6 +185,9 @@ impl fmt::Display for State {
                 Named(hello),
                 hello.protocol_version(),
             ),
+            Self::Stranger { .. } if self.is_echo() => {
+                f.write_str("sends back what this program says")
+            }
             Self::Stranger { hello, wanted, .. } => {
                 write!(f, "{}, not the {}", Named(hello), wanted.name())
             }

@@ -229,7 +229,7 @@ impl Flash {
     /// Whether the console allows to go on; asks if that is somebody's to say and he is there.
     fn check_console(&self, state: State, role: Role, is_attended: bool) -> anyhow::Result<()> {
         match state {
-            State::Stranger { ref hello, .. } => {
+            State::Stranger { ref hello, .. } if !state.is_echo() => {
                 let is = Named(hello).to_string();
                 if self.change_role {
                     return Ok(());
@@ -248,7 +248,8 @@ impl Flash {
                     role.name()
                 )
             }
-            State::Busy { .. }
+            State::Stranger { .. }
+            | State::Busy { .. }
             | State::Hung { .. }
             | State::Denied { .. }
             | State::Failed { .. }

@@ -3,15 +3,16 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::bench::Bench;
 use crate::clock::now_us;
 use crate::link::{Event, Link};
+use crate::lock::locked;
 use crate::monitor::firmware_log::{LogError, Logs, Origin};
 use crate::monitor::log_entry::LogEvent;
 use crate::recording::gauge_stream::GaugeStream;
@@ -46,7 +47,7 @@ Examples:
   host-bridge record arm.mcap --sensor /dev/ttyACM0  the sensor board alone
 
 Exit status: 0 recorded, to the end that was asked for; 1 the same with --for, but a board of the bench was never \
-there; 2 nothing could be recorded, or not to the end: what was said to be safe is.";
+there, or not there at the end; 2 nothing could be recorded, or not to the end: what was said to be safe is.";
 
 /// How often is looked whether there is something to do.
 const LOOK: Duration = Duration::from_millis(50);
@@ -109,10 +110,14 @@ impl Record {
             part: Some(part).filter(|part| !part.is_zero()),
         })?);
         let started = Instant::now();
+        let started_us = now_us();
         let (events, told) = channel();
         let recording = Arc::clone(&recorder);
+        let presence = Arc::new(Mutex::new(Presence::default()));
+        let theirs = Arc::clone(&presence);
         let links = super::links(&bench, move |role, event| {
             recording.on_event(role, &event);
+            locked(&theirs).on_event(role, &event);
             if concerns(&event) {
                 // Nobody listens any more when the recording ends.
                 let _ = events.send((role, event));
@@ -123,7 +128,7 @@ impl Record {
             // Nobody listens any more when the recording ends.
             let _ = said.send(());
         });
-        let absent = Session {
+        Session {
             recorder: &recorder,
             links: &links,
             told,
@@ -131,21 +136,35 @@ impl Record {
             outcome: Outcome::new(roles.clone()),
             lines,
             stream: GaugeStream::new(!self.no_gauges),
-            absent: BOARDS.into(),
             screen: Screen::new(self.quiet),
             started,
         }
         .run(&ended, self.until);
         let seconds = started.elapsed().as_secs_f64();
+        let presence = *locked(&presence);
         // Nothing is told any more once the links are gone.
         drop(links);
         let progress = recorder.stop()?;
-        self.report(seconds, &progress, &absent)?;
-        let is_missed = self.until.is_some() && roles.iter().any(|role| absent.contains(role));
+        let absent = presence.absent();
+        let missing: Vec<(Role, f64)> = presence
+            .missing()
+            .map(|(role, heard_us)| (role, heard_us.saturating_sub(started_us) as f64 / 1e6))
+            .collect();
+        self.report(seconds, &progress, &absent, &missing)?;
+        let is_missed = self.until.is_some()
+            && (!missing.is_empty() || roles.iter().any(|role| absent.contains(role)));
         Ok(ExitCode::from(u8::from(is_missed)))
     }
 
-    fn report(&self, seconds: f64, progress: &Progress, absent: &[Role]) -> anyhow::Result<()> {
+    /// Tells what was recorded; `missing` are the boards that were not there at the end, and when each was heard last,
+    /// in s since the start.
+    fn report(
+        &self,
+        seconds: f64,
+        progress: &Progress,
+        absent: &[Role],
+        missing: &[(Role, f64)],
+    ) -> anyhow::Result<()> {
         let absent: Vec<&str> = absent.iter().map(|role| role.name()).collect();
         let tally = progress.tally;
         if self.json {
@@ -159,6 +178,11 @@ impl Record {
                 "unwritten": tally.unwritten,
                 // The boards that were never there.
                 "absent": absent,
+                // Those that were there, and were not at the end.
+                "missing_at_end": missing
+                    .iter()
+                    .map(|(role, heard_s)| json!({ "board": role.name(), "last_heard_s": heard_s }))
+                    .collect::<Vec<_>>(),
             });
             return output::print(&summary.to_string());
         }
@@ -166,12 +190,19 @@ impl Record {
             [] => String::new(),
             names => format!("; never there: {}", names.join(", ")),
         };
+        let gone: String = missing
+            .iter()
+            .map(|(role, heard_s)| {
+                let name = role.name();
+                format!("; not there at the end: {name}, last heard at {heard_s:.1} s")
+            })
+            .collect();
         output::print(&format!(
-            "{seconds:.1} s: {} messages, {} samples of each gauge, {}{}{absent}",
+            "{seconds:.1} s: {} messages, {} samples of each gauge, {}{}{absent}{gone}",
             tally.messages,
             tally.samples,
             bytes(progress.safe_bytes),
-            missing(progress),
+            unheard(progress),
         ))
     }
 }
@@ -207,8 +238,8 @@ fn bytes(count: u64) -> String {
     }
 }
 
-/// What is missing, in words; empty if nothing is.
-fn missing(progress: &Progress) -> String {
+/// What was not heard or not written, in words; empty if all was.
+fn unheard(progress: &Progress) -> String {
     let tally = progress.tally;
     let mut text = String::new();
     if tally.gaps > 0 {
@@ -223,6 +254,58 @@ fn missing(progress: &Progress) -> String {
     text
 }
 
+/// Which boards are there, as their links tell.
+#[derive(Clone, Copy, Default)]
+struct Presence {
+    sensor: Sight,
+    display: Sight,
+}
+
+/// What has been seen of one board.
+#[derive(Clone, Copy, Default)]
+struct Sight {
+    is_there: bool,
+    /// None before it is there for the first time; in µs of [`now_us`].
+    heard_us: Option<u64>,
+}
+
+impl Presence {
+    fn on_event(&mut self, role: Role, event: &Event) {
+        let sight = match role {
+            Role::Sensor => &mut self.sensor,
+            Role::Display | Role::Host => &mut self.display,
+        };
+        match event {
+            Event::StateChanged(state) => {
+                sight.is_there = state.is_known();
+                if sight.is_there {
+                    sight.heard_us = Some(now_us());
+                }
+            }
+            Event::Heard { at_us, .. } if sight.is_there => sight.heard_us = Some(*at_us),
+            Event::Heard { .. } | Event::Restarted => {}
+        }
+    }
+
+    fn sights(&self) -> [(Role, Sight); 2] {
+        [(Role::Sensor, self.sensor), (Role::Display, self.display)]
+    }
+
+    /// The boards that have not been there yet.
+    fn absent(&self) -> Vec<Role> {
+        let sights = self.sights().into_iter();
+        let absent = sights.filter(|(_, sight)| sight.heard_us.is_none());
+        absent.map(|(role, _)| role).collect()
+    }
+
+    /// The boards that were there and are not any more, and when each was heard last, in µs of [`now_us`].
+    fn missing(&self) -> impl Iterator<Item = (Role, u64)> {
+        let gone = self.sights().into_iter();
+        let gone = gone.filter(|(_, sight)| !sight.is_there);
+        gone.filter_map(|(role, sight)| Some((role, sight.heard_us?)))
+    }
+}
+
 /// A recording while it goes on.
 struct Session<'a> {
     recorder: &'a Recorder,
@@ -234,15 +317,13 @@ struct Session<'a> {
     /// The boards' logs.
     lines: Receiver<(Role, LogEvent)>,
     stream: GaugeStream,
-    /// The boards that have not been there yet.
-    absent: Vec<Role>,
     screen: Screen,
     started: Instant,
 }
 
 impl Session<'_> {
-    /// Records until it is asked to end, or can't go on. Returns the boards that were never there.
-    fn run(mut self, ended: &AtomicBool, until: Option<Duration>) -> Vec<Role> {
+    /// Records until it is asked to end, or can't go on.
+    fn run(mut self, ended: &AtomicBool, until: Option<Duration>) {
         for role in BOARDS {
             if self.link(role).is_none() {
                 let name = role.name();
@@ -252,7 +333,6 @@ impl Session<'_> {
             }
         }
         self.record(ended, until);
-        self.absent
     }
 
     fn record(&mut self, ended: &AtomicBool, until: Option<Duration>) {
@@ -318,9 +398,6 @@ impl Session<'_> {
 
     /// Tells how the way to a board stands now.
     fn on_state(&mut self, role: Role, state: &State) {
-        if state.is_known() {
-            self.absent.retain(|absent| *absent != role);
-        }
         if !matches!(state, State::Opened { .. }) {
             self.screen
                 .tell(&format!("{}: {}", role.name(), Advised(state)));
@@ -357,7 +434,7 @@ impl Session<'_> {
             progress.tally.messages,
             progress.tally.samples,
             bytes(progress.safe_bytes),
-            missing(&progress),
+            unheard(&progress),
         ));
     }
 }
@@ -430,5 +507,38 @@ impl Drop for Screen {
         }
         self.lines = None;
         let _ = self.written.recv_timeout(LINGER);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use protocol::{Hello, Ping};
+
+    use super::*;
+
+    #[test]
+    fn a_board_that_went_is_missing_until_it_returns_and_one_that_never_came_is_absent() {
+        let port = PathBuf::from("/dev/null/s");
+        let known = State::Known(port.clone(), Hello::new(Role::Sensor, "chip", [0, 1, 0]));
+        let mut presence = Presence::default();
+        let mut turn = |state: &State| {
+            presence.on_event(Role::Sensor, &Event::StateChanged(state.clone()));
+            presence.on_event(
+                Role::Sensor,
+                &Event::Heard {
+                    at_us: 7,
+                    message: Message::Ping(Ping { sent_us: 0 }),
+                },
+            );
+            (presence.absent(), presence.missing().collect::<Vec<_>>())
+        };
+        let [neither, display] = [BOARDS.to_vec(), vec![Role::Display]];
+        assert_eq!(turn(&State::Opened(port.clone())), (neither, vec![]));
+        assert_eq!(turn(&known), (display.clone(), vec![]));
+        let gone = vec![(Role::Sensor, 7)];
+        assert_eq!(turn(&State::Silent(port)), (display.clone(), gone));
+        assert_eq!(turn(&known), (display, vec![]));
     }
 }

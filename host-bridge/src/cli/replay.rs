@@ -16,7 +16,7 @@ use crate::monitor::{self, Options, RecordingFeed, Source};
 use crate::recording::reader::Reader;
 use crate::replay::StandIn;
 use crate::replay::scene;
-use crate::replay::{Pace, Played, SPEEDS, play};
+use crate::replay::{Pace, Played, SPEEDS, holds_for, play};
 use anyhow::bail;
 use clap::ValueHint;
 use protocol::Role;
@@ -132,6 +132,16 @@ impl Replay {
                 self.speed
             );
         }
+        if !matches!(self.to, Target::Scene(_)) {
+            let of_scene = [
+                ("--wavelength", self.wavelength.is_some()),
+                ("--expect", self.expect),
+                ("--force", self.force),
+            ];
+            if let Some((name, _)) = of_scene.into_iter().find(|&(_, is_given)| is_given) {
+                bail!("{name}: is for a scene: leave it out");
+            }
+        }
         if let Some(wavelength_mm) = self.wavelength
             && !(0.01..=100.0).contains(&wavelength_mm)
         {
@@ -211,7 +221,14 @@ impl Replay {
         let is_interrupted = ended.swap(true, Ordering::Relaxed);
         let played = player.join();
         watched?;
-        played.map_err(|_| anyhow::anyhow!("the player died"))??;
+        let played = played.map_err(|_| anyhow::anyhow!("the player died"))??;
+        if played.cut {
+            say(&format!(
+                "{}: was cut off at {:.1} s",
+                self.file.display(),
+                self.from + played.recorded_s
+            ));
+        }
         Ok(ExitCode::from(u8::from(is_interrupted)))
     }
 
@@ -225,6 +242,16 @@ impl Replay {
 
     fn play_to(&self, recording: Reader, role: Role) -> anyhow::Result<ExitCode> {
         let bench = self.boards.find()?;
+        let pace = self.pace();
+        let what = said_to(role);
+        // Else it is played to its end first.
+        if !holds_for(Reader::open(&self.file)?, role, &pace)? {
+            bail!(
+                "{}: holds no {what} there, and a {} board is told nothing else: give a recording, or a part of it, that does",
+                self.file.display(),
+                role.name(),
+            );
+        }
         let ended = signals::flag_set_by(&signals::USUAL, Again::IsIgnored)?;
         let place = bench.seat(role).map(crate::bench::Seat::place);
         let (states, turned) = channel();
@@ -255,7 +282,6 @@ impl Replay {
                 self.speed
             );
         }
-        let pace = self.pace();
         let mut peer = StandIn::new(role, self.speed);
         let (mut said, mut unsaid) = (0_u64, 0_u64);
         let played = play(&SystemClock, recording, &pace, &ended, |from, event| {
@@ -289,11 +315,16 @@ fn passed_over(count: u64) -> String {
     }
 }
 
-fn report(role: Role, played: &Played, said: u64, unsaid: u64) -> anyhow::Result<ExitCode> {
-    let what = match role {
+/// What a board is told of its peer.
+const fn said_to(role: Role) -> &'static str {
+    match role {
         Role::Display => "estimates",
         Role::Sensor | Role::Host => "motions",
-    };
+    }
+}
+
+fn report(role: Role, played: &Played, said: u64, unsaid: u64) -> anyhow::Result<ExitCode> {
+    let what = said_to(role);
     let missed = match unsaid {
         0 => String::new(),
         unsaid => format!(", {unsaid} could not be said"),

@@ -6,12 +6,12 @@ use std::sync::atomic::AtomicBool;
 
 use crate::link::{Link, stop_all};
 use protocol::Role;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 
 /// What asks for an end; a terminal that goes away does.
-pub const USUAL: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
+pub const USUAL: [i32; 4] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT];
 
 /// SIGUSR1, or another signal that asks for something. A command listens before it does anything that may take its
 /// time: until then the signal ends the program, and afterwards it is kept until somebody can obey.

@@ -14,7 +14,7 @@ use super::page::{self, Newest};
 use crate::clock::now_us;
 use crate::hand;
 use crate::link::{Event, Link, stop_all};
-use crate::monitor::dashboard::Dashboard;
+use crate::monitor::dashboard::{Dashboard, FRESH_US};
 use crate::recording::gauge_stream::GaugeStream;
 
 /// Between two pictures for the page.
@@ -148,9 +148,6 @@ fn take_ports(address: IpAddr, port: Option<u16>) -> Result<Taken, LiveError> {
     next.find(Result::is_ok).unwrap_or(first)
 }
 
-/// A value that is older than this, in µs, is not shown.
-const FRESH_US: u64 = 500_000;
-
 /// One moment of a dashboard, and of what the relays here say of who moves the arm.
 pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
     let now_us = dashboard.now_us;
@@ -174,8 +171,8 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
             "stopped": stopped.map(Trip::name),
         })
     };
-    let estimate = dashboard.estimate.filter(|(at_us, _)| is_fresh(*at_us));
-    let motion = dashboard.motion.filter(|(at_us, _)| is_fresh(*at_us));
+    let estimate = dashboard.present_estimate();
+    let motion = dashboard.present_motion();
     let has_gauges = dashboard.gauges_us.is_some_and(is_fresh);
     // In ADC steps (3.3 V / 4096).
     let gauges_lsb = dashboard.traces.gauges_lsb.each_ref().map(|trace| {
@@ -194,14 +191,14 @@ pub fn picture(dashboard: &Dashboard, hands: &[String]) -> Value {
     json!({
         "now_ms": now_us / 1_000,
         "boards": [board(Role::Sensor), board(Role::Display)],
-        "estimate": estimate.map(|(_, estimate)| json!({
+        "estimate": estimate.map(|estimate| json!({
             "wavelength_mm": estimate.wavelength_mm,
             "valid": estimate.valid,
             "confidence": estimate.confidence,
             "counted_mm": estimate.counted_mm,
             "arm_mm_s": mm_s(estimate.velocity_um_s),
         })),
-        "hand_mm_s": motion.map(|(_, motion)| mm_s(motion.velocity_um_s)),
+        "hand_mm_s": motion.map(|motion| mm_s(motion.velocity_um_s)),
         "gauges_lsb": gauges_lsb,
         "supervisor": safety.map(|state| state.to_string()),
         "stopped": matches!(safety, Some(DisplayState::Stopped(_))),

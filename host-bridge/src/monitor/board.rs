@@ -33,6 +33,11 @@ impl Board {
         self.state.as_ref().is_some_and(State::is_known)
     }
 
+    /// Whether the way to it is known to lead nowhere.
+    pub fn is_lost(&self) -> bool {
+        self.state.as_ref().is_some_and(|state| !state.is_known())
+    }
+
     /// An instant of the board's clock on this program's, for a message that came at `at_us`: by the
     /// clocks' offset where it is known and can be right, else when it came.
     pub fn own_us(&self, instant_us: u64, at_us: u64) -> u64 {
@@ -46,7 +51,7 @@ impl Board {
 
     /// Time since its start, in µs, if it has said so and is still there.
     pub fn uptime_us(&self, now_us: u64) -> Option<u64> {
-        let (at_us, status) = self.status.as_ref()?;
+        let (at_us, status) = self.status.as_ref().filter(|_| !self.is_lost())?;
         let since_us = now_us.saturating_sub(*at_us);
         Some(status.uptime_us.saturating_add(since_us))
     }

@@ -26,6 +26,9 @@ const SAMPLE_US: u64 = 1_000;
 /// A board answers a Stop within milliseconds; after so long, in µs, whoever said it is told that it did not.
 const STOP_US: u64 = 500_000;
 
+/// A value that is older than this, in µs, is not told as the present.
+pub(crate) const FRESH_US: u64 = 500_000;
+
 /// The last seconds of everything that is traced.
 #[derive(Clone, Debug, Default)]
 pub struct Traces {
@@ -265,6 +268,23 @@ impl Dashboard {
     /// What is to be said to the person who watches at the moment.
     pub const fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
+    }
+
+    /// Whether something that the board of `role` said at `at_us` tells of the present.
+    fn is_present(&self, role: Role, at_us: u64) -> bool {
+        !self.board(role).is_lost() && self.now_us.saturating_sub(at_us) < FRESH_US
+    }
+
+    /// The last estimate, while it tells of the present.
+    pub fn present_estimate(&self) -> Option<&Estimate> {
+        let (at_us, estimate) = self.estimate.as_ref()?;
+        self.is_present(Role::Sensor, *at_us).then_some(estimate)
+    }
+
+    /// The last motion, while it tells of the present.
+    pub fn present_motion(&self) -> Option<&Motion> {
+        let (at_us, motion) = self.motion.as_ref()?;
+        self.is_present(Role::Display, *at_us).then_some(motion)
     }
 
     /// Time since the last estimate, in ms.

@@ -16,19 +16,20 @@ use crate::clock::micros;
 use crate::clock::{now_us, unix_ns};
 use crate::state::State;
 
-/// The names of the columns of [`second`], over their values. What is not known is `-`; the last column
-/// may hold spaces.
+/// The names of the columns of [`second`], over their values. What is not known, or not of the present any more, is
+/// `-`; the last column may hold spaces.
 pub const HEADING: &str = "#    t_s sensor     display    lambda_mm conf valid  range contact    \
                            count_mm  arm_mm_s hand_mm_s age_ms  lost   bad rtt_s_ms rtt_d_ms supervisor";
 
 pub fn second(dashboard: &Dashboard) -> String {
-    let estimate = dashboard.estimate.map(|(_, estimate)| estimate);
+    let estimate = dashboard.present_estimate();
     let number = |value: Option<f32>, digits: usize| {
         value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
     };
     let mm_s = |um_s: Option<i32>| number(um_s.map(|um_s| um_s as f32 / 1e3), 1);
     let rtt_ms = |board: &Board| {
-        let rtt_us = board.clocks.map(|clocks| clocks.round_trip_us);
+        let clocks = board.clocks.filter(|_| !board.is_lost());
+        let rtt_us = clocks.map(|clocks| clocks.round_trip_us);
         number(rtt_us.map(|us| us as f32 / 1e3), 2)
     };
     let (lost, bad) = troubles(dashboard);
@@ -50,7 +51,11 @@ pub fn second(dashboard: &Dashboard) -> String {
         estimate.map_or("-", |estimate| estimate.contact.name()),
         number(estimate.and_then(|estimate| estimate.counted_mm), 2),
         mm_s(estimate.map(|estimate| estimate.velocity_um_s)),
-        mm_s(dashboard.motion.map(|(_, motion)| motion.velocity_um_s)),
+        mm_s(
+            dashboard
+                .present_motion()
+                .map(|motion| motion.velocity_um_s)
+        ),
         rtt_ms(&dashboard.sensor),
         rtt_ms(&dashboard.display),
         dashboard
@@ -73,28 +78,30 @@ pub fn log_entry(log_entry: &LogEntry) -> String {
     )
 }
 
-/// The present as one JSON object.
+/// The present as one JSON object: of what a board said last, but is not of the present any more, only the age.
 pub fn second_json(dashboard: &Dashboard) -> Value {
-    let estimate = dashboard.estimate.map(|(_, estimate)| {
+    let present = dashboard.present_estimate();
+    let estimate = dashboard.estimate.as_ref().map(|_| {
         json!({
-            "wavelength_mm": estimate.wavelength_mm,
-            "confidence": estimate.confidence,
-            "valid": estimate.valid,
-            "range": estimate.range.name(),
-            "contact": estimate.contact.name(),
-            "counted_mm": estimate.counted_mm,
-            "amplitude_lsb": estimate.amplitude_lsb,
-            "velocity_mm_s": mm_s(estimate.velocity_um_s),
-            "lag_um": estimate.lag_um,
-            "gauges": estimate.health.map(GaugeHealth::name),
+            "wavelength_mm": present.and_then(|estimate| estimate.wavelength_mm),
+            "confidence": present.map(|estimate| estimate.confidence),
+            "valid": present.is_some_and(|estimate| estimate.valid),
+            "range": present.map(|estimate| estimate.range.name()),
+            "contact": present.map(|estimate| estimate.contact.name()),
+            "counted_mm": present.and_then(|estimate| estimate.counted_mm),
+            "amplitude_lsb": present.map(|estimate| estimate.amplitude_lsb),
+            "velocity_mm_s": present.map(|estimate| mm_s(estimate.velocity_um_s)),
+            "lag_um": present.and_then(|estimate| estimate.lag_um),
+            "gauges": present.map(|estimate| estimate.health.map(GaugeHealth::name)),
             "age_ms": dashboard.estimate_age_ms(),
             "rate_hz": dashboard.sensor.rate.per_s(),
         })
     });
-    let motion = dashboard.motion.map(|(_, motion)| {
+    let present = dashboard.present_motion();
+    let motion = dashboard.motion.as_ref().map(|_| {
         json!({
-            "velocity_mm_s": mm_s(motion.velocity_um_s),
-            "position_um": motion.position_um,
+            "velocity_mm_s": present.map(|motion| mm_s(motion.velocity_um_s)),
+            "position_um": present.map(|motion| motion.position_um),
             "age_ms": dashboard.motion_age_ms(),
             "rate_hz": dashboard.display.rate.per_s(),
         })
@@ -155,6 +162,7 @@ pub fn happening_json(log_entry: &LogEntry) -> Value {
 
 fn board_json(board: &Board, now_us: u64) -> Value {
     let status = board.status.as_ref().map(|(_, status)| status);
+    let clocks = board.clocks.filter(|_| !board.is_lost());
     json!({
         "state": state_word(board),
         "text": board.state.as_ref().map(State::to_string),
@@ -162,8 +170,8 @@ fn board_json(board: &Board, now_us: u64) -> Value {
         "uptime_s": board.uptime_us(now_us).map(seconds),
         "started_by": status.map(|status| status.reset.name()),
         "watchdog_resets": status.map(|status| status.watchdog_resets),
-        "round_trip_ms": board.clocks.map(|clocks| clocks.round_trip_us as f64 / 1e3),
-        "clock_offset_ms": board.clocks.map(|clocks| clocks.offset_us as f64 / 1e3),
+        "round_trip_ms": clocks.map(|clocks| clocks.round_trip_us as f64 / 1e3),
+        "clock_offset_ms": clocks.map(|clocks| clocks.offset_us as f64 / 1e3),
         "counters": status.map(|status| match status.role {
             RoleCounters::Sensor(counters) => json!(counters),
             RoleCounters::Display(counters) => json!(counters),
@@ -284,5 +292,93 @@ fn write_lines(
         if is_over {
             return Ok(());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::{Contact, Estimate, GAUGES, Hello, Message, Motion, Range, Role};
+
+    use super::*;
+    use crate::link::Event;
+    use crate::state::State;
+
+    fn turn(dashboard: &mut Dashboard, now_us: u64, is_known: bool) {
+        for role in [Role::Sensor, Role::Display] {
+            let state = if is_known {
+                State::Known("/dev/tty".into(), Hello::new(role, "chip", [0, 1, 0]))
+            } else {
+                State::Absent("/dev/tty".to_owned())
+            };
+            dashboard.on(now_us, role, Event::StateChanged(state));
+        }
+    }
+
+    /// Boards that have spoken at `at_us`, and not since.
+    fn spoken(at_us: u64) -> Dashboard {
+        let mut dashboard = Dashboard::default();
+        turn(&mut dashboard, at_us, true);
+        let estimate = Message::Estimate(Estimate {
+            sequence: 1,
+            instant_us: 1,
+            wavelength_mm: Some(2.0),
+            valid: true,
+            confidence: 0.9,
+            amplitude_lsb: 300.0,
+            counted_mm: Some(2.1),
+            range: Range::T1,
+            contact: Contact::Slip,
+            velocity_um_s: 70_000,
+            lag_um: Some(5),
+            gauges_used: 1,
+            health: [GaugeHealth::Good; GAUGES],
+        });
+        let motion = Message::Motion(Motion {
+            sequence: 1,
+            instant_us: 1,
+            position_um: 9,
+            velocity_um_s: 60_000,
+        });
+        for (role, message) in [(Role::Sensor, estimate), (Role::Display, motion)] {
+            dashboard.on(at_us, role, Event::Heard { at_us, message });
+        }
+        dashboard
+    }
+
+    /// The columns from λ to the hand's velocity, and what JSON says of them.
+    fn told(dashboard: &Dashboard) -> (String, [Value; 4]) {
+        let line = second(dashboard);
+        let columns: Vec<&str> = line.split_whitespace().skip(3).take(8).collect();
+        let json = second_json(dashboard);
+        let [estimate, motion] = [&json["estimate"], &json["motion"]];
+        let values = [
+            &estimate["wavelength_mm"],
+            &estimate["valid"],
+            &estimate["velocity_mm_s"],
+            &motion["velocity_mm_s"],
+        ];
+        (columns.join(" "), values.map(Value::clone))
+    }
+
+    #[test]
+    fn what_boards_have_said_is_not_told_as_the_present_once_it_is_old_or_they_are_gone() {
+        let at_us = 1_000_000;
+        let present = (
+            "2.000 0.90 valid T1 slip 2.10 70.0 60.0".to_owned(),
+            [json!(2.0), json!(true), json!(70.0), json!(60.0)],
+        );
+        let nothing = (
+            "- - - - - - - -".to_owned(),
+            [json!(null), json!(false), json!(null), json!(null)],
+        );
+        let mut dashboard = spoken(at_us);
+        dashboard.elapse(at_us + 499_999);
+        assert_eq!(told(&dashboard), present);
+        dashboard.elapse(at_us + 500_000);
+        assert_eq!(told(&dashboard), nothing);
+        assert_eq!(second_json(&dashboard)["estimate"]["age_ms"], 500);
+        let mut dashboard = spoken(at_us);
+        turn(&mut dashboard, at_us + 1, false);
+        assert_eq!(told(&dashboard), nothing);
     }
 }

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::{self, BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use mcap::McapError;
@@ -84,7 +84,8 @@ pub enum RowError {
 /// A recording that is being read.
 pub struct Reader {
     path: PathBuf,
-    file: File,
+    /// Read as far as `reader` has needed, and no further.
+    file: BufReader<File>,
     reader: LinearReader,
     schemas: BTreeMap<u16, (String, String)>,
     channels: BTreeMap<u16, Channel>,
@@ -135,7 +136,7 @@ impl Reader {
             .with_record_length_limit(LONGEST_RECORD);
         let mut reader = Self {
             path: path.to_owned(),
-            file,
+            file: BufReader::with_capacity(READ_BYTES, file),
             reader: LinearReader::new_with_options(options),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
@@ -298,7 +299,7 @@ impl Reader {
                     break;
                 }
                 Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
-                    let room = self.reader.insert(wanted.max(READ_BYTES));
+                    let room = self.reader.insert(wanted);
                     let count = self.file.read(room).map_err(|source| {
                         let path = self.path.clone();
                         ReadError::Unreadable(path, source)
@@ -306,12 +307,18 @@ impl Reader {
                     self.reader.notify_read(count);
                     continue;
                 }
-                // What a file system may leave where it lost power.
-                Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => McapError::UnexpectedEof,
+                // What a file system may leave at the end where it lost power; elsewhere it is damage.
+                Some(Ok(LinearReadEvent::Record { opcode: 0, data })) => {
+                    if data.is_empty() && self.only_zeros_follow()? {
+                        Some(McapError::UnexpectedEof)
+                    } else {
+                        None
+                    }
+                }
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                     match mcap::parse_record(opcode, data).map(Record::into_owned) {
                         // What it was is missing, with all that lies behind it.
-                        Ok(Record::Footer(_)) if !self.has_all_data => McapError::BadFooter,
+                        Ok(Record::Footer(_)) if !self.has_all_data => Some(McapError::BadFooter),
                         Ok(Record::Footer(_)) => {
                             self.ended = Some(Ending::Whole);
                             break;
@@ -321,13 +328,13 @@ impl Reader {
                             self.note(&record)?;
                             return Ok(Some(record));
                         }
-                        Err(error) => error,
+                        Err(error) => Some(error),
                     }
                 }
-                Some(Err(error)) => error,
+                Some(Err(error)) => Some(error),
             };
             self.ended = Some(Ending::Cut);
-            if !matches!(error, McapError::UnexpectedEof) {
+            if !matches!(error, Some(McapError::UnexpectedEof)) {
                 return Err(ReadError::Damaged {
                     path: self.path.clone(),
                     after: self.last.as_ref().map_or_else(
@@ -335,16 +342,32 @@ impl Reader {
                         |(topic, at_s)| format!("{topic} at {at_s:.3} s"),
                     ),
                     advice: match error {
-                        McapError::BadDataCrc { .. } => {
+                        Some(McapError::BadDataCrc { .. }) => {
                             format!("some of it may be missing: {}", self.advice())
                         }
                         _ => self.advice(),
                     },
-                    reason: words(error),
+                    reason: error.map_or_else(|| "zeros, and more behind them".to_owned(), words),
                 });
             }
         }
         Ok(None)
+    }
+
+    /// Whether the rest of the file, which is passed over, is nothing but zeros.
+    fn only_zeros_follow(&mut self) -> Result<bool, ReadError> {
+        let unreadable = |source| ReadError::Unreadable(self.path.clone(), source);
+        loop {
+            let bytes = self.file.fill_buf().map_err(unreadable)?;
+            let length = bytes.len();
+            if length == 0 {
+                return Ok(true);
+            }
+            if bytes.iter().any(|&byte| byte != 0) {
+                return Ok(false);
+            }
+            self.file.consume(length);
+        }
     }
 
     /// What to do about damage: rows behind that time have been read.

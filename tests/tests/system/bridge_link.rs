@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use host_bridge::clock::Clock;
-use host_bridge::link::{Event, Link, NotSent};
+use host_bridge::link::{Event, Link, NotSent, host_hello};
 use host_bridge::place::Place;
 use host_bridge::state::State;
 use protocol::{
@@ -349,6 +349,26 @@ fn a_board_of_another_protocol_or_schema_is_named_and_not_spoken_to() {
         assert!(said.contains("sensor 9.8.7 on stm32f429zi"), "{said}");
         assert_eq!(watched.link.post(&motion(9)), Err(NotSent::NotKnown));
     }
+}
+
+#[test]
+fn a_port_that_sends_back_what_it_is_told_is_named_as_such() {
+    let bench = VirtualBench::default();
+    let echo = FakeBoard::acting_on(&bench, host_hello(), Box::new(|_| Vec::new()));
+    let watched = Watched::at(&bench, Role::Sensor, &echo);
+    let state = watched.turns_to("wrong-role");
+    let said = state.to_string();
+    assert!(
+        said.ends_with("sends back what this program says"),
+        "{said}"
+    );
+    assert!(
+        state
+            .advice()
+            .expect("advice")
+            .contains("TX is joined to its RX")
+    );
+    assert_eq!(watched.link.post(&motion(9)), Err(NotSent::NotKnown));
 }
 
 #[test]

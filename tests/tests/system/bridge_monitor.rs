@@ -292,7 +292,7 @@ fn a_cable_that_is_put_back_is_seen() {
 #[test]
 fn signals_and_its_own_end_are_a_success_without_a_word() {
     let running = bench();
-    for name in ["INT", "TERM", "HUP"] {
+    for name in ["INT", "TERM", "HUP", "QUIT"] {
         let mut lines = Lines::of(monitor(&running).arg("--plain"));
         lines.with("display safety: driving");
         lines.signal(name);
@@ -375,7 +375,7 @@ fn the_terminal_is_restored_after_control_c() {
 
 #[test]
 fn the_terminal_is_restored_after_any_signal() {
-    for name in ["TERM", "HUP", "INT"] {
+    for name in ["TERM", "HUP", "INT", "QUIT"] {
         assert_restores(|_, child| signal(child, name));
     }
 }

@@ -211,12 +211,51 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
     let blocks = [0, 8, 16, 24].map(|first| (0, Role::Sensor, speaker.gauges(first)));
     record(&unsaid, blocks);
     let unsaid = unsaid.to_str().expect("UTF-8");
+    let empty = folder.join("empty.mcap");
+    record(&empty, []);
+    let empty = empty.to_str().expect("UTF-8");
     let none = folder.join("none.mcap");
     fs::write(&none, "none at all").expect("the file can be written");
     let none = none.to_str().expect("UTF-8");
     let toml = folder.join("x.toml");
     let toml = toml.to_str().expect("UTF-8");
+    let sensor = FakeBoard::new(Role::Sensor);
+    let sensor = sensor.path().to_str().expect("UTF-8");
+    let display = FakeBoard::new(Role::Display);
+    let display = display.path().to_str().expect("UTF-8");
     for (words, want) in [
+        (
+            vec![unsaid, "--to", "sensor-board", "--sensor", sensor],
+            "unsaid.mcap: holds no motions there, and a sensor board is told nothing else: give a recording",
+        ),
+        (
+            vec![empty, "--to", "display-board", "--display", display],
+            "empty.mcap: holds no estimates there, and a display board is told nothing else: give a recording",
+        ),
+        (
+            vec![
+                file,
+                "--to",
+                "display-board",
+                "--from",
+                "0.495",
+                "--display",
+                display,
+            ],
+            "half.mcap: holds no estimates there",
+        ),
+        (
+            vec![file, "--to", "monitor", "--wavelength", "2"],
+            "--wavelength: is for a scene: leave it out",
+        ),
+        (
+            vec![file, "--to", "monitor", "--expect"],
+            "--expect: is for a scene: leave it out",
+        ),
+        (
+            vec![file, "--to", "display-board", "--force"],
+            "--force: is for a scene: leave it out",
+        ),
         (
             vec![file, "--to", "sensor-board", "--sensor", "/dev/null/s"],
             "/dev/null/s: not there: plug the board in",
@@ -263,6 +302,23 @@ fn a_board_that_is_not_there_and_a_file_that_is_none_are_named() {
         assert_eq!(ended.status.code(), Some(2), "{words:?}: {}", ended.stderr);
         assert!(ended.stderr.contains(want), "{words:?}: {}", ended.stderr);
     }
+}
+
+#[test]
+fn a_monitor_of_a_recording_that_was_cut_off_says_so() {
+    let path = folder("cut").join("half.mcap");
+    record(&path, half_a_second());
+    let watch = || {
+        let file = path.to_str().expect("UTF-8");
+        let ended = bridge::run(["replay", file, "--to", "monitor"], LIMIT);
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        ended.stderr
+    };
+    assert_eq!(watch(), "");
+    let bytes = fs::read(&path).expect("the file can be read");
+    fs::write(&path, &bytes[..bytes.len() - 10]).expect("the file can be written");
+    let said = watch();
+    assert!(said.contains("half.mcap: was cut off at 0.5 s"), "{said}");
 }
 
 /// A scene that was recorded and made a scene of again.

@@ -2,6 +2,7 @@
 
 use host_bridge::doctor::examination::BoardFacts;
 use host_bridge::doctor::permission::Permission;
+use host_bridge::link::host_hello;
 use host_bridge::state::State;
 use protocol::Role;
 
@@ -86,6 +87,16 @@ fn each_state_of_a_port_is_named_with_advice() {
             "wrong-role",
             "sensor: /dev/ttyACM0: display 0.1.0 on stm32f429zi, not the sensor",
             "exchange --sensor and --display, or flash the other firmware",
+        ),
+        (
+            State::Stranger {
+                port: port(),
+                hello: host_hello(),
+                wanted: Role::Sensor,
+            },
+            "wrong-role",
+            "sensor: /dev/ttyACM0: sends back what this program says",
+            "see whether its TX is joined to its RX, or whether a computer is at its far end",
         ),
     ] {
         one(

@@ -217,6 +217,40 @@ fn a_recording_ends_by_itself_when_it_is_told_to() {
 }
 
 #[test]
+fn an_unattended_recording_names_a_board_that_went_and_did_not_return() {
+    for is_json in [false, true] {
+        let path = folder(&format!("went-{is_json}")).join("went.mcap");
+        let mut pair = Pair::new();
+        let mut words = vec![path.to_str().expect("UTF-8"), "--no-gauges", "--for", "5"];
+        words.extend(is_json.then_some("--json"));
+        let running = pair.record(&mut bridge::command(), &words);
+        pair.wait_until_heard();
+        // Its port goes with it.
+        pair.sensor = FakeBoard::saying(Hello::new(Role::Sensor, "unplugged", [0, 0, 0]));
+        let ended = running.wait(LIMIT);
+        assert_eq!(
+            ended.status.code(),
+            Some(1),
+            "{}{}",
+            ended.stdout,
+            ended.stderr
+        );
+        if is_json {
+            let summary: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
+            assert_eq!(summary["absent"], serde_json::json!([]), "{summary}");
+            let missing = summary["missing_at_end"].as_array().expect("a list");
+            assert_eq!(missing.len(), 1, "{summary}");
+            assert_eq!(missing[0]["board"], "sensor", "{summary}");
+            let heard_s = missing[0]["last_heard_s"].as_f64().expect("a number");
+            assert!((0.0..5.0).contains(&heard_s), "{summary}");
+        } else {
+            let named = "; not there at the end: sensor, last heard at ";
+            assert!(ended.stdout.contains(named), "{}", ended.stdout);
+        }
+    }
+}
+
+#[test]
 fn a_recording_goes_on_when_the_program_that_owns_its_ports_is_killed() {
     let folder = folder("owner");
     let path = folder.join("owner.mcap");

@@ -92,6 +92,40 @@ fn a_file_cut_off_anywhere_is_read_up_to_its_last_whole_chunk() {
 }
 
 #[test]
+fn zeros_with_anything_behind_them_are_damage_and_no_end() {
+    let folder = folder("zeros");
+    let path = folder.join("zeros.mcap");
+    record_gauges(&path, 40_000);
+    let whole = fs::read(&path).expect("the file can be read");
+    let summary = Summary::read(&whole)
+        .expect("well-formed")
+        .expect("there is one");
+    let third = &summary.chunk_indexes[2];
+    // Where a record begins: it looks as a file does that was cut off there.
+    let begin = third.chunk_start_offset as usize;
+    for length in [1, 9, 10, 4_096, whole.len() - begin - 1] {
+        let mut bytes = whole.clone();
+        bytes[begin..begin + length].fill(0);
+        fs::write(&path, &bytes).expect("the file can be written");
+        let Err(error) = entries(&path) else {
+            panic!("{length} zeros are taken for an end");
+        };
+        let words = error.to_string();
+        assert!(
+            words.contains("zeros.mcap: damaged after /sensor/gauges at "),
+            "{length}: {words}"
+        );
+    }
+    // With nothing behind them they are what a file system left of an end.
+    for length in [1, 9, 10, 4_096, 200_000] {
+        let bytes = [&whole[..begin], &vec![0; length]].concat();
+        fs::write(&path, &bytes).expect("the file can be written");
+        let (_, is_cut) = entries(&path).unwrap_or_else(|error| panic!("{length}: {error}"));
+        assert!(is_cut, "{length}");
+    }
+}
+
+#[test]
 fn damage_is_named_with_file_channel_and_time() {
     let folder = folder("damage");
     let path = folder.join("damaged.mcap");
