@@ -19,7 +19,7 @@ const HELD_UP_NS: u64 = TAKEN_NS + 2 * MAX_FRAME as u64 * BYTE_NS;
 
 /// Histories followed at a time. Estimates that hardly differ while the hand hardly moves, about a
 /// turning point, can be taken in any of ten ticks each, and no word tells.
-const MOST_HISTORIES: usize = 100;
+const MOST_HISTORIES: usize = 200;
 /// The same if the link has delays and losses, so that more than one estimate in a hundred is held up.
 const MOST_HISTORIES_OF_BAD_LINK: usize = 1_000;
 

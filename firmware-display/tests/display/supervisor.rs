@@ -184,7 +184,17 @@ fn no_sequence_of_rates_and_references_breaks_a_limit() {
         max_age_ms: 5_000,
         ..DisplayConfiguration::DEFAULT
     };
-    let mut rig = Rig::driving(&base);
+    let loud = Estimate {
+        amplitude_lsb: 1_000.0,
+        ..sound(0, 0.5)
+    };
+    let mut rig = Rig::new(&base);
+    for tick in 0..4_000 {
+        if tick % 40 == 0 {
+            rig.tell(loud);
+        }
+        rig.tick(10);
+    }
     for change in 0..1_400 {
         let fast = change % 2 == 0;
         rig.configure(&DisplayConfiguration {
@@ -194,9 +204,9 @@ fn no_sequence_of_rates_and_references_breaks_a_limit() {
             ..base
         });
         if change % 40 == 0 {
-            rig.estimate(2.0);
+            rig.tell(loud);
         }
-        rig.tick(if fast { 3 } else { 7 });
+        rig.tick(if fast { 5 } else { 10 });
         assert_eq!(rig.state(), DisplayState::Driving, "{change}");
     }
 }

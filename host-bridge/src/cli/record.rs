@@ -116,8 +116,9 @@ impl Record {
         let presence = Arc::new(Mutex::new(Presence::default()));
         let theirs = Arc::clone(&presence);
         let links = super::links(&bench, move |role, event| {
-            recording.on_event(role, &event);
+            // First: a board that is asked something then is there.
             locked(&theirs).on_event(role, &event);
+            recording.on_event(role, &event);
             if concerns(&event) {
                 // Nobody listens any more when the recording ends.
                 let _ = events.send((role, event));

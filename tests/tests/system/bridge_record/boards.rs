@@ -219,12 +219,20 @@ fn a_recording_ends_by_itself_when_it_is_told_to() {
 #[test]
 fn an_unattended_recording_names_a_board_that_went_and_did_not_return() {
     for is_json in [false, true] {
-        let path = folder(&format!("went-{is_json}")).join("went.mcap");
+        let folder = folder(&format!("went-{is_json}"));
+        // By a name of its own: the number of a port that has gone is another's soon.
+        let name = folder.join("ttySensor");
         let mut pair = Pair::new();
-        let mut words = vec![path.to_str().expect("UTF-8"), "--no-gauges", "--for", "5"];
-        words.extend(is_json.then_some("--json"));
-        let running = pair.record(&mut bridge::command(), &words);
+        symlink(pair.sensor.path(), &name).expect("a link can be made");
+        let mut command = bridge::command();
+        command.args(["record", "--no-gauges", "--for", "5"]);
+        command.args(is_json.then_some("--json"));
+        command.arg(folder.join("went.mcap"));
+        command.arg("--sensor").arg(&name);
+        command.arg("--display").arg(pair.display.path());
+        let running = Running::start(&mut command);
         pair.wait_until_heard();
+        fs::remove_file(&name).expect("the link can be taken away");
         // Its port goes with it.
         pair.sensor = FakeBoard::saying(Hello::new(Role::Sensor, "unplugged", [0, 0, 0]));
         let ended = running.wait(LIMIT);

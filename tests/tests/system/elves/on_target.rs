@@ -29,6 +29,7 @@ const DISPLAY: (&str, &[&str]) = (
         "the_bus_gets_back_what_it_says",
         "clr_is_low_until_it_is_held_off_and_falls_two_milliseconds_later",
         "clr_stays_high_for_as_long_as_it_is_held_off",
+        "clr_that_has_fallen_unseen_stays_low_until_it_was_seen",
         "the_tick_comes_as_often_as_it_is_asked_to",
         "ldac_falls_at_its_time_behind_the_tick",
         "an_open_emergency_stop_is_a_pressed_one_and_an_open_alarm_is_none",
@@ -108,7 +109,7 @@ fn a_jumper_that_is_left_out_fails_the_test_that_needs_it() {
         (Jumper::Serial, SENSOR.0, SENSOR.1[8]),
         (Jumper::Spi, DISPLAY.0, DISPLAY.1[1]),
         (Jumper::Pulse, DISPLAY.0, DISPLAY.1[2]),
-        (Jumper::Load, DISPLAY.0, DISPLAY.1[5]),
+        (Jumper::Load, DISPLAY.0, DISPLAY.1[6]),
     ] {
         let others: Vec<Jumper> = Jumper::ALL
             .into_iter()
