@@ -66,6 +66,17 @@ pub fn peer_grown(board: &BoardFacts) -> Option<u32> {
     Some(last.peer.received.wrapping_sub(first.peer.received))
 }
 
+/// Whether a board has taken what the other one says while nothing came over the link between them: a relay told it.
+fn is_relayed(board: &BoardFacts) -> bool {
+    let taken = |status: &Status| match &status.role {
+        RoleCounters::Sensor(counters) => counters.motions,
+        RoleCounters::Display(counters) => counters.estimates,
+    };
+    let statuses = board.first.as_ref().zip(board.last.as_ref());
+    peer_grown(board) == Some(0)
+        && statuses.is_some_and(|(first, last)| taken(first) != taken(last))
+}
+
 struct Spoken<'a>(&'a Hello);
 
 impl fmt::Display for Spoken<'_> {
@@ -125,6 +136,9 @@ impl Findings {
             );
         }
         if !(sensor.state.is_known() && display.state.is_known()) {
+            return;
+        }
+        if [sensor, display].into_iter().any(is_relayed) {
             return;
         }
         let is_deaf = [sensor, display].map(|board| peer_grown(board) == Some(0));

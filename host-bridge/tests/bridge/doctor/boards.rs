@@ -4,7 +4,9 @@ use host_bridge::doctor::examination::BoardFacts;
 use host_bridge::doctor::examination::Drift;
 use host_bridge::doctor::examination::ElfFacts;
 use host_bridge::state::State;
-use protocol::{DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, Trip};
+use protocol::{
+    DisplayState, GaugeHealth, Hello, Hold, ResetCause, Role, RoleCounters, SensorCounters, Trip,
+};
 
 use super::bench::{
     display_counters, display_spoiled, hello, one, peer, sensor_counters, sensor_spoiled, spoiled,
@@ -105,6 +107,16 @@ fn a_link_that_is_down_is_named_by_who_hears_nothing() {
         "the link between the boards is down: neither hears the other",
         "see the wires between the boards: PD5 and PD6 crossed, a common ground",
     );
+    // A relay of both consoles carries what the wires would.
+    let relayed = spoiled(|bench| {
+        bench.boards.iter_mut().for_each(deaf);
+        let last = bench.boards[0].last.as_mut().unwrap();
+        last.role = RoleCounters::Sensor(SensorCounters {
+            motions: 900,
+            ..SensorCounters::ZERO
+        });
+    });
+    assert_eq!(relayed, []);
     // One board alone, as at one end of a relay, has nobody to hear.
     let alone = spoiled(|bench| {
         bench.boards.truncate(1);
