@@ -77,8 +77,6 @@ pub struct Plausibility {
     /// See [`Plausibility::take_beginning`].
     began_anew: bool,
     held: Option<Wavelength>,
-    /// The one trusted last, whatever became of `held`: it is what is played as long as it is [fresh](Self::is_fresh).
-    played: Option<Wavelength>,
     surprise: Option<Wavelength>,
     /// Surprises that were not confirmed, to be counted by the caller.
     unconfirmed: u32,
@@ -103,7 +101,6 @@ impl Plausibility {
             greeted: 0,
             began_anew: false,
             held: None,
-            played: None,
             surprise: None,
             unconfirmed: 0,
             age: u32::MAX,
@@ -146,8 +143,8 @@ impl Plausibility {
         self.contradiction.hear(estimate.velocity_um_s);
         let wavelength = estimate.wavelength_mm.and_then(Wavelength::new);
         if !estimate.valid {
-            if let Some((guess, played)) = wavelength.zip(self.played) {
-                self.doubt(guess, played, estimate.confidence);
+            if let Some((guess, held)) = wavelength.zip(self.held) {
+                self.doubt(guess, held, estimate.confidence);
             }
             return Verdict::Idle;
         }
@@ -161,9 +158,9 @@ impl Plausibility {
         self.weigh(wavelength)
     }
 
-    /// A λ that its estimator does not stand by speaks for the one played, or against it.
-    fn doubt(&mut self, guess: Wavelength, played: Wavelength, confidence: f32) {
-        if !are_about_the_same(guess, played) {
+    /// A λ that its estimator does not stand by speaks for the one held, or against it.
+    fn doubt(&mut self, guess: Wavelength, held: Wavelength, confidence: f32) {
+        if !are_about_the_same(guess, held) {
             self.is_doubted |= confidence >= POSSIBLE;
         } else if confidence >= LIKELY {
             self.known = self.since;
@@ -248,7 +245,6 @@ impl Plausibility {
         self.known = self.since;
         self.is_doubted = false;
         self.held = Some(wavelength);
-        self.played = self.held;
         self.age = 0;
         Verdict::Trusted(wavelength)
     }

@@ -441,27 +441,6 @@ fn doubtful_estimates_that_likely_say_the_same_make_a_surface_known() {
 }
 
 #[test]
-fn a_sensor_that_has_started_again_and_doubts_another_surface_ends_the_hold_too() {
-    let mut plausibility = Plausibility::new();
-    let mut judge = |estimate| {
-        plausibility.elapse(quarters(10), false);
-        plausibility.judge(&estimate, MAX_AGE_MS);
-        plausibility.is_fresh(MAX_AGE_MS)
-    };
-    for sequence in 5_000..5_020 {
-        assert!(judge(sound(sequence, 2.0)));
-    }
-    let doubtful = |sequence, mm| Estimate {
-        valid: false,
-        confidence: 0.55,
-        ..sound(sequence, mm)
-    };
-    assert!(judge(doubtful(0, 2.0)), "it may be the same surface");
-    assert!(!judge(doubtful(1, 6.0)));
-    assert!(judge(sound(2, 6.0)), "it need not surprise anybody");
-}
-
-#[test]
 fn a_doubtful_estimate_that_may_be_right_about_another_surface_ends_the_hold() {
     let doubtful = |sequence, mm: f32, confidence| Estimate {
         valid: false,
