@@ -9,7 +9,7 @@ use crate::frame::MAX_FRAME;
 use crate::message::{Message, Ping, Pong};
 use crate::receiver::{Event, Peer, Receiver, is_typed};
 use crate::sender::Sender;
-use crate::{Hello, PortCounters};
+use crate::{Arm, ArmState, DisplayState, Hello, PortCounters, Safety};
 
 /// Bytes that may wait to be sent: some 20 ms of a 921 600 baud line.
 pub const QUEUE_BYTES: usize = 2_048;
@@ -19,6 +19,8 @@ pub struct Port {
     sender: Sender,
     receiver: Receiver,
     queue: Deque<u8, QUEUE_BYTES>,
+    /// What the board said last of its own halt, and the bytes in the queue up to its end.
+    halt: Option<(Halt, usize)>,
     /// See [`Port::take_asked`].
     asked: bool,
     /// When bytes came last, whatever they were.
@@ -46,6 +48,7 @@ impl Port {
             sender,
             receiver: Receiver::new(),
             queue: Deque::new(),
+            halt: None,
             asked: false,
             stirred_us: 0,
             heard_us: 0,
@@ -60,13 +63,23 @@ impl Port {
     ///
     /// A [`Stop`](crate::Stop), and the answer to one, is queued whoever listens, and always: a Stop takes the
     /// place of all that waits to be sent, an answer does if there is no room. A 0x00 comes before it, to end
-    /// whatever went out before.
+    /// whatever went out before. What a board says of its own halt, which it says once, comes again behind a Stop that
+    /// took its place.
     pub fn post(&mut self, message: &Message) {
         match message {
             Message::Stop(_) => self.give_up(),
             Message::Stopped(_) if !self.has_room() => self.give_up(),
-            _ => {}
+            _ => return self.queue_frame(message),
         }
+        let halt = self.halt.take();
+        self.queue_frame(message);
+        if let Some((halt, _)) = halt {
+            self.queue_frame(&halt.message());
+        }
+    }
+
+    /// Queues `message` if somebody who understands it listens, and if there is room; counts it as dropped if not.
+    fn queue_frame(&mut self, message: &Message) {
         let mut frame = [0; MAX_FRAME];
         if !self.has_room() {
             self.dropped = self.dropped.wrapping_add(1);
@@ -74,6 +87,9 @@ impl Port {
             for &byte in bytes {
                 let fits = self.queue.push_back(byte);
                 debug_assert!(fits.is_ok(), "the queue had room for a whole frame");
+            }
+            if let Some(halt) = Halt::told_by(message) {
+                self.halt = Some((halt, self.queue.len()));
             }
         }
     }
@@ -179,6 +195,10 @@ impl Port {
             *place = byte;
             taken += 1;
         }
+        self.halt = self.halt.take().and_then(|(halt, left)| {
+            let left = left.saturating_sub(taken);
+            (left > 0).then_some((halt, left))
+        });
         taken
     }
 
@@ -238,6 +258,35 @@ impl Port {
             overruns: self.overruns,
             line_errors: self.line_errors,
             ..self.receiver.counters()
+        }
+    }
+}
+
+/// A board's own halt, as it tells of it.
+#[derive(Clone, Copy)]
+enum Halt {
+    Display(Safety),
+    Sensor(Arm),
+}
+
+impl Halt {
+    /// The halt that a message tells of, if it tells of one.
+    const fn told_by(message: &Message) -> Option<Self> {
+        match message {
+            Message::Safety(safety) if matches!(safety.state, DisplayState::Stopped(_)) => {
+                Some(Self::Display(*safety))
+            }
+            Message::Arm(arm) if matches!(arm.state, ArmState::Stopped(_)) => {
+                Some(Self::Sensor(*arm))
+            }
+            _ => None,
+        }
+    }
+
+    const fn message(self) -> Message {
+        match self {
+            Self::Display(safety) => Message::Safety(safety),
+            Self::Sensor(arm) => Message::Arm(arm),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use protocol::port::QUEUE_BYTES;
 use protocol::{
-    DisplayState, Hello, Message, Peer, Ping, Port, Role, Safety, Stop, StopReason, Stopped, Trip,
+    Arm, ArmState, DisplayState, Hello, Message, Peer, Ping, Port, Role, Safety, Stop, StopReason, Stopped, Trip,
 };
 
 fn port(role: Role) -> Port {
@@ -36,9 +36,21 @@ const WORD: Message = Message::Safety(Safety {
     instant_us: 7,
     state: DisplayState::Ready,
 });
+const ARM: Message = Message::Arm(Arm {
+    instant_us: 8,
+    state: ArmState::Stopped(Trip::Operator),
+});
 const STOP: Message = Message::Stop(Stop {
     reason: StopReason::Operator,
 });
+
+/// What a display says of its own halt.
+const fn halted(state: DisplayState) -> Message {
+    Message::Safety(Safety {
+        instant_us: 7,
+        state,
+    })
+}
 
 #[test]
 fn two_ports_know_each_other_after_one_exchange() {
@@ -218,6 +230,50 @@ fn a_stop_that_is_said_again_counts_each_frame_once_that_it_takes_the_place_of()
         assert_eq!(host.counters().dropped, said);
     }
     assert_eq!(carry(&mut host, &mut board, 1), [WORD, STOP]);
+}
+
+/// A board stops by its own and passes a Stop on: both in one instant.
+#[test]
+fn a_stop_does_not_take_the_place_of_what_a_board_says_of_its_own_halt() {
+    for halt in [halted(DisplayState::Stopped(Trip::Operator)), ARM] {
+        let (mut board, mut host) = acquainted();
+        board.post(&WORD);
+        board.post(&halt);
+        for _ in 0..3 {
+            board.post(&STOP);
+        }
+        assert_eq!(carry(&mut board, &mut host, 1), [STOP, halt.clone()]);
+        // It has gone out.
+        board.post(&STOP);
+        assert_eq!(carry(&mut board, &mut host, 2), [STOP]);
+    }
+}
+
+#[test]
+fn what_a_board_says_of_its_own_halt_is_heard_however_much_of_it_has_gone_out() {
+    let halt = halted(DisplayState::Stopped(Trip::Operator));
+    let length = {
+        let (mut board, _) = acquainted();
+        board.post(&halt);
+        board.take(&mut [0; QUEUE_BYTES])
+    };
+    for gone in 0..=length {
+        let (mut board, mut host) = acquainted();
+        board.post(&halt);
+        let mut bytes = [0; QUEUE_BYTES];
+        assert_eq!(board.take(&mut bytes[..gone]), gone);
+        let mut heard = Vec::new();
+        host.receive(1, &bytes[..gone], |message| heard.push(message));
+        board.post(&STOP);
+        heard.extend(carry(&mut board, &mut host, 1));
+        // All but its end, which the Stop's 0x00 is: it is heard, and said again, since the port cannot know.
+        let expected = match gone {
+            _ if gone == length => vec![halt.clone(), STOP],
+            _ if gone + 1 == length => vec![halt.clone(), STOP, halt.clone()],
+            _ => vec![STOP, halt.clone()],
+        };
+        assert_eq!(heard, expected, "{gone} of {length} bytes");
+    }
 }
 
 #[test]
