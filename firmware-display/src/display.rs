@@ -94,8 +94,7 @@ impl Display {
     }
 
     /// Takes settings as [`Settings`] made them; others are a fault of memory. See
-    /// [`Stimulus::configure`] for how they come into force; the board paces the ticks by
-    /// [`update_rate`](DisplayConfiguration::update_rate) from the next one on.
+    /// [`Stimulus::configure`] for how they come into force, and [`Display::rate`] for how long the periods are.
     pub fn configure(&mut self, settings: &Settings) {
         if !settings.are_sound() {
             self.ask(Trip::Memory);
@@ -108,8 +107,7 @@ impl Display {
         self.fade
             .set_times(configuration.fade_in_ms, configuration.fade_out_ms);
         self.stimulus.configure(&configuration, actuators);
-        self.limits
-            .set(self.stimulus.rate(), configuration.amplitude_mv);
+        self.limits.set(configuration.amplitude_mv);
         // A lower age makes too old at once what no tick, and no texture, will see to become so.
         if !self.relief.wave_is_fresh(configuration.max_age_ms) {
             self.stimulus.wear_off();
@@ -220,7 +218,7 @@ impl Display {
         }
     }
 
-    /// How long the next tick is: another rate is in force from the one after it on.
+    /// How long the period is that the next tick ends: another rate is in force from the one after it on.
     pub const fn rate(&self) -> UpdateRate {
         self.stimulus.rate()
     }

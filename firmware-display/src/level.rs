@@ -109,8 +109,15 @@ impl Level {
         };
         if target != self.target {
             self.target = target;
-            self.ticks_left = ticks_at(rate, GLIDE_MS);
-            self.per_tick = (target as i32 - self.value as i32) / self.ticks_left as i32;
+            self.glide(ticks_at(rate, GLIDE_MS));
+        }
+    }
+
+    /// Is there after `ticks` ticks, by equal steps; nothing changes with none.
+    const fn glide(&mut self, ticks: u32) {
+        self.ticks_left = ticks;
+        if ticks > 0 {
+            self.per_tick = (self.target as i32 - self.value as i32) / ticks as i32;
         }
     }
 
@@ -122,8 +129,7 @@ impl Level {
 
     /// Ticks last another time from now on.
     pub fn change_rate(&mut self, change: RateChange) {
-        self.ticks_left = change.ticks(self.ticks_left);
-        self.per_tick = change.a_tick(self.per_tick);
+        self.glide(change.ticks(self.ticks_left));
         // As near to 0 as a tick's own.
         self.turn = change.a_tick(self.turn).clamp(1 - (1 << 30), (1 << 30) - 1);
     }
@@ -285,6 +291,39 @@ mod tests {
                 );
             }
             assert_eq!(level.amplitude(), FULL / 5);
+        }
+    }
+
+    #[test]
+    fn however_often_the_rate_changes_no_glide_goes_beyond_its_end() {
+        let [slow, fast] = RATES;
+        for every in [1, 2, 3, 5, 11] {
+            for (before_mv, after_mv) in [(1_000, 0), (0, 1_000), (5_000, 1_000), (1_000, 5_000)] {
+                let configuration = |amplitude_mv| DisplayConfiguration {
+                    amplitude_mv,
+                    ..DisplayConfiguration::DEFAULT
+                };
+                let mut level = Level::new(&configuration(before_mv));
+                let mut rate = slow;
+                level.configure(&configuration(after_mv), rate);
+                let (mut before, end) = (level.amplitude(), level.target);
+                let far = before.abs_diff(end);
+                for tick in 1..=200 {
+                    level.tick(0, rate);
+                    let now = level.amplitude();
+                    assert!(now.abs_diff(end) <= before.abs_diff(end), "{tick}: {now}");
+                    assert!((now <= end) == (before_mv < after_mv) || now == end);
+                    // A tick of 2 kHz is a fortieth of the glide.
+                    assert!(now.abs_diff(before) <= far / 20, "{tick}: {now}");
+                    before = now;
+                    if tick % every == 0 {
+                        let from = rate;
+                        rate = if rate == slow { fast } else { slow };
+                        level.change_rate(RateChange { from, to: rate });
+                    }
+                }
+                assert_eq!(level.amplitude(), end);
+            }
         }
     }
 

@@ -90,9 +90,8 @@ impl Limits {
         }
     }
 
-    /// Takes another rate and amplitude, of which a lower one has 250 ms to be reached.
-    pub const fn set(&mut self, rate: UpdateRate, amplitude_mv: u16) {
-        self.quarters = per_tick(rate);
+    /// Takes another amplitude; a lower one has 250 ms to be reached.
+    pub const fn set(&mut self, amplitude_mv: u16) {
         let amplitude = steps(amplitude_mv);
         // What is the same, said again, puts nothing off.
         if amplitude < self.amplitude {
@@ -302,13 +301,13 @@ mod tests {
             let mut limits = Limits::new(rate, 5_000);
             let high = [word(5.0); ACTUATORS];
             limits.before = high;
-            limits.set(rate, 1_000);
+            limits.set(1_000);
             let settling = 250 * rate.hz() / 1_000;
             for _ in 1..settling {
                 assert_eq!(limits.check(&high), Ok(()));
             }
             assert_eq!(limits.check(&high), Err(Breach::Voltage));
-            limits.set(rate, 5_000);
+            limits.set(5_000);
             assert_eq!(limits.check(&high), Ok(()));
         }
     }
@@ -322,7 +321,7 @@ mod tests {
             let (settling, often) = (250 * rate.hz() / 1_000, 100 * rate.hz() / 1_000);
             for tick in 1..settling {
                 if tick % often == 1 {
-                    limits.set(rate, 1_000);
+                    limits.set(1_000);
                 }
                 assert_eq!(limits.check(&high), Ok(()), "tick {tick}");
             }

@@ -290,7 +290,7 @@ mod tests {
             let rate = rates[tick / 3 % 2];
             waited += per_tick(rate);
             if rounds.tick(rate, true, &WORDS).is_some() {
-                // A long tick may end it a quarter late.
+                // A tick of two quarters may end it a quarter late.
                 assert!((8..=9).contains(&waited), "{tick}: {waited}");
                 (waited, looks) = (0, looks + 1);
             }

@@ -21,7 +21,8 @@ pub const fn per_tick(rate: UpdateRate) -> u32 {
     FASTEST_HZ / rate.hz()
 }
 
-/// From one update rate to another: what is counted in ticks, or added a tick, goes on as it was in time.
+/// From one update rate to another: what is counted in ticks, and averages of what happens in a tick, go on as they were in
+/// time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RateChange {
     /// The rate before.
@@ -38,7 +39,7 @@ impl RateChange {
             .div_ceil(per_tick(self.to))
     }
 
-    /// What has to be added a tick where `amount` was.
+    /// What happens in a tick where `amount` did.
     pub const fn a_tick(self, amount: i32) -> i32 {
         amount.saturating_mul(per_tick(self.to) as i32) / per_tick(self.from) as i32
     }

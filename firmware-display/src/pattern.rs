@@ -104,12 +104,19 @@ impl Pattern {
         if !self.travelling || !self.set_targets(per_micrometre) {
             return;
         }
-        self.ticks_left = ticks.max(1);
-        let ticks = self.ticks_left as i32;
+        self.glide_to_targets(ticks.max(1));
+    }
+
+    /// Is there after `ticks` ticks, by equal steps; nothing changes with none.
+    fn glide_to_targets(&mut self, ticks: u32) {
+        self.ticks_left = ticks;
+        if ticks == 0 {
+            return;
+        }
         for ((step, target), ahead) in self.per_tick.iter_mut().zip(&self.targets).zip(&self.ahead)
         {
             // As a signed number the difference is the shorter way.
-            *step = target.wrapping_sub(*ahead) as i32 / ticks;
+            *step = target.wrapping_sub(*ahead) as i32 / ticks as i32;
         }
     }
 
@@ -135,10 +142,7 @@ impl Pattern {
 
     /// Ticks last another time from now on.
     pub fn change_rate(&mut self, change: RateChange) {
-        self.ticks_left = change.ticks(self.ticks_left);
-        for step in &mut self.per_tick {
-            *step = change.a_tick(*step);
-        }
+        self.glide_to_targets(change.ticks(self.ticks_left));
     }
 
     /// Is there at once: for when nobody feels it.

@@ -72,12 +72,19 @@ impl Phase {
             return;
         }
         self.target = target;
-        self.ticks_left = ticks;
         if ticks == 0 {
             self.settle();
         } else {
+            self.glide(ticks);
+        }
+    }
+
+    /// Has the wavenumber after `ticks` ticks, by equal steps; nothing changes with none.
+    const fn glide(&mut self, ticks: u32) {
+        self.ticks_left = ticks;
+        if ticks > 0 {
             // A twentieth of a turn at most: no overflow.
-            self.per_tick = (target as i32 - self.per_count as i32) / ticks as i32;
+            self.per_tick = (self.target as i32 - self.per_count as i32) / ticks as i32;
         }
     }
 
@@ -88,8 +95,7 @@ impl Phase {
 
     /// Ticks last another time from now on.
     pub const fn change_rate(&mut self, change: RateChange) {
-        self.ticks_left = change.ticks(self.ticks_left);
-        self.per_tick = change.a_tick(self.per_tick);
+        self.glide(change.ticks(self.ticks_left));
     }
 
     /// Has the wavenumber of the wavelength followed at once: for when nobody feels it.
@@ -132,6 +138,8 @@ impl Phase {
 
 #[cfg(test)]
 mod tests {
+    use protocol::UpdateRate;
+
     use super::*;
 
     #[test]
@@ -214,6 +222,35 @@ mod tests {
             // The same wavelength told again does not begin anew.
             phase.follow(after, 40);
             assert_eq!(phase.ticks_left, 0);
+        }
+    }
+
+    #[test]
+    fn however_often_the_rate_changes_no_wavenumber_goes_beyond_its_end() {
+        let [slow, fast] = [UpdateRate::Hz2000, UpdateRate::Hz4000];
+        for every in [1, 2, 3, 5, 11] {
+            for (before_mm, after_mm) in [(0.1, 50.0), (50.0, 0.1), (2.0, 3.0)] {
+                let [before, after] = [before_mm, after_mm].map(|mm| Wavelength::new(mm).unwrap());
+                let mut phase = Phase::default();
+                phase.follow(before, 0);
+                phase.follow(after, 40);
+                let end = after.phase_per_count();
+                let (mut last, is_rising) = (phase.per_count(), phase.per_count() < end);
+                let mut rate = slow;
+                for tick in 1..=200 {
+                    phase.advance(1);
+                    let now = phase.per_count();
+                    assert!(now.abs_diff(end) <= last.abs_diff(end), "{tick}: {now}");
+                    assert!(now == end || (now < end) == is_rising, "{tick}: {now}");
+                    last = now;
+                    if tick % every == 0 {
+                        let from = rate;
+                        rate = if rate == slow { fast } else { slow };
+                        phase.change_rate(RateChange { from, to: rate });
+                    }
+                }
+                assert_eq!(phase.per_count(), end);
+            }
         }
     }
 

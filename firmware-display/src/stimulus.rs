@@ -169,7 +169,7 @@ impl Stimulus {
         self.level.rub(friction, self.rate);
     }
 
-    /// How long the next tick is.
+    /// How long the period is that the next tick ends.
     pub const fn rate(&self) -> UpdateRate {
         self.rate
     }

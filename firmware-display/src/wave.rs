@@ -130,13 +130,8 @@ impl Wave {
 
     /// Ticks last another time from now on.
     pub fn change_rate(&mut self, change: RateChange) {
-        let before = self.ticks_left;
-        self.ticks_left = change.ticks(before);
+        self.glide(change.ticks(self.ticks_left));
         self.travel = change.a_tick(self.travel);
-        if self.ticks_left > 0 {
-            let part = before as f32 / self.ticks_left as f32;
-            self.per_tick = self.per_tick.map(|step| step * part);
-        }
     }
 
     /// Is there at once: for when nobody feels it.
@@ -156,9 +151,17 @@ impl Wave {
 
     fn aim(&mut self, target: [f32; COEFFICIENTS], rate: UpdateRate) {
         self.target = target;
-        self.ticks_left = ticks_at(rate, GLIDE_MS);
-        let part = 1.0 / self.ticks_left as f32;
-        for ((step, target), now) in self.per_tick.iter_mut().zip(&target).zip(&self.now) {
+        self.glide(ticks_at(rate, GLIDE_MS));
+    }
+
+    /// Is there after `ticks` ticks, by equal steps; nothing changes with none.
+    fn glide(&mut self, ticks: u32) {
+        self.ticks_left = ticks;
+        if ticks == 0 {
+            return;
+        }
+        let part = 1.0 / ticks as f32;
+        for ((step, target), now) in self.per_tick.iter_mut().zip(&self.target).zip(&self.now) {
             *step = (target - now) * part;
         }
     }
