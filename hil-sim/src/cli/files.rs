@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use anyhow::Context;
 #[cfg(target_os = "linux")]
 use signal_hook::{
-    consts::{SIGHUP, SIGINT, SIGTERM},
+    consts::{SIGINT, SIGTERM},
     iterator::Signals,
     low_level::emulate_default_handler,
 };
@@ -66,7 +66,7 @@ const STANDARD_OUTPUTS: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/
 ///
 /// What is written goes to a draft beside it, named `FILE.part`, which takes the file's place at the end: until
 /// then an earlier result is there. A signal that ends the program takes the draft away. A device or a pipe is written
-/// to at once. So is standard output, and what else would be printed there goes to standard error.
+/// to at once. So is standard output, which takes one result; what else would be printed there goes to standard error.
 pub(super) struct Results<'a> {
     pub path: &'a Path,
     file: BufWriter<File>,
@@ -90,9 +90,12 @@ impl<'a> Results<'a> {
         let wrong = || format!("{here}: cannot be written: give a file in a folder that exists");
         #[cfg(unix)]
         if STANDARD_OUTPUTS.iter().any(|name| path == Path::new(name)) {
+            anyhow::ensure!(
+                keep_standard_output(),
+                "{here}: standard output takes one result: give the other a file of its own"
+            );
             // As it is: opened by its name, a file that it leads to would be begun anew.
             let out = io::stdout().as_fd().try_clone_to_owned();
-            keep_standard_output();
             return Ok(Self {
                 path,
                 file: BufWriter::new(File::from(out.with_context(wrong)?)),
@@ -256,7 +259,8 @@ fn take_away_at_signals() -> io::Result<()> {
     if *are_heard {
         return Ok(());
     }
-    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM])?;
+    // Not SIGHUP: who listens to it undoes what nohup has asked for.
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
     std::thread::spawn(move || {
         for signal in signals.forever() {
             // Held to the end: none takes its place any more.

@@ -95,10 +95,12 @@ impl What {
     }
 
     fn renew(&self) -> anyhow::Result<ExitCode> {
+        // A file that can't be used is refused before the runs, which take long.
         Golden::open(&self.file)?;
         let scenes = self.load()?;
         let seen = self.run(&scenes, 1)?;
-        // Once more: another may have renewed other scenes meanwhile.
+        // Read again: what another `golden renew` has written meanwhile stays. Nothing is locked: of two that write at the
+        // same moment, one may lose its hashes.
         let mut golden = Golden::open(&self.file)?;
         let engine = self.way.engine();
         let mut same = 0;

@@ -52,7 +52,7 @@ pub(super) struct Jury {
     /// The first seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How many surfaces, a seed each
+    /// How many surfaces, a seed each: a million at most
     #[arg(long, value_name = "COUNT", default_value_t = 200, value_parser = clap::value_parser!(u64).range(..=1_000_000))]
     surfaces: u64,
     /// Judge the scenes of this folder instead, which has an index.json with their truths

@@ -26,12 +26,13 @@ macro_rules! tell {
 }
 pub(super) use tell;
 
-/// Whether results are written to standard output.
+/// Whether a result is written to standard output.
 static KEPT: AtomicBool = AtomicBool::new(false);
 
-/// Standard output is for results alone: what is said from now on goes to standard error.
-pub(super) fn keep_standard_output() {
-    KEPT.store(true, Ordering::Relaxed);
+/// Standard output is for one result alone: what is said from now on goes to standard error. False if another result
+/// has it already.
+pub(super) fn keep_standard_output() -> bool {
+    !KEPT.swap(true, Ordering::Relaxed)
 }
 
 /// Prints `text` as it is. If it can't be written, for another reason than that nobody reads it, the

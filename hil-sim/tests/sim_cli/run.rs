@@ -1,7 +1,7 @@
 //! `hil-sim run` as a person or a script meets it.
 
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -288,6 +288,22 @@ fn standard_output_takes_results_alone_and_keeps_what_is_there() {
 }
 
 #[test]
+fn standard_output_takes_one_result() {
+    let folder = folder("one-result");
+    fs::write(folder.join("a.toml"), SOUND).unwrap();
+    for second in ["/dev/stdout", "/dev/fd/1"] {
+        let output = hil_sim(
+            &folder,
+            &["run", "a.toml", "--json", "/dev/stdout", "--junit", second],
+        );
+        assert_eq!(output.status.code(), Some(2), "{second}");
+        let want = format!("{second}: standard output takes one result: give the other a file");
+        assert!(errors(&output).contains(&want), "{}", errors(&output));
+        assert!(output.stdout.is_empty(), "{second}");
+    }
+}
+
+#[test]
 fn nothing_but_results_and_drafts_of_them_is_written_over() {
     let folder = folder("over-nothing");
     fs::write(folder.join("a.toml"), SOUND).unwrap();
@@ -323,17 +339,23 @@ fn nothing_but_results_and_drafts_of_them_is_written_over() {
 
 #[test]
 fn gauges_may_come_out_of_a_pipe() {
-    let folder = folder("pipe");
+    let folder = folder("gauges-pipe");
     let rows = (0..8_000).map(|n| format!("{},1.6,1.7,1.65,1.6,1.7\n", f64::from(n) * 250e-6));
     let table = format!("t_s,g0,g1,g2,g3,g4\n{}", rows.collect::<String>());
-    fs::write(folder.join("table.csv"), table).unwrap();
-    let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"pipe.csv\"\n";
+    let gauges = "[gauges]\nkind = \"recorded\"\nfile = \"/dev/stdin\"\n";
     fs::write(folder.join("a.toml"), format!("{SOUND}{gauges}")).unwrap();
-    let (status, printed) = shell(
-        &folder,
-        "mkfifo pipe.csv; cat table.csv > pipe.csv & \"$0\" run a.toml 2>&1",
-    );
-    assert_eq!(status, Some(0), "{printed}");
+    let mut run = command(&folder, &["run", "a.toml"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut pipe = run.stdin.take().unwrap();
+    // A pipe holds less than the table, and is closed behind it.
+    let writer = thread::spawn(move || pipe.write_all(table.as_bytes()));
+    let output = run.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    writer.join().unwrap().unwrap();
 }
 
 #[test]

@@ -12,10 +12,9 @@ use crate::judge::{finite, mean, seconds, words};
 use crate::run::observer::{RunEvent, RunObserver, replay_to};
 use crate::run::recording::{Arrival, EstimateRecord, Recording, ScanRecord};
 
-/// Speed from which on the arm counts as in motion, in mm/s.
-pub const MOTION_MM_S: f64 = 5.0;
-/// As much as a speed worked out of two places and instants may be off, so that no rounding makes it motion.
-pub(super) const ROUNDED: f64 = 1.0 + 1e-9;
+/// Speed above which arm and hand count as in motion, in mm/s: 5, and as much more as a speed worked out of two places
+/// and instants may be off by rounding.
+pub const MOTION_MM_S: f64 = 5.0 * (1.0 + 1e-9);
 /// Relative error within which an estimate counts as settled, and above which a valid one is wrong.
 pub const SETTLED: f64 = 0.1;
 /// Relative change of λ from one scan to the next that makes a boundary between specimens.
@@ -222,7 +221,7 @@ impl<'a> Judge<'a> {
     /// Time in motion counts as valid if the last estimate made is.
     fn count(&mut self, (from_s, from_mm): (f64, f64), (to_s, to_mm): (f64, f64)) {
         let step_s = to_s - from_s;
-        if step_s <= 0.0 || ((to_mm - from_mm) / step_s).abs() <= MOTION_MM_S * ROUNDED {
+        if step_s <= 0.0 || ((to_mm - from_mm) / step_s).abs() <= MOTION_MM_S {
             return;
         }
         self.moving_s += step_s;

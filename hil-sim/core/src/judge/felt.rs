@@ -7,7 +7,7 @@
 //!
 //! [`DuePhase`]: crate::judge::phase::DuePhase
 
-use crate::judge::estimates::{MOTION_MM_S, ROUNDED, SETTLED};
+use crate::judge::estimates::{MOTION_MM_S, SETTLED};
 use crate::run::recording::{OutputRecord, TickRecord, ZERO_VOLT};
 
 /// Relative error of λ within which what is driven is right.
@@ -16,8 +16,8 @@ pub const RIGHT: f64 = 0.05;
 pub const WRONG: f64 = SETTLED;
 /// Ticks at 0 V that may be a wave's crossing: one, of which a tick sees the beginning and the end.
 const CROSSING_TICKS: u32 = 2;
-/// Speed of the hand in mm per ns from which on it counts as in motion.
-const MOTION_MM_NS: f64 = MOTION_MM_S * ROUNDED * 1e-9;
+/// Speed of the hand in mm per ns above which it counts as in motion.
+const MOTION_MM_NS: f64 = MOTION_MM_S * 1e-9;
 
 /// What was felt, as shares of the time in which the hand moved, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

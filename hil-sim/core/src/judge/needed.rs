@@ -10,6 +10,7 @@ use protocol::{Message, Role, Texture};
 use serde::Serialize;
 use strum::{IntoStaticStr, VariantArray};
 
+use crate::judge::estimates::MOTION_MM_S;
 use crate::run::decoder::TimedMessage;
 use crate::run::recording::TickRecord;
 
@@ -17,8 +18,6 @@ use crate::run::recording::TickRecord;
 pub const LIMEN_DB: f64 = 2.2;
 /// The smallest Weber fraction of its frequency.
 pub const WEBER: f64 = 0.18;
-/// Speed of the hand from which on it counts as in motion, in mm/s, as for the estimates.
-const MOTION_MM_S: f64 = 5.0;
 /// What is felt as vibration, in Hz.
 const FELT_HZ: std::ops::RangeInclusive<f64> = 2.0..=200.0;
 
