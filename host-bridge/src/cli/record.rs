@@ -116,7 +116,7 @@ impl Record {
         let presence = Arc::new(Mutex::new(Presence::default()));
         let theirs = Arc::clone(&presence);
         let links = super::links(&bench, move |role, event| {
-            // First: a board that is asked something then is there.
+            // Before anybody else is told: a board that is asked something counts as there.
             locked(&theirs).on_event(role, &event);
             recording.on_event(role, &event);
             if concerns(&event) {
@@ -142,8 +142,9 @@ impl Record {
         }
         .run(&ended, self.until);
         let seconds = started.elapsed().as_secs_f64();
+        // Which boards are there at the end, before this program itself closes the ways to them.
         let presence = *locked(&presence);
-        // Nothing is told any more once the links are gone.
+        // Closed links tell the recorder nothing more.
         drop(links);
         let progress = recorder.stop()?;
         let absent = presence.absent();
@@ -152,8 +153,8 @@ impl Record {
             .map(|(role, heard_us)| (role, heard_us.saturating_sub(started_us) as f64 / 1e6))
             .collect();
         self.report(seconds, &progress, &absent, &missing)?;
-        let is_missed = self.until.is_some()
-            && (!missing.is_empty() || roles.iter().any(|role| absent.contains(role)));
+        // With --for nobody watches: the status tells of a board that is not there at the end, whether it ever was or not.
+        let is_missed = self.until.is_some() && presence.lacks(&roles);
         Ok(ExitCode::from(u8::from(is_missed)))
     }
 
@@ -290,6 +291,12 @@ impl Presence {
 
     fn sights(&self) -> [(Role, Sight); 2] {
         [(Role::Sensor, self.sensor), (Role::Display, self.display)]
+    }
+
+    /// Whether one of `roles` is not there, be it that it never came or that it went.
+    fn lacks(&self, roles: &[Role]) -> bool {
+        let mut sights = self.sights().into_iter();
+        sights.any(|(role, sight)| !sight.is_there && roles.contains(&role))
     }
 
     /// The boards that have not been there yet.
@@ -541,5 +548,27 @@ mod tests {
         let gone = vec![(Role::Sensor, 7)];
         assert_eq!(turn(&State::Silent(port)), (display.clone(), gone));
         assert_eq!(turn(&known), (display, vec![]));
+    }
+
+    #[test]
+    fn a_bench_lacks_the_boards_it_names_that_never_came_or_went() {
+        let port = PathBuf::from("/dev/null/s");
+        let known = State::Known(port.clone(), Hello::new(Role::Sensor, "chip", [0, 1, 0]));
+        let mut presence = Presence::default();
+        // Of a bench of the sensor alone, and of one of both boards.
+        let mut lacks = |state: State| {
+            presence.on_event(Role::Sensor, &Event::StateChanged(state));
+            [presence.lacks(&[Role::Sensor]), presence.lacks(&BOARDS)]
+        };
+        assert_eq!(lacks(State::Opened(port.clone())), [true, true]);
+        assert_eq!(lacks(known.clone()), [false, true]);
+        assert_eq!(lacks(State::Silent(port)), [true, true]);
+        assert_eq!(lacks(known), [false, true]);
+        let there = State::Known(
+            "/dev/null/d".into(),
+            Hello::new(Role::Display, "chip", [0, 1, 0]),
+        );
+        presence.on_event(Role::Display, &Event::StateChanged(there));
+        assert!(!presence.lacks(&BOARDS));
     }
 }

@@ -67,14 +67,14 @@ pub fn peer_grown(board: &BoardFacts) -> Option<u32> {
 }
 
 /// Whether a board has taken what the other one says while nothing came over the link between them: a relay told it.
+/// The count of a board that has started anew falls, which tells nothing.
 fn is_relayed(board: &BoardFacts) -> bool {
     let taken = |status: &Status| match &status.role {
         RoleCounters::Sensor(counters) => counters.motions,
         RoleCounters::Display(counters) => counters.estimates,
     };
     let statuses = board.first.as_ref().zip(board.last.as_ref());
-    peer_grown(board) == Some(0)
-        && statuses.is_some_and(|(first, last)| taken(first) != taken(last))
+    peer_grown(board) == Some(0) && statuses.is_some_and(|(first, last)| taken(last) > taken(first))
 }
 
 struct Spoken<'a>(&'a Hello);

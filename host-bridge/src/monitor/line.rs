@@ -16,8 +16,8 @@ use crate::clock::micros;
 use crate::clock::{now_us, unix_ns};
 use crate::state::State;
 
-/// The names of the columns of [`second`], over their values. What is not known, or not of the present any more, is
-/// `-`; the last column may hold spaces.
+/// The names of the columns of [`second`], over their values. What is not known is `-`, as is an estimate or a motion
+/// that is not of the present any more; the last column may hold spaces.
 pub const HEADING: &str = "#    t_s sensor     display    lambda_mm conf valid  range contact    \
                            count_mm  arm_mm_s hand_mm_s age_ms  lost   bad rtt_s_ms rtt_d_ms supervisor";
 
@@ -28,8 +28,7 @@ pub fn second(dashboard: &Dashboard) -> String {
     };
     let mm_s = |um_s: Option<i32>| number(um_s.map(|um_s| um_s as f32 / 1e3), 1);
     let rtt_ms = |board: &Board| {
-        let clocks = board.clocks.filter(|_| !board.is_lost());
-        let rtt_us = clocks.map(|clocks| clocks.round_trip_us);
+        let rtt_us = board.clocks.map(|clocks| clocks.round_trip_us);
         number(rtt_us.map(|us| us as f32 / 1e3), 2)
     };
     let (lost, bad) = troubles(dashboard);
@@ -78,7 +77,8 @@ pub fn log_entry(log_entry: &LogEntry) -> String {
     )
 }
 
-/// The present as one JSON object: of what a board said last, but is not of the present any more, only the age.
+/// The present as one JSON object. Of an estimate or a motion that is not of the present any more only age and rate are
+/// told; this rule is for those two alone.
 pub fn second_json(dashboard: &Dashboard) -> Value {
     let present = dashboard.present_estimate();
     let estimate = dashboard.estimate.as_ref().map(|_| {
@@ -162,7 +162,6 @@ pub fn happening_json(log_entry: &LogEntry) -> Value {
 
 fn board_json(board: &Board, now_us: u64) -> Value {
     let status = board.status.as_ref().map(|(_, status)| status);
-    let clocks = board.clocks.filter(|_| !board.is_lost());
     json!({
         "state": state_word(board),
         "text": board.state.as_ref().map(State::to_string),
@@ -170,8 +169,8 @@ fn board_json(board: &Board, now_us: u64) -> Value {
         "uptime_s": board.uptime_us(now_us).map(seconds),
         "started_by": status.map(|status| status.reset.name()),
         "watchdog_resets": status.map(|status| status.watchdog_resets),
-        "round_trip_ms": clocks.map(|clocks| clocks.round_trip_us as f64 / 1e3),
-        "clock_offset_ms": clocks.map(|clocks| clocks.offset_us as f64 / 1e3),
+        "round_trip_ms": board.clocks.map(|clocks| clocks.round_trip_us as f64 / 1e3),
+        "clock_offset_ms": board.clocks.map(|clocks| clocks.offset_us as f64 / 1e3),
         "counters": status.map(|status| match status.role {
             RoleCounters::Sensor(counters) => json!(counters),
             RoleCounters::Display(counters) => json!(counters),

@@ -117,6 +117,21 @@ fn a_link_that_is_down_is_named_by_who_hears_nothing() {
         });
     });
     assert_eq!(relayed, []);
+    // A count that begins again is no relay's doing.
+    let restarted = spoiled(|bench| {
+        bench.boards.iter_mut().for_each(deaf);
+        let first = bench.boards[0].first.as_mut().unwrap();
+        first.role = RoleCounters::Sensor(SensorCounters {
+            motions: 900,
+            ..SensorCounters::ZERO
+        });
+    });
+    one(
+        &restarted,
+        "peer-link",
+        "the link between the boards is down: neither hears the other",
+        "see the wires between the boards: PD5 and PD6 crossed, a common ground",
+    );
     // One board alone, as at one end of a relay, has nobody to hear.
     let alone = spoiled(|bench| {
         bench.boards.truncate(1);

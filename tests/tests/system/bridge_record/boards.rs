@@ -1,6 +1,6 @@
 //! Boards that are not there, that come later, and that go and return.
 
-use std::fs;
+use std::fs::{self, File};
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -217,40 +217,55 @@ fn a_recording_ends_by_itself_when_it_is_told_to() {
 }
 
 #[test]
-fn an_unattended_recording_names_a_board_that_went_and_did_not_return() {
-    for is_json in [false, true] {
-        let folder = folder(&format!("went-{is_json}"));
+fn a_board_that_went_and_did_not_return_is_named_in_the_summary() {
+    for (number, (words, status)) in [
+        (&["--json"][..], 0),
+        (&[], 0),
+        // With --for the exit status tells of it as well, also if a signal ends it before.
+        (&["--for", "600"], 1),
+        (&["--for", "600", "--json"], 1),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let folder = folder(&format!("went-{number}"));
         // By a name of its own: the number of a port that has gone is another's soon.
         let name = folder.join("ttySensor");
+        let told = folder.join("told");
         let mut pair = Pair::new();
         symlink(pair.sensor.path(), &name).expect("a link can be made");
         let mut command = bridge::command();
-        command.args(["record", "--no-gauges", "--for", "5"]);
-        command.args(is_json.then_some("--json"));
+        command.args(["record", "--no-gauges"]).args(words);
         command.arg(folder.join("went.mcap"));
         command.arg("--sensor").arg(&name);
         command.arg("--display").arg(pair.display.path());
+        command.stderr(File::create(&told).expect("a file can be made"));
         let running = Running::start(&mut command);
-        pair.wait_until_heard();
+        pair.wait_for_questions();
         fs::remove_file(&name).expect("the link can be taken away");
         // Its port goes with it.
         pair.sensor = FakeBoard::saying(Hello::new(Role::Sensor, "unplugged", [0, 0, 0]));
+        let text = || fs::read_to_string(&told).unwrap_or_default();
+        let gone = format!("sensor: {}: not there", name.display());
+        assert!(wait_until(LIMIT, || text().contains(&gone)), "{}", text());
+        signal(&running, "-INT");
         let ended = running.wait(LIMIT);
         assert_eq!(
             ended.status.code(),
-            Some(1),
-            "{}{}",
+            Some(status),
+            "{words:?}: {}{}",
             ended.stdout,
-            ended.stderr
+            text()
         );
-        if is_json {
+        if words.contains(&"--json") {
             let summary: serde_json::Value = serde_json::from_str(&ended.stdout).expect("JSON");
             assert_eq!(summary["absent"], serde_json::json!([]), "{summary}");
             let missing = summary["missing_at_end"].as_array().expect("a list");
             assert_eq!(missing.len(), 1, "{summary}");
             assert_eq!(missing[0]["board"], "sensor", "{summary}");
             let heard_s = missing[0]["last_heard_s"].as_f64().expect("a number");
-            assert!((0.0..5.0).contains(&heard_s), "{summary}");
+            let seconds = summary["seconds"].as_f64().expect("a number");
+            assert!((0.0..seconds).contains(&heard_s), "{summary}");
         } else {
             let named = "; not there at the end: sensor, last heard at ";
             assert!(ended.stdout.contains(named), "{}", ended.stdout);
