@@ -16,6 +16,7 @@ pub use desk::Desk;
 
 mod bringup;
 mod completions;
+mod configure;
 mod desk;
 mod doctor;
 mod export;
@@ -81,6 +82,9 @@ enum Command {
     /// Carries the link between two sites over a network
     #[command(after_long_help = relay::EXAMPLES)]
     Relay(relay::Relay),
+    /// Shows the boards' settings, or changes some of them
+    #[command(long_about = configure::ABOUT, after_long_help = configure::EXAMPLES)]
+    Configure(configure::ConfigureBoards),
     /// Stops the boards, now
     #[command(after_long_help = stop::EXAMPLES)]
     Stop(stop::StopBoards),
@@ -134,14 +138,15 @@ fn links(
     tell: impl FnMut(Role, Event) + Clone + Send + 'static,
 ) -> Vec<(Role, Link)> {
     let open = |role| {
-        let place = bench.seat(role)?.place();
         let mut tell = tell.clone();
-        Some((
-            role,
-            Link::open(role, place, move |event| tell(role, event)),
-        ))
+        Some((role, link(bench, role, move |event| tell(role, event))?))
     };
     bench.roles().into_iter().filter_map(open).collect()
+}
+
+/// The link to the board of `role`, if the bench has a seat for it.
+fn link(bench: &Bench, role: Role, tell: impl FnMut(Event) + Send + 'static) -> Option<Link> {
+    Some(Link::open(role, bench.seat(role)?.place(), tell))
 }
 
 /// A place in a recording, in s after its start.
@@ -255,6 +260,7 @@ impl Arguments {
             Command::Replay(replay) => replay.execute(),
             Command::Export(export) => export.execute(),
             Command::Relay(relay) => relay.execute(),
+            Command::Configure(configure) => configure.execute(),
             Command::Stop(stop) => stop.execute(),
             Command::Doctor(doctor) => Ok(doctor.execute(&mut Desk::own()?)?.into()),
             Command::Bringup(bringup) => Ok(bringup.execute(&mut Desk::own()?)?.into()),

@@ -10,7 +10,7 @@ use protocol::{
 use super::board::Board;
 use super::fingertip::Fingertip;
 use super::log_entry::{LogEntry, LogEvent};
-use super::orders::Outcome;
+use super::orders::{Change, Outcome, taken};
 use super::settings;
 use super::settings::Setting;
 use super::trace::Trace;
@@ -239,7 +239,11 @@ impl Dashboard {
         }
         let now_us = self.now_us;
         self.outcome = None;
-        self.board_mut(role).orders.change(setting, text, now_us);
+        let change = Change {
+            settings: vec![(setting, text.to_owned())],
+            actuators: None,
+        };
+        self.board_mut(role).orders.change(change, now_us);
     }
 
     /// Has the gauges streamed for who watches, or no longer.
@@ -349,7 +353,7 @@ impl Dashboard {
                 if let protocol::Configuration::Display(display) = &configuration {
                     self.fingertip.configure(display);
                 }
-                if let Some(outcome) = self.board_mut(role).orders.on_report(report) {
+                if let Some(outcome) = self.board_mut(role).orders.on_report(at_us, report) {
                     self.conclude(role, outcome);
                 }
             }
@@ -434,10 +438,7 @@ impl Dashboard {
     fn conclude(&mut self, role: Role, outcome: Outcome) {
         let name = role.name();
         let (is_bad, text) = match &outcome {
-            Outcome::Taken {
-                name: setting,
-                value,
-            } => (false, format!("{name}: {setting} is {value} now")),
+            Outcome::Taken(values) => (false, format!("{name}: {}", taken(values))),
             Outcome::Refused(refusal) => (true, format!("{name}: refused: {refusal}")),
             Outcome::Misread(misread) => (true, misread.to_string()),
             Outcome::Unanswered => (

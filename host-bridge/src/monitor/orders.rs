@@ -2,38 +2,114 @@
 //!
 //! A configuration is taken as a whole, and another program may have changed it. So it is read right before it
 //! is changed, and the change names what it replaces: if that is not in force any more, the board refuses, and
-//! the change is made again of what is.
+//! the change is made again of what is. If no answer comes, the same is done again.
 
+use protocol::actuators::{self, ACTUATOR_BLOCK, ACTUATORS, Actuator, Actuators};
 use protocol::{Configuration, ConfigurationReport, Configure, Message, Question, Refusal};
 
-use super::settings::{Misread, Setting};
+use super::settings::{Misread, Setting, check};
 use crate::clock::is_due;
 
-/// A question that was not answered is repeated after so long, in µs.
+/// A question, or a change, that was not answered is repeated after so long, in µs.
 const AGAIN_US: u64 = 300_000;
 /// A change that was not answered is given up after so long, in µs.
 const GIVEN_UP_US: u64 = 2_000_000;
 
-/// A setting that is to be changed.
+/// What is to be changed of a board's configuration, all at once.
+#[derive(Clone, Debug, Default)]
+pub struct Change {
+    /// Settings, each with its new value as it was typed.
+    pub settings: Vec<(&'static Setting, String)>,
+    /// What the display's fingertip carries.
+    pub actuators: Option<Box<[Actuator; ACTUATORS]>>,
+}
+
+impl Change {
+    /// Whether nothing is to be changed.
+    pub const fn is_empty(&self) -> bool {
+        self.settings.is_empty() && self.actuators.is_none()
+    }
+
+    /// `configuration` with the change made. Fails if a text is no value of its setting.
+    fn of(&self, mut configuration: Configuration) -> Result<Configuration, Misread> {
+        for (setting, text) in &self.settings {
+            configuration = setting.changed(configuration, text)?;
+        }
+        if let (Configuration::Display(display), Some(described)) =
+            (&mut configuration, &self.actuators)
+        {
+            display.actuators = actuators::hash(described);
+        }
+        Ok(configuration)
+    }
+
+    /// The description of the actuators, in the parts in which it is sent.
+    fn blocks(&self) -> impl Iterator<Item = Message> {
+        let described = self.actuators.iter().flat_map(|described| {
+            let (blocks, _) = described.as_chunks::<ACTUATOR_BLOCK>();
+            blocks.iter().zip((0..).step_by(ACTUATOR_BLOCK))
+        });
+        described.map(|(block, first)| {
+            Message::Actuators(Actuators {
+                first,
+                actuators: *block,
+            })
+        })
+    }
+
+    /// Each setting that is to be changed, and its value in `configuration`, with its unit.
+    pub fn values(&self, configuration: &Configuration) -> Vec<(&'static str, String)> {
+        let value = |setting: &Setting| setting.value(configuration).unwrap_or_default();
+        let settings = self.settings.iter().map(|(setting, _)| {
+            let text = [value(setting).as_str(), setting.unit].join(" ");
+            (setting.name, text.trim_end().to_owned())
+        });
+        settings.collect()
+    }
+}
+
+/// A change on its way.
 #[derive(Clone, Debug)]
-struct Change {
-    setting: &'static Setting,
-    text: String,
+struct Changing {
+    change: Change,
     since_us: u64,
     /// What was sent, once the configuration in force is known.
-    sent: Option<Configuration>,
+    sent: Option<Sent>,
+    /// The last refusal that was heard, whoever was refused.
+    refused: Option<Refusal>,
+}
+
+/// A change as it was sent.
+#[derive(Clone, Copy, Debug)]
+struct Sent {
+    configuration: Configuration,
+    at_us: u64,
+    /// Whether no answer came, and what is in force was asked for once more.
+    is_overdue: bool,
+}
+
+impl Changing {
+    /// Whether a refusal is of this change. All programs at a port hear the answers to each of them.
+    fn is_own(&self, refusal: &Refusal, sent: &Configuration) -> bool {
+        use protocol::Setting as On;
+        match refusal.setting {
+            On::Role | On::Rendering => true,
+            On::ActuatorsFirst
+            | On::ActuatorX
+            | On::ActuatorY
+            | On::ActuatorGain
+            | On::ActuatorResonance
+            | On::ActuatorDamping => self.change.actuators.is_some(),
+            setting => check(sent).is_err_and(|own| own.setting == setting),
+        }
+    }
 }
 
 /// What a change has come to.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The setting is in force.
-    Taken {
-        /// Its name.
-        name: &'static str,
-        /// Its value, with its unit.
-        value: String,
-    },
+    /// It is in force: each setting that was changed, and its value with its unit.
+    Taken(Vec<(&'static str, String)>),
     /// The board refused it.
     Refused(Refusal),
     /// The text is no value of it.
@@ -42,12 +118,20 @@ pub enum Outcome {
     Unanswered,
 }
 
+/// Settings that are in force, and their values, in words.
+pub fn taken(values: &[(&'static str, String)]) -> String {
+    let values: Vec<_> = (values.iter())
+        .map(|(name, value)| format!("{name} is {value}"))
+        .collect();
+    format!("{} now", values.join(", "))
+}
+
 /// The orders to one board.
 #[derive(Clone, Debug, Default)]
 pub struct Orders {
     /// When the configuration was asked for last, while it is wanted.
     wanted: Option<Option<u64>>,
-    change: Option<Change>,
+    change: Option<Changing>,
     outbox: Vec<Message>,
 }
 
@@ -57,13 +141,13 @@ impl Orders {
         self.wanted.get_or_insert(None);
     }
 
-    /// Changes one setting and keeps all others.
-    pub fn change(&mut self, setting: &'static Setting, text: &str, now_us: u64) {
-        self.change = Some(Change {
-            setting,
-            text: text.to_owned(),
+    /// Makes `change`, and keeps all other settings.
+    pub fn change(&mut self, change: Change, now_us: u64) {
+        self.change = Some(Changing {
+            change,
             since_us: now_us,
             sent: None,
+            refused: None,
         });
         // What is known may be old.
         self.wanted = Some(None);
@@ -75,45 +159,56 @@ impl Orders {
         self.outbox.clear();
     }
 
-    /// The board has answered. What has come of a change, if it was the answer to one.
-    pub fn on_report(&mut self, report: &ConfigurationReport) -> Option<Outcome> {
+    /// The board has answered, at `now_us`. What has come of a change, if it was the answer to one.
+    pub fn on_report(&mut self, now_us: u64, report: &ConfigurationReport) -> Option<Outcome> {
         self.wanted = None;
-        let change = self.change.as_mut()?;
-        match (change.sent, report.refused) {
-            (None, _) => self.make_change(report),
-            // Another program's change came in between.
-            (Some(_), Some(refusal)) if refusal.setting == protocol::Setting::Replaces => {
-                self.make_change(report)
+        let changing = self.change.as_mut()?;
+        let Some(sent) = changing.sent else {
+            return self.make_change(now_us, report);
+        };
+        match report.refused {
+            None if report.configuration == sent.configuration => {
+                let values = changing.change.values(&sent.configuration);
+                self.change = None;
+                Some(Outcome::Taken(values))
             }
-            (Some(_), Some(refusal)) => {
+            // It was not heard.
+            None if sent.is_overdue => self.make_change(now_us, report),
+            // The answer to somebody else.
+            None => None,
+            // Another program's change came in between.
+            Some(refusal) if refusal.setting == protocol::Setting::Replaces => {
+                self.make_change(now_us, report)
+            }
+            // Not all of the description was heard, or another program's came in between.
+            Some(refusal)
+                if refusal.setting == protocol::Setting::Actuators
+                    && changing.change.actuators.is_some() =>
+            {
+                self.make_change(now_us, report)
+            }
+            Some(refusal) if changing.is_own(&refusal, &sent.configuration) => {
                 self.change = None;
                 Some(Outcome::Refused(refusal))
             }
-            (Some(sent), None) if report.configuration == sent => {
-                let setting = change.setting;
-                self.change = None;
-                Some(Outcome::Taken {
-                    name: setting.name,
-                    value: [
-                        setting.value(&sent).unwrap_or_default().as_str(),
-                        setting.unit,
-                    ]
-                    .join(" ")
-                    .trim_end()
-                    .to_owned(),
-                })
+            Some(refusal) => {
+                changing.refused = Some(refusal);
+                None
             }
-            // The answer to somebody else.
-            (Some(_), None) => None,
         }
     }
 
     /// Makes the change of what `report` says is in force.
-    fn make_change(&mut self, report: &ConfigurationReport) -> Option<Outcome> {
-        let change = self.change.as_mut()?;
-        match change.setting.changed(report.configuration, &change.text) {
+    fn make_change(&mut self, now_us: u64, report: &ConfigurationReport) -> Option<Outcome> {
+        let changing = self.change.as_mut()?;
+        match changing.change.of(report.configuration) {
             Ok(configuration) => {
-                change.sent = Some(configuration);
+                changing.sent = Some(Sent {
+                    configuration,
+                    at_us: now_us,
+                    is_overdue: false,
+                });
+                self.outbox.extend(changing.change.blocks());
                 self.outbox.push(Message::Configure(Configure {
                     replaces: Some(report.hash),
                     configuration,
@@ -129,6 +224,14 @@ impl Orders {
 
     /// Repeats what was not answered; what is given up is returned.
     pub fn elapse(&mut self, now_us: u64, is_known: bool) -> Option<Outcome> {
+        if let Some(changing) = &mut self.change
+            && let Some(sent) = &mut changing.sent
+            && is_due(Some(sent.at_us), AGAIN_US, now_us)
+            && !sent.is_overdue
+        {
+            sent.is_overdue = true;
+            self.wanted = Some(None);
+        }
         if let Some(asked_us) = &mut self.wanted
             && is_known
             && is_due(*asked_us, AGAIN_US, now_us)
@@ -136,8 +239,14 @@ impl Orders {
             *asked_us = Some(now_us);
             self.outbox.push(Message::Question(Question::Configuration));
         }
-        let given_up = |change: &mut Change| is_due(Some(change.since_us), GIVEN_UP_US, now_us);
-        self.change.take_if(given_up).map(|_| Outcome::Unanswered)
+        let given_up =
+            |changing: &mut Changing| is_due(Some(changing.since_us), GIVEN_UP_US, now_us);
+        let changing = self.change.take_if(given_up)?;
+        Some(
+            changing
+                .refused
+                .map_or(Outcome::Unanswered, Outcome::Refused),
+        )
     }
 
     /// What is to be said now.

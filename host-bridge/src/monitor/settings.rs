@@ -103,7 +103,8 @@ impl Setting {
     }
 }
 
-fn check(configuration: &Configuration) -> Result<(), Refusal> {
+/// Checks every range, as a board of this protocol does. Fails with the first setting outside of its own.
+pub fn check(configuration: &Configuration) -> Result<(), Refusal> {
     match configuration {
         Configuration::Sensor(sensor) => sensor.check(),
         Configuration::Display(display) => display.check(),

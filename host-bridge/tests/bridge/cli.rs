@@ -50,7 +50,14 @@ fn shells_get_their_completions() {
         let script = text(&output.stdout);
         assert!(script.contains(mark), "{shell}: {script}");
         for command in [
-            "flash", "monitor", "record", "replay", "export", "relay", "doctor",
+            "flash",
+            "monitor",
+            "record",
+            "replay",
+            "export",
+            "relay",
+            "doctor",
+            "configure",
         ] {
             assert!(script.contains(command), "{shell} has no {command}");
         }

@@ -5,11 +5,11 @@ use host_bridge::link::Event;
 use host_bridge::monitor::dashboard::Dashboard;
 use host_bridge::monitor::fingertip::Fingertip;
 use host_bridge::monitor::log_entry::LogEvent;
-use host_bridge::monitor::orders::Outcome;
+use host_bridge::monitor::orders::{Change, Orders, Outcome};
 use host_bridge::monitor::settings::{self, Kind};
 use host_bridge::monitor::trace::{Trace, column_us};
 use host_bridge::state::State;
-use protocol::actuators::{self, grid};
+use protocol::actuators::{self, ACTUATORS, Actuator, DEFAULT_ACTUATORS, grid};
 use protocol::{
     Arm, ArmState, Configuration, ConfigurationReport, Configure, Contact, DisplayConfiguration,
     DisplayState, Estimate, GAUGES, GaugeHealth, Hello, Message, Mode, PortCounters, Question,
@@ -29,13 +29,9 @@ fn connected() -> Dashboard {
     dashboard
 }
 
-/// What a board says of its configuration.
-fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option<Setting>) {
-    let role = match configuration {
-        Configuration::Sensor(_) => Role::Sensor,
-        Configuration::Display(_) => Role::Display,
-    };
-    let message = Message::Configuration(ConfigurationReport {
+/// A board's word on its configuration.
+fn report(configuration: Configuration, refused: Option<Setting>) -> ConfigurationReport {
+    ConfigurationReport {
         refused: refused.map(|setting| Refusal {
             setting,
             index: 0,
@@ -44,7 +40,16 @@ fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option
         }),
         hash: configuration.hash(),
         configuration,
-    });
+    }
+}
+
+/// What a board says of its configuration.
+fn says(dashboard: &mut Dashboard, configuration: Configuration, refused: Option<Setting>) {
+    let role = match configuration {
+        Configuration::Sensor(_) => Role::Sensor,
+        Configuration::Display(_) => Role::Display,
+    };
+    let message = Message::Configuration(report(configuration, refused));
     let at_us = dashboard.now_us;
     dashboard.on(at_us, role, Event::Heard { at_us, message });
 }
@@ -118,11 +123,141 @@ fn a_change_is_made_of_what_is_in_force_and_again_if_another_comes_in_between() 
     says(&mut dashboard, with(120, 5), None);
     assert_eq!(
         dashboard.outcome,
-        Some(Outcome::Taken {
-            name: "waves",
-            value: "5 λ".to_owned()
-        })
+        Some(Outcome::Taken(vec![("waves", "5 λ".to_owned())]))
     );
+}
+
+/// Several settings and a description of the actuators, on their way to a display.
+fn described() -> (Orders, [Actuator; ACTUATORS]) {
+    let named = |name| {
+        let mut all = settings::DISPLAY.iter();
+        all.find(|setting| setting.name == name).expect(name)
+    };
+    let mut actuators = grid(1_200);
+    actuators[31].inverted = true;
+    let mut orders = Orders::default();
+    let change = Change {
+        settings: vec![
+            (named("amplitude_mv"), "1000".to_owned()),
+            (named("mode"), "travelling".to_owned()),
+        ],
+        actuators: Some(Box::new(actuators)),
+    };
+    orders.change(change, 0);
+    orders.elapse(0, true);
+    let asks = [Message::Question(Question::Configuration)];
+    assert_eq!(orders.take(), asks);
+    (orders, actuators)
+}
+
+#[test]
+fn settings_and_a_description_of_the_actuators_are_one_change() {
+    let (mut orders, described) = described();
+    let before = DisplayConfiguration::DEFAULT;
+    let after = DisplayConfiguration {
+        amplitude_mv: 1_000,
+        mode: Mode::Travelling,
+        actuators: actuators::hash(&described),
+        ..before
+    };
+    let own = Configuration::Display(before);
+    assert_eq!(orders.on_report(1, &report(own, None)), None);
+    let said = orders.take();
+    // The display takes them, as they are said, and has then what was described.
+    let mut display =
+        Settings::new(DisplayConfiguration::DEFAULT, &DEFAULT_ACTUATORS).expect("in its ranges");
+    let mut answers = Vec::new();
+    for message in said {
+        match message {
+            Message::Actuators(block) => answers.extend(display.on_actuators(&block)),
+            Message::Configure(configure) => {
+                answers.push(display.on_configure(&configure));
+            }
+            message => panic!("{message:?}"),
+        }
+    }
+    let after = Configuration::Display(after);
+    assert_eq!(answers, [report(after, None)]);
+    assert_eq!(*display.actuators(), described);
+    let taken = vec![
+        ("amplitude_mv", "1000 mV".to_owned()),
+        ("mode", "travelling".to_owned()),
+    ];
+    let outcome = orders.on_report(2, &answers[0]);
+    assert_eq!(outcome, Some(Outcome::Taken(taken)));
+}
+
+/// The same, sent to a display with its own settings at 1 ms, and overdue.
+fn overdue() -> (Orders, Configuration) {
+    let (mut orders, _) = described();
+    let own = Configuration::Display(DisplayConfiguration::DEFAULT);
+    assert_eq!(orders.on_report(1_000, &report(own, None)), None);
+    let sent = match orders.take().last() {
+        Some(Message::Configure(configure)) => configure.configuration,
+        last => panic!("{last:?}"),
+    };
+    assert_eq!(orders.elapse(300_999, true), None);
+    assert_eq!(orders.take(), []);
+    assert_eq!(orders.elapse(301_000, true), None);
+    let asks = [Message::Question(Question::Configuration)];
+    assert_eq!(orders.take(), asks);
+    (orders, sent)
+}
+
+#[test]
+fn a_change_that_was_not_heard_is_made_again() {
+    let (mut orders, sent) = overdue();
+    let own = report(Configuration::Display(DisplayConfiguration::DEFAULT), None);
+    assert_eq!(orders.on_report(302_000, &own), None);
+    let again = orders.take();
+    let last = Message::Configure(Configure {
+        replaces: Some(own.hash),
+        configuration: sent,
+    });
+    assert_eq!((again.len(), again.last()), (6, Some(&last)));
+    let outcome = orders.on_report(303_000, &report(sent, None));
+    assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
+    assert_eq!(orders.elapse(3_000_000, true), None);
+}
+
+#[test]
+fn a_change_whose_answer_was_lost_or_is_late_is_made_once() {
+    let (mut orders, sent) = overdue();
+    let outcome = orders.on_report(302_000, &report(sent, None));
+    assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
+    let (mut orders, _) = overdue();
+    let own = Configuration::Display(DisplayConfiguration::DEFAULT);
+    let late = orders.on_report(302_000, &report(own, Some(Setting::Rendering)));
+    assert!(matches!(late, Some(Outcome::Refused(_))), "{late:?}");
+    assert_eq!(orders.take(), []);
+}
+
+#[test]
+fn a_description_of_which_a_part_was_lost_is_sent_again() {
+    let (mut orders, sent) = overdue();
+    let own = Configuration::Display(DisplayConfiguration::DEFAULT);
+    for at_us in [302_000, 303_000] {
+        let part = report(own, Some(Setting::Actuators));
+        assert_eq!(orders.on_report(at_us, &part), None);
+        assert_eq!(orders.take().len(), 6);
+    }
+    let outcome = orders.on_report(304_000, &report(sent, None));
+    assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
+}
+
+#[test]
+fn what_was_refused_to_another_program_is_not_taken_for_ones_own() {
+    let (mut orders, sent) = overdue();
+    let own = Configuration::Display(DisplayConfiguration::DEFAULT);
+    let another = report(own, Some(Setting::GlideMs));
+    assert_eq!(orders.on_report(302_000, &another), None);
+    let outcome = orders.on_report(303_000, &report(sent, None));
+    assert!(matches!(outcome, Some(Outcome::Taken(_))), "{outcome:?}");
+    // Where nothing else comes it may have been.
+    let (mut orders, _) = overdue();
+    assert_eq!(orders.on_report(302_000, &another), None);
+    let outcome = orders.elapse(2_000_000, true);
+    assert_eq!(outcome, another.refused.map(Outcome::Refused));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod bench;
 mod bridge_bringup;
+mod bridge_configure;
 mod bridge_doctor;
 mod bridge_doctor_boards;
 mod bridge_export;

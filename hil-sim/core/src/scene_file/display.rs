@@ -1,14 +1,16 @@
 //! `[display]` of a scene file, its description of the actuators included.
 
+use std::path::Path;
+
 use protocol::actuators::{
     self, ACTUATORS, Actuator, DAMPING_PERCENT, FURTHEST_UM, HIGHEST_RESONANCE_DHZ,
     LOWEST_RESONANCE_DHZ, UNITY_GAIN,
 };
 use protocol::{DisplayConfiguration, Mode, Rendering, UpdateRate};
 
-use super::series::series;
+use super::read_bytes;
 use super::table::Table;
-use crate::scene::{Display, SceneError};
+use crate::scene::{Display, SceneError, Series};
 
 /// Columns of a description of the actuators, and with their models.
 const HEADERS: [&str; 2] = [
@@ -53,7 +55,9 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
         actuators: defaults.actuators,
     };
     let described = if table.contains("file") {
-        described(&mut table)?
+        let path = table.file(&format!("give a CSV file with the columns {}", HEADERS[0]))?;
+        let bytes = read_bytes(&path).map_err(|error| table.unreadable(&path, &error))?;
+        described(&path, &bytes)?
     } else {
         let pitch_um = table.whole("pitch_um", 100, 4_000)?;
         actuators::grid(pitch_um.map_or(actuators::DEFAULT_PITCH_UM, |um| um as u16))
@@ -75,10 +79,24 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Display, SceneError> {
     Ok(display)
 }
 
-/// The actuators of a CSV file: one row each, in their order.
-fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError> {
+/// The actuators that a CSV file describes, as `file` in `[display]` of a scene names one: one row each, in their order.
+///
+/// # Errors
+/// If the file can't be read, or does not describe all of them.
+pub fn actuators(path: &Path) -> Result<[Actuator; ACTUATORS], SceneError> {
+    let bytes = read_bytes(path).map_err(|error| {
+        let message = format!(
+            "cannot be read: {error}: give a CSV file with the columns {}",
+            HEADERS[0]
+        );
+        SceneError::of(path.display(), "", message)
+    })?;
+    described(path, &bytes)
+}
+
+fn described(path: &Path, bytes: &[u8]) -> Result<[Actuator; ACTUATORS], SceneError> {
     let furthest_um = f64::from(FURTHEST_UM);
-    let rows = series(table, &HEADERS, &|before, row| {
+    let rows = Series::read(path, bytes, &HEADERS, &|before, row| {
         let expected = before.map_or(0.0, |before| before[0] + 1.0);
         let whole = |value: f64| value.fract() == 0.0 && value.abs() <= furthest_um;
         let place = || {
@@ -122,7 +140,7 @@ fn described(table: &mut Table<'_>) -> Result<[Actuator; ACTUATORS], SceneError>
             "describes {} actuators: give all {ACTUATORS}",
             rows.at.len()
         );
-        return Err(table.refuse("file", message));
+        return Err(SceneError::of(path.display(), "", message));
     }
     Ok(std::array::from_fn(|index| {
         let row = &rows.values[index * rows.width..][..rows.width];

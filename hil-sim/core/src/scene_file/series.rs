@@ -3,10 +3,8 @@
 use std::path::Path;
 
 use super::csv_rows::CsvRows;
-use super::read_bytes;
 use super::recorded::EVERYWHERE;
 use super::recorded::tape::{Check, Conversion, Tape, plain, too_few};
-use super::table::Table;
 use crate::scene::{SceneError, Series};
 
 impl Series {
@@ -25,16 +23,4 @@ impl Series {
         }
         Ok(series)
     }
-}
-
-/// The CSV file that `table` names.
-pub(super) fn series(
-    table: &mut Table<'_>,
-    headers: &[&str],
-    check: Check<'_>,
-) -> Result<Series, SceneError> {
-    let give = format!("give a CSV file with the columns {}", headers[0]);
-    let path = table.file(&give)?;
-    let bytes = read_bytes(&path).map_err(|error| table.unreadable(&path, &error))?;
-    Series::read(&path, &bytes, headers, check)
 }

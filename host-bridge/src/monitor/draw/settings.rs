@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
 use crate::monitor::dashboard::Dashboard;
-use crate::monitor::orders::Outcome;
+use crate::monitor::orders::{Outcome, taken};
 use crate::monitor::settings::{self, Kind};
 use crate::monitor::theme::Theme;
 use crate::monitor::view::{Form, View};
@@ -59,7 +59,7 @@ pub fn draw(frame: &mut Frame<'_>, area: Rect, live: &Dashboard, view: &View, fo
         .map(|(setting, configuration)| format!(" {}", setting.wanted(configuration)));
     lines.push(Line::styled(choice.unwrap_or_default(), theme.quiet()));
     let (words, style) = match &live.outcome {
-        Some(Outcome::Taken { name, value }) => (format!("{name} is {value} now"), theme.good()),
+        Some(Outcome::Taken(values)) => (taken(values), theme.good()),
         Some(Outcome::Refused(refusal)) => (format!("refused: {refusal}"), theme.bad()),
         Some(Outcome::Misread(misread)) => (misread.to_string(), theme.bad()),
         Some(Outcome::Unanswered) => ("no answer".to_owned(), theme.bad()),
