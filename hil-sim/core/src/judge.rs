@@ -120,6 +120,10 @@ impl RunObserver for Judge<'_> {
     }
 }
 
+/// Speed above which arm and hand count as in motion, in mm/s: 5, and as much more as a speed worked out of two places
+/// and instants may be off by rounding.
+pub const MOTION_MM_S: f64 = 5.0 * (1.0 + 1e-9);
+
 /// An instant of a recording in s.
 pub fn seconds(at_ns: u64) -> f64 {
     at_ns as f64 / 1e9

@@ -65,7 +65,7 @@ const STANDARD_OUTPUTS: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/
 /// A file for results, opened before there are any: an hour is not to be lost for a folder that is not there.
 ///
 /// What is written goes to a draft beside it, named `FILE.part`, which takes the file's place at the end: until
-/// then an earlier result is there. A signal that ends the program takes the draft away. A device or a pipe is written
+/// then an earlier result is there. SIGINT and SIGTERM take the draft away. A device or a pipe is written
 /// to at once. So is standard output, which takes one result; what else would be printed there goes to standard error.
 pub(super) struct Results<'a> {
     pub path: &'a Path,
@@ -251,7 +251,7 @@ fn drafts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     DRAFTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Has a signal that ends the program take all drafts away before.
+/// Has SIGINT and SIGTERM take all drafts away before they end the program.
 #[cfg(target_os = "linux")]
 fn take_away_at_signals() -> io::Result<()> {
     static ARE_HEARD: Mutex<bool> = Mutex::new(false);

@@ -2,7 +2,8 @@
 
 use protocol::port::QUEUE_BYTES;
 use protocol::{
-    Arm, ArmState, DisplayState, Hello, Message, Peer, Ping, Port, Role, Safety, Stop, StopReason, Stopped, Trip,
+    Arm, ArmState, DisplayState, Hello, Message, Peer, Ping, Port, Role, Safety, Stop, StopReason,
+    Stopped, Trip,
 };
 
 fn port(role: Role) -> Port {

@@ -8,13 +8,10 @@ use serde::Serialize;
 use crate::judge::needed::Rendering;
 use crate::judge::track::interpolate;
 use crate::judge::truth::Truth;
-use crate::judge::{finite, mean, seconds, words};
+use crate::judge::{MOTION_MM_S, finite, mean, seconds, words};
 use crate::run::observer::{RunEvent, RunObserver, replay_to};
 use crate::run::recording::{Arrival, EstimateRecord, Recording, ScanRecord};
 
-/// Speed above which arm and hand count as in motion, in mm/s: 5, and as much more as a speed worked out of two places
-/// and instants may be off by rounding.
-pub const MOTION_MM_S: f64 = 5.0 * (1.0 + 1e-9);
 /// Relative error within which an estimate counts as settled, and above which a valid one is wrong.
 pub const SETTLED: f64 = 0.1;
 /// Relative change of λ from one scan to the next that makes a boundary between specimens.

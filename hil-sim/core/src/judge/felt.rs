@@ -7,7 +7,8 @@
 //!
 //! [`DuePhase`]: crate::judge::phase::DuePhase
 
-use crate::judge::estimates::{MOTION_MM_S, SETTLED};
+use crate::judge::MOTION_MM_S;
+use crate::judge::estimates::SETTLED;
 use crate::run::recording::{OutputRecord, TickRecord, ZERO_VOLT};
 
 /// Relative error of λ within which what is driven is right.

@@ -10,7 +10,7 @@ use protocol::{Message, Role, Texture};
 use serde::Serialize;
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::judge::estimates::MOTION_MM_S;
+use crate::judge::MOTION_MM_S;
 use crate::run::decoder::TimedMessage;
 use crate::run::recording::TickRecord;
 

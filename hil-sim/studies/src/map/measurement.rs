@@ -12,7 +12,7 @@ use hil_sim_core::scene::{Scene, SceneError};
 pub struct Measurement {
     pub rms_percent: Option<f64>,
     pub bias_percent: Option<f64>,
-    /// [`estimates::Summary::valid_share`]; none if v never exceeds [`estimates::MOTION_MM_S`].
+    /// [`estimates::Summary::valid_share`]; none if v never exceeds [`judge::MOTION_MM_S`](hil_sim_core::judge::MOTION_MM_S).
     pub valid_share: Option<f64>,
     /// Estimates made, the first ones included, which have nothing to go by.
     pub estimates: u32,
