@@ -175,8 +175,8 @@ impl Outcome {
         self.until
     }
 
-    /// Takes what the link to the board of `role` tells. Words if a board has stopped: by its own name, for behind a
-    /// port may be the other one.
+    /// Takes what the link to the board of `role` tells. Words if a board has stopped, once until it starts again or is
+    /// told again: by its own name, for behind a port may be the other one.
     pub fn hear(&mut self, role: Role, event: &Event) -> Option<String> {
         match event {
             Event::StateChanged(state) => {
@@ -190,10 +190,18 @@ impl Outcome {
             } => {
                 let state = self.states.iter().find(|(of, _)| *of == role);
                 let who = state.map_or(Some(role), |(_, state)| state.who(role))?;
-                self.stopped.push(who);
-                Some(has_stopped(who, stopped))
+                // A Stop that is repeated is answered as often.
+                let is_new = !self.stopped.contains(&who);
+                is_new.then(|| {
+                    self.stopped.push(who);
+                    has_stopped(who, stopped)
+                })
             }
-            Event::Heard { .. } | Event::Restarted => None,
+            Event::Restarted => {
+                self.stopped.retain(|who| *who != role);
+                None
+            }
+            Event::Heard { .. } => None,
         }
     }
 
@@ -257,6 +265,7 @@ impl Teller {
     /// Takes what the link to the board of `role` tells.
     pub fn on_event(&self, role: Role, event: &Event) {
         if let Event::StateChanged(_)
+        | Event::Restarted
         | Event::Heard {
             message: Message::Stopped(_),
             ..
@@ -296,5 +305,30 @@ fn tell(mut outcome: Outcome, tells: &Receiver<Told>) {
         if let Some(words) = words {
             say(&words);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn that_a_board_has_stopped_is_told_once_however_often_it_answers() {
+        let mut outcome = Outcome::new(vec![Role::Display]);
+        let answer = Event::Heard {
+            at_us: 0,
+            message: Message::Stopped(Stopped::by(Trip::Operator)),
+        };
+        let words = Some("display has stopped: by the operator".to_owned());
+        let mut told = |event| outcome.hear(Role::Display, event);
+        assert_eq!(told(&answer), words);
+        assert_eq!(told(&answer), None);
+        // It goes again.
+        assert_eq!(told(&Event::Restarted), None);
+        assert_eq!(told(&answer), words);
+        assert_eq!(told(&answer), None);
+        outcome.begin();
+        assert_eq!(outcome.hear(Role::Display, &answer), words);
+        assert_eq!(outcome.overdue(), None);
     }
 }
