@@ -32,7 +32,7 @@ impl core::fmt::Display for Refusal {
             ),
             Setting::Actuators => write!(
                 f,
-                "Actuators names neither the description in force nor the one that was sent, {low:#010x}"
+                "actuators names neither the description in force nor the one that was sent, {low:#010x}"
             ),
             Setting::ActuatorsFirst => {
                 write!(
@@ -47,15 +47,20 @@ impl core::fmt::Display for Refusal {
             | Setting::ActuatorDamping => {
                 write!(
                     f,
-                    "{setting:?} of actuator {index} is out of range: give {low} to {high}"
+                    "{} of actuator {index} is out of range: give {low} to {high}",
+                    setting.name()
                 )
             }
             Setting::Rendering => write!(
                 f,
-                "Rendering is too much with these actuators: more than the fundamental, or a resonance, is worked out \
+                "rendering is too much with these actuators: more than the fundamental, or a resonance, is worked out \
                  for at most {high} of them with different places, phases or resonances"
             ),
-            _ => write!(f, "{setting:?} is out of range: give {low} to {high}"),
+            _ => write!(
+                f,
+                "{} is out of range: give {low} to {high}",
+                setting.name()
+            ),
         }
     }
 }
@@ -118,6 +123,40 @@ pub enum Setting {
     Rendering,
 }
 
+impl Setting {
+    /// Its name on the wire: a field's.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Role => "role",
+            Self::WindowMs => "window_ms",
+            Self::CountedGauge => "counted_gauge",
+            Self::Gauges => "gauges",
+            Self::Waves => "waves",
+            Self::ValidPercent => "valid_percent",
+            Self::ForceScale => "force_mn_per_v",
+            Self::Stiffness => "stiffness_n_per_m",
+            Self::ArmFullScale => "arm_full_scale_um_s",
+            Self::MaxAgeMs => "max_age_ms",
+            Self::FadeInMs => "fade_in_ms",
+            Self::FadeOutMs => "fade_out_ms",
+            Self::GlideMs => "glide_ms",
+            Self::AmplitudeMv => "amplitude_mv",
+            Self::ReferenceLsb => "reference_lsb",
+            Self::ReferenceMn => "reference_mn",
+            Self::FullDriveS => "full_drive_s",
+            Self::Actuators => "actuators",
+            Self::ActuatorsFirst => "first",
+            Self::ActuatorX => "x_um",
+            Self::ActuatorY => "y_um",
+            Self::ActuatorGain => "gain_q15",
+            Self::ActuatorResonance => "resonance_dhz",
+            Self::ActuatorDamping => "damping_percent",
+            Self::Replaces => "replaces",
+            Self::Rendering => "rendering",
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use core::fmt::Write;
@@ -146,7 +185,7 @@ mod tests {
             ),
             (
                 Setting::Actuators,
-                "Actuators names neither the description in force nor the one that was sent, 0x00000003",
+                "actuators names neither the description in force nor the one that was sent, 0x00000003",
             ),
             (
                 Setting::ActuatorsFirst,
@@ -154,9 +193,9 @@ mod tests {
             ),
             (
                 Setting::ActuatorGain,
-                "ActuatorGain of actuator 20 is out of range: give 3 to 50",
+                "gain_q15 of actuator 20 is out of range: give 3 to 50",
             ),
-            (Setting::WindowMs, "WindowMs is out of range: give 3 to 50"),
+            (Setting::WindowMs, "window_ms is out of range: give 3 to 50"),
         ] {
             assert_eq!(words(setting), said);
         }

@@ -210,6 +210,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_refusal_names_a_setting_as_it_is_typed() {
+        let mut refused = 0;
+        for configuration in [
+            Configuration::Sensor(SensorConfiguration::DEFAULT),
+            Configuration::Display(DisplayConfiguration::DEFAULT),
+        ] {
+            for setting in of(role_of(&configuration)) {
+                for beyond in ["4294967295", "65535", "255"] {
+                    let set = setting.set(configuration, beyond);
+                    if let Some(Err(refusal)) = set.map(|set| check(&set)) {
+                        assert_eq!(refusal.setting.name(), setting.name);
+                        refused += 1;
+                    }
+                }
+            }
+        }
+        assert!(refused >= 15, "{refused}");
+    }
+
+    #[test]
     fn every_setting_is_a_field_on_the_wire_and_every_variant_of_it_has_a_word() {
         for (shape, settings) in [
             (SensorConfiguration::SCHEMA, &SENSOR[..]),

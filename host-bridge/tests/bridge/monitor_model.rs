@@ -275,7 +275,7 @@ fn a_refusal_is_shown_by_name_and_range() {
     assert!(notice.is_bad);
     assert_eq!(
         notice.text,
-        "display: refused: AmplitudeMv is out of range: give 1 to 2"
+        "display: refused: amplitude_mv is out of range: give 1 to 2"
     );
 }
 

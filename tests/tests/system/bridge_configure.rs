@@ -121,11 +121,11 @@ fn settings_and_actuators_come_into_force_on_the_firmware_and_are_read_back() {
     for (words, why) in [
         (
             &["amplitude_mv=6000", "max_age_ms=100"][..],
-            "display: refused: AmplitudeMv is out of range: give 0 to 5000",
+            "display: refused: amplitude_mv is out of range: give 0 to 5000",
         ),
         (
             &["rendering=texture", "--actuators", far],
-            "display: refused: Rendering is too much with these actuators",
+            "display: refused: rendering is too much with these actuators",
         ),
     ] {
         let refused = on(&alone, words);

@@ -673,7 +673,7 @@ fn the_form_changes_a_setting_and_shows_a_refusal() {
     terminal.type_keys("jjj");
     terminal.types_until(LIMIT, "77\r", "max_age_ms is 77 ms now");
     assert_eq!(running.bench().displaying.max_age_ms, 77);
-    terminal.types_until(LIMIT, "7\r", "MaxAgeMs is out of range: give 20 to 5000");
+    terminal.types_until(LIMIT, "7\r", "max_age_ms is out of range: give 20 to 5000");
     assert_eq!(running.bench().displaying.max_age_ms, 77);
     terminal.type_keys("qq");
     assert!(ended(&mut child).success());

@@ -261,7 +261,7 @@ fn the_form_is_there_to_its_last_word() {
             "│ spectrum or counting or counting-adapted or crossings ",
             "│ arm_full_scale_um_s ",
             " µm/s ",
-            "refused: Actuators names neither the description in force nor the one",
+            "refused: actuators names neither the description in force nor the one",
             "0x00000001",
             " ↑↓ setting  0-9 ←→ value  Enter send  Tab other board  Esc close ─",
         ] {

@@ -96,7 +96,7 @@ fn what_the_board_refuses_ends_the_run_with_the_settings_name() {
         ),
         "{error:?}"
     );
-    let wanted = "Waves is out of range: give 2 to 8";
+    let wanted = "waves is out of range: give 2 to 8";
     assert!(error.to_string().contains(wanted), "{error}");
 }
 
@@ -160,15 +160,15 @@ fn the_display_board_refuses_what_is_out_of_range_by_name_and_range() {
     let cases: [(Change, &str); 3] = [
         (
             |display| display.configuration.amplitude_mv = 5_001,
-            "AmplitudeMv is out of range: give 0 to 5000",
+            "amplitude_mv is out of range: give 0 to 5000",
         ),
         (
             |display| display.actuators[37].gain_q15 = 32_769,
-            "ActuatorGain of actuator 37 is out of range: give 0 to 32768",
+            "gain_q15 of actuator 37 is out of range: give 0 to 32768",
         ),
         (
             |display| display.actuators[3].x_um = -20_001,
-            "ActuatorX of actuator 3 is out of range: give -20000 to 20000",
+            "x_um of actuator 3 is out of range: give -20000 to 20000",
         ),
     ];
     for (change, wanted) in cases {
